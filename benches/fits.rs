@@ -3,7 +3,7 @@
 mod common;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use kmcfit::config::{ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit_core::internals::study::multistart::multistart;
 use std::hint::black_box;
 use std::path::Path;
@@ -66,12 +66,12 @@ fn fits(criterion: &mut Criterion) {
 }
 
 /// What the program does before a fit.
-fn reading(criterion: &mut Criterion) {
+fn sample(criterion: &mut Criterion) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/knots.yaml");
     criterion.bench_function("read and build a model", |b| {
         b.iter(|| {
             let file = ModelFile::read(black_box(&path)).expect("a model");
-            build(&file, Purpose::Fit).expect("a model")
+            build(&file, BuildMode::Fit).expect("a model")
         });
     });
 }
@@ -88,5 +88,5 @@ fn start_up(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, fits, reading, start_up);
+criterion_group!(benches, fits, sample, start_up);
 criterion_main!(benches);

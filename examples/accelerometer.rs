@@ -17,12 +17,12 @@ pub fn found() -> Result<[[f64; 2]; 3], Box<dyn Error>> {
         .interpolation(Interpolation::Cubic)
         .acceleration(times, table.column("a_m_per_s2")?)
         .sigma(0.02);
-    let device = [
+    let nodal = [
         CoefficientSpec::constant(3.0),
         CoefficientSpec::constant(0.0),
         CoefficientSpec::constant(200.0),
     ];
-    let problem = Builder::new(device).record(record).nodes(4801).build()?;
+    let problem = Builder::new(nodal).record(record).nodes(4801).build()?;
     let fit = problem.fit()?;
     println!("{}: {}", fit.outcome.status.name(), fit.outcome.reason);
 

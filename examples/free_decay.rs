@@ -9,20 +9,20 @@ pub fn found() -> Result<[f64; 2], Box<dyn Error>> {
     let times: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 1e-3).collect();
     let omega = 2499.0f64.sqrt();
     let decay = |t: &f64| 0.01 * (-t).exp() * ((omega * t).cos() + (omega * t).sin() / omega);
-    let motion: Vec<f64> = times.iter().map(decay).collect();
+    let response: Vec<f64> = times.iter().map(decay).collect();
 
-    let device = [
+    let nodal = [
         CoefficientSpec::fixed(1.0),
         CoefficientSpec::constant(1.0).min(0.0),
         CoefficientSpec::constant(2000.0).min(0.0),
     ];
     let record = Record::new("ring-down")
         .from_state(0.01, 0.0)
-        .displacement(&times, &motion);
-    let fit = Builder::new(device).record(record).build()?.fit()?;
+        .displacement(&times, &response);
+    let fit = Builder::new(nodal).record(record).build()?.fit()?;
 
     println!("{}: {}", fit.outcome.status.name(), fit.outcome.reason);
-    Ok([0, 1].map(|j| fit.best.evaluation.device.coefficients[j][0]))
+    Ok([0, 1].map(|j| fit.best.evaluation.nodal.coefficients[j][0]))
 }
 
 pub fn main() -> Result<(), Box<dyn Error>> {

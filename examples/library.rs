@@ -1,17 +1,17 @@
-// A fit from Rust: the model file becomes a problem, the problem a device.
+// A fit from Rust: a model file is built into a problem and fitted.
 
-use kmcfit::config::{ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit_core::fit;
 use std::error::Error;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let file = ModelFile::read("models/paper-lbfgs.yaml")?;
-    let model = build(&file, Purpose::Fit)?;
+    let model = build(&file, BuildMode::Fit)?;
     let start = model.problem.functions.start();
     let found = fit(&model.problem, &start, &model.settings, &mut |_| {})
-        .map_err(|breakdown| breakdown.to_string())?;
-    let (device, motion) = (
-        &found.best.evaluation.device,
+        .map_err(|error| error.to_string())?;
+    let (nodal, response) = (
+        &found.best.evaluation.nodal,
         &found.best.evaluation.trajectories[0],
     );
     println!(
@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     );
     println!(
         "m(0) = {:.3} kg, y(25) = {:.3} m",
-        device.mass[0], motion.displacement[1999]
+        nodal.mass[0], response.displacement[1999]
     );
     Ok(())
 }

@@ -1,19 +1,19 @@
-// Results load back: what `kmcfit fit models/linear-mass.yaml` wrote, and the motion from another start.
+// Results load back: what `kmcfit fit models/linear-mass.yaml` wrote, and the response from another start.
 
 use kmcfit::Run;
 use kmcfit_core::State;
 use std::error::Error;
 use std::path::Path;
 
-/// The ratio J/J0, and the largest displacement (m) of the found device when it is let go at 1 m.
+/// The ratio J/J0, and the largest displacement (m) of the found system when it is let go at 1 m.
 pub fn found(folder: &Path) -> Result<[f64; 2], Box<dyn Error>> {
     let run = Run::open(folder)?;
     let let_go = State {
         displacement: 1.0,
         velocity: 0.0,
     };
-    let motion = run.system.forward(&run.device, let_go, None)?;
-    let most = motion
+    let response = run.system.forward(&run.device, let_go, None)?;
+    let most = response
         .displacement
         .iter()
         .fold(0.0, |most: f64, y| most.max(y.abs()));

@@ -1,5 +1,5 @@
-//! Makes the files of `data/` that `kmcfit simulate` does not make: the device behind the paper's
-//! data, and the motion of a linearly decaying mass from its closed form.
+//! Makes the files of `data/` that `kmcfit simulate` does not make: the system behind the paper's
+//! data, and the response of a linearly decaying mass from its closed form.
 //!
 //! `cargo run --example make_data -- data`
 
@@ -26,7 +26,7 @@ pub fn paper_truth() -> CsvTable {
         .column("stiffness_N_per_m", vec![1.0; NODES])
 }
 
-/// The motion for m = 1 - a t, c = 0, k = 1 from y(0) = 3.3, v(0) = 1: with x = 1 - a t and
+/// The response for m = 1 - a t, c = 0, k = 1 from y(0) = 3.3, v(0) = 1: with x = 1 - a t and
 /// z = 2 sqrt(x)/a, y = sqrt(x) [A J1(z) + B Y1(z)].
 pub fn bessel() -> CsvTable {
     const A: f64 = -43.2406529071;

@@ -1,4 +1,4 @@
-//! Makes the records of `data/` that stand for measurements: devices of known values, simulated on a
+//! Makes the records of `data/` that stand for measurements: systems of known values, simulated on a
 //! fine grid, read by sensors with noise, and written as instruments write.
 //!
 //! `cargo run --example make_records -- data`
@@ -18,13 +18,13 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 const GRAVITY: f64 = 9.80665;
-/// Steps of the simulation between two readings.
+/// Steps of the simulation between two samples.
 const FINE: usize = 16;
 
 /// A function of time.
 type Function<'a> = &'a dyn Fn(f64) -> f64;
 
-/// A device, what drives it, and how long it is watched.
+/// A system, what drives it, and how long it is watched.
 struct Run<'a> {
     mass: f64,
     terms: Vec<(Term, Function<'a>)>,
@@ -32,7 +32,7 @@ struct Run<'a> {
     /// Acceleration of the base, m/s^2.
     base: Option<Function<'a>>,
     initial: State,
-    /// Readings per s, and their number.
+    /// Samples per s, and their number.
     rate: f64,
     count: usize,
 }
@@ -42,12 +42,12 @@ impl Run<'_> {
         i as f64 / self.rate
     }
 
-    /// Displacement and acceleration at the times of the readings.
-    fn motion(&self) -> (Vec<f64>, Vec<f64>) {
+    /// Displacement and acceleration at the times of the samples.
+    fn response(&self) -> (Vec<f64>, Vec<f64>) {
         let nodes = FINE * (self.count - 1) + 1;
         let grid = Grid::new(0.0, self.time(self.count - 1), nodes).expect("a grid");
         let at_nodes = |f: Function| grid.times().iter().map(|t| f(*t)).collect();
-        let device = NodalCoefficients {
+        let nodal = NodalCoefficients {
             mass: vec![self.mass; nodes],
             coefficients: self.terms.iter().map(|(_, p)| at_nodes(*p)).collect(),
         };
@@ -67,11 +67,11 @@ impl Run<'_> {
             force: self.force.map(steps),
             base: self.base.map(steps),
         };
-        let motion: Trajectory = system
-            .forward(&device, self.initial, Some(&excitation))
+        let response: Trajectory = system
+            .forward(&nodal, self.initial, Some(&excitation))
             .expect("a motion");
-        let readings = 0..self.count;
-        let acceleration = readings.clone().map(|i| {
+        let samples = 0..self.count;
+        let acceleration = samples.clone().map(|i| {
             let around = InputSample {
                 force: self.force.map_or(0.0, |f| f(self.time(i))),
                 base: self.base.map_or(0.0, |b| b(self.time(i))),
@@ -79,11 +79,11 @@ impl Run<'_> {
             let place = TimePoint::node(FINE * i, nodes);
             let kind = ChannelKind::Acceleration;
             let excitation = Some(&excitation);
-            reference::observe(&system, kind, &device, excitation, &motion, place, around).value
+            reference::observe(&system, kind, &nodal, excitation, &response, place, around).value
         });
         let acceleration = acceleration.collect();
         (
-            readings.map(|i| motion.displacement[FINE * i]).collect(),
+            samples.map(|i| response.displacement[FINE * i]).collect(),
             acceleration,
         )
     }
@@ -116,7 +116,7 @@ fn linear<'a>(c: Function<'a>, k: Function<'a>) -> Vec<(Term, Function<'a>)> {
 
 /// A ring-down of 2 kg on a spring that softens from 3000 to 2700 N/m, c = 1.2 N s/m, read in g at
 /// 400 Hz by an accelerometer with an offset of 0.05 g and noise of 0.01 g, as a data logger writes
-/// it: preamble, semicolons, decimal commas, a row of units, Windows line ends, lost readings.
+/// it: preamble, semicolons, decimal commas, a row of units, Windows line ends, lost samples.
 pub fn accelerometer() -> String {
     let run = Run {
         mass: 2.0,
@@ -127,18 +127,18 @@ pub fn accelerometer() -> String {
         rate: 400.0,
         count: 1201,
     };
-    let (_, acceleration) = run.motion();
+    let (_, acceleration) = run.response();
     let mut noise = Noise::new(11);
     let mut text = String::from(
         "Data logger DL-4\r\nChannel 1: accelerometer\r\nSample rate: 400 Hz\r\n\r\nTime;Acc 1\r\ns;g\r\n",
     );
     for (i, a) in acceleration.iter().enumerate() {
-        let reading = a / GRAVITY + 0.05 + noise.next(0.01);
+        let sample = a / GRAVITY + 0.05 + noise.next(0.01);
         let lost = i % 397 == 300;
         let field = if lost {
             String::new()
         } else {
-            format!("{reading:.4}")
+            format!("{sample:.4}")
         };
         let line = format!("{:.4};{field}\r\n", run.time(i));
         text += &line.replace('.', ",");
@@ -146,7 +146,7 @@ pub fn accelerometer() -> String {
     text
 }
 
-/// The device of the hammer tests and the shaker run: 1.2 kg, 0.9 N s/m, 480 N/m.
+/// The system of the hammer tests and the shaker run: 1.2 kg, 0.9 N s/m, 480 N/m.
 const TESTED: [f64; 3] = [1.2, 0.9, 480.0];
 
 /// A hammer test: displacement in mm after a blow, noise of 0.02 mm.
@@ -161,17 +161,17 @@ pub fn hammer(number: u64) -> String {
         rate: 100.0,
         count: 301,
     };
-    let (y, _) = run.motion();
+    let (y, _) = run.response();
     let mut noise = Noise::new(20 + number);
     let mut text = String::from("t_s,y [mm]\n");
     for (i, y) in y.iter().enumerate() {
-        let reading = 1e3 * y + noise.next(0.02);
-        let _ = writeln!(text, "{:.2},{reading:.4}", run.time(i));
+        let sample = 1e3 * y + noise.next(0.02);
+        let _ = writeln!(text, "{:.2},{sample:.4}", run.time(i));
     }
     text
 }
 
-/// The shaker run of the same device: force in N (a sweep from 1 to 6 Hz) and acceleration in m/s^2 with
+/// The shaker run of the same system: force in N (a sweep from 1 to 6 Hz) and acceleration in m/s^2 with
 /// noise of 0.02.
 pub fn shaker() -> String {
     let sweep = |t: f64| 1.5 * libm::sin(TAU * (t + 5.0 / 16.0 * t * t));
@@ -184,13 +184,13 @@ pub fn shaker() -> String {
         rate: 200.0,
         count: 1601,
     };
-    let (_, acceleration) = run.motion();
+    let (_, acceleration) = run.response();
     let mut noise = Noise::new(30);
     let mut text = String::from("t_s,f_N,a_m_per_s2\n");
     for (i, a) in acceleration.iter().enumerate() {
         let t = run.time(i);
-        let reading = a + noise.next(0.02);
-        let _ = writeln!(text, "{t:.3},{:.6},{reading:.5}", sweep(t));
+        let sample = a + noise.next(0.02);
+        let _ = writeln!(text, "{t:.3},{:.6},{sample:.5}", sweep(t));
     }
     text
 }
@@ -236,13 +236,13 @@ pub fn friction() -> String {
 }
 
 fn with_force(run: &Run, force: Function, sigma: f64, seed: u64) -> String {
-    let (y, _) = run.motion();
+    let (y, _) = run.response();
     let mut noise = Noise::new(seed);
     let mut text = String::from("t_s,f_N,y_m\n");
     for (i, y) in y.iter().enumerate() {
         let t = run.time(i);
-        let reading = y + noise.next(sigma);
-        let _ = writeln!(text, "{t:.3},{:.6},{reading:.6}", force(t));
+        let sample = y + noise.next(sigma);
+        let _ = writeln!(text, "{t:.3},{:.6},{sample:.6}", force(t));
     }
     text
 }
@@ -262,12 +262,12 @@ pub fn roll() -> String {
         rate: 20.0,
         count: 1001,
     };
-    let (y, _) = run.motion();
+    let (y, _) = run.response();
     let mut noise = Noise::new(60);
     let mut text = String::from("t_s\troll [deg]\n");
     for (i, y) in y.iter().enumerate() {
-        let reading = y.to_degrees() + noise.next(0.02);
-        let _ = writeln!(text, "{:.2}\t{reading:.3}", run.time(i));
+        let sample = y.to_degrees() + noise.next(0.02);
+        let _ = writeln!(text, "{:.2}\t{sample:.3}", run.time(i));
     }
     text
 }
@@ -302,13 +302,13 @@ pub fn moving_support() -> String {
         rate: 400.0,
         count: 2401,
     };
-    let (_, acceleration) = run.motion();
+    let (_, acceleration) = run.response();
     let mut text = String::from("t_s,a_m_per_s2,true_f_Hz\n");
     for (i, a) in acceleration.iter().enumerate() {
         let t = run.time(i);
         let frequency = stiffness(t).sqrt() / TAU;
-        let reading = a + random.next(0.2);
-        let _ = writeln!(text, "{t:.4},{reading:.4},{frequency:.5}");
+        let sample = a + random.next(0.2);
+        let _ = writeln!(text, "{t:.4},{sample:.4},{frequency:.5}");
     }
     text
 }
@@ -330,7 +330,7 @@ pub fn table() -> String {
         rate: 200.0,
         count: 1001,
     };
-    let (_, acceleration) = run.motion();
+    let (_, acceleration) = run.response();
     let mut noise = Noise::new(80);
     let mut text = String::from("t_s,table (g),mass (g)\n");
     for (i, a) in acceleration.iter().enumerate() {
@@ -341,8 +341,8 @@ pub fn table() -> String {
     text
 }
 
-/// A free decay (1 kg, 0.2 N s/m, 25 N/m) photographed at irregular times: a gap, missing readings, one
-/// reading in twenty far off, a sensor that drifts by 2 mm/s; in m with noise of 2 mm.
+/// A free decay (1 kg, 0.2 N s/m, 25 N/m) photographed at irregular times: a gap, missing samples, one
+/// sample in twenty far off, a sensor that drifts by 2 mm/s; in m with noise of 2 mm.
 pub fn camera() -> String {
     let run = Run {
         mass: 1.0,
@@ -353,7 +353,7 @@ pub fn camera() -> String {
         rate: 1000.0,
         count: 15001,
     };
-    let (y, _) = run.motion();
+    let (y, _) = run.response();
     let mut random = Noise::new(90);
     let mut text = String::from("t_s,y_m\n");
     let mut i = 0usize;
@@ -362,7 +362,7 @@ pub fn camera() -> String {
         let good = y[i] + 0.002 * t + random.next(0.002);
         let far = random.next(1.0);
         let blind = random.next(1.0);
-        let reading = if far.abs() > 1.96 {
+        let sample = if far.abs() > 1.96 {
             good + 0.1 * far
         } else {
             good
@@ -370,7 +370,7 @@ pub fn camera() -> String {
         if !(6.0..7.5).contains(&t) {
             match blind.abs() > 2.0 {
                 true => _ = writeln!(text, "{t:.3},"),
-                false => _ = writeln!(text, "{t:.3},{reading:.5}"),
+                false => _ = writeln!(text, "{t:.3},{sample:.5}"),
             }
         }
         // From 15 to some 50 ms to the next picture.

@@ -1,10 +1,10 @@
-// The paper's record: what turns an optimum that matches the data into the device that made them.
+// The paper's record: what turns an optimum that matches the data into the system that made them.
 
 use kmcfit::observations::Table;
 use kmcfit_core::CoefficientKind;
 use kmcfit_core::Method;
 use kmcfit_core::{Builder, CoefficientSpec, Record};
-use kmcfit_core::{Shape, Statement};
+use kmcfit_core::{Constraint, Shape};
 use std::error::Error;
 
 /// The largest error of the mass (kg), whose truth is a line from 1 to 0.5.
@@ -13,17 +13,17 @@ pub fn found() -> Result<f64, Box<dyn Error>> {
     let record = Record::new("free decay")
         .from_state(3.3, 1.0)
         .displacement(table.column("t_s")?, table.column("y_m")?);
-    let device = [
+    let nodal = [
         // Positive, and bent as little as the record lets it be.
         CoefficientSpec::nodal(2.0).min(0.05).tikhonov(2, 1e-3),
         CoefficientSpec::nodal(1.0).min(0.0).tikhonov(2, 1e-3),
-        // Free motion shows ratios alone: one function must be known.
+        // Free response shows ratios alone: one function must be known.
         CoefficientSpec::fixed(1.0),
     ];
-    let problem = Builder::new(device)
+    let problem = Builder::new(nodal)
         .record(record)
         .method(Method::Midpoint)
-        .constrain(Statement::Shape {
+        .constrain(Constraint::Shape {
             of: CoefficientKind::Mass,
             shape: Shape::NonIncreasing,
         })
@@ -31,7 +31,7 @@ pub fn found() -> Result<f64, Box<dyn Error>> {
     let fit = problem.fit()?;
     println!("{}: {}", fit.outcome.status.name(), fit.outcome.reason);
 
-    let mass = &fit.best.evaluation.device.mass;
+    let mass = &fit.best.evaluation.nodal.mass;
     let count = mass.len() as f64;
     let truth = (1..=mass.len()).map(|i| 1.0 - 0.5 * i as f64 / count);
     let errors = mass.iter().zip(truth).map(|(m, truth)| (m - truth).abs());

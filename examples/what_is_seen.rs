@@ -1,6 +1,6 @@
 // Before measuring: what can a record show? One free decay, and the same with a shaker run.
 
-use kmcfit_core::internals::identifiability::{Symmetry, count};
+use kmcfit_core::internals::identifiability::{Symmetry, structural_rank};
 use kmcfit_core::{Builder, CoefficientSpec, Record};
 use kmcfit_core::{Excitation, Grid, Method, NodalCoefficients, State, System, Term};
 use std::error::Error;
@@ -8,7 +8,7 @@ use std::error::Error;
 /// For one free record and for the pair: directions seen at most, and whether a factor of all functions
 /// stays free.
 pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
-    // Any motion will do: what can be counted depends on the records, not on what they read.
+    // Any response will do: what can be counted depends on the records, not on what they read.
     let grid = Grid::new(0.0, 20.0, 401).ok_or("a grid")?;
     let system = System {
         grid,
@@ -16,7 +16,7 @@ pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
         terms: vec![Term::Damping, Term::Stiffness],
     };
     let nodes = grid.nodes();
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.1; nodes], vec![4.0; nodes]],
     };
@@ -27,8 +27,8 @@ pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
         displacement: 1.0,
         velocity: 0.0,
     };
-    let decay = system.forward(&device, plucked, None)?;
-    let shaken = system.forward(&device, State::default(), Some(&excitation))?;
+    let decay = system.forward(&nodal, plucked, None)?;
+    let shaken = system.forward(&nodal, State::default(), Some(&excitation))?;
 
     let free = Record::new("free decay")
         .from_state(1.0, 0.0)
@@ -41,8 +41,8 @@ pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
     let alone = Builder::new(parts()).record(free.clone()).build()?;
     let pair = Builder::new(parts()).record(free).record(forced).build()?;
     Ok([alone, pair].map(|problem| {
-        let seen = count(&problem);
-        (seen.seen_at_most, seen.symmetry != Symmetry::None)
+        let seen = structural_rank(&problem);
+        (seen.rank_bound, seen.symmetry != Symmetry::None)
     }))
 }
 

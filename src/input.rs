@@ -38,7 +38,7 @@ pub const LONGEST_LINE: usize = 1 << 20;
 ///
 /// # Errors
 ///
-/// When there is no such file, it is a folder, it cannot be read, it is longer than `limit`, or it
+/// When no such file, it is a folder, it cannot be read, it is longer than `limit`, or it
 /// is not UTF-8 text.
 pub fn read_text(path: &Path, what: &str, limit: u64) -> Result<String, InputError> {
     let bytes = read_bytes(path, what, limit)?;
@@ -69,7 +69,7 @@ pub fn read_text_within(
 ///
 /// # Errors
 ///
-/// When there is no such file, it is a folder, a device or somebody else's pipe, it cannot be read, it
+/// When no such file, it is a folder, a device or somebody else's pipe, it cannot be read, it
 /// is longer than `limit`, or does not fit into memory.
 pub fn read_bytes(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>, InputError> {
     let (file, length) = open(path, what)?;
@@ -89,7 +89,7 @@ pub fn read_bytes(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>, InputE
 ///
 /// # Errors
 ///
-/// When there is no such file, it is a folder, a device or somebody else's pipe, or cannot be opened.
+/// When no such file, it is a folder, a device or somebody else's pipe, or cannot be opened.
 pub fn open(path: &Path, what: &str) -> Result<(File, u64), InputError> {
     let metadata = fs::metadata(path).map_err(|error| unreadable(path, what, &error))?;
     if let Some(other) = no_file(path, &metadata) {
@@ -100,7 +100,7 @@ pub fn open(path: &Path, what: &str) -> Result<(File, u64), InputError> {
 }
 
 /// What stands at a path in the place of a file. A device may never end, and a pipe never begin; but the
-/// program's own (`/dev/stdin`) was begun by whoever started it.
+/// program's own (`/dev/stdin`) belongs to the process that started it.
 fn no_file(path: &Path, metadata: &Metadata) -> Option<&'static str> {
     let is_own = ["/dev", "/proc"].iter().any(|own| path.starts_with(own));
     match () {
@@ -266,7 +266,7 @@ fn unreadable(path: &Path, what: &str, error: &std::io::Error) -> InputError {
     if error.kind() != ErrorKind::NotFound {
         return InputError::file(path, format!("the file cannot be read: {error}")).expected(what);
     }
-    InputError::file(path, "there is no such file")
+    InputError::file(path, "no such file")
         .expected(what)
         .hint_if(neighbour(path))
 }

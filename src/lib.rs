@@ -26,6 +26,7 @@ pub mod error;
 mod escape;
 mod excerpt;
 mod faults;
+pub mod finding;
 pub mod guide;
 mod input;
 mod memory;

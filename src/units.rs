@@ -2,7 +2,7 @@
 //!
 //! A device may turn instead of move: then displacements are angles in rad, forces are torques in
 //! N m, and mass, damping and stiffness are a moment of inertia and so on. Volts stand for readings
-//! that nobody calibrated: they count as they are.
+//! without calibration: they count as they are.
 
 use crate::error::InputError;
 use crate::input::{one_of, quote};

@@ -2,7 +2,7 @@
 //! cannot mean.
 
 use insta::assert_snapshot;
-use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit_core::internals::functions::{Basis, Parameterization};
 use std::path::PathBuf;
 
@@ -28,7 +28,7 @@ functions:
         error.to_string().replace(&shown, "")
     };
     let file = ModelFile::parse(&path, text).map_err(said)?;
-    build(&file, Purpose::Simulate { nodes: None }).map_err(said)
+    build(&file, BuildMode::Simulate { nodes: None }).map_err(said)
 }
 
 fn message(mass: &str) -> String {
@@ -48,7 +48,7 @@ fn basis(mass: &str) -> Basis {
 /// The mass at the nodes at the start.
 fn start(mass: &str) -> Vec<f64> {
     let functions = functions(mass);
-    functions.device(&functions.start()).mass
+    functions.nodal(&functions.start()).mass
 }
 
 #[track_caller]
@@ -414,7 +414,7 @@ fn limits() {
       expected: a finite number, or a column: {data: file.csv, column: name}
     ");
     assert_snapshot!(with("max: {data: x.csv, column: m_kg}"), @"
-    m.yaml:5:46: functions.mass.max.data: x.csv: there is no such file
+    m.yaml:5:46: functions.mass.max.data: x.csv: no such file
       expected: a CSV file with one row of column names and rows of numbers
       hint: did you mean `m.csv`?
     ");

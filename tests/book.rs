@@ -14,7 +14,7 @@ mod library {
 
 use common::pages::{Tour, blocks_in, fresh_clone, output, page};
 use common::repository;
-use kmcfit::config::{ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::solvers::{FitSettings, Solver, Status, Stopping, fit};
 use kmcfit_core::internals::system::Method;
@@ -60,7 +60,7 @@ fn models_are_valid_and_their_gradients_exact() {
         fs::write(clone.path().join("models/shown.yaml"), model.text()).expect("a file");
         let printed = output(clone.path(), "kmcfit check models/shown.yaml");
         assert!(printed.contains(expected), "{printed}");
-        let verdict = "the discrete gradient is exact: least error below 1e-6\n";
+        let verdict = "the discrete gradient is exact: min error below 1e-6\n";
         assert!(printed.ends_with(verdict), "{printed}");
         let printed = output(clone.path(), "kmcfit fit models/shown.yaml");
         assert!(!printed.contains("warning"), "{printed}");
@@ -80,7 +80,7 @@ functions:
   stiffness: {fixed: 1.0}
 ";
     let file = ModelFile::parse(repository("bare.yaml"), text).expect("a model");
-    let model = build(&file, Purpose::Fit).expect("a problem");
+    let model = build(&file, BuildMode::Fit).expect("a problem");
     assert_eq!(model.title, "bare");
     assert_eq!(model.problem.experiments[0].name, "experiment 1");
     assert_eq!(model.problem.system.grid.nodes(), 2000);

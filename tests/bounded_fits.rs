@@ -1,7 +1,7 @@
 //! Fits with thousands of bounds and a path of weights: the minima that an interior-point method on the stages of the
 //! linearised equation of motion finds, in double and in extended precision.
 
-use kmcfit::config::{Model, ModelFile, Override, Purpose, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, Override, build};
 use kmcfit_core::internals::solvers::{Fit, Status, WeightPath, choose_weight};
 
 /// `models/noisy.yaml` with `values` set, fitted along its path of weights.
@@ -10,7 +10,7 @@ fn noisy(values: &[&str]) -> (WeightPath, Fit) {
     let texts: Vec<String> = values.iter().map(|text| (*text).to_string()).collect();
     let overrides = Override::parse_all(&texts).expect("values");
     let file = ModelFile::read_with(path, &overrides).expect("a file");
-    let model: Model = build(&file, Purpose::Fit).expect("a model");
+    let model: Model = build(&file, BuildMode::Fit).expect("a model");
     let search = model.weight_rule.as_ref().expect("a rule");
     let start = model.problem.functions.start();
     let (path, _, fit) = choose_weight(

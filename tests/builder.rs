@@ -1,11 +1,11 @@
 //! Problems from Rust: the same as from a model file, and refusals with a place.
 
-use kmcfit::config::{ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit::observations::Table;
 use kmcfit_core::internals::builder::{
     BasisSpec, Builder, CoefficientSpec, Knots, Record, ScalarSpec, Start,
 };
-use kmcfit_core::internals::constraints::{Shape, Statement};
+use kmcfit_core::internals::constraints::{Constraint, Shape};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Loss;
@@ -23,7 +23,7 @@ fn columns<const N: usize>(file: &str, names: [&str; N]) -> [Vec<f64>; N] {
 
 fn from_file(yaml: &str) -> (Problem, kmcfit_core::internals::solvers::FitSettings) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/built-by-the-test.yaml");
-    let model = build(&ModelFile::parse(&path, yaml).unwrap(), Purpose::Fit).unwrap();
+    let model = build(&ModelFile::parse(&path, yaml).unwrap(), BuildMode::Fit).unwrap();
     (model.problem, model.settings)
 }
 
@@ -74,16 +74,16 @@ fit: {stop: {iterations: 20, tolerance: 1e-10}}
     let built = Builder::new([mass, damping, stiffness])
         .record(paper_record())
         .method(Method::Midpoint)
-        .constrain(Statement::Value {
+        .constrain(Constraint::Value {
             of: CoefficientKind::Stiffness,
             at: 0.0,
             value: 1.0,
         })
-        .constrain(Statement::Shape {
+        .constrain(Constraint::Shape {
             of,
             shape: Shape::NonIncreasing,
         })
-        .penalize(Statement::Mean { of, value: 0.75 }, 10.0)
+        .penalize(Constraint::Mean { of, value: 0.75 }, 10.0)
         .build()
         .unwrap();
     same_way(&built, &written);
@@ -144,7 +144,7 @@ fn what_cannot_be_meant_is_refused() {
         (Builder::new(system()), "experiments: there are no records"),
         (
             Builder::new(system()).record(short()),
-            "experiments[0]: this experiment has no readings",
+            "experiments[0]: this experiment has no data",
         ),
         (
             Builder::new(system()).record(short().displacement(&times, &values[..2])),
@@ -152,7 +152,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             Builder::new(system()).record(short().velocity(&[0.0, 2.0, 1.0], &values)),
-            "experiments[0].columns.velocity: these samples make no record\n  found: times that do not increase",
+            "experiments[0].columns.velocity: these samples are invalid\n  found: times that do not increase",
         ),
         (
             Builder::new(system()).record(short().displacement(&times, &[1.0, f64::NAN, 0.0])),
@@ -168,7 +168,7 @@ fn what_cannot_be_meant_is_refused() {
                     .displacement(&times, &values)
                     .loss(Loss::Huber { threshold: 1.0 }),
             ),
-            "experiments[0].loss.displacement: a robust loss needs to know which residuals are large",
+            "experiments[0].loss.displacement: a robust loss needs a sigma to identify large residuals",
         ),
         (
             Builder::new(system()).record(short().velocity(&times, &values)),
@@ -176,7 +176,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             Builder::new(system()).record(short().displacement(&times[..2], &values[..2])),
-            "grid.nodes: this number of nodes cannot be used\n  found: 2",
+            "grid.nodes: invalid number of nodes\n  found: 2",
         ),
         (
             Builder::new(system()).record(short().displacement(&[0.0, 0.1, 2.0], &values)),
@@ -188,7 +188,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             Builder::new(system()).record(record().validation()),
-            "experiments: every experiment is held out of the fit",
+            "experiments: every experiment is a validation record",
         ),
         (
             Builder::new(system()).record(record().force(&times, &values)),
@@ -231,7 +231,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             mass(one()).nodes(usize::MAX),
-            "grid.nodes: this number of nodes cannot be used\n  found: 18446744073709551615",
+            "grid.nodes: invalid number of nodes\n  found: 18446744073709551615",
         ),
         (
             mass(CoefficientSpec::estimated(
@@ -256,7 +256,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             mass(one().max(0.0)),
-            "functions.mass.max: this leaves no mass: it must be positive at all times",
+            "functions.mass.max: this excludes a positive mass: the mass must be positive at all times",
         ),
         (
             mass(one().min(f64::NAN)),
@@ -287,21 +287,21 @@ fn what_cannot_be_meant_is_refused() {
             "functions.mass.width: only Coulomb friction has a width",
         ),
         (
-            mass(one().min(2.0)).constrain(Statement::Mean { of, value: 1.0 }),
+            mass(one().min(2.0)).constrain(Constraint::Mean { of, value: 1.0 }),
             "constraints: these constraints contradict each other",
         ),
         (
-            mass(one()).penalize(Statement::Mean { of, value: 1.0 }, 0.0),
+            mass(one()).penalize(Constraint::Mean { of, value: 1.0 }, 0.0),
             "constraints[0].soft: the weight of a soft constraint must be positive\n  found: 0",
         ),
         (
-            mass(one()).penalize(Statement::DampingRatio { max: 0.1 }, 1.0),
+            mass(one()).penalize(Constraint::DampingRatio { max: 0.1 }, 1.0),
             "constraints[0].soft: a cap on the damping ratio cannot be soft",
         ),
         (
             Builder::new([CoefficientSpec::fixed(1.0), one(), one()])
                 .record(record())
-                .constrain(Statement::Mean { of, value: 1.0 }),
+                .constrain(Constraint::Mean { of, value: 1.0 }),
             "constraints[0]: mass is fixed, so it cannot be constrained",
         ),
         (
@@ -311,7 +311,7 @@ fn what_cannot_be_meant_is_refused() {
         (
             Builder::new(system())
                 .record(record().coefficient(CoefficientKind::CubicStiffness, one())),
-            "experiments[0].functions.cubic_stiffness: the device has no such function",
+            "experiments[0].functions.cubic_stiffness: the system has no such function",
         ),
         (
             Builder::new(system())

@@ -1,6 +1,6 @@
 //! Every basis with every term, channel and method: a fit with a named outcome, or a refusal that says why.
 
-use kmcfit::config::{ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit_core::internals::solvers::{Status, fit};
 use kmcfit_core::internals::system::{
     Excitation, Grid, Method, NodalCoefficients, State, System, Term,
@@ -155,7 +155,7 @@ fn every_basis_of_every_function_ends_by_name() {
 /// How a model ends; what is found is looked at.
 fn ended(path: &std::path::Path, text: &str, here: &str) -> String {
     let file = ModelFile::parse(path, text).unwrap_or_else(|e| panic!("{here}: {e}"));
-    let model = match build(&file, Purpose::Fit) {
+    let model = match build(&file, BuildMode::Fit) {
         Ok(model) => model,
         Err(error) => return format!("refused: {}", error.problem),
     };
@@ -165,11 +165,11 @@ fn ended(path: &std::path::Path, text: &str, here: &str) -> String {
     let best = &found.best.evaluation;
     assert!(best.cost.is_finite(), "{here}");
     assert!(
-        best.device.functions().flatten().all(|p| p.is_finite()),
+        best.nodal.functions().flatten().all(|p| p.is_finite()),
         "{here}"
     );
     // An equation error whose minimum has no mass says so.
-    let has_mass = best.device.mass.iter().all(|m| *m > 0.0);
+    let has_mass = best.nodal.mass.iter().all(|m| *m > 0.0);
     let is_infeasible = found.outcome.status == Status::Infeasible;
     assert!(has_mass || is_infeasible, "{here}");
     if found.outcome.status != Status::Failed && !text.contains("equation-error") {

@@ -2,7 +2,7 @@
 
 mod common;
 
-use kmcfit::config::{ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit_core::internals::solvers::{Status, fit};
 
 /// Roll decay of the ship model KVLCC2 (Alexandersson and Kjellberg 2021, doi
@@ -30,7 +30,7 @@ fit: {{method: lbfgs, stop: {{iterations: 200, tolerance: 1e-9}}}}
         data.canonicalize().unwrap().display()
     );
     let file = ModelFile::parse("roll.yaml", text).unwrap();
-    let model = build(&file, Purpose::Fit).unwrap();
+    let model = build(&file, BuildMode::Fit).unwrap();
     let start = model.problem.functions.start();
     let run = fit(&model.problem, &start, &model.settings, &mut |_| {}).unwrap();
     assert_eq!(run.outcome.status, Status::Converged, "{:?}", run.outcome);
@@ -67,7 +67,7 @@ functions:
         data.canonicalize().unwrap().display()
     );
     let file = ModelFile::parse("roll.yaml", text).unwrap();
-    let model = build(&file, Purpose::Fit).unwrap();
+    let model = build(&file, BuildMode::Fit).unwrap();
     let run = fit(
         &model.problem,
         &model.problem.start(),
@@ -100,7 +100,7 @@ fn the_roll_decay_with_nonlinear_damping() {
     };
     let rms = rms_degrees(&model, &run);
     assert!(rms <= 0.026, "{rms}");
-    let device = &run.best.evaluation.device;
+    let device = &run.best.evaluation.nodal;
     let [linear, _, _, quadratic] = [0, 1, 2, 3].map(|j| device.coefficients[j][0]);
     let inertia = device.mass[0];
     assert!((inertia / 135.75 - 1.0).abs() <= 0.01, "{inertia}");
@@ -128,7 +128,7 @@ fn the_roll_decay_with_damping_over_time() {
         let rms = rms_degrees(&model, &run);
         assert!(rms <= 0.026, "{knots} knots: {rms}");
         let grid = &model.problem.system.grid;
-        let damping = &run.best.evaluation.device.coefficients[0];
+        let damping = &run.best.evaluation.nodal.coefficients[0];
         let at = |t: f64| damping[(t / grid.step()).round() as usize];
         assert!((at(10.0) - 4.8).abs() <= 0.3, "{knots} knots: {}", at(10.0));
         assert!(

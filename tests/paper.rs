@@ -126,7 +126,7 @@ fn all_rows_and_the_optimum_follow_the_shared_reference() {
         );
     }
     let optimum = common::csv(&folder.join("paper_optimum.csv"));
-    let device = &run.best.evaluation.device;
+    let device = &run.best.evaluation.nodal;
     for (i, row) in optimum.iter().enumerate() {
         assert!((device.mass[i] - row[1]).abs() < 1e-9);
         assert!((device.coefficients[1][i] - row[2]).abs() < 1e-9);
@@ -184,8 +184,8 @@ fn the_paper_s_optimum_does_not_predict() {
             velocity,
         })
         .collect();
-    let truth = common::paper_device(2000);
-    let device = &paper_run().best.evaluation.device;
+    let truth = common::paper_system(2000);
+    let device = &paper_run().best.evaluation.nodal;
     let motions = predict(&system, device, Some(&truth), &states).unwrap();
     for (motion, (.., cost, energy)) in motions.iter().zip(expected) {
         let found = (motion.summary.cost.unwrap(), motion.summary.energy.unwrap());

@@ -1,6 +1,6 @@
 //! Records as model files bring them, from the YAML to the constants found.
 
-use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::solvers::{Fit, Status, fit_with_noise};
 use kmcfit_core::internals::system::{
@@ -78,7 +78,7 @@ functions:
 "
     );
     let file = ModelFile::parse(folder.path().join("model.yaml"), yaml).unwrap();
-    let model = build(&file, Purpose::Fit).unwrap();
+    let model = build(&file, BuildMode::Fit).unwrap();
     let start = model.problem.start();
     let (_, run) = fit_with_noise(&model.problem, &start, &model.settings, &mut |_| {}).unwrap();
     assert_eq!(run.outcome.status, Status::Converged, "{:?}", run.outcome);
@@ -89,7 +89,7 @@ const KNOWN: &str = "{fixed: 1.5}";
 
 /// The largest relative error of the constants that are fitted.
 fn error(run: &Fit) -> f64 {
-    let device = &run.best.evaluation.device;
+    let device = &run.best.evaluation.nodal;
     let found = [
         device.mass[0],
         device.coefficients[0][0],
@@ -129,7 +129,7 @@ fn a_window_of_a_file_without_names() {
     let ignored = &model.notes[0][0].ignored;
     assert_eq!(ignored[0], (1000, "outside the window".to_owned()));
     assert_eq!(ignored[1], (1, "missing".to_owned()));
-    assert_eq!(model.problem.reading_count(), 800);
+    assert_eq!(model.problem.sample_count(), 800);
 }
 
 /// A tone far above the motion that would be folded into it.
@@ -148,7 +148,7 @@ fn decimation_and_band() {
     let decimated = format!("{plain}\n    decimate: 10");
     let (model, run) = fitted(&text, &decimated, KNOWN);
     assert!(error(&run) < 5e-3, "{}", error(&run));
-    assert_eq!(model.problem.reading_count(), 401);
+    assert_eq!(model.problem.sample_count(), 401);
     // The band filters the model alike, edges included, and leaves of the hum only what its sudden
     // beginning and end have in the band.
     let band = format!("{plain}\n    band: {{max: 20.0}}");
@@ -279,7 +279,7 @@ fn the_grid_follows_the_frequency() {
     }
     let experiment = "    initial: {displacement: 0.02, velocity: 0.0}";
     let (model, run) = fitted(&text, experiment, KNOWN);
-    assert_eq!(model.remarks.len(), 1, "{:?}", model.remarks);
+    assert_eq!(model.automatic.len(), 1, "{:?}", model.automatic);
     assert!(error(&run) < 1e-5, "{}", error(&run));
     let half = model
         .problem
@@ -323,7 +323,7 @@ functions:
 fit: {method: lbfgs, gradient: continuous}
 ";
         let file = ModelFile::parse(folder.path().join("model.yaml"), yaml).unwrap();
-        let problem = build(&file, Purpose::Fit).unwrap().problem;
+        let problem = build(&file, BuildMode::Fit).unwrap().problem;
         let theta = problem.start();
         let evaluation = problem.evaluate(&theta).unwrap();
         let [a, b] = [GradientKind::Discrete, GradientKind::Continuous]

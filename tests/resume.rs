@@ -1,6 +1,6 @@
 //! A fit that is interrupted and gone on with ends with the bits of one that is not.
 
-use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit::results::{FIT_JOURNAL, FitJournal, Heading};
 use kmcfit_core::internals::solvers::{
     Fit, IterationRecord, Observer, Status, WeightPath, choose_weight_watched,
@@ -19,7 +19,7 @@ fn model(name: &str, changes: &[(&str, &str)]) -> (ModelFile, Model) {
         text = text.replace(from, to);
     }
     let file = ModelFile::parse(&path, text).expect("a model");
-    let model = build(&file, Purpose::Fit).expect("a model");
+    let model = build(&file, BuildMode::Fit).expect("a model");
     (file, model)
 }
 

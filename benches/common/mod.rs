@@ -1,7 +1,7 @@
 //! The problems that are timed.
 #![allow(dead_code, reason = "each benchmark needs some of them")]
 
-use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
@@ -25,7 +25,7 @@ const INITIAL: State = State {
 const SPREAD: f64 = 3.0;
 
 /// The paper's problem on `nodes` nodes: one free value per node for mass, damping and stiffness, the
-/// midpoint rule, the start (2, 1, 1), and readings that the same stepper made.
+/// midpoint rule, the start (2, 1, 1), and samples that the same stepper made.
 pub fn paper(nodes: usize) -> Problem {
     let system = System {
         grid: Grid::new(0.0, DURATION, nodes).expect("a grid"),
@@ -36,8 +36,8 @@ pub fn paper(nodes: usize) -> Problem {
     let weighting = Weighting::Integral {
         spacing: grid.step(),
     };
-    let readings = paper_readings(&system);
-    let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
+    let samples = paper_readings(&system);
+    let channel = Channel::displacement_at_nodes(samples, 1, weighting, &grid);
     let list = vec![
         CoefficientFunction::nodal(CoefficientKind::Mass, vec![2.0; nodes]),
         CoefficientFunction::nodal(CoefficientKind::Damping, vec![1.0; nodes]),
@@ -56,8 +56,8 @@ fn paper_readings(system: &System) -> Vec<f64> {
             .collect(),
         coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
     };
-    let motion = system.forward(&truth, INITIAL, None);
-    motion.expect("a motion").displacement
+    let response = system.forward(&truth, INITIAL, None);
+    response.expect("a motion").displacement
 }
 
 /// A model of `models/`, with some of its text replaced.
@@ -72,7 +72,7 @@ pub fn model(name: &str, changes: &[(&str, &str)]) -> Model {
         text = text.replace(old, new);
     }
     let file = ModelFile::parse(&path, text).expect("a model");
-    build(&file, Purpose::Fit).expect("a model")
+    build(&file, BuildMode::Fit).expect("a model")
 }
 
 /// `models/paper-smooth.yaml` on `nodes` nodes.
@@ -122,7 +122,7 @@ pub fn many_starts(model: &Model, starts: usize, threads: usize) -> Multistart {
 }
 
 /// A hardening spring under three sines, seen by a displacement and an acceleration sensor with
-/// `samples` readings each; mass, damping, stiffness and cubic stiffness are sought.
+/// `samples` samples each; mass, damping, stiffness and cubic stiffness are estimated.
 pub fn duffing(samples: usize) -> (Problem, FitSettings) {
     let grid = Grid::new(0.0, 0.001 * (samples - 1) as f64, samples).expect("a grid");
     let times = grid.times();
@@ -144,11 +144,11 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
         mass: vec![1.0; samples],
         coefficients: [1.2, 20.0, 15.0].map(|p| vec![p; samples]).to_vec(),
     };
-    let motion = system.forward(&truth, rest, Some(&excitation));
-    let motion = motion.expect("a motion");
+    let response = system.forward(&truth, rest, Some(&excitation));
+    let response = response.expect("a motion");
     let acceleration: Vec<f64> = (0..samples)
         .map(|i| {
-            let (y, v) = (motion.displacement[i], motion.velocity[i]);
+            let (y, v) = (response.displacement[i], response.velocity[i]);
             force[i] - 1.2 * v - 20.0 * y - 15.0 * y * y * y
         })
         .collect();
@@ -162,13 +162,13 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
         Parameterization::new(list, samples, grid.step()).expect("independent functions");
     let channel = |kind, values, sigma| {
         let weighting = Weighting::Sigma(sigma);
-        Channel::new(kind, times.clone(), values, weighting, &grid, samples).expect("readings")
+        Channel::new(kind, times.clone(), values, weighting, &grid, samples).expect("samples")
     };
     let record = Experiment::free("three sines", rest, samples)
         .with_excitation(excitation)
         .with_channel(channel(
             ChannelKind::Displacement,
-            motion.displacement,
+            response.displacement,
             0.01,
         ))
         .with_channel(channel(ChannelKind::Acceleration, acceleration, 0.05));

@@ -1,4 +1,4 @@
-//! What is wrong with the arguments, where clap says too little.
+//! Errors in command-line arguments, with more detail than clap gives.
 
 use crate::error::InputError;
 use crate::near::nearest;
@@ -6,7 +6,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use std::error::Error;
 use std::num::{ParseFloatError, ParseIntError};
 
-/// An argument that is no number where one must be; `None` for all else.
+/// The error of an argument that is not a number; `None` for any other error.
 pub fn no_number(error: &clap::Error) -> Option<InputError> {
     if error.kind() != ErrorKind::ValueValidation {
         return None;
@@ -14,7 +14,7 @@ pub fn no_number(error: &clap::Error) -> Option<InputError> {
     let source = error.source()?;
     let expected = match () {
         () if source.is::<ParseFloatError>() => "a number",
-        () if source.is::<ParseIntError>() => "a whole number, not negative",
+        () if source.is::<ParseIntError>() => "a whole number, 0 or greater",
         () => return None,
     };
     let text = |kind| match error.get(kind) {
@@ -24,11 +24,11 @@ pub fn no_number(error: &clap::Error) -> Option<InputError> {
     let argument = text(ContextKind::InvalidArg)?;
     let name = argument.split(' ').next().unwrap_or(&argument);
     let found = text(ContextKind::InvalidValue)?;
-    let error = InputError::argument(name, "this is no number");
+    let error = InputError::argument(name, "not a number");
     Some(error.found(format!("`{found}`")).expected(expected))
 }
 
-/// The error, with the command that was probably meant.
+/// The error with the most similar command as a suggestion.
 pub fn with_near_command(mut error: clap::Error, program: &clap::Command) -> clap::Error {
     if let (ErrorKind::InvalidSubcommand, None, Some(ContextValue::String(word))) = (
         error.kind(),

@@ -1,33 +1,34 @@
 //! `kmcfit check`
 
 use super::{Failure, NOT_CONVERGED, OK, Overrides, announce, inputs, print, say, unwritable};
-use crate::config::{Model, Purpose, build};
+use crate::config::{BuildMode, Model, build};
 use crate::report::{CsvTable, figures, render};
 use crate::results::{Claim, OutputFolder};
 use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
 use kmcfit_core::internals::simulate::SimulationError;
 use std::path::PathBuf;
 
-/// Read and validate a model, then test its gradient against differences.
+/// Validate a model and its data, then compare its gradient with finite differences.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit check model.yaml --nodes 500,1000,2000")]
 pub struct Arguments {
     /// Model file (YAML).
     model: PathBuf,
-    /// Numbers of nodes to check at, separated by commas [default: the model's].
+    /// Numbers of nodes for the check [default: that of the model].
     #[arg(long, value_delimiter = ',', value_name = "N,N,...")]
     nodes: Vec<usize>,
     #[command(flatten)]
     set: Overrides,
-    /// Only read and validate.
+    /// Validate only.
     #[arg(long)]
     no_gradient: bool,
-    /// Folder for the errors as a table and a figure.
+    /// Folder for the table and the figure of the errors.
     #[arg(long)]
     out: Option<PathBuf>,
 }
 
-fn no_motion(breakdown: SimulationError) -> Failure {
-    Failure::Numerical(format!("the start has no motion: {breakdown}"))
+fn no_response(breakdown: SimulationError) -> Failure {
+    Failure::Numerical(format!("the start has no response: {breakdown}"))
 }
 
 /// The files in the output folder.
@@ -35,22 +36,22 @@ const FILES: [&str; 2] = ["gradient.csv", "figures/gradient.svg"];
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let file = arguments.set.read(&arguments.model)?;
-    let model = build(&file, Purpose::Fit)?;
+    let model = build(&file, BuildMode::Fit)?;
     announce(&model);
     if arguments.no_gradient || model.problem.functions.parameters() == 0 {
         print(&describe(&model));
         return Ok(OK);
     }
-    // Whatever is wrong with the input is said before anything is printed or made.
+    // Errors in the input come before any output.
     let refined = node_counts(arguments)
         .into_iter()
-        .map(|nodes| build(&file, Purpose::Check { nodes }))
+        .map(|nodes| build(&file, BuildMode::Check { nodes }))
         .collect::<Result<Vec<_>, _>>()?;
     let problem = &model.problem;
     let steps = problem.check_steps(&problem.functions.start());
-    let Some(steps) = steps.map_err(no_motion)? else {
+    let Some(steps) = steps.map_err(no_response)? else {
         print(&describe(&model));
-        print("the gradient vanishes at the start: check it from another one\n");
+        print("the gradient is zero at the start values: choose others for the check\n");
         return Ok(OK);
     };
     let folder = (arguments.out.as_deref())
@@ -63,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     print(&describe(&model));
     print(&format!(
         "{:>8}  {:<10}  {:>12}  {:>9}\n",
-        "nodes", "adjoint", "least error", "at step"
+        "nodes", "adjoint", "min error", "at step"
     ));
     for model in &refined {
         for curve in check(model, &steps)? {
@@ -80,7 +81,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         write(&folder, &curves).map_err(|error| unwritable(folder.path(), &error))?;
         print(&format!("results in {}\n", folder.path().display()));
     }
-    Ok(verdict(&curves))
+    Ok(report_result(&curves))
 }
 
 fn node_counts(arguments: &Arguments) -> Vec<Option<usize>> {
@@ -101,12 +102,12 @@ fn describe(model: &Model) -> String {
         for (channel, note) in experiment.channels.iter().zip(notes) {
             let (name, kind, unit) = (&experiment.name, note.kind.name(), note.unit.symbol());
             text += &format!(
-                "{name}: {} readings of the {kind} in {unit} ({})\n",
+                "{name}: {} samples of the {kind} in {unit} ({})\n",
                 channel.len(),
                 note.format
             );
             for (count, reason) in &note.ignored {
-                text += &format!("{name}: {count} readings of the {kind} not used: {reason}\n");
+                text += &format!("{name}: {count} samples of the {kind} not used: {reason}\n");
             }
         }
     }
@@ -130,16 +131,16 @@ fn check(model: &Model, steps: &[f64]) -> Result<Vec<GradientCheck>, Failure> {
     let theta = problem.functions.start();
     let checks = kinds.into_iter();
     let checks = checks.map(|kind| problem.check_gradient(&theta, kind, steps));
-    checks.collect::<Result<_, _>>().map_err(no_motion)
+    checks.collect::<Result<_, _>>().map_err(no_response)
 }
 
-fn verdict(curves: &[GradientCheck]) -> u8 {
+fn report_result(curves: &[GradientCheck]) -> u8 {
     let failed: Vec<&GradientCheck> = (curves.iter())
         .filter(|c| c.kind == GradientKind::Discrete && !c.passes())
         .collect();
     if failed.is_empty() {
         print(&format!(
-            "the discrete gradient is exact: least error below {:.0e}\n",
+            "the discrete gradient is exact: min error below {:.0e}\n",
             GradientCheck::PASS
         ));
         return OK;
@@ -147,7 +148,7 @@ fn verdict(curves: &[GradientCheck]) -> u8 {
     for curve in failed {
         let (nodes, error) = (curve.nodes, curve.best().1);
         let sentence =
-            format!("the discrete gradient on {nodes} nodes has an error of {error:.1e} at best");
+            format!("the discrete gradient on {nodes} nodes has a min error of {error:.1e}");
         say("failed", sentence);
     }
     NOT_CONVERGED

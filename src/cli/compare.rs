@@ -3,7 +3,7 @@
 use super::fit::{fit_into, note_discarded, open_journal};
 use super::progress::Progress;
 use super::{Failure, NOT_CONVERGED, OK, exit_code, inputs, interrupt, print, say, unwritable};
-use crate::config::{Model, ModelFile, Purpose, Sequence, build};
+use crate::config::{BuildMode, Model, ModelFile, Sequence, build};
 use crate::error::InputError;
 use crate::report::compare::{ComparedRun, Comparison, LeftOut};
 use crate::report::{fit_claim, json};
@@ -16,13 +16,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Fit models or take finished runs, and put them side by side: a table, figures, one page.
+/// Compare models and finished runs: one table, overlaid figures, one page.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit compare constant.yaml spline.yaml runs/earlier")]
 pub struct Arguments {
-    /// Model files (YAML), which are fitted, and folders of finished runs, which are read.
+    /// Model files (YAML), which are fitted, and folders of finished runs.
     #[arg(required = true, value_name = "MODEL|RUN")]
     runs: Vec<PathBuf>,
-    /// Folder for the comparison; each fitted model has a folder of its own in it.
+    /// Folder for the comparison, with a folder for each fitted model.
     #[arg(long, default_value = "runs/compare")]
     out: PathBuf,
     /// Print the comparison as JSON instead of the table.
@@ -34,8 +35,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     compare(&arguments.runs, &arguments.out, arguments.json, false)
 }
 
-/// Resumes a comparison that did not come to its end.
-pub(super) fn go_on(place: &Path, as_json: bool) -> Result<u8, Failure> {
+/// Resumes an unfinished comparison.
+pub(super) fn resume(place: &Path, as_json: bool) -> Result<u8, Failure> {
     let runs = AnalysisJournal::heading(place, COMPARE_JOURNAL)?.inputs;
     compare(&runs, place, as_json, true)
 }
@@ -57,7 +58,7 @@ pub(super) fn run_in(folder: &OutputFolder, runs: &[PathBuf]) -> Result<u8, Fail
 }
 
 /// Fits the models of a sequence one after another and compares them on one page.
-pub(super) fn tell(
+pub(super) fn run_sequence(
     path: &Path,
     sequence: &Sequence,
     out: &Path,
@@ -75,16 +76,16 @@ pub(super) fn tell(
     job.run(&folder, as_json, is_resumed)
 }
 
-/// What a comparison writes into its folder, fits apart.
+/// Files of a comparison without those of its fits.
 fn claim(command: &'static str, journal: &'static str) -> Claim {
     Comparison::claim(command).journals(&[journal])
 }
 
-/// One argument, read and found usable.
-enum Entry {
-    /// To be fitted into a folder of its own.
+/// A model or a run that is compared.
+enum ComparisonEntry {
+    /// A model that is fitted.
     Model(Box<ToFit>),
-    /// Finished.
+    /// A finished run.
     Run(Box<ComparedRun>),
 }
 
@@ -95,12 +96,12 @@ struct ToFit {
     heading: Heading,
 }
 
-impl Entry {
+impl ComparisonEntry {
     /// The files that the comparison reads for it.
     fn files(&self) -> Vec<PathBuf> {
         match self {
-            Entry::Model(to_fit) => inputs(&to_fit.file),
-            Entry::Run(run) => vec![run.finished.folder.join(RESULT)],
+            ComparisonEntry::Model(to_fit) => inputs(&to_fit.file),
+            ComparisonEntry::Run(run) => vec![run.finished.folder.join(RESULT)],
         }
     }
 
@@ -111,11 +112,11 @@ impl Entry {
         parent: &OutputFolder,
     ) -> Result<Option<OutputFolder>, InputError> {
         match self {
-            Entry::Model(to_fit) => {
+            ComparisonEntry::Model(to_fit) => {
                 let claim = fit_claim(&to_fit.model).inputs(self.files());
                 parent.prepare_inside(name, claim).map(Some)
             }
-            Entry::Run(_) => Ok(None),
+            ComparisonEntry::Run(_) => Ok(None),
         }
     }
 }
@@ -123,7 +124,7 @@ impl Entry {
 /// Models and runs to be compared, or the models of a sequence.
 struct Job<'a> {
     /// The arguments and the name of each.
-    entries: Vec<(String, Entry)>,
+    entries: Vec<(String, ComparisonEntry)>,
     heading: Heading,
     journal: &'static str,
     sequence: Option<&'a Sequence>,
@@ -152,8 +153,8 @@ impl Job<'_> {
     fn full_heading(&self) -> Heading {
         let entries = self.entries.iter();
         entries.fold(self.heading.clone(), |heading, (_, entry)| match entry {
-            Entry::Model(to_fit) => heading.with_model(&to_fit.file),
-            Entry::Run(run) => heading.with_file(run.finished.folder.join(RESULT)),
+            ComparisonEntry::Model(to_fit) => heading.with_model(&to_fit.file),
+            ComparisonEntry::Run(run) => heading.with_file(run.finished.folder.join(RESULT)),
         })
     }
 
@@ -172,17 +173,17 @@ impl Job<'_> {
         };
         for ((name, entry), child) in self.entries.into_iter().zip(children) {
             match (entry, child) {
-                (Entry::Model(to_fit), Some(child)) => {
+                (ComparisonEntry::Model(to_fit), Some(child)) => {
                     compared.model(&name, *to_fit, &child, &mut journal)?;
                 }
-                (Entry::Run(run), _) => compared.runs.push(*run),
-                (Entry::Model(..), None) => {}
+                (ComparisonEntry::Run(run), _) => compared.runs.push(*run),
+                (ComparisonEntry::Model(..), None) => {}
             }
         }
         let interrupted = compared.interrupted;
         let mut comparison = Comparison::new(compared.runs, compared.left_out);
         if let Some(sequence) = self.sequence.filter(|_| !interrupted) {
-            comparison = comparison.told_as(&sequence.title);
+            comparison = comparison.as_sequence(&sequence.title);
         }
         comparison.write(folder).map_err(full)?;
         journal.finish_if(!interrupted).map_err(full)?;
@@ -195,7 +196,7 @@ impl Job<'_> {
         }
         Ok(match interrupted {
             true => interrupt::exit_code(),
-            false => verdict(&comparison),
+            false => exit_code_of(&comparison),
         })
     }
 }
@@ -227,19 +228,18 @@ fn show(comparison: &Comparison, sequence: Option<&Sequence>, interrupted: bool,
     print(&format!("{}\n\n", sequence.title));
     match interrupted {
         true => {
-            print("interrupted: the sequence is not complete, so nothing is concluded from it\n");
+            print("Interrupted: no conclusions, because the sequence is incomplete.\n");
         }
         false => comparison
             .conclusions()
             .iter()
             .for_each(|sentence| print(&format!("- {sentence}\n"))),
     }
-    print(&format!("\nthe page is {page}\n"));
+    print(&format!("\nPage   {page}\n"));
 }
 
-/// The arguments, read and found usable, and what each is called: whatever is wrong with them is said
-/// before anything is run or made.
-fn entries(runs: &[PathBuf], out: &Path) -> Result<Vec<(String, Entry)>, InputError> {
+/// The arguments with their names. All errors in them are found before anything is run or written.
+fn entries(runs: &[PathBuf], out: &Path) -> Result<Vec<(String, ComparisonEntry)>, InputError> {
     let entries = runs.iter().zip(names(runs, out));
     entries
         .map(|(path, name)| Ok((name.clone(), entry(path, &name)?)))
@@ -295,7 +295,7 @@ impl Compared {
     ) -> Result<(), Failure> {
         if self.flag.load(Ordering::Relaxed) {
             self.interrupted = true;
-            self.leave_out(name, "not begun: interrupted".into());
+            self.leave_out(name, "not started: interrupted".into());
             return Ok(());
         }
         for warning in &model.warnings {
@@ -329,35 +329,38 @@ impl Compared {
     }
 }
 
-fn entry(path: &Path, name: &str) -> Result<Entry, InputError> {
+fn entry(path: &Path, name: &str) -> Result<ComparisonEntry, InputError> {
     const EXPECTED: &str = "a model file (YAML), or the folder of a finished run";
     if path.is_dir() {
-        return Ok(Entry::Run(Box::new(ComparedRun::read(name, path)?)));
+        return Ok(ComparisonEntry::Run(Box::new(ComparedRun::read(
+            name, path,
+        )?)));
     }
     if !path.exists() {
         let missing = ModelFile::read(path).err();
-        let missing = missing.unwrap_or_else(|| InputError::file(path, "there is no such file"));
+        let missing = missing.unwrap_or_else(|| InputError::file(path, "no such file"));
         return Err(missing.expected(EXPECTED));
     }
     if path.file_name().is_some_and(|name| name == "result.json") {
         let folder = path.parent().unwrap_or(path).display();
-        return Err(InputError::file(path, "this is a result, not a model")
-            .expected(EXPECTED)
-            .hint(format!("give its folder: {folder}")));
+        return Err(
+            InputError::file(path, "a result file in place of a model file")
+                .expected(EXPECTED)
+                .hint(format!("give its folder: {folder}")),
+        );
     }
     let file = ModelFile::read(path)?;
-    let model = build(&file, Purpose::Fit)?;
+    let model = build(&file, BuildMode::Fit)?;
     let heading = Heading::of_model("fit", &file, true, None);
-    Ok(Entry::Model(Box::new(ToFit {
+    Ok(ComparisonEntry::Model(Box::new(ToFit {
         file,
         model,
         heading,
     })))
 }
 
-/// What each run is called: the name of its file or folder, with a number where that is taken. A
-/// fitted model never takes the folder of a finished run that is compared with it, or one of the
-/// comparison's own names.
+/// Name of each run: the name of its file or folder, numbered if it is taken. No fitted model gets the name of a compared
+/// run's folder or of a file of the comparison.
 fn names(paths: &[PathBuf], out: &Path) -> Vec<String> {
     let runs: Vec<PathBuf> = paths
         .iter()
@@ -381,7 +384,7 @@ fn names(paths: &[PathBuf], out: &Path) -> Vec<String> {
         let free = |name: &String| {
             let place = out.join(name).canonicalize();
             let overwrites = !path.is_dir() && place.is_ok_and(|place| runs.contains(&place));
-            // Some file systems do not tell small letters from capitals.
+            // Some file systems ignore case.
             !taken.contains(&name.to_lowercase()) && !overwrites
         };
         let name = wanted.find(free).unwrap_or(stem.clone());
@@ -400,8 +403,8 @@ fn stem(path: &Path) -> String {
     name.map_or_else(|| "run".into(), |name| name.to_string_lossy().into_owned())
 }
 
-/// Whether every run ended as asked for.
-fn verdict(comparison: &Comparison) -> u8 {
+/// Exit code: success if every run converged or completed.
+fn exit_code_of(comparison: &Comparison) -> u8 {
     let all = (comparison.measures().iter()).all(|m| exit_code(m.status) == OK);
     match all && comparison.left_out().is_empty() {
         true => OK,

@@ -4,7 +4,7 @@ use super::{Failure, compare, print, unwritable};
 use crate::results::{Claim, OutputFolder};
 use std::path::PathBuf;
 
-/// The files of the demonstration, by their place in its folder.
+/// Files of the demonstration, by path in its folder.
 const FILES: [(&str, &str); 4] = [
     ("models/paper.yaml", include_str!("../../models/paper.yaml")),
     (
@@ -18,17 +18,17 @@ const FILES: [(&str, &str); 4] = [
     ),
 ];
 
-/// What is said before the comparison.
+/// Introduction, printed before the comparison.
 const BEFORE: &str = "\
-A mass that halves in 25 s, no damping, unit stiffness: this device moved, and its displacement was read.
-Two fits of that record: the paper's run, which asks for a small misfit alone, and a physical fit, which
-says besides that m, c and k are positive and smooth and that k(0) = 1.
+Record: displacement of a free response; the mass halves within 25 s, no damping, k = 1 N/m.
+Two fits: the paper's, by the misfit alone, and a physical one, in which m, c and k are positive and smooth
+and k(0) = 1 N/m.
 
 ";
 
-/// Fit the paper's record twice, as the paper does and with what physics says, and compare: models and
-/// data are built in.
+/// Compare the paper's fit of its record with a physically constrained fit; models and data are built in.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit demo --out runs/demo")]
 pub struct Arguments {
     /// Folder for models, data and results.
     #[arg(long, default_value = "runs/demo")]
@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let code = compare::run_in(&results, &models)?;
     let place = out.display();
     print(&format!(
-        "\nthe models are in {place}/models: change one, and `kmcfit fit {place}/models/physical.yaml` fits it\n"
+        "Models {place}/models; edit one and fit it with `kmcfit fit {place}/models/physical.yaml`\n"
     ));
     Ok(code)
 }

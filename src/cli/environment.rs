@@ -1,4 +1,4 @@
-//! What the numerics take from the process: limits, thread starts, the arithmetic that a variable names.
+//! Services of the process for the numerics: clock, memory limit, thread starts, choice of SIMD arithmetic.
 
 use crate::error::InputError;
 use crate::faults::{self, Operation};
@@ -14,7 +14,7 @@ static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 /// Provides the functions of the host.
 pub fn provide_host() {
-    host::provide(Host {
+    host::set_host(Host {
         clock: || START.elapsed(),
         has_memory: |bytes| memory::check(bytes).is_ok(),
         may_start_thread: || faults::check(Operation::Spawn),
@@ -25,7 +25,7 @@ pub fn provide_host() {
 pub fn check_arithmetic() -> Result<(), InputError> {
     check_limit().map_err(|found| {
         let names = arithmetics();
-        InputError::argument(LIMIT, "no arithmetic has this name")
+        InputError::argument(LIMIT, "unknown arithmetic")
             .found(format!("`{found}`"))
             .expected(names.join(", "))
             .hint_if(did_you_mean(&found, names))

@@ -3,11 +3,11 @@
 use super::{Failure, OK, print};
 use crate::config::keys;
 
-/// Say what a key of a model file means: its kind, unit, default, and an example.
+/// Explain a key of the model file: meaning, type, unit, default, example.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit explain functions.mass")]
 pub struct Arguments {
-    /// A key, alone or with those above it: tolerance, fit.stop, functions.mass [default: the keys at
-    /// the top].
+    /// Key, with or without its parents: tolerance, fit.stop, functions.mass [default: top-level keys].
     key: Option<String>,
 }
 

@@ -4,7 +4,7 @@ use super::progress::Progress;
 use super::{
     Failure, Overrides, announce, exit_code, inputs, interrupt, print, say, stem, unwritable,
 };
-use crate::config::{Model, ModelFile, Override, Purpose, WeightSearch, build};
+use crate::config::{BuildMode, Model, ModelFile, Override, WeightSearch, build};
 use crate::error::InputError;
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
@@ -15,14 +15,17 @@ use console::Term;
 use kmcfit_core::internals::simulate::SimulationError;
 use kmcfit_core::internals::solvers::{
     CheckpointStore, Fit, IterationEvent, IterationRecord, Observer, Status, WeightPath,
-    choose_weight_watched, fit_with_noise_watched, without_motion,
+    choose_weight_watched, fit_with_noise_watched, no_response,
 };
 use kmcfit_core::internals::system::State;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Fit the functions of a model to its data; write result, tables and figures.
+/// Fit a model to its records; write results, tables, figures and a report.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  kmcfit fit model.yaml --out runs/first --set fit.stop.iterations=50"
+)]
 pub struct Arguments {
     /// Model file (YAML).
     model: PathBuf,
@@ -37,22 +40,21 @@ pub struct Arguments {
     /// Write no figures and no page.
     #[arg(long)]
     no_report: bool,
-    /// Print where the time went.
+    /// Print the computing times.
     #[arg(long)]
     timings: bool,
-    /// Draw readings, fit and functions in the terminal.
+    /// Plot record, fit and functions in the terminal.
     #[arg(long, conflicts_with = "json")]
     plot: bool,
-    /// Least time between two checkpoints, from which `resume` goes on after the fit was killed [default:
-    /// 1 s, and more where they take more than 2 % of the time].
+    /// Shortest time between checkpoints for `resume` [default: 1 s, longer if they take over 2 % of the time].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     checkpoint: Option<f64>,
 }
 
-/// Columns of a chart where there is no terminal.
+/// Width of a chart without a terminal, columns.
 const PIPED: usize = 80;
 
-/// What is printed at the end.
+/// Options of the final output.
 pub(super) struct Printed {
     pub json: bool,
     pub timings: bool,
@@ -61,9 +63,9 @@ pub(super) struct Printed {
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     if let Some(seconds) = arguments.checkpoint.filter(|s| !(0.0..=1e9).contains(s)) {
-        return Err(InputError::argument("--checkpoint", "no time can be this")
+        return Err(InputError::argument("--checkpoint", "invalid time")
             .found(seconds)
-            .expected("a number of seconds, 0 (after every iteration) or greater")
+            .expected("seconds, 0 or greater (0: after every iteration)")
             .into());
     }
     let file = arguments.set.read(&arguments.model)?;
@@ -78,8 +80,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     fit(&file, &heading, &out, &printed, false)
 }
 
-/// Goes on with a fit that did not come to its end.
-pub(super) fn go_on(place: &Path, heading: &Heading, printed: &Printed) -> Result<u8, Failure> {
+/// Resumes an unfinished fit.
+pub(super) fn resume(place: &Path, heading: &Heading, printed: &Printed) -> Result<u8, Failure> {
     let path = heading.inputs.first().cloned().unwrap_or_default();
     let file = ModelFile::read_with(path, &Override::parse_all(&heading.overrides)?)?;
     let now = Heading::of_model("fit", &file, heading.figures, heading.checkpoint);
@@ -93,7 +95,7 @@ fn fit(
     printed: &Printed,
     is_resumed: bool,
 ) -> Result<u8, Failure> {
-    let mut model = build(file, Purpose::Fit)?;
+    let mut model = build(file, BuildMode::Fit)?;
     model.settings.interrupt = Some(interrupt::flag());
     let folder = OutputFolder::prepare(out, fit_claim(&model).inputs(inputs(file)))?;
     if !is_resumed {
@@ -103,14 +105,14 @@ fn fit(
     announce(&model);
     let progress = Progress::new(&model.settings.stopping);
     let (document, status) = fit_into(&folder, &model, &progress, heading.figures, journal)?;
-    tell(&document, folder.path(), printed);
+    print_results(&document, folder.path(), printed);
     if status == Status::Interrupted {
         interrupt::say_resumable(folder.path(), "fit");
     }
     Ok(exit_code(status))
 }
 
-/// Says that unfinished work of the same command on the same inputs is discarded.
+/// Notes that unfinished work of the same command on the same inputs is discarded.
 ///
 /// # Errors
 /// If the folder holds unfinished work on other inputs.
@@ -143,8 +145,8 @@ pub(super) fn open_journal(
     }
 }
 
-/// Prints what a run came to.
-pub(super) fn tell(document: &ResultDocument, folder: &Path, printed: &Printed) {
+/// Prints the results of a fit.
+pub(super) fn print_results(document: &ResultDocument, folder: &Path, printed: &Printed) {
     if printed.json {
         return print(&json(document));
     }
@@ -155,7 +157,7 @@ pub(super) fn tell(document: &ResultDocument, folder: &Path, printed: &Printed) 
             .map_or(PIPED, |(_, columns)| columns.into());
         match charts(folder, document, width) {
             Ok(text) => print(&text),
-            Err(error) => say("warning", format!("nothing could be drawn: {error}")),
+            Err(error) => say("warning", format!("no plot: {error}")),
         }
     }
     if printed.timings {
@@ -164,8 +166,7 @@ pub(super) fn tell(document: &ResultDocument, folder: &Path, printed: &Printed) 
     print(&format!("results in {}\n", folder.display()));
 }
 
-/// Fits a model and writes everything that the run leaves behind into a folder. An older run there
-/// stays as it is until the new one is complete.
+/// Fits a model and writes all files of the run. An older run in the folder stays unchanged until the new one is complete.
 pub(super) fn fit_into(
     folder: &OutputFolder,
     model: &Model,
@@ -217,7 +218,7 @@ pub(super) fn fit_into(
         analysis,
         report: report.elapsed().saturating_sub(writing),
     };
-    // A fit that was gone on with took longer than this clock saw.
+    // The time of a resumed fit includes its earlier parts.
     let total = (before.total + clock.elapsed()).max(around.sum() + found.elapsed);
     document.timings = TimingsSummary::new(&found, &around, total);
     stage.write(RESULT, &json(&document)).map_err(full)?;
@@ -229,12 +230,11 @@ pub(super) fn fit_into(
     Ok((document, status))
 }
 
-/// The fit; where a rule chooses the weight of the smoothness also the model with that weight and
-/// the path on which it was chosen.
+/// Runs the fit. If a rule chooses the penalty weight, also returns the model with that weight and the path of weights.
 pub(super) fn search(
     model: &Model,
     progress: &Progress,
-    keeper: Option<&mut dyn CheckpointStore>,
+    store: Option<&mut dyn CheckpointStore>,
 ) -> Result<(Option<Model>, Option<WeightPath>, Fit), String> {
     let start = model.problem.functions.start();
     let (mut ignore, mut show) = (
@@ -242,11 +242,11 @@ pub(super) fn search(
         |moment: &IterationEvent| progress.show(moment),
     );
     let mut watch = Observer::new(&mut ignore);
-    if progress.is_seen() {
+    if progress.is_visible() {
         watch = watch.looking(&mut show);
     }
-    if let Some(keeper) = keeper {
-        watch = watch.keeping(keeper);
+    if let Some(store) = store {
+        watch = watch.keeping(store);
     }
     let (problem, settings) = (&model.problem, &model.settings);
     let result = match &model.weight_rule {
@@ -266,16 +266,16 @@ pub(super) fn search(
         (Some(as_fitted), path, fit)
     });
     let result = result.or_else(|breakdown| {
-        let fit = without_motion(problem, &model.given_start, settings, breakdown)?;
+        let fit = no_response(problem, &model.given_start, settings, breakdown)?;
         Ok((None, None, fit))
     });
     result
         .map_err(|breakdown: SimulationError| format!("the start cannot be evaluated: {breakdown}"))
 }
 
-/// The predictions that the model asks for; one without a motion says so and harms no other.
+/// Predictions of the model file; a failed one has its reason.
 fn predictions(model: &Model, found: &Fit) -> Vec<Prediction> {
-    let device = &found.best.evaluation.device;
+    let device = &found.best.evaluation.nodal;
     let system = &model.problem.system;
     let one = |state: &State| {
         let motions = predict(system, device, model.truth.as_ref(), &[*state]);

@@ -8,19 +8,19 @@ use crate::report::shell_quoted;
 use crate::results::write_together;
 use std::path::{Component, Path, PathBuf};
 
-/// The schema that the comment in the first line of a model names.
+/// Schema file named by the comment in the first line of a model file.
 const SCHEMA: &str = "kmcfit.schema.json";
 
-/// Write a commented starter model for a table of readings: columns, units, grid, bases and start are
-/// found in the file.
+/// Write a commented model file for a record: columns, units, grid, bases and start values are taken from it.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit init record.csv --sample-rate 250")]
 pub struct Arguments {
-    /// The readings (CSV, or as an instrument wrote them).
+    /// Record (CSV or another text table).
     data: PathBuf,
-    /// The model file [default: beside the readings, with their name].
+    /// Model file [default: beside the record, with its name].
     #[arg(long, value_name = "MODEL")]
     out: Option<PathBuf>,
-    /// Readings per second, Hz, where the file has no column of times.
+    /// Sampling rate, Hz, if the file has no column of times.
     #[arg(long, value_name = "HZ")]
     sample_rate: Option<f64>,
 }
@@ -28,34 +28,36 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let rate = arguments.sample_rate;
     if let Some(rate) = rate.filter(|rate| !SAMPLE_RATES.contains(rate)) {
-        return Err(InputError::argument("--sample-rate", "no rate can be this")
-            .found(format!("{rate:?}"))
-            .expected(format!(
-                "samples per second, a number from {:e} to {:e}",
-                SAMPLE_RATES.start(),
-                SAMPLE_RATES.end()
-            ))
-            .into());
+        return Err(
+            InputError::argument("--sample-rate", "invalid sampling rate")
+                .found(format!("{rate:?}"))
+                .expected(format!(
+                    "samples per second, a number from {:e} to {:e}",
+                    SAMPLE_RATES.start(),
+                    SAMPLE_RATES.end()
+                ))
+                .into(),
+        );
     }
     let out = match &arguments.out {
         Some(out) => out.clone(),
         None => arguments.data.with_extension("yaml"),
     };
     if out.symlink_metadata().is_ok() {
-        return Err(InputError::file(&out, "there is such a file already")
+        return Err(InputError::file(&out, "the file exists already")
             .expected("another name: --out MODEL")
             .into());
     }
     let folder = out.parent().unwrap_or(Path::new(""));
     let starter = starter(&arguments.data, &named_from(folder, &arguments.data), rate)?;
-    // What was written must be what can be read.
+    // The written model must be readable.
     ModelFile::parse(&out, starter.text.as_str())?;
     let schema = folder.join(SCHEMA);
     let is_new = schema.symlink_metadata().is_err();
     let schema_text = schema::text();
     let mut files = vec![(out.as_path(), starter.text.as_str())];
     if is_new {
-        // The model last: while it is missing, the command can be given again.
+        // The model is written last: without it the command can be repeated.
         files.insert(0, (&schema, &schema_text));
     }
     write_together(&files).map_err(|error| unwritable(&out, &error))?;
@@ -64,15 +66,12 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         text += &format!("  {sentence}\n");
     }
     if is_new {
-        text += &format!(
-            "  {} is for editors: it completes and checks keys while you type\n",
-            schema.display()
-        );
+        text += &format!("  schema for editors: {}\n", schema.display());
     }
     let place = out.display();
     let argument = shell_quoted(&place.to_string());
     print(&format!(
-        "{text}the model is {place}; look at it, then\n  kmcfit check {argument} --no-gradient\n  \
+        "{text}Model {place}; review it, then run\n  kmcfit check {argument} --no-gradient\n  \
          kmcfit fit {argument}\n"
     ));
     Ok(OK)

@@ -8,11 +8,11 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock};
 
-/// The signal that came last, or 0.
+/// The last signal received, or 0.
 static RECEIVED: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
 
 /// A flag that Ctrl-C or SIGTERM sets. A second signal ends the process with its exit code, without waiting for the
-/// iteration; `kmcfit resume` then goes on from the last checkpoint.
+/// iteration; `kmcfit resume` then continues from the last checkpoint.
 pub fn flag() -> Arc<AtomicBool> {
     let is_set = Arc::new(AtomicBool::new(false));
     if let Err(error) = register(&is_set) {
@@ -42,8 +42,8 @@ fn register(is_set: &Arc<AtomicBool>) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether the process was started to ignore a signal (`trap '' TERM`), which it then goes on to do. Linux lists these signals in
-/// `/proc/self/status`; elsewhere none is known.
+/// True if the process was started with the signal ignored (`trap '' TERM`), by `/proc/self/status` on Linux; false on
+/// other systems.
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
@@ -59,12 +59,12 @@ pub fn exit_code() -> u8 {
     }
 }
 
-/// Says how interrupted work is continued.
+/// Notes the command that continues interrupted work.
 pub fn say_resumable(folder: &Path, what: &str) {
     let folder = folder.display();
     super::say(
         "note",
-        format!("`kmcfit resume {folder}` goes on with this {what}"),
+        format!("continue this {what} with `kmcfit resume {folder}`"),
     );
 }
 

@@ -1,4 +1,4 @@
-//! The command line: one file per command, no numerics.
+//! The command line, one file for each command.
 
 mod arguments;
 mod check;
@@ -30,9 +30,14 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Finds the time-varying mass, damping and stiffness of an oscillator from its measured motion.
+/// Identify time-varying mass, damping and stiffness of a vibrating system from measured records.
 #[derive(Debug, Parser)]
-#[command(version, about, max_term_width = 100)]
+#[command(
+    version,
+    about,
+    max_term_width = 100,
+    after_help = "Example:\n  kmcfit init record.csv      write a model file for the record\n  kmcfit fit record.yaml      fit it; results in runs/record\n\nExit status: 0 converged or completed, 2 invalid input, 3 not converged, 130 or 143 interrupted."
+)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -55,23 +60,23 @@ enum Command {
     Man(shell::Manual),
 }
 
-/// Everything is as asked for.
+/// Converged or completed.
 const OK: u8 = 0;
-/// The input cannot be used.
+/// Invalid input.
 const BAD_INPUT: u8 = 2;
-/// Ended otherwise than asked for; results are written.
+/// Not converged; results are written.
 const NOT_CONVERGED: u8 = 3;
-/// Interrupted by Ctrl-C; the best so far is written.
+/// Interrupted by Ctrl-C; the best point is written.
 const INTERRUPTED: u8 = 130;
-/// Ended by SIGTERM; the best so far is written.
+/// Interrupted by SIGTERM; the best point is written.
 const TERMINATED: u8 = 143;
 
-/// Why a command did not come to its end.
+/// Reason for which a command failed.
 #[derive(Debug)]
 enum Failure {
-    /// The input cannot be used.
+    /// Invalid input.
     Input(InputError),
-    /// Numerical trouble before there was a result, in one sentence.
+    /// Numerical failure before there was a result, as a sentence.
     Numerical(String),
 }
 
@@ -137,7 +142,7 @@ pub fn main() -> ExitCode {
 
 /// Prints the notes and warnings of a model.
 fn announce(model: &Model) {
-    model.remarks.iter().for_each(|remark| say("note", remark));
+    (model.automatic.iter()).for_each(|note| say("note", note));
     (model.warnings.iter()).for_each(|warning| say("warning", warning));
 }
 
@@ -153,8 +158,7 @@ fn exit_code(status: Status) -> u8 {
     }
 }
 
-/// The name of a model file without its ending, for a folder: never one that leads out of the folder
-/// above, as `..` does.
+/// Name of a model file without its extension, as the name of a folder; `run` for names such as `..`.
 fn stem(model: &Path) -> String {
     match model.file_stem().map(|stem| stem.to_string_lossy()) {
         Some(stem) if !stem.trim_matches('.').is_empty() => stem.into_owned(),
@@ -162,16 +166,16 @@ fn stem(model: &Path) -> String {
     }
 }
 
-/// The files that a command on a model reads: none of them may be replaced by its results.
+/// Files that a command on a model reads, which its results must not replace.
 fn inputs(file: &ModelFile) -> Vec<PathBuf> {
     let mut files = file.data_files();
     files.push(file.path.clone());
     files
 }
 
-/// A failure to write, as an input error about where the output should go.
+/// A failure to write as an error of the output folder.
 fn unwritable(path: &Path, error: &io::Error) -> InputError {
     InputError::argument("--out", "the results cannot be written")
         .found(format!("{}: {error}", path.display()))
-        .expected("a place that can be written to")
+        .expected("a writable folder")
 }

@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 static HAS_FAILED: AtomicBool = AtomicBool::new(false);
 
-/// Whether a result could not be printed.
+/// True if a result could not be printed.
 pub fn has_failed() -> bool {
     HAS_FAILED.load(Ordering::Relaxed)
 }
@@ -48,13 +48,13 @@ pub fn say(kind: &str, what: impl Display) {
     message(&format!("{kind}: {what}"));
 }
 
-/// Numerical trouble in one sentence.
+/// Prints a numerical failure.
 pub fn say_failed(reason: &str) {
     styled(&format!("{} {}", red("failed:"), harmless(reason)));
 }
 
-/// What is wrong with the input: the message, and below its first line the line of the file that
-/// it is about. Coloured on a terminal only, and not where `NO_COLOR` is set.
+/// Prints an input error: its message and, below the first line, the line of the file. Coloured on a terminal unless
+/// `NO_COLOR` is set.
 pub fn complain(error: &InputError) {
     let message = error.to_string();
     let message = harmless(&message);
@@ -71,7 +71,7 @@ pub fn complain(error: &InputError) {
     styled(&text);
 }
 
-/// Writes lines that are harmless already, and may have colours. A failure is ignored: it cannot be reported anywhere.
+/// Writes escaped lines, which may be coloured. A failure is ignored: it cannot be reported.
 fn styled(text: &str) {
     if faults::check(Operation::Write).is_ok() {
         let _ = io::stderr()
@@ -80,7 +80,7 @@ fn styled(text: &str) {
     }
 }
 
-/// Prints what clap says: help and version on standard output, mistakes on standard error. The exit code.
+/// Prints help and version to standard output, usage errors to standard error. Returns the exit code.
 pub fn print_usage(error: &clap::Error) -> u8 {
     let is_mistake = error.use_stderr();
     match error.print() {

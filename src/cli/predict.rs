@@ -3,21 +3,22 @@
 use super::{Failure, OK, print, unwritable};
 use crate::error::InputError;
 use crate::report::{
-    CsvTable, PredictedMotion, Run, figures, json, predict, prediction_table, render,
+    CsvTable, PredictedResponse, Run, figures, json, predict, prediction_table, render,
 };
 use crate::results::{Claim, OutputFolder};
 use kmcfit_core::internals::system::State;
 use std::path::PathBuf;
 
-/// Predict the free motion of a found device from other initial states.
+/// Predict the free response of an identified system from other initial states.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit predict runs/model --initial 3.3,1.0 --initial 0,2")]
 pub struct Arguments {
     /// Folder of a finished run.
     run: PathBuf,
-    /// Initial displacement (m, of a rotation rad) and velocity (m/s, rad/s); may be given again.
+    /// Initial displacement (m or rad) and velocity (m/s or rad/s); may be repeated.
     #[arg(long, value_name = "Y,V", required = true, allow_hyphen_values = true)]
     initial: Vec<String>,
-    /// Folder for the motions as a table and a figure.
+    /// Folder for the table and the figure of the responses.
     #[arg(long)]
     out: Option<PathBuf>,
     /// Print the predictions as JSON.
@@ -42,7 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         })
         .transpose()?;
     let motions = predict(&run.system, &run.device, run.truth.as_ref(), &states)
-        .map_err(|breakdown| Failure::Numerical(format!("no motion: {breakdown}")))?;
+        .map_err(|breakdown| Failure::Numerical(format!("no response: {breakdown}")))?;
     if let Some(folder) = folder {
         let unit = if run.document.is_rotation() {
             "rad"
@@ -71,26 +72,22 @@ fn state(text: &str) -> Result<State, InputError> {
             displacement,
             velocity,
         }),
-        _ => Err(
-            InputError::argument("--initial", "this is no initial state")
-                .found(format!("`{text}`"))
-                .expected(
-                    "two numbers: displacement in m, velocity in m/s, as in --initial 3.4,1.1",
-                ),
-        ),
+        _ => Err(InputError::argument("--initial", "invalid initial state")
+            .found(format!("`{text}`"))
+            .expected("two numbers: displacement in m, velocity in m/s, as in --initial 3.4,1.1")),
     }
 }
 
 fn write(
     folder: &OutputFolder,
     times: &[f64],
-    motions: &[PredictedMotion],
+    motions: &[PredictedResponse],
     unit: &str,
 ) -> std::io::Result<()> {
     let mut table = CsvTable::new().column("t_s", times.to_vec());
     for (i, motion) in motions.iter().enumerate() {
         let header = format!("y_{unit}_{}", i + 1);
-        table = table.column(header, motion.motion.displacement.clone());
+        table = table.column(header, motion.response.displacement.clone());
         if let Some(truth) = &motion.truth {
             table = table.column(
                 format!("true_y_{unit}_{}", i + 1),

@@ -1,22 +1,22 @@
-//! A progress line on a terminal, nothing elsewhere.
+//! Progress line of a fit, on a terminal only.
 
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use kmcfit_core::internals::solvers::{IterationEvent, Stopping};
 use std::cell::Cell;
 use std::time::Duration;
 
-/// The line: iteration, cost and gradient, violation of the constraints, start strategy, time left.
+/// Progress line: iteration, cost ratio, gradient ratio, constraint violation, start strategy, remaining time.
 pub struct Progress {
     bar: ProgressBar,
     /// Wall-clock limit.
     limit: Option<Duration>,
-    /// Searches that were begun, and the last iteration that was shown.
+    /// Number of searches started, and the last iteration shown.
     searches: Cell<u32>,
     last: Cell<u64>,
 }
 
 impl Progress {
-    /// A line for a run that stops by these rules; hidden where standard error is no terminal.
+    /// A line for these stopping tests; hidden if standard error is not a terminal.
     pub fn new(stopping: &Stopping) -> Self {
         let bar = ProgressBar::new(stopping.iterations);
         let template = "{prefix}{bar:24} {pos}/{len}  {msg}";
@@ -37,8 +37,8 @@ impl Progress {
         self
     }
 
-    /// Whether anybody sees it.
-    pub fn is_seen(&self) -> bool {
+    /// True on a terminal.
+    pub fn is_visible(&self) -> bool {
         !self.bar.is_hidden()
     }
 
@@ -52,28 +52,29 @@ impl Progress {
         }
         self.bar.set_position(row.iteration);
         let message = message(moment, self.searches.get());
-        // Of the first iterations nobody knows what the others will take.
-        let left = self.left();
-        self.bar.set_message(match left >= Duration::from_secs(1) {
-            true => format!("{message}  {} left at most", HumanDuration(left)),
-            false => message,
-        });
+        // The first iterations give no estimate of the remaining time.
+        let remaining = self.remaining();
+        self.bar
+            .set_message(match remaining >= Duration::from_secs(1) {
+                true => format!("{message}  at most {} remaining", HumanDuration(remaining)),
+                false => message,
+            });
     }
 
-    /// What the iterations or the wall clock leave, whichever ends first.
-    fn left(&self) -> Duration {
+    /// Remaining time by the iteration limit or the time limit, whichever is shorter.
+    fn remaining(&self) -> Duration {
         let by_iterations = self.bar.eta();
         let by_clock = self.limit.map(|l| l.saturating_sub(self.bar.elapsed()));
         by_clock.map_or(by_iterations, |left| left.min(by_iterations))
     }
 
-    /// Takes the line away.
+    /// Removes the line.
     pub fn clear(&self) {
         self.bar.finish_and_clear();
     }
 }
 
-/// What is said of an iteration of the search `number`; of the first one not where it started.
+/// Text of an iteration of search `number`, with its start strategy from the second search on.
 fn message(moment: &IterationEvent, number: u32) -> String {
     let IterationEvent {
         row,

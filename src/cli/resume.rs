@@ -8,18 +8,19 @@ use crate::results::{self, COMPARE_JOURNAL, FitJournal, STUDY_JOURNAL};
 use kmcfit_core::internals::solvers::Status;
 use std::path::PathBuf;
 
-/// Go on with a fit, study or comparison that was killed or interrupted, to the same bits.
+/// Resume an interrupted fit, study or comparison; the results are those of an uninterrupted run.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit resume runs/model")]
 pub struct Arguments {
-    /// Its folder.
+    /// Folder of the run.
     folder: PathBuf,
     /// Print the result document instead of the summary.
     #[arg(long)]
     json: bool,
-    /// Draw readings, fit and functions of a fit in the terminal.
+    /// Plot record, fit and functions in the terminal.
     #[arg(long, conflicts_with = "json")]
     plot: bool,
-    /// Threads of a study; the results do not depend on them [default: one per core].
+    /// Number of threads of a study; results do not depend on it [default: one per core].
     #[arg(long)]
     threads: Option<usize>,
 }
@@ -27,16 +28,16 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let folder = &arguments.folder;
     if !folder.is_dir() {
-        return Err(InputError::file(folder, "there is no such folder")
-            .expected("the folder of a fit, study or comparison that did not come to its end")
+        return Err(InputError::file(folder, "no such folder")
+            .expected("the folder of an unfinished fit, study or comparison")
             .into());
     }
     results::complete(folder)?;
     if folder.join(STUDY_JOURNAL).exists() {
-        return study::go_on(folder, arguments.json, arguments.threads);
+        return study::resume(folder, arguments.json, arguments.threads);
     }
     if folder.join(COMPARE_JOURNAL).exists() {
-        return compare::go_on(folder, arguments.json);
+        return compare::resume(folder, arguments.json);
     }
     let printed = Printed {
         json: arguments.json,
@@ -44,27 +45,22 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         plot: arguments.plot,
     };
     if let Some(heading) = FitJournal::heading(folder)? {
-        return fit::go_on(folder, &heading, &printed);
+        return fit::resume(folder, &heading, &printed);
     }
     finished(arguments, &printed)
 }
 
-/// What was finished before is told again.
+/// Prints the results of a finished run.
 fn finished(arguments: &Arguments, printed: &Printed) -> Result<u8, Failure> {
     let folder = &arguments.folder;
     if !folder.join("result.json").exists() {
-        return Err(
-            InputError::file(folder, "there is nothing to go on with in this folder")
-                .expected("the folder of a fit, study or comparison that did not come to its end")
-                .into(),
-        );
+        return Err(InputError::file(folder, "no unfinished run in this folder")
+            .expected("the folder of an unfinished fit, study or comparison")
+            .into());
     }
     let run = Run::open(folder)?;
-    say(
-        "note",
-        "nothing is left to do: this run had come to its end",
-    );
-    fit::tell(&run.document, folder, printed);
+    say("note", "this run is finished; nothing to resume");
+    fit::print_results(&run.document, folder, printed);
     Ok(match run.document.outcome.status {
         Status::Interrupted => INTERRUPTED,
         status => exit_code(status),

@@ -4,8 +4,9 @@ use super::{Failure, OK, print};
 use crate::config::keys;
 use crate::report::json;
 
-/// Print the JSON schema (draft 07) of model files, for editors that complete and check them.
+/// Print the JSON schema (draft 07) of model files, for completion and checks in editors.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit schema > kmcfit.schema.json")]
 pub struct Arguments {}
 
 pub fn run(_: &Arguments) -> Result<u8, Failure> {

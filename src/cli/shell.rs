@@ -6,18 +6,20 @@ use clap_complete::Shell;
 use clap_mangen::Man;
 use std::io;
 
-/// Print the script that lets a shell complete commands and options.
-///
-/// For bash: kmcfit completions bash > ~/.local/share/bash-completion/completions/kmcfit
+/// Print a completion script for a shell.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  kmcfit completions bash > ~/.local/share/bash-completion/completions/kmcfit"
+)]
 pub struct Completions {
-    /// The shell.
+    /// Shell.
     #[arg(value_enum)]
     shell: Shell,
 }
 
-/// Print the manual page (roff): kmcfit man > kmcfit.1
+/// Print the manual page in roff format.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit man > kmcfit.1")]
 pub struct Manual {}
 
 pub fn completions(arguments: &Completions) -> Result<u8, Failure> {

@@ -1,7 +1,7 @@
 //! `kmcfit simulate`
 
 use super::{Failure, OK, Overrides, inputs, print, say, unwritable};
-use crate::config::{ModelFile, Purpose, build};
+use crate::config::{BuildMode, ModelFile, build};
 use crate::digest::{digest, digest_of_file};
 use crate::error::InputError;
 use crate::input::{one_of, quote, read_text};
@@ -15,13 +15,15 @@ use serde::{Deserialize, Serialize};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Compute the motion of a model's device (its fixed and start values) and write it as readings.
+/// Simulate a model with its fixed and start values; write the response as a record.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  kmcfit simulate model.yaml --noise 0.01 --seed 1 --out record.csv"
+)]
 pub struct Arguments {
     /// Model file (YAML).
     model: PathBuf,
-    /// CSV file for the readings; how they were made goes to OUT.json beside it [default: standard
-    /// output].
+    /// CSV file for the record; OUT.json has its origin [default: standard output].
     #[arg(long)]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -29,7 +31,7 @@ pub struct Arguments {
     /// Number of nodes instead of the model's.
     #[arg(long)]
     nodes: Option<usize>,
-    /// Standard deviation of Gaussian noise on the readings, m.
+    /// Standard deviation of added Gaussian noise, m.
     #[arg(
         long,
         value_name = "SIGMA",
@@ -47,7 +49,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let file = arguments.set.read(&arguments.model)?;
-    let purpose = Purpose::Simulate {
+    let purpose = BuildMode::Simulate {
         nodes: arguments.nodes,
     };
     let problem = build(&file, purpose)?.problem;
@@ -56,21 +58,21 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         check_place(out, &file)?;
     }
     let experiment = chosen(arguments, &problem.experiments)?;
-    if experiment.sought != [None; 2] {
+    if experiment.initial_parameters != [None; 2] {
         return Err(file
             .error_at(
                 "experiments",
-                "the initial state is to be estimated, so it is not known",
+                "the initial state is estimated; a simulation needs its values",
             )
             .found(format!("`estimate` in `{}`", experiment.name))
             .expected("an experiment with an initial state in numbers")
             .into());
     }
-    let mut device = problem.functions.empty_device();
+    let mut device = problem.functions.empty_nodal();
     let start = problem.start();
     problem
         .functions
-        .device_into(&start, experiment.device, &mut device);
+        .nodal_into(&start, experiment.coefficient_set, &mut device);
     let motion = problem
         .system
         .forward(&device, experiment.initial, experiment.excitation.as_ref())
@@ -133,13 +135,13 @@ fn check_place(out: &Path, file: &ModelFile) -> Result<(), InputError> {
     match is_taken(out) || is_taken(&beside) {
         true if !is_own(out, &beside) => Err(InputError::argument(
             "--out",
-            "a file stands here that was not written by `kmcfit simulate`, or was changed since",
+            "the file exists, and is not an unchanged output of `kmcfit simulate`",
         )
         .found(match is_taken(out) {
             true => out.display().to_string(),
             false => beside.display().to_string(),
         })
-        .expected("a new file, or one that this command wrote with its record beside it")),
+        .expected("a new file, or an unchanged output of this command with its OUT.json")),
         _ => Ok(()),
     }
 }
@@ -228,7 +230,7 @@ fn noise(arguments: &Arguments) -> Result<Option<Noise>, InputError> {
     match (arguments.noise, arguments.seed) {
         (Some(sigma), _) if !(sigma.is_finite() && sigma >= 0.0) => Err(InputError::argument(
             "--noise",
-            "a standard deviation cannot be this",
+            "invalid standard deviation",
         )
         .found(sigma)
         .expected("a finite number, 0 or greater, in m")),
@@ -251,7 +253,7 @@ fn chosen<'a>(
     };
     found.ok_or_else(|| {
         let names = experiments.iter().map(|e| e.name.as_str());
-        InputError::argument("--experiment", "the model has no such experiment")
+        InputError::argument("--experiment", "no such experiment in the model")
             .found(quote(arguments.experiment.as_deref().unwrap_or_default()))
             .expected(one_of(names))
     })

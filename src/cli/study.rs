@@ -1,20 +1,21 @@
 //! `kmcfit study`
 
-use super::compare::{open_analyses, tell};
+use super::compare::{open_analyses, run_sequence};
 use super::fit::search;
 use super::progress::Progress;
 use super::{
     Failure, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, say, stem,
     unwritable,
 };
-use crate::config::{Model, ModelFile, Override, Purpose, Sequence, build};
+use crate::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
 use crate::error::InputError;
-use crate::report::study::{self, FitPiece, Optimum, StudyDocument};
+use crate::report::study::{
+    self, AnalysisFailure, Optimum, StudiedFit, StudyDocument, structural_rank,
+};
 use crate::report::{Run, json};
 use crate::results::{
     AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, STUDY_JOURNAL,
 };
-use kmcfit_core::internals::identifiability::count;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{CheckpointStore, Status};
@@ -25,8 +26,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What the data can and cannot tell: of a model, or a sequence of several models on one page.
+/// Analyse what the records determine: profiles, extremes, equivalent systems, next experiments.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit study model.yaml --threads 4")]
 pub struct Arguments {
     /// Model file or sequence (YAML), or the folder of a finished run, whose model is fitted again.
     model: PathBuf,
@@ -38,7 +40,7 @@ pub struct Arguments {
     /// Print the result document instead of the summary.
     #[arg(long)]
     json: bool,
-    /// Threads; the results do not depend on them [default: one per core].
+    /// Number of threads; results do not depend on it [default: one per core].
     #[arg(long)]
     threads: Option<usize>,
 }
@@ -50,7 +52,6 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         .clone()
         .unwrap_or_else(|| PathBuf::from("runs").join(format!("{}-study", stem(&arguments.model))));
     if arguments.model.is_dir() {
-        // A run of another format, or one that failed, is refused here.
         let run = Run::open(&arguments.model)?;
         let mut overrides = Override::parse_all(&run.document.model.overrides)?;
         overrides.extend(arguments.set.parse()?);
@@ -59,10 +60,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     }
     match Sequence::read(&arguments.model)? {
         Some(sequence) => {
-            arguments
-                .set
-                .refuse("a sequence, whose models say themselves what they are")?;
-            tell(&arguments.model, &sequence, &out, arguments.json, false)
+            arguments.set.refuse("a sequence")?;
+            run_sequence(&arguments.model, &sequence, &out, arguments.json, false)
         }
         None => {
             let file = arguments.set.read(&arguments.model)?;
@@ -71,15 +70,15 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     }
 }
 
-/// Goes on with a study or a sequence that did not come to its end.
-pub(super) fn go_on(folder: &Path, as_json: bool, asked: Option<usize>) -> Result<u8, Failure> {
+/// Resumes an unfinished study or sequence.
+pub(super) fn resume(folder: &Path, as_json: bool, asked: Option<usize>) -> Result<u8, Failure> {
     let threads = threads(asked)?;
     let Heading {
         inputs, overrides, ..
     } = AnalysisJournal::heading(folder, STUDY_JOURNAL)?;
     let model = inputs.into_iter().next().unwrap_or_default();
     match Sequence::read(&model)? {
-        Some(sequence) => tell(&model, &sequence, folder, as_json, true),
+        Some(sequence) => run_sequence(&model, &sequence, folder, as_json, true),
         None => {
             let file = ModelFile::read_with(&model, &Override::parse_all(&overrides)?)?;
             run_in(&file, folder, as_json, threads, true)
@@ -89,9 +88,11 @@ pub(super) fn go_on(folder: &Path, as_json: bool, asked: Option<usize>) -> Resul
 
 fn threads(asked: Option<usize>) -> Result<usize, InputError> {
     match asked {
-        Some(0) => Err(InputError::argument("--threads", "a study needs a thread")
-            .found(0)
-            .expected("1 or more")),
+        Some(0) => Err(
+            InputError::argument("--threads", "invalid number of threads")
+                .found(0)
+                .expected("1 or more"),
+        ),
         Some(threads) => Ok(threads),
         None => Ok(std::thread::available_parallelism().map_or(1, usize::from)),
     }
@@ -102,9 +103,9 @@ fn run_in(
     out: &Path,
     as_json: bool,
     threads: usize,
-    go_on: bool,
+    is_resumed: bool,
 ) -> Result<u8, Failure> {
-    let mut model = build(file, Purpose::Fit)?;
+    let mut model = build(file, BuildMode::Fit)?;
     can_be_studied(file, &model)?;
     model.check_study_memory()?;
     announce(&model);
@@ -115,12 +116,12 @@ fn run_in(
         .journals(&[STUDY_JOURNAL, FIT_JOURNAL, CHECKPOINT])
         .inputs(inputs(file));
     let folder = OutputFolder::prepare(out, claim)?;
-    let journal = open_analyses(&folder, STUDY_JOURNAL, &heading, go_on)?;
-    let mut work = Work {
+    let journal = open_analyses(&folder, STUDY_JOURNAL, &heading, is_resumed)?;
+    let mut work = StudyRun {
         model: &model,
         folder: folder.path(),
         heading: Heading::of_model("study", file, false, None),
-        go_on,
+        is_resumed,
         journal,
         flag,
         threads: model.threads_within_memory(threads),
@@ -131,15 +132,15 @@ fn run_in(
             status: "interrupted".into(),
             confidence: model.study.confidence,
             seed: model.study.seed,
-            before: count(&model.problem).sentences(),
+            structural_rank: structural_rank(&model.problem),
             ..StudyDocument::default()
         },
     };
     let done = match work.run() {
         Ok(()) => true,
-        Err(Trouble::Interrupted) => false,
-        Err(Trouble::Disk(error)) => return Err(unwritable(folder.path(), &error).into()),
-        Err(Trouble::Numerical(reason)) => return Err(Failure::Numerical(reason)),
+        Err(StudyError::Interrupted) => false,
+        Err(StudyError::Disk(error)) => return Err(unwritable(folder.path(), &error).into()),
+        Err(StudyError::Numerical(reason)) => return Err(Failure::Numerical(reason)),
     };
     let mut document = work.document;
     if done {
@@ -154,7 +155,7 @@ fn run_in(
         false => {
             print(&document.text());
             print(&format!(
-                "\nthe page is {}\n",
+                "\nPage   {}\n",
                 folder.path().join("study.html").display()
             ));
         }
@@ -166,65 +167,62 @@ fn run_in(
     })
 }
 
-/// A study is of a simulated motion.
+/// Checks that the fit simulates a response and has parameters.
 fn can_be_studied(file: &ModelFile, model: &Model) -> Result<(), InputError> {
     use kmcfit_core::internals::solvers::Solver;
     match model.settings.solver {
         Solver::EquationError => Err(file
             .error_at(
                 "fit.method",
-                "a fit of the equation error cannot be studied",
+                "`study` needs a fit of the simulated response",
             )
-            .found("`equation-error`, which simulates no motion")
+            .found("`equation-error`")
             .expected("another method")),
         _ if model.problem.parameters() == 0 => Err(file
-            .error_at(
-                "functions",
-                "there is nothing to study: every function is fixed",
-            )
+            .error_at("functions", "nothing to study: every function is fixed")
             .expected("at least one function with a basis")),
         _ => Ok(()),
     }
 }
 
-/// The journal of the fit of a study; a fit without one begins again when it is gone on with.
-fn fit_journal(folder: &Path, heading: &Heading, go_on: bool) -> Option<FitJournal> {
-    let before = go_on.then(|| FitJournal::resume(folder, heading));
+/// The journal of the fit within a study. A resumed study without one starts its fit over.
+fn fit_journal(folder: &Path, heading: &Heading, is_resumed: bool) -> Option<FitJournal> {
+    let before = is_resumed.then(|| FitJournal::resume(folder, heading));
     match before {
         Some(Ok(journal)) => Some(journal),
         _ => FitJournal::begin(folder, heading).ok(),
     }
 }
 
-/// Why a study cannot go on.
-enum Trouble {
+/// Reason for which a study ends early.
+enum StudyError {
     Interrupted,
     Disk(io::Error),
     Numerical(String),
 }
 
-impl From<io::Error> for Trouble {
+impl From<io::Error> for StudyError {
     fn from(error: io::Error) -> Self {
-        Trouble::Disk(error)
+        StudyError::Disk(error)
     }
 }
 
-/// A study at work.
-struct Work<'a> {
+/// A running study.
+struct StudyRun<'a> {
     model: &'a Model,
     folder: &'a Path,
-    /// Of the journal of the fit.
+    /// Heading of the journal of the fit.
     heading: Heading,
-    go_on: bool,
+    is_resumed: bool,
     journal: AnalysisJournal,
     flag: Arc<AtomicBool>,
     threads: usize,
     document: StudyDocument,
 }
 
-impl Work<'_> {
+impl StudyRun<'_> {
     /// All analyses, up to an interrupt.
-    fn run(&mut self) -> Result<(), Trouble> {
+    fn run(&mut self) -> Result<(), StudyError> {
         let (problem, theta, evaluation) = self.fit()?;
         let at = Optimum {
             problem: &problem,
@@ -236,11 +234,11 @@ impl Work<'_> {
         self.extremes(at)
     }
 
-    /// Analyses of the linearised fit and of one number at a time.
-    fn at_the_optimum(&mut self, at: Optimum) -> Result<(), Trouble> {
+    /// Analyses of the linearised fit, profiles, candidate experiments and equivalent systems.
+    fn at_the_optimum(&mut self, at: Optimum) -> Result<(), StudyError> {
         let model = self.model;
         let plan = &model.study;
-        self.document.spectrum = Some(self.analysis("spectrum", || study::spectrum(at))?);
+        self.document.sensitivity = Some(self.analysis("sensitivity", || study::sensitivity(at))?);
         let bands = || study::bands(at, plan, model.truth.as_ref());
         self.document.bands = Some(self.analysis("bands", bands)?);
         for (i, target) in plan.profiles.iter().enumerate() {
@@ -249,107 +247,112 @@ impl Work<'_> {
             };
             let profile = || study::profile_of(at, &of, plan);
             let found = self.analysis(&format!("profile {i}"), profile)?;
-            let found = self.or_fail(&format!("the profile of {}", of.name), found);
+            let found = self.or_fail(&format!("profile of {}", of.name), found);
             self.document.profiles.extend(found);
         }
         if !plan.candidates.is_empty() {
             let candidates = || study::candidates(at, &plan.candidates);
             self.document.candidates = self.analysis("candidates", candidates)?;
         }
-        let equivalents = || study::equivalents(at, &plan.equivalents);
-        self.document.equivalents = self.analysis("equivalents", equivalents)?;
+        let equivalent = || study::equivalent(at, &plan.equivalent_systems);
+        self.document.equivalent_systems = self.analysis("equivalent systems", equivalent)?;
         Ok(())
     }
 
-    /// Further fits: from other starting points, of constant functions, of other noise.
-    fn further_fits(&mut self, at: Optimum) -> Result<(), Trouble> {
+    /// Further fits: from random starting points, with constant functions, of resampled records.
+    fn further_fits(&mut self, at: Optimum) -> Result<(), StudyError> {
         let (model, threads) = (self.model, self.threads);
         let plan = &model.study;
         if plan.starts > 0 {
             let starts = || study::starts(model, at, threads);
             self.document.multistart = Some(self.analysis("starts", starts)?);
         }
-        if plan.varies {
-            let found = self.analysis("varies", || study::varies(at, plan, threads))?;
-            let found = self.or_fail("whether each function varies", found);
-            self.document.varies = found.unwrap_or_default();
+        if plan.constancy_test {
+            let test = || study::constancy_test(at, plan, threads);
+            let found = self.analysis("constancy test", test)?;
+            let found = self.or_fail("constancy test", found);
+            self.document.constancy_test = found.unwrap_or_default();
         }
         if plan.replicates > 0 {
-            let found = self.analysis("refits", || study::refits(at, plan, threads))?;
-            self.document.bootstrap = self.or_fail("refits", found).unwrap_or_default();
+            let found = self.analysis("bootstrap", || study::refits(at, plan, threads))?;
+            self.document.bootstrap = self.or_fail("bootstrap", found).unwrap_or_default();
         }
         Ok(())
     }
 
     /// Extremes of the functions, and the predictions of the systems that have them.
-    fn extremes(&mut self, at: Optimum) -> Result<(), Trouble> {
+    fn extremes(&mut self, at: Optimum) -> Result<(), StudyError> {
         let (model, threads) = (self.model, self.threads);
-        let (tubes, predictions) = self.analysis("tubes", || study::tubes(model, at, threads))?;
-        if tubes.is_empty() {
-            let reason = "the optimum itself is not within the stated level and the constraints";
-            self.fail("tubes", reason);
+        let compute = || study::extremes(model, at, threads);
+        let (extremes, predictions) = self.analysis("extremes", compute)?;
+        if extremes.is_empty() {
+            let reason = "the optimum violates the misfit limit or the constraints";
+            self.fail("extremes", reason);
         }
-        self.document.tubes = tubes;
-        self.document.budgeted = !at.problem.penalties.is_empty();
+        self.document.extremes = extremes;
+        self.document.roughness_limited = !at.problem.penalties.is_empty();
         self.document.predictions = predictions;
         Ok(())
     }
 
-    /// One analysis: from the journal, or computed now. An interrupt may have cut it short; then it is not kept.
+    /// Result of one analysis, from the journal or computed. The result of an interrupted analysis is discarded.
     fn analysis<T: Serialize + DeserializeOwned>(
         &mut self,
         name: &str,
         compute: impl FnOnce() -> T,
-    ) -> Result<T, Trouble> {
+    ) -> Result<T, StudyError> {
         let flag = Arc::clone(&self.flag);
         let whole = || !flag.load(Ordering::Relaxed);
         if !whole() {
-            return Err(Trouble::Interrupted);
+            return Err(StudyError::Interrupted);
         }
         if io::stderr().is_terminal() {
-            say("studying", name);
+            say("study", name);
         }
         let found = self.journal.analysis(name, compute, whole)?;
-        found.ok_or(Trouble::Interrupted)
+        found.ok_or(StudyError::Interrupted)
     }
 
-    /// The result of an analysis, or a note of its failure.
+    /// The result of an analysis; its failure is noted in the document.
     fn or_fail<T>(&mut self, what: &str, found: Result<T, String>) -> Option<T> {
         found.map_err(|reason| self.fail(what, &reason)).ok()
     }
 
     fn fail(&mut self, what: &str, reason: &str) {
-        self.document.failures.push(format!("{what}: {reason}"));
+        self.document.failures.push(AnalysisFailure {
+            analysis: what.to_owned(),
+            reason: reason.to_owned(),
+        });
     }
 
-    /// The fit, from the journal if it is there.
-    fn fit(&mut self) -> Result<(Problem, Vec<f64>, Evaluation), Trouble> {
+    /// The fit, from the journal or computed.
+    fn fit(&mut self) -> Result<(Problem, Vec<f64>, Evaluation), StudyError> {
         let model = self.model;
         let progress = Progress::new(&model.settings.stopping);
-        let (folder, heading, go_on) = (self.folder, &self.heading, self.go_on);
+        let (folder, heading, is_resumed) = (self.folder, &self.heading, self.is_resumed);
         let flag = Arc::clone(&self.flag);
         let mut interrupted = None;
         let compute = || {
-            let mut keeper = fit_journal(folder, heading, go_on);
+            let mut keeper = fit_journal(folder, heading, is_resumed);
             let keeper = keeper.as_mut().map(|k| k as &mut dyn CheckpointStore);
             let (weighted, _, found) = search(model, &progress, keeper)?;
             let problem = weighted.as_ref().map_or(&model.problem, |m| &m.problem);
-            let fit = FitPiece::of(problem, &found);
+            let fit = StudiedFit::of(problem, &found);
             interrupted = Some(fit.clone());
             Ok::<_, String>(fit)
         };
         let whole = || !flag.load(Ordering::Relaxed);
-        let is_right = |kept: &Result<FitPiece, String>| {
+        let is_right = |kept: &Result<StudiedFit, String>| {
             kept.as_ref().map_or(true, |fit| fit.is_of(&model.problem))
         };
         self.journal.forget_unless("fit", is_right);
         let fitted = self.journal.analysis("fit", compute, whole)?;
         let Some(fitted) = fitted else {
-            // The best so far is told, and the journal of the fit has what it goes on from.
+            // The document has the best point; the journal of the fit has its checkpoint.
             self.document.fit = interrupted;
-            return Err(Trouble::Interrupted);
+            return Err(StudyError::Interrupted);
         };
-        let fit = fitted.map_err(Trouble::Numerical)?;
+        let fit = fitted.map_err(StudyError::Numerical)?;
         FitJournal::clear(folder)?;
         let interrupted = fit.status == Status::Interrupted;
         let problem = fit.problem(&model.problem);
@@ -357,9 +360,9 @@ impl Work<'_> {
         self.document.fit = Some(fit);
         let evaluation = problem
             .evaluate(&theta)
-            .map_err(|breakdown| Trouble::Numerical(breakdown.to_string()))?;
+            .map_err(|breakdown| StudyError::Numerical(breakdown.to_string()))?;
         match interrupted {
-            true => Err(Trouble::Interrupted),
+            true => Err(StudyError::Interrupted),
             false => Ok((problem, theta, evaluation)),
         }
     }

@@ -90,7 +90,7 @@ impl Failure<'_> {
 
     /// More than one document in a file.
     fn several_documents(&self, at: Position) -> InputError {
-        InputError::new(place(self.file, at), "a second document begins here")
+        InputError::new(place(self.file, at), "second YAML document")
             .found("two documents in one file")
             .expected("one model per file")
             .hint("remove the line `---` and what follows, or put it into a file of its own")

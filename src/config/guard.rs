@@ -57,7 +57,7 @@ pub(super) fn check(file: &Path, text: &str) -> Result<(), InputError> {
             file,
             format!("the file is longer than {LONGEST_MODEL} bytes"),
         )
-        .hint("put readings into CSV files"));
+        .hint("put samples into CSV files"));
     }
     check_brackets(file, text)?;
     check_anchors(file, text)?;
@@ -92,14 +92,14 @@ fn check_expansion(file: &Path, text: &str) -> Result<(), InputError> {
         None => (passed, String::new()),
     };
     Err(
-        InputError::new(place(file, at), "the aliases stand for too long a text")
+        InputError::new(place(file, at), "the aliases expand to too long a text")
             .found(format!(
                 "more than {LONGEST} bytes with all aliases written out{which}"
             ))
             .expected(format!(
                 "at most {LONGEST} bytes with all aliases written out"
             ))
-            .hint("put readings and long lists into CSV files"),
+            .hint("put samples and long lists into CSV files"),
     )
 }
 
@@ -143,16 +143,14 @@ fn check_anchors(file: &Path, text: &str) -> Result<(), InputError> {
     for (index, name) in names(text, '&') {
         let here = Position::of(text, index);
         if let Some(first) = seen.insert(name, here) {
-            return Err(
-                InputError::new(place(file, here), "an anchor is given twice")
-                    .found(format!(
-                        "{} again; it is first given in line {}",
-                        quote(&format!("&{name}")),
-                        first.line
-                    ))
-                    .expected("every anchor once")
-                    .hint("rename one of them"),
-            );
+            return Err(InputError::new(place(file, here), "duplicate anchor")
+                .found(format!(
+                    "{} again; it is first given in line {}",
+                    quote(&format!("&{name}")),
+                    first.line
+                ))
+                .expected("every anchor once")
+                .hint("rename one of them"));
         }
     }
     Ok(())

@@ -1,9 +1,9 @@
 //! Keys of a model file: meaning, kind of value, unit, default and an example of each.
 //!
-//! `keys!` (`map.rs`) declares the struct that reads a map together with this documentation, so that the reader,
-//! `kmcfit explain` and the JSON schema cannot disagree.
+//! `keys!` (`map.rs`) declares the struct that reads a map together with this documentation, from which `kmcfit explain` and
+//! the JSON schema are generated.
 
-/// What may stand behind a key.
+/// Type of a value.
 #[derive(Debug, Clone, Copy)]
 pub enum Kind {
     /// The version of the file format: 1.
@@ -12,15 +12,15 @@ pub enum Kind {
     Number,
     /// An integer, 0 or more.
     Count,
-    /// A text that is not empty.
+    /// A non-empty text.
     Text,
     /// `true` or `false`.
     Bool,
     /// A column of a file, by its name or its number from 1.
     Column,
-    /// One word.
+    /// One fixed word.
     Word(&'static str),
-    /// One of these words, each with what it means.
+    /// One of these words, each with its meaning.
     Choice(&'static [(&'static str, &'static str)]),
     /// A map with these keys.
     Map(&'static Group),
@@ -30,38 +30,38 @@ pub enum Kind {
     AnyOf(&'static [Kind]),
 }
 
-/// Keys that stand together in one map.
+/// Keys of one map.
 #[derive(Debug)]
 pub struct Group {
     /// Its name in the schema.
     pub name: &'static str,
-    /// What the map says, in one sentence.
+    /// Meaning of the map, as a sentence.
     pub text: &'static str,
     /// Its keys, in the order of the reader.
     pub keys: &'static [Key],
 }
 
-/// One key.
+/// A key.
 #[derive(Debug)]
 pub struct Key {
-    /// As it is written.
+    /// Name in the file.
     pub name: &'static str,
-    /// What may stand behind it.
+    /// Type of its value.
     pub kind: Kind,
-    /// What it says.
+    /// Meaning.
     pub text: &'static str,
-    /// What may be written behind it.
+    /// Example of a value.
     pub example: &'static str,
-    /// The unit, where it has one.
+    /// Unit, if it has one.
     pub unit: Option<&'static str>,
-    /// What holds without it, where something does.
+    /// Default, if it has one.
     pub default: Option<&'static str>,
-    /// Whether it must be there.
+    /// True for a required key.
     pub required: bool,
 }
 
 impl Kind {
-    /// The maps that may stand here, those in lists included.
+    /// Maps among the values of this type, those in lists included.
     pub fn groups(self) -> Vec<&'static Group> {
         match self {
             Kind::Map(group) => vec![group],

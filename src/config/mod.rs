@@ -25,7 +25,7 @@ mod syntax;
 mod value;
 
 pub use build::{
-    Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation, Purpose, StudyPlan,
+    BuildMode, Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation, StudyPlan,
     StudyTarget, WeightSearch, build,
 };
 pub use model_file::ModelFile;

@@ -37,7 +37,7 @@ impl ModelFile {
     ///
     /// # Errors
     ///
-    /// When there is no such file, its path or its content is not UTF-8 text, or
+    /// When no such file, its path or its content is not UTF-8 text, or
     /// [`parse`](Self::parse) finds a mistake.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
         let path = path.as_ref();
@@ -141,7 +141,7 @@ impl ModelFile {
         };
         if model.spec.experiments.is_empty() {
             return Err(model
-                .error_at("experiments", "there is no experiment")
+                .error_at("experiments", "no experiment")
                 .found("an empty list")
                 .expected("at least one experiment"));
         }
@@ -149,7 +149,7 @@ impl ModelFile {
         if experiments > MOST_EXPERIMENTS {
             let key = format!("experiments[{MOST_EXPERIMENTS}]");
             return Err(model
-                .error_at(&key, "there are too many experiments")
+                .error_at(&key, "too many experiments")
                 .found(experiments)
                 .expected(format!("at most {MOST_EXPERIMENTS}")));
         }

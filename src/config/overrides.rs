@@ -31,20 +31,20 @@ impl Override {
     /// `experiments[0].sigma.displacement`; positions count from 0), and a value in YAML.
     ///
     /// # Errors
-    /// When there is no `=`, no key, or the value is not YAML.
+    /// When missing `=`, no key, or the value is not YAML.
     pub fn parse(text: &str) -> Result<Self, InputError> {
         let wrong = |problem: &str| {
             InputError::new(Place::Argument("--set".into()), problem).found(quote(text))
         };
         let Some((key, written)) = text.split_once('=') else {
             return Err(
-                wrong("there is no `=`").expected("KEY=VALUE, for instance fit.stop.iterations=50")
+                wrong("missing `=`").expected("KEY=VALUE, for instance fit.stop.iterations=50")
             );
         };
         let (key, written) = (key.trim(), written.trim());
         let path = path(key);
         if path.is_empty() || matches!(path[0], Segment::Index(_)) {
-            return Err(wrong("there is no key before `=`")
+            return Err(wrong("missing key before `=`")
                 .expected("KEY=VALUE, for instance fit.stop.iterations=50"));
         }
         match Checked::new(Path::new("--set"), written)?.read() {
@@ -104,7 +104,7 @@ impl Override {
             (Value::Sequence(list), Segment::Index(index)) => {
                 let last = list.len().saturating_sub(1);
                 list.get_mut(*index).ok_or_else(|| {
-                    self.error(format!("the list {} has no such element", above()))
+                    self.error(format!("no such element in the list {}", above()))
                         .found(format!("position {index}"))
                         .expected(match last {
                             0 => "the position 0".to_owned(),

@@ -415,7 +415,7 @@ impl<T: Value> Value for OneOrList<T> {
     const KIND: Kind = Kind::AnyOf(&[T::KIND, Kind::List(&T::KIND)]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         if let Kind::Map(_) = T::KIND {
-            let problem = "this is the wrong kind of value";
+            let problem = "wrong type of value";
             return Err(scalar.refused(problem, "a map, or a list of maps"));
         }
         (T::scalar(scalar).map(Self::One))

@@ -16,7 +16,7 @@ keys! {
         /// Version of the file format.
         format: Format, example "1";
         /// Title of the page.
-        title: Option<Text>, example "From the paper to the device", default "the name of the file";
+        title: Option<Text>, example "From the paper's fit to the true system", default "the name of the file";
         /// Model files, in the order of the analysis; paths are relative to this file.
         sequence: Vec<Text>, example "[paper.yaml, paper-smooth.yaml]";
     }

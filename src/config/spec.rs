@@ -1,7 +1,7 @@
-//! What a model file says, key by key: these structs mirror the YAML one to one.
+//! Keys of a model file: structs that mirror the YAML, with the documentation of every key.
 //!
-//! A new key is a new field; an optional one is an `Option`. What the keys mean together is decided
-//! where the problem is built, not here.
+//! A new key is a new field; an optional one is an `Option`. Conditions that concern several keys are checked in
+//! `config/build/`, where the problem is built.
 
 mod experiment;
 mod study;
@@ -17,36 +17,36 @@ use super::scalar::{Count, Format, Knots, Nodes, Number, NumberOrColumn, OneOrLi
 use super::scalar::{Start, Text, Weight};
 
 keys! {
-    /// A model: records of one device, what is sought, and how.
+    /// A model: records of one system, its coefficient functions, and the settings of the fit.
     pub struct ModelSpec = "model", expecting "a map with the keys format, experiments, functions, fit, …" {
         /// Version of the file format.
         format: Format, example "1";
-        /// What reports call the run.
-        title: Option<Text>, example "A decaying mass", default "the name of the file";
-        /// Measured (or to be simulated) motions of the same device, over the same time.
+        /// Title for reports.
+        title: Option<Text>, example "A decaying mass", default "file name";
+        /// Records of one system on a common time axis, measured or to be simulated.
         experiments: Vec<ExperimentSpec>, example "[{initial: {displacement: 3.3, velocity: 1.0}}]";
-        /// Time nodes and stepper.
-        grid: Option<GridSpec>, example "{nodes: 2000, method: midpoint}", default "one node per reading, rk4";
-        /// Mass, damping, stiffness and further terms over time.
+        /// Time grid and stepper.
+        grid: Option<GridSpec>, example "{nodes: 2000, method: midpoint}", default "one node per sample, rk4";
+        /// Coefficient functions of the equation of motion.
         functions: FunctionsSpec,
             example "{mass: {fixed: 1.0}, damping: {basis: constant, start: 0.0}, stiffness: {basis: constant, start: 1.0}}";
-        /// What the functions must satisfy besides their own `min` and `max`; each map demands one thing.
+        /// Constraints on the functions beyond their own `min` and `max`; one map for each.
         constraints: Option<Vec<ConstraintSpec>>, example "[{function: mass, shape: non-increasing}]", default "none";
-        /// How to fit.
+        /// Method, start and stopping tests of the fit.
         fit: Option<FitSpec>,
             example "{method: gauss-newton, initial: data}",
             default "Gauss-Newton from the start values";
-        /// The true functions, where they are known; for reports only.
+        /// True functions, for reports only.
         truth: Option<TruthSpec>, example "{data: truth.csv}", default "unknown";
-        /// Other initial states to predict the motion from.
+        /// Initial states for which the free response is predicted.
         predict: Option<Vec<StateSpec>>, example "[{displacement: -3.3, velocity: 1.0}]", default "none";
-        /// What `kmcfit study` looks into besides what it always does.
+        /// Analyses of `kmcfit study`.
         study: Option<StudySpec>, example "{starts: 20, constancy_test: true}";
     }
 }
 
 keys! {
-    /// A state of the oscillator.
+    /// Displacement and velocity at one time.
     pub struct StateSpec = "state", expecting "a map such as {displacement: 3.3, velocity: 1.0}" {
         /// Displacement.
         displacement: Number, example "3.3", unit "m";
@@ -56,58 +56,58 @@ keys! {
 }
 
 keys! {
-    /// Time nodes and stepper.
+    /// Time grid and stepper.
     pub struct GridSpec = "grid", expecting "a map such as {nodes: 2000, method: midpoint}" {
-        /// Number of time nodes, the step is duration/(nodes - 1); or `auto`, from the frequencies in the readings.
-        nodes: Option<Nodes>, example "2000", default "one per reading";
-        /// How the motion is stepped through time.
+        /// Number of nodes, with the step duration/(nodes - 1); `auto` chooses it from the spectrum of the records.
+        nodes: Option<Nodes>, example "2000", default "one per sample";
+        /// Time integration method.
         method: Option<StepMethod>, example "midpoint", default "rk4";
         /// Length of the time axis.
-        duration: Option<Number>, example "25.0", unit "s", default "that of the readings";
+        duration: Option<Number>, example "25.0", unit "s", default "that of the records";
     }
 }
 
 choice! {
-    /// How the motion is stepped through time.
+    /// Time integration method.
     pub type StepMethod = kmcfit_core::internals::system::Method {
-        /// The midpoint rule of the paper.
+        /// Midpoint rule, of order 2.
         Midpoint = "midpoint",
-        /// The classical Runge-Kutta method of order four.
+        /// Classical Runge-Kutta method, of order 4.
         Rk4 = "rk4",
     }
 }
 
 keys! {
-    /// The functions of the device; mass, damping and stiffness must be there.
+    /// Coefficient functions of the system; mass, damping and stiffness are required.
     pub struct FunctionsSpec = "functions", expecting "a map with the keys mass, damping, stiffness" {
         /// Mass m(t).
         mass: FunctionSpec, example "{basis: nodal, start: 2.0}", unit "kg";
-        /// Damping c(t): a force on v.
+        /// Damping c(t), with the force c y'.
         damping: FunctionSpec, example "{basis: constant, start: 1.0}", unit "N s/m";
-        /// Stiffness k(t): a force on y.
+        /// Stiffness k(t), with the force k y.
         stiffness: FunctionSpec, example "{fixed: 1.0}", unit "N/m";
-        /// Cubic stiffness: a force on y^3.
+        /// Cubic stiffness k3(t), with the force k3 y^3.
         cubic_stiffness: Option<FunctionSpec>,
             example "{basis: constant, start: 0.0}",
             unit "N/m^3",
-            default "no such force";
-        /// Quadratic damping: a force on |v| v.
+            default "none";
+        /// Quadratic damping c2(t), with the force c2 |y'| y'.
         quadratic_damping: Option<FunctionSpec>,
             example "{basis: constant, start: 0.0}",
             unit "N s^2/m^2",
-            default "no such force";
-        /// Coulomb friction: a force on v/sqrt(v^2 + width^2).
+            default "none";
+        /// Coulomb friction, with the force f y'/sqrt(y'^2 + width^2).
         coulomb_friction: Option<FunctionSpec>,
             example "{basis: constant, start: 0.5, width: 0.01}",
             unit "N",
-            default "no such force";
-        /// Static force against the direction of y.
-        static_force: Option<FunctionSpec>, example "{fixed: 0.0}", unit "N", default "no such force";
+            default "none";
+        /// Static force, which acts against positive y.
+        static_force: Option<FunctionSpec>, example "{fixed: 0.0}", unit "N", default "none";
     }
 }
 
 keys! {
-    /// Functions that one experiment does not share with the others.
+    /// Coefficient functions of one experiment, in place of the shared ones.
     pub struct OwnFunctionsSpec (Default) = "own_functions", expecting "a map such as {damping: {basis: constant, start: 1.0}}" {
         /// Mass m(t) of this experiment.
         mass: Option<FunctionSpec>, example "{basis: constant, start: 2.0}", unit "kg";
@@ -115,74 +115,74 @@ keys! {
         damping: Option<FunctionSpec>, example "{basis: constant, start: 1.0}", unit "N s/m";
         /// Stiffness k(t) of this experiment.
         stiffness: Option<FunctionSpec>, example "{basis: constant, start: 1.0}", unit "N/m";
-        /// Cubic stiffness: a force on y^3.
+        /// Cubic stiffness, with the force k3 y^3.
         cubic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^3";
-        /// Quadratic damping: a force on |v| v.
+        /// Quadratic damping, with the force c2 |y'| y'.
         quadratic_damping: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N s^2/m^2";
-        /// Coulomb friction: a force on v/sqrt(v^2 + width^2).
+        /// Coulomb friction, with the force f y'/sqrt(y'^2 + width^2).
         coulomb_friction: Option<FunctionSpec>, example "{basis: constant, start: 0.5, width: 0.01}", unit "N";
-        /// Static force against the direction of y.
+        /// Static force, which acts against positive y.
         static_force: Option<FunctionSpec>, example "{fixed: 0.0}", unit "N";
     }
 }
 
 keys! {
-    /// One function: sought, with a basis and a start, or fixed.
+    /// A coefficient function: estimated, with a basis and start values, or fixed.
     pub struct FunctionSpec = "function", expecting "a map such as {basis: nodal, start: 2.0}" {
-        /// Shape of the function over time, and so what its free values are.
+        /// Basis of an estimated function, which defines its parameters.
         basis: Option<Basis>, example "piecewise-linear";
-        /// Break points of a piecewise function or a spline: how many, equally spaced with both ends, or their times.
+        /// Knots of a piecewise function or spline: their number (equally spaced, ends included) or their times.
         knots: Option<Knots>, example "11", unit "s, of times";
         /// Degree of a polynomial.
         degree: Option<Count>, example "2";
-        /// Where the search starts: one number, one value per node, cell or knot, the factors of a polynomial, or a
-        /// column of a file.
+        /// Start values of the search: one number, one value per node, cell or knot, polynomial coefficients, or a column of
+        /// a file.
         start: Option<Start>, example "2.0", unit "that of the function";
-        /// Known values, which are not fitted; in place of `basis`.
+        /// Fixed values, in place of `basis`.
         fixed: Option<NumberOrColumn>, example "1.0", unit "that of the function";
-        /// Smallest value allowed.
+        /// Lower bound.
         min: Option<NumberOrColumn>, example "0.05", unit "that of the function", default "none";
-        /// Largest value allowed.
+        /// Upper bound.
         max: Option<NumberOrColumn>, example "10.0", unit "that of the function", default "none";
-        /// Penalty on roughness, added to J; or a list of such.
+        /// Penalty on the roughness, added to J; or a list of penalties.
         penalty: Option<OneOrList<PenaltySpec>>,
             example "{kind: tikhonov, order: 2, weight: 0.1}",
             default "none";
-        /// Of Coulomb friction: speed over which the sign of the velocity is smoothed, well below the speeds of the
-        /// motion.
+        /// For Coulomb friction: velocity over which its sign is smoothed, well below the peak velocity of the
+        /// response.
         width: Option<Number>, example "0.01", unit "m/s";
     }
 }
 
 choice! {
-    /// Shape of a coefficient function.
+    /// Basis of a coefficient function.
     pub enum Basis {
-        /// A free value at every node of the grid.
+        /// One parameter per node of the grid.
         Nodal = "nodal",
-        /// One value for all times.
+        /// One constant.
         Constant = "constant",
-        /// One value per cell between knots.
+        /// One value per interval between knots.
         PiecewiseConstant = "piecewise-constant",
         /// One value per knot, linear in between.
         PiecewiseLinear = "piecewise-linear",
-        /// A polynomial over the whole record.
+        /// Polynomial over the whole record.
         Polynomial = "polynomial",
-        /// A cubic spline.
+        /// Cubic B-spline.
         BSpline = "b-spline",
     }
 }
 
 keys! {
-    /// A penalty on the roughness of a coefficient function p: `tikhonov`, weight times the integral of the squared derivative, or
-    /// `tv`, weight times the total variation, for which a jump costs no more than a slow change.
+    /// Penalty on the roughness of a function p: `tikhonov`, weight times the integral of the squared derivative, or `tv`,
+    /// weight times the total variation, which permits jumps.
     pub struct PenaltySpec = "penalty", expecting "a map such as {kind: tikhonov, order: 2, weight: 0.1}" {
-        /// Which measure of roughness.
+        /// Measure of roughness.
         kind: PenaltyKind, example "tikhonov";
-        /// Of `tikhonov`: which derivative, 0 (distance from `reference`), 1 (slope) or 2 (curvature).
+        /// For `tikhonov`: order of the derivative, 0 (difference from `reference`), 1 (slope) or 2 (curvature).
         order: Option<Count>, example "2";
-        /// Factor of the penalty in J, or for `tikhonov` the rule that chooses it from the data.
+        /// Weight of the penalty in J, or for `tikhonov` the rule that chooses it.
         weight: Weight, example "0.1", unit "of J per unit of the measure";
-        /// Of `tikhonov` with order 0: what the penalty pulls towards.
+        /// For `tikhonov` of order 0: the reference values.
         reference: Option<NumberOrColumn>, example "1.0", unit "that of the function", default "0";
     }
 }
@@ -190,7 +190,7 @@ keys! {
 choice! {
     /// Measure of roughness.
     pub enum PenaltyKind {
-        /// Integral of the squared derivative of some order.
+        /// Integral of the squared derivative.
         Tikhonov = "tikhonov",
         /// Total variation.
         TotalVariation = "tv",
@@ -198,7 +198,7 @@ choice! {
 }
 
 impl FunctionSpec {
-    /// Whether its total variation is penalised.
+    /// Names of the penalty on the total variation.
     pub fn has_total_variation(&self) -> bool {
         let mut penalties = self.penalty.iter().flat_map(|list| list.values());
         penalties.any(|penalty| penalty.kind == PenaltyKind::TotalVariation)
@@ -226,77 +226,77 @@ choice! {
 }
 
 keys! {
-    /// One demand on the functions.
+    /// A constraint on coefficient functions.
     pub struct ConstraintSpec (Default) = "constraint", expecting "a map such as {function: mass, shape: non-increasing}" {
-        /// Which function it is about.
+        /// Constrained function.
         function: Option<FunctionName>, example "mass";
-        /// Smallest value allowed, at all times.
+        /// Lower bound at all times.
         min: Option<NumberOrColumn>, example "0.05", unit "that of the function";
-        /// Largest value allowed, at all times.
+        /// Upper bound at all times.
         max: Option<NumberOrColumn>, example "10.0", unit "that of the function";
-        /// Smallest and largest slope.
+        /// Lower and upper bound of the slope.
         slope: Option<RangeSpec>, example "{min: -0.2, max: 0.0}", unit "that of the function per s";
-        /// Monotone, or curved in one direction; or a list of such.
+        /// Monotonicity or sign of the curvature; or a list of both.
         shape: Option<OneOrList<ShapeName>>, example "non-increasing";
-        /// Times at which the value is held.
+        /// Times at which the value is prescribed.
         at: Option<OneOrList<Number>>, example "0.0", unit "s";
-        /// Values at these times, one for all or one each.
+        /// Prescribed values, one for all times or one each.
         value: Option<OneOrList<Number>>, example "1.0", unit "that of the function";
         /// Mean over the record.
         mean: Option<Number>, example "0.75", unit "that of the function";
         /// Integral over the record.
         integral: Option<Number>, example "18.75", unit "that of the function times s";
-        /// Two functions: the first is `ratio` times the second.
+        /// Two functions; the first equals `ratio` times the second.
         equal: Option<Vec<FunctionName>>, example "[damping, stiffness]";
-        /// Factor of the second function of `equal`.
+        /// Ratio of the two functions of `equal`.
         ratio: Option<Number>, example "0.1", default "1";
-        /// The stored energy never grows: c - m'/2 >= 0 and k' <= 0.
+        /// Passivity, c - m'/2 >= 0 and k' <= 0: the stored energy never grows.
         passive: Option<bool>, example "true";
-        /// Band of the natural frequency sqrt(k/m)/2π, at every instant.
+        /// Bounds of the natural frequency sqrt(k/m)/2π at every time.
         frequency: Option<RangeSpec>, example "{min: 0.1, max: 0.3}", unit "Hz";
-        /// Cap on the size of c/(2 sqrt(k m)).
+        /// Upper bound of the damping ratio |c|/(2 sqrt(k m)).
         damping_ratio: Option<RangeSpec>, example "{max: 0.2}";
-        /// The price of breaking it: a weight on the mean squared excess.
-        soft: Option<Number>, example "10.0", default "it holds";
+        /// Soft constraint: weight of the mean squared violation in J.
+        soft: Option<Number>, example "10.0", default "hard constraint";
     }
 }
 
 choice! {
-    /// Shape that a function must have.
+    /// Monotonicity or sign of the curvature.
     pub type ShapeName = kmcfit_core::internals::constraints::Shape {
-        /// It never rises.
+        /// Monotonically non-increasing.
         NonIncreasing = "non-increasing",
-        /// It never falls.
+        /// Monotonically non-decreasing.
         NonDecreasing = "non-decreasing",
-        /// Its slope never falls.
+        /// Convex.
         Convex = "convex",
-        /// Its slope never rises.
+        /// Concave.
         Concave = "concave",
     }
 }
 
 keys! {
-    /// A range; either end may be missing.
+    /// A range; either end may be left out.
     pub struct RangeSpec = "range", expecting "a map such as {min: 0.1, max: 0.5}" {
         /// Lower end.
-        min: Option<Number>, example "0.1", default "open";
+        min: Option<Number>, example "0.1", default "unbounded";
         /// Upper end.
-        max: Option<Number>, example "0.5", default "open";
+        max: Option<Number>, example "0.5", default "unbounded";
     }
 }
 
 keys! {
-    /// How to fit.
+    /// Method, start and stopping tests of the fit.
     pub struct FitSpec = "fit", expecting "a map such as {method: gauss-newton, initial: data}" {
-        /// Solver.
+        /// Fit method.
         method: Option<FitMethod>, example "lbfgs", default "gauss-newton";
-        /// Where the fit starts.
+        /// Starting point.
         initial: Option<InitialName>, example "data", default "functions";
-        /// Which gradient the solver follows.
+        /// Gradient of the cost.
         gradient: Option<Gradient>, example "continuous", default "discrete";
-        /// Pairs of steps that L-BFGS remembers.
+        /// Number of step pairs that L-BFGS stores.
         memory: Option<Count>, example "20", default "20";
-        /// When to stop; whichever comes first.
+        /// Stopping tests; the first one met ends the fit.
         stop: Option<StopSpec>,
             example "{iterations: 200, cost_ratio: 1e-4}",
             default "{iterations: 1000, tolerance: 1e-10}";
@@ -304,63 +304,63 @@ keys! {
 }
 
 choice! {
-    /// Solver.
+    /// Fit method.
     pub enum FitMethod {
-        /// Along the negative gradient.
+        /// Steepest descent.
         SteepestDescent = "steepest-descent",
         /// Limited-memory BFGS.
         Lbfgs = "lbfgs",
-        /// Along the projected negative gradient, under constraints.
+        /// Projected gradient, with constraints.
         ProjectedGradient = "projected-gradient",
-        /// Gauss-Newton steps, under constraints.
+        /// Gauss-Newton, with constraints.
         GaussNewton = "gauss-newton",
-        /// The minimum of the equation error, under constraints: nothing is simulated.
+        /// Minimum of the equation error, with constraints; no response is simulated.
         EquationError = "equation-error",
     }
 }
 
 choice! {
-    /// Where a fit starts.
+    /// Starting point of a fit.
     pub type InitialName = kmcfit_core::internals::solvers::Initial {
-        /// From the start values of the functions.
+        /// The start values of the functions.
         Functions = "functions",
-        /// From the smoothed readings, put into the equation of motion.
+        /// The minimum of the equation error of the smoothed record.
         Data = "data",
     }
 }
 
 choice! {
-    /// How the gradient is computed.
+    /// Gradient of the cost.
     pub type Gradient = kmcfit_core::internals::objective::GradientKind {
-        /// The exact gradient of the discretised cost.
+        /// Exact gradient of the discretised cost (discrete adjoint).
         Discrete = "discrete",
-        /// The adjoint differential equation, discretised afterwards.
+        /// Discretised adjoint differential equation (continuous adjoint).
         Continuous = "continuous",
     }
 }
 
 keys! {
-    /// When to stop; whichever comes first.
+    /// Stopping tests; the first one met ends the fit.
     pub struct StopSpec = "stop", expecting "a map such as {iterations: 1000, cost_ratio: 1e-4}" {
-        /// After so many iterations; exactly so many if nothing else is asked for.
+        /// Iteration limit; without another test exactly this number of iterations.
         iterations: Option<Count>, example "200", default "1000";
-        /// Converged when J/J0 is at most this (and so is the gradient, if asked for).
+        /// Limit of J/J0 for convergence (with the gradient's limit, if given).
         cost_ratio: Option<Number>, example "1e-4", unit "part of the first J";
-        /// Converged when the squared norm of the gradient is at most this part of its first value.
+        /// Limit of the squared gradient norm relative to its initial value, for convergence.
         gradient_ratio: Option<Number>, example "1e-4", unit "part of the first G^2";
-        /// Converged when an iteration changes J and the functions by less than this part.
+        /// Relative change of J and of the functions in one iteration, for convergence.
         tolerance: Option<Number>, example "1e-10", default "1e-10, if no other rule is given";
-        /// Converged when an iteration changes no function by more than this part of its size.
+        /// Relative change of the functions in one iteration, for convergence.
         step: Option<Number>, example "1e-12";
-        /// Wall-clock limit.
+        /// Time limit.
         seconds: Option<Number>, example "60", unit "s";
     }
 }
 
 keys! {
-    /// The true functions, for reports only.
+    /// True functions, for reports only.
     pub struct TruthSpec = "truth", expecting "a map such as {data: truth.csv}" {
-        /// File of the true functions with times in `t_s`, relative to the model file.
+        /// Table of the true functions with times in `t_s`, relative to the model file.
         data: Text, example "truth.csv";
         /// Names of its columns.
         columns: Option<TruthColumnsSpec>,

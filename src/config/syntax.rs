@@ -77,7 +77,7 @@ const MEANINGS: &[(&str, &str, &str)] = &[
     ),
     (
         "found character that cannot start any token",
-        "this character cannot begin a value",
+        "invalid first character of a value",
         "put the text in quotes",
     ),
     (

@@ -56,7 +56,7 @@ impl Scalar<'_> {
     /// The mistake of a value in the place of a map or a list.
     pub fn wrong_kind(self, expected: impl Into<String>) -> Mistake {
         Mistake::Value {
-            problem: "this is the wrong kind of value",
+            problem: "wrong type of value",
             found: match self {
                 Scalar::Integer(value) => format!("the number {value}"),
                 Scalar::Float(value) if value.is_finite() => format!("the number {value}"),

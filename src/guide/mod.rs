@@ -1,13 +1,13 @@
 //! A short course: from a record to the device behind it.
 //!
-//! 1. [`tutorial`] takes the paper's record as far as it goes, and then a file of one's own. Each step is a
+//! 1. [`tutorial`] fits the paper's record, then a record of one's own. Each step is a
 //!    shipped model and one command.
 //! 2. [`choosing`] says which method, which basis and which constraint fit which record, and shows how fits
 //!    go wrong and what cures them.
 //! 3. [`theory`] has the equations: the device, the cost, the adjoints, Gauss–Newton, and what a record can
 //!    show.
 //!
-//! Whoever writes Rust rather than model files goes on with [`builder`](kmcfit_core::internals::builder); [`Run`](crate::Run)
+//! Programs in Rust use [`builder`](kmcfit_core::internals::builder); [`Run`](crate::Run)
 //! loads results back.
 //!
 //! The pages are those of `docs/`, their equations turned into MathML, which browsers draw by themselves.

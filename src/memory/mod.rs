@@ -70,7 +70,7 @@ pub fn check_file(path: &Path, needed: u64) -> Result<(), InputError> {
 /// When less than that is available.
 pub(crate) fn check_base() -> Result<(), InputError> {
     check(BASE).map_err(|available| {
-        InputError::argument("memory", "there is too little memory to begin")
+        InputError::argument("memory", "too little memory to start")
             .found(available)
             .expected(format!("at least {}", in_words(BASE as f64)))
     })

@@ -43,11 +43,9 @@ impl Table {
             ColumnName::Name(name) => self.find_name(name),
             ColumnName::Number(number) => match number.checked_sub(1) {
                 Some(index) if index < self.width() => Ok(index),
-                _ => Err(
-                    InputError::file(self.path(), "there is no column of this number")
-                        .found(number)
-                        .expected(numbers(self.width())),
-                ),
+                _ => Err(InputError::file(self.path(), "no column of this number")
+                    .found(number)
+                    .expected(numbers(self.width()))),
             },
         }
     }

@@ -71,11 +71,11 @@ pub fn not_a_number(place: Place, field: &str, decimal: char) -> InputError {
 
 /// The error for a field that is neither a finite number nor missing.
 pub fn not_a_reading(place: Place, field: &str, decimal: char) -> InputError {
-    let expected = "a finite number, or an empty field where a reading is missing";
+    let expected = "a finite number, or an empty field for a missing sample";
     match parse(field, decimal) {
         Some(_) => wrong(place, "not a finite number", field, decimal)
             .expected(expected)
-            .hint("was the instrument overloaded? Leave the field empty where there is no reading"),
+            .hint("leave the field empty for a missing sample or an overload"),
         None => wrong(place, "not a number", field, decimal).expected(expected),
     }
 }

@@ -53,7 +53,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// When there is no such file, it is not text, or [`parse`](Self::parse) finds a mistake.
+    /// When no such file, it is not text, or [`parse`](Self::parse) finds a mistake.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
         Self::read_with(path, &TableFormat::default())
     }
@@ -62,7 +62,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// When there is no such file, it is not text, or [`parse_with`](Self::parse_with) finds a
+    /// When no such file, it is not text, or [`parse_with`](Self::parse_with) finds a
     /// mistake.
     pub fn read_with(path: impl AsRef<Path>, format: &TableFormat) -> Result<Self, InputError> {
         let path = path.as_ref();
@@ -261,7 +261,7 @@ impl Table {
         }
     }
 
-    /// Adds a data row; a field that is no number spoils its column, for whoever asks for it.
+    /// Adds a data row; a field that is not a number makes its column unusable.
     fn push(
         &mut self,
         line: usize,
@@ -325,7 +325,7 @@ fn empty(path: &Path, skipped: usize) -> InputError {
     let error = InputError::file(path, "the file is empty").expected(TABLE);
     match skipped {
         0 => error,
-        lines => error.found(format!("nothing after the {lines} lines that are skipped")),
+        lines => error.found(format!("nothing after {lines} skipped lines")),
     }
 }
 

@@ -65,7 +65,7 @@ pub fn equally_spaced_at(table: &Table, index: usize) -> Result<f64, InputError>
     let column = &*table.label(index);
     let (&[first, .., last], intervals) = (times, times.len().saturating_sub(1)) else {
         return Err(
-            InputError::new(table.place(0, Some(column)), "there is only one time")
+            InputError::new(table.place(0, Some(column)), "only one time")
                 .found("1 row")
                 .expected("at least 2 rows, to have a spacing"),
         );

@@ -37,7 +37,7 @@ impl Columns {
     /// So every table that a run wrote can be read where the run itself fitted into memory.
     ///
     /// # Errors
-    /// If there is no such file, or a row has another number of fields than the header, or a field that
+    /// If no such file, or a row has another number of fields than the header, or a field that
     /// is neither empty nor a number; if it has another number of rows, so that it does not belong to the
     /// result beside it, or was cut off; if its values do not fit into memory.
     pub fn read_rows(path: &Path, rows: usize, what: &str) -> Result<Self, InputError> {
@@ -94,7 +94,7 @@ impl Columns {
     pub fn required(&self, name: &str) -> Result<Vec<f64>, InputError> {
         self.column(name).ok_or_else(|| {
             let names = || self.headers.iter().map(String::as_str);
-            InputError::file(&self.path, format!("there is no column `{name}`"))
+            InputError::file(&self.path, format!("no column `{name}`"))
                 .expected(one_of(names()))
                 .hint_if(did_you_mean(name, names()))
         })
@@ -115,7 +115,7 @@ impl Columns {
                     line: i + 2,
                     column: Some(name.into()),
                 };
-                Err(InputError::new(place, "this is no finite number").expected("one"))
+                Err(InputError::new(place, "not a finite number").expected("one"))
             }
         }
     }
@@ -171,9 +171,9 @@ fn take(
         column.push(match field.trim() {
             "" => f64::NAN,
             field => field.parse().map_err(|_| {
-                damaged("this is no number", Some(name))
+                damaged("not a number", Some(name))
                     .found(quote(field))
-                    .expected("a number, or nothing")
+                    .expected("a number, or an empty field")
             })?,
         });
     }

@@ -17,7 +17,7 @@ pub enum CostKind {
     ChiSquare,
     /// Some records have a sigma and some have none.
     Mixed,
-    /// `integral (m (y'' + b'') + sum_j p_j phi_j(y, y') - f)^2 dt` with the motion from the readings.
+    /// `integral (m (y'' + b'') + sum_j p_j phi_j(y, y') - f)^2 dt` with the motion from the samples.
     EquationError,
 }
 
@@ -40,19 +40,19 @@ impl CostKind {
     fn misfit(self) -> &'static str {
         match self {
             CostKind::Integral => {
-                "integral (y - y_obs)^2 dt (trapezoid rule over the readings, m^2 s)"
+                "integral (y - y_obs)^2 dt (trapezoid rule over the samples, m^2 s)"
             }
             CostKind::ChiSquare => {
-                "sum over the readings of ((model - reading)/sigma)^2 (chi-square)"
+                "sum over the samples of ((model - sample)/sigma)^2 (chi-square)"
             }
             CostKind::Mixed => {
                 "integral (y - y_obs)^2 dt over the records without sigma (trapezoid rule over the \
-                 readings, m^2 s) + sum of ((model - reading)/sigma)^2 over the readings with sigma \
+                 samples, m^2 s) + sum of ((model - sample)/sigma)^2 over the samples with sigma \
                  (chi-square)"
             }
             CostKind::EquationError => {
-                "integral (m (y'' + b'') + sum p_j phi_j(y, y') - f)^2 dt over the readings, with y, y' \
-                 and y'' from the readings and not from a simulation (N^2 s)"
+                "integral (m (y'' + b'') + sum p_j phi_j(y, y') - f)^2 dt over the samples, with y, y' \
+                 and y'' from the samples and not from a simulation (N^2 s)"
             }
         }
     }

@@ -21,7 +21,7 @@ impl FittedModel<'_> {
             list.iter_mut().for_each(|figure| figure.name += &suffix);
             figures.extend(list);
         }
-        figures.extend(self.held_out_figures());
+        figures.extend(self.validation_figures());
         figures
     }
 
@@ -74,16 +74,16 @@ impl FittedModel<'_> {
         [seen.observation(), beside, residuals]
     }
 
-    /// The readings of the records that took no part in the fit with what the model says of them, and the residuals.
-    pub(super) fn held_out_figures(&self) -> Vec<Figure> {
+    /// Validation records with their predictions and residuals.
+    pub(super) fn validation_figures(&self) -> Vec<Figure> {
         let mut figures = Vec::new();
-        for (i, held) in self.known.held_out.iter().enumerate() {
+        for (i, held) in self.known.validation.iter().enumerate() {
             for seen in held.channels() {
                 let kind = seen.channel.kind().name();
                 for mut figure in seen.figures() {
-                    figure.name += &format!("-held-out-{}-{kind}", i + 1);
+                    figure.name += &format!("-validation-{}-{kind}", i + 1);
                     figure.title = format!(
-                        "{}: {} (held out), {kind}",
+                        "{}: {} (validation), {kind}",
                         figure.title, held.out.experiment.name
                     );
                     figures.push(figure);
@@ -147,7 +147,7 @@ impl FittedModel<'_> {
     }
 
     pub(super) fn ratios_figure(&self) -> Figure {
-        let found = Ratios::of(&self.fit.best.evaluation.device);
+        let found = Ratios::of(&self.fit.best.evaluation.nodal);
         let truth = self.model.truth.as_ref().map(Ratios::of);
         let times = self.model.problem.system.grid.times();
         let bands = self

@@ -5,7 +5,7 @@ use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
 use kmcfit_core::internals::solvers::{PathPoint, WeightPath, WeightRule};
-use kmcfit_core::internals::study::PredictedMotion;
+use kmcfit_core::internals::study::PredictedResponse;
 
 /// Beyond this number of readings the dots are drawn smaller.
 const MANY: usize = 400;
@@ -36,7 +36,7 @@ pub type Channel<'a> = (&'a str, &'a str, &'a [f64], &'a [f64]);
 pub fn observation(channels: &[Channel]) -> Figure {
     Figure::new(
         "observation",
-        "Observed motion",
+        "Record",
         "The measured channels against time, one panel for each.",
     )
     .panels(channels.iter().map(|(label, unit, t, y)| {
@@ -52,7 +52,7 @@ pub fn channel((label, unit): (&str, &str), t: &[f64], observed: &[f64], model: 
     Figure::new(
         "channel",
         "Readings and model",
-        "The readings of the channel and what the fitted model says of them, against time.",
+        "Samples of the channel and the fitted response against time.",
     )
     .panel(Panel::of_time(label, unit).marks([readings, Mark::line("model", t, model, line)]))
 }
@@ -136,7 +136,7 @@ pub fn motion(t_obs: &[f64], y_obs: &[f64], snapshots: &[Snapshot]) -> Figure {
     Figure::new(
         "motion",
         "Motion during the fit",
-        "The observed displacement against time, and the motion of the fit at some iterations.",
+        "Measured displacement against time, and the response at some iterations.",
     )
     .panel(panel)
 }
@@ -289,18 +289,18 @@ pub fn ratios(
 
 /// The motion from other initial states, one panel each, and the true one where known; times in s,
 /// displacements in m.
-pub fn predictions(t: &[f64], motions: &[PredictedMotion]) -> Figure {
+pub fn predictions(t: &[f64], motions: &[PredictedResponse]) -> Figure {
     Figure::new(
         "predictions",
         "Predictions",
-        "The free motion of the device that was found from other initial states, against time.",
+        "Predicted free response from other initial states against time.",
     )
     .panels(motions.iter().map(|predicted| {
         let state = &predicted.summary;
         let (y, v) = (state.displacement, state.velocity);
         Panel::of_time("displacement y", "m")
             .title(format!("from y = {y} m, v = {v} m/s"))
-            .mark(found("predicted", t, &predicted.motion.displacement))
+            .mark(found("predicted", t, &predicted.response.displacement))
             .marks(predicted.truth.as_ref().map(|m| truth(t, &m.displacement)))
     }))
 }

@@ -1,96 +1,139 @@
-//! Sentences about a fit: its plausibility, and further fits beside it.
+//! Findings and warnings about a fit, from the typed results of the core.
 
+use crate::finding::Finding;
 use kmcfit_core::internals::assessment::{FitWarning, Unidentified};
-use kmcfit_core::internals::study::multistart::Finding;
+use kmcfit_core::internals::identifiability::{
+    Classification, FunctionClassification, RankFinding,
+};
+use kmcfit_core::internals::study::multistart;
 
-/// Why the optimum identifies no system.
-pub fn unidentified(why: &Unidentified) -> String {
-    let why = match why {
+/// A finding on the structural rank.
+pub fn rank(finding: &RankFinding) -> Finding {
+    let kind = serde_json::to_value(finding.kind).unwrap_or_default();
+    Finding::new(kind.as_str().unwrap_or_default(), &*finding.sentence)
+}
+
+/// The classification of a function or ratio, with the half-width of its band relative to its scale, the identified
+/// ratio, or the spans of time on which it is identified, s.
+pub fn classification(judgement: &FunctionClassification) -> Finding {
+    let verdict = &judgement.verdict;
+    let finding = Finding::new(verdict.name().replace('-', "_"), &*judgement.sentence);
+    let finding = finding.with("function", &judgement.name);
+    match verdict {
+        Classification::Identified { relative } => finding.with("relative_half_width", relative),
+        Classification::OnlyRatio(ratio) => finding.with("ratio", ratio),
+        Classification::PartlyIdentified(spans) => finding.with("spans", spans),
+        Classification::NotIdentified | Classification::Fixed => finding,
+    }
+}
+
+/// The reason for which an optimum identifies no system.
+pub fn unidentified(reason: &Unidentified) -> Finding {
+    let why = match reason {
         Unidentified::Failed => "the fit failed".to_owned(),
-        Unidentified::NoResponseOnHalfStep(breakdown) => {
-            format!("on half the step there is no motion: {breakdown}")
+        Unidentified::NoResponseOnHalfStep { error } => {
+            format!("with half the step there is no response: {error}")
         }
         Unidentified::StepDependent => {
-            "on half the step the model's readings change by more than a tenth of the largest one"
-                .into()
+            "halving the step changes the response by more than 10 % of its peak".into()
         }
         Unidentified::Unrelated => {
-            "its motion misses the readings by more than twice what they vary".into()
+            "the residuals exceed twice the variation of every channel".into()
         }
-        Unidentified::Noise => {
-            "noise of the size of these readings would be matched as well".into()
-        }
+        Unidentified::Noise => "white noise would be fitted equally well".into(),
     };
-    format!("the device is not identified: {why}")
+    Finding::of(reason, format!("no system identified: {why}"))
 }
 
-/// A record that took no part in the fit and is matched to so many per cent only.
-pub fn unpredicted((record, percent): (&str, f64)) -> String {
-    format!(
-        "the record `{record}`, which was held out, is matched to {} only: the device does not predict it",
-        super::advice::percent(percent, 0)
-    )
+/// A validation record, by name, that the fit predicts to so many per cent only.
+pub fn not_predicted((record, percent): (&str, f64)) -> Finding {
+    let text = format!(
+        "validation record `{record}`: fit {} only; the estimates do not predict it",
+        super::suggestions::percent(percent, 0)
+    );
+    let finding = Finding::new("validation_not_predicted", text);
+    finding.with("record", record).with("fit_percent", percent)
 }
 
-/// A warning.
-pub fn warning(warning: &FitWarning) -> String {
-    match warning {
+/// A warning about a fit.
+pub fn warning(warning: &FitWarning) -> Finding {
+    let text = match warning {
         FitWarning::BeyondSigma { times } => format!(
-            "how sure the functions are is not known: the residuals are {times:.1} times sigma, so the device does not \
-             explain the readings, or sigma is too small"
+            "no confidence intervals: the residuals are {times:.1} times sigma, so the model does not explain the record \
+             or sigma is too small"
         ),
         FitWarning::CoarseSteps { times } => format!(
-            "how sure the functions are is not known: half the step changes the model's readings by {times:.1} times the \
-             residuals"
+            "no confidence intervals: halving the step changes the response by {times:.1} times the rms residual"
         ),
         FitWarning::PoorFit => {
-            "how sure the functions are is not known: what the device leaves of the readings is large, and not white"
-                .into()
+            "no confidence intervals: the residuals are large and autocorrelated".into()
         }
         FitWarning::Coloured => {
-            "by how much the errors are too small is not known: they hold for white residuals, and these are not"
+            "the residuals are autocorrelated: the true confidence intervals are wider than those given, which assume \
+             white noise"
                 .into()
         }
         FitWarning::Aliased {
             per_period,
             frequency,
         } => format!(
-            "devices of other frequencies may match as well: with {per_period:.1} readings in a period of {frequency:.3} \
-             Hz its aliases do; read more often, or at uneven times"
+            "aliasing: with {per_period:.1} samples per period at {frequency:.3} Hz, systems of other natural frequencies \
+             fit equally well; sample faster or at uneven times"
         ),
         FitWarning::Negative { function } => {
-            format!("the {function} is negative at most times, as that of no passive device")
+            format!("the {function} is negative at most times: the system is not passive")
         }
         FitWarning::NegligibleForce { experiment } => format!(
-            "the force of {experiment} is nothing beside those of the device: as if it did not act"
+            "the force of {experiment} is negligible relative to the inertia force; check its unit"
         ),
-    }
+    };
+    Finding::of(warning, text)
 }
 
-/// A finding of fits from so many starts.
-pub fn of_starts(finding: &Finding, starts: usize) -> String {
+/// A finding of fits from so many starting points.
+pub fn of_starts(finding: &multistart::MultistartFinding, starts: usize) -> Finding {
+    use multistart::MultistartFinding as Starts;
     match finding {
-        Finding::Nowhere => format!("none of {starts} starts led anywhere"),
-        Finding::Points {
+        Starts::Nowhere => {
+            let text = format!("no fit from the {starts} starting points reached a minimum");
+            Finding::new("no_minimum", text)
+        }
+        Starts::Points {
             ended,
             different,
             lowest,
-        } => format!(
-            "{ended} of {starts} starts led to {different} different points; the lowest cost is {lowest:.6e}"
+        } => {
+            let text = match (*ended == starts, *different) {
+                (true, 1) => format!(
+                    "all {starts} starting points converged to the same minimum; lowest J = {lowest:.6e}"
+                ),
+                _ => format!(
+                    "{ended} of {starts} starting points led to {different} different end points; lowest J = {lowest:.6e}"
+                ),
+            };
+            let finding = Finding::new("minima", text);
+            let finding = finding.with("ended", ended).with("starts", starts);
+            finding.with("different", different).with("lowest", lowest)
+        }
+        Starts::OneValley(true) => Finding::new(
+            "connected_minima",
+            "the two lowest minima are connected by a path of nearly constant cost: the solution is not unique",
         ),
-        Finding::OneValley(true) => {
-            "the two lowest are ends of one valley: a path between them hardly rises".into()
+        Starts::OneValley(false) => Finding::new(
+            "separate_minima",
+            "the cost rises between the two lowest minima, on the straight path and along the scaling ambiguity",
+        ),
+        Starts::Lower { cost, fit } => {
+            let text = format!(
+                "a starting point led to a lower J than the fit: {cost:.6e} instead of {fit:.6e}"
+            );
+            Finding::new("lower_minimum", text)
+                .with("cost", cost)
+                .with("fit", fit)
         }
-        Finding::OneValley(false) => {
-            "between the two lowest the cost rises on the straight path and along the gauge: no path without a rise was \
-             found"
-                .into()
-        }
-        Finding::Lower { cost, fit } => {
-            format!("a start led lower than the fit: {cost:.6e} instead of {fit:.6e}")
-        }
-        Finding::NotReached(fit) => {
-            format!("no start reached the fit, whose cost is {fit:.6e}: they were too far off, or got stuck")
+        Starts::NotReached(fit) => {
+            let text = format!("no starting point reached the minimum of the fit (J = {fit:.6e})");
+            Finding::new("fit_not_reached", text).with("fit", fit)
         }
     }
 }

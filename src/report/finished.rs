@@ -69,7 +69,7 @@ impl Run {
     pub fn open(folder: impl AsRef<Path>) -> Result<Self, InputError> {
         let folder = folder.as_ref();
         if !folder.is_dir() {
-            return Err(InputError::file(folder, "there is no such folder")
+            return Err(InputError::file(folder, "no such folder")
                 .expected("the folder of a finished run, as written by `kmcfit fit`"));
         }
         results::complete(folder)?;
@@ -145,7 +145,7 @@ fn value(folder: &Path) -> Result<Value, InputError> {
     let what = "the result of a finished run";
     let text = read_text_within(&path, what, LONGEST_DOCUMENT, JSON)?;
     let value: Value = serde_json::from_str(&text).map_err(|error| {
-        InputError::file(&path, "this is no JSON document")
+        InputError::file(&path, "not a JSON document")
             .found(error)
             .expected("a result written by `kmcfit fit`")
     })?;
@@ -168,9 +168,9 @@ fn document(folder: &Path, value: &Value) -> Result<ResultDocument, InputError> 
     {
         // Written by a run that could not begin: its outcome is all there is.
         return Err(
-            InputError::file(&path, "this run failed and found no device")
+            InputError::file(&path, "this run failed and has no estimates")
                 .found(reason)
-                .expected("the result of a run that found one"),
+                .expected("the result of a run with estimates"),
         );
     }
     ResultDocument::deserialize(value).map_err(|error| {

@@ -7,7 +7,7 @@ use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::simulate::SimulationError;
-use kmcfit_core::internals::solvers::{Fit, Solver, predict_held_out};
+use kmcfit_core::internals::solvers::{Fit, Solver, predict_validation};
 use nalgebra::DMatrix;
 
 /// Assessment of a fit, computed once for all its documents.
@@ -16,17 +16,19 @@ pub struct Known {
     /// `None` for the equation error, which simulates no response.
     pub(super) assessment: Option<FitAssessment>,
     /// The records that took no part.
-    pub(super) held_out: Vec<HeldOut>,
+    pub(super) validation: Vec<ValidationRecord>,
 }
 
 impl Known {
     /// Assesses a fit.
     pub fn of(model: &Model, fit: &Fit) -> Self {
         let is_simulated = model.settings.solver != Solver::EquationError;
-        let held_out = model.held_out.iter();
+        let validation = model.validation.iter();
         Self {
             assessment: is_simulated.then(|| FitAssessment::of(&model.problem, fit)),
-            held_out: held_out.map(|out| HeldOut::of(model, fit, out)).collect(),
+            validation: validation
+                .map(|out| ValidationRecord::of(model, fit, out))
+                .collect(),
         }
     }
 
@@ -48,18 +50,18 @@ impl Known {
 
 /// A record that took no part in the fit, and what the found device says of it.
 #[derive(Debug, Clone)]
-pub(super) struct HeldOut {
+pub(super) struct ValidationRecord {
     /// The record.
     pub out: HoldOut,
     /// The problem of that record alone and its point; what the record leaves open is found from its own readings.
     pub found: Result<(Problem, Evaluation), SimulationError>,
 }
 
-impl HeldOut {
+impl ValidationRecord {
     fn of(model: &Model, fit: &Fit, out: &HoldOut) -> Self {
         Self {
             out: out.clone(),
-            found: predict_held_out(
+            found: predict_validation(
                 &model.problem,
                 &fit.best.evaluation,
                 &out.experiment,

@@ -1,7 +1,7 @@
 //! Parts of the result document from the assessment of a fit: channels, scalars, validation records.
 
-use super::document::{ChannelSummary, HoldOutSummary, IgnoredSummary, ScalarSummary};
-use super::known::HeldOut;
+use super::document::{ChannelSummary, IgnoredSummary, NuisanceParameter, ValidationSummary};
+use super::known::ValidationRecord;
 use super::seen::SeenChannel;
 use kmcfit_core::internals::assessment::{diagnostics, outliers, pattern};
 use kmcfit_core::internals::objective::Evaluation;
@@ -30,7 +30,7 @@ pub fn channel(seen: &SeenChannel) -> ChannelSummary {
             });
             ignored.collect()
         }),
-        left_aside: outliers(channel, &residuals).len(),
+        outliers: outliers(channel, &residuals).len(),
         rms_residual: diagnostics.rms / factor,
         fit_percent: diagnostics.fit_percent,
         sigma,
@@ -51,11 +51,11 @@ pub fn scalars(
     problem: &Problem,
     evaluation: &Evaluation,
     covariance: Option<&DMatrix<f64>>,
-) -> Vec<ScalarSummary> {
+) -> Vec<NuisanceParameter> {
     let range = problem.functions.scalar_range();
     let list = problem.functions.scalars().iter().zip(range);
     list.zip(&evaluation.scalars)
-        .map(|((scalar, index), value)| ScalarSummary {
+        .map(|((scalar, index), value)| NuisanceParameter {
             name: scalar.name.clone(),
             unit: scalar.unit.clone(),
             value: *value,
@@ -65,19 +65,19 @@ pub fn scalars(
 }
 
 /// A record that took no part in the fit.
-pub(super) fn held_out(held: &HeldOut) -> HoldOutSummary {
+pub(super) fn validation(held: &ValidationRecord) -> ValidationSummary {
     let channels = held.channels();
     let summaries = channels.iter().map(channel);
-    let mut summary = HoldOutSummary {
+    let mut summary = ValidationSummary {
         name: held.out.experiment.name.clone(),
         channels: summaries.collect(),
-        scalars: Vec::new(),
+        nuisance_parameters: Vec::new(),
         failure: None,
     };
     match &held.found {
         Ok((problem, evaluation)) => {
             let covariance = problem.covariance(evaluation);
-            summary.scalars = scalars(problem, evaluation, covariance.as_ref());
+            summary.nuisance_parameters = scalars(problem, evaluation, covariance.as_ref());
         }
         Err(breakdown) => summary.failure = Some(breakdown.to_string()),
     }

@@ -15,7 +15,8 @@
 //! assert!(render(&figure).contains("time t (s)"));
 //! ```
 
-pub mod advice;
+mod assessment;
+mod assumptions;
 pub mod chart;
 mod columns;
 pub mod compare;
@@ -26,14 +27,13 @@ mod drawn;
 pub mod figures;
 pub(crate) mod findings;
 mod finished;
-mod knowledge;
 mod known;
 mod measured;
 mod page;
 mod run;
-mod run_findings;
 mod seen;
 pub mod study;
+mod suggestions;
 mod summary;
 mod tables;
 mod terminal;
@@ -46,7 +46,7 @@ pub use compare::Comparison;
 pub use cost::{CostKind, cost_definition};
 pub use csv::CsvTable;
 pub use finished::Run;
-pub use kmcfit_core::internals::study::{PredictedMotion, predict};
+pub use kmcfit_core::internals::study::{PredictedResponse, predict};
 pub use known::Known;
 pub(crate) use page::shell_quoted;
 pub use run::{FittedModel, fit_claim, json};

@@ -2,15 +2,16 @@
 
 use super::cost::{CostKind, cost_definition};
 use super::document::{
-    ActiveSummary, ChannelSummary, ConstraintSummary, CostSummary, CountsSummary,
+    ActiveSummary, AttemptSummary, ChannelSummary, ConstraintSummary, CostSummary, CountsSummary,
     ExperimentSummary, FORMAT, GradientSummary, ModelSummary, OutcomeSummary, PathSummary,
-    Prediction, ResultDocument, RungSummary, SlackSummary, WeightSummary,
+    Prediction, ResultDocument, SlackSummary, WeightSummary,
 };
 use super::known::Known;
 use super::measured;
 use super::page::fit_page;
 use super::render;
 use super::seen::SeenChannel;
+use super::suggestions::suggestions;
 use super::timings::{Around, TimingsSummary};
 use crate::config::{ChannelNote, Model};
 use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, Stage};
@@ -35,7 +36,7 @@ pub struct FittedModel<'a> {
     pub predictions: &'a [Prediction],
     /// The path on which the weight of the smoothness was chosen, if by a rule.
     pub weights: Option<&'a WeightPath>,
-    /// How well the readings determine what was found.
+    /// Assessment of the fit.
     pub known: &'a Known,
 }
 
@@ -76,7 +77,7 @@ impl FittedModel<'_> {
     /// The result document.
     pub fn document(&self) -> ResultDocument {
         let (model, fit) = (self.model, self.fit);
-        ResultDocument {
+        let mut document = ResultDocument {
             format: FORMAT,
             title: model.title.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
@@ -110,10 +111,15 @@ impl FittedModel<'_> {
             constraints: self.constraint_summary(),
             identifiability: self.identifiability(),
             weights: self.weight_summary(),
-            rungs: self.fit.attempts.iter().map(rung_summary).collect(),
+            attempts: self.fit.attempts.iter().map(attempt_summary).collect(),
             experiments: self.experiment_summaries(),
-            held_out: self.known.held_out.iter().map(measured::held_out).collect(),
-            scalars: match self.is_simulated() {
+            validation: self
+                .known
+                .validation
+                .iter()
+                .map(measured::validation)
+                .collect(),
+            nuisance_parameters: match self.is_simulated() {
                 true => {
                     let covariance = self.known.covariance();
                     measured::scalars(&model.problem, &fit.best.evaluation, covariance)
@@ -123,11 +129,14 @@ impl FittedModel<'_> {
             statistics: (self.known.assessment.as_ref())
                 .map(|a| a.statistics.clone())
                 .unwrap_or_default(),
-            half_step: self.known.step_check().cloned(),
-            remarks: model.remarks.clone(),
+            step_check: self.known.step_check().cloned(),
+            automatic: model.automatic.clone(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),
-        }
+            suggestions: Vec::new(),
+        };
+        document.suggestions = suggestions(&document);
+        document
     }
 
     /// Whether the fit compares a simulated motion with the readings, and not the equation of motion.
@@ -135,7 +144,7 @@ impl FittedModel<'_> {
         self.model.settings.solver != Solver::EquationError
     }
 
-    /// The bands of functions and ratios, for models of few free values.
+    /// The bands of functions and ratios, for models of at most 64 parameters.
     pub(super) fn bands(&self) -> Option<&Bands> {
         self.known.bands()
     }
@@ -154,7 +163,7 @@ impl FittedModel<'_> {
             method: self.model.settings.solver.name().into(),
             gradient: self.model.settings.gradient.name().into(),
             parameters: problem.parameters(),
-            terms: (problem.functions.assembly(0).iter().skip(1))
+            terms: (problem.functions.coefficient_set(0).iter().skip(1))
                 .map(|f| problem.functions.get(*f).quantity.name().into())
                 .collect(),
             friction_width: problem.system.terms.iter().find_map(|t| match t {
@@ -191,7 +200,7 @@ impl FittedModel<'_> {
                 name: group.name.clone(),
                 rows: rows.len(),
                 largest,
-                price: group.price(theta),
+                penalty: group.price(theta),
             })
         });
         broken.collect()
@@ -249,7 +258,7 @@ impl FittedModel<'_> {
                 ExperimentSummary {
                     name: experiment.name.clone(),
                     driven_by: driven_by(experiment.excitation.as_ref()),
-                    readings: experiment.reading_count(),
+                    readings: experiment.sample_count(),
                     rms_residual: channels
                         .first()
                         .map_or(f64::NAN, |first| factor * first.rms_residual),
@@ -296,7 +305,7 @@ fn driven_by(excitation: Option<&Excitation>) -> Vec<String> {
 
 fn active_summary(group: ActiveGroup) -> ActiveSummary {
     ActiveSummary {
-        sentence: group.sentence(),
+        text: group.sentence(),
         name: group.name,
         rows: group.rows,
         spans: group.spans,
@@ -304,14 +313,14 @@ fn active_summary(group: ActiveGroup) -> ActiveSummary {
     }
 }
 
-fn rung_summary(rung: &Attempt) -> RungSummary {
+fn attempt_summary(attempt: &Attempt) -> AttemptSummary {
     let known = |x: f64| x.is_finite().then_some(x);
-    RungSummary {
-        start: rung.start.name().into(),
-        initial_cost: known(rung.initial_cost),
-        cost: known(rung.cost),
-        iterations: rung.iterations,
-        status: rung.outcome.status,
+    AttemptSummary {
+        start: attempt.start.name().into(),
+        initial_cost: known(attempt.initial_cost),
+        cost: known(attempt.cost),
+        iterations: attempt.iterations,
+        status: attempt.outcome.status,
     }
 }
 
@@ -337,7 +346,7 @@ pub fn fit_claim(model: &Model) -> Claim {
             "trajectory.csv",
             "report.html",
         ])
-        .family("readings", "csv", readings.chain(["held-out".to_owned()]))
+        .family("readings", "csv", readings.chain(["validation".to_owned()]))
         .family("figures", "svg", FIGURES)
         .journals(&[FIT_JOURNAL, CHECKPOINT])
 }

@@ -1,14 +1,17 @@
-//! What a person reads in ten seconds.
+//! Summary of a fit for the terminal.
 
-use super::advice::{self, Advice};
 use super::document::{ChannelSummary, Prediction, ResultDocument};
+use super::suggestions;
 use crate::digits::significant;
+use crate::finding::Finding;
 use kmcfit_core::internals::assessment::FunctionSummary;
-use kmcfit_core::internals::identifiability::VerdictKind;
+use kmcfit_core::internals::diagnostics::NORMAL_975;
+use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::solvers::StartStrategy;
 use std::fmt::Write;
 
-/// The outcome, the misfit and the functions, as text.
+/// The summary: status, estimates, fit, identifiability, warnings, suggestions, then tables.
 pub fn summary(document: &ResultDocument) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
@@ -45,17 +48,17 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     for (name, channel) in document.records() {
         write_channel(text, &name, channel)?;
     }
-    for out in &document.held_out {
+    for out in &document.validation {
         if let Some(failure) = &out.failure {
-            writeln!(text, "{}: no motion: {failure}", out.title())?;
+            writeln!(text, "{}: no response: {failure}", out.title())?;
         }
     }
     write_statistics(text, document)?;
     writeln!(text)?;
     write_functions(text, document)?;
-    write_scalars(text, document)?;
+    write_nuisance_parameters(text, document)?;
     write_constraints(text, document)?;
-    write_rungs(text, document)?;
+    write_attempts(text, document)?;
     if !document.predictions.is_empty() {
         write!(
             text,
@@ -66,81 +69,107 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     Ok(())
 }
 
-/// What was found, how well, how sure, what stays open, what to try next: a line each.
+/// Estimate, fit, identifiability, warnings and suggestions under their headings.
 fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
-    let well = document.worst_fit().map(|worst| {
-        let what = match document.channels().count() {
-            1 => "the readings are",
-            _ => "the worst channel is",
-        };
-        let aside = match document.channels().map(|c| c.left_aside).sum::<usize>() {
-            0 => String::new(),
-            far => format!(", {} far off left aside", count(far, "reading")),
-        };
-        let ratio = match document.has_ratio() {
-            true => format!("; J/J0 {:.1e}", document.cost.ratio),
-            false => String::new(),
-        };
-        let held = document.held_out.iter().flat_map(|e| &e.channels);
-        let held = held.map(|c| c.fit_percent).reduce(f64::min);
-        let held = held.map_or(String::new(), |worst| {
-            format!("; held out: {}", advice::percent(worst, 2))
-        });
-        format!(
-            "{what} matched to {}{aside}{held}{ratio}",
-            advice::percent(worst, 2)
-        )
-    });
     let known = &document.identifiability;
-    for (label, sentences) in [
-        ("found", vec![found(document)]),
-        ("how well", well.into_iter().collect()),
-        ("how sure", known.settled.clone()),
-        ("open", known.open.clone()),
-        (
-            "try next",
-            advice::next(document)
-                .iter()
-                .map(Advice::to_string)
-                .collect(),
-        ),
+    let mut warnings = Finding::texts(&known.warnings);
+    warnings.extend(Finding::texts(&document.warnings));
+    for (heading, sentences) in [
+        ("Estimate", estimates(document)),
+        ("Fit", fit(document).into_iter().collect()),
+        ("Identifiability", Finding::texts(&known.findings)),
+        ("Warnings", warnings),
+        ("Suggestions", Finding::texts(&document.suggestions)),
     ] {
         for (i, sentence) in sentences.iter().enumerate() {
-            let label = if i == 0 { label } else { "" };
-            writeln!(text, "  {label:<9} {sentence}")?;
+            let heading = if i == 0 { heading } else { "" };
+            writeln!(text, "  {heading:<15} {sentence}")?;
         }
     }
     writeln!(text)
 }
 
-/// The functions of the device with their units: `mass 0.6 to 2.3 kg; stiffness 1 N/m`. What readings do not show has no
-/// value, what they show at times has its values then.
-fn found(document: &ResultDocument) -> String {
-    let function = |(name, f): (&str, &FunctionSummary)| {
-        if f.is_rounding {
-            return format!("{name} 0 {}", f.unit);
-        }
-        if f.verdict == Some(VerdictKind::NotSeen) {
-            return format!("{name} not seen");
-        }
-        let (range, seen) = match f.known_range {
-            Some(range) if f.verdict == Some(VerdictKind::OnlyOn) => (range, " where it is seen"),
-            _ => ([f.min, f.max], ""),
-        };
-        let [low, high] = range.map(short);
-        let values = match f.standard_error {
-            Some(error) if f.min == f.max => format!("{low} +- {error:.1e}"),
-            _ if low == high => low,
-            _ => format!("{low} to {high}"),
-        };
-        format!("{name} {values} {}{seen}", f.unit)
+/// Fit of the worst channel, of the validation records, rejected outliers and cost ratio in one line; `None` where no
+/// channel has a fit in per cent.
+fn fit(document: &ResultDocument) -> Option<String> {
+    let worst = document.worst_fit()?;
+    let mut text = match document.channels().count() {
+        1 => fit_percent(worst),
+        _ => format!("{} for the worst channel", fit_percent(worst)),
     };
-    let found: Vec<String> = document.terms().map(function).collect();
-    let legend = match found.iter().any(|f| f.contains(" +- ")) {
-        true => " (+- one standard error)",
-        false => "",
+    let outliers = document.channels().map(|c| c.outliers).sum::<usize>();
+    if outliers > 0 {
+        text += &format!(", {} rejected", count(outliers, "outlier"));
+    }
+    let validation = document.validation.iter().flat_map(|e| &e.channels);
+    if let Some(worst) = validation.map(|c| c.fit_percent).reduce(f64::min) {
+        text += &format!("; validation records: {}", fit_percent(worst));
+    }
+    if document.has_ratio() {
+        text += &format!("; J/J0 {:.1e}", document.cost.ratio);
+    }
+    Some(text)
+}
+
+fn fit_percent(fit: f64) -> String {
+    suggestions::percent(fit, 2)
+}
+
+/// Estimates of the coefficient functions: `k = 4075 N/m (95 % CI 4061 to 4089)`, or the range over the record.
+fn estimates(document: &ResultDocument) -> Vec<String> {
+    document.terms().map(estimate).collect()
+}
+
+fn estimate((name, f): (&str, &FunctionSummary)) -> String {
+    let symbol = symbol(name);
+    let unit = &f.unit;
+    if f.negligible {
+        return format!("{symbol} = 0 {unit}");
+    }
+    if f.verdict == Some(ClassificationKind::NotIdentified) {
+        return format!("{symbol}: not identifiable");
+    }
+    let fixed = match f.verdict {
+        Some(ClassificationKind::Fixed) => " (fixed)",
+        _ => "",
     };
-    found.join("; ") + legend
+    if let (Some(error), true) = (f.standard_error, f.min == f.max) {
+        let half = NORMAL_975 * error;
+        let [value, low, high] = [f.min, f.min - half, f.min + half].map(|x| resolved(x, half));
+        return format!("{symbol} = {value} {unit} (95 % CI {low} to {high})");
+    }
+    let (range, span) = match f.identified_range {
+        Some(range) if f.verdict == Some(ClassificationKind::PartlyIdentified) => {
+            (range, " where identified")
+        }
+        _ => ([f.min, f.max], " over the record"),
+    };
+    let [low, high] = range.map(short);
+    match low == high {
+        true => format!("{symbol} = {low} {unit}{fixed}"),
+        false => format!("{symbol} = {low} to {high} {unit}{span}{fixed}"),
+    }
+}
+
+/// Symbol of a coefficient function in the equation of motion; the name of any other.
+fn symbol(name: &str) -> &str {
+    let kind = CoefficientKind::ALL.into_iter().find(|k| k.name() == name);
+    kind.map_or(name, |kind| kind.symbol())
+}
+
+/// A value with the decimals that an interval of this half-width resolves: two digits of the half-width.
+fn resolved(x: f64, half: f64) -> String {
+    let order = |x: f64| x.abs().log10().floor();
+    let decimals = 1.0 - order(half);
+    if (1e-3..1e7).contains(&x.abs()) && (..=12.0).contains(&decimals) {
+        let decimals = decimals.max(0.0) as usize;
+        return format!("{x:.decimals$}");
+    }
+    let digits = order(x) + decimals + 1.0;
+    match digits.is_finite() {
+        true => significant(x, digits.clamp(2.0, 15.0) as usize),
+        false => short(x),
+    }
 }
 
 /// Four significant digits.
@@ -148,7 +177,7 @@ fn short(x: f64) -> String {
     significant(x, 4)
 }
 
-/// How well one channel is matched.
+/// Fit of one channel.
 pub(super) fn write_channel(
     text: &mut String,
     name: &str,
@@ -156,77 +185,84 @@ pub(super) fn write_channel(
 ) -> std::fmt::Result {
     write!(
         text,
-        "{name}: {} within {:.4e} {} rms, {}, {}",
+        "{name}: {}, rms residual {:.4e} {}, {}, {}",
         channel.kind,
         channel.rms_residual,
         channel.unit,
         fit_in_words(channel.fit_percent),
-        count(channel.readings, "reading")
+        count(channel.readings, "sample")
     )?;
-    if channel.left_aside > 0 {
-        write!(text, "; {} far off left aside", channel.left_aside)?;
+    if channel.outliers > 0 {
+        write!(text, "; {} rejected", count(channel.outliers, "outlier"))?;
     }
     for ignored in &channel.ignored {
-        write!(text, "; {} not used: {}", ignored.readings, ignored.reason)?;
+        write!(text, "; {} not used ({})", ignored.readings, ignored.reason)?;
     }
     writeln!(text)?;
     if let (Some(sigma), true) = (channel.sigma, channel.sigma_estimated) {
         writeln!(text, "  sigma estimated: {sigma:.4e} {}", channel.unit)?;
     }
-    // Where there is no noise the question makes no sense.
+    // Without a sigma the residuals are not assumed to be noise.
     if channel.sigma.is_some() {
         writeln!(text, "  {}", channel.whiteness)?;
     }
     Ok(())
 }
 
-/// The fit of a channel; readings that are all the same have none.
+/// Fit of a channel in per cent; samples that are all equal have none.
 pub(super) fn fit_in_words(percent: f64) -> String {
     match percent.is_finite() {
-        true => format!("fit {}", advice::percent(percent, 2)),
-        false => "no fit in per cent".into(),
+        true => format!("fit {}", fit_percent(percent)),
+        false => "fit undefined".into(),
     }
 }
 
-/// All readings together, and what half the step changes.
+/// Statistics of all samples and the step-size check.
 pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
     let statistics = &document.statistics;
     if let Some(reduced) = statistics.reduced_chi_square {
         write!(
             text,
-            "chi-square per degree of freedom {reduced:.4} ({} readings, {} parameters)",
-            statistics.readings, statistics.parameters
+            "chi-square per degree of freedom {reduced:.4} ({} samples, {} parameters)",
+            statistics.samples, statistics.parameters
         )?;
         match (statistics.aic, statistics.bic) {
             (Some(aic), Some(bic)) => writeln!(text, ", AIC {aic:.2}, BIC {bic:.2}")?,
             _ => writeln!(text)?,
         }
     }
-    match &document.half_step {
+    match &document.step_check {
         Some(half) => writeln!(
             text,
-            "on half the step the model's readings change by at most {:.1e} of the largest one",
-            half.change_per_reading
+            "step-size check: halving the step changes the response by at most {} % of its peak",
+            significant(100.0 * half.change_per_sample, 2)
         ),
         None if !document.is_simulated() => Ok(()),
-        None => writeln!(text, "on half the step there is no motion"),
+        None => writeln!(text, "step-size check: no response with half the step"),
     }
 }
 
-/// The numbers that were fitted beside the functions.
-pub(super) fn write_scalars(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
-    for scalar in &document.scalars {
-        write!(text, "{} {}", scalar.name, significant(scalar.value, 6))?;
-        match scalar.standard_error {
-            Some(error) => writeln!(text, " +- {error:.2e} {}", scalar.unit)?,
-            None => writeln!(text, " {}", scalar.unit)?,
+/// Nuisance parameters with their confidence intervals.
+pub(super) fn write_nuisance_parameters(
+    text: &mut String,
+    document: &ResultDocument,
+) -> std::fmt::Result {
+    for parameter in &document.nuisance_parameters {
+        let (name, unit) = (&parameter.name, &parameter.unit);
+        match parameter.standard_error {
+            Some(error) => {
+                let half = NORMAL_975 * error;
+                let (low, high) = (parameter.value - half, parameter.value + half);
+                let [value, low, high] = [parameter.value, low, high].map(|x| resolved(x, half));
+                writeln!(text, "{name} = {value} {unit} (95 % CI {low} to {high})")?;
+            }
+            None => writeln!(text, "{name} = {} {unit}", significant(parameter.value, 6))?,
         }
     }
     Ok(())
 }
 
-/// The iterations of the last fit, and of the fits on the way to it: to its weight, if a rule chose that, or from other
-/// starts.
+/// Iterations of the last fit, and of the fits before it: along the path of weights, or from other starting points.
 pub(super) fn iterations(document: &ResultDocument) -> String {
     let last = count(document.counts.iterations as usize, "iteration");
     if let Some(weights) = &document.weights {
@@ -234,26 +270,26 @@ pub(super) fn iterations(document: &ResultDocument) -> String {
         let before = weights.iterations();
         return format!("{last} after {before} along a path of {fits}");
     }
-    if document.rungs.len() < 2 {
+    if document.attempts.len() < 2 {
         return last;
     }
     let all = document
-        .rungs
+        .attempts
         .iter()
-        .map(|rung| rung.iterations)
+        .map(|attempt| attempt.iterations)
         .sum::<u64>();
     let starts = document
-        .rungs
+        .attempts
         .iter()
-        .filter(|rung| rung.start != StartStrategy::Continued.name());
-    let starts = count(starts.count(), "start");
+        .filter(|attempt| attempt.start != StartStrategy::Continued.name());
+    let starts = count(starts.count(), "starting point");
     match document.estimates_sigma() {
         true => format!("{last} after {all} from {starts}"),
         false => format!("{last}, {all} in all from {starts}"),
     }
 }
 
-/// A number of things, in the singular where there is one.
+/// A count with its noun in the singular or plural.
 pub(super) fn count(number: usize, thing: &str) -> String {
     match number {
         1 => format!("1 {thing}"),
@@ -261,8 +297,7 @@ pub(super) fn count(number: usize, thing: &str) -> String {
     }
 }
 
-/// Numbers of one kind with five decimals, or in powers of ten where the largest asks for that; what rounds to zero
-/// has no sign.
+/// Numbers with five decimals, or in powers of ten if the largest is below 0.01 or at least 10^6. Zero has no sign.
 pub(super) fn alike<const N: usize>(numbers: [f64; N]) -> [String; N] {
     let largest = numbers.iter().fold(0.0f64, |most, x| most.max(x.abs()));
     match largest == 0.0 || (1e-2..1e6).contains(&largest) {
@@ -288,11 +323,11 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
     let width = longest.unwrap_or(0).max(10);
     write!(text, "{:<width$} {:>12} {:>12}", "function", "min", "max")?;
     if has_truth {
-        write!(text, " {:>14} {:>14}", "largest error", "rms error")?;
+        write!(text, " {:>14} {:>14}", "max error", "rms error")?;
     }
     writeln!(text)?;
     for (name, function) in document.all_functions() {
-        let [min, max] = match function.is_rounding {
+        let [min, max] = match function.negligible {
             true => [0.0; 2].map(decimals),
             false => alike([function.min, function.max]),
         };
@@ -300,10 +335,10 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
         if let (Some(most), Some(rms)) = (function.truth_max_error, function.truth_rms_error) {
             write!(text, " {most:>14.3e} {rms:>14.3e}")?;
         }
-        let is_seen = function.verdict != Some(VerdictKind::NotSeen);
-        match function.standard_error.filter(|_| !function.is_rounding) {
-            _ if !is_seen => write!(text, "  not seen")?,
-            Some(error) => write!(text, "  +- {error:.2e}")?,
+        let is_identifiable = function.verdict != Some(ClassificationKind::NotIdentified);
+        match function.standard_error.filter(|_| !function.negligible) {
+            _ if !is_identifiable => write!(text, "  not identifiable")?,
+            Some(error) => write!(text, "  s.e. {error:.2e}")?,
             None => {}
         }
         writeln!(text)?;
@@ -315,7 +350,7 @@ pub(super) fn write_constraints(text: &mut String, document: &ResultDocument) ->
     if let Some(weights) = &document.weights {
         writeln!(
             text,
-            "weight of the smoothness {:.3e} by {}",
+            "penalty weight {:.3e} by {}",
             weights.weight, weights.rule
         )?;
         if let Some(remark) = &weights.remark {
@@ -325,44 +360,44 @@ pub(super) fn write_constraints(text: &mut String, document: &ResultDocument) ->
     for slack in &document.constraints.slack {
         writeln!(
             text,
-            "soft `{}` is broken by up to {:.3e} on {}",
+            "soft constraint `{}` is violated by up to {:.3e} on {}",
             slack.name,
             slack.largest,
             count(slack.rows, "row")
         )?;
     }
     for active in &document.constraints.active {
-        writeln!(text, "{}", active.sentence)?;
+        writeln!(text, "{}", active.text)?;
     }
     Ok(())
 }
 
-/// The ladder, where more than one start was tried.
-pub(super) fn write_rungs(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
-    if document.rungs.len() < 2 {
+/// The attempts, if there is more than one.
+pub(super) fn write_attempts(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+    if document.attempts.len() < 2 {
         return Ok(());
     }
     let with = match document.estimates_sigma() {
-        true => " (sigma not estimated yet)",
+        true => " (before sigma is estimated)",
         false => "",
     };
-    for rung in &document.rungs {
-        let cost = rung
+    for attempt in &document.attempts {
+        let cost = attempt
             .cost
-            .map_or("no motion".into(), |cost| format!("J {cost:.4e}{with}"));
+            .map_or("no response".into(), |cost| format!("J {cost:.4e}{with}"));
         writeln!(
             text,
-            "from the {}: {cost} after {} ({})",
-            rung.start,
-            count(rung.iterations as usize, "iteration"),
-            rung.status.name()
+            "attempt from the {}: {cost} after {} ({})",
+            attempt.start,
+            count(attempt.iterations as usize, "iteration"),
+            attempt.status.name()
         )?;
     }
     Ok(())
 }
 
-/// Predictions as a table: the initial state and, where a truth is known, the cost against it and the energy of the true
-/// motion, else how far the motion goes and where it ends.
+/// Predictions as a table: the initial state and, if the true system is known, the cost relative to its response and the
+/// energy of that response, else the largest and the last displacement.
 pub fn prediction_table(predictions: &[Prediction], is_rotation: bool) -> String {
     let has_truth = predictions
         .iter()
@@ -384,7 +419,7 @@ pub fn prediction_table(predictions: &[Prediction], is_rotation: bool) -> String
         .map(|x| x.unwrap_or_else(|| "unknown".into()));
         text += &row([&y, &v, &one, &other]);
         if let Some(failure) = &p.failure {
-            let _ = writeln!(text, "{:>12} no motion: {failure}", "");
+            let _ = writeln!(text, "{:>12} no response: {failure}", "");
         }
     }
     text

@@ -29,7 +29,7 @@ impl FittedModel<'_> {
     }
 
     pub(super) fn functions_table(&self) -> CsvTable {
-        let device = &self.fit.best.evaluation.device;
+        let device = &self.fit.best.evaluation.nodal;
         let times = self.model.problem.system.grid.times();
         let mut table = CsvTable::new().column("t_s", times);
         for (function, values) in self.named_functions() {
@@ -115,14 +115,14 @@ impl FittedModel<'_> {
             let name = format!("readings/{}-{}.csv", e + 1, seen.channel.kind().name());
             (name, seen.table())
         });
-        let held_out = self.known.held_out.iter().enumerate();
-        let held_out = held_out.flat_map(|(i, out)| {
+        let validation = self.known.validation.iter().enumerate();
+        let validation = validation.flat_map(|(i, out)| {
             out.channels().into_iter().map(move |seen| {
                 let kind = seen.channel.kind().name();
-                let name = format!("readings/held-out-{}-{kind}.csv", i + 1);
+                let name = format!("readings/validation-{}-{kind}.csv", i + 1);
                 (name, seen.table())
             })
         });
-        fitted.chain(held_out).collect()
+        fitted.chain(validation).collect()
     }
 }

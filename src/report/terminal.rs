@@ -30,7 +30,7 @@ pub fn charts(
             let name = format!("readings/{}-{}.csv", e + 1, channel.kind);
             let table = Columns::read(&folder.join(name))?;
             let title = format!(
-                "{}: {} in {} (line: fit, o: readings off it)",
+                "{}: {} in {} (line: fit, o: samples)",
                 experiment.name, channel.kind, channel.unit
             );
             let times = table.required("t_s")?;

@@ -27,7 +27,7 @@ pub struct TimingsSummary {
     pub start: PartSummary,
     /// Reading data, and writing checkpoints and results; `result.json` itself is written after the clock has stopped.
     pub io: PartSummary,
-    /// What the fit is worth: errors and bands, statistics, the half step, records held out, predictions.
+    /// Assessment: errors and bands, statistics, step-size check, validation records, predictions.
     #[serde(default)]
     pub analysis: PartSummary,
     /// Tables, figures and the page, made to be written.

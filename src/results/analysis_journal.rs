@@ -1,4 +1,4 @@
-//! A journal of finished analyses: a study or comparison that was killed goes on with the next one.
+//! A journal of finished analyses: an interrupted study or comparison resumes after the last one.
 
 use super::heading::Heading;
 use super::journal::{JournalFile, JournalText};

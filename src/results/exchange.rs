@@ -400,7 +400,7 @@ pub(super) fn complete_locked(folder: &Path) -> Result<(), InputError> {
     }
     let unusable = |problem: &str| {
         InputError::file(&exchange, problem)
-            .expected("what a run of kmcfit left here that was killed, or nothing")
+            .expected("leftovers of a killed run of kmcfit, or nothing")
             .hint("move it away")
     };
     if exchange.is_symlink() || !is_marked(&exchange) {

@@ -218,7 +218,7 @@ impl JournalText {
     /// If there is none of this format.
     pub fn read(path: &Path, what: &'static str) -> Result<Self, InputError> {
         if path.is_symlink() {
-            return Err(InputError::file(path, "this is a link").expected(what));
+            return Err(InputError::file(path, "this is a symbolic link").expected(what));
         }
         // Of a file that is no journal nothing more is read.
         let (file, _) = open(path, what)?;
@@ -258,7 +258,7 @@ impl JournalText {
 }
 
 fn no_journal(path: &Path, what: &str) -> InputError {
-    InputError::file(path, "this is no journal of kmcfit, or it was edited").expected(what)
+    InputError::file(path, "not a journal of kmcfit, or it was edited").expected(what)
 }
 
 /// The lines of a text, each a JSON value, with the checksums that they have behind the heading of a journal: for

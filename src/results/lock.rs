@@ -47,7 +47,7 @@ impl Lock {
             Some(Ok(lock)) => Ok(Some(lock)),
             Some(Err(TryLockError::WouldBlock)) => Err(Taken),
             Some(Err(TryLockError::Error(_))) => {
-                // A file system without locks: the file serves nobody.
+                // A file system without locks: the lock file has no effect.
                 let _ = system::remove_file(path);
                 Ok(None)
             }

@@ -53,7 +53,7 @@ impl FileRecord {
 /// A file of another length or digest.
 const CHANGED: &str = "this file was changed since kmcfit wrote it";
 /// A file whose length or contents cannot be read.
-const UNREADABLE: &str = "this file cannot be read, to see whether kmcfit wrote it";
+const UNREADABLE: &str = "this file cannot be read to check that kmcfit wrote it";
 
 /// What stands where the manifest names a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,7 +73,7 @@ impl FileRecord {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => FileState::Missing,
             Err(_) => FileState::Other(UNREADABLE),
             Ok(metadata) if !metadata.is_file() => {
-                FileState::Other("something else stands in the place of a file that kmcfit wrote")
+                FileState::Other("a file written by kmcfit was replaced by something else")
             }
             Ok(metadata) if metadata.len() != self.bytes => FileState::Other(CHANGED),
             Ok(_) => match digest_of_file(path) {

@@ -257,12 +257,11 @@ impl OutputFolder {
                 return Err(a_link(&folder));
             }
             if folder.exists() && !folder.is_dir() {
-                return Err(InputError::file(
-                    &folder,
-                    "this is a file where results need a folder",
-                )
-                .expected("a folder, or nothing")
-                .hint("move it away, or give another folder with --out"));
+                return Err(
+                    InputError::file(&folder, "this is a file; results need a folder")
+                        .expected("a folder, or nothing")
+                        .hint("move it away, or give another folder with --out"),
+                );
             }
         }
         Ok(())
@@ -312,7 +311,7 @@ fn taken(path: &Path) -> InputError {
 fn a_link(path: &Path) -> InputError {
     InputError::file(
         path,
-        "this is a link, and results would be written elsewhere",
+        "this is a symbolic link: results would be written elsewhere",
     )
     .expected("a folder, or nothing")
     .hint("remove the link, or give another folder with --out")

@@ -128,7 +128,7 @@ pub fn create_folders(folder: &Path) -> io::Result<()> {
             match other {
                 other if other.is_symlink() => "a link that leads to no folder",
                 other if other.is_file() => "a file",
-                _ => "a device, a pipe or a socket",
+                _ => "a special file (device node, pipe or socket)",
             }
         ))),
         None => fs::create_dir_all(folder),

@@ -102,7 +102,7 @@ fn keys() {
       |
     4 |   - name: free decay
       |     ^^^^
-      expected: `data`, a CSV file with the readings
+      expected: `data`, a CSV file with the samples
     ");
     assert_snapshot!(changed("fit:\n", "fit:\n  method: lbfgs\n"), @"
     error: model.yaml:15:3: fit: duplicate key `method`
@@ -200,7 +200,7 @@ fn kinds_of_value() {
       hint: a newer version of the program may
     ");
     assert_snapshot!(changed("fit:", "fit: lbfgs\nfitting:"), @"
-    error: model.yaml:13:6: fit: this is the wrong kind of value
+    error: model.yaml:13:6: fit: wrong type of value
        |
     13 | fit: lbfgs
        |      ^^^^^
@@ -304,12 +304,12 @@ fn sigma() {
     let model = MODEL.replace("    initial", &sigma("0.1"));
     bench.write("model.yaml", &model.replace("discrete", "continuous"));
     assert_snapshot!(message(&bench), @"
-    error: model.yaml:16:13: fit.gradient: the continuous adjoint is that of the integral cost with a reading at every node
+    error: model.yaml:16:13: fit.gradient: the continuous adjoint needs the integral cost with a sample at every node
        |
     16 |   gradient: continuous
        |             ^^^^^^^^^^
-      found: `continuous` with a sigma or with fewer readings than nodes
-      expected: `discrete`, which has no such limits
+      found: `continuous` with a sigma or with fewer samples than nodes
+      expected: `discrete`
     ");
 }
 
@@ -324,7 +324,7 @@ fn grid() {
       expected: a length of time in s, greater than 0
     ");
     assert_snapshot!(changed("nodes: 21", "nodes: 21, duration: 3.0"), @"
-    error: model.yaml:8:29: grid.duration: the duration is not that of the readings
+    error: model.yaml:8:29: grid.duration: the duration differs from that of the records
       |
     8 | grid: {nodes: 21, duration: 3.0, method: midpoint}
       |                             ^^^
@@ -332,7 +332,7 @@ fn grid() {
       expected: 2 (or leave it out)
     ");
     assert_snapshot!(changed("nodes: 21", "nodes: 2"), @"
-    error: model.yaml:8:15: grid.nodes: this number of nodes cannot be used
+    error: model.yaml:8:15: grid.nodes: invalid number of nodes
       |
     8 | grid: {nodes: 2, method: midpoint}
       |               ^
@@ -407,7 +407,7 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
 #[test]
 fn readings_files() {
     assert_snapshot!(changed("data: readings.csv", "data: reading.csv"), @"
-    error: model.yaml:5:11: experiments[0].data: reading.csv: there is no such file
+    error: model.yaml:5:11: experiments[0].data: reading.csv: no such file
       |
     5 |     data: reading.csv
       |           ^^^^^^^^^^^
@@ -415,7 +415,7 @@ fn readings_files() {
       hint: did you mean `readings.csv`?
     ");
     assert_snapshot!(changed("data: readings.csv", "data: data/readings.csv"), @"
-    error: model.yaml:5:11: experiments[0].data: data/readings.csv: there is no such file
+    error: model.yaml:5:11: experiments[0].data: data/readings.csv: no such file
       |
     5 |     data: data/readings.csv
       |           ^^^^^^^^^^^^^^^^^
@@ -445,7 +445,7 @@ fn readings_files() {
       expected: a CSV file with one row of column names and rows of numbers
     ");
     assert_snapshot!(with_readings(&readings(2)), @"
-    error: model.yaml:6:40: experiments[0].columns.displacement: there are too few readings
+    error: model.yaml:6:40: experiments[0].columns.displacement: too few samples
       |
     6 |     columns: {time: t_s, displacement: y_m}
       |                                        ^^^
@@ -453,7 +453,7 @@ fn readings_files() {
       expected: at least 3
     ");
     assert_snapshot!(with_readings("t_s,y_m\n0,1\n"), @"
-    error: model.yaml:6:40: experiments[0].columns.displacement: there are too few readings
+    error: model.yaml:6:40: experiments[0].columns.displacement: too few samples
       |
     6 |     columns: {time: t_s, displacement: y_m}
       |                                        ^^^
@@ -487,7 +487,7 @@ fn rows() {
     18 | 1.6,off
        |     ^^^
       found: `off`
-      expected: a finite number, or an empty field where a reading is missing
+      expected: a finite number, or an empty field for a missing sample
     ");
     assert_snapshot!(with_row(17, "1.6"), @"
     error: readings.csv:18: row 17: the row does not fit the column names
@@ -522,7 +522,7 @@ fn files_of_functions() {
     let bench = Workbench::with_small_model();
     bench.write("model.yaml", &model);
     assert_snapshot!(message(&bench), @"
-    error: model.yaml:10:43: functions.mass.start.data: device.csv: there is no such file
+    error: model.yaml:10:43: functions.mass.start.data: device.csv: no such file
        |
     10 |   mass:      {basis: nodal, start: {data: device.csv, column: mass_kg}}
        |                                           ^^^^^^^^^^
@@ -561,12 +561,12 @@ fn files_of_functions() {
 fn model_files() {
     let bench = Workbench::with_small_model();
     assert_snapshot!(refused(&bench, &["fit", "modle.yaml"]), @"
-    error: modle.yaml: there is no such file
+    error: modle.yaml: no such file
       expected: a model file (YAML)
       hint: did you mean `model.yaml`?
     ");
     assert_snapshot!(refused(&bench, &["simulate", "readings.csv"]), @"
-    error: readings.csv:1:1: this is the wrong kind of value
+    error: readings.csv:1:1: wrong type of value
       |
     1 | t_s,y_m
       | ^^^^^^^
@@ -600,13 +600,13 @@ fn output_folders() {
         @"
     error: --out: the results cannot be written
       found: model.yaml/motion.csv: model.yaml is a file, not a folder
-      expected: a place that can be written to
+      expected: a writable folder
     "
     );
     assert_snapshot!(refused(&bench, &["simulate", "model.yaml", "--out", "."]), @"
     error: --out: the results cannot be written
       found: .: this is a folder, not a file
-      expected: a place that can be written to
+      expected: a writable folder
     ");
 }
 
@@ -631,32 +631,32 @@ fn simulate_arguments() {
     For more information, try '--help'.
     ");
     assert_snapshot!(with(&["--noise=-1", "--seed", "1"]), @"
-    error: --noise: a standard deviation cannot be this
+    error: --noise: invalid standard deviation
       found: -1
       expected: a finite number, 0 or greater, in m
     ");
     assert_snapshot!(with(&["--experiment", "forced"]), @"
-    error: --experiment: the model has no such experiment
+    error: --experiment: no such experiment in the model
       found: `forced`
       expected: `free decay`
     ");
     assert_snapshot!(with(&["--nodes", "2"]), @"
-    error: --nodes: this number of nodes cannot be used
+    error: --nodes: invalid number of nodes
       found: 2
       expected: 3 or more
     ");
     assert_snapshot!(with(&["--nodes", "many"]), @"
-    error: --nodes: this is no number
+    error: --nodes: not a number
       found: `many`
-      expected: a whole number, not negative
+      expected: a whole number, 0 or greater
     ");
     bench.write("model.yaml", &MODEL.replace("    data: readings.csv\n", ""));
     assert_snapshot!(with(&[]), @"
-    error: model.yaml:7:7: grid: the length of the motion is missing
+    error: model.yaml:7:7: grid: the duration is missing
       |
     7 | grid: {nodes: 21, method: midpoint}
       |       ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
-      expected: `duration` in s, since there are no readings to take it from
+      expected: `duration` in s, because there is no record
     ");
 }
 
@@ -665,7 +665,7 @@ fn check_arguments() {
     let bench = Workbench::with_small_model();
     let with = |more: &[&str]| refused(&bench, &[&["check", "model.yaml"], more].concat());
     assert_snapshot!(with(&["--nodes", "1"]), @"
-    error: --nodes: this number of nodes cannot be used
+    error: --nodes: invalid number of nodes
       found: 1
       expected: 3 or more
     ");
@@ -682,31 +682,31 @@ fn predict_arguments() {
     bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
     let from = |run: &str, state: &str| refused(&bench, &["predict", run, "--initial", state]);
     assert_snapshot!(from("run", "3.3"), @"
-    error: --initial: this is no initial state
+    error: --initial: invalid initial state
       found: `3.3`
       expected: two numbers: displacement in m, velocity in m/s, as in --initial 3.4,1.1
     ");
     assert_snapshot!(from("run", "-3.3,fast"), @"
-    error: --initial: this is no initial state
+    error: --initial: invalid initial state
       found: `-3.3,fast`
       expected: two numbers: displacement in m, velocity in m/s, as in --initial 3.4,1.1
     ");
     assert_snapshot!(from("run", "1,2,3"), @"
-    error: --initial: this is no initial state
+    error: --initial: invalid initial state
       found: `1,2,3`
       expected: two numbers: displacement in m, velocity in m/s, as in --initial 3.4,1.1
     ");
     assert_snapshot!(from("run", "nan,0"), @"
-    error: --initial: this is no initial state
+    error: --initial: invalid initial state
       found: `nan,0`
       expected: two numbers: displacement in m, velocity in m/s, as in --initial 3.4,1.1
     ");
     assert_snapshot!(from("rum", "1,0"), @"
-    error: rum: there is no such folder
+    error: rum: no such folder
       expected: the folder of a finished run, as written by `kmcfit fit`
     ");
     assert_snapshot!(from("model.yaml", "1,0"), @"
-    error: model.yaml: there is no such folder
+    error: model.yaml: no such folder
       expected: the folder of a finished run, as written by `kmcfit fit`
     ");
     assert_snapshot!(refused(&bench, &["predict", "run"]), @"
@@ -725,7 +725,7 @@ fn predict_arguments() {
     ");
     bench.write("other/result.json", &bench.read("run/result.json"));
     assert_snapshot!(from("other", "1,0"), @"
-    error: other/functions.csv: there is no such file
+    error: other/functions.csv: no such file
       expected: a CSV file with one row of column names and rows of numbers
     ");
     bench.write("other/functions.csv", "t_s,mass_kg\n0,1\n");

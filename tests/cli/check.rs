@@ -11,7 +11,7 @@ fn discrete_gradient_passes_where_the_continuous_one_has_a_floor() {
     let stdout = bench.run_to(0, &[&check[..], &["--out", "checked"]].concat());
     assert!(
         stdout.ends_with(
-            "results in checked\nthe discrete gradient is exact: least error below 1e-6\n"
+            "results in checked\nthe discrete gradient is exact: min error below 1e-6\n"
         )
     );
     assert_eq!(stdout.matches("discrete  ").count(), 2, "{stdout}");
@@ -32,7 +32,7 @@ fn without_gradient_it_only_reads() {
     let stdout = bench.run_to(0, &["check", "model.yaml", "--no-gradient"]);
     assert_eq!(
         stdout,
-        "free decay: 21 readings of the displacement in m (UTF-8; separated by commas; decimal point; \
+        "free decay: 21 samples of the displacement in m (UTF-8; separated by commas; decimal point; \
          column names in line 1)\nSmall: 21 nodes over 2 s (midpoint), 43 parameters, lbfgs\n"
     );
     assert_eq!(bench.contents(), before);

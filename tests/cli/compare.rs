@@ -145,23 +145,23 @@ fn the_table() {
     settings.bind(|| {
         assert_snapshot!(stdout, @"
         constants: Constants
-          the true device: k/m and c/m to [tiny]
+          true system recovered: relative error of k/m and c/m at most [tiny]
         twice: Twice the mass
-          the true device: k/m and c/m to [tiny], but m, c and k off by a common factor (m by 100 %)
+          true system recovered: relative error of k/m and c/m at most [tiny]; m, c and k are scaled by a common factor (error of m 100 %)
         free: One value per step
-          matches the motion (J/J0 [tiny]) but is another device: k/m off by 77 %, c/m off by 1142 %
+          response fitted (J/J0 [tiny]), but not by the true system: error of k/m 77 %, error of c/m 1142 %
 
                                              constants      twice       free
         status                               converged  converged  converged
         method                                   lbfgs      lbfgs      lbfgs
         nodes                                      200        200        200
-        free values                                  2          2        600
+        parameters                                   2          2        600
         misfit (m² s)                           [tiny]     [tiny]     [tiny]
         worst fit of a channel (%)               100.0      100.0      99.89
         J/J0                                    [tiny]     [tiny]     [tiny]
         iterations                                   9          7         69
         time (s) [seconds]
-        largest error of m (kg)                      0      1.000      1.926
+        max error of m (kg)                          0      1.000      1.926
           of c (N s/m)                          [tiny]     0.1000      1.259
           of k (N/m)                            [tiny]      1.000     0.9349
           of k/m (1/s²)                         [tiny]     [tiny]     0.7749
@@ -269,7 +269,7 @@ fn as_json() {
     assert_eq!(found["left_out"], json("[]"));
     for (run, name) in [(0, "constants"), (1, "twice")] {
         assert_eq!(found["runs"][run]["name"], name);
-        assert_eq!(found["runs"][run]["true_device"], true);
+        assert_eq!(found["runs"][run]["is_true_system"], true);
     }
     assert!(
         found["runs"][1]["errors"]["mass_relative"]
@@ -362,17 +362,17 @@ fn a_bad_argument_ends_everything_before_it_begins() {
     let stderr = refused("bad.yaml");
     assert!(stderr.starts_with("error: bad.yaml:10:"), "{stderr}");
     assert_snapshot!(refused("constant.yaml"), @"
-    error: constant.yaml: there is no such file
+    error: constant.yaml: no such file
       expected: a model file (YAML), or the folder of a finished run
       hint: did you mean `constants.yaml`?
     ");
     assert_snapshot!(refused("empty"), @"
-    error: empty/result.json: there is no such file
+    error: empty/result.json: no such file
       expected: the result of a finished run
     ");
     bench.run_to(0, &["fit", "constants.yaml"]);
     assert_snapshot!(refused("runs/constants/result.json"), @"
-    error: runs/constants/result.json: this is a result, not a model
+    error: runs/constants/result.json: a result file in place of a model file
       expected: a model file (YAML), or the folder of a finished run
       hint: give its folder: runs/constants
     ");
@@ -410,7 +410,7 @@ fn the_page() {
         let all = |name: &'static str| page.descendants().filter(move |n| n.has_tag_name(name));
         let text = text_of(page.root_element());
         assert!(text.contains("<script>alert(1)</script>&\" =HYPERLINK"));
-        assert!(text.contains("2 of the 3 runs that name the truth reach it."));
+        assert!(text.contains("2 of the 3 runs with a known true system recover it."));
         for run in &records {
             assert!(text.to_lowercase().contains(&run["verdict"].to_lowercase()));
         }
@@ -460,7 +460,7 @@ fn a_run_that_does_not_converge() {
     let early = "{method: lbfgs, stop: {iterations: 3, cost_ratio: 1e-9}}";
     bench.write("early.yaml", &model("Early", 200, FREE, early));
     let stdout = bench.run_to(3, &["compare", "early.yaml", "constants.yaml"]);
-    assert!(stdout.contains("does not match the motion"), "{stdout}");
+    assert!(stdout.contains("response not fitted"), "{stdout}");
     assert!(bench.path("runs/compare/constants/result.json").exists());
 }
 
@@ -477,12 +477,12 @@ fn a_run_without_motion() {
         "{stderr}"
     );
     assert!(
-        stdout.contains("heavy: left out\n  the start cannot be evaluated"),
+        stdout.contains("heavy: no result\n  the start cannot be evaluated"),
         "{stdout}"
     );
     assert_eq!(records(&bench.read("runs/compare/compare.csv")).len(), 1);
     with_page(&bench, "runs/compare/compare.html", |page| {
-        assert!(text_of(page.root_element()).contains("left out: the start cannot be evaluated"));
+        assert!(text_of(page.root_element()).contains("no result: the start cannot be evaluated"));
     });
 }
 
@@ -507,9 +507,9 @@ fn noise_and_no_truth() {
     let records = records(&bench.read("runs/compare/compare.csv"));
     assert_eq!(records[0]["misfit_unit"], "1");
     let [noisy, blind] = [0, 1].map(|i| records[i]["verdict"].as_str());
-    assert!(noisy.starts_with("close to the true device: "), "{noisy}");
-    assert!(noisy.contains("within its noise (chi-square "), "{noisy}");
-    assert!(blind.ends_with("; the truth is not known"), "{blind}");
+    assert!(noisy.starts_with("close to the true system: "), "{noisy}");
+    assert!(noisy.contains("within the noise (chi-square "), "{noisy}");
+    assert!(blind.ends_with("; true system not known"), "{blind}");
     assert_eq!(records[1]["mass_error_kg"], "");
 }
 
@@ -546,7 +546,7 @@ fn interrupt() {
     assert_eq!(output.status.code(), Some(130), "{output:?}");
     let stdout = String::from_utf8_lossy(&output.stdout);
     assert!(
-        stdout.contains("twice: left out\n  not begun: interrupted"),
+        stdout.contains("twice: no result\n  not started: interrupted"),
         "{stdout}"
     );
     let records = records(&bench.read("runs/compare/compare.csv"));

@@ -500,7 +500,7 @@ fn a_resumption_that_is_refused() {
     error: models/../data/paper.csv: this file has changed since the fit was begun
       expected: the same model and data, or a new fit
 
-    error: run/fit.journal: this is no journal of kmcfit, or it was edited
+    error: run/fit.journal: not a journal of kmcfit, or it was edited
       found: a first line with a wrong checksum
       expected: the journal of a fit that was begun by `kmcfit fit`
 
@@ -508,12 +508,12 @@ fn a_resumption_that_is_refused() {
       found: 7
       expected: 2
 
-    error: run/fit.journal: this is no journal of kmcfit, or it was edited
+    error: run/fit.journal: not a journal of kmcfit, or it was edited
       found: expected ident at line 1 column 2
       expected: the journal of a fit that was begun by `kmcfit fit`
 
-    error: run: there is nothing to go on with in this folder
-      expected: the folder of a fit, study or comparison that did not come to its end
+    error: run: no unfinished run in this folder
+      expected: the folder of an unfinished fit, study or comparison
     ");
 }
 

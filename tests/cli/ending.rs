@@ -142,14 +142,16 @@ fn a_mass_that_must_pass_zero() {
     assert!(reason.contains("the mass is -"), "{reason}");
     // Nothing is said to push at a point outside.
     assert_eq!(result["constraints"]["active"], serde_json::json!([]));
-    assert!(stdout.contains("infeasible: no start within the constraints has a motion"));
+    assert!(stdout.contains(
+        "infeasible: the simulation fails at all starting points within the constraints"
+    ));
 }
 
 #[test]
 fn a_damping_that_must_overflow() {
     let (_, result) = infeasible("{function: damping, at: 0.0, value: -1e20}");
     let reason = result["outcome"]["reason"].as_str().expect("text");
-    assert!(reason.contains("the motion overflows"), "{reason}");
+    assert!(reason.contains("the response overflows"), "{reason}");
 }
 
 /// A run that failed is said to have; one whose history is empty is a run like any other.
@@ -167,9 +169,9 @@ fn failed_and_empty_runs_are_read_back() {
         assert_eq!(code, 2, "{stderr}");
         insta::allow_duplicates! {
             insta::assert_snapshot!(stderr, @"
-            error: failed/result.json: this run failed and found no device
-              found: the start cannot be evaluated: the motion overflows at t = 0.100000 s
-              expected: the result of a run that found one
+            error: failed/result.json: this run failed and has no estimates
+              found: the start cannot be evaluated: the response overflows at t = 0.100000 s
+              expected: the result of a run with estimates
             ");
         }
     }

@@ -9,56 +9,56 @@ fn keys_are_explained() {
     let bench = Workbench::empty();
     assert_snapshot!(bench.run_to(0, &["explain", "tolerance"]), @"
     fit.stop.tolerance
-      Converged when an iteration changes J and the functions by less than this part.
-      kind     a number
+      Relative change of J and of the functions in one iteration, for convergence.
+      type     a number
       default  1e-10, if no other rule is given
       example  tolerance: 1e-10
     ");
     assert_snapshot!(bench.run_to(0, &["explain", "functions.mass.basis"]), @"
     functions.mass.basis
-      Shape of the function over time, and so what its free values are.
-      kind     one of the words below
+      Basis of an estimated function, which defines its parameters.
+      type     one of the values below
       example  basis: piecewise-linear
       also     functions.damping.basis, functions.stiffness.basis, functions.cubic_stiffness.basis, functions.quadratic_damping.basis and 9 more
 
-      nodal               A free value at every node of the grid.
-      constant            One value for all times.
-      piecewise-constant  One value per cell between knots.
+      nodal               One parameter per node of the grid.
+      constant            One constant.
+      piecewise-constant  One value per interval between knots.
       piecewise-linear    One value per knot, linear in between.
-      polynomial          A polynomial over the whole record.
-      b-spline            A cubic spline.
+      polynomial          Polynomial over the whole record.
+      b-spline            Cubic B-spline.
     ");
     assert_snapshot!(bench.run_to(0, &["explain", "experiments[0].initial"]), @"
     experiments.initial
-      State at the beginning, or `estimate` for both of its numbers.
-      kind     `estimate`, or a map with the keys below
-      default  none: it must be there
+      Initial state, or `estimate` for displacement and velocity.
+      type     `estimate`, or a map with the keys below
+      default  none (required)
       example  initial: {displacement: 3.3, velocity: 1.0}
 
-      State at the beginning: each number known, `estimate`, or an estimate with a start or a prior.
-      displacement  Displacement at the beginning.
-      velocity      Velocity at the beginning.
+      Initial state: each component a number, `estimate`, or an estimate with a start value or a prior.
+      displacement  Initial displacement.
+      velocity      Initial velocity.
     ");
     assert_snapshot!(bench.run_to(0, &["explain"]), @"
-    Keys of a model file; `kmcfit explain KEY` says more of one:
+    Keys of a model file (`kmcfit explain KEY` explains one):
 
       format       Version of the file format.
-      title        What reports call the run.
-      experiments  Measured (or to be simulated) motions of the same device, over the same time.
-      grid         Time nodes and stepper.
-      functions    Mass, damping, stiffness and further terms over time.
-      constraints  What the functions must satisfy besides their own `min` and `max`; each map demands one thing.
-      fit          How to fit.
-      truth        The true functions, where they are known; for reports only.
-      predict      Other initial states to predict the motion from.
-      study        What `kmcfit study` looks into besides what it always does.
+      title        Title for reports.
+      experiments  Records of one system on a common time axis, measured or to be simulated.
+      grid         Time grid and stepper.
+      functions    Coefficient functions of the equation of motion.
+      constraints  Constraints on the functions beyond their own `min` and `max`; one map for each.
+      fit          Method, start and stopping tests of the fit.
+      truth        True functions, for reports only.
+      predict      Initial states for which the free response is predicted.
+      study        Analyses of `kmcfit study`.
     ");
     let (code, stdout, stderr) = bench.run(&["explain", "fit.stop.tolerence"]);
     assert_eq!((code, stdout.as_str()), (2, ""));
     assert_snapshot!(stderr, @"
-    error: KEY: there is no such key
+    error: KEY: no such key
       found: `fit.stop.tolerence`
-      expected: a key of a model file; `kmcfit explain` lists those at the top
+      expected: a key of a model file; `kmcfit explain` lists the top-level keys
       hint: did you mean `fit.stop.tolerance`?
     ");
     let stderr = bench.run(&["explain", "nods"]).2;
@@ -122,16 +122,16 @@ fn arguments_that_are_no_numbers_and_commands_that_are_near() {
     let (code, _, said) = bench.run(&["fit", "model.yaml", "--checkpoint", "often"]);
     assert_eq!(code, 2);
     assert_snapshot!(said, @"
-    error: --checkpoint: this is no number
+    error: --checkpoint: not a number
       found: `often`
       expected: a number
     ");
     let (code, _, said) = bench.run(&["check", "model.yaml", "--nodes", "100,many"]);
     assert_eq!(code, 2);
     assert_snapshot!(said, @"
-    error: --nodes: this is no number
+    error: --nodes: not a number
       found: `many`
-      expected: a whole number, not negative
+      expected: a whole number, 0 or greater
     ");
 }
 
@@ -142,19 +142,19 @@ fn a_starter_says_what_was_found() {
     bench.write("run 1/my data.csv", &text);
     assert_snapshot!(bench.run_to(0, &["init", "run 1/my data.csv"]), @"
     run 1/my data.csv
-      201 readings over 0.02 s, one every 0.0001 s
+      201 samples over 0.02 s, one every 0.0001 s
       column `Time [ms]`: time, ms
       column `Weg_mm`: displacement, mm
       dominant frequency 159.6 Hz: 3 periods in the record
-      run 1/kmcfit.schema.json is for editors: it completes and checks keys while you type
-    the model is run 1/my data.yaml; look at it, then
+      schema for editors: run 1/kmcfit.schema.json
+    Model run 1/my data.yaml; review it, then run
       kmcfit check 'run 1/my data.yaml' --no-gradient
       kmcfit fit 'run 1/my data.yaml'
     ");
     assert_snapshot!(bench.read("run 1/my data.yaml"), @r#"
     # yaml-language-server: $schema=kmcfit.schema.json
-    # A starter model, made from the readings. `kmcfit check` reads it, `kmcfit fit` fits it,
-    # `kmcfit explain KEY` says what a key does.
+    # Model file written by `kmcfit init`. Check it with `kmcfit check`, fit it with `kmcfit fit`;
+    # `kmcfit explain KEY` explains a key.
     format: 1
     title: my data
     experiments:
@@ -162,9 +162,9 @@ fn a_starter_says_what_was_found() {
         data: my data.csv
         columns: {time: "Time [ms]", displacement: Weg_mm}  # by name or by number from 1
         units: {displacement: mm}                     # converted to SI
-        sigma: {displacement: estimate}               # standard deviation of a reading, SI; a number, if it is known
+        sigma: {displacement: estimate}               # standard deviation of a sample, SI; give a number if it is known
         initial: estimate                             # or {displacement: …, velocity: …} in m and m/s
-    grid: {nodes: auto}                               # as many steps as the frequencies of the readings ask for
+    grid: {nodes: auto}                               # chosen from the spectrum of the record
     functions:
       mass:      {fixed: 1.0}                         # kg; WRITE YOURS: without a force only k/m and c/m show
       damping:   {basis: constant, start: 40.11}      # N s/m; starts at 2 % of critical
@@ -175,7 +175,7 @@ fn a_starter_says_what_was_found() {
     let again = bench.run(&["init", "run 1/my data.csv"]);
     assert_eq!(again.0, 2);
     assert_snapshot!(again.2, @"
-    error: run 1/my data.yaml: there is such a file already
+    error: run 1/my data.yaml: the file exists already
       expected: another name: --out MODEL
     ");
     let said = bench.run_to(
@@ -189,7 +189,7 @@ fn a_starter_says_what_was_found() {
             "other.yaml",
         ],
     );
-    let taken = "`--sample-rate 500` is taken, though `Time [ms]` says 10000 Hz\n";
+    let taken = "`--sample-rate 500` is used, although `Time [ms]` has 10000 Hz\n";
     assert!(said.contains(taken), "{said}");
     bench.write("bare.csv", &text.replace("Time [ms],Weg_mm", "t,y"));
     let said = bench.run_to(0, &["init", "bare.csv"]);
@@ -199,30 +199,30 @@ fn a_starter_says_what_was_found() {
     );
     bench.write("empty.csv", "t_s,y_m\n0,\n1,\n2,\n");
     assert_snapshot!(bench.run(&["init", "empty.csv"]).2, @"
-    error: empty.csv: all readings are missing
+    error: empty.csv: all samples are missing
       found: no number in the column `y_m`
-      expected: at least some readings
+      expected: at least one sample
     ");
     bench.write("only.csv", "acc\n1\n2\n1\n");
     assert_snapshot!(bench.run(&["init", "only.csv"]).2, @"
-    error: only.csv: there is no column of times
+    error: only.csv: no column of times
       found: no column whose numbers increase from row to row
       expected: a column of times, or `--sample-rate HZ`
     ");
     assert_snapshot!(bench.run(&["init", "only.csv", "--sample-rate", "0"]).2, @"
-    error: --sample-rate: no rate can be this
+    error: --sample-rate: invalid sampling rate
       found: 0.0
       expected: samples per second, a number from 1e-12 to 1e12
     ");
     // The smallest number there is: its reciprocal is infinite.
     let rate = ["init", "only.csv", "--sample-rate", "5e-324"];
     assert_snapshot!(bench.run(&rate).2, @"
-    error: --sample-rate: no rate can be this
+    error: --sample-rate: invalid sampling rate
       found: 5e-324
       expected: samples per second, a number from 1e-12 to 1e12
     ");
     assert_snapshot!(bench.run(&["init", "onli.csv"]).2, @"
-    error: onli.csv: there is no such file
+    error: onli.csv: no such file
       expected: a CSV file with one row of column names and rows of numbers
       hint: did you mean `only.csv`?
     ");
@@ -348,7 +348,7 @@ fn mistakes_in_what_is_set() {
       found: `sigma`
       expected: a position, as in experiments.0.sigma
 
-    error: --set experiments.3.sigma.displacement=1: the list experiments has no such element
+    error: --set experiments.3.sigma.displacement=1: no such element in the list experiments
       found: position 3
       expected: the position 0
 
@@ -359,11 +359,11 @@ fn mistakes_in_what_is_set() {
       found: position 0
       expected: a key
 
-    error: --set: there is no `=`
+    error: --set: missing `=`
       found: `fit.stop.iterations`
       expected: KEY=VALUE, for instance fit.stop.iterations=50
 
-    error: --set: there is no key before `=`
+    error: --set: missing key before `=`
       found: `=5`
       expected: KEY=VALUE, for instance fit.stop.iterations=50
 
@@ -375,7 +375,7 @@ fn mistakes_in_what_is_set() {
       found: `fit.stop.iterations=`
       expected: a value as in a model file: 50, constant, {order: 2, weight: 0.1}, …
 
-    error: --set functions.mass.start={data: nothing.csv, column: m}: functions.mass.start.data: nothing.csv: there is no such file
+    error: --set functions.mass.start={data: nothing.csv, column: m}: functions.mass.start.data: nothing.csv: no such file
       expected: a CSV file with one row of column names and rows of numbers
     ");
 }
@@ -384,9 +384,9 @@ fn mistakes_in_what_is_set() {
 fn the_demo_needs_nothing() {
     let bench = Workbench::empty();
     let stdout = bench.run_to(0, &["demo"]);
-    assert!(stdout.contains("but is another device"), "{stdout}");
+    assert!(stdout.contains("but not by the true system"), "{stdout}");
     assert!(
-        stdout.contains("the true device: k/m and c/m to"),
+        stdout.contains("true system recovered: relative error of k/m"),
         "{stdout}"
     );
     assert!(bench.path("runs/demo/results/compare.html").exists());

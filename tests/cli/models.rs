@@ -506,7 +506,10 @@ fn accelerometer() {
 }
 
 fn scalar(result: &Value, name: &str) -> f64 {
-    let mut scalars = result["scalars"].as_array().expect("scalars").iter();
+    let mut scalars = result["nuisance_parameters"]
+        .as_array()
+        .expect("nuisance_parameters")
+        .iter();
     let found = scalars.find(|s| s["name"] == name).expect(name);
     found["value"].as_f64().expect("a number")
 }
@@ -514,7 +517,7 @@ fn scalar(result: &Value, name: &str) -> f64 {
 #[test]
 fn a_held_out_record_is_predicted_within_its_noise() {
     let (bench, result) = fitted("hammer-and-shaker", 0);
-    let held = &result["held_out"][0];
+    let held = &result["validation"][0];
     assert_eq!(held["name"], "hammer 3");
     let rms = held["channels"][0]["rms_residual"]
         .as_f64()
@@ -522,12 +525,12 @@ fn a_held_out_record_is_predicted_within_its_noise() {
     // The noise is 0.02 mm; 301 readings know it to 4 %.
     assert!((rms - 0.02).abs() < 0.0025, "{rms}");
     let folder = "runs/hammer-and-shaker";
-    let table = bench.read(&format!("{folder}/readings/held-out-1-displacement.csv"));
+    let table = bench.read(&format!("{folder}/readings/validation-1-displacement.csv"));
     let residuals = column(&table, "residual");
     let mean = residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64;
     assert!((mean.sqrt() - rms).abs() < 1e-9 * rms, "{rms}");
     let page = bench.read(&format!("{folder}/report.html"));
-    assert!(page.contains("Readings and model: hammer 3 (held out), displacement"));
+    assert!(page.contains("Readings and model: hammer 3 (validation), displacement"));
     let experiments = result["experiments"].as_array().expect("experiments");
     assert_eq!(experiments.len(), 3);
 }

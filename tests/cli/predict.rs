@@ -115,9 +115,7 @@ fn the_plot_draws_readings_and_functions() {
     let plain = ["fit", "model.yaml", "--no-report", "--out", "run"];
     let without = bench.run_to(0, &plain);
     let plot = bench.run_to(0, &[&plain[..], &["--plot"]].concat());
-    let begin = plot
-        .find("(line: fit, o: readings off it)")
-        .expect("a chart");
+    let begin = plot.find("(line: fit, o: samples)").expect("a chart");
     assert!(!without.contains("(line: fit"));
     let charts = &plot[begin..];
     for title in ["mass in kg", "damping in N s/m", "stiffness in N/m"] {

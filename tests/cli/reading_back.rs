@@ -68,7 +68,7 @@ fn damaged_runs() {
         let whole = std::fs::read(&path).expect("a file");
         std::fs::remove_file(&path).expect("a file");
         assert!(
-            refused().contains(&format!("{name}: there is no such file")),
+            refused().contains(&format!("{name}: no such file")),
             "{}",
             refused()
         );
@@ -102,15 +102,15 @@ fn damaged_runs() {
     let text = spoil("\n0,", "\nx,");
     let field = spoil("\n0,", "\n0,,");
     insta::assert_snapshot!([text, field].join("\n"), @"
-    run/functions.csv:2: row 1, column `t_s`: this is no number
+    run/functions.csv:2: row 1, column `t_s`: not a number
       found: `x`
-      expected: a number, or nothing
+      expected: a number, or an empty field
     run/functions.csv:2: row 1: the row has another number of fields
       found: 9
       expected: 8
     ");
     assert!(
-        renamed.starts_with("run/functions.csv: there is no column `mass_kg`"),
+        renamed.starts_with("run/functions.csv: no column `mass_kg`"),
         "{renamed}"
     );
     assert!(renamed.contains("did you mean `mass_g`"), "{renamed}");

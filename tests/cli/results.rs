@@ -81,7 +81,7 @@ fn the_sentence_is_the_whole_cost() {
     assert_eq!(result["model"]["cost_kind"], "integral");
     assert_eq!(
         result["model"]["cost_definition"],
-        "J = integral (y - y_obs)^2 dt (trapezoid rule over the readings, m^2 s) \
+        "J = integral (y - y_obs)^2 dt (trapezoid rule over the samples, m^2 s) \
          + 0.3 * integral (dm/dt)^2 dt \
          + 0.02 * integral (c - reference)^2 dt \
          + 0.004 * integral (d^2c/dt^2)^2 dt \
@@ -171,9 +171,9 @@ fn the_kind_of_the_cost_follows_the_sigmas() {
     assert!(sentence.contains("records without sigma") && sentence.contains("chi-square"));
 }
 
-/// What a soft constraint costs is in J, and that it is broken is said, in the result and in words.
+/// The penalty of a soft constraint is part of J; its violation is in the result and in the summary.
 #[test]
-fn soft_constraints_that_are_broken_are_said_to_be() {
+fn violated_soft_constraints_are_in_the_result_and_the_summary() {
     let bench = bench();
     let result = fitted(&bench, EVERYTHING);
     let slack = result["constraints"]["slack"].as_array().expect("a list");
@@ -188,13 +188,13 @@ fn soft_constraints_that_are_broken_are_said_to_be() {
         assert_eq!(entry["rows"], 1);
         // Each row is computed from the knots, the column from the table: rounding apart.
         assert!((number(&entry["largest"]) - (value - 1.2).abs()).abs() < 1e-12);
-        assert!((number(&entry["price"]) - 0.5 * (value - 1.2).powi(2)).abs() < 1e-12);
+        assert!((number(&entry["penalty"]) - 0.5 * (value - 1.2).powi(2)).abs() < 1e-12);
     }
     // None is a hard one.
     assert_eq!(result["constraints"]["max_violation"], 0.0);
     let summary = bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
     assert!(
-        summary.contains("soft `stiffness(0) = 1.2` is broken by up to "),
+        summary.contains("soft constraint `stiffness(0) = 1.2` is violated by up to "),
         "{summary}"
     );
     assert!(summary.contains(" on 1 row\n"), "{summary}");
@@ -265,10 +265,10 @@ fit: {{stop: {{iterations: 200, tolerance: 1e-8}}}}
     );
 }
 
-/// Every start that was tried is in the result and in the summary, and the best of them is the fit:
+/// Every attempt is in the result and in the summary, and the best of them is the fit:
 /// 40 periods with three readings each, from a period that is off (`tests/ladder.rs`).
 #[test]
-fn the_rungs_of_the_ladder_are_told() {
+fn every_attempt_is_in_the_result_and_the_summary() {
     let bench = Workbench::empty();
     let model = |stiffness: &str, rest: &str| {
         format!(
@@ -297,18 +297,21 @@ fit: {{stop: {{iterations: 100, tolerance: 1e-12}}}}
     bench.write("model.yaml", &model(sought, data));
     let summary = bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
     let result: Value = serde_json::from_str(&bench.read("run/result.json")).expect("JSON");
-    let rungs = result["rungs"].as_array().expect("a list");
-    let starts: Vec<&Value> = rungs.iter().map(|rung| &rung["start"]).collect();
+    let attempts = result["attempts"].as_array().expect("a list");
+    let starts: Vec<&Value> = attempts.iter().map(|attempt| &attempt["start"]).collect();
     assert_eq!(
         starts,
         ["start values", "equation error", "growing horizon"]
     );
-    let costs: Vec<f64> = rungs.iter().map(|rung| number(&rung["cost"])).collect();
+    let costs: Vec<f64> = attempts
+        .iter()
+        .map(|attempt| number(&attempt["cost"]))
+        .collect();
     assert!(costs[2] < 1e-12 * costs[0].min(costs[1]), "{costs:?}");
     assert_eq!(number(&result["cost"]["final"]), costs[2]);
     for start in ["start values", "equation error", "growing horizon"] {
         assert!(
-            summary.contains(&format!("\nfrom the {start}: J ")),
+            summary.contains(&format!("\nattempt from the {start}: J ")),
             "{summary}"
         );
     }

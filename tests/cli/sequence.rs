@@ -55,14 +55,11 @@ fn one_command_tells_what_finds_the_device() {
 
     // The paper's fit has mass and damping of the wrong sign or size; positivity alone has not, fits
     // better, and is as wrong.
-    assert_eq!(paper["true_device"], false);
-    assert_eq!(positive["true_device"], false);
-    assert!(verdict(positive).starts_with("matches the motion (J/J0 "));
+    assert_eq!(paper["is_true_system"], false);
+    assert_eq!(positive["is_true_system"], false);
+    assert!(verdict(positive).starts_with("response fitted (J/J0 "));
     for run in [paper, positive] {
-        assert!(
-            verdict(run).contains("another device: k/m off by "),
-            "{run}"
-        );
+        assert!(verdict(run).contains("true system: error of k/m "), "{run}");
         assert!(number(run, "/errors/k_over_m_relative") > 0.1, "{run}");
     }
     assert!(number(positive, "/misfit") < 0.1 * number(paper, "/misfit"));
@@ -72,9 +69,9 @@ fn one_command_tells_what_finds_the_device() {
     // Smooth and normalised, few parameters, knots, splines: the device, and what it does elsewhere.
     // The readings are those of the stepper and the truth costs no roughness: rounding is left.
     for run in known {
-        assert_eq!(run["true_device"], true, "{run}");
+        assert_eq!(run["is_true_system"], true, "{run}");
         assert_eq!(run["status"], "converged", "{run}");
-        assert!(verdict(run).starts_with("the true device: k/m and c/m to "));
+        assert!(verdict(run).starts_with("true system recovered: "));
         assert!(number(run, "/errors/mass") < 1e-6, "{run}");
         assert!(number(run, "/roughness/mass") < 1e-6 * number(positive, "/roughness/mass"));
         assert!(number(run, "/max_violation") <= 1e-9);
@@ -84,7 +81,7 @@ fn one_command_tells_what_finds_the_device() {
     assert!(number(noisy, "/errors/k_over_m_relative") < 0.05, "{noisy}");
     assert!(number(noisy, "/errors/mass") < 0.05, "{noisy}");
     assert_eq!(noisy["misfit_unit"], "1");
-    assert!(verdict(noisy).contains("to the true device") || noisy["true_device"] == true);
+    assert!(verdict(noisy).contains("to the true system") || noisy["is_true_system"] == true);
     // The iterations on the way to the weight are counted, where nothing is left to do at its end.
     let result = bench.read("runs/compare/noisy/result.json");
     let result: Value = serde_json::from_str(&result).expect("JSON");
@@ -116,7 +113,7 @@ fn a_sequence_in_flow_style() {
         bench.write("models/flow.yaml", text);
         let (code, _, said) = bench.run(&["study", "models/flow.yaml"]);
         assert_eq!(code, 2, "{said}");
-        let read = "models/nowhere.yaml: there is no such file";
+        let read = "models/nowhere.yaml: no such file";
         assert!(said.contains(read), "{text}: {said}");
     }
 }

@@ -60,8 +60,10 @@ fn a_study_tells_what_the_data_tell() {
     assert!(stdout.contains("damping is identified"), "{stdout}");
     let study = document(&bench, "runs/model-study");
     assert_eq!(study["status"], "complete");
-    assert_eq!(study["spectrum"]["rank"], 5);
-    let verdicts = study["bands"]["verdicts"].as_array().expect("verdicts");
+    assert_eq!(study["sensitivity"]["rank"], 5);
+    let verdicts = study["bands"]["classification"]
+        .as_array()
+        .expect("verdicts");
     assert!(
         verdicts.iter().any(|v| v["verdict"] == "fixed"),
         "{verdicts:?}"
@@ -69,8 +71,8 @@ fn a_study_tells_what_the_data_tell() {
     for profile in study["profiles"].as_array().expect("profiles") {
         assert_eq!(profile["verdict"], "identified", "{profile}");
     }
-    let tubes = study["tubes"].as_array().expect("tubes");
-    assert!(tubes.len() >= 3, "{tubes:?}");
+    let extremes = study["extremes"].as_array().expect("extremes");
+    assert!(extremes.len() >= 3, "{extremes:?}");
     assert_eq!(
         study["multistart"]["clusters"]
             .as_array()
@@ -82,7 +84,7 @@ fn a_study_tells_what_the_data_tell() {
     assert_eq!(study["failures"].as_array().expect("failures").len(), 0);
     let page = bench.read("runs/model-study/study.html");
     roxmltree::Document::parse(page.trim_start_matches("<!DOCTYPE html>\n")).expect("well-formed");
-    for figure in ["bands", "spectrum", "profiles", "tubes", "waterfall"] {
+    for figure in ["bands", "spectrum", "profiles", "extremes", "waterfall"] {
         let svg = bench.read(&format!("runs/model-study/figures/{figure}.svg"));
         roxmltree::Document::parse(&svg).expect("XML");
     }
@@ -176,16 +178,16 @@ fn a_sequence() {
         "format: 1\ntitle: Two runs\nsequence: [paper-positive.yaml, linear-mass.yaml]\n",
     );
     let stdout = bench.run_to(0, &["study", "models/short.yaml"]);
-    assert!(stdout.contains("paper-positive leaves J/J0"), "{stdout}");
+    assert!(stdout.contains("paper-positive has J/J0"), "{stdout}");
     assert!(
         stdout
-            .contains("The first of these runs to find the device with its scale is linear-mass."),
+            .contains("linear-mass is the first run that recovers the true system with its scale."),
         "{stdout}"
     );
     assert!(
         bench
             .read("runs/short-study/compare.html")
-            .contains("What it comes to")
+            .contains("Conclusions")
     );
     // Gone on with after the second fit was lost: the first is kept as it is, and all ends alike.
     let first = bench.read("runs/short-study/paper-positive/result.json");
@@ -203,10 +205,7 @@ fn a_sequence() {
         &bench,
         &["study", "models/short.yaml", "--out", "runs/other"],
     );
-    assert!(
-        missing.contains("nowhere.yaml: there is no such file"),
-        "{missing}"
-    );
+    assert!(missing.contains("nowhere.yaml: no such file"), "{missing}");
     bench.write("models/short.yaml", "format: 1\nsequence: []\n");
     let before = refused(&bench, &["study", "models/short.yaml"]);
     assert!(before.contains("the sequence has no model"), "{before}");
@@ -230,7 +229,7 @@ fn a_record_at_rest() {
     bench.write("model.yaml", &model);
     let (code, stdout, stderr) = bench.run(&["study", "model.yaml"]);
     assert!(code == 0 || code == 3, "{code} {stderr}");
-    assert!(stdout.contains("the readings see 0 of"), "{stdout}");
+    assert!(stdout.contains("the samples determine 0 of"), "{stdout}");
     assert!(!stdout.contains("NaN"), "{stdout}");
 }
 

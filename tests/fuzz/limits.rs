@@ -94,7 +94,7 @@ fn models_that_mean_more_than_they_say() {
         "*a, ".repeat(900)
     ));
     assert!(
-        said.contains("m.yaml:1:4: the aliases stand for too long a text")
+        said.contains("m.yaml:1:4: the aliases expand to too long a text")
             && said.contains("found: more than 262144 bytes")
             && said.contains("`*a` repeats the value of `&a` 900 times")
             && said.contains("expected: at most 262144 bytes with all aliases written out"),
@@ -109,7 +109,7 @@ fn models_that_mean_more_than_they_say() {
         record.repeat(2001)
     ));
     assert!(
-        said.contains("experiments[2000]: there are too many experiments\n"),
+        said.contains("experiments[2000]: too many experiments\n"),
         "{said}"
     );
     assert!(

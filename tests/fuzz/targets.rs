@@ -4,7 +4,7 @@
 
 use kmcfit::Run;
 use kmcfit::config::scalar::{Count, Nodes};
-use kmcfit::config::{Model, ModelFile, Override, Purpose, Sequence, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
 use kmcfit::error::InputError;
 use kmcfit::observations::{ColumnName, Table, TableFormat, times};
 use kmcfit::report::study::StudyDocument;
@@ -124,7 +124,7 @@ fn small(folder: &Path, method: &str) -> (Heading, Model) {
         checkpoint: Some(1e9),
         ..Heading::new("fit", vec!["m.yaml".into()])
     };
-    (heading, build(&file, Purpose::Fit).expect("a problem"))
+    (heading, build(&file, BuildMode::Fit).expect("a problem"))
 }
 
 /// Fits a model, keeping a journal.
@@ -285,9 +285,9 @@ pub fn model(bytes: &[u8]) -> Verdict {
         *count = Count(MANY_NODES);
     }
     let purposes = [
-        Purpose::Fit,
-        Purpose::Check { nodes: None },
-        Purpose::Simulate { nodes: Some(21) },
+        BuildMode::Fit,
+        BuildMode::Check { nodes: None },
+        BuildMode::Simulate { nodes: Some(21) },
     ];
     let mut verdict = Verdict::Accepted;
     for purpose in purposes {
@@ -413,7 +413,7 @@ pub fn fit_journal(bytes: &[u8]) -> Verdict {
         Ok(mut journal) => {
             let found = fitted(model, &mut journal);
             assert!(found.best.evaluation.cost.is_finite());
-            assert!(found.best.evaluation.device.mass.iter().all(|m| *m > 0.0));
+            assert!(found.best.evaluation.nodal.mass.iter().all(|m| *m > 0.0));
             Verdict::Accepted
         }
     }
@@ -431,23 +431,23 @@ pub fn study_journal(bytes: &[u8]) -> Verdict {
     };
     let mut document = StudyDocument {
         fit: kept::<Result<_, String>>(&mut journal, "fit").and_then(Result::ok),
-        spectrum: kept(&mut journal, "spectrum"),
+        sensitivity: kept(&mut journal, "sensitivity"),
         bands: kept(&mut journal, "bands"),
         candidates: kept(&mut journal, "candidates").unwrap_or_default(),
-        equivalents: kept(&mut journal, "equivalents").unwrap_or_default(),
+        equivalent_systems: kept(&mut journal, "equivalent systems").unwrap_or_default(),
         multistart: kept(&mut journal, "starts"),
         ..StudyDocument::default()
     };
     let profile = kept::<Result<_, String>>(&mut journal, "profile 0");
     document.profiles.extend(profile.and_then(Result::ok));
-    if let Some(Ok(varies)) = kept::<Result<_, String>>(&mut journal, "varies") {
-        document.varies = varies;
+    if let Some(Ok(constancy_test)) = kept::<Result<_, String>>(&mut journal, "constancy test") {
+        document.constancy_test = constancy_test;
     }
-    if let Some(Ok(refits)) = kept::<Result<_, String>>(&mut journal, "refits") {
+    if let Some(Ok(refits)) = kept::<Result<_, String>>(&mut journal, "bootstrap") {
         document.bootstrap = refits;
     }
-    if let Some((tubes, predictions)) = kept(&mut journal, "tubes") {
-        document.tubes = tubes;
+    if let Some((extremes, predictions)) = kept(&mut journal, "extremes") {
+        document.extremes = extremes;
         document.predictions = predictions;
     }
     document.text();
@@ -468,9 +468,9 @@ const PIECES: [&str; 10] = [
     "equivalents",
     "starts",
     "profile 0",
-    "varies",
-    "refits",
-    "tubes",
+    "constancy test",
+    "bootstrap",
+    "extremes",
 ];
 
 fn kept<T: Serialize + DeserializeOwned>(journal: &mut AnalysisJournal, name: &str) -> Option<T> {

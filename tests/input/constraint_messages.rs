@@ -1,7 +1,8 @@
 //! Constraints in model files: what they mean, and every message about what they cannot mean.
 
 use insta::assert_snapshot;
-use kmcfit::config::{Model, ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, Model, ModelFile, build};
+use kmcfit::finding::Finding;
 use kmcfit_core::internals::solvers::{Initial, Solver};
 
 /// A model with 21 readings over 2 s; line 8 is the mass, line 11 the constraints, line 12 the fit.
@@ -38,7 +39,7 @@ fn read(text: &str) -> Result<Model, String> {
         error.to_string().replace(&shown, "")
     };
     let file = ModelFile::parse(folder.path().join("m.yaml"), text).map_err(said)?;
-    build(&file, Purpose::Fit).map_err(said)
+    build(&file, BuildMode::Fit).map_err(said)
 }
 
 fn message(constraints: &str) -> String {
@@ -48,7 +49,7 @@ fn message(constraints: &str) -> String {
 fn said(text: &str) -> String {
     read(text).map_or_else(
         |error| error,
-        |model| format!("no error {:?}", model.warnings),
+        |model| format!("no error {:?}", Finding::texts(&model.warnings)),
     )
 }
 
@@ -133,7 +134,7 @@ fn bounds_of_the_functions_are_rows() {
     assert_eq!(name(&model, 0), "mass = 2");
     let model = with("max: 1.5");
     assert_eq!(
-        model.warnings,
+        Finding::texts(&model.warnings),
         ["the start was moved into the constraints (`mass <= 1.5`)"]
     );
     assert_eq!(model.problem.functions.start()[..5], [1.5; 5]);
@@ -221,7 +222,7 @@ fn penalties_and_rules() {
     assert_eq!((variation.function, variation.weight), (1, 0.5));
 
     assert_snapshot!(said(&with("penalty: {kind: tikhonov, order: 2, weight: discrepancy}")), @"
-    m.yaml:9:81: functions.damping.penalty.weight: the rule `discrepancy` needs the noise of the readings
+    m.yaml:9:81: functions.damping.penalty.weight: the rule `discrepancy` needs the noise of the samples
       found: no `sigma` in experiments[0]
       expected: `sigma` in every experiment, or `l-curve` or `gcv`, which do without
     ");
@@ -299,21 +300,21 @@ fn kinds() {
       expected: at least one constraint, or no `constraints`
     ");
     assert_snapshot!(message("5"), @"
-    m.yaml:11:14: constraints: this is the wrong kind of value
+    m.yaml:11:14: constraints: wrong type of value
       found: the number 5
       expected: a list: lines that begin with `- `, or [ … ]
     ");
     assert_snapshot!(message("[{}]"), @"
-    m.yaml:11:15: constraints[0]: this constraint demands nothing
+    m.yaml:11:15: constraints[0]: empty constraint
       expected: one of: `min` or `max`, `slope`, `shape`, `at` and `value`, `mean`, `integral`, `equal`, `passive`, `frequency`, `damping_ratio`
     ");
     assert_snapshot!(message("[positive]"), @"
-    m.yaml:11:15: constraints[0]: this is the wrong kind of value
+    m.yaml:11:15: constraints[0]: wrong type of value
       found: text `positive`
       expected: a map such as {function: mass, shape: non-increasing}
     ");
     assert_snapshot!(message("[{function: mass}]"), @"
-    m.yaml:11:15: constraints[0]: this constraint demands nothing
+    m.yaml:11:15: constraints[0]: empty constraint
       expected: one of: `min` or `max`, `slope`, `shape`, `at` and `value`, `mean`, `integral`, `equal`, `passive`, `frequency`, `damping_ratio`
     ");
     assert_snapshot!(message("[{function: mass, shape: convex, mean: 1}]"), @"
@@ -346,10 +347,10 @@ fn kinds() {
     assert_snapshot!(message("[{passive: false}]"), @"
     m.yaml:11:25: constraints[0].passive: this demands nothing
       found: false
-      expected: `passive: true`, or no such constraint
+      expected: `passive: true`, or leave the constraint out
     ");
     assert_snapshot!(message("[{passive: maybe}]"), @"
-    m.yaml:11:25: constraints[0].passive: this is the wrong kind of value
+    m.yaml:11:25: constraints[0].passive: wrong type of value
       found: text `maybe`
       expected: true or false
     ");
@@ -399,7 +400,7 @@ fn shapes_and_ranges() {
       expected: min at most max
     ");
     assert_snapshot!(message("[{function: mass, slope: 0.1}]"), @"
-    m.yaml:11:39: constraints[0].slope: this is the wrong kind of value
+    m.yaml:11:39: constraints[0].slope: wrong type of value
       found: the number 0.1
       expected: a map such as {min: 0.1, max: 0.5}
     ");
@@ -443,12 +444,12 @@ fn shapes_and_ranges() {
 #[test]
 fn values_at_times() {
     assert_snapshot!(message("[{function: mass, at: 0}]"), @"
-    m.yaml:11:36: constraints[0].at: `at` needs `value` beside it
+    m.yaml:11:36: constraints[0].at: `at` requires `value`
       found: `at` alone
       expected: both, as in {function: stiffness, at: 0.0, value: 1.0}
     ");
     assert_snapshot!(message("[{function: mass, value: 1}]"), @"
-    m.yaml:11:39: constraints[0].value: `value` needs `at` beside it
+    m.yaml:11:39: constraints[0].value: `value` requires `at`
       found: `value` alone
       expected: both, as in {function: stiffness, at: 0.0, value: 1.0}
     ");
@@ -468,7 +469,7 @@ fn values_at_times() {
       expected: at least one time in s
     ");
     assert_snapshot!(message("[{function: mass, at: [0, 1], value: [1, 2, 3]}]"), @"
-    m.yaml:11:51: constraints[0].value: there is not one value for every time
+    m.yaml:11:51: constraints[0].value: the numbers of values and times differ
       found: 3 values, 2 times
       expected: as many values as times, or one for all
     ");
@@ -518,19 +519,18 @@ fn equalities() {
 fn what_the_record_cannot_feel() {
     let free = |constraints: &str| {
         let free = text(constraints).replace("{fixed: 1}", "{basis: nodal, start: 1}");
-        read(&free)
-            .unwrap_or_else(|error| panic!("{error}"))
-            .warnings
+        let model = read(&free).unwrap_or_else(|error| panic!("{error}"));
+        Finding::texts(&model.warnings)
     };
     let nothing = free("[{function: stiffness, shape: non-increasing}]");
-    assert_snapshot!(nothing.join("\n"), @"constraints[0].shape: a monotone stiffness says nothing about the device here. Without a force the motion shows only k/m and c/m, and any s(t) may multiply all three functions; fix a function, bound the functions on both sides, or smooth them");
+    assert_snapshot!(nothing.join("\n"), @"constraints[0].shape: a monotone stiffness says nothing about the system here. Without a force the response shows only k/m and c/m, and any s(t) may multiply all three functions; fix a function, bound the functions on both sides, or smooth them");
     assert_eq!(free("[{passive: true}]").len(), 1);
     assert_eq!(
         free("[{function: mass, min: 1, max: 3}, {passive: true}]"),
         [""; 0]
     );
     let fixed = read(&text("[{passive: true}]")).unwrap();
-    assert_eq!(fixed.warnings, [""; 0]);
+    assert!(fixed.warnings.is_empty(), "{:?}", fixed.warnings);
 }
 
 #[test]
@@ -549,7 +549,10 @@ fn a_mass_must_be_left() {
         "integral: -2.0",
     ] {
         let said = message(&format!("[{{function: mass, {held}}}]"));
-        assert!(said.contains("this leaves no mass"), "{held}: {said}");
+        assert!(
+            said.contains("this excludes a positive mass"),
+            "{held}: {said}"
+        );
     }
     assert!(message("[{function: damping, max: -1.0}]").starts_with("no error"));
 }

@@ -31,12 +31,12 @@ fn columns() {
       expected: one of: a [g], a [V]
     ");
     assert_snapshot!(find("t,y\n0,1\n", ColumnName::Number(3)), @"
-    t.csv: there is no column of this number
+    t.csv: no column of this number
       found: 3
       expected: a number from 1 to 2
     ");
     assert_snapshot!(find("t\n0\n", ColumnName::Number(0)), @"
-    t.csv: there is no column of this number
+    t.csv: no column of this number
       found: 0
       expected: the number 1: there is one column
     ");
@@ -53,24 +53,24 @@ fn fields() {
     assert_snapshot!(readings("t;y\n0;1,5\n1;off\n", 1), @"
     t.csv:3: row 2, column `y`: not a number
       found: `off`
-      expected: a finite number, or an empty field where a reading is missing
+      expected: a finite number, or an empty field for a missing sample
     ");
     assert_snapshot!(readings("t;y\n0;1,5\n1;1.5\n", 1), @"
     t.csv:2: row 1, column `y`: not a number
       found: `1,5`
-      expected: a finite number, or an empty field where a reading is missing
+      expected: a finite number, or an empty field for a missing sample
       hint: write numbers with a decimal point, not a comma
     ");
     assert_snapshot!(readings("t,y\n0,1.5\n1,-inf\n", 1), @"
     t.csv:3: row 2, column `y`: not a finite number
       found: `-inf`
-      expected: a finite number, or an empty field where a reading is missing
-      hint: was the instrument overloaded? Leave the field empty where there is no reading
+      expected: a finite number, or an empty field for a missing sample
+      hint: leave the field empty for a missing sample or an overload
     ");
     assert_snapshot!(readings("0,1.5\n1,off\n", 1), @"
     t.csv:2: row 2, column `2`: not a number
       found: `off`
-      expected: a finite number, or an empty field where a reading is missing
+      expected: a finite number, or an empty field for a missing sample
     ");
     assert_snapshot!(parsed("0,1.5\n1,\n").values(1).unwrap_err(), @"
     t.csv:2: row 2, column `2`: a number is missing
@@ -112,7 +112,7 @@ fn formats() {
     ");
     assert_snapshot!(told(TableFormat { skip: Some(9), ..any }), @"
     t.csv: the file is empty
-      found: nothing after the 9 lines that are skipped
+      found: nothing after 9 skipped lines
       expected: a CSV file with one row of column names and rows of numbers
     ");
     assert_snapshot!(told(TableFormat { delimiter: Some('x'), ..any }), @"

@@ -32,12 +32,12 @@ fn file(name: &str, content: &[u8], read: &str) -> String {
 #[test]
 fn files() {
     assert_snapshot!(file("model.yaml", b"", "modell.yaml"), @"
-    DIR/modell.yaml: there is no such file
+    DIR/modell.yaml: no such file
       expected: a model file (YAML)
       hint: did you mean `model.yaml`?
     ");
     assert_snapshot!(file("model.yaml", b"", "deep/model.yaml"), @"
-    DIR/deep/model.yaml: there is no such file
+    DIR/deep/model.yaml: no such file
       expected: a model file (YAML)
       hint: the folder DIR/deep does not exist
     ");
@@ -364,22 +364,22 @@ fn formats() {
 #[test]
 fn wrong_kinds() {
     assert_snapshot!(message("- format: 1\n"), @"
-    m.yaml:1:1: this is the wrong kind of value
+    m.yaml:1:1: wrong type of value
       found: a list
       expected: a map with the keys format, experiments, functions, fit, …
     ");
     assert_snapshot!(message("only text\n"), @"
-    m.yaml:1:1: this is the wrong kind of value
+    m.yaml:1:1: wrong type of value
       found: text `only text`
       expected: a map with the keys format, experiments, functions, fit, …
     ");
     assert_snapshot!(changed("grid: {nodes: 2000, method: midpoint, duration: 25.0}", "grid: 2000"), @"
-    m.yaml:12:7: grid: this is the wrong kind of value
+    m.yaml:12:7: grid: wrong type of value
       found: the number 2000
       expected: a map such as {nodes: 2000, method: midpoint}
     ");
     assert_snapshot!(changed("grid: {nodes: 2000, method: midpoint, duration: 25.0}", "grid: fine"), @"
-    m.yaml:12:7: grid: this is the wrong kind of value
+    m.yaml:12:7: grid: wrong type of value
       found: text `fine`
       expected: a map such as {nodes: 2000, method: midpoint}
     ");
@@ -389,7 +389,7 @@ fn wrong_kinds() {
       hint: check the indentation, and that quotes and brackets before are closed
     ");
     assert_snapshot!(message(&SHORT.replace("  - initial", "    initial")), @"
-    m.yaml:3:5: experiments: this is the wrong kind of value
+    m.yaml:3:5: experiments: wrong type of value
       found: a map
       expected: a list: lines that begin with `- `, or [ … ]
     ");
@@ -399,22 +399,22 @@ fn wrong_kinds() {
       expected: one of: format, title, experiments, grid, functions, constraints, fit, truth, predict, study
     ");
     assert_snapshot!(message("format: 1\nexperiments: []\nfunctions:\n  mass: {basis: nodal}\n  damping: {basis: nodal}\n  stiffness: {basis: nodal}\n"), @"
-    m.yaml:2:14: experiments: there is no experiment
+    m.yaml:2:14: experiments: no experiment
       found: an empty list
       expected: at least one experiment
     ");
     assert_snapshot!(changed("initial: {displacement: 3.3, velocity: 1}", "initial: [3.3, 1]"), @"
-    m.yaml:8:14: experiments[0].initial: this is the wrong kind of value
+    m.yaml:8:14: experiments[0].initial: wrong type of value
       found: a list
       expected: a map such as {displacement: 3.3, velocity: 1.0}, or `estimate`
     ");
     assert_snapshot!(changed("initial: {displacement: 3.3, velocity: 1}", "initial: true"), @"
-    m.yaml:8:14: experiments[0].initial: this is the wrong kind of value
+    m.yaml:8:14: experiments[0].initial: wrong type of value
       found: the truth value true
       expected: a map such as {displacement: 3.3, velocity: 1.0}, or `estimate`
     ");
     assert_snapshot!(changed("title: Linear mass decay", "title: {a: b}"), @"
-    m.yaml:2:8: title: this is the wrong kind of value
+    m.yaml:2:8: title: wrong type of value
       found: a map
       expected: text
     ");
@@ -439,7 +439,7 @@ fn wrong_kinds() {
       hint: write `key: value`, with a space after the colon
     ");
     assert_snapshot!(changed("{displacement: 3.301, velocity: 1.001}", "3.301"), @"
-    m.yaml:28:5: predict[0]: this is the wrong kind of value
+    m.yaml:28:5: predict[0]: wrong type of value
       found: the number 3.301
       expected: a map such as {displacement: 3.3, velocity: 1.0}
     ");
@@ -487,7 +487,7 @@ fn broken_yaml() {
       hint: separate the elements of [ … ] by commas and close the bracket
     ");
     assert_snapshot!(changed("title: Linear mass decay", "title: @home"), @"
-    m.yaml:2:8: the file is not valid YAML: this character cannot begin a value
+    m.yaml:2:8: the file is not valid YAML: invalid first character of a value
       found: `@home`
       hint: put the text in quotes
     ");
@@ -564,7 +564,7 @@ fn what_the_yaml_crate_does_not_cope_with() {
         kmcfit::config::scalar::ScalarOr::Scalar(two)
     );
     assert_snapshot!(message(&format!("{twice}predict:\n  - {{displacement: &b 7, velocity: *a}}\n")), @"
-    m.yaml:3:45: an anchor is given twice
+    m.yaml:3:45: duplicate anchor
       found: `&a` again; it is first given in line 3
       expected: every anchor once
       hint: rename one of them
@@ -576,7 +576,7 @@ fn what_the_yaml_crate_does_not_cope_with() {
     ");
     assert_snapshot!(message(&"- ".repeat(1 << 18)), @"
     m.yaml: the file is longer than 262144 bytes
-      hint: put readings into CSV files
+      hint: put samples into CSV files
     ");
     for piece in ["- ", "? ", "a: b\n", "!t ", "'", "- &a *a\n", "{}"] {
         assert_ne!(message(&piece.repeat((1 << 17) / piece.len())), "no error");
@@ -629,13 +629,13 @@ fn documents_and_limits() {
       hint: begin with `format: 1`
     ");
     assert_snapshot!(message(&format!("{SHORT}---\n{SHORT}")), @"
-    m.yaml:9:1: a second document begins here
+    m.yaml:9:1: second YAML document
       found: two documents in one file
       expected: one model per file
       hint: remove the line `---` and what follows, or put it into a file of its own
     ");
     assert_snapshot!(message(&format!("{SHORT}---\n")), @"
-    m.yaml:9:1: a second document begins here
+    m.yaml:9:1: second YAML document
       found: two documents in one file
       expected: one model per file
       hint: remove the line `---` and what follows, or put it into a file of its own
@@ -652,12 +652,12 @@ fn documents_and_limits() {
       expected: every `[` and `{` closed
     ");
     assert_snapshot!(message("experiments: &a [*a]"), @"
-    m.yaml:1:14: experiments[0]: this is the wrong kind of value
+    m.yaml:1:14: experiments[0]: wrong type of value
       found: a list
       expected: a map such as {name: free decay, data: file.csv, initial: {displacement: 3.3, velocity: 1.0}}
     ");
     assert_snapshot!(message("~"), @"
-    m.yaml:1:1: this is the wrong kind of value
+    m.yaml:1:1: wrong type of value
       found: nothing
       expected: a map with the keys format, experiments, functions, fit, …
     ");

@@ -30,12 +30,12 @@ fn files() {
             .replace(&folder.path().display().to_string(), "DIR")
     };
     assert_snapshot!(read("nosy.csv"), @"
-    DIR/nosy.csv: there is no such file
+    DIR/nosy.csv: no such file
       expected: a CSV file with one row of column names and rows of numbers
       hint: did you mean `noisy.csv`?
     ");
     assert_snapshot!(read("data/noisy.csv"), @"
-    DIR/data/noisy.csv: there is no such file
+    DIR/data/noisy.csv: no such file
       expected: a CSV file with one row of column names and rows of numbers
       hint: the folder DIR/data does not exist
     ");
@@ -230,7 +230,7 @@ fn spacing() {
       expected: a time greater than 0
     ");
     assert_snapshot!(equal("t\n0\n"), @"
-    t.csv:2: row 1, column `t`: there is only one time
+    t.csv:2: row 1, column `t`: only one time
       found: 1 row
       expected: at least 2 rows, to have a spacing
     ");

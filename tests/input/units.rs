@@ -1,7 +1,8 @@
 //! The unit of a column, from all places that may state it, and what is said where they differ.
 
 use insta::assert_snapshot;
-use kmcfit::config::{ModelFile, Purpose, build};
+use kmcfit::config::{BuildMode, ModelFile, build};
+use kmcfit::finding::Finding;
 
 /// The warnings about a table with columns of a time and a displacement, or why it is refused; and the
 /// last time in s.
@@ -19,11 +20,11 @@ fn built(table: &str, names: [&str; 2], units: &str) -> Result<(String, f64), St
         error.to_string().replace(&place, "")
     };
     let file = ModelFile::parse(folder.path().join("m.yaml"), text).map_err(said)?;
-    let model = build(&file, Purpose::Fit).map_err(said)?;
+    let model = build(&file, BuildMode::Fit).map_err(said)?;
     let grid = &model.problem.system.grid;
-    let about_units = |w: &&String| w.contains("the column `") || w.contains("the unit of");
+    let about_units = |w: &&Finding| w.kind.contains("unit");
     let warnings: Vec<&str> = (model.warnings.iter().filter(about_units))
-        .map(String::as_str)
+        .map(|w| w.text.as_str())
         .collect();
     Ok((warnings.join("\n"), grid.time(grid.nodes() - 1)))
 }
@@ -39,8 +40,8 @@ fn a_name_that_ends_like_another_unit_is_a_warning_of_times_as_of_readings() {
     let (warnings, time) = built(&rows("t_ms,y_mm"), ["t_ms", "y_mm"], "").expect("a model");
     assert_eq!(time, 100.0);
     assert_snapshot!(warnings, @"
-    experiments[0].columns.displacement: the column `y_mm` is taken in m, though its name ends like mm; if that is its unit, say `units: {displacement: mm}`
-    experiments[0].columns.time: the column `t_ms` is taken in s, though its name ends like ms; if that is its unit, say `units: {time: ms}`
+    experiments[0].columns.displacement: column `y_mm` is read in m, although its name ends like mm; if mm is its unit, add `units: {displacement: mm}`
+    experiments[0].columns.time: column `t_ms` is read in s, although its name ends like ms; if ms is its unit, add `units: {time: ms}`
     ");
     // What the warnings advise.
     let units = "units: {time: ms, displacement: mm}";
@@ -50,8 +51,8 @@ fn a_name_that_ends_like_another_unit_is_a_warning_of_times_as_of_readings() {
     let (warnings, time) = built(&rows("t_ms,y_mm"), ["t_ms", "y_mm"], units).expect("a model");
     assert_eq!(time, 100.0);
     assert_snapshot!(warnings, @"
-    experiments[0].units.displacement: the column `y_mm` is taken in m, though the file says mm
-    experiments[0].units.time: the column `t_ms` is taken in s, though the file says ms
+    experiments[0].units.displacement: column `y_mm` is read in m, as the model states; the file states mm
+    experiments[0].units.time: column `t_ms` is read in s, as the model states; the file states ms
     ");
 }
 
@@ -61,11 +62,11 @@ fn a_name_that_ends_like_another_unit_than_the_file_states() {
     let (warnings, time) = built(&rows(head), ["1", "y_mm"], "").expect("a model");
     assert_eq!(time, 0.1);
     assert_snapshot!(warnings, @"
-    experiments[0].columns.displacement: the column `y_mm` is taken in m, as the file says, though its name ends like mm
-    experiments[0].columns.time: the column `t_s [ms]` is taken in ms, as the file says, though its name ends like s
+    experiments[0].columns.displacement: column `y_mm` is read in m, as the file's row of units states; its name ends like mm
+    experiments[0].columns.time: column `t_s [ms]` is read in ms, as the file's row of units states; its name ends like s
     ");
     let unknown = built(&rows("t [h],y"), ["t", "y"], "").expect("a model").0;
-    assert_snapshot!(unknown, @"experiments[0].columns.time: `h`, which the file gives as the unit of `t [h]`, is not known as one of time; the values are taken as they are, in s");
+    assert_snapshot!(unknown, @"experiments[0].columns.time: unknown unit `h` of time in column `t [h]`; the values are read in s without conversion");
 }
 
 #[test]
@@ -75,7 +76,7 @@ fn a_name_and_a_row_of_units_that_differ_are_refused() {
     d.csv:2:1: experiments[0].columns.displacement: two units for the column `y [mm]`
       found: `m` in the row of units (line 2), `mm` in the column name (line 1)
       expected: the same unit in both, or in one of them
-      hint: `units: {displacement: …}` in the model decides
+      hint: state the unit in the model: `units: {displacement: …}`
     ");
     let head = "t [ms],y [m]\ns,m";
     let said = built(&rows(head), ["t", "y"], "").expect_err("a contradiction");
@@ -86,7 +87,7 @@ fn a_name_and_a_row_of_units_that_differ_are_refused() {
     let units = "units: {time: ms}";
     let (warnings, time) = built(&rows(head), ["t", "y"], units).expect("a model");
     assert_eq!(time, 0.1);
-    assert_snapshot!(warnings, @"experiments[0].units.time: the column `t [ms]` is taken in ms, though the file says s");
+    assert_snapshot!(warnings, @"experiments[0].units.time: column `t [ms]` is read in ms, as the model states; the file states s");
 }
 
 #[test]
@@ -95,5 +96,5 @@ fn a_column_of_standard_deviations_in_another_unit() {
     let text = format!("t_s,y_m,s_mm\n{}", (0..101).map(row).collect::<String>());
     let units = "sigma: {displacement: s_mm}";
     let (warnings, _) = built(&text, ["t_s", "y_m"], units).expect("a model");
-    assert_snapshot!(warnings, @"experiments[0].sigma.displacement: the column `s_mm` is taken in m, as the readings, though the file says mm");
+    assert_snapshot!(warnings, @"experiments[0].sigma.displacement: column `s_mm` is read in m, the unit of its samples; the file states mm");
 }

@@ -106,13 +106,13 @@ fn a_report_is_complete() {
         let list = list.unwrap_or_else(|| panic!("{pointer}"));
         // What is quoted is code in the page.
         list.iter()
-            .filter_map(|v| v.as_str().or(v["sentence"].as_str()))
+            .filter_map(|v| v["text"].as_str())
             .map(|sentence| sentence.replace('`', ""))
             .collect()
     };
     for pointer in [
-        "/identifiability/settled",
-        "/identifiability/open",
+        "/identifiability/findings",
+        "/identifiability/warnings",
         "/constraints/active",
     ] {
         let said = sentences(pointer);

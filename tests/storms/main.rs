@@ -87,9 +87,9 @@ fn run(case: &Case, method: &str) -> End {
 /// Numbers of a run that has a device make sense; its mass and damping.
 fn sensible(what: &str, place: &Path, result: &Value) -> [f64; 2] {
     let cost = |key: &str| result["cost"][key].as_f64();
-    if result["rungs"]
+    if result["attempts"]
         .as_array()
-        .is_some_and(|rungs| !rungs.is_empty())
+        .is_some_and(|attempts| !attempts.is_empty())
     {
         let (before, after) = (cost("initial"), cost("final"));
         let (before, after) = before

@@ -1,6 +1,6 @@
 //! Services of the host, provided by the application: a clock, the memory limit and the permission to start a thread.
 //!
-//! Without them a fit has no time limit and its timings are zero, memory counts as available, and threads may start.
+//! Without a host, a fit has no time limit, timings are zero, memory is unlimited, and threads may start.
 
 use std::io;
 use std::sync::OnceLock;
@@ -11,38 +11,38 @@ use std::time::Duration;
 pub struct Host {
     /// Time since any fixed instant; never decreasing.
     pub clock: fn() -> Duration,
-    /// Whether so many more bytes can be allocated.
+    /// True if so many more bytes may be allocated.
     pub has_memory: fn(u64) -> bool,
-    /// Called before a thread is started; an error counts as the operating system's refusal.
+    /// Permission to start a thread; an error counts as a refusal by the operating system.
     pub may_start_thread: fn() -> io::Result<()>,
 }
 
 static HOST: OnceLock<Host> = OnceLock::new();
 
-/// Provides the functions of the host, for the rest of the process; later calls change nothing.
-pub fn provide(host: Host) {
+/// Sets the functions of the host for the rest of the process; later calls have no effect.
+pub fn set_host(host: Host) {
     let _ = HOST.set(host);
 }
 
-/// Whether so many more bytes can be allocated; true where the host sets no limit.
+/// True if so many more bytes may be allocated; always true without a host.
 pub(crate) fn has_memory(bytes: u64) -> bool {
     HOST.get().is_none_or(|host| (host.has_memory)(bytes))
 }
 
-/// Asks the host before a thread is started.
+/// Permission of the host to start a thread.
 ///
 /// # Errors
-/// The host's refusal.
+/// The refusal of the host.
 pub(crate) fn may_start_thread() -> io::Result<()> {
     HOST.get().map_or(Ok(()), |host| (host.may_start_thread)())
 }
 
-/// Provides the clock of the process to the tests of timings.
+/// Sets the process clock as host, for tests of timings.
 #[cfg(test)]
 pub(crate) fn provide_clock() {
     static START: std::sync::LazyLock<std::time::Instant> =
         std::sync::LazyLock::new(std::time::Instant::now);
-    provide(Host {
+    set_host(Host {
         clock: || START.elapsed(),
         has_memory: |_| true,
         may_start_thread: || Ok(()),
@@ -54,7 +54,7 @@ pub(crate) fn provide_clock() {
 pub(crate) struct Instant(Duration);
 
 impl Instant {
-    /// The present; always the same where the host provides no clock.
+    /// Current time; constant without a host.
     pub fn now() -> Self {
         Self(HOST.get().map_or(Duration::ZERO, |host| (host.clock)()))
     }

@@ -18,29 +18,32 @@ pub mod builder {
 }
 pub mod constraints {
     pub use crate::constraints::{
-        Cone, Constraints, Impossible, RowGroup, Rows, Shape, Statement, TOLERANCE, TimeHistory,
+        Cone, Constraint, ConstraintError, Constraints, RowGroup, Rows, Shape, TOLERANCE,
+        TimeHistory,
     };
 }
 pub mod diagnostics {
     pub use crate::diagnostics::{
-        ResidualDiagnostics, SIGNIFICANCE, chi_square_one, far_off, normal_half_width,
+        NORMAL_975, ResidualDiagnostics, SIGNIFICANCE, chi_square_one, far_off, normal_half_width,
         offset_and_drift, rms, spread, without_line,
     };
 }
 pub mod functions {
     pub use crate::functions::{
         Basis, CoefficientFunction, CoefficientKind, Design, Gram, Parameterization, Penalty,
-        Prior, Ratios, ScalarParameter, Value, Variation, basis,
+        Prior, Ratios, ScalarParameter, ScalarValue, TotalVariation, basis,
     };
 }
 pub mod host {
-    pub use crate::host::{Host, provide};
+    pub use crate::host::{Host, set_host};
 }
 pub mod identifiability {
     pub use crate::identifiability::{
-        Band, BandSettings, Bands, Candidate, CandidateChannel, Gain, Gauge, Judgement, Ranked,
-        Seen, Sensitivity, Side, Spectrum, Symmetry, Verdict, VerdictKind, anchors, count,
-        is_rounding, is_unhindered, rank_experiments, residual_spread, verdicts,
+        Band, BandSettings, Bands, CandidateChannel, CandidateExperiment, Classification,
+        ClassificationKind, FunctionClassification, Gain, RankFinding, RankFindingKind, Ranked,
+        ResolvedDirection, ScalingAmbiguity, Sensitivity, Side, SingularSpectrum, Symmetry,
+        anchors, classify_functions, is_negligible, is_unhindered, rank_experiments,
+        residual_spread, structural_rank,
     };
 }
 pub mod objective {
@@ -62,9 +65,9 @@ pub mod record {
 }
 pub mod signal {
     pub use crate::signal::{
-        Interpolation, SecondOrder, Shape, Signal, Spectrum, SweepLaw, band_pass, clipped,
-        decimate, decimation_filter, even_spacing, high_pass, low_pass, median, median_spacing,
-        onset,
+        ExcitationShape, Interpolation, SecondOrder, Signal, Spectrum, SweepLaw, band_pass,
+        clipped, decimate, decimation_filter, even_spacing, high_pass, low_pass, median,
+        median_spacing, onset,
     };
 }
 pub mod simd {
@@ -82,16 +85,16 @@ pub mod solvers {
         ActiveGroup, Attempt, CheckpointStore, CheckpointUnit, ExactF64s, Fit, FitSettings,
         Initial, IterationEvent, IterationRecord, Measurements, Observer, Optimality, PathPoint,
         Solver, SolverState, StartProjection, StartStrategy, Status, Stopping, WeightPath,
-        WeightRule, active_constraints, choose_weight, choose_weight_watched, equation_error, fit,
-        fit_from, fit_with_noise, fit_with_noise_watched, number_or_nan, predict_held_out,
-        states_from_readings, timed, without_motion,
+        WeightRule, active_constraints, choose_weight, choose_weight_watched, equation_error,
+        estimate_states, fit, fit_from, fit_with_noise, fit_with_noise_watched, no_response,
+        number_or_nan, predict_validation, timed,
     };
 }
 pub mod study {
     pub use crate::study::{
-        Choice, EquivalentSystem, Linear, PredictedMotion, Prediction, Profile, ProfileSettings,
-        Target, bootstrap, equivalent, equivalent_systems, multistart, predict, prediction,
-        profile, profiles, pull_apart, variation,
+        Choice, EquivalentSystem, Linear, PredictedResponse, PredictionSummary, Profile,
+        ProfileSettings, Target, bootstrap, constancy_test, equivalent_coefficients,
+        equivalent_systems, extremes, multistart, predict, prediction, profile, profiles,
     };
 }
 pub mod system {

@@ -84,7 +84,7 @@ pub use builder::{
     BasisSpec, BuildError, Builder, ChannelSpec, CoefficientSpec, Knots, Record, ScalarSpec,
     SensorSpec, Start,
 };
-pub use constraints::{Shape, Statement, TimeHistory};
+pub use constraints::{Constraint, Shape, TimeHistory};
 pub use functions::{CoefficientKind, Prior};
 pub use problem::{Problem, ProblemError};
 pub use record::{ChannelKind, Loss, Weighting};
@@ -95,15 +95,15 @@ pub use objective::{Evaluation, Gradient, GradientError, GradientKind};
 pub use simulate::{Cause, SimulationError, Trajectory};
 // Fits.
 pub use solvers::{
-    Attempt, Counts, Fit, FitSettings, Initial, Optimality, Outcome, Reason, Solver, StartStrategy,
-    Status, Stopping, Timings, WeightPath, WeightRule, choose_weight, fit,
+    Attempt, Fit, FitSettings, Initial, Optimality, Outcome, Reason, SolveCounts, Solver,
+    StartStrategy, Status, Stopping, Timings, WeightPath, WeightRule, choose_weight, fit,
 };
 // Inference.
 pub use assessment::{FitAssessment, FitWarning, Unidentified};
-pub use identifiability::{BandSettings, Bands, count, verdicts};
+pub use identifiability::{BandSettings, Bands, classify_functions, structural_rank};
 pub use study::{Profile, ProfileSettings, Target, profile};
 // Services of the host.
-pub use host::{Host, provide};
+pub use host::{Host, set_host};
 
 #[doc(hidden)]
 pub mod internals;

@@ -1,43 +1,43 @@
-//! The problem to be fitted: system, functions, records, penalties and constraints that fit each other.
+//! Definition of a problem: system, functions, records, penalties and constraints, checked for consistency.
 
 use crate::constraints::{ConeGroup, Constraints, RowGroup};
-use crate::functions::{CoefficientKind, Parameterization, Penalty, Variation};
+use crate::functions::{CoefficientKind, Parameterization, Penalty, TotalVariation};
 use crate::record::{Channel, Experiment, Weighting};
 use crate::rows::Rows;
 use crate::system::System;
 use std::ops::{Deref, Range};
 use thiserror::Error;
 
-/// Up to so many parameters Jacobians are formed by one tangent solve each, and covariances and bands with every fit.
+/// Number of parameters up to which Jacobians use one tangent solve each, and covariances and bands are computed with every fit.
 pub const FEW_PARAMETERS: usize = 64;
 
-/// The parts of a problem. [`Problem::new`] and [`Problem::with`] check that they fit each other.
+/// Parts of a problem, checked for consistency by [`Problem::new`] and [`Problem::with`].
 #[derive(Debug, Clone)]
 pub struct ProblemParts {
     /// Grid, stepper and terms.
     pub system: System,
-    /// Mass and one function per term.
+    /// Coefficient functions and scalars.
     pub functions: Parameterization,
-    /// The records.
+    /// Records.
     pub experiments: Vec<Experiment>,
-    /// Penalties on roughness.
+    /// Tikhonov penalties.
     pub penalties: Vec<Penalty>,
-    /// Penalties on total variation.
-    pub variations: Vec<Variation>,
-    /// Constraints on the functions.
+    /// Total-variation penalties.
+    pub variations: Vec<TotalVariation>,
+    /// Constraints.
     pub constraints: Constraints,
-    /// Constraints that may be violated at a penalty.
+    /// Soft constraints.
     pub soft: Vec<RowGroup>,
 }
 
-/// A problem to be fitted: parts that fit each other, which can be read and not changed in place.
+/// A consistent problem; its parts are read-only.
 #[derive(Debug, Clone)]
 pub struct Problem(ProblemParts);
 
-/// Parts of a problem that do not fit each other.
+/// Inconsistency of the parts of a problem.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ProblemError {
-    /// The functions have another number of nodes than the grid.
+    /// Functions and grid have different numbers of nodes.
     #[error("functions on {functions} nodes, a grid of {grid}")]
     Nodes {
         /// Nodes of the functions.
@@ -45,7 +45,7 @@ pub enum ProblemError {
         /// Nodes of the grid.
         grid: usize,
     },
-    /// A system has not one function for the mass and one for each term.
+    /// A coefficient set does not have one function for the mass and one for each term.
     #[error("{found} functions for a mass and {terms} terms")]
     Functions {
         /// Number of functions.
@@ -56,18 +56,18 @@ pub enum ProblemError {
     /// A record does not fit the grid or the functions.
     #[error("record `{name}`: {reason}")]
     Record {
-        /// Its name.
+        /// Name of the record.
         name: String,
-        /// What is wrong.
+        /// Inconsistency.
         reason: &'static str,
     },
-    /// A penalty is of a function that is not there, or of another number of parameters.
+    /// A penalty has a function index out of range, or a wrong number of parameters.
     #[error("a penalty does not fit function {function}")]
     Penalty {
         /// Index of the function.
         function: usize,
     },
-    /// A constraint is about a parameter that is not there.
+    /// A constraint has a parameter index out of range.
     #[error("`{name}` is about a parameter that is not there")]
     Constraint {
         /// Name of the constraint.
@@ -84,14 +84,14 @@ impl Deref for Problem {
 }
 
 impl ProblemParts {
-    /// Whether all parts fit each other.
+    /// Checks the consistency of all parts.
     fn check(&self) -> Result<(), ProblemError> {
         let (functions, grid) = (self.functions.nodes(), self.system.grid.nodes());
         if functions != grid {
             return Err(ProblemError::Nodes { functions, grid });
         }
         let terms = self.system.terms.len();
-        for found in self.functions.assemblies().iter().map(Vec::len) {
+        for found in self.functions.coefficient_sets().iter().map(Vec::len) {
             if found != 1 + terms {
                 return Err(ProblemError::Functions { found, terms });
             }
@@ -133,18 +133,18 @@ impl ProblemParts {
         }
     }
 
-    /// Why a record does not fit the grid or the functions.
+    /// Inconsistency of a record with the grid or the functions, if any.
     fn mismatch(&self, record: &Experiment) -> Option<&'static str> {
         let scalars = self.functions.scalars().len();
         let sensors = record.channels.iter().flat_map(|c| c.sensor().indices());
-        let mut indices = sensors.chain(record.sought).flatten();
+        let mut indices = sensors.chain(record.initial_parameters).flatten();
         let mut places = record.channels.iter().flat_map(|c| c.places());
         let excitation = record.excitation.as_ref();
         match () {
             () if !(2..=self.system.grid.nodes()).contains(&record.nodes) => {
                 Some("fewer than two nodes, or more than the grid has")
             }
-            () if record.device >= self.functions.assemblies().len() => {
+            () if record.coefficient_set >= self.functions.coefficient_sets().len() => {
                 Some("a set of functions that is not there")
             }
             () if indices.any(|i| i >= scalars) => Some("a nuisance parameter that is not there"),
@@ -181,10 +181,10 @@ impl Problem {
         parts.check().map(|()| Self(parts))
     }
 
-    /// The problem with its parts changed.
+    /// Changes the parts of the problem.
     ///
     /// # Errors
-    /// A [`ProblemError`] if they do not fit each other any more.
+    /// A [`ProblemError`] if the changed parts are inconsistent.
     pub fn with(mut self, change: impl FnOnce(&mut ProblemParts)) -> Result<Self, ProblemError> {
         change(&mut self.0);
         self.0.check().map(|()| self)
@@ -193,7 +193,7 @@ impl Problem {
     /// Adds constraints; groups with a penalty weight are soft.
     ///
     /// # Errors
-    /// A [`ProblemError`] if one is about a parameter that is not there; then none is added.
+    /// A [`ProblemError`] if a parameter index is out of range; then no constraint is added.
     pub fn constrain(&mut self, mut rows: Constraints) -> Result<(), ProblemError> {
         self.check_rows(rows.groups.iter(), &rows.cones)?;
         self.0.soft.extend(rows.take_soft());
@@ -201,27 +201,27 @@ impl Problem {
         Ok(())
     }
 
-    /// Adds a penalty on roughness.
+    /// Adds a Tikhonov penalty.
     ///
     /// # Errors
-    /// A [`ProblemError`] if it is of a function that is not there, or of another number of parameters.
+    /// A [`ProblemError`] if the function index is out of range, or the number of parameters is wrong.
     pub fn penalize(&mut self, penalty: Penalty) -> Result<(), ProblemError> {
         self.check_penalty(penalty.function, &penalty.rows)?;
         self.0.penalties.push(penalty);
         Ok(())
     }
 
-    /// Adds a penalty on total variation.
+    /// Adds a total-variation penalty.
     ///
     /// # Errors
     /// As [`Problem::penalize`].
-    pub fn penalize_variation(&mut self, variation: Variation) -> Result<(), ProblemError> {
+    pub fn penalize_variation(&mut self, variation: TotalVariation) -> Result<(), ProblemError> {
         self.check_penalty(variation.function, &variation.rows)?;
         self.0.variations.push(variation);
         Ok(())
     }
 
-    /// The parts, for changes that keep them fitting each other.
+    /// Mutable parts, for changes that keep them consistent.
     pub(crate) fn parts_mut(&mut self) -> &mut ProblemParts {
         &mut self.0
     }
@@ -231,14 +231,14 @@ impl Problem {
         self.functions.parameters()
     }
 
-    /// Values at the nodes of the shared coefficient function of a kind for the parameters `theta`, in its SI unit; `None` if the
-    /// system has no such function.
+    /// Nodal values of the shared coefficient function of kind `kind` at the parameters `theta`, in its SI unit; `None` if the system has
+    /// no such function.
     ///
     /// # Panics
     /// If `theta` has another number of parameters.
     pub fn coefficient(&self, kind: CoefficientKind, theta: &[f64]) -> Option<Vec<f64>> {
         let functions = &self.functions;
-        let mut shared = functions.assembly(0).iter();
+        let mut shared = functions.coefficient_set(0).iter();
         let index = *shared.find(|&&f| functions.get(f).quantity == kind)?;
         let mut values = vec![0.0; functions.nodes()];
         let range = functions.ranges()[index].clone();
@@ -246,12 +246,12 @@ impl Problem {
         Some(values)
     }
 
-    /// The start of the search.
+    /// Start parameters.
     pub fn start(&self) -> Vec<f64> {
         self.functions.start()
     }
 
-    /// Moves the start of the search.
+    /// Sets the start.
     ///
     /// # Panics
     /// If `theta` has another number of parameters.
@@ -259,7 +259,7 @@ impl Problem {
         self.0.functions.set_start(theta);
     }
 
-    /// The part of `theta` that belongs to the scalars.
+    /// Scalars of the parameters `theta`.
     pub fn scalars<'a>(&self, theta: &'a [f64]) -> &'a [f64] {
         &theta[self.functions.scalar_range()]
     }
@@ -269,19 +269,18 @@ impl Problem {
         self.experiments.iter().flat_map(|e| &e.channels)
     }
 
-    /// Number of readings of all experiments.
-    pub fn reading_count(&self) -> usize {
+    /// Number of samples of all experiments.
+    pub fn sample_count(&self) -> usize {
         self.channels().map(Channel::len).sum()
     }
 
-    /// The misfit of no motion at all: what there is to explain.
+    /// Misfit of zero response.
     pub fn zero_response_misfit(&self) -> f64 {
         let silence = |c: &Channel| c.cost(&vec![0.0; c.len()]);
         self.channels().map(silence).sum()
     }
 
-    /// The same problem with only the first part of the readings, `share` of the time of each
-    /// record.
+    /// The problem with the samples of the first `share` of each record's time.
     #[must_use]
     pub fn truncated(&self, share: f64) -> Self {
         let mut part = self.clone();
@@ -297,8 +296,7 @@ impl Problem {
         part
     }
 
-    /// Whether the continuous adjoint of Eq. 13 applies: the integral cost, one reading of the
-    /// displacement per node, over the whole grid.
+    /// True if the continuous adjoint of Eq. 13 applies: the integral cost and one displacement sample per node over the whole grid.
     pub fn supports_continuous(&self) -> bool {
         let nodes = self.system.grid.nodes();
         let fits = |c: &Channel| {

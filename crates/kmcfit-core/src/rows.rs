@@ -1,4 +1,4 @@
-//! Sparse rows with a right-hand side, built one after the other: design matrices, penalties, constraints, subproblems.
+//! Sparse rows with right-hand sides, appended one by one: design matrices, penalties, constraints, subproblems.
 
 use crate::simd::sum::largest;
 use nalgebra::DMatrix;
@@ -14,12 +14,12 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// No rows.
+    /// Empty rows.
     pub fn new() -> Self {
         Self::of_width(0)
     }
 
-    /// No rows yet, of at least so many columns.
+    /// Empty rows with at least `width` columns.
     pub fn of_width(width: usize) -> Self {
         Self {
             width,
@@ -28,13 +28,13 @@ impl Rows {
         }
     }
 
-    /// Adds the row with these entries (columns may repeat; they add up) and right-hand side.
+    /// Appends a row with these entries (repeated columns are added) and right-hand side.
     pub fn push(&mut self, entries: impl IntoIterator<Item = (usize, f64)>, right: f64) {
         if self.starts.is_empty() {
             self.starts.push(0);
         }
         let first = self.columns.len();
-        // Rows usually come with rising columns; only others have to be searched.
+        // Entries usually come with rising columns; only others are searched.
         let mut highest = None;
         for (column, value) in entries {
             self.width = self.width.max(column + 1);
@@ -56,7 +56,7 @@ impl Rows {
         self.right.push(right);
     }
 
-    /// Makes room for so many further rows and entries.
+    /// Reserves capacity for further rows and entries.
     pub fn reserve(&mut self, rows: usize, entries: usize) {
         self.starts.reserve(rows + 1);
         self.right.reserve(rows);
@@ -69,12 +69,12 @@ impl Rows {
         self.right.len()
     }
 
-    /// Number of columns: as many as were stated, or one more than the largest column of an entry.
+    /// Number of columns: as stated, or one more than the largest column of an entry.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Whether there are no rows.
+    /// True without rows.
     pub fn is_empty(&self) -> bool {
         self.right.is_empty()
     }
@@ -105,14 +105,14 @@ impl Rows {
         self.right = right;
     }
 
-    /// `a_i^T z` for all rows.
+    /// Products `a_i^T z` of all rows.
     pub fn multiply(&self, z: &[f64]) -> Vec<f64> {
         let mut values = vec![0.0; self.len()];
         self.multiply_add(z, &mut values);
         values
     }
 
-    /// Adds `a_i^T z` to the values, of which there may be fewer than rows.
+    /// Adds `a_i^T z` to the values, which may be fewer than the rows.
     pub fn multiply_add(&self, z: &[f64], values: &mut [f64]) {
         if self.is_column() {
             let pairs = values.iter_mut().zip(&self.values);
@@ -134,13 +134,13 @@ impl Rows {
         }
     }
 
-    /// Largest size of `a_i^T z`.
+    /// Largest `|a_i^T z|`.
     pub fn largest(&self, z: &[f64]) -> f64 {
         if self.is_column() {
-            // Rounding keeps the order of sizes.
+            // Rounding preserves the order of magnitudes.
             return (largest(&self.values) * z[0]).abs();
         }
-        // Some side by side: one maximum would wait for itself.
+        // Several maxima, because a single one is a chain of dependent operations.
         let mut most = [0.0f64; 4];
         self.each_product(z, self.len(), |i, product| {
             most[i % 4] = most[i % 4].max(product.abs());
@@ -148,23 +148,23 @@ impl Rows {
         largest(&most)
     }
 
-    /// Whether there is one column, with the same entry in every row.
+    /// True for a single column with equal entries in all rows.
     pub fn is_constant(&self) -> bool {
         self.is_column() && self.values.windows(2).all(|pair| pair[0] == pair[1])
     }
 
-    /// Whether there is one column, without gaps: its values are all there is to it.
+    /// True for a single column with an entry in every row.
     fn is_column(&self) -> bool {
         self.width == 1 && !self.is_empty() && self.entries() == self.len()
     }
 
-    /// Gives `act` the number of each of the first `count` rows and its product with `z`.
+    /// Calls `act` with the index and the product with `z` of each of the first `count` rows.
     #[inline(always)]
     fn each_product(&self, z: &[f64], count: usize, mut act: impl FnMut(usize, f64)) {
         for (i, ends) in self.starts.windows(2).take(count).enumerate() {
             let range = ends[0]..ends[1];
             let product = match (&self.columns[range.clone()], &self.values[range]) {
-                // As on knots: no loop.
+                // Two entries, as on knots: no loop.
                 (&[j, k], &[a, b]) => a * z[j] + b * z[k],
                 (columns, values) => {
                     let pairs = columns.iter().zip(values);
@@ -180,7 +180,7 @@ impl Rows {
         (&self.starts, &self.columns, &self.values)
     }
 
-    /// The rows as a matrix.
+    /// Dense matrix of the rows.
     pub fn dense(&self) -> DMatrix<f64> {
         let mut out = DMatrix::zeros(self.len(), self.width);
         for i in 0..self.len() {
@@ -201,7 +201,7 @@ impl Rows {
         self.values.len()
     }
 
-    /// Largest size of an entry of row `i`; 0 for an empty row.
+    /// Largest absolute entry of row `i`; 0 for an empty row.
     pub fn scale(&self, i: usize) -> f64 {
         self.row(i).fold(0.0, |most, (_, a)| most.max(a.abs()))
     }
@@ -211,7 +211,7 @@ impl Rows {
 mod tests {
     use super::*;
 
-    /// Two rows over three columns, by hand.
+    /// Two rows with three columns.
     fn rows() -> Rows {
         let mut rows = Rows::new();
         rows.push([(0, 1.0), (2, -2.0)], 5.0);
@@ -224,7 +224,7 @@ mod tests {
         assert_eq!(rows().multiply(&[1.0, 10.0, 100.0]), [-199.0, 40.0]);
     }
 
-    /// What is scaled in its columns says of `z` what the rows said of `factors * z`.
+    /// Rows with scaled columns have the products of the original rows with `factors * z`.
     #[test]
     fn scaled_columns() {
         let mut scaled = rows();

@@ -1,7 +1,7 @@
-//! Threads: the only place that starts them, and when one may be taken.
+//! Start of threads, and the use of a second processor.
 //!
-//! A thread can be refused by the operating system (limits on processes or memory). The callers then do its work
-//! themselves, with the same result.
+//! The operating system may refuse a thread (limits on processes or memory). The caller then does the work itself, with the same
+//! result.
 
 #![allow(clippy::disallowed_methods)]
 
@@ -15,23 +15,22 @@ thread_local! {
     static SHARES: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whether there is a processor for a second thread: there are two, and this thread is not itself one of several
-/// that share them.
+/// True if a second thread has a processor: there are at least two, and this thread does not share them with others.
 pub fn spare() -> bool {
     static THREADS: LazyLock<usize> =
         LazyLock::new(|| std::thread::available_parallelism().map_or(1, usize::from));
     !SHARES.get() && *THREADS > 1
 }
 
-/// Says that this thread shares the processors with others from now on.
+/// Marks this thread as one that shares the processors.
 pub fn share() {
     SHARES.set(true);
 }
 
-/// Starts a thread that may borrow what outlives `scope`.
+/// Starts a scoped thread.
 ///
 /// # Errors
-/// If the system has no thread to give.
+/// If the operating system or the host refuses.
 pub fn spawn_scoped<'scope, T: Send + 'scope>(
     scope: &'scope Scope<'scope, '_>,
     work: impl FnOnce() -> T + Send + 'scope,
@@ -40,7 +39,7 @@ pub fn spawn_scoped<'scope, T: Send + 'scope>(
     Builder::new().spawn_scoped(scope, work)
 }
 
-/// Does `work` while another thread is busy for the same end.
+/// Does `work` with this thread marked as sharing the processors.
 pub fn sharing<T>(work: impl FnOnce() -> T) -> T {
     let before = SHARES.replace(true);
     let result = work();
@@ -48,16 +47,15 @@ pub fn sharing<T>(work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// The results of `own` and `other`, which is computed on a second thread at the same time where a processor is to spare
-/// and the system has a thread to give.
+/// Results of `own` and `other`; `other` is computed on a second thread where a processor is free and the thread starts.
 ///
 /// # Panics
-/// If one of them does.
+/// If one of them panics.
 pub fn both<A, B: Send>(own: impl FnOnce() -> A, other: impl FnOnce() -> B + Send) -> (A, B) {
     if !spare() {
         return (own(), other());
     }
-    // Taken by the second thread, or by this one where there is no other.
+    // Taken by the second thread, or by this one without a second thread.
     let other = Mutex::new(Some(other));
     let take = || other.lock().unwrap_or_else(PoisonError::into_inner).take();
     std::thread::scope(|scope| {

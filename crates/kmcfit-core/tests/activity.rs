@@ -2,7 +2,7 @@
 
 mod common;
 
-use kmcfit_core::internals::constraints::{RowGroup, Statement};
+use kmcfit_core::internals::constraints::{Constraint, RowGroup};
 use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
@@ -13,7 +13,7 @@ use kmcfit_core::internals::system::{Method, NodalCoefficients};
 
 const NODES: usize = 101;
 
-/// m = k = 1 known, a constant c sought from the motion of c = 0.8, its damping ratio capped.
+/// m = k = 1 known, a constant c estimated from the response of c = 0.8, its damping ratio capped.
 fn capped(cap: f64) -> Problem {
     let system = common::system(NODES, Method::Rk4);
     let truth = NodalCoefficients {
@@ -27,7 +27,7 @@ fn capped(cap: f64) -> Problem {
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
     let mut problem = common::problem_of(system, list, observed.displacement, None);
-    let statement = Statement::DampingRatio { max: cap };
+    let statement = Constraint::DampingRatio { max: cap };
     let rows = statement.build(&problem.system.grid, &problem.functions);
     problem.constrain(rows.unwrap()).unwrap();
     problem
@@ -132,7 +132,7 @@ fn a_bound_on_one_parameter_is_reported_with_its_multiplier() {
     }
 }
 
-/// m = 1 known, c and k sought from readings of sigma `sigma`, by a fit that stays where it starts.
+/// m = 1 known, c and k estimated from samples of sigma `sigma`, by a fit that stays where it starts.
 fn resting(c: f64, k: f64, sigma: f64, groups: Vec<RowGroup>) -> Vec<ActiveGroup> {
     let plain = capped(0.2);
     let list = vec![
@@ -158,7 +158,7 @@ fn resting(c: f64, k: f64, sigma: f64, groups: Vec<RowGroup>) -> Vec<ActiveGroup
 
 /// Multipliers of bounds on single parameters, against those of the program that rows of several
 /// parameters need: with a row that is far away, which changes nothing else. J falls with c below 0.8, and with
-/// k above 1. The point lies as near to its bounds as a program comes, and J is told in any unit.
+/// k above 1. The point lies as near to its bounds as a program comes, for J in any unit.
 #[test]
 fn multipliers_of_bounds_on_one_parameter_are_those_of_a_program() {
     let (c, k) = (0.4, 1.3);
@@ -230,7 +230,7 @@ fn a_bound_that_the_data_pull_away_from_is_not_pushed() {
     }
 }
 
-/// m = 1 known, c = 0.8 and k = 1 sought, their sum at most `cap`.
+/// m = 1 known, c = 0.8 and k = 1 estimated, their sum at most `cap`.
 fn with_sum_below(cap: f64) -> Problem {
     let mut problem = capped(0.2);
     let list = vec![
@@ -284,7 +284,7 @@ fn a_bound_on_a_sum_is_reported_with_its_multiplier() {
     );
 }
 
-/// [`capped`] with noise, and with m, c and k times `unit`: the motions are the same.
+/// [`capped`] with noise, and with m, c and k times `unit`: the responses are the same.
 fn capped_in_units(unit: f64, cap: f64) -> Problem {
     let mut problem = capped(cap);
     let observed = problem.experiments[0].channels[0].observed().to_vec();
@@ -295,7 +295,7 @@ fn capped_in_units(unit: f64, cap: f64) -> Problem {
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![unit; NODES]),
     ];
     problem = common::problem_of(problem.system.clone(), list, observed, None);
-    let statement = Statement::DampingRatio { max: cap };
+    let statement = Constraint::DampingRatio { max: cap };
     let built = statement.build(&problem.system.grid, &problem.functions);
     problem = problem
         .with(|parts| {
@@ -308,7 +308,7 @@ fn capped_in_units(unit: f64, cap: f64) -> Problem {
 /// A push counts if giving way by one per cent would lower J by more than a millionth, to first order.
 /// The bound m + k gives way by one per cent where c = zeta (m + k) does.
 #[test]
-fn whether_a_push_counts_is_no_matter_of_units() {
+fn the_significance_of_a_multiplier_does_not_depend_on_units() {
     let best = |unit: f64, cap: f64| {
         let problem = capped_in_units(unit, cap);
         let start = problem.functions.start();
@@ -335,7 +335,7 @@ fn whether_a_push_counts_is_no_matter_of_units() {
     }
 }
 
-/// The bound m + k of a cone is part known and part sought. A push counts if where it gives way by one per
+/// The bound m + k of a cone is part known and part estimated. A push counts if where it gives way by one per
 /// cent J would fall by more than a millionth, to first order.
 #[test]
 fn a_push_against_a_cone_is_measured_by_its_whole_bound() {
@@ -357,7 +357,7 @@ fn a_push_against_a_cone_is_measured_by_its_whole_bound() {
     let mut seen = [0; 2];
     for exponent in 6..18 {
         let max = ratio * (1.0 - 0.5f64.powi(exponent));
-        let statement = Statement::DampingRatio { max };
+        let statement = Constraint::DampingRatio { max };
         problem = problem
             .with(|parts| {
                 parts.constraints = statement.build(&grid, &parts.functions).unwrap();

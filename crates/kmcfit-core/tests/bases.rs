@@ -48,7 +48,7 @@ fn table() -> Vec<(Basis, usize, usize)> {
     ]
 }
 
-/// Times that are nobody's knots or nodes, the ends, and every knot and node.
+/// Times other than knots and nodes, the ends, and every knot and node.
 fn times(grid: &Grid) -> Vec<f64> {
     let mut times: Vec<f64> = (0..97)
         .map(|i| -1.5 + 4.0 * (f64::from(i) + 0.37) / 97.3)
@@ -532,8 +532,8 @@ fn coefficient_functions_of_every_basis() {
         })
         .collect();
     let functions = Parameterization::new(list, 41, grid.step()).unwrap();
-    let device = functions.device(&functions.start());
-    for values in device.functions() {
+    let nodal = functions.nodal(&functions.start());
+    for values in nodal.functions() {
         assert_close(values, &[2.0; 41], 1e-15, "start");
     }
     let nodal = CoefficientFunction::nodal(CoefficientKind::Mass, vec![1.0; 41]);

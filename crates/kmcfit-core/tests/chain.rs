@@ -4,7 +4,7 @@
 mod common;
 
 use common::properties::properties;
-use common::{add_physics, errors, paper_device, paper_problem};
+use common::{add_physics, errors, paper_problem, paper_system};
 use kmcfit_core::internals::constraints::Rows;
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::qp::Subproblem;
@@ -83,7 +83,7 @@ proptest! {
         for (z, right) in found.iter().zip(&a).take(given) {
             prop_assert_eq!(*z, right / 2.0);
         }
-        // At a minimum the value hardly depends on where one stands: what is left is its own rounding.
+        // At a minimum the value hardly depends on the point: the rest is its rounding error.
         let (found, expected) = (plain.value(&found), plain.value(&expected));
         prop_assert!((found - expected).abs() <= 1e-12 * (1.0 + expected), "{found} {expected}");
     }
@@ -131,7 +131,7 @@ fn several_right_hand_sides_are_solved_as_each_by_itself() {
 }
 
 #[test]
-fn what_cannot_be_solved_is_not_solved() {
+fn unsolvable_problems_have_no_solution() {
     let numbers = [0.3, -0.7, 0.9, 0.2, -0.4, 0.8, 0.1];
     let mut sub = chain(12, 3, &numbers, &[0]);
     sub.stations = (0..13).collect();
@@ -152,7 +152,7 @@ fn what_cannot_be_solved_is_not_solved() {
 }
 
 #[test]
-fn bounds_that_the_plain_minimum_breaks_are_held() {
+fn bounds_violated_by_the_plain_minimum_become_active() {
     let mut sub = Subproblem::new(3);
     sub.stations = vec![0, 1, 2];
     for (j, target) in [-1.0, 0.5, 3.0].into_iter().enumerate() {
@@ -183,7 +183,7 @@ fn tens_of_thousands_of_values_take_no_more_work_than_thousands() {
         // The bound on the damping is touched everywhere and pushed nowhere: no program is needed.
         assert_eq!(found.counts.qp, 0, "{nodes}");
         assert!(found.history.len() <= 3, "{nodes}: {}", found.history.len());
-        let errors = errors(&found.best.evaluation.device, &paper_device(nodes));
+        let errors = errors(&found.best.evaluation.nodal, &paper_system(nodes));
         assert!(errors.iter().all(|e| *e < 1e-11), "{nodes}: {errors:?}");
     }
 }

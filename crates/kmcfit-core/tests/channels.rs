@@ -1,4 +1,4 @@
-//! The gradient of J with every kind of reading, term, excitation, sensor and loss, against dual
+//! The gradient of J with every kind of sample, term, excitation, sensor and loss, against dual
 //! numbers through an independent evaluation.
 
 mod common;
@@ -6,7 +6,8 @@ mod common;
 use common::properties::properties;
 use common::sensed::{Record, Response, cost};
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, Prior, ScalarParameter, Value,
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, Prior, ScalarParameter,
+    ScalarValue,
 };
 use kmcfit_core::internals::objective::{Evaluation, GradientKind};
 use kmcfit_core::internals::problem::Problem;
@@ -60,7 +61,7 @@ struct Readings {
     sigmas: Vec<f64>,
     around: Vec<(f64, f64)>,
     fixed_in_space: Vec<f64>,
-    /// Gain, offset and drift, all sought.
+    /// Gain, offset and drift, all estimated.
     sensor: [f64; 3],
     loss: Loss,
 }
@@ -198,20 +199,20 @@ impl Case {
             force: Some(StageSamples::new(self.force.clone())),
             base: Some(StageSamples::new(self.base.clone())),
         });
-        experiment.sought = [Some(0), Some(1)];
-        for (n, readings) in self.channels.iter().enumerate() {
+        experiment.initial_parameters = [Some(0), Some(1)];
+        for (n, samples) in self.channels.iter().enumerate() {
             let time = |(i, x): &(usize, f64)| (*i as f64 + x) * grid.step();
-            let times = readings.places.iter().map(time).collect();
-            let weighting = Weighting::Sigmas(readings.sigmas.clone());
-            let around = readings.around.iter().map(|(force, base)| InputSample {
+            let times = samples.places.iter().map(time).collect();
+            let weighting = Weighting::Sigmas(samples.sigmas.clone());
+            let around = samples.around.iter().map(|(force, base)| InputSample {
                 force: *force,
                 base: *base,
             });
             let first = 2 + 3 * n;
             let channel = Channel::new(
-                readings.kind,
+                samples.kind,
                 times,
-                readings.values.clone(),
+                samples.values.clone(),
                 weighting,
                 &grid,
                 nodes,
@@ -219,12 +220,12 @@ impl Case {
             let channel = channel
                 .unwrap()
                 .with_surroundings(around.collect())
-                .with_base(readings.fixed_in_space.clone())
-                .with_loss(readings.loss)
+                .with_base(samples.fixed_in_space.clone())
+                .with_loss(samples.loss)
                 .with_sensor(Sensor {
-                    gain: Value::Sought(first),
-                    offset: Value::Sought(first + 1),
-                    drift: Value::Sought(first + 2),
+                    gain: ScalarValue::Estimated(first),
+                    offset: ScalarValue::Estimated(first + 1),
+                    drift: ScalarValue::Estimated(first + 2),
                 });
             experiment = experiment.with_channel(channel);
         }
@@ -257,19 +258,19 @@ impl Case {
             base: self.base.clone(),
             initial: (rest[0], rest[1]),
         };
-        let states = record.motion();
+        let states = record.response();
         let mut sum = ((rest[1] - PRIOR.mean) / PRIOR.sigma).powi(2);
-        for (n, readings) in self.channels.iter().enumerate() {
+        for (n, samples) in self.channels.iter().enumerate() {
             let [gain, offset, drift] = [0, 1, 2].map(|k| rest[2 + 3 * n + k]);
             let time = |(i, x): (usize, f64)| (i as f64 + x) * self.dt;
-            for (i, &place) in readings.places.iter().enumerate() {
-                let seen = record.seen(readings.kind, &states, place, readings.around[i])
-                    + readings.fixed_in_space[i];
-                let age = time(place) - time(readings.places[0]);
+            for (i, &place) in samples.places.iter().enumerate() {
+                let seen = record.seen(samples.kind, &states, place, samples.around[i])
+                    + samples.fixed_in_space[i];
+                let age = time(place) - time(samples.places[0]);
                 let model = gain * seen + offset + drift * age;
                 sum += cost(
-                    readings.loss,
-                    (model - readings.values[i]) / readings.sigmas[i],
+                    samples.loss,
+                    (model - samples.values[i]) / samples.sigmas[i],
                 );
             }
         }
@@ -371,7 +372,7 @@ fn on_few_parameters(problem: &Problem, with_knots: bool) -> Problem {
             .collect(),
     };
     let list = problem.functions.iter().enumerate().map(|(i, nodal)| {
-        // No term that drives the motion out of bounds.
+        // No term that drives the response out of bounds.
         let start = nodal.start[0].abs();
         match i % 3 {
             1 if with_knots => {
@@ -398,7 +399,7 @@ proptest! {
     /// Constants are carried along by a way of their own: against values at the nodes, to which a design takes
     /// their gradient, and against one direction at a time.
     #[test]
-    fn few_parameters_move_what_values_at_the_nodes_do(
+    fn few_parameters_have_the_tangents_of_nodal_values(
         methods in prop_oneof![Just(Method::Midpoint), Just(Method::Rk4)],
         nodes in prop_oneof![4usize..14, 60..70usize],
         seed in any::<u64>(),
@@ -432,7 +433,7 @@ fn index_of_prior(problem: &Problem) -> usize {
     problem.functions.scalar_range().start + 1
 }
 
-/// The motions are far apart, so that the difference of two rounded costs is exact enough.
+/// The responses are far apart, so that the difference of two rounded costs is exact enough.
 #[test]
 fn the_difference_of_costs_is_that_of_both_costs() {
     let grid = Grid::new(0.0, 1.0, 9).unwrap();
@@ -445,8 +446,8 @@ fn the_difference_of_costs_is_that_of_both_costs() {
     for weighting in [Weighting::Sigma(0.3), Weighting::Sigmas(sigmas)] {
         for loss in LOSSES {
             let kind = ChannelKind::Displacement;
-            let readings = observed.clone();
-            let channel = Channel::new(kind, grid.times(), readings, weighting.clone(), &grid, 9);
+            let samples = observed.clone();
+            let channel = Channel::new(kind, grid.times(), samples, weighting.clone(), &grid, 9);
             let channel = channel.unwrap().with_loss(loss);
             let expected = channel.cost(&to) - channel.cost(&from);
             let found = channel.cost_difference(&from, &to);

@@ -1,4 +1,4 @@
-//! The forward solve against motions known in closed form.
+//! The forward solve against responses known in closed form.
 
 mod common;
 
@@ -18,12 +18,12 @@ fn bessel_error(nodes: usize, method: Method) -> f64 {
     let system = system(nodes, common::DURATION, method);
     let exact = Bessel::PAPER;
     let times = system.grid.times();
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: times.iter().map(|t| exact.mass(*t)).collect(),
         coefficients: vec![vec![0.0; nodes], vec![1.0; nodes]],
     };
-    let motion = system.forward(&device, common::INITIAL, None).unwrap();
-    let errors = times.iter().zip(&motion.displacement);
+    let response = system.forward(&nodal, common::INITIAL, None).unwrap();
+    let errors = times.iter().zip(&response.displacement);
     errors.fold(0.0f64, |most, (t, y)| {
         most.max((y - exact.displacement(*t)).abs())
     })
@@ -64,7 +64,7 @@ fn rk4_converges_to_the_bessel_solution_with_order_4() {
 #[test]
 fn constant_coefficients_converge_with_the_order_of_the_stepper() {
     // Under-, over- and critically damped, undamped, and negative damping.
-    let devices = [
+    let nodal_sets = [
         (2.0, 0.4, 3.0),
         (1.0, 5.0, 2.0),
         (1.0, 4.0, 4.0),
@@ -75,20 +75,20 @@ fn constant_coefficients_converge_with_the_order_of_the_stepper() {
         displacement: -0.7,
         velocity: 1.3,
     };
-    for (m, c, k) in devices {
+    for (m, c, k) in nodal_sets {
         for method in [Method::Midpoint, Method::Rk4] {
             let error = |nodes: usize| {
                 let system = system(nodes, 10.0, method);
-                let device = NodalCoefficients {
+                let nodal = NodalCoefficients {
                     mass: vec![m; nodes],
                     coefficients: vec![vec![c; nodes], vec![k; nodes]],
                 };
-                let motion = system.forward(&device, initial, None).unwrap();
+                let response = system.forward(&nodal, initial, None).unwrap();
                 let times = system.grid.times();
                 let exact = times
                     .iter()
                     .map(|t| constant_coefficients((m, c, k), initial, *t));
-                let errors = exact.zip(motion.displacement.iter().zip(&motion.velocity));
+                let errors = exact.zip(response.displacement.iter().zip(&response.velocity));
                 errors.fold(0.0f64, |most, ((ye, ve), (y, v))| {
                     most.max((y - ye).abs()).max((v - ve).abs())
                 })

@@ -2,7 +2,7 @@
 //! message about constraints in model files.
 
 use kmcfit_core::internals::constraints::{
-    Constraints, Impossible, RowGroup, Shape, Statement, TimeHistory,
+    Constraint, ConstraintError, Constraints, RowGroup, Shape, TimeHistory,
 };
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
@@ -95,7 +95,7 @@ fn fine() -> Vec<f64> {
     grid().with_nodes(count).unwrap().times()
 }
 
-fn built(statement: &Statement, functions: &Parameterization) -> Constraints {
+fn built(statement: &Constraint, functions: &Parameterization) -> Constraints {
     statement.build(&grid(), functions).unwrap()
 }
 
@@ -111,16 +111,16 @@ fn inside(constraints: &Constraints, functions: &Parameterization, seed: u64) ->
     projection.theta
 }
 
-fn bounds(of: CoefficientKind, min: f64, max: f64) -> Statement {
-    Statement::Bounds {
+fn bounds(of: CoefficientKind, min: f64, max: f64) -> Constraint {
+    Constraint::Bounds {
         of,
         min: Some(TimeHistory::Constant(min)),
         max: Some(TimeHistory::Constant(max)),
     }
 }
 
-fn shape(of: CoefficientKind, shape: Shape) -> Statement {
-    Statement::Shape { of, shape }
+fn shape(of: CoefficientKind, shape: Shape) -> Constraint {
+    Constraint::Shape { of, shape }
 }
 
 /// Whether a derivative of function `j` nowhere rises, or for smooth bases at no node.
@@ -145,11 +145,11 @@ fn tested(basis: &Basis) -> Vec<f64> {
 }
 
 #[test]
-fn rows_say_what_the_functions_do() {
+fn rows_agree_with_the_functions() {
     for basis in bases() {
         let functions = functions([&basis, &Basis::Nodal, &Basis::Constant]);
         let theta = random(functions.parameters(), 1);
-        let held = Statement::Value {
+        let held = Constraint::Value {
             of: MASS,
             at: 3.3,
             value: 0.0,
@@ -168,19 +168,19 @@ fn rows_say_what_the_functions_do() {
             .map(|p| p * step)
             .sum();
         let (of, value) = (MASS, 1.0);
-        let group = &built(&Statement::Integral { of, value }, &functions).groups[0];
+        let group = &built(&Constraint::Integral { of, value }, &functions).groups[0];
         let found = group.rows.multiply(&theta)[0];
         assert!(
             (found - integral).abs() < 1e-3,
             "{basis:?}: {found} {integral}"
         );
-        let group = &built(&Statement::Mean { of, value }, &functions).groups[0];
+        let group = &built(&Constraint::Mean { of, value }, &functions).groups[0];
         let mean = group.rows.multiply(&theta)[0];
         assert!((mean - found / 10.0).abs() < 1e-12, "{basis:?}");
         assert_eq!(group.name, "mean of mass = 1");
         assert_eq!(group.bounds(0), [1.0, 1.0]);
 
-        let slope = Statement::Slope {
+        let slope = Constraint::Slope {
             of,
             min: Some(-1.0),
             max: None,
@@ -203,12 +203,12 @@ fn rows_say_what_the_functions_do() {
 
 #[test]
 fn one_row_for_every_value_that_can_differ() {
-    let rows = |basis: &Basis, statement: &Statement| {
+    let rows = |basis: &Basis, statement: &Constraint| {
         let functions = functions([basis, &Basis::Constant, &Basis::Constant]);
         let groups = built(statement, &functions).groups;
         groups.iter().map(|g| g.rows.len()).collect::<Vec<_>>()
     };
-    let positive = Statement::Bounds {
+    let positive = Constraint::Bounds {
         of: MASS,
         min: Some(TimeHistory::Constant(0.0)),
         max: None,
@@ -232,9 +232,9 @@ fn one_row_for_every_value_that_can_differ() {
 }
 
 #[test]
-fn what_is_projected_satisfies_the_statement_between_the_nodes() {
+fn projected_functions_satisfy_the_constraint_between_nodes() {
     let limit = |t: f64| 0.2 + 0.3 * (t - 1.0) / 10.0 * ((t - 1.0) * 2.0).sin();
-    let moving = Statement::Bounds {
+    let moving = Constraint::Bounds {
         of: MASS,
         min: Some(TimeHistory::Nodal {
             name: "a column".into(),
@@ -245,7 +245,7 @@ fn what_is_projected_satisfies_the_statement_between_the_nodes() {
     for (seed, basis) in bases().iter().enumerate() {
         let functions = functions([basis, &Basis::Nodal, &Basis::Nodal]);
         let times = tested(basis);
-        let values = |statement: &Statement, q: usize| {
+        let values = |statement: &Constraint, q: usize| {
             let theta = inside(&built(statement, &functions), &functions, seed as u64);
             dense(&functions, &theta, 0, q, &times)
         };
@@ -266,11 +266,11 @@ fn what_is_projected_satisfies_the_statement_between_the_nodes() {
             continue;
         }
         let theta =
-            |statement: &Statement| inside(&built(statement, &functions), &functions, seed as u64);
+            |statement: &Constraint| inside(&built(statement, &functions), &functions, seed as u64);
         let falling = theta(&shape(MASS, Shape::NonIncreasing));
         assert!(falls(&functions, &falling, 0, 0), "{basis:?}");
         if !matches!(basis, Basis::PiecewiseConstant { .. }) {
-            let slope = Statement::Slope {
+            let slope = Constraint::Slope {
                 of: MASS,
                 min: Some(-0.1),
                 max: Some(0.2),
@@ -300,7 +300,7 @@ fn two_functions_at_once() {
                 false => grid().times(),
             };
             let slack = 1e-6;
-            let band = Statement::Frequency {
+            let band = Constraint::Frequency {
                 min: Some(0.1),
                 max: Some(0.5),
             };
@@ -312,7 +312,7 @@ fn two_functions_at_once() {
                 assert!(*k <= (TAU * 0.5).powi(2) * m + slack, "{mass:?} {other:?}");
             }
 
-            let theta = inside(&built(&Statement::Passive, &functions), &functions, seed);
+            let theta = inside(&built(&Constraint::Passive, &functions), &functions, seed);
             let m = dense(&functions, &theta, 0, 1, &times);
             let c = dense(&functions, &theta, 1, 0, &times);
             for (c, slope) in c.iter().zip(&m) {
@@ -328,7 +328,7 @@ fn equal_functions() {
     for a in bases() {
         for b in bases() {
             let functions = functions([&Basis::Constant, &a, &b]);
-            let statement = Statement::Equal {
+            let statement = Constraint::Equal {
                 first: DAMPING,
                 second: STIFFNESS,
                 ratio: 2.0,
@@ -347,16 +347,16 @@ fn equal_functions() {
 }
 
 /// The rows hold where functions known at the nodes satisfy them.
-fn holds(constraints: &Constraints, device: [&dyn Fn(f64) -> f64; 3]) -> bool {
+fn holds(constraints: &Constraints, nodal: [&dyn Fn(f64) -> f64; 3]) -> bool {
     let values = |f: &dyn Fn(f64) -> f64| grid().times().into_iter().map(f).collect::<Vec<_>>();
-    let theta = device.map(values).concat();
+    let theta = nodal.map(values).concat();
     constraints.hold(&theta, 1e-9)
 }
 
 #[test]
-fn the_true_device_is_passive_and_a_stiffening_spring_is_not() {
+fn the_true_system_is_passive_and_a_stiffening_spring_is_not() {
     let nodal = functions([&Basis::Nodal; 3]);
-    let passive = built(&Statement::Passive, &nodal);
+    let passive = built(&Constraint::Passive, &nodal);
     let names: Vec<&str> = passive.groups.iter().map(|g| g.name.as_str()).collect();
     assert_eq!(names, ["passive: c >= m'/2", "passive: k' <= 0"]);
     let decay = |t: f64| 1.0 - 0.02 * t;
@@ -373,7 +373,7 @@ fn the_true_device_is_passive_and_a_stiffening_spring_is_not() {
         &Basis::Constant,
         &Basis::Constant,
     ]);
-    let passive = built(&Statement::Passive, &jumps);
+    let passive = built(&Constraint::Passive, &jumps);
     assert!(passive.hold(&[1.0, 0.9, 0.0, 1.0], 0.0));
     assert!(!passive.hold(&[1.0, 1.1, 5.0, 1.0], 1e-9));
     assert!(!passive.hold(&[1.0, 0.9, -0.1, 1.0], 1e-9));
@@ -388,7 +388,7 @@ fn the_cone_is_the_cap_on_the_damping_ratio() {
     let zeta: f64 = 0.2;
     for [mass, stiffness] in [[1.0, 1.0], [1e-3, 5e4], [2e5, 3.0]] {
         let functions = constants(mass, stiffness);
-        let cones = built(&Statement::DampingRatio { max: zeta }, &functions);
+        let cones = built(&Constraint::DampingRatio { max: zeta }, &functions);
         assert_eq!(cones.cones[0].cones.len(), 1);
         let mut random = ChaCha8Rng::seed_from_u64(7);
         for _ in 0..1000 {
@@ -406,7 +406,7 @@ fn the_cone_is_the_cap_on_the_damping_ratio() {
     }
     // Between nodes it holds too, and fixed functions are constants of the cone.
     let nodal = functions([&Basis::Nodal, &Basis::Nodal, &Basis::Nodal]);
-    let cap = built(&Statement::DampingRatio { max: zeta }, &nodal);
+    let cap = built(&Constraint::DampingRatio { max: zeta }, &nodal);
     assert_eq!(cap.cones[0].cones.len(), NODES);
     let theta = inside(&cap, &nodal, 5);
     let [m, c, k] = [0, 1, 2].map(|j| dense(&nodal, &theta, j, 0, &fine()));
@@ -419,7 +419,7 @@ fn the_cone_is_the_cap_on_the_damping_ratio() {
         free(DAMPING, &Basis::Constant, 1.0),
         known,
     ];
-    let cap = built(&Statement::DampingRatio { max: zeta }, &collect(list));
+    let cap = built(&Constraint::DampingRatio { max: zeta }, &collect(list));
     assert!(cap.hold(&[1.0, 0.8], 1e-12));
     assert!(!cap.hold(&[1.0, 0.81], 1e-12));
 }
@@ -435,7 +435,7 @@ fn fixed_functions_move_to_the_bounds() {
         collect(vec![mass, free(DAMPING, &Basis::Constant, 1.0), k])
     };
     let flat = with(known(STIFFNESS, &|_| 2.0));
-    let band = Statement::Frequency {
+    let band = Constraint::Frequency {
         min: None,
         max: Some(0.5),
     };
@@ -448,27 +448,29 @@ fn fixed_functions_move_to_the_bounds() {
     }
     // Only what is about free functions is left of passivity.
     let names = |f: &Parameterization| {
-        let groups = built(&Statement::Passive, f).groups;
+        let groups = built(&Constraint::Passive, f).groups;
         groups.into_iter().map(|g| g.name).collect::<Vec<_>>()
     };
     assert_eq!(names(&flat), ["passive: c >= m'/2"]);
     let rising = with(known(STIFFNESS, &|t| 1.0 + t));
-    let broken = Statement::Passive.build(&grid(), &rising);
-    assert!(matches!(broken, Err(Impossible::Broken { name, .. }) if name == "passive: k' <= 0"));
+    let broken = Constraint::Passive.build(&grid(), &rising);
+    assert!(
+        matches!(broken, Err(ConstraintError::Broken { name, .. }) if name == "passive: k' <= 0")
+    );
     assert_eq!(
         bounds(STIFFNESS, 0.0, 1.0).build(&grid(), &flat),
-        Err(Impossible::Fixed(vec![STIFFNESS]))
+        Err(ConstraintError::Fixed(vec![STIFFNESS]))
     );
     // A line cannot be a parabola.
     let bent = with(known(STIFFNESS, &|t| 1.0 + t * t));
-    let equal = Statement::Equal {
+    let equal = Constraint::Equal {
         first: MASS,
         second: STIFFNESS,
         ratio: 1.0,
     };
     assert!(matches!(
         equal.build(&grid(), &bent),
-        Err(Impossible::Broken { .. })
+        Err(ConstraintError::Broken { .. })
     ));
     let theta = inside(&built(&equal, &rising), &rising, 2);
     let mass = dense(&rising, &theta, 0, 0, &fine());
@@ -488,7 +490,7 @@ fn bounds_and_fixed_values_hold_exactly() {
         let mut constraints = built(&bounds(MASS, low, high), &functions);
         constraints.extend(built(&bounds(DAMPING, 0.3, 0.3), &functions));
         constraints.extend(built(
-            &Statement::Value {
+            &Constraint::Value {
                 of: STIFFNESS,
                 at: 1.0,
                 value: 0.7,
@@ -532,11 +534,11 @@ fn a_contradiction_names_exactly_the_two() {
         bounds(DAMPING, 0.0, 5.0),
         bounds(MASS, 1.0, 3.0),
         shape(MASS, Shape::NonIncreasing),
-        Statement::Mean {
+        Constraint::Mean {
             of: MASS,
             value: 0.5,
         },
-        Statement::Value {
+        Constraint::Value {
             of: STIFFNESS,
             at: 1.0,
             value: 1.0,

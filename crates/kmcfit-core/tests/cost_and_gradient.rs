@@ -47,10 +47,10 @@ fn of_one_value_a_node() {
 #[test]
 fn with_a_sigma_and_with_penalties() {
     let mut problem = paper_problem(300, [2.0, 1.0, 1.0]);
-    let readings = problem.experiments[0].channels[0].observed().to_vec();
+    let samples = problem.experiments[0].channels[0].observed().to_vec();
     let grid = problem.system.grid;
     let sigma = Weighting::Sigma(0.1);
-    let channel = Channel::displacement_at_nodes(readings.clone(), 1, sigma, &grid);
+    let channel = Channel::displacement_at_nodes(samples.clone(), 1, sigma, &grid);
     problem = problem
         .with(|parts| {
             parts.experiments[0].channels = vec![channel];
@@ -61,7 +61,7 @@ fn with_a_sigma_and_with_penalties() {
     let parts = [2.0, 1.0, 1.0].map(|start| CoefficientSpec::nodal(start).tikhonov(1, 0.3));
     let record = Record::new("free decay")
         .from_state(3.3, 1.0)
-        .displacement(&grid.times(), &readings);
+        .displacement(&grid.times(), &samples);
     let method = problem.system.method;
     let smooth = Builder::new(parts)
         .record(record)
@@ -71,13 +71,13 @@ fn with_a_sigma_and_with_penalties() {
     agree(&smooth, &uneven(&smooth));
 }
 
-/// Every second node is read, or other bases are sought: no short way.
+/// Every second node is read, or other bases are estimated: no short way.
 #[test]
 fn of_everything_else() {
     let mut problem = paper_problem(301, [2.0, 1.0, 1.0]);
     let grid = problem.system.grid;
-    let readings: Vec<f64> = problem.experiments[0].channels[0].observed().to_vec();
-    let half: Vec<f64> = readings.iter().copied().step_by(2).collect();
+    let samples: Vec<f64> = problem.experiments[0].channels[0].observed().to_vec();
+    let half: Vec<f64> = samples.iter().copied().step_by(2).collect();
     let spacing = 2.0 * grid.step();
     let channel = Channel::displacement_at_nodes(half, 2, Weighting::Integral { spacing }, &grid);
     problem = problem
@@ -94,7 +94,7 @@ fn of_everything_else() {
     ];
     let record = Record::new("free decay")
         .from_state(3.3, 1.0)
-        .displacement(&grid.times(), &readings);
+        .displacement(&grid.times(), &samples);
     let knots = Builder::new(parts).record(record).build().unwrap();
     agree(&knots, &uneven(&knots));
 }

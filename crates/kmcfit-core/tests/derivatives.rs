@@ -3,7 +3,7 @@
 mod common;
 
 use common::properties::properties;
-use common::reference::{Inputs, motion};
+use common::reference::{Inputs, response};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::simulate::{
     Engine, Purpose, Trajectory, continuous_adjoint, reference,
@@ -18,20 +18,20 @@ use proptest::prelude::*;
 /// The discrete adjoint as fits compute it.
 fn discrete_adjoint(
     system: &System,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
-    motion: &Trajectory,
+    response: &Trajectory,
     source: &Trajectory,
 ) -> SystemTangent {
-    let engine = Engine::choose(system, excitation, motion.nodes(), Purpose::Estimation);
-    engine.discrete_adjoint(system, device, excitation, motion, source)
+    let engine = Engine::choose(system, excitation, response.nodes(), Purpose::Estimation);
+    engine.discrete_adjoint(system, nodal, excitation, response, source)
 }
 
-/// A random device with a random force, initial state and cost weights.
+/// A random system with a random force, initial state and cost weights.
 #[derive(Debug, Clone)]
 struct Case {
     method: Method,
-    device: NodalCoefficients,
+    nodal: NodalCoefficients,
     force: Vec<f64>,
     initial: State,
     /// Weight and target of displacement and velocity at each node.
@@ -50,19 +50,19 @@ impl Case {
 
     /// `sum a (y - b)^2 + c (v - d)^2`, by the independent solve.
     fn cost<D: DualNum<Primitive = f64> + Copy>(&self, inputs: &Inputs<D>, y0: D, v0: D) -> D {
-        let states = motion(self.method, inputs, (y0, v0), self.system().grid.step());
+        let states = response(self.method, inputs, (y0, v0), self.system().grid.step());
         let terms = states.iter().zip(&self.weights);
         terms.fold(D::from(0.0), |sum, ((y, v), [a, b, c, d])| {
             sum + (*y - *b).powi(2) * *a + (*v - *d).powi(2) * *c
         })
     }
 
-    fn source(&self, motion: &Trajectory) -> Trajectory {
+    fn source(&self, response: &Trajectory) -> Trajectory {
         let pair = |i: usize| {
             let [a, b, c, d] = self.weights[i];
             (
-                2.0 * a * (motion.displacement[i] - b),
-                2.0 * c * (motion.velocity[i] - d),
+                2.0 * a * (response.displacement[i] - b),
+                2.0 * c * (response.velocity[i] - d),
             )
         };
         let (displacement, velocity) = (0..self.weights.len()).map(pair).unzip();
@@ -76,9 +76,9 @@ impl Case {
         let system = self.system();
         let excitation = Excitation::force_at_nodes(&self.force);
         let force = Some(&excitation);
-        let motion = system.forward(&self.device, self.initial, force).unwrap();
-        let source = self.source(&motion);
-        discrete_adjoint(&system, &self.device, force, &motion, &source)
+        let response = system.forward(&self.nodal, self.initial, force).unwrap();
+        let source = self.source(&response);
+        discrete_adjoint(&system, &self.nodal, force, &response, &source)
     }
 
     /// The derivative with respect to input `seed`: the functions' nodes in order, then y0, v0.
@@ -90,9 +90,9 @@ impl Case {
             Dual64::new(*x, eps)
         };
         let inputs = Inputs {
-            mass: self.device.mass.iter().map(&mut dual).collect(),
-            damping: self.device.coefficients[0].iter().map(&mut dual).collect(),
-            stiffness: self.device.coefficients[1].iter().map(&mut dual).collect(),
+            mass: self.nodal.mass.iter().map(&mut dual).collect(),
+            damping: self.nodal.coefficients[0].iter().map(&mut dual).collect(),
+            stiffness: self.nodal.coefficients[1].iter().map(&mut dual).collect(),
             force: self.force.iter().map(|f| Dual64::from(*f)).collect(),
         };
         let y0 = dual(&self.initial.displacement);
@@ -102,7 +102,7 @@ impl Case {
 }
 
 fn flatten(gradient: &SystemTangent) -> Vec<f64> {
-    let mut flat: Vec<f64> = gradient.device.functions().flatten().copied().collect();
+    let mut flat: Vec<f64> = gradient.nodal.functions().flatten().copied().collect();
     flat.extend([gradient.initial.displacement, gradient.initial.velocity]);
     flat
 }
@@ -122,7 +122,7 @@ fn case() -> impl Strategy<Value = Case> {
         )
             .prop_map(move |(mass, c, k, force, (y0, v0), weights)| Case {
                 method,
-                device: NodalCoefficients {
+                nodal: NodalCoefficients {
                     mass,
                     coefficients: vec![c, k],
                 },
@@ -154,24 +154,24 @@ proptest! {
         let system = case.system();
         let excitation = Excitation::force_at_nodes(&case.force);
         let force = Some(&excitation);
-        let motion = system.forward(&case.device, case.initial, force).unwrap();
+        let response = system.forward(&case.nodal, case.initial, force).unwrap();
         // A direction and weights of the right length, taken from an unrelated case.
         let cut = |f: &[f64]| -> Vec<f64> {
             f.iter().cycle().take(case.force.len()).copied().collect()
         };
         let direction = SystemTangent {
-            device: NodalCoefficients {
-                mass: cut(&other.device.coefficients[0]),
-                coefficients: vec![cut(&other.device.mass), cut(&other.force)],
+            nodal: NodalCoefficients {
+                mass: cut(&other.nodal.coefficients[0]),
+                coefficients: vec![cut(&other.nodal.mass), cut(&other.force)],
             },
             initial: other.initial,
         };
         let weights = Trajectory {
             displacement: cut(&other.force),
-            velocity: cut(&other.device.coefficients[1]),
+            velocity: cut(&other.nodal.coefficients[1]),
         };
-        let forward = reference::tangent(&system, &case.device, force, &motion, &direction);
-        let backward = discrete_adjoint(&system, &case.device, force, &motion, &weights);
+        let forward = reference::tangent(&system, &case.nodal, force, &response, &direction);
+        let backward = discrete_adjoint(&system, &case.nodal, force, &response, &weights);
         let all = |t: &Trajectory| [t.displacement.clone(), t.velocity.clone()].concat();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let (ju, w) = (all(&forward), all(&weights));
@@ -185,16 +185,16 @@ proptest! {
     fn the_forward_solve_is_the_textbook_one(case in case()) {
         let system = case.system();
         let ours = system
-            .forward(&case.device, case.initial, Some(&Excitation::force_at_nodes(&case.force)))
+            .forward(&case.nodal, case.initial, Some(&Excitation::force_at_nodes(&case.force)))
             .unwrap();
         let inputs = Inputs {
-            mass: case.device.mass.clone(),
-            damping: case.device.coefficients[0].clone(),
-            stiffness: case.device.coefficients[1].clone(),
+            mass: case.nodal.mass.clone(),
+            damping: case.nodal.coefficients[0].clone(),
+            stiffness: case.nodal.coefficients[1].clone(),
             force: case.force.clone(),
         };
         let start = (case.initial.displacement, case.initial.velocity);
-        let other = motion(case.method, &inputs, start, system.grid.step());
+        let other = response(case.method, &inputs, start, system.grid.step());
         let largest = other.iter().fold(0.0f64, |m, s| m.max(s.0.abs()).max(s.1.abs()));
         for (i, (y, v)) in other.iter().enumerate() {
             prop_assert!((ours.displacement[i] - y).abs() <= 1e-13 * largest);
@@ -293,19 +293,19 @@ fn the_continuous_gradient_converges_to_the_discrete_one() {
     }
 }
 
-/// Of a device whose mass and damping at the beginning are neither 1 nor 0, nor at rest.
+/// Of a system whose mass and damping at the beginning are neither 1 nor 0, nor at rest.
 fn initial_gradients(nodes: usize) -> [State; 2] {
     let system = common::system(nodes, Method::Midpoint);
     let times = system.grid.times();
     let of = |f: fn(f64) -> f64| -> Vec<f64> { times.iter().map(|t| f(*t)).collect() };
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: of(|t| 2.5 + 0.4 * (0.5 * t).sin()),
         coefficients: vec![of(|t| 0.3 + 0.01 * t), of(|t| 1.5 - 0.2 * (0.3 * t).cos())],
     };
-    let motion = system.forward(&device, common::INITIAL, None).unwrap();
+    let response = system.forward(&nodal, common::INITIAL, None).unwrap();
     let observed = of(|t| (0.7 * t).cos());
     let weights = trapezoid_weights(nodes, system.grid.step());
-    let pairs = motion.displacement.iter().zip(&observed);
+    let pairs = response.displacement.iter().zip(&observed);
     let source = Trajectory {
         displacement: (pairs.zip(weights))
             .map(|((y, o), w)| 2.0 * w * (y - o))
@@ -313,8 +313,8 @@ fn initial_gradients(nodes: usize) -> [State; 2] {
         velocity: vec![0.0; nodes],
     };
     [
-        continuous_adjoint(&system, &device, None, &motion, &observed).initial,
-        discrete_adjoint(&system, &device, None, &motion, &source).initial,
+        continuous_adjoint(&system, &nodal, None, &response, &observed).initial,
+        discrete_adjoint(&system, &nodal, None, &response, &source).initial,
     ]
 }
 

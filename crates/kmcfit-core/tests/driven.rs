@@ -1,4 +1,4 @@
-//! Driven motions against closed forms: harmonic, base and transient excitation, Coulomb friction, and
+//! Driven responses against closed forms: harmonic, base and transient excitation, Coulomb friction, and
 //! what sensors see between nodes.
 
 mod common;
@@ -85,7 +85,7 @@ fn tone(times: &[f64], values: &[f64], w: f64) -> (f64, f64) {
 }
 
 /// How many times as many steps the long records take: 0.02 and 0.01 s, 50 and 100 or more steps in
-/// the shorter of the periods of force and device.
+/// the shorter of the periods of force and system.
 const STEADY: usize = 30;
 
 /// Far below, near and far above resonance (3 rad/s), long after the beginning is forgotten:
@@ -101,12 +101,15 @@ fn a_harmonic_force_gives_the_steady_state_of_the_textbook() {
                 let system = system(nodes, 240.0, method);
                 let grid = system.grid;
                 let force = sampled(&grid, |t| 5.0 * (w * t).cos());
-                let motion = system
+                let response = system
                     .forward(&constants(nodes, &[M, C, K]), REST, Some(&pushed(force)))
                     .unwrap();
                 let settled = nodes * 5 / 6;
-                let (amplitude, phase) =
-                    tone(&grid.times()[settled..], &motion.displacement[settled..], w);
+                let (amplitude, phase) = tone(
+                    &grid.times()[settled..],
+                    &response.displacement[settled..],
+                    w,
+                );
                 (amplitude * impedance / 5.0 - 1.0).hypot(phase - lag)
             };
             let left = check_order(method, &format!("w = {w}"), error);
@@ -138,8 +141,8 @@ fn base_and_relative_motion_together_have_the_transmissibility() {
                         force: None,
                         base: Some(sampled(&grid, |t| -w * w * (w * t).cos())),
                     };
-                    let device = constants(nodes, &[M, C, K]);
-                    let motion = system.forward(&device, REST, Some(&excitation)).unwrap();
+                    let nodal = constants(nodes, &[M, C, K]);
+                    let response = system.forward(&nodal, REST, Some(&excitation)).unwrap();
                     let settled: Vec<usize> = (nodes * 5 / 6..nodes).collect();
                     let times: Vec<f64> = settled.iter().map(|i| grid.time(*i)).collect();
                     let relative = settled.iter().map(|i| {
@@ -148,9 +151,9 @@ fn base_and_relative_motion_together_have_the_transmissibility() {
                         let sensed = reference::observe(
                             &system,
                             kind,
-                            &device,
+                            &nodal,
                             Some(&excitation),
-                            &motion,
+                            &response,
                             place,
                             around,
                         );
@@ -187,11 +190,11 @@ fn a_force_that_jumps_at_nodes_gives_the_step_response() {
             let (first, last) = ((nodes - 1) / 8, (nodes - 1) / 2);
             let on = |i: usize| [f64::from(u8::from((first..last).contains(&i))); 3];
             let force = StageSamples::new((0..nodes - 1).map(on).collect());
-            let motion = system
+            let response = system
                 .forward(&constants(nodes, &[M, C, K]), REST, Some(&pushed(force)))
                 .unwrap();
             let after = |t: f64| if t > 0.0 { step_response(t) } else { 0.0 };
-            let times = system.grid.times().into_iter().zip(&motion.displacement);
+            let times = system.grid.times().into_iter().zip(&response.displacement);
             times.fold(0.0f64, |most, (t, y)| {
                 most.max((y - after(t - 1.0) + after(t - 4.0)).abs())
             })
@@ -200,7 +203,7 @@ fn a_force_that_jumps_at_nodes_gives_the_step_response() {
     }
 }
 
-/// `sin(pi t / 2)` for 2 s, without damping: in closed form during the push, free motion after it.
+/// `sin(pi t / 2)` for 2 s, without damping: in closed form during the push, free response after it.
 #[test]
 fn a_half_sine_gives_the_response_of_the_textbook() {
     let (w, wn) = (PI / 2.0, (K / M).sqrt());
@@ -227,17 +230,17 @@ fn a_half_sine_gives_the_response_of_the_textbook() {
             let force = sampled(&system.grid, |t| {
                 if t < 2.0 + 1e-9 { (w * t).sin() } else { 0.0 }
             });
-            let motion = system
+            let response = system
                 .forward(&constants(nodes, &[M, 0.0, K]), REST, Some(&pushed(force)))
                 .unwrap();
-            let times = system.grid.times().into_iter().zip(&motion.displacement);
+            let times = system.grid.times().into_iter().zip(&response.displacement);
             times.fold(0.0f64, |most, (t, y)| most.max((y - exact(t)).abs()))
         };
         check_order(method, "half sine", error);
     }
 }
 
-/// A free motion under dry friction: its turning points, as displacements.
+/// A free response under dry friction: its turning points, as displacements.
 fn turning_points(friction: f64, width: f64) -> Vec<f64> {
     // A step 1/20 of the time that the speed takes to cross the narrowest width.
     let nodes = 40_001;
@@ -247,13 +250,13 @@ fn turning_points(friction: f64, width: f64) -> Vec<f64> {
         displacement: 1.0,
         velocity: 0.0,
     };
-    let motion = system
+    let response = system
         .forward(&constants(nodes, &[1.0, 1.0, friction]), initial, None)
         .unwrap();
     let Trajectory {
         displacement: y,
         velocity: v,
-    } = motion;
+    } = response;
     let turns = (1..nodes - 1).filter(|i| v[*i] * v[i + 1] <= 0.0);
     // At the turn itself: v is a line between the nodes, and y a parabola.
     let h = system.grid.step();
@@ -315,7 +318,7 @@ fn dry_friction_decays_in_a_line() {
 
 /// What sensors see between nodes has the order of the stepper: the interpolation is not worse.
 #[test]
-fn readings_between_nodes_have_the_order_of_the_stepper() {
+fn samples_between_nodes_have_the_order_of_the_stepper() {
     let w = 2.0;
     // Harmonic force in its steady state from the first node on.
     let impedance = (K - M * w * w).hypot(C * w);
@@ -335,13 +338,13 @@ fn readings_between_nodes_have_the_order_of_the_stepper() {
     for method in METHODS {
         for kind in ChannelKind::ALL {
             let error = |nodes: usize| {
-                // 16 to 32 steps in a period of the device: with more, rounding would show.
+                // 16 to 32 steps in a period of the system: with more, rounding would show.
                 let nodes = (nodes - 1) / 4 + 1;
                 let system = system(nodes, 10.0, method);
                 let grid = system.grid;
                 let excitation = pushed(sampled(&grid, |t| (w * t).cos()));
-                let device = constants(nodes, &[M, C, K]);
-                let motion = system.forward(&device, initial, Some(&excitation)).unwrap();
+                let nodal = constants(nodes, &[M, C, K]);
+                let response = system.forward(&nodal, initial, Some(&excitation)).unwrap();
                 let mut most = 0.0f64;
                 for step in 0..nodes - 1 {
                     for fraction in [0.0, 0.1, 0.31, 0.5, 0.77, 0.99] {
@@ -354,9 +357,9 @@ fn readings_between_nodes_have_the_order_of_the_stepper() {
                         let seen = reference::observe(
                             &system,
                             kind,
-                            &device,
+                            &nodal,
                             Some(&excitation),
-                            &motion,
+                            &response,
                             place,
                             around,
                         );

@@ -15,15 +15,15 @@ use kmcfit_core::internals::system::{Excitation, Method, NodalCoefficients, Term
 const NODES: usize = 401;
 const START: f64 = 2.0;
 
-/// Free motion of m = 1, c = 0, k = 1.5, a force of zero if asked for; m and k are constants to be
-/// found from a mass of 2, c is fixed at `damping`, or sought if that is `None`.
+/// Free response of m = 1, c = 0, k = 1.5, a force of zero if asked for; m and k are constants to be
+/// found from a mass of 2, c is fixed at `damping`, or estimated if that is `None`.
 fn problem(damping: Option<f64>, silent_force: bool) -> Problem {
     let system = common::system(NODES, Method::Rk4);
     let truth = NodalCoefficients {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![damping.unwrap_or(0.0); NODES], vec![1.5; NODES]],
     };
-    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
+    let response = system.forward(&truth, common::INITIAL, None).unwrap();
     let damping = match damping {
         Some(value) => CoefficientFunction::fixed(CoefficientKind::Damping, vec![value; NODES]),
         None => CoefficientFunction::constant(CoefficientKind::Damping, 0.5, NODES),
@@ -33,7 +33,7 @@ fn problem(damping: Option<f64>, silent_force: bool) -> Problem {
         damping,
         CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, NODES),
     ];
-    let mut problem = common::problem_of(system, list, motion.displacement, None);
+    let mut problem = common::problem_of(system, list, response.displacement, None);
     if silent_force {
         problem = problem
             .with(|parts| {
@@ -62,7 +62,7 @@ fn close(found: f64, expected: f64) {
 }
 
 /// What says nothing about the scale leaves the mass at its start: without that the equation is
-/// solved best by a device of nothing.
+/// solved best by a system of nothing.
 #[test]
 fn the_mass_keeps_its_mean_where_nothing_fixes_the_scale() {
     let mut with_zero = problem(None, false);
@@ -116,7 +116,7 @@ fn a_fixed_function_or_value_sets_the_scale() {
     }
 }
 
-/// A device need not have a damping, nor a stiffness in any place of its list.
+/// A system need not have a damping, nor a stiffness in any place of its list.
 #[test]
 fn a_spring_alone_has_an_equation_too() {
     let mut system = common::system(NODES, Method::Rk4);
@@ -125,12 +125,12 @@ fn a_spring_alone_has_an_equation_too() {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![1.5; NODES]],
     };
-    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
+    let response = system.forward(&truth, common::INITIAL, None).unwrap();
     let list = vec![
         CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
         CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, NODES),
     ];
-    let problem = common::problem_of(system, list, motion.displacement, None);
+    let problem = common::problem_of(system, list, response.displacement, None);
     let found = equation_error(&problem, &problem.functions.start()).unwrap();
     close(found[0], 1.5);
 }
@@ -149,7 +149,7 @@ fn irregular_velocities_are_integrated() {
     };
     let maker = Truth {
         system: &problem.system,
-        device: &truth,
+        nodal: &truth,
         excitation: None,
         initial: common::INITIAL,
     };
@@ -168,10 +168,10 @@ fn irregular_velocities_are_integrated() {
     assert!((ratio / 1.5 - 1.0).abs() < 0.05, "{found:?}");
 }
 
-/// Mass, stiffness and readings in other units, and the penalty with them: the readings count as they did,
+/// Mass, stiffness and samples in other units, and the penalty with them: the samples count as they did,
 /// so the start is the same but for the unit.
 #[test]
-fn the_start_knows_no_unit_of_mass_or_length() {
+fn the_start_does_not_depend_on_units_of_mass_and_length() {
     let plain = problem(Some(0.0), false);
     let observed = plain.experiments[0].channels[0].observed().to_vec();
     let observed = common::synthetic::with_noise(&observed, 0.05, 4);
@@ -212,8 +212,8 @@ fn the_start_knows_no_unit_of_mass_or_length() {
     }
 }
 
-/// How much a penalty smooths is told by the spring's force and the mass's at the start, whatever a
-/// damping that is sought begins with.
+/// The smoothing by a penalty depends on the spring force and the inertia force at the start, whatever a
+/// damping that is estimated begins with.
 #[test]
 fn the_start_of_a_damping_has_no_part_in_the_smoothing() {
     let plain = problem(Some(0.0), false);

@@ -1,4 +1,4 @@
-//! What several records of one device determine together that one alone does not.
+//! What several records of one system determine together that one alone does not.
 
 mod common;
 
@@ -69,8 +69,8 @@ fn force(grid: &Grid) -> Excitation {
 /// Which records there are: of each the initial state, and whether it is forced.
 type Records<'a> = &'a [(State, bool)];
 
-/// One value per step for each function, from (2, 1, 1), with readings at all nodes.
-fn problem(nodes: usize, device: &NodalCoefficients, records: Records) -> Problem {
+/// One value per step for each function, from (2, 1, 1), with samples at all nodes.
+fn problem(nodes: usize, nodal: &NodalCoefficients, records: Records) -> Problem {
     let system = system(nodes);
     let grid = system.grid;
     let list = QUANTITIES.into_iter().zip([2.0, 1.0, 1.0]);
@@ -80,7 +80,7 @@ fn problem(nodes: usize, device: &NodalCoefficients, records: Records) -> Proble
         let excitation = forced.then(|| force(&grid));
         let truth = Truth {
             system: &system,
-            device,
+            nodal,
             excitation: excitation.as_ref(),
             initial,
         };
@@ -96,7 +96,7 @@ fn problem(nodes: usize, device: &NodalCoefficients, records: Records) -> Proble
     Problem::new(system, functions, records).unwrap()
 }
 
-/// Light smoothness: the truth pays `weight` times some 1e-3 for its curvature, beside readings whose
+/// Light smoothness: the truth pays `weight` times some 1e-3 for its curvature, beside samples whose
 /// misfit is counted in thousandths of a metre.
 const SMOOTHNESS: f64 = 1e-2;
 
@@ -128,15 +128,15 @@ fn largest(a: &[f64], b: &[f64]) -> f64 {
 
 /// Largest errors of k/m and c/m.
 fn ratio_errors(found: &Fit, truth: &NodalCoefficients) -> [f64; 2] {
-    let (found, exact) = (Ratios::of(&found.best.evaluation.device), Ratios::of(truth));
+    let (found, exact) = (Ratios::of(&found.best.evaluation.nodal), Ratios::of(truth));
     [
         largest(&found.k_over_m, &exact.k_over_m),
         largest(&found.c_over_m, &exact.c_over_m),
     ]
 }
 
-/// A fit of one record that explains it, but with another device.
-fn another_device(records: Records, scale_fixed: bool, truth: &NodalCoefficients) -> Fit {
+/// A fit of one record that explains it, but with another system.
+fn another_system(records: Records, scale_fixed: bool, truth: &NodalCoefficients) -> Fit {
     let problem = smooth(problem(NODES, truth, records), scale_fixed);
     let found = fit(&problem, &problem.start(), &settings(), &mut |_| {}).unwrap();
     let misfit = found.best.evaluation.misfit / problem.zero_response_misfit();
@@ -161,27 +161,27 @@ fn two_free_records_determine_the_ratios() {
         found.attempts
     );
     // The functions themselves are not to be seen: their common factor s(t) is the smoothest one.
-    let off = common::errors(&found.best.evaluation.device, &truth);
+    let off = common::errors(&found.best.evaluation.nodal, &truth);
     assert!(off[0] > 0.05, "{off:?}");
-    let one = ratio_errors(&another_device(&two[..1], true, &truth), &truth);
+    let one = ratio_errors(&another_system(&two[..1], true, &truth), &truth);
     println!("one free record: k/m {:.1e}, c/m {:.1e}", one[0], one[1]);
     assert!(one[0] > 0.02 && one[1] > 0.02, "{one:?}");
 }
 
 #[test]
-fn two_free_records_and_a_forced_one_determine_the_device() {
+fn two_free_records_and_a_forced_one_determine_the_system() {
     let truth = truth(&system(NODES).grid);
     let three = [(STATES[0], false), (STATES[1], false), (STATES[2], true)];
     let found = run(&smooth(problem(NODES, &truth, &three), false));
-    let errors = common::errors(&found.best.evaluation.device, &truth);
+    let errors = common::errors(&found.best.evaluation.nodal, &truth);
     println!("two free, one forced: {errors:?}");
     assert!(
         errors.iter().all(|e| *e < 5e-3),
         "{errors:?} {:#?}",
         found.attempts
     );
-    let one = another_device(&three[2..], false, &truth);
-    let off = common::errors(&one.best.evaluation.device, &truth);
+    let one = another_system(&three[2..], false, &truth);
+    let off = common::errors(&one.best.evaluation.nodal, &truth);
     println!("one forced: {off:?}");
     assert!(off[0] > 0.05, "{off:?}");
 }
@@ -198,7 +198,7 @@ fn rank(jacobian: DMatrix<f64>) -> usize {
 #[test]
 fn the_rank_of_the_records_is_that_of_the_table() {
     let nodes = 200;
-    let device = common::paper_device(nodes);
+    let nodal = common::paper_system(nodes);
     let [a, b, c] = STATES;
     let (free, forced) = (false, true);
     let table: [(&str, Records, usize); 6] = [
@@ -217,10 +217,10 @@ fn the_rank_of_the_records_is_that_of_the_table() {
             597,
         ),
     ];
-    let mut theta = device.mass.clone();
-    theta.extend(device.coefficients.iter().flatten());
+    let mut theta = nodal.mass.clone();
+    theta.extend(nodal.coefficients.iter().flatten());
     let sensitivity = |records: Records, silent: usize| {
-        let mut problem = problem(nodes, &device, records);
+        let mut problem = problem(nodes, &nodal, records);
         problem = problem
             .with(|parts| {
                 parts.system.method = Method::Midpoint;

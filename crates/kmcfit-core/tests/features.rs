@@ -1,4 +1,4 @@
-//! What records, sensors, devices and terms can be, each alone and all together: noise-free records
+//! What records, sensors, systems and terms can be, each alone and all together: noise-free records
 //! by an independent evaluation, from which the truth is found again to 1e-8.
 
 mod common;
@@ -7,7 +7,7 @@ use common::synthetic::{Truth, rms, run, settings};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty, Prior, ScalarParameter,
-    Value,
+    ScalarValue,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Loss, Sensor, Weighting};
@@ -19,10 +19,10 @@ use kmcfit_core::internals::system::{
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// 63 steps in a period of the device.
+/// 63 steps in a period of the system.
 const NODES: usize = 301;
 const DURATION: f64 = 15.0;
-/// Rounding of some hundred steps is 1e-14, and parameters that are well determined move the motion by
+/// Rounding of some hundred steps is 1e-14, and parameters that are well determined move the response by
 /// about as much as they move themselves: 1e-8 leaves room for those that are not.
 const EXACT: f64 = 1e-8;
 const WIDTH: f64 = 0.3;
@@ -51,15 +51,15 @@ fn line() -> Basis {
 
 /// A function to be found: its basis, the true parameters, and the start.
 #[derive(Clone)]
-struct Sought {
+struct EstimatedFunction {
     quantity: CoefficientKind,
     basis: Basis,
     truth: Vec<f64>,
     start: Vec<f64>,
 }
 
-fn constant(quantity: CoefficientKind, truth: f64, start: f64) -> Sought {
-    Sought {
+fn constant(quantity: CoefficientKind, truth: f64, start: f64) -> EstimatedFunction {
+    EstimatedFunction {
         quantity,
         basis: Basis::Constant,
         truth: vec![truth],
@@ -67,8 +67,8 @@ fn constant(quantity: CoefficientKind, truth: f64, start: f64) -> Sought {
     }
 }
 
-fn lines(quantity: CoefficientKind, truth: [f64; 5], start: f64) -> Sought {
-    Sought {
+fn lines(quantity: CoefficientKind, truth: [f64; 5], start: f64) -> EstimatedFunction {
+    EstimatedFunction {
         quantity,
         basis: line(),
         truth: truth.to_vec(),
@@ -76,7 +76,7 @@ fn lines(quantity: CoefficientKind, truth: [f64; 5], start: f64) -> Sought {
     }
 }
 
-impl Sought {
+impl EstimatedFunction {
     fn function(&self) -> CoefficientFunction {
         CoefficientFunction::free(
             self.quantity,
@@ -91,12 +91,12 @@ impl Sought {
     }
 }
 
-/// Damping and stiffness of the linear device, which most tests look for; the mass is known.
-fn damping() -> Sought {
+/// Damping and stiffness of the linear system, which most tests look for; the mass is known.
+fn damping() -> EstimatedFunction {
     constant(CoefficientKind::Damping, 0.25, 0.4)
 }
 
-fn stiffness() -> Sought {
+fn stiffness() -> EstimatedFunction {
     lines(CoefficientKind::Stiffness, [4.0, 4.6, 4.3, 3.7, 4.1], 3.6)
 }
 
@@ -107,7 +107,7 @@ fn known_mass() -> Vec<f64> {
     times.iter().map(|t| 1.1 - 0.01 * t).collect()
 }
 
-/// The times of a record: irregular, off the nodes, with missing readings and a gap.
+/// The times of a record: irregular, off the nodes, with missing samples and a gap.
 fn scattered(count: usize, seed: u64) -> Vec<f64> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut times: Vec<f64> = (0..count)
@@ -124,9 +124,9 @@ struct Reading {
     kind: ChannelKind,
     times: Vec<f64>,
     sigma: Weighting,
-    /// True gain, offset and drift, and which scalars they are where they are sought.
+    /// True gain, offset and drift, and which scalars they are where they are estimated.
     sensor: [f64; 3],
-    sought: [Option<usize>; 3],
+    initial_parameters: [Option<usize>; 3],
     around: Vec<InputSample>,
     base: Vec<f64>,
     filter: Vec<SecondOrder>,
@@ -140,7 +140,7 @@ impl Reading {
             times,
             sigma: Weighting::Sigma(1e-3),
             sensor: [1.0, 0.0, 0.0],
-            sought: [None; 3],
+            initial_parameters: [None; 3],
             around: Vec::new(),
             base: Vec::new(),
             filter: Vec::new(),
@@ -152,10 +152,10 @@ impl Reading {
         Self::of(kind, grid().times())
     }
 
-    /// Gain, offset and drift, which are sought as the scalars from `first` on.
+    /// Gain, offset and drift, which are estimated as the scalars from `first` on.
     fn unknown_sensor(mut self, sensor: [f64; 3], first: usize) -> Self {
         self.sensor = sensor;
-        self.sought = [first, first + 1, first + 2].map(Some);
+        self.initial_parameters = [first, first + 1, first + 2].map(Some);
         self
     }
 
@@ -164,14 +164,17 @@ impl Reading {
         let [gain, offset, drift] = self.sensor;
         let base = |i: usize| self.base.get(i).copied().unwrap_or(0.0);
         let age = |i: usize| self.times[i] - self.times[0];
-        let readings = seen.iter().enumerate();
-        let values = readings
+        let samples = seen.iter().enumerate();
+        let values = samples
             .map(|(i, x)| gain * (x + base(i)) + offset + drift * age(i))
             .collect();
         let sigma = self.sigma.clone();
         let mut channel =
             Channel::new(self.kind, self.times.clone(), values, sigma, &grid(), nodes).unwrap();
-        let value = |i: usize| self.sought[i].map_or(Value::Known(self.sensor[i]), Value::Sought);
+        let value = |i: usize| {
+            self.initial_parameters[i]
+                .map_or(ScalarValue::Known(self.sensor[i]), ScalarValue::Estimated)
+        };
         channel = channel.with_loss(self.loss).with_sensor(Sensor {
             gain: value(0),
             offset: value(1),
@@ -194,29 +197,29 @@ impl Reading {
 #[derive(Clone)]
 struct Record {
     initial: State,
-    /// The scalars that the initial state is, where it is sought.
-    sought: [Option<usize>; 2],
+    /// The scalars that the initial state is, where it is estimated.
+    initial_parameters: [Option<usize>; 2],
     excitation: Option<Excitation>,
-    readings: Vec<Reading>,
-    /// Which device of the case.
-    device: usize,
+    samples: Vec<Reading>,
+    /// Which system of the case.
+    coefficient_set: usize,
 }
 
 impl Record {
-    fn free(readings: Vec<Reading>) -> Self {
+    fn free(samples: Vec<Reading>) -> Self {
         Self {
             initial: INITIAL,
-            sought: [None; 2],
+            initial_parameters: [None; 2],
             excitation: None,
-            readings,
-            device: 0,
+            samples,
+            coefficient_set: 0,
         }
     }
 
-    fn driven(excitation: Excitation, readings: Vec<Reading>) -> Self {
+    fn driven(excitation: Excitation, samples: Vec<Reading>) -> Self {
         Self {
             excitation: Some(excitation),
-            ..Self::free(readings)
+            ..Self::free(samples)
         }
     }
 }
@@ -234,14 +237,14 @@ fn scalar(truth: f64, start: f64, prior: Option<f64>) -> (f64, ScalarParameter) 
     (truth, scalar)
 }
 
-/// A device, its records, and what is to be found.
+/// A system, its records, and what is to be found.
 struct Case {
     terms: Vec<Term>,
     /// `None` where the mass is known.
-    mass: Option<Sought>,
-    functions: Vec<Sought>,
-    /// Functions that replace one of the main device in the other devices: which one of its list.
-    own: Vec<(usize, Sought)>,
+    mass: Option<EstimatedFunction>,
+    functions: Vec<EstimatedFunction>,
+    /// Functions that replace one of the shared coefficient set in the other systems: which one of its list.
+    own: Vec<(usize, EstimatedFunction)>,
     scalars: Vec<(f64, ScalarParameter)>,
     records: Vec<Record>,
 }
@@ -264,7 +267,7 @@ impl Case {
     }
 
     fn truth(&self) -> Vec<f64> {
-        let own = self.own.iter().map(|(_, sought)| sought);
+        let own = self.own.iter().map(|(_, estimated)| estimated);
         let functions = self.mass.iter().chain(&self.functions).chain(own);
         functions
             .flat_map(|f| f.truth.clone())
@@ -272,52 +275,60 @@ impl Case {
             .collect()
     }
 
-    fn device(&self, which: usize) -> NodalCoefficients {
-        let mass = self.mass.as_ref().map_or_else(known_mass, Sought::values);
-        let mut coefficients: Vec<Vec<f64>> = self.functions.iter().map(Sought::values).collect();
-        let mut device = NodalCoefficients {
+    fn nodal(&self, which: usize) -> NodalCoefficients {
+        let mass = self
+            .mass
+            .as_ref()
+            .map_or_else(known_mass, EstimatedFunction::values);
+        let mut coefficients: Vec<Vec<f64>> = self
+            .functions
+            .iter()
+            .map(EstimatedFunction::values)
+            .collect();
+        let mut nodal = NodalCoefficients {
             mass,
             coefficients: std::mem::take(&mut coefficients),
         };
         if which > 0 {
-            let (replaced, sought) = &self.own[which - 1];
-            device.coefficients[replaced - 1] = sought.values();
+            let (replaced, estimated) = &self.own[which - 1];
+            nodal.coefficients[replaced - 1] = estimated.values();
         }
-        device
+        nodal
     }
 
     fn problem(&self) -> Problem {
         let system = system(&self.terms);
         let mass = match &self.mass {
-            Some(sought) => sought.function(),
+            Some(estimated) => estimated.function(),
             None => CoefficientFunction::fixed(CoefficientKind::Mass, known_mass()),
         };
         let mut list = vec![mass];
-        list.extend(self.functions.iter().map(Sought::function));
+        list.extend(self.functions.iter().map(EstimatedFunction::function));
         let main: Vec<usize> = (0..list.len()).collect();
-        let mut devices = vec![main.clone()];
-        for (replaced, sought) in &self.own {
-            let mut device = main.clone();
-            device[*replaced] = list.len();
-            devices.push(device);
-            list.push(sought.function());
+        let mut nodal_sets = vec![main.clone()];
+        for (replaced, estimated) in &self.own {
+            let mut nodal = main.clone();
+            nodal[*replaced] = list.len();
+            nodal_sets.push(nodal);
+            list.push(estimated.function());
         }
-        let functions = Parameterization::with_devices(list, devices, NODES, system.grid.step())
-            .unwrap()
-            .with_scalars(self.scalars.iter().map(|s| s.1.clone()).collect());
+        let functions =
+            Parameterization::with_coefficient_sets(list, nodal_sets, NODES, system.grid.step())
+                .unwrap()
+                .with_scalars(self.scalars.iter().map(|s| s.1.clone()).collect());
         let records = self.records.iter().map(|record| {
-            // A record ends with its last reading, at the next node.
-            let ends = record.readings.iter().map(|r| r.times[r.times.len() - 1]);
+            // A record ends with its last sample, at the next node.
+            let ends = record.samples.iter().map(|r| r.times[r.times.len() - 1]);
             let end = ends.fold(0.0, f64::max);
             let nodes = ((end / system.grid.step() - 1e-9).ceil() as usize + 1).min(NODES);
-            let device = self.device(record.device);
+            let nodal = self.nodal(record.coefficient_set);
             let truth = Truth {
                 system: &system,
-                device: &device,
+                nodal: &nodal,
                 excitation: record.excitation.as_ref(),
                 initial: record.initial,
             };
-            let start = |q: usize, known: f64| match record.sought[q] {
+            let start = |q: usize, known: f64| match record.initial_parameters[q] {
                 Some(index) => self.scalars[index].1.start,
                 None => known,
             };
@@ -326,11 +337,11 @@ impl Case {
                 velocity: start(1, record.initial.velocity),
             };
             let mut experiment = Experiment::free("record", initial, nodes);
-            experiment.sought = record.sought;
-            experiment.device = record.device;
+            experiment.initial_parameters = record.initial_parameters;
+            experiment.coefficient_set = record.coefficient_set;
             experiment.excitation = record.excitation.clone();
-            for reading in &record.readings {
-                experiment = experiment.with_channel(reading.channel(&truth, nodes));
+            for sample in &record.samples {
+                experiment = experiment.with_channel(sample.channel(&truth, nodes));
             }
             experiment
         });
@@ -343,7 +354,7 @@ impl Case {
     fn check(&self, words: &str) {
         let problem = self.problem();
         let truth = self.truth();
-        // The data are in the model class: to rounding, nothing is left at the truth.
+        // The data are in the model class: the residuals at the truth are rounding errors.
         let misfit = problem.evaluate(&truth).unwrap().misfit;
         assert!(
             misfit <= 1e-18 * problem.zero_response_misfit(),
@@ -405,41 +416,41 @@ fn each_kind_of_channel() {
 
 #[test]
 fn channels_at_times_of_their_own() {
-    let readings = ChannelKind::ALL.iter().zip(1..);
-    let readings = readings.map(|(kind, seed)| Reading::of(*kind, scattered(70, seed)));
-    Case::linear(vec![Record::free(readings.collect())]).check("mixed");
+    let samples = ChannelKind::ALL.iter().zip(1..);
+    let samples = samples.map(|(kind, seed)| Reading::of(*kind, scattered(70, seed)));
+    Case::linear(vec![Record::free(samples.collect())]).check("mixed");
 }
 
 #[test]
-fn readings_with_a_sigma_each_and_robust_losses() {
+fn samples_with_individual_sigmas_and_robust_losses() {
     let times = scattered(150, 8);
     let sigmas = (0..times.len()).map(|i| 1e-3 * (1.0 + (i % 7) as f64));
-    let mut reading = Reading::of(ChannelKind::Displacement, times.clone());
-    reading.sigma = Weighting::Sigmas(sigmas.collect());
+    let mut sample = Reading::of(ChannelKind::Displacement, times.clone());
+    sample.sigma = Weighting::Sigmas(sigmas.collect());
     for loss in [
         Loss::Squares,
         Loss::Huber { threshold: 1.345 },
         Loss::StudentT { degrees: 4.0 },
     ] {
-        reading.loss = loss;
-        Case::linear(vec![Record::free(vec![reading.clone()])]).check(&format!("{loss:?}"));
+        sample.loss = loss;
+        Case::linear(vec![Record::free(vec![sample.clone()])]).check(&format!("{loss:?}"));
     }
-    reading.loss = Loss::Squares;
-    reading.sigma = kmcfit_core::internals::record::integral_over(&times);
-    Case::linear(vec![Record::free(vec![reading])]).check("integral over irregular times");
+    sample.loss = Loss::Squares;
+    sample.sigma = kmcfit_core::internals::record::integral_over(&times);
+    Case::linear(vec![Record::free(vec![sample])]).check("integral over irregular times");
 }
 
 #[test]
 fn gain_offset_and_drift() {
     for kind in ChannelKind::ALL {
         // The mass is known, so that a force tells what the gain is; a free record could not.
-        let reading = Reading::of(kind, scattered(150, 4)).unknown_sensor([1.3, 0.4, -0.05], 0);
+        let sample = Reading::of(kind, scattered(150, 4)).unknown_sensor([1.3, 0.4, -0.05], 0);
         let scalars = vec![
             scalar(1.3, 1.0, None),
             scalar(0.4, 0.0, None),
             scalar(-0.05, 0.0, None),
         ];
-        Case::linear(vec![Record::driven(forced(), vec![reading])])
+        Case::linear(vec![Record::driven(forced(), vec![sample])])
             .with_scalars(scalars)
             .check(&format!("sensor of {}", kind.name()));
     }
@@ -450,7 +461,7 @@ fn initial_states_with_and_without_a_prior() {
     for kind in ChannelKind::ALL {
         for prior in [None, Some(0.02)] {
             let mut record = Record::free(vec![Reading::of(kind, scattered(150, 5))]);
-            record.sought = [Some(0), Some(1)];
+            record.initial_parameters = [Some(0), Some(1)];
             let scalars = vec![
                 scalar(INITIAL.displacement, 0.8, prior),
                 scalar(INITIAL.velocity, 0.1, prior),
@@ -478,7 +489,7 @@ fn a_measured_force_gives_the_mass_too() {
 fn base_excitation_with_sensors_on_the_base_and_in_space() {
     let times = scattered(200, 7);
     let (h, steps) = (grid().step(), base());
-    // Force and base at the readings: linear over each step, as the stepper's own.
+    // Force and base at the samples: linear over each step, as the stepper's own.
     let base_at = |t: &f64| {
         let i = ((t / h).floor() as usize).min(NODES - 2);
         let x = t / h - i as f64;
@@ -487,21 +498,21 @@ fn base_excitation_with_sensors_on_the_base_and_in_space() {
     };
     for fixed_in_space in [false, true] {
         for kind in [ChannelKind::Displacement, ChannelKind::Acceleration] {
-            let mut reading = Reading::of(kind, times.clone());
-            reading.around = (times.iter())
+            let mut sample = Reading::of(kind, times.clone());
+            sample.around = (times.iter())
                 .map(|t| InputSample {
                     force: 0.0,
                     base: base_at(t),
                 })
                 .collect();
             if fixed_in_space {
-                reading.base = times.iter().map(|t| (0.4 * t).sin() + base_at(t)).collect();
+                sample.base = times.iter().map(|t| (0.4 * t).sin() + base_at(t)).collect();
             }
             let excitation = Excitation {
                 force: None,
                 base: Some(base()),
             };
-            let record = Record::driven(excitation, vec![reading]);
+            let record = Record::driven(excitation, vec![sample]);
             let words = format!("base, {} in space {fixed_in_space}", kind.name());
             Case::linear(vec![record]).check(&words);
         }
@@ -516,7 +527,7 @@ fn several_experiments_share_functions_and_have_some_of_their_own() {
         displacement: -0.4,
         velocity: 2.0,
     };
-    second.sought = [Some(0), Some(1)];
+    second.initial_parameters = [Some(0), Some(1)];
     // It ends long before the grid does.
     let short = times(13).into_iter().filter(|t| *t < 9.0).collect();
     let third = Record::driven(
@@ -532,7 +543,7 @@ fn several_experiments_share_functions_and_have_some_of_their_own() {
     case.mass = Some(constant(CoefficientKind::Mass, 1.2, 1.6));
     case.check("three experiments");
     case.own = vec![(2, constant(CoefficientKind::Stiffness, 5.2, 4.0))];
-    case.records[0].device = 1;
+    case.records[0].coefficient_set = 1;
     case.check("a stiffness of its own");
 }
 
@@ -561,12 +572,12 @@ fn each_nonlinear_term() {
             ),
         ),
     ];
-    for (term, sought) in others {
-        let readings = vec![Reading::of(ChannelKind::Displacement, scattered(250, 9))];
-        let mut case = Case::linear(vec![Record::driven(forced(), readings)]);
+    for (term, estimated) in others {
+        let samples = vec![Reading::of(ChannelKind::Displacement, scattered(250, 9))];
+        let mut case = Case::linear(vec![Record::driven(forced(), samples)]);
         case.terms.push(term);
         case.functions[1] = constant(CoefficientKind::Stiffness, 4.0, 3.6);
-        case.functions.push(sought);
+        case.functions.push(estimated);
         case.check(&format!("{term:?}"));
     }
 }
@@ -575,10 +586,10 @@ fn each_nonlinear_term() {
 fn a_band_pass_filter() {
     let rate = 1.0 / grid().step();
     for kind in ChannelKind::ALL {
-        let mut reading = Reading::at_nodes(kind);
-        reading.filter = band_pass(2, 0.1, 2.0, rate).unwrap();
-        reading.sensor = [1.0, 0.7, 0.02];
-        Case::linear(vec![Record::free(vec![reading])]).check(&format!("band of {}", kind.name()));
+        let mut sample = Reading::at_nodes(kind);
+        sample.filter = band_pass(2, 0.1, 2.0, rate).unwrap();
+        sample.sensor = [1.0, 0.7, 0.02];
+        Case::linear(vec![Record::free(vec![sample])]).check(&format!("band of {}", kind.name()));
     }
 }
 
@@ -601,9 +612,9 @@ fn all_together() {
     let mut acceleration = Reading::at_nodes(ChannelKind::Acceleration);
     acceleration.filter = band_pass(2, 0.1, 2.5, 1.0 / grid().step()).unwrap();
     let mut first = Record::driven(both, vec![displacement, velocity.clone()]);
-    first.sought = [Some(0), Some(1)];
+    first.initial_parameters = [Some(0), Some(1)];
     let mut second = Record::free(vec![acceleration, velocity]);
-    second.device = 1;
+    second.coefficient_set = 1;
     second.initial = State {
         displacement: -1.5,
         velocity: 1.0,
@@ -649,10 +660,10 @@ fn all_together() {
 }
 
 /// One value per node: the states are unknowns of the subproblem. The truth is linear in time, so
-/// that light smoothness charges nothing for it and decides what the readings leave open.
+/// that light smoothness charges nothing for it and decides what the samples leave open.
 #[test]
 fn one_value_per_node_with_sensors_states_and_a_filter() {
-    let nodal = |quantity, from: f64, slope: f64, start: f64| Sought {
+    let nodal = |quantity, from: f64, slope: f64, start: f64| EstimatedFunction {
         quantity,
         basis: Basis::Nodal,
         truth: grid().times().iter().map(|t| from + slope * t).collect(),
@@ -664,9 +675,9 @@ fn one_value_per_node_with_sensors_states_and_a_filter() {
         .unknown_sensor([1.2, 0.3, 0.01], 2);
     let acceleration = Reading::of(ChannelKind::Acceleration, scattered(200, 32));
     let mut first = Record::driven(forced(), vec![displacement, acceleration]);
-    first.sought = [Some(0), Some(1)];
+    first.initial_parameters = [Some(0), Some(1)];
     let mut second = Record::free(vec![filtered]);
-    second.device = 1;
+    second.coefficient_set = 1;
     let case = Case {
         terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
         mass: None,
@@ -700,26 +711,26 @@ fn one_value_per_node_with_sensors_states_and_a_filter() {
     assert!(error < EXACT, "{error:e} {:#?}", found.attempts);
 }
 
-/// Fifty periods, with six nodes in each, of a device that is three times as stiff as the start says:
+/// Fifty periods, with six nodes in each, of a system that is three times as stiff as the start says:
 /// differences are too coarse for an equation error. States and functions are corrected at once for
-/// several devices, sensors, unknown states and a filter together.
+/// several systems, sensors, unknown states and a filter together.
 #[test]
 fn all_of_it_from_far_away_on_a_coarse_grid() {
     let rate = 1.0 / grid().step();
-    // Some six irregular readings in a period, every tenth of them missing.
+    // Some six irregular samples in a period, every tenth of them missing.
     let late = |i: usize| 0.2 * (1.0 + (1.7 * i as f64).sin());
     let times = (0..NODES - 1).filter(|i| i % 10 != 7);
     let times = times.map(|i| (i as f64 + late(i)) * grid().step());
     let mut displacement = Reading::of(ChannelKind::Displacement, times.collect())
         .unknown_sensor([1.0, 0.05, 0.002], 2);
     // A free record could not tell the gain from the initial state.
-    displacement.sought = [None, Some(2), Some(3)];
+    displacement.initial_parameters = [None, Some(2), Some(3)];
     let mut filtered = Reading::at_nodes(ChannelKind::Velocity);
     filtered.filter = band_pass(2, 1.0, 8.0, rate).unwrap();
     let mut first = Record::free(vec![displacement]);
-    first.sought = [Some(0), Some(1)];
+    first.initial_parameters = [Some(0), Some(1)];
     let mut second = Record::driven(forced(), vec![filtered]);
-    second.device = 1;
+    second.coefficient_set = 1;
     let case = Case {
         functions: vec![
             damping(),
@@ -748,14 +759,14 @@ fn all_of_it_from_far_away_on_a_coarse_grid() {
     case.check("far away");
 }
 
-/// A prior with another mean pulls, by as much as its weight beside that of the readings says.
+/// A prior with another mean pulls, by as much as its weight beside that of the samples says.
 #[test]
 fn a_prior_pulls_towards_its_mean() {
     let mut record = Record::free(vec![Reading::of(
         ChannelKind::Displacement,
         scattered(150, 5),
     )]);
-    record.sought = [Some(0), None];
+    record.initial_parameters = [Some(0), None];
     let case = Case::linear(vec![record]).with_scalars(vec![scalar(
         INITIAL.displacement,
         0.8,
@@ -789,9 +800,9 @@ fn a_prior_pulls_towards_its_mean() {
 /// nothing is left of it.
 #[test]
 fn a_part_of_a_filtered_record_is_a_record() {
-    let mut reading = Reading::at_nodes(ChannelKind::Displacement);
-    reading.filter = band_pass(2, 0.1, 2.0, 1.0 / grid().step()).unwrap();
-    let case = Case::linear(vec![Record::free(vec![reading])]);
+    let mut sample = Reading::at_nodes(ChannelKind::Displacement);
+    sample.filter = band_pass(2, 0.1, 2.0, 1.0 / grid().step()).unwrap();
+    let case = Case::linear(vec![Record::free(vec![sample])]);
     let part = case.problem().truncated(0.3);
     let misfit = part.evaluate(&case.truth()).unwrap().misfit;
     assert!(misfit < 1e-18 * part.zero_response_misfit(), "{misfit:e}");

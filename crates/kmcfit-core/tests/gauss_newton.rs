@@ -5,7 +5,7 @@ mod common;
 use common::synthetic::{settings, with_noise};
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{
-    CoefficientFunction, CoefficientKind, Prior, ScalarParameter, Value,
+    CoefficientFunction, CoefficientKind, Prior, ScalarParameter, ScalarValue,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Sensor, Weighting};
@@ -20,12 +20,12 @@ const PRIOR: Prior = Prior {
     sigma: 0.5,
 };
 
-/// In what a problem is told.
+/// Units of a problem.
 #[derive(Debug, Clone, Copy)]
 struct Units {
     /// One metre.
     length: f64,
-    /// What the sigmas of readings and priors are multiplied with: J is divided by its square.
+    /// What the sigmas of samples and priors are multiplied with: J is divided by its square.
     sigma: f64,
 }
 
@@ -34,26 +34,26 @@ const PLAIN: Units = Units {
     sigma: 1.0,
 };
 
-/// A known motion, read with an offset (m) and a drift (m/s) that are sought: the readings are linear in
+/// A known response, read with an offset (m) and a drift (m/s) that are estimated: the samples are linear in
 /// both. The noise is as large, so that a step leaves half of the cost.
 fn problem(units: Units) -> Problem {
     let system = common::system(NODES, Method::Rk4);
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: vec![1.0; NODES],
         coefficients: vec![vec![0.1; NODES], vec![1.0; NODES]],
     };
-    let motion = system.forward(&device, common::INITIAL, None).unwrap();
+    let response = system.forward(&nodal, common::INITIAL, None).unwrap();
     let times = system.grid.times();
-    let drifted = motion.displacement.iter().zip(&times);
+    let drifted = response.displacement.iter().zip(&times);
     let drifted: Vec<f64> = drifted.map(|(y, t)| y + 1.0 + 0.05 * t).collect();
     let observed = with_noise(&drifted, 1.0, 7)
         .iter()
         .map(|y| units.length * y)
         .collect();
     let list = vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, device.mass.clone()),
-        CoefficientFunction::fixed(CoefficientKind::Damping, device.coefficients[0].clone()),
-        CoefficientFunction::fixed(CoefficientKind::Stiffness, device.coefficients[1].clone()),
+        CoefficientFunction::fixed(CoefficientKind::Mass, nodal.mass.clone()),
+        CoefficientFunction::fixed(CoefficientKind::Damping, nodal.coefficients[0].clone()),
+        CoefficientFunction::fixed(CoefficientKind::Stiffness, nodal.coefficients[1].clone()),
     ];
     let sigma = units.length * units.sigma;
     let mut problem = common::problem_of(system, list, observed, Some(sigma));
@@ -78,9 +78,9 @@ fn problem(units: Units) -> Problem {
     let channel = problem.experiments[0].channels[0].clone();
     assert_eq!(*channel.weighting(), Weighting::Sigma(sigma));
     let sensor = Sensor {
-        gain: Value::Known(units.length),
-        offset: Value::Sought(0),
-        drift: Value::Sought(1),
+        gain: ScalarValue::Known(units.length),
+        offset: ScalarValue::Estimated(0),
+        drift: ScalarValue::Estimated(1),
     };
     let channel = channel.with_sensor(sensor);
     problem = problem
@@ -91,7 +91,7 @@ fn problem(units: Units) -> Problem {
     problem
 }
 
-/// `J = |A theta - b|^2` with the rows `(1, t)` of A and the readings less the motion in b, and the priors.
+/// `J = |A theta - b|^2` with the rows `(1, t)` of A and the samples less the response in b, and the priors.
 struct Squares {
     matrix: Matrix2<f64>,
     right: Vector2<f64>,
@@ -164,7 +164,7 @@ fn after(problem: &Problem, iterations: u64) -> Fit {
 }
 
 /// Three steps of the free problem with the offset held below a bound: clipping it costs `share` of the
-/// decrease of the first plain step. The model of linear readings comes true, so the damping falls to a
+/// decrease of the first plain step. The model of linear samples comes true, so the damping falls to a
 /// tenth with every step.
 fn check(units: Units, share: f64, is_clipped: bool, programs: u64) {
     let mut bounded = problem(units);
@@ -212,7 +212,7 @@ fn a_step_beyond_a_bound_is_clipped_or_is_the_best_in_it() {
 /// With a length in kilometres a step far beyond a bound is a small number; with large sigmas the whole
 /// cost is.
 #[test]
-fn a_step_beyond_a_bound_knows_no_unit() {
+fn a_step_beyond_a_bound_does_not_depend_on_units() {
     let kilometres = Units {
         length: 1e-3,
         ..PLAIN

@@ -10,8 +10,9 @@ use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty,
 };
 use kmcfit_core::internals::identifiability::{
-    Band, BandSettings, Bands, Candidate, CandidateChannel, Gauge, Sensitivity, Side, Spectrum,
-    Symmetry, Verdict, count, rank_experiments, verdicts,
+    Band, BandSettings, Bands, CandidateChannel, CandidateExperiment, Classification,
+    ScalingAmbiguity, Sensitivity, Side, SingularSpectrum, Symmetry, classify_functions,
+    rank_experiments, structural_rank,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
@@ -50,11 +51,11 @@ fn forced(i: usize, grid: &Grid, silent: usize) -> Record {
     (STATES[i], Some(force))
 }
 
-/// Displacement of `device` at all nodes, for each record; sigma 1e-3.
+/// Displacement of `system` at all nodes, for each record; sigma 1e-3.
 fn with_records(
     system: &System,
     list: Vec<CoefficientFunction>,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     records: &[Record],
 ) -> Problem {
     let grid = system.grid;
@@ -62,11 +63,11 @@ fn with_records(
     let functions = Parameterization::new(list, nodes, grid.step()).unwrap();
     let records = records.iter().map(|(initial, force)| {
         let excitation = force.as_ref().map(|f| Excitation::force_at_nodes(f));
-        let motion = system
-            .forward(device, *initial, excitation.as_ref())
+        let response = system
+            .forward(nodal, *initial, excitation.as_ref())
             .unwrap();
         let weighting = Weighting::Sigma(1e-3);
-        let channel = Channel::displacement_at_nodes(motion.displacement, 1, weighting, &grid);
+        let channel = Channel::displacement_at_nodes(response.displacement, 1, weighting, &grid);
         let mut record = Experiment::free("record", *initial, nodes).with_channel(channel);
         record.excitation = excitation;
         record
@@ -74,14 +75,14 @@ fn with_records(
     Problem::new(system.clone(), functions, records.collect()).unwrap()
 }
 
-/// One value per node for each function, starting at the device itself.
-fn nodal(system: &System, device: &NodalCoefficients, records: &[Record]) -> Problem {
-    let list = QUANTITIES.into_iter().zip(device.functions());
+/// One value per node for each function, starting at the system itself.
+fn nodal_problem(system: &System, nodal: &NodalCoefficients, records: &[Record]) -> Problem {
+    let list = QUANTITIES.into_iter().zip(nodal.functions());
     let list = list.map(|(q, p)| CoefficientFunction::nodal(q, p.to_vec()));
-    with_records(system, list.collect(), device, records)
+    with_records(system, list.collect(), nodal, records)
 }
 
-fn spectrum(problem: &Problem) -> Spectrum {
+fn spectrum(problem: &Problem) -> SingularSpectrum {
     let here = problem.evaluate(&problem.start()).unwrap();
     Sensitivity::of(problem, &here).spectrum()
 }
@@ -92,7 +93,7 @@ fn linear_mass(system: &System, record: Record) -> Problem {
     let nodes = grid.nodes();
     let mass: Vec<f64> = grid.times().iter().map(|t| 1.0 - 0.02 * t).collect();
     let degree_1 = Basis::Polynomial { degree: 1 };
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
         mass: mass.clone(),
     };
@@ -102,14 +103,14 @@ fn linear_mass(system: &System, record: Record) -> Problem {
         CoefficientFunction::constant(CoefficientKind::Damping, 0.05, nodes),
         CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, nodes),
     ];
-    with_records(system, list, &device, &[record])
+    with_records(system, list, &nodal, &[record])
 }
 
 #[test]
-fn the_count_and_the_rank_are_those_of_the_table() {
+fn structural_and_numerical_rank_are_those_of_the_table() {
     let nodes = 200;
     let system = common::system(nodes, Method::Midpoint);
-    let device = common::paper_device(nodes);
+    let nodal = common::paper_system(nodes);
     let grid = system.grid;
     let drive = |i, silent| forced(i, &grid, silent);
     let table: [(&str, Vec<Record>, usize, Symmetry); 8] = [
@@ -148,8 +149,8 @@ fn the_count_and_the_rank_are_those_of_the_table() {
         ),
     ];
     for (words, records, expected, symmetry) in table {
-        let problem = nodal(&system, &device, &records);
-        let counted = count(&problem);
+        let problem = nodal_problem(&system, &nodal, &records);
+        let counted = structural_rank(&problem);
         let seen = spectrum(&problem);
         println!(
             "{words}: {} of {}; {}",
@@ -159,7 +160,7 @@ fn the_count_and_the_rank_are_those_of_the_table() {
         );
         assert_eq!((seen.rank(), seen.of()), (expected, 600), "{words}");
         assert_eq!(
-            (counted.seen_at_most, counted.of),
+            (counted.rank_bound, counted.parameters),
             (expected, 600),
             "{words}"
         );
@@ -171,13 +172,13 @@ fn the_count_and_the_rank_are_those_of_the_table() {
 fn a_force_that_pauses_sees_less_while_it_does() {
     let nodes = 80;
     let system = common::system(nodes, Method::Midpoint);
-    let device = common::paper_device(nodes);
+    let nodal = common::paper_system(nodes);
     let (state, force) = forced(2, &system.grid, 0);
     let mut force = force.unwrap();
     force[30..50].fill(0.0);
-    let problem = nodal(&system, &device, &[free(0), free(1), (state, Some(force))]);
+    let problem = nodal_problem(&system, &nodal, &[free(0), free(1), (state, Some(force))]);
     // Nodes 31 to 49 have no force around them: two equations each instead of three.
-    assert_eq!(count(&problem).seen_at_most, 3 * 79 - 19);
+    assert_eq!(structural_rank(&problem).rank_bound, 3 * 79 - 19);
     assert_eq!(spectrum(&problem).rank(), 3 * 79 - 19);
 }
 
@@ -190,9 +191,9 @@ fn a_linear_mass_lacks_one_direction_until_a_force_acts() {
         (force, 4, Symmetry::None),
     ] {
         let problem = linear_mass(&system, record);
-        let counted = count(&problem);
+        let counted = structural_rank(&problem);
         println!("{}", counted.sentences().join("; "));
-        assert_eq!((counted.seen_at_most, counted.of), (expected, 4));
+        assert_eq!((counted.rank_bound, counted.parameters), (expected, 4));
         assert_eq!(spectrum(&problem).rank(), expected);
         assert_eq!(counted.symmetry, symmetry);
     }
@@ -201,10 +202,10 @@ fn a_linear_mass_lacks_one_direction_until_a_force_acts() {
 proptest! {
     #![proptest_config(properties(12, 1))]
 
-    /// Devices that vary, by each stepper, under up to four records: the rank never exceeds the count,
+    /// Systems that vary, by each stepper, under up to four records: the rank never exceeds the count,
     /// and by the midpoint rule it is the count.
     #[test]
-    fn the_count_bounds_the_rank_of_random_devices(
+    fn the_structural_rank_bounds_the_rank_of_random_systems(
         shape in prop::array::uniform3((0.5f64..1.5, -0.3f64..0.3, 0.5f64..2.0)),
         states in prop::collection::vec((-3.0f64..3.0, -3.0f64..3.0, any::<bool>()), 1..=4),
         (from, pause) in (0usize..20, 0usize..10),
@@ -221,14 +222,14 @@ proptest! {
             grid.times().iter().map(|t| base + swing * (pace * t).sin()).collect()
         };
         let [mass, damping, stiffness] = shape.map(function);
-        let device = NodalCoefficients { mass, coefficients: vec![damping, stiffness] };
+        let nodal = NodalCoefficients { mass, coefficients: vec![damping, stiffness] };
         let records: Vec<Record> = states.iter().map(|&(y, v, drive)| {
             let mut force = forced(0, &grid, 0).1.unwrap();
             force[from..from + pause].fill(0.0);
             (state(y, v), drive.then_some(force))
         }).collect();
-        let problem = nodal(&system, &device, &records);
-        let (counted, seen) = (count(&problem).seen_at_most, spectrum(&problem).rank());
+        let problem = nodal_problem(&system, &nodal, &records);
+        let (counted, seen) = (structural_rank(&problem).rank_bound, spectrum(&problem).rank());
         prop_assert!(seen <= counted, "{seen} > {counted}");
         if !rk4 {
             prop_assert_eq!(seen, counted);
@@ -237,7 +238,7 @@ proptest! {
 }
 
 #[test]
-fn a_constant_factor_leaves_motion_and_cost_and_is_named() {
+fn a_constant_factor_leaves_response_and_cost_and_is_named() {
     let system = common::system(200, Method::Midpoint);
     let problem = linear_mass(&system, free(0));
     let theta = problem.start();
@@ -254,18 +255,18 @@ fn a_constant_factor_leaves_motion_and_cost_and_is_named() {
     );
     let cost = (a.cost - b.cost).abs() / a.cost;
     println!("motion {off:.1e} m, cost {cost:.1e} of itself");
-    // Relative to a motion of 3.3 m, and to the cost.
+    // Relative to a response of 3.3 m, and to the cost.
     assert!(off < 1e-13 * 3.3, "{off}");
     assert!(cost < 1e-13, "{cost}");
     let seen = Sensitivity::of(&problem, &a).spectrum();
-    let gauge = Gauge::at(&problem, &theta);
-    assert_eq!(gauge.directions.len(), 1);
-    let named = gauge.unseen(&seen);
+    let ambiguity = ScalingAmbiguity::at(&problem, &theta);
+    assert_eq!(ambiguity.directions.len(), 1);
+    let named = ambiguity.undetermined(&seen);
     assert_eq!(named.len(), 1);
     assert_eq!(named[0].name, "scale of (m, c, k)");
     // Rounding of a Jacobian of some hundred steps.
     assert!(named[0].share > 1.0 - 1e-10, "{}", named[0].share);
-    let other = gauge.share(&seen.best(&problem, 1)[0].change, seen.directions());
+    let other = ambiguity.share(&seen.best(&problem, 1)[0].change, seen.directions());
     assert!(other < 1e-10, "{other}");
 }
 
@@ -275,19 +276,22 @@ fn largest(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[test]
-fn a_factor_over_time_leaves_the_motion_to_the_order_of_the_stepper() {
+fn a_factor_over_time_leaves_the_response_to_the_order_of_the_stepper() {
     for (method, order) in [(Method::Midpoint, 2.0), (Method::Rk4, 2.0)] {
         let off = |nodes: usize| {
             let system = common::system(nodes, method);
             let times = system.grid.times();
-            let device = common::paper_device(nodes);
-            let mut scaled = device.clone();
+            let nodal = common::paper_system(nodes);
+            let mut scaled = nodal.clone();
             for values in scaled.functions_mut() {
                 let factors = times.iter().map(|t| 1.0 + 0.4 * (0.5 * t).sin());
                 values.iter_mut().zip(factors).for_each(|(p, s)| *p *= s);
             }
-            let motion = |d: &NodalCoefficients| system.forward(d, STATES[0], None).unwrap();
-            largest(&motion(&device).displacement, &motion(&scaled).displacement)
+            let response = |d: &NodalCoefficients| system.forward(d, STATES[0], None).unwrap();
+            largest(
+                &response(&nodal).displacement,
+                &response(&scaled).displacement,
+            )
         };
         let rate = (off(401) / off(801)).log2();
         println!(
@@ -301,34 +305,34 @@ fn a_factor_over_time_leaves_the_motion_to_the_order_of_the_stepper() {
 }
 
 #[test]
-fn what_holds_the_scale_and_what_only_its_constant_factor() {
+fn constraints_and_penalties_determine_the_scale_or_its_constant_factor() {
     let nodes = 60;
     let system = common::system(nodes, Method::Midpoint);
-    let device = common::paper_device(nodes);
+    let nodal = common::paper_system(nodes);
     let both = [free(0), free(1)];
-    let open = nodal(&system, &device, &both);
-    let gauge = |problem: &Problem| Gauge::at(problem, &problem.start());
-    let found = gauge(&open);
+    let open = nodal_problem(&system, &nodal, &both);
+    let ambiguity = |problem: &Problem| ScalingAmbiguity::at(problem, &problem.start());
+    let found = ambiguity(&open);
     assert_eq!(found.constant().count(), 1);
     assert_eq!(found.over_time().count(), nodes);
-    let named = found.unseen(&spectrum(&open));
+    let named = found.undetermined(&spectrum(&open));
     println!(
         "{} named, least share {:.4}",
         named.len(),
         named.iter().map(|n| n.share).fold(1.0, f64::min)
     );
-    // 62 directions are not seen: the scale at every node, and m, c, k at the last one.
+    // 62 directions are undetermined: the scale at every node, and m, c, k at the last one.
     assert_eq!(named.len(), nodes);
     assert_eq!(named[0].name, "scale of (m, c, k)");
     assert_eq!(named[1].name, "scale over time s(t) of (m, c, k)");
 
     let drive = forced(2, &system.grid, 0);
-    let with_force = nodal(&system, &device, &[free(0), free(1), drive]);
-    assert!(gauge(&with_force).is_empty());
+    let with_force = nodal_problem(&system, &nodal, &[free(0), free(1), drive]);
+    assert!(ambiguity(&with_force).is_empty());
 
     let mut fixed = open.clone();
     let list = vec![
-        CoefficientFunction::nodal(CoefficientKind::Mass, device.mass.clone()),
+        CoefficientFunction::nodal(CoefficientKind::Mass, nodal.mass.clone()),
         CoefficientFunction::nodal(CoefficientKind::Damping, vec![0.0; nodes]),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
@@ -337,8 +341,8 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
             parts.functions = Parameterization::new(list, nodes, system.grid.step()).unwrap();
         })
         .unwrap();
-    assert!(gauge(&fixed).is_empty());
-    assert_eq!(count(&fixed).symmetry, Symmetry::None);
+    assert!(ambiguity(&fixed).is_empty());
+    assert_eq!(structural_rank(&fixed).symmetry, Symmetry::None);
 
     let first = open.functions.ranges()[2].start;
     let mut value = RowGroup::new("k(0) = 1");
@@ -357,10 +361,10 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
                 parts.constraints.groups.push(group);
             })
             .unwrap();
-        let found = gauge(&held);
+        let found = ambiguity(&held);
         assert_eq!(found.constant().count(), 0);
         assert_eq!(found.over_time().count(), nodes - 1);
-        let counted = count(&held);
+        let counted = structural_rank(&held);
         println!("{}", counted.sentences().join("; "));
         assert_eq!(counted.symmetry, Symmetry::Function);
         let mut smooth = held.clone();
@@ -370,7 +374,7 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
                 parts.penalties.push(Penalty::new(0, 2, 1.0, rows));
             })
             .unwrap();
-        assert_eq!(count(&smooth).symmetry, Symmetry::None);
+        assert_eq!(structural_rank(&smooth).symmetry, Symmetry::None);
     }
 }
 
@@ -422,7 +426,7 @@ impl Coverage {
     }
 }
 
-/// Fits of 200 records with noise: the coverage of every function that is sought, and of the ratios.
+/// Fits of 200 records with noise: the coverage of every function that is estimated, and of the ratios.
 fn coverage(problem: &Problem, truth: &NodalCoefficients, sigma: f64) {
     let clean = (problem.system)
         .forward(truth, problem.experiments[0].initial, None)
@@ -461,7 +465,7 @@ fn coverage(problem: &Problem, truth: &NodalCoefficients, sigma: f64) {
             &fit.best.evaluation,
             &settings,
         );
-        assert_eq!(bands.unseen, 0);
+        assert_eq!(bands.undetermined, 0);
         let four = [
             &bands.functions[0],
             &bands.functions[1],
@@ -535,13 +539,13 @@ fn bands_of_functions_on_knots_cover_the_truth() {
 }
 
 #[test]
-fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
+fn undetermined_functions_have_infinite_bands_and_ratios_finite_ones() {
     let system = common::system(200, Method::Midpoint);
     let problem = linear_mass(&system, free(0));
     let theta = problem.start();
     let here = problem.evaluate(&theta).unwrap();
     let bands = Bands::at(&problem, &theta, &here, &BandSettings::default());
-    assert_eq!(bands.unseen, 1);
+    assert_eq!(bands.undetermined, 1);
     for band in &bands.functions {
         assert!(
             band.standard_error.iter().all(|s| *s == f64::INFINITY),
@@ -549,7 +553,7 @@ fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
             band.name
         );
         assert!(
-            band.notes.iter().any(|n| n.starts_with("not seen")),
+            band.notes.iter().any(|n| n.starts_with("not identifiable")),
             "{:?}",
             band.notes
         );
@@ -564,12 +568,15 @@ fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
         );
         assert!(band.simultaneous.unwrap() > 1.96, "{}", band.name);
     }
-    let words = verdicts(&problem, &here, &bands);
+    let words = classify_functions(&problem, &here, &bands);
     words.iter().for_each(|j| println!("{}", j.sentence));
-    assert_eq!(words[0].verdict, Verdict::OnlyRatio("k/m".into()));
-    assert_eq!(words[1].verdict, Verdict::OnlyRatio("c/m".into()));
-    assert_eq!(words[2].verdict, Verdict::OnlyRatio("k/m".into()));
-    assert!(matches!(words[3].verdict, Verdict::Identified { .. }));
+    assert_eq!(words[0].verdict, Classification::OnlyRatio("k/m".into()));
+    assert_eq!(words[1].verdict, Classification::OnlyRatio("c/m".into()));
+    assert_eq!(words[2].verdict, Classification::OnlyRatio("k/m".into()));
+    assert!(matches!(
+        words[3].verdict,
+        Classification::Identified { .. }
+    ));
 
     // A value of the stiffness brings all of them back.
     let mut held = problem.clone();
@@ -581,7 +588,7 @@ fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
         })
         .unwrap();
     let bands = Bands::at(&held, &theta, &here, &BandSettings::default());
-    assert_eq!(bands.unseen, 0);
+    assert_eq!(bands.undetermined, 0);
     assert!(
         bands.functions[0]
             .standard_error
@@ -592,9 +599,9 @@ fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
         bands.functions[2].sides.iter().all(|s| *s == Side::Neither)
             || bands.functions[2].standard_error.iter().all(|s| *s < 1e-12)
     );
-    let words = verdicts(&held, &here, &bands);
+    let words = classify_functions(&held, &here, &bands);
     assert!(
-        matches!(words[0].verdict, Verdict::Identified { .. }),
+        matches!(words[0].verdict, Classification::Identified { .. }),
         "{}",
         words[0].sentence
     );
@@ -604,13 +611,13 @@ fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
 fn a_bound_that_is_active_makes_the_band_one_sided() {
     let nodes = 200;
     let system = common::system(nodes, Method::Midpoint);
-    let device = common::paper_device(nodes);
+    let nodal = common::paper_system(nodes);
     let list = vec![
-        CoefficientFunction::fixed(CoefficientKind::Mass, device.mass.clone()),
+        CoefficientFunction::fixed(CoefficientKind::Mass, nodal.mass.clone()),
         CoefficientFunction::constant(CoefficientKind::Damping, 0.0, nodes),
         CoefficientFunction::constant(CoefficientKind::Stiffness, 1.0, nodes),
     ];
-    let mut problem = with_records(&system, list, &device, &[free(0)]);
+    let mut problem = with_records(&system, list, &nodal, &[free(0)]);
     let theta = problem.start();
     let here = problem.evaluate(&theta).unwrap();
     let open = Bands::at(&problem, &theta, &here, &BandSettings::default());
@@ -634,8 +641,11 @@ fn a_bound_that_is_active_makes_the_band_one_sided() {
     // With the damping held the stiffness is known better, and never worse.
     let (held, free) = (&bands.functions[2], &open.functions[2]);
     assert!(held.standard_error[5] <= free.standard_error[5] * (1.0 + 1e-9));
-    assert_eq!(bands.functions[0].pointwise(0), [device.mass[0]; 2]);
-    assert_eq!(verdicts(&problem, &here, &bands)[0].verdict, Verdict::Fixed);
+    assert_eq!(bands.functions[0].pointwise(0), [nodal.mass[0]; 2]);
+    assert_eq!(
+        classify_functions(&problem, &here, &bands)[0].verdict,
+        Classification::Fixed
+    );
 }
 
 #[test]
@@ -673,7 +683,7 @@ fn without_sigma_the_residuals_say_it() {
         spacing: system.grid.step(),
     });
     assert_eq!(known.sigma, None);
-    // The scatter of a standard deviation from 396 readings is 3.6 %: three of these, for both.
+    // The scatter of a standard deviation from 396 samples is 3.6 %: three of these, for both.
     let found = guessed.sigma.unwrap();
     assert!((found / sigma - 1.0).abs() < 0.11, "{found}");
     for (a, b) in known.functions.iter().zip(&guessed.functions) {
@@ -682,8 +692,8 @@ fn without_sigma_the_residuals_say_it() {
     }
 }
 
-fn candidate(name: &str, (initial, force): Record) -> Candidate {
-    Candidate {
+fn candidate(name: &str, (initial, force): Record) -> CandidateExperiment {
+    CandidateExperiment {
         name: name.into(),
         initial,
         excitation: force.map(|f| Excitation::force_at_nodes(&f)),
@@ -698,10 +708,10 @@ fn candidate(name: &str, (initial, force): Record) -> Candidate {
 fn the_next_experiment_is_the_one_that_sees_something_new() {
     let nodes = 60;
     let system = common::system(nodes, Method::Midpoint);
-    let device = common::paper_device(nodes);
+    let nodal = common::paper_system(nodes);
     let drive = forced(2, &system.grid, 0);
-    let ranked = |records: &[Record], candidates: &[Candidate]| {
-        let problem = nodal(&system, &device, records);
+    let ranked = |records: &[Record], candidates: &[CandidateExperiment]| {
+        let problem = nodal_problem(&system, &nodal, records);
         let theta = problem.start();
         let here = problem.evaluate(&theta).unwrap();
         let found = rank_experiments(&problem, &theta, &here, candidates, false);
@@ -713,11 +723,11 @@ fn the_next_experiment_is_the_one_that_sees_something_new() {
         base: None,
     };
     let broken = [
-        Candidate {
+        CandidateExperiment {
             channels: Vec::new(),
             ..candidate("blind", free(1))
         },
-        Candidate {
+        CandidateExperiment {
             excitation: Some(short),
             ..candidate("short", free(1))
         },
@@ -735,7 +745,7 @@ fn the_next_experiment_is_the_one_that_sees_something_new() {
     assert_eq!(first[1].name, "repeat");
     let gain = first[1].gain.clone().unwrap();
     assert_eq!((gain.new_directions, gain.sees_scale), (0, Some(false)));
-    // Twice the readings: all standard errors by the root of two. The worst directions carry the
+    // Twice the samples: all standard errors by the root of two. The worst directions carry the
     // rounding of the Jacobian, some 1e-16 beside 1e-6 of the best.
     for ratio in [gain.volume, gain.average, gain.worst] {
         assert!((ratio - 0.5f64.sqrt()).abs() < 1e-6, "{ratio}");
@@ -767,11 +777,11 @@ fn the_next_experiment_is_the_one_that_sees_something_new() {
 fn tangents_and_adjoints_give_the_same_jacobian() {
     let nodes = 40;
     let system = common::system(nodes, Method::Rk4);
-    let device = common::paper_device(nodes);
+    let nodal = common::paper_system(nodes);
     let drive = forced(1, &system.grid, 0);
-    // 40 readings of 120 parameters: adjoints. Four times as many: tangents.
-    let one = nodal(&system, &device, std::slice::from_ref(&drive));
-    let four = nodal(&system, &device, &vec![drive; 4]);
+    // 40 samples of 120 parameters: adjoints. Four times as many: tangents.
+    let one = nodal_problem(&system, &nodal, std::slice::from_ref(&drive));
+    let four = nodal_problem(&system, &nodal, &vec![drive; 4]);
     let jacobian = |p: &Problem| {
         let here = p.evaluate(&p.start()).unwrap();
         Sensitivity::of(p, &here).jacobian
@@ -790,7 +800,7 @@ fn a_record_that_ends_early_identifies_only_its_span() {
     let basis = Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, 11),
     };
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
     };
@@ -799,7 +809,7 @@ fn a_record_that_ends_early_identifies_only_its_span() {
         CoefficientFunction::constant(CoefficientKind::Damping, 0.05, nodes),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
-    let problem = with_records(&system, list, &device, &[free(0)]);
+    let problem = with_records(&system, list, &nodal, &[free(0)]);
     let part = problem.experiments[0].channels[0].first(half);
     let (times, values) = (part.times().to_vec(), part.observed().to_vec());
     let weighting = part.weighting().clone();
@@ -810,23 +820,26 @@ fn a_record_that_ends_early_identifies_only_its_span() {
             parts.experiments[0].nodes = half;
         })
         .unwrap();
-    // Half of the knots are beyond the last reading.
-    assert_eq!(count(&problem).seen_at_most, 7);
+    // Half of the knots are beyond the last sample.
+    assert_eq!(structural_rank(&problem).rank_bound, 7);
     assert_eq!(spectrum(&problem).rank(), 7);
     let theta = problem.start();
     let here = problem.evaluate(&theta).unwrap();
     let bands = Bands::at(&problem, &theta, &here, &BandSettings::default());
-    let words = verdicts(&problem, &here, &bands);
+    let words = classify_functions(&problem, &here, &bands);
     words.iter().for_each(|j| println!("{}", j.sentence));
-    let Verdict::OnlyOn(spans) = &words[0].verdict else {
+    let Classification::PartlyIdentified(spans) = &words[0].verdict else {
         panic!("{}", words[0].sentence);
     };
     assert_eq!(spans.len(), 1);
-    // Up to the last reading at 12.475 s: from the knot at 12.5 s the mass depends on the next one.
+    // Up to the last sample at 12.475 s: from the knot at 12.5 s the mass depends on the next one.
     assert_eq!(spans[0][0], 0.0);
     assert!((12.4..=12.5).contains(&spans[0][1]), "{spans:?}");
-    assert!(matches!(words[1].verdict, Verdict::Identified { .. }));
-    assert_eq!(words[2].verdict, Verdict::Fixed);
+    assert!(matches!(
+        words[1].verdict,
+        Classification::Identified { .. }
+    ));
+    assert_eq!(words[2].verdict, Classification::Fixed);
 }
 
 /// Smoothness so heavy that the estimate scatters much less than Cramer and Rao would have it: the
@@ -839,7 +852,7 @@ fn the_sandwich_is_the_scatter_of_smoothed_estimates() {
     let basis = Basis::PiecewiseLinear {
         knots: uniform_knots(&grid, 9),
     };
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
     };
@@ -848,7 +861,7 @@ fn the_sandwich_is_the_scatter_of_smoothed_estimates() {
         CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.05; nodes]),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; nodes]),
     ];
-    let bare = with_records(&system, list, &device, &[free(0)]);
+    let bare = with_records(&system, list, &nodal, &[free(0)]);
     let mut problem = bare.clone();
     let rows = basis.roughness(&grid, 2);
     problem.penalize(Penalty::new(0, 2, 3e4, rows)).unwrap();
@@ -878,7 +891,7 @@ fn the_sandwich_is_the_scatter_of_smoothed_estimates() {
     let mut squares = vec![0.0; nodes];
     for seed in 0..seeds {
         let fit = run(&record(&problem, with_noise(&clean, sigma, 1000 + seed)));
-        let mass = &fit.best.evaluation.device.mass;
+        let mass = &fit.best.evaluation.nodal.mass;
         squares
             .iter_mut()
             .zip(mass)
@@ -904,17 +917,17 @@ fn the_scale_by_bases_and_drives() {
     let nodes = 61;
     let system = common::system(nodes, Method::Rk4);
     let grid = system.grid;
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: grid.times().iter().map(|t| 1.0 - 0.02 * t).collect(),
         coefficients: vec![vec![0.05; nodes], vec![1.0; nodes]],
     };
     let with = |bases: [Basis; 3], records: &[Record]| {
-        let parts = QUANTITIES.into_iter().zip(bases).zip(device.functions());
+        let parts = QUANTITIES.into_iter().zip(bases).zip(nodal.functions());
         let list = parts.map(|((quantity, basis), values)| {
             let start = basis.project(&grid, values).unwrap();
             CoefficientFunction::free(quantity, basis, &grid, start)
         });
-        with_records(&system, list.collect(), &device, records)
+        with_records(&system, list.collect(), &nodal, records)
     };
     let all = |basis: Basis| [basis.clone(), basis.clone(), basis];
     let knots = |count| uniform_knots(&grid, count);
@@ -950,14 +963,14 @@ fn the_scale_by_bases_and_drives() {
     for (bases, expected, symmetry) in table {
         let name = format!("{bases:?}");
         let problem = with(bases, &[free(0), free(1)]);
-        let counted = count(&problem);
+        let counted = structural_rank(&problem);
         println!(
             "{}: {}",
             problem.functions.get(0).basis.as_ref().unwrap().name(),
             counted.sentences().join("; ")
         );
         assert_eq!(
-            (counted.seen_at_most, counted.symmetry),
+            (counted.rank_bound, counted.symmetry),
             (expected, symmetry),
             "{name}"
         );
@@ -966,12 +979,12 @@ fn the_scale_by_bases_and_drives() {
         if symmetry != Symmetry::Function {
             assert!(spectrum(&problem).rank() <= expected, "{name}");
         }
-        let gauge = Gauge::at(&problem, &problem.start());
-        assert_eq!(gauge.constant().count(), 1, "{name}");
+        let ambiguity = ScalingAmbiguity::at(&problem, &problem.start());
+        assert_eq!(ambiguity.constant().count(), 1, "{name}");
     }
 
     // A base that moves pushes with m b'': that scales too.
-    let mut problem = nodal(&system, &device, &[free(0)]);
+    let mut problem = nodal_problem(&system, &nodal, &[free(0)]);
     problem = problem
         .with(|parts| {
             parts.experiments[0].excitation = Some(Excitation {
@@ -980,9 +993,11 @@ fn the_scale_by_bases_and_drives() {
             });
         })
         .unwrap();
-    assert_eq!(count(&problem).symmetry, Symmetry::Function);
+    assert_eq!(structural_rank(&problem).symmetry, Symmetry::Function);
     assert_eq!(
-        Gauge::at(&problem, &problem.start()).over_time().count(),
+        ScalingAmbiguity::at(&problem, &problem.start())
+            .over_time()
+            .count(),
         nodes
     );
 
@@ -990,7 +1005,7 @@ fn the_scale_by_bases_and_drives() {
     let mut cubic = system.clone();
     cubic.terms = vec![Term::Damping, Term::CubicStiffness];
     let records = [free(0), free(1), free(2)];
-    let linear = count(&nodal(&system, &device, &records)).equations;
-    let bent = count(&nodal(&cubic, &device, &records)).equations;
+    let linear = structural_rank(&nodal_problem(&system, &nodal, &records)).equations;
+    let bent = structural_rank(&nodal_problem(&cubic, &nodal, &records)).equations;
     assert_eq!((linear, bent), (2 * (nodes - 1), 3 * (nodes - 1)));
 }

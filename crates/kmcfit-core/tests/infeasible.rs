@@ -1,4 +1,4 @@
-//! Problems without a device, and quadratic programs without an answer: the fit ends with a word for
+//! Problems without a system, and quadratic programs without an answer: the fit ends with a word for
 //! it, and keeps its best point.
 
 mod common;
@@ -17,7 +17,7 @@ use kmcfit_core::internals::system::{Method, NodalCoefficients};
 const NODES: usize = 101;
 const UNBOUNDED: f64 = f64::INFINITY;
 
-/// Readings of a mass that grows, `m = 0.8 + 0.01 t`; the mass is sought in `basis`.
+/// Samples of a mass that grows, `m = 0.8 + 0.01 t`; the mass is estimated in `basis`.
 fn problem(basis: &Basis) -> Problem {
     let system = common::system(NODES, Method::Rk4);
     let grid = system.grid;
@@ -25,14 +25,14 @@ fn problem(basis: &Basis) -> Problem {
         mass: grid.times().iter().map(|t| 0.8 + 0.01 * t).collect(),
         coefficients: vec![vec![0.05; NODES], vec![1.0; NODES]],
     };
-    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
+    let response = system.forward(&truth, common::INITIAL, None).unwrap();
     let start = basis.constant(&grid, 1.0);
     let list = vec![
         CoefficientFunction::free(CoefficientKind::Mass, basis.clone(), &grid, start),
         CoefficientFunction::constant(CoefficientKind::Damping, 0.1, NODES),
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
-    common::problem_of(system, list, motion.displacement, None)
+    common::problem_of(system, list, response.displacement, None)
 }
 
 fn knots() -> Basis {
@@ -71,7 +71,7 @@ fn run(problem: &Problem, solver: Solver, program_iterations: u32) -> Fit {
 
 const SOLVERS: [Solver; 2] = [Solver::GaussNewton, Solver::ProjectedGradient];
 
-/// Nothing is lost: the point is finite, and no worse than the start.
+/// The returned point is finite, and its cost is not above the start's.
 fn keeps_the_best_point(problem: &Problem, found: &Fit) {
     let finite = found.best.parameters.iter().all(|p| p.is_finite());
     let cost = found.best.evaluation.cost;
@@ -176,7 +176,7 @@ fn badly_scaled_constraints_cost_no_point() {
 
 /// From a start outside of constraints that contradict each other no step leads anywhere.
 #[test]
-fn contradictory_constraints_are_infeasible_where_nobody_looked_before() {
+fn contradictory_constraints_of_a_problem_make_a_fit_infeasible() {
     for solver in SOLVERS {
         let mut problem = problem(&knots());
         problem = problem
@@ -217,7 +217,7 @@ fn a_start_is_moved_to_where_there_is_a_mass() {
         .unwrap();
     let start = problem.functions.start();
     let least = |theta: &[f64]| {
-        let mass = problem.functions.device(theta).mass;
+        let mass = problem.functions.nodal(theta).mass;
         mass.into_iter().fold(f64::INFINITY, f64::min)
     };
     let metric = problem.functions.gram_diagonal();

@@ -5,7 +5,7 @@ mod common;
 use kmcfit_core::internals::constraints::Rows;
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Penalty, Variation,
+    Basis, CoefficientFunction, CoefficientKind, Penalty, TotalVariation,
 };
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
@@ -94,7 +94,7 @@ fn total_variation_finds_the_jump_and_both_levels() {
     let rows = differences();
     problem = problem
         .with(|parts| {
-            parts.variations = vec![Variation {
+            parts.variations = vec![TotalVariation {
                 function: 2,
                 weight: 300.0,
                 rows,

@@ -1,4 +1,4 @@
-//! The last rung of the start ladder: a horizon that grows.
+//! Start strategies: growing horizon, truncated start, continued attempts.
 
 mod common;
 
@@ -13,13 +13,13 @@ use kmcfit_core::internals::system::{
     Excitation, Grid, Method, NodalCoefficients, State, System, Term,
 };
 
-/// Nodes from one reading to the next.
+/// Nodes from one sample to the next.
 const STRIDE: usize = 20;
 const READINGS: usize = 121;
 const STIFFNESS: f64 = 101.0;
 
-/// 40 periods with three readings each, and only the stiffness to be found. Differences of so few
-/// readings take 15 % off the acceleration, so the equation error has the period wrong by 7 %: a third
+/// 40 periods with three samples each, and only the stiffness to be found. Differences of so few
+/// samples take 15 % off the acceleration, so the equation error has the period wrong by 7 %: a third
 /// of a period after an eighth of the record, three periods at its end. The start values are off by 13 %.
 fn problem() -> Problem {
     let nodes = STRIDE * (READINGS - 1) + 1;
@@ -32,10 +32,10 @@ fn problem() -> Problem {
         mass: vec![1.0; nodes],
         coefficients: vec![vec![0.05; nodes], vec![STIFFNESS; nodes]],
     };
-    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
-    let observed: Vec<f64> = motion.displacement.into_iter().step_by(STRIDE).collect();
+    let response = system.forward(&truth, common::INITIAL, None).unwrap();
+    let observed: Vec<f64> = response.displacement.into_iter().step_by(STRIDE).collect();
     let step = system.grid.step();
-    // Known to be free of noise: so few readings look like noise to a rule that does not know.
+    // Known to be free of noise: so few samples look like noise to a rule that does not know.
     let weighting = Weighting::Sigma(1e-8);
     let list = vec![
         CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
@@ -67,12 +67,12 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
     let names: Vec<&str> = found
         .attempts
         .iter()
-        .map(|rung| rung.start.name())
+        .map(|attempt| attempt.start.name())
         .collect();
     println!("{:#?}", found.attempts);
     assert_eq!(names, ["start values", "equation error", "growing horizon"]);
     let silence = problem.zero_response_misfit();
-    let costs: Vec<f64> = found.attempts.iter().map(|rung| rung.cost).collect();
+    let costs: Vec<f64> = found.attempts.iter().map(|attempt| attempt.cost).collect();
     // The first two end in minima that leave per cents of the record, the last at the answer.
     assert!(
         costs[0] > 0.05 * silence && costs[1] > 0.05 * silence,
@@ -81,12 +81,16 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
     assert!(costs[2] < 1e-12 * silence, "{costs:?} {silence}");
     assert_eq!(found.best.evaluation.cost, costs[2]);
     assert_eq!(found.outcome.status, Status::Converged);
-    // Rounding of the motion, 2400 steps, over its sensitivity.
+    // Rounding of the response, 2400 steps, over its sensitivity.
     let error = (found.best.parameters[0] / STIFFNESS - 1.0).abs();
     assert!(error < 1e-8, "{error}");
     // Every search takes a gradient at its start and one after each iteration; those of the three parts
-    // of the record count as well as those of the three rungs.
-    let iterations: u64 = found.attempts.iter().map(|rung| rung.iterations).sum();
+    // of the record count as well as those of the three attempts.
+    let iterations: u64 = found
+        .attempts
+        .iter()
+        .map(|attempt| attempt.iterations)
+        .sum();
     assert!(
         found.counts.adjoint >= iterations + 3 + 3,
         "{:?}",
@@ -118,7 +122,7 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
         terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
     };
     let truth = [1.0, 1.2, 20.0, 15.0];
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: vec![truth[0]; nodes],
         coefficients: truth[1..].iter().map(|p| vec![*p; nodes]).collect(),
     };
@@ -134,8 +138,8 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
         displacement: 0.0,
         velocity: 0.0,
     };
-    let motion = system.forward(&device, rest, Some(&excitation)).unwrap();
-    let observed = motion.displacement.into_iter().step_by(4).collect();
+    let response = system.forward(&nodal, rest, Some(&excitation)).unwrap();
+    let observed = response.displacement.into_iter().step_by(4).collect();
     let weighting = Weighting::Sigma(1e-4);
     let channel = Channel::displacement_at_nodes(observed, 4, weighting, &system.grid);
     let experiment = Experiment::free("two sines", rest, nodes)
@@ -158,7 +162,7 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
 }
 
 #[test]
-fn constants_of_a_long_record_are_sought_in_its_beginning_first() {
+fn constants_of_a_long_record_are_first_fitted_to_its_first_steps() {
     let (problem, truth) = long_record(0);
     let settings = FitSettings::default();
     let start = problem.start();
@@ -167,7 +171,7 @@ fn constants_of_a_long_record_are_sought_in_its_beginning_first() {
     let names: Vec<&str> = found
         .attempts
         .iter()
-        .map(|rung| rung.start.name())
+        .map(|attempt| attempt.start.name())
         .collect();
     assert_eq!(names, ["beginning of the record"]);
     // Without noise its beginning tells the constants to the tolerance on it, and one step on all of it the rest.
@@ -192,9 +196,9 @@ fn constants_of_a_long_record_are_sought_in_its_beginning_first() {
     }
 }
 
-/// Nothing moves while the beginning lasts: it says nothing, and the start values are what there is.
+/// A record that starts at rest has no information in its first steps: the fit starts from the start values.
 #[test]
-fn a_silent_beginning_says_nothing() {
+fn a_record_with_a_rest_at_its_start_is_fitted_as_a_whole() {
     let (problem, truth) = long_record(5000);
     let start = problem.start();
     let found = fit(&problem, &start, &FitSettings::default(), &mut |_| {}).unwrap();
@@ -204,10 +208,10 @@ fn a_silent_beginning_says_nothing() {
     }
 }
 
-/// Parts of a record have no reading at every node of the grid, which the continuous gradient needs: the fits of parts have
+/// Parts of a record have no sample at every node of the grid, which the continuous gradient needs: the fits of parts have
 /// the discrete one.
 #[test]
-fn a_fit_by_the_continuous_gradient_climbs_the_whole_ladder() {
+fn a_fit_by_the_continuous_gradient_tries_all_starting_points() {
     let nodes = 401;
     let system = System {
         grid: Grid::new(0.0, 20.0, nodes).unwrap(),

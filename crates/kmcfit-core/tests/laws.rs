@@ -1,4 +1,4 @@
-//! Laws that hold for every device: checked on random ones, the same in every run.
+//! Laws that hold for every system: checked on random ones, the same in every run.
 
 use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
 use kmcfit_core::internals::problem::Problem;
@@ -16,7 +16,7 @@ mod properties;
 
 const DURATION: f64 = 12.0;
 
-/// A smooth device, a start and a force, on any grid.
+/// A smooth system, a start and a force, on any grid.
 #[derive(Debug, Clone, Copy)]
 struct Case {
     /// Mean, share of change, angular frequency of the change of mass, damping, stiffness.
@@ -60,7 +60,7 @@ impl Case {
         mean * share * omega * (omega * t).cos()
     }
 
-    fn device(&self, grid: &Grid) -> NodalCoefficients {
+    fn nodal(&self, grid: &Grid) -> NodalCoefficients {
         let values = |f: usize| grid.times().iter().map(|t| self.value(f, *t)).collect();
         NodalCoefficients {
             mass: values(0),
@@ -93,8 +93,8 @@ fn system(nodes: usize, method: Method) -> System {
     }
 }
 
-fn size(motion: &[f64]) -> f64 {
-    motion.iter().fold(0.0, |most, y| most.max(y.abs()))
+fn size(response: &[f64]) -> f64 {
+    response.iter().fold(0.0, |most, y| most.max(y.abs()))
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
@@ -102,19 +102,19 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     size(&differences)
 }
 
-/// Rounding of a motion of some hundred steps, relative to its size.
+/// Rounding of a response of some hundred steps, relative to its size.
 const ROUNDING: f64 = 1e-12;
 
 #[test]
 fn the_sum_of_two_causes_has_the_sum_of_their_effects() {
     for_cases(|case| {
         let system = system(501, Method::Rk4);
-        let device = case.device(&system.grid);
+        let nodal = case.nodal(&system.grid);
         let excitation = case.excitation(&system.grid);
         let rest = State::default();
-        let both = system.forward(&device, case.state(), Some(&excitation));
-        let free = system.forward(&device, case.state(), None).unwrap();
-        let forced = system.forward(&device, rest, Some(&excitation)).unwrap();
+        let both = system.forward(&nodal, case.state(), Some(&excitation));
+        let free = system.forward(&nodal, case.state(), None).unwrap();
+        let forced = system.forward(&nodal, rest, Some(&excitation)).unwrap();
         let sum: Vec<f64> = (free.displacement.iter().zip(&forced.displacement))
             .map(|(a, b)| a + b)
             .collect();
@@ -127,15 +127,15 @@ fn the_sum_of_two_causes_has_the_sum_of_their_effects() {
 }
 
 #[test]
-fn one_factor_of_all_functions_is_not_seen() {
+fn a_common_factor_is_not_identifiable() {
     for_cases(|case| {
         let system = system(501, Method::Midpoint);
-        let device = case.device(&system.grid);
-        let mut scaled = device.clone();
+        let nodal = case.nodal(&system.grid);
+        let mut scaled = nodal.clone();
         scaled
             .functions_mut()
             .for_each(|f| f.iter_mut().for_each(|p| *p *= 1.7));
-        let [a, b] = [&device, &scaled].map(|d| system.forward(d, case.state(), None).unwrap());
+        let [a, b] = [&nodal, &scaled].map(|d| system.forward(d, case.state(), None).unwrap());
         let scale = size(&a.displacement);
         assert!(
             distance(&a.displacement, &b.displacement) <= ROUNDING * scale,
@@ -154,17 +154,17 @@ fn time_can_be_turned_round_to_the_order_of_the_stepper() {
                 let system = system(nodes, method);
                 // Constant functions: sampled ones are lines between nodes, of order 2 whatever the stepper.
                 let constant = |f: usize| vec![case.functions[f][0]; nodes];
-                let device = |sign: f64| NodalCoefficients {
+                let nodal = |sign: f64| NodalCoefficients {
                     mass: constant(0),
                     coefficients: vec![constant(1).iter().map(|c| sign * c).collect(), constant(2)],
                 };
-                let there = system.forward(&device(1.0), case.state(), None).unwrap();
+                let there = system.forward(&nodal(1.0), case.state(), None).unwrap();
                 let last = nodes - 1;
                 let turned = State {
                     displacement: there.displacement[last],
                     velocity: -there.velocity[last],
                 };
-                let back = system.forward(&device(-1.0), turned, None).unwrap();
+                let back = system.forward(&nodal(-1.0), turned, None).unwrap();
                 let Trajectory {
                     displacement,
                     velocity,
@@ -187,11 +187,11 @@ fn energy_is_balanced_to_the_order_of_the_stepper() {
             let system = system(nodes, Method::Rk4);
             let grid = system.grid;
             let excitation = case.excitation(&grid);
-            let motion = system.forward(&case.device(&grid), case.state(), Some(&excitation));
+            let response = system.forward(&case.nodal(&grid), case.state(), Some(&excitation));
             let Trajectory {
                 displacement: y,
                 velocity: v,
-            } = motion.unwrap();
+            } = response.unwrap();
             let energy = |i: usize| {
                 let t = grid.time(i);
                 0.5 * (case.value(0, t) * v[i] * v[i] + case.value(2, t) * y[i] * y[i])
@@ -218,20 +218,20 @@ fn energy_is_balanced_to_the_order_of_the_stepper() {
     });
 }
 
-/// Readings of a case in a unit that is `per_metre` to the metre, `later` seconds later.
+/// Samples of a case in a unit that is `per_metre` to the metre, `later` seconds later.
 fn record(case: Case, per_metre: f64, later: f64) -> Record {
     let system = system(121, Method::Rk4);
     let grid = system.grid;
-    let motion = system
-        .forward(&case.device(&grid), case.state(), None)
+    let response = system
+        .forward(&case.nodal(&grid), case.state(), None)
         .unwrap();
     // A deterministic error, so that no fit is exact.
     let read = |(i, y): (usize, &f64)| per_metre * (y + 0.01 * (1.3 * i as f64).sin());
-    let readings: Vec<f64> = motion.displacement.iter().enumerate().map(read).collect();
+    let samples: Vec<f64> = response.displacement.iter().enumerate().map(read).collect();
     let times: Vec<f64> = grid.times().iter().map(|t| t + later).collect();
     Record::new(format!("from {:?}", case.start))
         .from_state(per_metre * case.start[0], per_metre * case.start[1])
-        .displacement(&times, &readings)
+        .displacement(&times, &samples)
         .sigma(0.02 * per_metre)
 }
 
@@ -256,8 +256,8 @@ const SAME_MINIMUM: f64 = 1e-4;
 fn same(a: &Fit, b: &Fit, case: Case) {
     let (ja, jb) = (a.best.evaluation.cost, b.best.evaluation.cost);
     assert!((ja - jb).abs() <= 1e-7 * ja, "{case:?}: {ja} {jb}");
-    let functions = a.best.evaluation.device.functions();
-    for (p, q) in functions.zip(b.best.evaluation.device.functions()) {
+    let functions = a.best.evaluation.nodal.functions();
+    for (p, q) in functions.zip(b.best.evaluation.nodal.functions()) {
         let scale = size(p).max(0.1);
         assert!(distance(p, q) <= SAME_MINIMUM * scale, "{case:?}");
     }
@@ -275,7 +275,7 @@ fn for_some_cases(law: impl Fn(Case)) {
 }
 
 #[test]
-fn millimetres_and_another_clock_find_the_same_device() {
+fn other_units_of_length_and_time_find_the_same_system() {
     for_some_cases(|case| {
         let fit = |per_metre: f64, later: f64| {
             let problem = builder(case, 4).record(record(case, per_metre, later));
@@ -288,7 +288,7 @@ fn millimetres_and_another_clock_find_the_same_device() {
 }
 
 #[test]
-fn the_order_of_records_and_those_without_readings_do_not_matter() {
+fn the_order_of_records_and_records_without_samples_do_not_matter() {
     for_some_cases(|case| {
         let other = Case {
             start: [case.start[1] + 0.5, -case.start[0]],
@@ -335,7 +335,7 @@ fn finer_knots_never_raise_the_optimum() {
             let fit = match &start {
                 None => fitted(&problem),
                 Some(coarse) => {
-                    let nodal = &coarse.best.evaluation.device;
+                    let nodal = &coarse.best.evaluation.nodal;
                     let theta: Vec<f64> = (problem.functions.iter().zip(nodal.functions()))
                         .filter_map(|(f, values)| f.basis.as_ref().map(|basis| (basis, values)))
                         .flat_map(|(basis, values)| {

@@ -1,4 +1,4 @@
-//! Long records of devices that vary in time: 300 periods, while the frequency doubles, with one per
+//! Long records of systems that vary in time: 300 periods, while the frequency doubles, with one per
 //! cent of noise, from a constant stiffness that is off by a factor of three.
 
 mod common;
@@ -93,23 +93,18 @@ impl Reading {
 }
 
 /// Mass known, damping constant, stiffness in `basis`; the start is a constant.
-fn problem(
-    basis: &Basis,
-    reading: Reading,
-    factor: f64,
-    seed: u64,
-) -> (Problem, NodalCoefficients) {
-    let Reading { kind, noise, .. } = reading;
+fn problem(basis: &Basis, sample: Reading, factor: f64, seed: u64) -> (Problem, NodalCoefficients) {
+    let Reading { kind, noise, .. } = sample;
     let system = system();
     let grid = system.grid;
     let truth = truth(&grid, basis);
     let maker = Truth {
         system: &system,
-        device: &truth,
+        nodal: &truth,
         excitation: None,
         initial: INITIAL,
     };
-    let times = reading.times(&grid);
+    let times = sample.times(&grid);
     let clean = maker.seen(kind, &times, &[]);
     let sigma = noise * rms(&clean);
     let values = with_noise(&clean, sigma, seed);
@@ -136,7 +131,7 @@ fn problem(
             prior: None,
         };
         functions = functions.with_scalars(vec![scalar("y(0)", 1.0), scalar("v(0)", 2.0)]);
-        experiment.sought = [Some(0), Some(1)];
+        experiment.initial_parameters = [Some(0), Some(1)];
         experiment.initial = State {
             displacement: 0.0,
             velocity: 0.0,
@@ -154,7 +149,7 @@ fn errors(problem: &Problem, found: &Fit, truth: &NodalCoefficients) -> [f64; 2]
     let covariance = cramer_rao(problem, &found.best.parameters);
     let functions = &problem.functions;
     let (range, design) = (functions.ranges()[2].clone(), &functions.get(2).design);
-    let device = &found.best.evaluation.device;
+    let nodal = &found.best.evaluation.nodal;
     let (mut relative, mut standard) = (0.0f64, 0.0f64);
     for i in 0..NODES {
         let row: Vec<(usize, f64)> = design.row(i).collect();
@@ -165,7 +160,7 @@ fn errors(problem: &Problem, found: &Fit, truth: &NodalCoefficients) -> [f64; 2]
             .map(|(j, l, ab)| ab * covariance[(index(*j), index(*l))])
             .sum();
         let exact = truth.coefficients[1][i];
-        let error = (device.coefficients[1][i] - exact).abs();
+        let error = (nodal.coefficients[1][i] - exact).abs();
         relative = relative.max(error / exact);
         standard = standard.max(error / variance.sqrt());
     }
@@ -173,18 +168,18 @@ fn errors(problem: &Problem, found: &Fit, truth: &NodalCoefficients) -> [f64; 2]
 }
 
 /// From a stiffness three times too large and three times too small: within `limit` of the truth at
-/// all times, and as near as the noise allows. Returns which rungs it took.
-fn check(basis: &Basis, reading: Reading, limit: f64) -> Vec<&'static str> {
+/// all times, and as near as the noise allows. Returns the attempts.
+fn check(basis: &Basis, sample: Reading, limit: f64) -> Vec<&'static str> {
     let mut last = Vec::new();
     for (factor, seed) in [(3.0, 1), (1.0 / 3.0, 2)] {
-        let (problem, truth) = problem(basis, reading, factor, seed);
-        // Enough for every rung that gets there: the others need not wander about for longer.
+        let (problem, truth) = problem(basis, sample, factor, seed);
+        // Enough for every successful attempt.
         let mut settings = settings();
         settings.stopping.iterations = 30;
         let found = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
         let [relative, standard] = errors(&problem, &found, &truth);
         println!(
-            "{reading:?} {} x{factor:.2}: {relative:.1e}, {standard:.2} sigma",
+            "{sample:?} {} x{factor:.2}: {relative:.1e}, {standard:.2} sigma",
             basis.name()
         );
         // The start values alone lead to a wrong period: they explain next to nothing.
@@ -207,42 +202,42 @@ fn displacements_at_every_node_give_the_stiffness_to_a_thousandth() {
 
 #[test]
 fn accelerations_alone_give_the_stiffness_to_a_thousandth() {
-    let reading = Reading::every_node(ChannelKind::Acceleration);
-    check(&spline(&system().grid), reading, 1e-3);
+    let sample = Reading::every_node(ChannelKind::Acceleration);
+    check(&spline(&system().grid), sample, 1e-3);
 }
 
-/// Five readings in the shortest period. Differences over them take several per cent off the
-/// acceleration, and the equation error is wrong by several periods; the motion is not.
+/// Five samples in the shortest period. Differences over them take several per cent off the
+/// acceleration, and the equation error is wrong by several periods; the response is not.
 #[test]
 fn few_displacements_in_a_period_need_states_and_functions_at_once() {
-    let reading = Reading {
+    let sample = Reading {
         stride: 3,
         ..Reading::every_node(ChannelKind::Displacement)
     };
-    // Four times fewer readings: errors twice as large.
-    let last = check(&line(&system().grid), reading, 2e-3);
-    assert_eq!(last, ["motion of the readings"; 2]);
+    // Four times fewer samples: errors twice as large.
+    let last = check(&line(&system().grid), sample, 2e-3);
+    assert_eq!(last, ["motion of the samples"; 2]);
 }
 
 /// Between samples, between nodes, without a displacement.
 #[test]
 fn few_irregular_accelerations_need_states_and_functions_at_once() {
-    let reading = Reading {
+    let sample = Reading {
         stride: 3,
         irregular: true,
         ..Reading::every_node(ChannelKind::Acceleration)
     };
-    let last = check(&spline(&system().grid), reading, 2e-3);
-    assert_eq!(last, ["motion of the readings"; 2]);
+    let last = check(&spline(&system().grid), sample, 2e-3);
+    assert_eq!(last, ["motion of the samples"; 2]);
 }
 
-/// With so much noise that smoothing takes a part of the motion with it.
+/// With so much noise that smoothing takes a part of the response with it.
 #[test]
 fn twenty_per_cent_of_noise_give_the_stiffness_to_two_per_cent() {
-    let reading = Reading {
+    let sample = Reading {
         noise: 0.2,
         ..Reading::every_node(ChannelKind::Displacement)
     };
-    let last = check(&spline(&system().grid), reading, 2e-2);
-    assert_eq!(last, ["motion of the readings"; 2]);
+    let last = check(&spline(&system().grid), sample, 2e-2);
+    assert_eq!(last, ["motion of the samples"; 2]);
 }

@@ -1,4 +1,4 @@
-//! Nonlinear devices from what drives them and how they move, with one per cent of noise.
+//! Nonlinear systems from what drives them and how they move, with one per cent of noise.
 
 mod common;
 
@@ -27,7 +27,7 @@ struct Case {
 }
 
 impl Case {
-    fn device(&self) -> NodalCoefficients {
+    fn nodal(&self) -> NodalCoefficients {
         let nodes = self.system.grid.nodes();
         let values = |c: &Constant| vec![c.1; nodes];
         NodalCoefficients {
@@ -36,17 +36,17 @@ impl Case {
         }
     }
 
-    fn motion(&self) -> Trajectory {
-        let (device, excitation) = (self.device(), Some(&self.excitation));
-        self.system.forward(&device, REST, excitation).unwrap()
+    fn response(&self) -> Trajectory {
+        let (nodal, excitation) = (self.nodal(), Some(&self.excitation));
+        self.system.forward(&nodal, REST, excitation).unwrap()
     }
 
     fn problem(&self, seed: u64) -> Problem {
         let grid = self.system.grid;
-        let device = self.device();
+        let nodal = self.nodal();
         let truth = Truth {
             system: &self.system,
-            device: &device,
+            nodal: &nodal,
             excitation: Some(&self.excitation),
             initial: REST,
         };
@@ -110,7 +110,7 @@ fn push(grid: &Grid, force: impl Fn(f64) -> f64) -> Excitation {
 
 fn duffing(factors: [f64; 4]) -> Case {
     let terms = [Term::Damping, Term::Stiffness, Term::CubicStiffness];
-    // 30 to 60 steps in a period of the device, which is 2 to 4 s.
+    // 30 to 60 steps in a period of the system, which is 2 to 4 s.
     let system = system(1501, 100.0, &terms);
     let truth = [
         (CoefficientKind::Mass, 1.0),
@@ -134,7 +134,7 @@ fn a_forced_duffing_oscillator_to_one_per_cent() {
     for factors in [[2.5, 5.0, 2.0, 3.0], [0.4, 0.2, 0.5, 0.0]] {
         let case = duffing(factors);
         // It is nonlinear: at the largest displacement the cubic spring is the stronger one.
-        let most = (case.motion().displacement.iter()).fold(0.0f64, |m, y| m.max(y.abs()));
+        let most = (case.response().displacement.iter()).fold(0.0f64, |m, y| m.max(y.abs()));
         assert!(1.2 * most * most > 2.5, "{most}");
         case.check();
     }
@@ -167,17 +167,19 @@ fn stick_slip() -> Case {
 #[test]
 fn a_mass_that_sticks_in_every_cycle_to_one_per_cent() {
     let case = stick_slip();
-    let motion = case.motion();
+    let response = case.response();
     let force = case.excitation.force.as_ref().unwrap().at_nodes();
     for cycle in 0..PERIODS {
         let nodes = cycle * STEPS..(cycle + 1) * STEPS;
         // At rest but for the creep of the smoothed friction, which alone holds the mass.
         let sticks = |i: &usize| {
-            let pull = force[*i] - 2.0 * motion.displacement[*i];
-            motion.velocity[*i].abs() < 2.0 * WIDTH && pull.abs() < FRICTION
+            let pull = force[*i] - 2.0 * response.displacement[*i];
+            response.velocity[*i].abs() < 2.0 * WIDTH && pull.abs() < FRICTION
         };
         let share = nodes.clone().filter(sticks).count() as f64 / STEPS as f64;
-        let fastest = nodes.map(|i| motion.velocity[i].abs()).fold(0.0, f64::max);
+        let fastest = nodes
+            .map(|i| response.velocity[i].abs())
+            .fold(0.0, f64::max);
         println!("cycle {cycle}: sticks for {share:.2} of it, up to {fastest:.2} m/s");
         assert!((0.1..0.7).contains(&share), "{share}");
         assert!(fastest > 20.0 * WIDTH, "{fastest}");

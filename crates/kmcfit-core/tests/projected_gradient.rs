@@ -4,7 +4,7 @@ mod common;
 
 use common::synthetic::{settings, with_noise};
 use kmcfit_core::internals::functions::{
-    CoefficientFunction, CoefficientKind, ScalarParameter, Value,
+    CoefficientFunction, CoefficientKind, ScalarParameter, ScalarValue,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Sensor;
@@ -15,16 +15,16 @@ const NODES: usize = 101;
 /// The share of the slope by which the method has J fall at least.
 const DECREASE: f64 = 1e-4;
 
-/// A known motion and noise, read with an offset that is sought, with readings' sigma.
+/// A known response and noise, read with an offset that is estimated, with samples' sigma.
 fn problem(sigma: f64) -> Problem {
     let system = common::system(NODES, Method::Rk4);
     let values = [1.0, 0.1, 1.0].map(|value| vec![value; NODES]);
-    let device = NodalCoefficients {
+    let nodal = NodalCoefficients {
         mass: values[0].clone(),
         coefficients: values[1..].to_vec(),
     };
-    let motion = system.forward(&device, common::INITIAL, None).unwrap();
-    let observed = with_noise(&motion.displacement, 1.0, 7);
+    let response = system.forward(&nodal, common::INITIAL, None).unwrap();
+    let observed = with_noise(&response.displacement, 1.0, 7);
     let quantities = [
         CoefficientKind::Mass,
         CoefficientKind::Damping,
@@ -47,7 +47,7 @@ fn problem(sigma: f64) -> Problem {
         .unwrap();
     let channel = problem.experiments[0].channels[0].clone();
     let sensor = Sensor {
-        offset: Value::Sought(0),
+        offset: ScalarValue::Estimated(0),
         ..Sensor::default()
     };
     problem
@@ -67,7 +67,7 @@ fn a_step_is_halved_until_it_brings_its_share_of_the_slope() {
         let channel = &problem.experiments[0].channels[0];
         let residuals: Vec<f64> = channel.residuals(&silent.predictions[0][0]).collect();
         let n = residuals.len() as f64;
-        // Model less reading falls to zero at minus its mean.
+        // Model less sample falls to zero at minus its mean.
         let mean = -residuals.iter().sum::<f64>() / n;
         let q = n / (sigma * sigma);
         let r = residuals.iter().map(|r| (r + mean).powi(2)).sum::<f64>() / (sigma * sigma);

@@ -132,9 +132,9 @@ fn reaches(basis: &Basis, solver: Solver, constrained: bool, seed: u64) -> bool 
     };
     let found = fit(&problem, &start, &settings, &mut |_| {}).unwrap();
     assert!(problem.constraints.hold(&found.best.parameters, 1e-9));
-    let errors = common::errors(&found.best.evaluation.device, &truth);
+    let errors = common::errors(&found.best.evaluation.nodal, &truth);
     let reached = errors.iter().all(|e| *e < 1e-3);
-    // Nobody ends anywhere else: who has not arrived is on the way.
+    // No fit ends elsewhere; unfinished fits are on the way.
     let status = found.outcome.status;
     assert!(
         reached || status == Status::MaxIterations,

@@ -1,4 +1,4 @@
-//! The true device is found again.
+//! The true system is found again.
 
 mod common;
 
@@ -55,9 +55,9 @@ fn linear_mass(system: System, observed: Vec<f64>, sigma: Option<f64>) -> Proble
 
 fn paper_data(nodes: usize) -> (System, NodalCoefficients, Vec<f64>) {
     let system = common::system(nodes, Method::Midpoint);
-    let truth = common::paper_device(nodes);
-    let motion = system.forward(&truth, common::INITIAL, None).unwrap();
-    (system, truth, motion.displacement)
+    let truth = common::paper_system(nodes);
+    let response = system.forward(&truth, common::INITIAL, None).unwrap();
+    (system, truth, response.displacement)
 }
 
 #[test]
@@ -66,7 +66,7 @@ fn a_linear_mass_is_recovered_to_1e_10() {
         let (system, truth, observed) = paper_data(2000);
         let problem = linear_mass(system, observed, None);
         let found = run(&problem, initial);
-        let errors = common::errors(&found.best.evaluation.device, &truth);
+        let errors = common::errors(&found.best.evaluation.nodal, &truth);
         assert!(errors[0] <= 1e-10, "{initial:?} {errors:?}");
     }
 }
@@ -92,7 +92,7 @@ fn knots_recover_all_three_functions_to_1e_6() {
     common::add_physics(&mut problem, 1.0, false);
     for initial in [Initial::Functions, Initial::Data] {
         let found = run(&problem, initial);
-        let errors = common::errors(&found.best.evaluation.device, &truth);
+        let errors = common::errors(&found.best.evaluation.nodal, &truth);
         assert!(errors.iter().all(|e| *e <= 1e-6), "{initial:?} {errors:?}");
     }
 }
@@ -120,7 +120,7 @@ fn one_value_per_step_recovers_all_three_functions_at_every_resolution() {
     for nodes in [500, 2000, 8000, 40_000] {
         let (problem, truth) = smooth_nodal(nodes);
         let found = run(&problem, Initial::Data);
-        let errors = common::errors(&found.best.evaluation.device, &truth);
+        let errors = common::errors(&found.best.evaluation.nodal, &truth);
         assert!(errors.iter().all(|e| *e <= 1e-4), "N = {nodes}: {errors:?}");
         assert!(problem.constraints.hold(&found.best.parameters, 0.0));
         iterations.push(found.history.len());
@@ -136,11 +136,11 @@ fn one_value_per_step_recovers_all_three_functions_at_every_resolution() {
 fn one_value_per_step_recovers_all_three_functions_from_the_start_of_the_paper() {
     let (problem, truth) = smooth_nodal(2000);
     let found = run(&problem, Initial::Functions);
-    let errors = common::errors(&found.best.evaluation.device, &truth);
+    let errors = common::errors(&found.best.evaluation.nodal, &truth);
     assert!(errors.iter().all(|e| *e <= 1e-4), "{errors:?}");
 }
 
-/// Readings from the closed form for m = 1 - 0.02 t.
+/// Samples from the closed form for m = 1 - 0.02 t.
 fn bessel_fit(nodes: usize, method: Method) -> f64 {
     let system = common::system(nodes, method);
     let times = system.grid.times();
@@ -150,7 +150,7 @@ fn bessel_fit(nodes: usize, method: Method) -> f64 {
         .collect();
     let problem = linear_mass(system, observed, None);
     let found = run(&problem, Initial::Data);
-    let mass = &found.best.evaluation.device.mass;
+    let mass = &found.best.evaluation.nodal.mass;
     let errors = mass
         .iter()
         .zip(&times)
@@ -160,7 +160,7 @@ fn bessel_fit(nodes: usize, method: Method) -> f64 {
 
 #[test]
 fn data_that_our_stepper_did_not_make_give_the_mass_to_the_order_of_the_stepper() {
-    // RK4's own error, 4e-9 of the motion at N = 2000, leaves the mass nearly untouched.
+    // RK4's own error, 4e-9 of the response at N = 2000, leaves the mass nearly untouched.
     let rk4 = bessel_fit(2000, Method::Rk4);
     assert!(rk4 <= 1e-7, "{rk4}");
     // The midpoint rule moves too slowly or too fast by a share (w dt)^2 of the period, and the fit
@@ -184,14 +184,15 @@ fn fisher(problem: &Problem, theta: &[f64], sigma: f64) -> Vec<Vec<f64>> {
             let mut unit = vec![0.0; theta.len()];
             unit[j] = 1.0;
             let direction = kmcfit_core::internals::system::SystemTangent {
-                device: problem.functions.direction(&unit, 0),
+                nodal: problem.functions.direction(&unit, 0),
                 initial: kmcfit_core::internals::system::State {
                     displacement: 0.0,
                     velocity: 0.0,
                 },
             };
-            let motion = &here.trajectories[0];
-            reference::tangent(&problem.system, &here.device, None, motion, &direction).displacement
+            let response = &here.trajectories[0];
+            reference::tangent(&problem.system, &here.nodal, None, response, &direction)
+                .displacement
         })
         .collect();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -207,7 +208,7 @@ fn fisher(problem: &Problem, theta: &[f64], sigma: f64) -> Vec<Vec<f64>> {
 }
 
 #[test]
-fn noise_moves_the_linear_mass_as_the_fisher_information_says() {
+fn the_scatter_of_the_linear_mass_agrees_with_the_fisher_information() {
     const SIGMA: f64 = 0.1;
     let (system, truth, clean) = paper_data(2000);
     let problem = linear_mass(system.clone(), clean, None);
@@ -234,10 +235,10 @@ fn noise_moves_the_linear_mass_as_the_fisher_information_says() {
     assert!((30.3..102.7).contains(&sum), "{sum}");
 }
 
-/// Positivity alone: an exact fit, and another device. Without a force only k/m and c/m can be
+/// Positivity alone: an exact fit, and another system. Without a force only k/m and c/m can be
 /// seen, and one record gives one equation per instant for the two.
 #[test]
-fn positivity_alone_does_not_find_the_device() {
+fn positivity_alone_does_not_recover_the_system() {
     let (system, truth, observed) = paper_data(2000);
     let nodes = system.grid.nodes();
     let quantities = [
@@ -272,9 +273,9 @@ fn positivity_alone_does_not_find_the_device() {
         ..settings(Initial::Data)
     };
     let found = fit(&problem, &start, &how, &mut |_| {}).unwrap();
-    let device = &found.best.evaluation.device;
+    let nodal = &found.best.evaluation.nodal;
     let least = |f: &[f64]| f.iter().copied().fold(f64::INFINITY, f64::min);
-    assert!(least(&device.mass) >= 0.05 && least(&device.coefficients[0]) >= -1e-9);
+    assert!(least(&nodal.mass) >= 0.05 && least(&nodal.coefficients[0]) >= -1e-9);
     let start_cost = problem.evaluate(&start).unwrap().cost;
     assert!(
         found.best.evaluation.misfit <= 1e-6 * start_cost,
@@ -282,7 +283,7 @@ fn positivity_alone_does_not_find_the_device() {
         found.outcome
     );
     // Judged by what a free record could show at all: the ratios.
-    let (ratios, exact) = (Ratios::of(device), Ratios::of(&truth));
+    let (ratios, exact) = (Ratios::of(nodal), Ratios::of(&truth));
     let off = |a: &[f64], b: &[f64]| {
         a.iter()
             .zip(b)

@@ -6,7 +6,7 @@ mod common;
 use common::synthetic::{Truth, cramer_rao, rms, run, settings, with_noise};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter, Value,
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter, ScalarValue,
 };
 use kmcfit_core::internals::identifiability::{BandSettings, Bands};
 use kmcfit_core::internals::problem::Problem;
@@ -21,7 +21,7 @@ use rand_chacha::ChaCha8Rng;
 const NODES: usize = 201;
 const DURATION: f64 = 12.0;
 const SEEDS: u64 = 200;
-/// Of the readings' size: small enough that the problem is linear over the errors that it makes (per
+/// Of the samples' size: small enough that the problem is linear over the errors that it makes (per
 /// mille to per cent), whose bias of second order is a hundredth of their spread.
 const NOISE: f64 = 0.02;
 const INITIAL: State = State {
@@ -29,10 +29,10 @@ const INITIAL: State = State {
     velocity: -0.8,
 };
 
-/// Readings from clean ones, sigma and a seed.
+/// Samples from clean ones, sigma and a seed.
 type Spoil = fn(&[f64], f64, u64) -> Vec<f64>;
 
-/// A device of constants that is read through one channel at all nodes.
+/// A system of constants that is read through one channel at all nodes.
 struct Setup {
     terms: Vec<(Term, CoefficientKind)>,
     /// Mass first; `None` for what is known.
@@ -40,9 +40,9 @@ struct Setup {
     truth: Vec<f64>,
     kind: ChannelKind,
     excitation: Option<Excitation>,
-    /// Whether the initial state is sought.
+    /// Whether the initial state is estimated.
     state: bool,
-    /// Gain and offset, where they are sought.
+    /// Gain and offset, where they are estimated.
     sensor: Option<[f64; 2]>,
     loss: Loss,
 }
@@ -86,8 +86,10 @@ impl Setup {
 
     /// The true parameters, in the order of the problem's.
     fn theta(&self) -> Vec<f64> {
-        let sought = self.truth.iter().zip(&self.start);
-        let mut theta: Vec<f64> = sought.filter_map(|(p, start)| start.map(|_| *p)).collect();
+        let estimated = self.truth.iter().zip(&self.start);
+        let mut theta: Vec<f64> = estimated
+            .filter_map(|(p, start)| start.map(|_| *p))
+            .collect();
         if self.state {
             theta.extend([INITIAL.displacement, INITIAL.velocity]);
         }
@@ -98,13 +100,13 @@ impl Setup {
     fn clean(&self) -> Vec<f64> {
         let system = self.system();
         let each: Vec<Vec<f64>> = self.truth.iter().map(|p| vec![*p; NODES]).collect();
-        let device = NodalCoefficients {
+        let nodal = NodalCoefficients {
             mass: each[0].clone(),
             coefficients: each[1..].to_vec(),
         };
         let truth = Truth {
             system: &system,
-            device: &device,
+            nodal: &nodal,
             excitation: self.excitation.as_ref(),
             initial: INITIAL,
         };
@@ -139,13 +141,13 @@ impl Setup {
         let mut experiment = Experiment::free("record", INITIAL, NODES);
         experiment.excitation = self.excitation.clone();
         if self.state {
-            experiment.sought = [Some(0), Some(1)];
+            experiment.initial_parameters = [Some(0), Some(1)];
             scalars.extend([scalar(1.3), scalar(-0.6)]);
         }
         if self.sensor.is_some() {
             channel = channel.with_sensor(Sensor {
-                gain: Value::Sought(scalars.len()),
-                offset: Value::Sought(scalars.len() + 1),
+                gain: ScalarValue::Estimated(scalars.len()),
+                offset: ScalarValue::Estimated(scalars.len() + 1),
                 ..Sensor::default()
             });
             scalars.extend([scalar(1.0), scalar(0.0)]);
@@ -157,7 +159,7 @@ impl Setup {
         Problem::new(system, functions, vec![experiment.with_channel(channel)]).unwrap()
     }
 
-    /// Errors of all parameters in units of the spread of Cramer and Rao, for readings that `spoil`
+    /// Errors of all parameters in units of the spread of Cramer and Rao, for samples that `spoil`
     /// makes of the clean ones and sigma.
     fn errors(&self, seeds: std::ops::RangeInclusive<u64>, spoil: Spoil) -> Vec<Vec<f64>> {
         let clean = self.clean();
@@ -228,7 +230,7 @@ fn a_force_that_gives_the_mass() {
     setup.check("m, c, k under a force, from velocity");
 }
 
-/// One reading in twenty is off by 30 standard deviations, to either side.
+/// One sample in twenty is off by 30 standard deviations, to either side.
 fn with_outliers(clean: &[f64], sigma: f64, seed: u64) -> Vec<f64> {
     let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
     let mut spoiled = with_noise(clean, sigma, seed);
@@ -257,7 +259,7 @@ fn robust_losses_stay_close_where_least_squares_does_not() {
     let huber = with_loss(Loss::Huber { threshold: 1.345 });
     let student = with_loss(Loss::StudentT { degrees: 4.0 });
     println!("5 % outliers: squares {squares:.2}, Huber {huber:.2}, Student {student:.2}");
-    // The variance of a reading is 1 + 0.05 * 900 = 46 of its own: 6.8 times the spread; 80 errors
+    // The variance of a sample is 1 + 0.05 * 900 = 46 of its own: 6.8 times the spread; 80 errors
     // know that to a tenth.
     assert!((5.4..8.2).contains(&squares), "{squares}");
     // Huber (1964): with a share e of outliers and the threshold a = 1.345 the variance is
@@ -314,7 +316,7 @@ fn without_a_sigma_the_covariance_is_that_of_the_residuals() {
         let ratio = covariance[(j, j)] / expected[(j, j)];
         assert!((ratio - 1.0).abs() < 1e-9, "{j}: {ratio}");
     }
-    // Readings that leave no residual do not tell it.
+    // Samples that leave no residual do not tell it.
     let exact = evaluation.predictions[0][0].clone();
     assert!(found(exact).2.is_none());
 }
@@ -323,7 +325,7 @@ fn without_a_sigma_the_covariance_is_that_of_the_residuals() {
 #[test]
 fn a_covariance_is_formed_of_up_to_64_parameters() {
     let setup = Setup::free(ChannelKind::Displacement);
-    let covariance = |knots: usize, readings: usize| {
+    let covariance = |knots: usize, samples: usize| {
         let mut problem = setup.problem(setup.clean(), 0.1);
         let grid = problem.system.grid;
         let basis = Basis::PiecewiseLinear {
@@ -339,8 +341,8 @@ fn a_covariance_is_formed_of_up_to_64_parameters() {
                 parts.functions = Parameterization::new(list, NODES, grid.step()).unwrap();
             })
             .unwrap();
-        let times = grid.times()[..readings].to_vec();
-        let values = setup.clean()[..readings].to_vec();
+        let times = grid.times()[..samples].to_vec();
+        let values = setup.clean()[..samples].to_vec();
         let weighting = Weighting::Sigma(0.1);
         let channel = Channel::new(setup.kind, times, values, weighting, &grid, NODES);
         problem = problem
@@ -350,23 +352,23 @@ fn a_covariance_is_formed_of_up_to_64_parameters() {
             .unwrap();
         problem.covariance(&problem.evaluate(&problem.start()).unwrap())
     };
-    // The stiffness at the last knot moves the last reading by next to nothing: one knot fewer is seen.
+    // The stiffness at the last knot moves the last sample by next to nothing: one knot fewer is seen.
     assert!(covariance(63, NODES).is_some());
     assert!(covariance(64, NODES).is_some());
     assert!(covariance(65, NODES).is_none());
     assert!(covariance(20, NODES / 2).is_none());
 }
 
-/// A free motion tells the ratios to the mass alone; and as many readings as functions leave nothing to
+/// A free response tells the ratios to the mass alone; and as many samples as functions leave nothing to
 /// judge these by.
 #[test]
-fn what_the_readings_do_not_see_has_no_covariance() {
+fn undetermined_parameters_have_no_covariance() {
     let mut setup = Setup::free(ChannelKind::Displacement);
-    let covariance = |setup: &Setup, readings: usize| {
+    let covariance = |setup: &Setup, samples: usize| {
         let mut problem = setup.problem(setup.clean(), 0.1);
         let grid = problem.system.grid;
-        let times = grid.times()[50..50 + readings].to_vec();
-        let values = setup.clean()[50..50 + readings].to_vec();
+        let times = grid.times()[50..50 + samples].to_vec();
+        let values = setup.clean()[50..50 + samples].to_vec();
         let weighting = Weighting::Sigma(0.1);
         let channel = Channel::new(setup.kind, times, values, weighting, &grid, NODES);
         problem = problem
@@ -382,7 +384,7 @@ fn what_the_readings_do_not_see_has_no_covariance() {
     assert!(covariance(&setup, 100).is_none());
 }
 
-/// Readings of a known motion by a sensor whose offset is sought, with an unknown sigma.
+/// Samples of a known response by a sensor whose offset is estimated, with an unknown sigma.
 fn with_an_offset(values: Vec<f64>, setup: &Setup) -> Problem {
     let mut problem = setup.problem(values, 1.0);
     let offset = ScalarParameter {
@@ -399,7 +401,7 @@ fn with_an_offset(values: Vec<f64>, setup: &Setup) -> Problem {
         .unwrap();
     let channel = problem.experiments[0].channels[0].clone();
     let sensor = Sensor {
-        offset: Value::Sought(0),
+        offset: ScalarValue::Estimated(0),
         ..Sensor::default()
     };
     let weighting = Weighting::Estimated { sigma: 1.0 };
@@ -417,35 +419,35 @@ fn sigma_of(problem: &Problem) -> f64 {
     channel.weighting().sigma(0).expect("a sigma")
 }
 
-/// The offset of readings of a known motion is their mean distance from it, and the sigma their sample
+/// The offset of samples of a known response is their mean distance from it, and the sigma their sample
 /// standard deviation, with `n - 1` below the squares.
 #[test]
 fn the_sigma_is_the_sample_standard_deviation() {
     let mut setup = Setup::free(ChannelKind::Displacement);
     setup.start = vec![None; 3];
     let clean = setup.clean();
-    let readings: Vec<f64> = (with_noise(&clean, 0.05, 9).iter())
+    let samples: Vec<f64> = (with_noise(&clean, 0.05, 9).iter())
         .map(|x| x + 0.3)
         .collect();
-    let problem = with_an_offset(readings.clone(), &setup);
+    let problem = with_an_offset(samples.clone(), &setup);
     let found = fit_with_noise(&problem, &problem.start(), &settings(), &mut |_| {});
     let (with_sigma, fit) = found.unwrap();
     let n = NODES as f64;
-    let residuals = readings.iter().zip(&clean).map(|(r, c)| r - c);
+    let residuals = samples.iter().zip(&clean).map(|(r, c)| r - c);
     let mean = residuals.clone().sum::<f64>() / n;
     let squares: f64 = residuals.map(|r| (r - mean).powi(2)).sum();
     let expected = (squares / (n - 1.0)).sqrt();
     let sigma = sigma_of(&with_sigma);
-    // The readings are simulated twice, to rounding.
+    // The samples are simulated twice, to machine precision.
     assert!((fit.best.parameters[0] - mean).abs() < 1e-9);
     assert!((sigma / expected - 1.0).abs() < 1e-9, "{sigma} {expected}");
     // The sigma changes nothing about the mean: it is found in the first round and confirmed by the
-    // second. Twenty rounds would take twenty motions at least; the first fit takes two, and each of the
+    // second. Twenty rounds would take twenty responses at least; the first fit takes two, and each of the
     // two rounds one at least.
     assert!((4..20).contains(&fit.counts.forward), "{:?}", fit.counts);
 }
 
-/// Two sensors of one motion with the same offset, one ten times as noisy: their sigmas are those about the
+/// Two sensors of one response with the same offset, one ten times as noisy: their sigmas are those about the
 /// offset, and the offset is the mean with the weights of these sigmas.
 #[test]
 fn sigmas_of_two_channels_rest_with_their_weighted_mean() {
@@ -465,8 +467,8 @@ fn sigmas_of_two_channels_rest_with_their_weighted_mean() {
     let (with_sigmas, fit) = found.unwrap();
 
     let n = NODES as f64;
-    let residuals = noisy.each_ref().map(|readings| -> Vec<f64> {
-        let pairs = readings.iter().zip(&clean);
+    let residuals = noisy.each_ref().map(|samples| -> Vec<f64> {
+        let pairs = samples.iter().zip(&clean);
         pairs.map(|(r, c)| r - c).collect()
     });
     let means = residuals.each_ref().map(|r| r.iter().sum::<f64>() / n);
@@ -475,7 +477,7 @@ fn sigmas_of_two_channels_rest_with_their_weighted_mean() {
     for _ in 0..100 {
         let [one, two] = variances;
         offset = (means[0] / one + means[1] / two) / (1.0 / one + 1.0 / two);
-        // One parameter of 2 n readings.
+        // One parameter of 2 n samples.
         variances = residuals.each_ref().map(|r| {
             let squares = r.iter().map(|r| (r - offset).powi(2)).sum::<f64>();
             squares / n / (1.0 - 0.5 / n)
@@ -493,7 +495,7 @@ fn sigmas_of_two_channels_rest_with_their_weighted_mean() {
     assert_eq!(fit.initial_cost, cost);
 }
 
-/// With a robust loss the sigma is told by the median of the residuals, half of which are below 0.6745 sigma
+/// With a robust loss the sigma follows from the median of the residuals, half of which are below 0.6745 sigma
 /// where they are Gaussian.
 #[test]
 fn a_robust_sigma_is_that_of_the_median() {
@@ -501,12 +503,12 @@ fn a_robust_sigma_is_that_of_the_median() {
     setup.start = vec![None; 3];
     setup.loss = Loss::Huber { threshold: 1.345 };
     let clean = setup.clean();
-    let readings = with_outliers(&clean, 0.05, 3);
-    let problem = with_an_offset(readings.clone(), &setup);
+    let samples = with_outliers(&clean, 0.05, 3);
+    let problem = with_an_offset(samples.clone(), &setup);
     let found = fit_with_noise(&problem, &problem.start(), &settings(), &mut |_| {});
     let (with_sigma, fit) = found.unwrap();
     let offset = fit.best.parameters[0];
-    let residuals = readings.iter().zip(&clean).map(|(r, c)| r - c - offset);
+    let residuals = samples.iter().zip(&clean).map(|(r, c)| r - c - offset);
     let mut sizes: Vec<f64> = residuals.map(f64::abs).collect();
     sizes.sort_by(f64::total_cmp);
     let n = NODES as f64;
@@ -516,9 +518,9 @@ fn a_robust_sigma_is_that_of_the_median() {
     assert!((sigma / expected - 1.0).abs() < 1e-4, "{sigma} {expected}");
 }
 
-/// Readings without noise: their sigma is the last digit of a reading, and not zero.
+/// Samples without noise: their sigma is the last digit of a sample, and not zero.
 #[test]
-fn readings_that_are_fitted_exactly_have_a_sigma() {
+fn samples_that_are_fitted_exactly_have_a_sigma() {
     let mut setup = Setup::free(ChannelKind::Displacement);
     setup.start = vec![None; 3];
     let silent = with_an_offset(vec![0.0; NODES], &setup);
@@ -531,9 +533,9 @@ fn readings_that_are_fitted_exactly_have_a_sigma() {
     assert!((sigma - 1.0).abs() < 1e-12, "{sigma}");
 }
 
-/// Readings that are all zero, of what is at rest, have no scale: the sigma stays as it was.
+/// Samples that are all zero, of what is at rest, have no scale: the sigma stays as it was.
 #[test]
-fn readings_of_nothing_keep_their_sigma() {
+fn zero_samples_keep_their_sigma() {
     let mut setup = Setup::free(ChannelKind::Displacement);
     setup.start = vec![None; 3];
     let mut problem = with_an_offset(vec![0.0; NODES], &setup);
@@ -571,7 +573,7 @@ fn standard_errors_and_bands_agree() {
     setup.start[0] = Some(1.1);
     let (covariance, bands) = both(&setup);
     let covariance = covariance.expect("a force gives the mass");
-    assert_eq!(bands.unseen, 0);
+    assert_eq!(bands.undetermined, 0);
     for (j, band) in bands.functions.iter().enumerate() {
         let ratio = band.standard_error[0] / covariance[(j, j)].sqrt();
         assert!((ratio - 1.0).abs() < 1e-9, "{j}: {ratio}");
@@ -587,7 +589,11 @@ fn standard_errors_and_bands_agree() {
             .collect();
         setup.excitation = Some(Excitation::force_at_nodes(&force));
         let (covariance, bands) = both(&setup);
-        assert_eq!(covariance.is_none(), bands.unseen > 0, "1e-{exponent}");
+        assert_eq!(
+            covariance.is_none(),
+            bands.undetermined > 0,
+            "1e-{exponent}"
+        );
         for (j, band) in bands.functions.iter().enumerate() {
             let error = covariance
                 .as_ref()
@@ -605,7 +611,7 @@ fn standard_errors_and_bands_agree() {
     setup.start[0] = Some(1.1);
     let (covariance, bands) = both(&setup);
     assert!(covariance.is_none());
-    assert_eq!(bands.unseen, 1);
+    assert_eq!(bands.undetermined, 1);
     for band in &bands.functions {
         assert!(band.standard_error.iter().all(|e| e.is_infinite()));
     }

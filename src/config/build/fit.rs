@@ -117,7 +117,10 @@ fn can_regularise(
     match solver {
         Solver::GaussNewton | Solver::EquationError => Ok(()),
         _ => Err(file
-            .error_at("fit.method", format!("this method knows no {asked}"))
+            .error_at(
+                "fit.method",
+                format!("this method does not support {asked}"),
+            )
             .found(format!("`{}`", solver.name()))
             .expected("`gauss-newton`, which does")),
     }
@@ -130,10 +133,10 @@ fn gradient(file: &ModelFile, problem: &Problem) -> Result<GradientKind, InputEr
         return Err(file
             .error_at(
                 "fit.gradient",
-                "the continuous adjoint is that of the integral cost with a reading at every node",
+                "the continuous adjoint needs the integral cost with a sample at every node",
             )
-            .found("`continuous` with a sigma or with fewer readings than nodes")
-            .expected("`discrete`, which has no such limits"));
+            .found("`continuous` with a sigma or with fewer samples than nodes")
+            .expected("`discrete`"));
     }
     Ok(asked.unwrap_or(GradientKind::Discrete))
 }

@@ -3,11 +3,12 @@
 mod auto;
 mod per_node;
 
-use super::Purpose;
+use super::BuildMode;
 use super::experiments::{RawChannel, Record};
 use crate::config::ModelFile;
 use crate::config::scalar::{Count, Nodes};
 use crate::error::{InputError, Place};
+use crate::finding::Finding;
 use crate::memory;
 use kmcfit_core::internals::system::{Grid, Method};
 
@@ -16,9 +17,9 @@ const MOST_CHOSEN: usize = 10_000_000;
 
 pub(super) fn build(
     file: &ModelFile,
-    purpose: Purpose,
+    purpose: BuildMode,
     records: &[Option<Record>],
-    remarks: &mut Vec<String>,
+    notes: &mut Vec<Finding>,
 ) -> Result<Grid, InputError> {
     let asked = file.spec.grid.as_ref().and_then(|g| g.nodes.as_ref());
     let asked = match (purpose.nodes(), asked) {
@@ -32,30 +33,28 @@ pub(super) fn build(
         _ if !measured => {
             return Err(file
                 .error_at("grid", "the number of nodes is missing")
-                .expected("`nodes`, since there are no readings to take it from"));
+                .expected("`nodes`, because there is no record"));
         }
-        Some(Nodes::Auto) => auto::nodes(method(file), records, duration, MOST_CHOSEN, remarks),
+        Some(Nodes::Auto) => auto::nodes(method(file), records, duration, MOST_CHOSEN, notes),
         None => match node_per_reading(records) {
             Some(nodes) => nodes,
-            None => auto::nodes(method(file), records, duration, MOST_CHOSEN, remarks),
+            None => auto::nodes(method(file), records, duration, MOST_CHOSEN, notes),
         },
     };
     if nodes < Grid::FEWEST_NODES {
-        return Err(
-            about_nodes(file, purpose, "this number of nodes cannot be used")
-                .found(nodes)
-                .expected(format!("{} or more", Grid::FEWEST_NODES)),
-        );
+        return Err(about_nodes(file, purpose, "invalid number of nodes")
+            .found(nodes)
+            .expected(format!("{} or more", Grid::FEWEST_NODES)));
     }
     fits_into_memory(file, purpose, nodes)?;
     Grid::new(start, duration, nodes).ok_or_else(|| {
-        file.error_at("grid", "the times make no grid")
+        file.error_at("grid", "invalid time axis")
             .found(format!("{nodes} nodes over {duration} s"))
             .expected("a positive duration whose steps are not zero")
     })
 }
 
-fn about_nodes(file: &ModelFile, purpose: Purpose, problem: &str) -> InputError {
+fn about_nodes(file: &ModelFile, purpose: BuildMode, problem: &str) -> InputError {
     match purpose.nodes() {
         Some(_) => InputError::new(Place::Argument("--nodes".into()), problem),
         None => file.error_at("grid.nodes", problem),
@@ -63,12 +62,12 @@ fn about_nodes(file: &ModelFile, purpose: Purpose, problem: &str) -> InputError 
 }
 
 /// Memory that a run of the model on so many nodes may need, bytes.
-pub(super) fn memory_of(file: &ModelFile, purpose: Purpose, nodes: usize) -> f64 {
+pub(super) fn memory_of(file: &ModelFile, purpose: BuildMode, nodes: usize) -> f64 {
     nodes as f64 * per_node::per_node(file, purpose) as f64 + memory::BASE as f64
 }
 
 /// Refuses a grid that the machine has no memory for, before any is taken.
-fn fits_into_memory(file: &ModelFile, purpose: Purpose, nodes: usize) -> Result<(), InputError> {
+fn fits_into_memory(file: &ModelFile, purpose: BuildMode, nodes: usize) -> Result<(), InputError> {
     let needed = memory_of(file, purpose, nodes);
     let Err(available) = memory::check(needed as u64) else {
         return Ok(());
@@ -118,8 +117,8 @@ fn span(file: &ModelFile, records: &[Option<Record>]) -> Result<(f64, f64), Inpu
     let measured = || records.iter().flatten().filter(|r| !r.channels.is_empty());
     let Some(first) = measured().next() else {
         let duration = asked.ok_or_else(|| {
-            file.error_at("grid", "the length of the motion is missing")
-                .expected("`duration` in s, since there are no readings to take it from")
+            file.error_at("grid", "the duration is missing")
+                .expected("`duration` in s, because there is no record")
         })?;
         return Ok((0.0, duration.0));
     };
@@ -132,7 +131,10 @@ fn span(file: &ModelFile, records: &[Option<Record>]) -> Result<(f64, f64), Inpu
         && (asked.0 - duration).abs() > first.spacing() * 1e-6
     {
         return Err(file
-            .error_at("grid.duration", "the duration is not that of the readings")
+            .error_at(
+                "grid.duration",
+                "the duration differs from that of the records",
+            )
             .found(asked.0)
             .expected(format!("{duration} (or leave it out)")));
     }

@@ -1,4 +1,4 @@
-//! From what was written to what is meant: a [`ModelFile`] becomes a [`Model`].
+//! Builds a [`Model`], the problem and its settings, from a [`ModelFile`] and its data files.
 
 mod constraints;
 mod experiments;
@@ -15,6 +15,7 @@ pub use study::{Candidate, Equivalent, StudyPlan, StudyTarget};
 use super::locate::{key_path, locate};
 use super::{ModelFile, Source};
 use crate::error::{InputError, Place};
+use crate::finding::Finding;
 use crate::memory;
 use kmcfit_core::internals::builder::{BuildError, Builder, Contradiction, listed};
 use kmcfit_core::internals::problem::Problem;
@@ -23,80 +24,79 @@ use kmcfit_core::internals::system::{Grid, NodalCoefficients, State};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Everything that a model file means.
+/// Problem, settings and further contents of a model file.
 #[derive(Debug, Clone)]
 pub struct Model {
-    /// The model file, as it was given.
+    /// Path of the model file.
     pub file: PathBuf,
     /// Title for reports.
     pub title: String,
-    /// What is fitted.
+    /// The problem.
     pub problem: Problem,
-    /// The start as it is given, before it was moved into the constraints.
+    /// Start values before the projection onto the constraints.
     pub given_start: Vec<f64>,
-    /// How it is fitted.
+    /// Settings of the fit.
     pub settings: FitSettings,
-    /// The rule that chooses the weight of some penalties, whose weight in `problem` is 1.
+    /// Rule that chooses the weight of some penalties; their weight in `problem` is 1.
     pub weight_rule: Option<WeightSearch>,
-    /// The true device on the grid, where it is known.
+    /// True coefficients at the nodes, if they are known.
     pub truth: Option<NodalCoefficients>,
-    /// What reports say about the channels of each experiment.
+    /// Notes for reports on the channels of each experiment.
     pub notes: Vec<Vec<ChannelNote>>,
-    /// Experiments that are only predicted and scored.
-    pub held_out: Vec<HoldOut>,
-    /// Initial states to predict the motion from.
+    /// Validation records.
+    pub validation: Vec<HoldOut>,
+    /// Initial states of the predictions.
     pub predictions: Vec<State>,
-    /// What `study` looks into.
+    /// Settings of a study.
     pub study: StudyPlan,
-    /// Memory that a fit of it may need, bytes: an upper estimate.
+    /// Upper estimate of the memory of a fit, bytes.
     pub memory: u64,
-    /// What the user should know although it is no error.
-    pub warnings: Vec<String>,
-    /// What was chosen for the user, and why.
-    pub remarks: Vec<String>,
-    /// What it was made from.
+    /// Warnings about data and specification.
+    pub warnings: Vec<Finding>,
+    /// Automatic choices, such as the number of nodes.
+    pub automatic: Vec<Finding>,
+    /// Source files.
     pub source: Source,
-    /// What it took to build it.
+    /// Time taken to build it.
     pub preparation: Preparation,
 }
 
-/// What it took to build a model, in wall-clock time.
+/// Wall-clock time taken to build a model.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Preparation {
-    /// Reading its data.
+    /// Time to read the data.
     pub reading: Duration,
-    /// All together.
+    /// Total time.
     pub total: Duration,
 }
 
-/// What a model is built for.
+/// Mode in which a model is built.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Purpose {
-    /// To be fitted: readings are needed, at nodes.
+pub enum BuildMode {
+    /// Fit: samples are required, at nodes.
     Fit,
-    /// To be simulated: readings are not looked at.
+    /// Simulation: data files are not read.
     Simulate {
         /// Number of nodes instead of the model's.
         nodes: Option<usize>,
     },
-    /// To have its gradient checked: readings are needed, and interpolated where a node has none.
+    /// Gradient check: samples are required, and interpolated at nodes without one.
     Check {
         /// Number of nodes instead of the model's.
         nodes: Option<usize>,
     },
 }
 
-impl Purpose {
+impl BuildMode {
     fn nodes(self) -> Option<usize> {
         match self {
-            Purpose::Fit => None,
-            Purpose::Simulate { nodes } | Purpose::Check { nodes } => nodes,
+            BuildMode::Fit => None,
+            BuildMode::Simulate { nodes } | BuildMode::Check { nodes } => nodes,
         }
     }
 }
 
-/// An error about a file as a whole, said at the key of the model that names the file; errors about
-/// its rows stay where they are.
+/// Moves an error about a whole file to the key of the model that names the file; errors about its rows keep their place.
 fn asked_for(file: &ModelFile, key: impl Into<String>) -> impl Fn(InputError) -> InputError {
     let key = key.into();
     move |error| match &error.place {
@@ -114,10 +114,10 @@ fn asked_for(file: &ModelFile, key: impl Into<String>) -> impl Fn(InputError) ->
     }
 }
 
-/// The specification that a model file states, with what its files have, and the notes of its channels.
+/// The builder of the core for a model file and its data, and the notes on its channels.
 fn builder(
     file: &ModelFile,
-    purpose: Purpose,
+    purpose: BuildMode,
     grid: &Grid,
     solver: Solver,
     records: Vec<Option<experiments::Record>>,
@@ -130,7 +130,7 @@ fn builder(
     let shared = shared.collect::<Result<_, _>>()?;
     let mut builder = Builder::of(shared).grid(*grid).solver(solver);
     builder = builder.method(grid::method(file));
-    if matches!(purpose, Purpose::Simulate { .. }) {
+    if matches!(purpose, BuildMode::Simulate { .. }) {
         builder = builder.simulation();
     }
     let mut notes = Vec::new();
@@ -158,7 +158,7 @@ fn input_error(file: &ModelFile, error: BuildError) -> InputError {
     }
 }
 
-/// The key as the file has it: what stands alone in place of a list has no number.
+/// The key as written in the file: a single map in place of a list has no index.
 fn written(file: &ModelFile, key: &str) -> String {
     let alone = key.replace("penalty[0]", "penalty");
     let depth = |key: &str| locate(file.effective_text(), &key_path(key)).depth;
@@ -191,17 +191,17 @@ fn contradicted(file: &ModelFile, contradiction: &Contradiction, problem: &str) 
 /// Builds the model of a file for a purpose.
 ///
 /// # Errors
-/// At the first thing that cannot be meant, with its line.
-pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
+/// At the first invalid key, with its line.
+pub fn build(file: &ModelFile, purpose: BuildMode) -> Result<Model, InputError> {
     let clock = Instant::now();
     let mut reading = Duration::ZERO;
     let spec = &file.spec;
     let mut warnings = Vec::new();
-    let mut remarks = Vec::new();
+    let mut automatic = Vec::new();
     let records = timed(&mut reading, || {
         experiments::read(file, purpose, &mut warnings)
     })?;
-    let grid = grid::build(file, purpose, &records, &mut remarks)?;
+    let grid = grid::build(file, purpose, &records, &mut automatic)?;
     let solver = fit::solver(file)?;
     let (builder, notes) = builder(file, purpose, &grid, solver, records)?;
     let about = |error| input_error(file, error);
@@ -210,15 +210,15 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
     let settings = fit::build(file, &built.problem, solver, searches)?;
     let given_start = built.problem.functions.start();
     // A simulation is of the functions as they are given.
-    if !matches!(purpose, Purpose::Simulate { .. }) {
+    if !matches!(purpose, BuildMode::Simulate { .. }) {
         built.move_start().map_err(about)?;
     }
-    warnings.extend(built.notices.iter().map(ToString::to_string));
-    let held_out = |i: &usize| experiments::is_held_out(&spec.experiments[*i]);
+    warnings.extend(built.notices.iter().map(Finding::stated));
+    let validation = |i: &usize| experiments::is_held_out(&spec.experiments[*i]);
     let (own, notes): (Vec<_>, Vec<_>) = notes
         .into_iter()
         .enumerate()
-        .partition(|(i, _)| held_out(i));
+        .partition(|(i, _)| validation(i));
     let truth = timed(&mut reading, || functions::truth(file, &grid))?;
     let state = |s: &super::spec::StateSpec| State {
         displacement: s.displacement.0,
@@ -238,7 +238,7 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
         weight_rule: built.weight_search,
         truth,
         notes: notes.into_iter().map(|(_, notes)| notes).collect(),
-        held_out: (built.validation.into_iter().zip(own))
+        validation: (built.validation.into_iter().zip(own))
             .map(|((experiment, scalars), (_, notes))| HoldOut {
                 experiment,
                 scalars,
@@ -247,7 +247,7 @@ pub fn build(file: &ModelFile, purpose: Purpose) -> Result<Model, InputError> {
             .collect(),
         predictions: spec.predict.iter().flatten().map(state).collect(),
         warnings,
-        remarks,
+        automatic,
         source,
         preparation: Preparation {
             reading,

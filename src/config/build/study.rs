@@ -26,24 +26,24 @@ pub struct StudyPlan {
     pub seed: u64,
     /// Numbers whose profile is drawn.
     pub profiles: Vec<StudyTarget>,
-    /// Times at which the widest tubes are sought, s.
-    pub tubes: Vec<f64>,
-    /// Largest J of a device in the tubes; `None` for what the confidence allows.
-    pub level: Option<f64>,
+    /// Times at which the widest extremes are sought, s.
+    pub extremes: Vec<f64>,
+    /// Largest J of a device in the extremes; `None` for what the confidence allows.
+    pub misfit_limit: Option<f64>,
     /// Number of starts of the search for other optima; 0 for none.
     pub starts: usize,
     /// Factor by which the starts may lie off the start values.
     pub spread: f64,
     /// Optima whose ratios and motions agree to this are one.
-    pub same: f64,
+    pub merge_tolerance: f64,
     /// Number of replicates of the bootstrap; 0 for none.
     pub replicates: usize,
     /// Whether their noise is drawn from the residuals.
     pub residual_noise: bool,
     /// Masses, and dampings to be near to, of devices that are to have the fit's motion.
-    pub equivalents: Vec<Equivalent>,
+    pub equivalent_systems: Vec<Equivalent>,
     /// Whether each function is held against a constant.
-    pub varies: bool,
+    pub constancy_test: bool,
     /// Experiments that might be made next.
     pub candidates: Vec<Candidate>,
     /// Wall-clock limit of one fit on the way.
@@ -103,8 +103,8 @@ const MOST_REPLICATES: usize = 1_000_000;
 const FEWEST_REPLICATES: usize = 40;
 /// Ratios and motions that differ by less are those of one optimum.
 const SAME: f64 = 1e-3;
-/// Tubes are sought at so many times unless the model names some.
-const TUBES: usize = 5;
+/// Number of times of the extremes, unless the model names them.
+const EXTREME_TIMES: usize = 5;
 
 pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, InputError> {
     let none = StudySpec::default();
@@ -115,7 +115,7 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
     let spread = within(file, "study.spread", spec.spread, SPREAD, |x| {
         x > 1.0 && x <= WIDEST_SPREAD
     })?;
-    let same = within(
+    let merge_tolerance = within(
         file,
         "study.merge_tolerance",
         spec.merge_tolerance,
@@ -131,8 +131,8 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
     let candidates = candidates
         .map(|(i, spec)| candidate(file, problem, &format!("study.candidates[{i}]"), spec))
         .collect::<Result<_, _>>()?;
-    let equivalents = spec.equivalent_systems.iter().flatten().enumerate();
-    let equivalents = equivalents
+    let equivalent_systems = spec.equivalent_systems.iter().flatten().enumerate();
+    let equivalent_systems = equivalent_systems
         .map(|(i, spec)| {
             equivalent(
                 file,
@@ -143,18 +143,18 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
         })
         .collect::<Result<_, _>>()?;
     Ok(StudyPlan {
-        equivalents,
+        equivalent_systems,
         residual_noise: spec.noise == Some(NoiseName::Residual),
         confidence,
         seed: spec.seed.map_or(SEED, |seed| seed.0 as u64),
         profiles,
-        tubes: tubes(file, problem, spec)?,
-        level: spec.misfit_limit.map(|level| level.0),
+        extremes: extremes(file, problem, spec)?,
+        misfit_limit: spec.misfit_limit.map(|level| level.0),
         starts: spec.starts.map_or(0, |count| count.0),
         spread,
-        same,
+        merge_tolerance,
         replicates: spec.bootstrap.map_or(0, |count| count.0),
-        varies: spec.constancy_test == Some(true),
+        constancy_test: spec.constancy_test == Some(true),
         candidates,
         limit: None,
     })
@@ -180,7 +180,7 @@ fn check(file: &ModelFile, spec: &StudySpec) -> Result<(), InputError> {
     for (name, given, fewest, most) in limits {
         if let Some(count) = given.filter(|count| !(fewest..=most).contains(&count.0)) {
             return Err(file
-                .error_at(&format!("study.{name}"), "this number cannot be used")
+                .error_at(&format!("study.{name}"), "invalid number")
                 .found(count.0)
                 .expected(format!("{fewest} to {most}, or no `{name}`")));
         }
@@ -188,7 +188,7 @@ fn check(file: &ModelFile, spec: &StudySpec) -> Result<(), InputError> {
     if spec
         .extremes
         .as_ref()
-        .is_some_and(|tubes| tubes.values().is_empty())
+        .is_some_and(|extremes| extremes.values().is_empty())
     {
         return Err(file
             .error_at("study.extremes", "there is no time")
@@ -231,7 +231,7 @@ fn within(
 ) -> Result<f64, InputError> {
     match given {
         Some(number) if !fits(number.0) => Err(file
-            .error_at(key, "this number cannot be used")
+            .error_at(key, "invalid number")
             .found(number.0)
             .expected(match key {
                 "study.confidence" => "a number between 0 and 1, for instance 0.95",
@@ -243,11 +243,12 @@ fn within(
 }
 
 /// Times on the grid; evenly spread where none are given.
-fn tubes(file: &ModelFile, problem: &Problem, spec: &StudySpec) -> Result<Vec<f64>, InputError> {
+fn extremes(file: &ModelFile, problem: &Problem, spec: &StudySpec) -> Result<Vec<f64>, InputError> {
     let grid = &problem.system.grid;
     let Some(given) = &spec.extremes else {
-        let time = |i: usize| grid.start() + grid.duration() * i as f64 / (TUBES - 1) as f64;
-        return Ok((0..TUBES).map(time).collect());
+        let time =
+            |i: usize| grid.start() + grid.duration() * i as f64 / (EXTREME_TIMES - 1) as f64;
+        return Ok((0..EXTREME_TIMES).map(time).collect());
     };
     for (i, time) in given.values().iter().enumerate() {
         on_grid(
@@ -310,7 +311,7 @@ fn target(
                 .ok_or_else(|| {
                     let names = || scalars.iter().map(|s| s.name.as_str());
                     let error = file
-                        .error_at(&format!("{key}.scalar"), "no such number is estimated")
+                        .error_at(&format!("{key}.scalar"), "no such nuisance parameter")
                         .found(quote(&name.0))
                         .expected(match scalars.is_empty() {
                             true => "a model that estimates initial states or sensors".to_owned(),
@@ -335,7 +336,7 @@ fn function(
     key: &str,
     quantity: FunctionName,
 ) -> Result<usize, InputError> {
-    let main = problem.functions.assembly(0);
+    let main = problem.functions.coefficient_set(0);
     let of = |f: &&usize| problem.functions.get(**f).quantity == quantity;
     let (key, name) = (format!("{key}.function"), quantity.name());
     match main.iter().find(of) {
@@ -345,7 +346,7 @@ fn function(
             .found(format!("`{name}`"))
             .expected("a function that is fitted")),
         None => Err(file
-            .error_at(&key, format!("the device has no {name}"))
+            .error_at(&key, format!("the model has no {name}"))
             .found(format!("`{name}`"))
             .expected("a function of the model")),
     }

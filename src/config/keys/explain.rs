@@ -1,4 +1,4 @@
-//! What a key of a model file says, in words.
+//! `kmcfit explain`: documentation of a key as text.
 
 use super::{Found, Kind, MODEL, all};
 use crate::error::{InputError, Place};
@@ -6,18 +6,18 @@ use crate::input::quote;
 use crate::near::did_you_mean;
 use std::fmt::Write;
 
-/// Most places of a key that are listed.
+/// Most further paths of a key that are listed.
 const MOST_PLACES: usize = 4;
 
-/// Explains the keys that a name or a path means: `tolerance`, `fit.stop`, `experiments[0].sigma`.
-/// Without a name it lists the keys at the top.
+/// Documentation of the keys with a name or a path: `tolerance`, `fit.stop`, `experiments[0].sigma`. Without a name, a list
+/// of the top-level keys.
 ///
 /// # Errors
-/// When there is no such key.
+/// If no such key.
 pub fn explain(name: Option<&str>) -> Result<String, InputError> {
     let Some(name) = name else {
         let mut text =
-            String::from("Keys of a model file; `kmcfit explain KEY` says more of one:\n\n");
+            String::from("Keys of a model file (`kmcfit explain KEY` explains one):\n\n");
         list(&mut text, MODEL.keys.iter().map(|key| (key.name, key.text)));
         return Ok(text);
     };
@@ -51,9 +51,9 @@ fn without_positions(path: &str) -> String {
 }
 
 fn unknown(name: &str, wanted: &str, keys: &[Found]) -> InputError {
-    let error = InputError::new(Place::Argument("KEY".into()), "there is no such key")
+    let error = InputError::new(Place::Argument("KEY".into()), "no such key")
         .found(quote(name))
-        .expected("a key of a model file; `kmcfit explain` lists those at the top");
+        .expected("a key of a model file; `kmcfit explain` lists the top-level keys");
     let last = wanted.rsplit('.').next().unwrap_or_default();
     let paths = || keys.iter().flat_map(|f| f.paths.iter().map(String::as_str));
     let names = || keys.iter().map(|f| f.key.name);
@@ -66,19 +66,19 @@ fn unknown(name: &str, wanted: &str, keys: &[Found]) -> InputError {
 fn entry(found: &Found, wanted: &str) -> String {
     let key = found.key;
     let mut paths: Vec<&str> = found.paths.iter().map(String::as_str).collect();
-    // The path that was asked for comes first, then the shortest.
+    // The requested path first, then the shortest.
     paths.sort_by_key(|path| (*path != wanted, path.matches('.').count()));
     let mut text = format!("{}\n  {}\n", paths[0], key.text);
     let mut row = |name: &str, value: &str| {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "  {name:<8} {value}");
     };
-    row("kind", &kind(key.kind));
+    row("type", &kind(key.kind));
     if let Some(unit) = key.unit {
         row("unit", unit);
     }
     match (key.required, key.default) {
-        (true, _) => row("default", "none: it must be there"),
+        (true, _) => row("default", "none (required)"),
         (false, Some(default)) => row("default", default),
         (false, None) => {}
     }
@@ -96,20 +96,20 @@ fn entry(found: &Found, wanted: &str) -> String {
         text.push('\n');
         list(&mut text, words.iter().copied());
     }
-    let mut told: Vec<&str> = Vec::new();
+    let mut listed: Vec<&str> = Vec::new();
     for group in key.kind.groups() {
         // A map, or a list of such maps.
-        if told.contains(&group.name) {
+        if listed.contains(&group.name) {
             continue;
         }
-        told.push(group.name);
+        listed.push(group.name);
         let _ = write!(text, "\n  {}\n", group.text);
         list(&mut text, group.keys.iter().map(|key| (key.name, key.text)));
     }
     text
 }
 
-/// Names and what they mean, in two columns.
+/// Names and their texts in two columns.
 fn list<'a>(text: &mut String, entries: impl Iterator<Item = (&'a str, &'a str)> + Clone) {
     let width = entries.clone().map(|(name, _)| name.len()).max();
     let width = width.unwrap_or_default();
@@ -118,7 +118,7 @@ fn list<'a>(text: &mut String, entries: impl Iterator<Item = (&'a str, &'a str)>
     }
 }
 
-/// The choices among the words that may stand here.
+/// Choices of a kind.
 fn choices(kind: Kind) -> Vec<&'static [(&'static str, &'static str)]> {
     match kind {
         Kind::Choice(words) => vec![words],
@@ -131,7 +131,7 @@ fn choices(kind: Kind) -> Vec<&'static [(&'static str, &'static str)]> {
     }
 }
 
-/// A kind in words.
+/// A kind of value as text.
 fn kind(kind: Kind) -> String {
     match kind {
         Kind::Format => "the number 1".into(),
@@ -141,12 +141,12 @@ fn kind(kind: Kind) -> String {
         Kind::Bool => "true or false".into(),
         Kind::Column => "a column, by name or by number from 1".into(),
         Kind::Word(word) => format!("`{word}`"),
-        Kind::Choice(_) => "one of the words below".into(),
+        Kind::Choice(_) => "one of the values below".into(),
         Kind::Map(_) => "a map with the keys below".into(),
         Kind::List(Kind::Map(_)) => "a list of maps with the keys below".into(),
         Kind::List(Kind::Number) => "a list of numbers".into(),
         Kind::List(Kind::Text) => "a list of texts".into(),
-        Kind::List(_) => "a list of words below".into(),
+        Kind::List(_) => "a list of the values below".into(),
         Kind::AnyOf(kinds) => {
             let kinds: Vec<String> = kinds.iter().map(|k| self::kind(*k)).collect();
             kinds.join(", or ")

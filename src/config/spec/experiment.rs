@@ -1,4 +1,4 @@
-//! Keys of an experiment: its file, channels, sensors, what drives it, and its beginning.
+//! Keys of an experiment: data file, channels, sensors, input and initial state.
 
 use crate::config::map::keys;
 
@@ -8,71 +8,71 @@ use crate::config::scalar::{ColumnId, Count, Estimate, Number, NumberOrEstimate,
 use crate::config::scalar::{Sigma, Text};
 
 keys! {
-    /// One record.
+    /// An experiment: one record and its input.
     pub struct ExperimentSpec = "experiment", expecting "a map such as {name: free decay, data: file.csv, initial: {displacement: 3.3, velocity: 1.0}}" {
-        /// What reports call it.
+        /// Name for reports.
         name: Option<Text>, example "free decay", default "experiment 1, experiment 2, …";
-        /// File of the readings, relative to the model file; a simulation needs none.
+        /// Data file, relative to the model file; a simulation needs none.
         data: Option<Text>, example "readings.csv";
-        /// How the file is written, where that is not to be found out from it.
+        /// Format of the data file, where automatic detection fails.
         format: Option<FileFormatSpec>,
             example "{delimiter: semicolon, decimal: comma}",
-            default "found out from the file";
-        /// Which columns of the file are what.
+            default "detected";
+        /// Columns of the data file.
         columns: Option<ColumnsSpec>,
             example "{time: t_s, displacement: y_m}",
             default "{time: t_s, displacement: y_m}";
-        /// Readings per second, in place of a column of times.
+        /// Sampling rate, in place of a column of times.
         sample_rate: Option<Number>, example "1000.0", unit "Hz";
-        /// Units of the columns, which are converted to SI.
-        units: Option<UnitsSpec>, example "{displacement: mm}", default "what the file states, else SI";
-        /// First and last time that is used, as the file counts.
+        /// Units of the columns, converted to SI.
+        units: Option<UnitsSpec>, example "{displacement: mm}", default "as stated in the file, else SI";
+        /// First and last time used, on the time axis of the file.
         window: Option<RangeSpec>, example "{min: 0.1, max: 2.9}", unit "s", default "all";
-        /// Time, as the file counts, that becomes 0.
+        /// Time of the file that becomes 0.
         time_zero: Option<Number>, example "0.1", unit "s", default "0";
-        /// Keep every so manyth reading after a low-pass filter.
+        /// Decimation factor; a low-pass filter is applied before.
         decimate: Option<Count>, example "4", default "1";
-        /// Frequencies outside which readings and model are filtered alike.
+        /// Frequency band to which samples and simulated response are filtered.
         band: Option<RangeSpec>, example "{min: 5.0, max: 50.0}", unit "Hz", default "all";
-        /// Standard deviation of the readings; without it J is the paper's integral.
+        /// Standard deviation of the samples; without it J is the paper's integral.
         sigma: Option<SigmaSpec>, example "{displacement: 0.1}";
-        /// What residuals cost; needs `sigma`.
+        /// Loss of the residuals; needs `sigma`.
         loss: Option<LossesSpec>, example "{displacement: huber}", default "squares";
-        /// reading = gain * motion + offset + drift * time.
-        sensors: Option<SensorsSpec>, example "{acceleration: {offset: estimate}}", default "perfect ones";
-        /// Force on the mass: how the column `force` is read between its samples, or a shape in its place.
+        /// Sensor model: sample = gain * response + offset + drift * time.
+        sensors: Option<SensorsSpec>, example "{acceleration: {offset: estimate}}", default "gain 1, offset 0";
+        /// Force on the mass: interpolation of the column `force`, or a waveform in its place.
         force: Option<ForceSpec>, example "{interpolation: cubic}", default "none, or the column `force`";
-        /// How the motion of the base is read between its samples.
+        /// Interpolation of the base motion.
         base: Option<BaseSpec>, example "{interpolation: cubic}";
-        /// State at the beginning, or `estimate` for both of its numbers.
+        /// Initial state, or `estimate` for displacement and velocity.
         initial: InitialSpec, example "{displacement: 3.3, velocity: 1.0}";
-        /// Functions that this experiment does not share with the others.
+        /// Coefficient functions of this experiment alone.
         functions: Option<OwnFunctionsSpec>,
             example "{damping: {basis: constant, start: 1.0}}",
-            default "all are shared";
-        /// Whether it is a validation record: kept out of the fit, predicted and scored.
+            default "none";
+        /// Validation record: predicted and scored, not fitted.
         validation: Option<bool>, example "true", default "false";
     }
 }
 
 keys! {
-    /// How a file of readings is written.
+    /// Format of a data file.
     pub struct FileFormatSpec = "file_format", expecting "a map such as {delimiter: semicolon, decimal: comma, skip: 3}" {
-        /// What separates fields.
-        delimiter: Option<Delimiter>, example "semicolon", default "found out";
-        /// What separates the decimals of a number.
-        decimal: Option<DecimalSign>, example "comma", default "found out";
-        /// Lines before the row of column names.
-        skip: Option<Count>, example "4", default "found out";
-        /// Whether there is a row of column names.
-        header: Option<bool>, example "true", default "found out";
-        /// Whether a row of units follows it.
-        units_row: Option<bool>, example "true", default "found out";
+        /// Separator of fields.
+        delimiter: Option<Delimiter>, example "semicolon", default "detected";
+        /// Decimal separator.
+        decimal: Option<DecimalSign>, example "comma", default "detected";
+        /// Number of lines before the row of column names.
+        skip: Option<Count>, example "4", default "detected";
+        /// Row of column names.
+        header: Option<bool>, example "true", default "detected";
+        /// Row of units below the column names.
+        units_row: Option<bool>, example "true", default "detected";
     }
 }
 
 choice! {
-    /// What separates fields.
+    /// Separator of fields.
     pub enum Delimiter {
         /// `,`
         Comma = "comma",
@@ -84,7 +84,7 @@ choice! {
 }
 
 choice! {
-    /// What separates the decimals of a number.
+    /// Decimal separator.
     pub enum DecimalSign {
         /// `.`
         Point = "point",
@@ -93,11 +93,11 @@ choice! {
     }
 }
 
-/// A column by name or number, or with a file and times of its own.
+/// A column by name or number, or with its own file and times.
 pub type ColumnRef = ScalarOr<ColumnId, SourceSpec>;
 
 keys! {
-    /// Which columns of a file are what, by name or by number from 1.
+    /// Columns of a data file, by name or by number from 1.
     pub struct ColumnsSpec (Default) = "columns", expecting "a map such as {time: t_s, displacement: y_m}" {
         /// Times.
         time: Option<ColumnId>, example "t_s", default "t_s";
@@ -109,23 +109,23 @@ keys! {
         acceleration: Option<ColumnRef>, example "a_m_per_s2";
         /// Force on the mass.
         force: Option<ColumnRef>, example "f_N";
-        /// Acceleration of the base; y is relative to the base then.
+        /// Acceleration of the base; y is then relative to the base.
         base_acceleration: Option<ColumnRef>, example "table_g";
-        /// Displacement of the base; y is relative to the base then.
+        /// Displacement of the base; y is then relative to the base.
         base_displacement: Option<ColumnRef>, example "table_mm";
     }
 }
 
 keys! {
-    /// A column with a file or times of its own.
+    /// A column with its own file or times.
     pub struct SourceSpec = "source", expecting "a map such as {data: other.csv, column: y_m, time: t_s}" {
-        /// File, relative to the model file.
+        /// Data file, relative to the model file.
         data: Option<Text>, example "other.csv", default "that of the experiment";
         /// Column of the values.
         column: ColumnId, example "y_m";
         /// Column of the times.
         time: Option<ColumnId>, example "t_s", default "that of the experiment";
-        /// Readings per second, in place of a column of times.
+        /// Sampling rate, in place of a column of times.
         sample_rate: Option<Number>, example "1000.0", unit "Hz";
     }
 }
@@ -133,43 +133,43 @@ keys! {
 keys! {
     /// Units of the columns: mm, deg, g, kN, ms, …
     pub struct UnitsSpec (Default) = "units", expecting "a map such as {displacement: mm, acceleration: g}" {
-        /// Of the times.
+        /// Unit of the times.
         time: Option<Text>, example "ms", default "s";
-        /// Of the displacement.
+        /// Unit of the displacement.
         displacement: Option<Text>, example "mm", default "m";
-        /// Of the velocity.
+        /// Unit of the velocity.
         velocity: Option<Text>, example "mm/s", default "m/s";
-        /// Of the acceleration.
+        /// Unit of the acceleration.
         acceleration: Option<Text>, example "g", default "m/s^2";
-        /// Of the force.
+        /// Unit of the force.
         force: Option<Text>, example "kN", default "N";
-        /// Of the acceleration of the base.
+        /// Unit of the base acceleration.
         base_acceleration: Option<Text>, example "g", default "m/s^2";
-        /// Of the displacement of the base.
+        /// Unit of the base displacement.
         base_displacement: Option<Text>, example "mm", default "m";
     }
 }
 
 keys! {
-    /// Standard deviation of a reading: a number, a column of the file, or `estimate`.
+    /// Standard deviation of a sample: a number, a column of the file, or `estimate`.
     pub struct SigmaSpec (Default) = "sigma", expecting "a map such as {displacement: 0.1}" {
-        /// Of the displacement.
+        /// Standard deviation of the displacement.
         displacement: Option<Sigma>, example "0.1", unit "m";
-        /// Of the velocity.
+        /// Standard deviation of the velocity.
         velocity: Option<Sigma>, example "0.1", unit "m/s";
-        /// Of the acceleration.
+        /// Standard deviation of the acceleration.
         acceleration: Option<Sigma>, example "estimate", unit "m/s^2";
     }
 }
 
 keys! {
-    /// What the residuals of each channel cost.
+    /// Loss of the residuals of each channel.
     pub struct LossesSpec (Default) = "losses", expecting "a map such as {displacement: huber}" {
-        /// Of the displacement.
+        /// Loss of the displacement.
         displacement: Option<ScalarOr<LossName, LossSpec>>, example "huber", default "squares";
-        /// Of the velocity.
+        /// Loss of the velocity.
         velocity: Option<ScalarOr<LossName, LossSpec>>, example "student-t", default "squares";
-        /// Of the acceleration.
+        /// Loss of the acceleration.
         acceleration: Option<ScalarOr<LossName, LossSpec>>,
             example "{name: huber, threshold: 1.345}",
             default "squares";
@@ -177,72 +177,72 @@ keys! {
 }
 
 keys! {
-    /// A loss with its settings.
+    /// A loss with its parameters.
     pub struct LossSpec = "loss", expecting "a map such as {name: huber, threshold: 1.345}" {
-        /// Which loss.
+        /// Kind of loss.
         name: LossName, example "huber";
-        /// Of `huber`: where squares end.
+        /// For `huber`: residual at which the loss becomes linear.
         threshold: Option<Number>, example "1.345", unit "standard deviations", default "1.345";
-        /// Of `student-t`: degrees of freedom.
+        /// For `student-t`: degrees of freedom.
         degrees: Option<Number>, example "4.0", default "4";
     }
 }
 
 choice! {
-    /// What a residual costs.
+    /// Loss of a residual.
     pub enum LossName {
-        /// Its square.
+        /// Square.
         Squares = "squares",
-        /// Its square up to a threshold, and linearly more beyond.
+        /// Huber: square up to a threshold, linear beyond it.
         Huber = "huber",
-        /// Minus the logarithm of Student's t.
+        /// Negative log-likelihood of Student's t distribution.
         StudentT = "student-t",
     }
 }
 
 keys! {
-    /// Sensors, per channel: reading = gain * motion + offset + drift * time.
+    /// Sensor of each channel: sample = gain * response + offset + drift * time.
     pub struct SensorsSpec (Default) = "sensors", expecting "a map such as {acceleration: {offset: estimate}}" {
-        /// Of the displacement.
+        /// Sensor of the displacement.
         displacement: Option<SensorSpec>, example "{drift: estimate}";
-        /// Of the velocity.
+        /// Sensor of the velocity.
         velocity: Option<SensorSpec>, example "{gain: estimate}";
-        /// Of the acceleration.
+        /// Sensor of the acceleration.
         acceleration: Option<SensorSpec>, example "{offset: estimate}";
     }
 }
 
 keys! {
-    /// What a sensor makes of the motion.
+    /// Parameters of a sensor.
     pub struct SensorSpec (Default) = "sensor", expecting "a map such as {gain: 1.0, offset: estimate}" {
-        /// Factor.
+        /// Gain.
         gain: Option<EstimateValue>, example "1.0", default "1";
-        /// Reading at rest.
+        /// Offset.
         offset: Option<EstimateValue>, example "estimate", unit "SI unit of the channel", default "0";
-        /// Change of the offset with time.
+        /// Drift: rate of change of the offset.
         drift: Option<EstimateValue>, example "estimate", unit "SI unit of the channel per s", default "0";
-        /// Whether it measures the motion in space and not relative to the base.
+        /// True for a sensor that measures absolute motion, false for motion relative to the base.
         absolute: Option<bool>, example "true", default "true for accelerations, false for the others";
     }
 }
 
-/// A number, `estimate`, or an estimate with a start or a prior.
+/// A number, `estimate`, or an estimate with a start value or a prior.
 pub type EstimateValue = ScalarOr<NumberOrEstimate, EstimateSpec>;
 
 keys! {
-    /// A number that is sought with the functions.
+    /// A nuisance parameter, estimated with the functions.
     pub struct EstimateSpec = "estimate", expecting "a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}" {
-        /// Where the search starts.
-        start: Option<Number>, example "1.0", default "what the readings say";
-        /// What is known of it: adds ((x - mean)/sigma)^2 to J.
+        /// Start value of the search.
+        start: Option<Number>, example "1.0", default "from the record";
+        /// Gaussian prior, which adds ((x - mean)/sigma)^2 to J.
         prior: Option<PriorSpec>, example "{mean: 1.0, sigma: 0.1}", default "nothing";
     }
 }
 
 keys! {
-    /// What is known of a number before the fit.
+    /// Gaussian prior of a nuisance parameter.
     pub struct PriorSpec = "prior", expecting "a map such as {mean: 1.0, sigma: 0.1}" {
-        /// Expected value.
+        /// Mean.
         mean: Number, example "1.0";
         /// Standard deviation.
         sigma: Number, example "0.1";
@@ -250,74 +250,74 @@ keys! {
 }
 
 keys! {
-    /// Force on the mass: a column with its interpolation, or a shape.
+    /// Force on the mass: a column with its interpolation, or a waveform.
     pub struct ForceSpec (Default) = "force", expecting "a map such as {interpolation: hold} or {shape: sine, amplitude: 2.0, frequency: 1.5}" {
-        /// Between the samples of the column `force`.
+        /// Interpolation of the column `force`.
         interpolation: Option<InterpolationName>, example "cubic", default "linear";
-        /// A shape in place of a column.
+        /// Waveform, in place of a column.
         shape: Option<ForceShape>, example "sine";
-        /// Largest value of a shape.
+        /// Amplitude of the waveform.
         amplitude: Option<Number>, example "1.0", unit "N";
-        /// Of a sine.
+        /// Frequency of a sine.
         frequency: Option<Number>, example "1.5", unit "Hz";
-        /// Of a sine at time 0.
+        /// Phase of a sine at time 0.
         phase: Option<Number>, example "0.7", unit "rad", default "0";
-        /// First frequency of a sweep.
+        /// Initial frequency of a sweep.
         from: Option<Number>, example "0.5", unit "Hz";
-        /// Last frequency of a sweep.
+        /// Final frequency of a sweep.
         to: Option<Number>, example "5.0", unit "Hz";
-        /// Where a step, a half-sine or a sweep begins.
+        /// Start of a step, half-sine or sweep.
         at: Option<Number>, example "1.0", unit "s", default "0";
-        /// How long a half-sine or a sweep lasts.
+        /// Duration of a half-sine or sweep.
         duration: Option<Number>, example "0.1", unit "s";
     }
 }
 
 choice! {
-    /// How values between samples are found.
+    /// Interpolation between samples.
     pub type InterpolationName = kmcfit_core::internals::signal::Interpolation {
-        /// The last sample holds.
+        /// Constant until the next sample.
         Hold = "hold",
-        /// Linear between samples.
+        /// Linear.
         Linear = "linear",
-        /// A cubic spline through the samples.
+        /// Cubic spline.
         Cubic = "cubic",
     }
 }
 
 choice! {
-    /// Shape of a force.
+    /// Waveform of a force.
     pub enum ForceShape {
-        /// The same at all times.
+        /// Constant.
         Constant = "constant",
-        /// A sine.
+        /// Sine.
         Sine = "sine",
-        /// A sine whose frequency rises in proportion to time.
+        /// Sine sweep of linearly increasing frequency.
         Sweep = "sweep",
-        /// Nothing, then constant.
+        /// Step from zero to a constant.
         Step = "step",
-        /// One half of a sine: a blow.
+        /// Half-sine pulse, as of an impact.
         HalfSine = "half-sine",
     }
 }
 
 keys! {
-    /// Motion of the base.
+    /// Base motion.
     pub struct BaseSpec = "base", expecting "a map such as {interpolation: cubic}" {
-        /// Between the samples of the column of the base.
+        /// Interpolation of the base column.
         interpolation: Option<InterpolationName>, example "cubic", default "linear";
     }
 }
 
-/// State at the beginning: `estimate`, or displacement and velocity.
+/// Initial state: `estimate`, or displacement and velocity.
 pub type InitialSpec = ScalarOr<Estimate, InitialStateSpec>;
 
 keys! {
-    /// State at the beginning: each number known, `estimate`, or an estimate with a start or a prior.
+    /// Initial state: each component a number, `estimate`, or an estimate with a start value or a prior.
     pub struct InitialStateSpec = "initial", expecting "a map such as {displacement: 3.3, velocity: 1.0}, or `estimate`" {
-        /// Displacement at the beginning.
+        /// Initial displacement.
         displacement: EstimateValue, example "3.3", unit "m";
-        /// Velocity at the beginning.
+        /// Initial velocity.
         velocity: EstimateValue, example "1.0", unit "m/s";
     }
 }

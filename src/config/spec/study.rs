@@ -7,35 +7,35 @@ use crate::config::choice::choice;
 use crate::config::scalar::{Count, Number, NumberOrColumn, OneOrList, Text};
 
 keys! {
-    /// What `kmcfit study` looks into besides what it always does.
+    /// Analyses of `kmcfit study`.
     pub struct StudySpec (Default) = "study", expecting "a map such as {profiles: [{function: mass, at: 0.0}], starts: 20}" {
-        /// Confidence of drawn bands, profiles, extremes and refits.
+        /// Confidence level of bands, profiles, extremes and bootstrap intervals.
         confidence: Option<Number>, example "0.95", default "0.95";
-        /// Seed of everything random.
+        /// Seed of all random numbers.
         seed: Option<Count>, example "1", default "1";
-        /// Numbers whose profile is drawn: the least cost with the number held.
+        /// Quantities for which a likelihood profile is computed.
         profiles: Option<Vec<ProfileSpec>>, example "[{function: mass, at: 0.0}]", default "none";
-        /// Times at which the smallest and largest compatible values are computed.
+        /// Times at which the data-consistent extremes are computed.
         extremes: Option<OneOrList<Number>>, example "[0.0, 12.5, 25.0]", unit "s", default "five over the record";
-        /// Largest J of a system that counts as compatible with the data.
-        misfit_limit: Option<Number>, example "2010.0", unit "that of J", default "what the confidence allows";
-        /// Fits from scattered starts.
+        /// Largest J of a system that is consistent with the data.
+        misfit_limit: Option<Number>, example "2010.0", unit "that of J", default "from the confidence level";
+        /// Number of fits from random starting points.
         starts: Option<Count>, example "20", default "none";
-        /// The starts lie within this factor of the start values.
+        /// Range of the random starting points: factor by which they differ from the start values.
         spread: Option<Number>, example "3.0", default "3";
-        /// Optima whose k/m, c/m and motions agree to this are one.
+        /// Relative difference of k/m, c/m and response below which two minima count as one.
         merge_tolerance: Option<Number>, example "1e-3", default "1e-3";
-        /// Refits to simulated readings.
+        /// Number of bootstrap refits.
         bootstrap: Option<Count>, example "200", default "none";
-        /// Where the noise of the refits comes from.
+        /// Noise of the bootstrap records.
         noise: Option<NoiseName>, example "residual", default "parametric";
-        /// Masses for which systems with the same response are computed.
+        /// Masses for which equivalent systems, with the same response, are computed.
         equivalent_systems: Option<Vec<EquivalentSpec>>,
             example "[{name: constant mass, mass: 1.0}]",
-            default "masses that grow, fall and swing away from the fit's";
-        /// Whether each function is tested against a constant.
+            default "increasing, decreasing and oscillating masses";
+        /// Likelihood-ratio test of each function against a constant.
         constancy_test: Option<bool>, example "true", default "false";
-        /// Experiments that might be made next.
+        /// Candidate experiments, ranked by their information.
         candidates: Option<Vec<CandidateSpec>>,
             example "[{name: again, initial: {displacement: 3.3, velocity: 1.0}}]",
             default "none";
@@ -43,15 +43,15 @@ keys! {
 }
 
 keys! {
-    /// A number: a function's value at a time, its mean, a constant, or a scalar.
+    /// A quantity: value or mean of a function, a constant, or a nuisance parameter.
     pub struct ProfileSpec = "profile", expecting "a map such as {function: mass, at: 0.0}" {
-        /// Which function.
+        /// Function.
         function: Option<FunctionName>, example "mass";
-        /// At which time.
+        /// Time of the value.
         at: Option<Number>, example "0.0", unit "s";
-        /// Its mean in place of a value.
+        /// Mean over the record in place of a value.
         mean: Option<bool>, example "true";
-        /// An estimated number, as the report calls it, in place of a function.
+        /// Name of a nuisance parameter, in place of a function.
         scalar: Option<Text>, example "initial velocity";
     }
 }
@@ -59,37 +59,37 @@ keys! {
 choice! {
     /// Noise of the replicates of a bootstrap.
     pub enum NoiseName {
-        /// Gaussian, of the readings' sigma.
+        /// Gaussian noise with the standard deviation of the samples.
         Parametric = "parametric",
-        /// The residuals of the fit, drawn with replacement.
+        /// Residuals of the fit, drawn with replacement.
         Residual = "residual",
     }
 }
 
 keys! {
-    /// A device to be sought with the motion of the fit.
+    /// An equivalent system with a given mass.
     pub struct EquivalentSpec = "equivalent", expecting "a map such as {name: constant mass, mass: 1.0}" {
-        /// What the report calls it.
+        /// Name for reports.
         name: Text, example "constant mass";
-        /// Its mass.
+        /// Mass.
         mass: NumberOrColumn, example "1.0", unit "kg";
-        /// The damping that it should be near to.
+        /// Damping to which the system is as close as possible.
         damping: Option<NumberOrColumn>, example "0.0", unit "N s/m", default "that of the fit";
     }
 }
 
 keys! {
-    /// An experiment that might be made.
+    /// A candidate experiment.
     pub struct CandidateSpec = "candidate", expecting "a map such as {name: second release, initial: {displacement: 0.0, velocity: 3.0}}" {
-        /// What the report calls it.
+        /// Name for reports.
         name: Text, example "a blow";
-        /// State at its beginning.
+        /// Initial state.
         initial: StateSpec, example "{displacement: 0.0, velocity: 3.0}";
-        /// Force on the mass, as a shape.
+        /// Waveform of the force.
         force: Option<ForceSpec>, example "{shape: sine, amplitude: 1.0, frequency: 0.2}", default "none";
-        /// What is measured, at every node.
+        /// Measured channel, sampled at every node.
         channel: Option<ChannelName>, example "acceleration", default "displacement";
-        /// Standard deviation of a reading.
+        /// Standard deviation of a sample.
         sigma: Option<Number>,
             example "0.1",
             unit "SI unit of the channel",

@@ -187,9 +187,9 @@ impl Columns {
         let mut empty = (0..table.width()).filter(|i| is_empty(i) && is_channel(i));
         if let Some(empty) = empty.next() {
             let label = table.label(empty);
-            return Err(InputError::file(table.path(), "all readings are missing")
+            return Err(InputError::file(table.path(), "all samples are missing")
                 .found(format!("no number in the column `{label}`"))
-                .expected("at least some readings"));
+                .expected("at least one sample"));
         }
         let is_open = |i: &usize| !is_foreign(table.headers().get(*i).map_or("", String::as_str));
         let Some(place) = self.unused.iter().position(is_open) else {
@@ -202,7 +202,7 @@ impl Columns {
                 "the columns {}",
                 names.collect::<Vec<_>>().join(", ")
             ))
-            .expected("a column of readings beside the times"));
+            .expected("a column of samples in addition to the times"));
         };
         self.used.push(Column {
             index: self.unused.remove(place),
@@ -313,11 +313,9 @@ fn time(table: &Table, numeric: &[usize]) -> Result<Column, InputError> {
                 guessed: true,
                 has_unit: false,
             })),
-        None => Err(
-            InputError::file(table.path(), "there is no column of times")
-                .found("no column whose numbers increase from row to row")
-                .expected("a column of times, or `--sample-rate HZ`"),
-        ),
+        None => Err(InputError::file(table.path(), "no column of times")
+            .found("no column whose numbers increase from row to row")
+            .expected("a column of times, or `--sample-rate HZ`")),
     }
 }
 

@@ -38,7 +38,7 @@ pub struct Starter {
 }
 
 /// A starter model for the table `csv`, which the model will call `data`. Readings per second are
-/// `sample_rate`, where there is no column of times.
+/// `sample_rate`, where no column of times.
 ///
 /// # Errors
 /// When the table cannot be read, has no column of times or of a motion, or a column is no readings.
@@ -48,7 +48,7 @@ pub fn starter(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Start
     let columns = Columns::of(&table, sample_rate)?;
     let motion = Motion::of(&table, &columns, sample_rate)?;
     let mut found = vec![format!(
-        "{} readings over {} s, {}",
+        "{} samples over {} s, {}",
         motion.readings,
         short(motion.duration),
         motion.spacing_in_words()
@@ -56,7 +56,7 @@ pub fn starter(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Start
     if let Some(begins) = motion.begins {
         found.insert(
             0,
-            format!("nothing moves before {begins} s: left out (window)"),
+            format!("at rest before {begins} s: excluded by `window`"),
         );
     }
     found.extend(columns.in_words(&table));
@@ -74,7 +74,7 @@ pub fn starter(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Start
         && (rate / given - 1.0).abs() > SAME_RATE
     {
         found.push(format!(
-            "`--sample-rate {given}` is taken, though `{}` says {} Hz",
+            "`--sample-rate {given}` is used, although `{}` has {} Hz",
             table.label(index),
             significant(rate, 4)
         ));
@@ -109,8 +109,8 @@ fn text(
         .to_string_lossy();
     let mut text = format!(
         "# yaml-language-server: $schema=kmcfit.schema.json\n\
-         # A starter model, made from the readings. `kmcfit check` reads it, `kmcfit fit` fits it,\n\
-         # `kmcfit explain KEY` says what a key does.\n\
+         # Model file written by `kmcfit init`. Check it with `kmcfit check`, fit it with `kmcfit fit`;\n\
+         # `kmcfit explain KEY` explains a key.\n\
          format: 1\n\
          title: {}\n\
          experiments:\n  \
@@ -161,7 +161,7 @@ fn keys(
         (
             "    window",
             motion.begins.map(|begins| format!("{{min: {begins}}}")),
-            "s; before, nothing moves: the device is held or not yet struck",
+            "s; at rest before (not yet released or struck)",
         ),
         (
             "    force",
@@ -172,12 +172,12 @@ fn keys(
         (
             "    sigma",
             Some(format!("{{{}}}", sigmas.join(", "))),
-            "standard deviation of a reading, SI; a number, if it is known",
+            "standard deviation of a sample, SI; give a number if it is known",
         ),
         (
             "    loss",
             motion.far_off.map(|_| robust),
-            "readings far off count little; squares count them in full",
+            "robust against outliers; or `squares`",
         ),
         (
             "    sensors",
@@ -192,7 +192,7 @@ fn keys(
         (
             "grid",
             Some("{nodes: auto}".into()),
-            "as many steps as the frequencies of the readings ask for",
+            "chosen from the spectrum of the record",
         ),
     ];
     let owned = keys.map(|(key, value, comment)| (key, value, comment.to_owned()));
@@ -213,12 +213,12 @@ fn sensors(columns: &Columns, motion: &Motion) -> (Vec<&'static str>, Vec<&'stat
         if motion.drifts {
             sensors.push((
                 "displacement: {offset: estimate, drift: estimate}",
-                "the readings swing about a line that rises or falls",
+                "the record oscillates about a sloping line",
             ));
         } else if motion.is_off_centre {
             sensors.push((
                 "displacement: {offset: estimate}",
-                "the readings swing about another value than zero",
+                "the record oscillates about a value other than zero",
             ));
         }
     }

@@ -66,10 +66,7 @@ impl Motion {
             .into_iter()
             .filter_map(|(r, p)| Some((channel(r)?, p)));
         let Some((column, power)) = measured.next() else {
-            return Err(InputError::file(
-                table.path(),
-                "there is no column of a motion",
-            ));
+            return Err(InputError::file(table.path(), "no column of a response"));
         };
         let mut pairs = moving(table, &times, in_si(table, column)?)?;
         let spacings: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
@@ -142,16 +139,16 @@ fn moving(table: &Table, times: &[f64], values: Vec<f64>) -> Result<Vec<(f64, f6
     let pairs = times.iter().copied().zip(values);
     let pairs: Vec<(f64, f64)> = pairs.filter(|(_, value)| value.is_finite()).collect();
     if pairs.len() < FEWEST {
-        return Err(InputError::file(table.path(), "there are too few readings")
+        return Err(InputError::file(table.path(), "too few samples")
             .found(pairs.len())
             .expected(format!("{FEWEST} or more")));
     }
     let still = pairs[0].1;
     match pairs.iter().all(|(_, x)| *x == still) {
         false => Ok(pairs),
-        true => Err(InputError::file(table.path(), "the readings do not move")
-            .found(format!("{} readings, all of them {still}", pairs.len()))
-            .expected("the motion of a device: nothing can be learnt from one that stands still")),
+        true => Err(InputError::file(table.path(), "all samples are equal")
+            .found(format!("{} samples, all {still}", pairs.len()))
+            .expected("a record of a moving system")),
     }
 }
 

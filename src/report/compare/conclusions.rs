@@ -1,82 +1,83 @@
-//! What a row of runs comes to, computed from their numbers: change the data and it changes.
+//! Conclusions on a sequence of runs, computed from their measures: the assumptions that each run adds, its result, and
+//! the first run that recovers the true system.
 
 use super::CLOSE;
 use super::measures::Measures;
 use kmcfit_core::internals::assessment::TruthErrors;
 
-/// One sentence for each run, and one on what led to the true device.
+/// One sentence for each run, then the sentences on the whole sequence.
 pub fn conclusions(runs: &[Measures]) -> Vec<String> {
     let mut sentences = Vec::new();
-    let mut told: Vec<&String> = Vec::new();
+    let mut earlier: Vec<&String> = Vec::new();
     for (i, run) in runs.iter().enumerate() {
-        let new = run.knowledge.iter().filter(|k| !told.contains(k));
+        let new = run.assumptions.iter().filter(|a| !earlier.contains(a));
         let new: Vec<&str> = new.map(String::as_str).collect();
-        let told_more = match (i, new.as_slice()) {
-            (_, []) => "Told nothing more".to_owned(),
-            (0, list) => format!("Told {}", list.join("; ")),
-            (_, list) => format!("Told besides, or instead: {}", list.join("; ")),
+        let assumptions = match (i, new.as_slice()) {
+            (_, []) => "no new assumption".to_owned(),
+            (0, list) => format!("assumptions: {}", list.join("; ")),
+            (_, list) => format!("new assumptions: {}", list.join("; ")),
         };
-        sentences.push(format!("{}. {told_more}, it {}.", run.name, outcome(run)));
-        told.extend(&run.knowledge);
+        sentences.push(format!("{} ({assumptions}): {}.", run.name, outcome(run)));
+        earlier.extend(&run.assumptions);
     }
-    sentences.extend(turning_point(runs));
+    sentences.extend(on_the_truth(runs));
     sentences
 }
 
-/// What a run found.
+/// Result of one run.
 fn outcome(run: &Measures) -> String {
     let matched = run.is_matched;
     let Some(errors) = &run.errors else {
         return match matched {
-            true => "matches the motion; the truth is not known".into(),
-            false => "does not match the motion; the truth is not known".into(),
+            true => "response fitted; true system not known".into(),
+            false => "response not fitted; true system not known".into(),
         };
     };
     let worst = errors.worst_ratio();
     let percent = |share: f64| match share < 1e-4 {
-        true => format!("{share:.0e} of their size"),
+        true => format!("{:.0e} %", 100.0 * share),
         false => format!("{:.2} %", 100.0 * share),
     };
     let scale = errors.mass_relative >= CLOSE;
     match (worst < CLOSE, scale, matched) {
         (true, false, _) => format!(
-            "finds the true device: k/m and c/m to {}, m to {}",
+            "true system recovered; relative error of k/m and c/m {}, of m {}",
             percent(worst),
             percent(errors.mass_relative)
         ),
         (true, true, _) => format!(
-            "finds the true k/m and c/m (to {}), but not the scale: m is off by {}",
+            "k/m and c/m recovered (error {}), but not the scale: error of m {}",
             percent(worst),
             percent(errors.mass_relative)
         ),
         (false, _, true) => format!(
-            "matches the motion with another device: k/m or c/m is off by {}",
+            "response fitted by another parameter set: error of k/m or c/m {}",
             percent(worst)
         ),
         (false, _, false) => format!(
-            "finds neither the motion nor the device: k/m or c/m is off by {}",
+            "response not fitted, true system not recovered: error of k/m or c/m {}",
             percent(worst)
         ),
     }
 }
 
-/// How near the ratios of a run are to the truth; `None` where it is not known.
-fn distance(run: &Measures) -> Option<f64> {
+/// Largest relative error of k/m and c/m; `None` if the true system is not known.
+fn ratio_error(run: &Measures) -> Option<f64> {
     run.errors.as_ref().map(TruthErrors::worst_ratio)
 }
 
-/// Whether a small misfit went with a wrong device, and which run of these is nearest to the truth.
-fn turning_point(runs: &[Measures]) -> Vec<String> {
+/// Sentences on the true system: the smallest misfit of a wrong parameter set, and the first run that recovers the system.
+fn on_the_truth(runs: &[Measures]) -> Vec<String> {
     let mut sentences = Vec::new();
     let known: Vec<&Measures> = runs.iter().filter(|r| r.errors.is_some()).collect();
-    let wrong = |r: &&&Measures| distance(r).is_some_and(|d| d >= CLOSE);
+    let wrong = |r: &&&Measures| ratio_error(r).is_some_and(|d| d >= CLOSE);
     let best_wrong = known
         .iter()
         .filter(wrong)
         .min_by(|a, b| a.cost_ratio.total_cmp(&b.cost_ratio));
     if let Some(run) = best_wrong {
         sentences.push(format!(
-            "A small misfit does not show the device: {} leaves J/J0 = {:.1e} and is another one.",
+            "A small misfit does not imply the true system: {} has J/J0 = {:.1e} with another parameter set.",
             run.name, run.cost_ratio
         ));
     }
@@ -85,14 +86,14 @@ fn turning_point(runs: &[Measures]) -> Vec<String> {
     let found: Vec<&&Measures> = found.collect();
     match (found.is_empty(), found.iter().find(with_scale)) {
         (true, _) if !known.is_empty() => {
-            sentences.push("None of these runs leads to the true device.".into());
+            sentences.push("No run recovers the true system.".into());
         }
         (false, Some(first)) => sentences.push(format!(
-            "The first of these runs to find the device with its scale is {}.",
+            "{} is the first run that recovers the true system with its scale.",
             first.name
         )),
         (false, None) => sentences.push(
-            "The ratios k/m and c/m are found; nothing here holds the scale of (m, c, k).".into(),
+            "k/m and c/m are recovered; no record or constraint determines the scale of m, c and k.".into(),
         ),
         _ => {}
     }

@@ -76,7 +76,7 @@ fn ratios(runs: &[ComparedRun], measures: &[Measures]) -> Figure {
     });
     let figure = Figure::new(
         "ratios",
-        "What a free motion shows: k/m and c/m",
+        "Ratios k/m and c/m, identifiable without a force",
         format!(
             "Two panels, one above the other: stiffness over mass and damping over mass of each \
              run against time{}",
@@ -211,7 +211,7 @@ fn residuals(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
     let misfits = list(measures, |m| Some(format!("J/J0 {:.1e}", m.cost_ratio)));
     let figure = Figure::new(
         "residuals",
-        "What is left of the measured motion",
+        "Residuals",
         format!("Fitted minus measured displacement of each run against time. {misfits}."),
     );
     let panels = names.iter().map(|name| {

@@ -1,46 +1,47 @@
-//! What is compared: the numbers of one run.
+//! Compared quantities of one run.
 
 use super::run::ComparedRun;
-use super::verdict::{Match, verdict};
+use super::verdict::{ResponseFit, verdict};
+use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::document::Prediction;
 use kmcfit_core::internals::assessment::{RECOVERED, Roughness, TruthErrors};
 use kmcfit_core::internals::solvers::Status;
 use serde::Serialize;
 
-/// The numbers of one run, and what they mean in one line.
+/// Compared quantities of one run; `--json` prints them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Measures {
-    /// What the comparison calls the run.
+    /// Name of the run in the comparison.
     pub name: String,
     /// Title of the model.
     pub title: String,
-    /// How the run ended, in one word.
+    /// Status.
     pub status: Status,
-    /// How the run ended, in one sentence.
+    /// Reason of the status, as a sentence.
     pub reason: String,
-    /// What the numbers mean, in one line.
+    /// Summary in one line.
     pub verdict: String,
-    /// Whether the measured motion is matched.
+    /// Whether the response is fitted.
     #[serde(skip)]
     pub is_matched: bool,
-    /// Whether the truth is known, and reached in `k/m` and `c/m`.
-    pub true_device: Option<bool>,
+    /// Whether `k/m` and `c/m` agree with the true system; `null` where it is not known.
+    pub is_true_system: Option<bool>,
     /// Solver.
     pub method: String,
     /// Number of nodes.
     pub nodes: usize,
     /// Number of free parameters.
     pub parameters: usize,
-    /// Part of J from the readings, in `misfit_unit`.
+    /// Part of J from the samples, in `misfit_unit`.
     pub misfit: f64,
     /// `m^2 s`; `1` for a chi-square; `N^2 s` for the equation error; of a rotation `rad^2 s` and `N^2 m^2 s`.
     pub misfit_unit: &'static str,
-    /// Fit of the channel that is matched worst, per cent; `None` where there is none.
+    /// Smallest fit of a channel, per cent; `null` where no channel has one.
     pub worst_fit: Option<f64>,
-    /// Whether the motion is a rotation: then what is said in kg, N and m is in kg m², N m and rad.
+    /// Whether the displacement is an angle: then kg, N and m stand for kg m², N m and rad.
     pub is_rotation: bool,
-    /// Whether `J/J0` means anything: not where sigma was estimated.
+    /// Whether `J/J0` is meaningful: not if sigma was estimated.
     pub has_ratio: bool,
     /// `J/J0`.
     pub cost_ratio: f64,
@@ -48,7 +49,7 @@ pub struct Measures {
     pub iterations: u64,
     /// Wall-clock time, s.
     pub seconds: f64,
-    /// Distances from the truth, where it is known.
+    /// Errors relative to the true system, where it is known.
     pub errors: Option<TruthErrors>,
     /// Smallest mass at a node, kg.
     pub smallest_mass: f64,
@@ -56,33 +57,33 @@ pub struct Measures {
     pub smallest_damping: f64,
     /// Largest violation of a constraint relative to its scale.
     pub max_violation: Option<f64>,
-    /// How rough the functions are.
+    /// Roughness of the functions.
     pub roughness: Roughness,
-    /// The motion from other initial states.
+    /// Predicted free responses.
     pub predictions: Vec<Prediction>,
-    /// What the model says besides the readings, in words.
-    pub knowledge: Vec<String>,
-    /// What the data leave open, in words.
-    pub open: Vec<String>,
-    /// What the user should know.
-    pub warnings: Vec<String>,
+    /// Assumptions of the model beside the records.
+    pub assumptions: Vec<String>,
+    /// Warnings on identifiability.
+    pub identifiability: Vec<Finding>,
+    /// Warnings about data and specification.
+    pub warnings: Vec<Finding>,
 }
 
 impl Measures {
-    /// The numbers of a run.
+    /// Quantities of a run.
     pub fn of(run: &ComparedRun) -> Self {
         let document = &run.finished.document;
         let device = &run.finished.device;
-        let matching = Match::of(run);
+        let response = ResponseFit::of(run);
         let errors = (run.finished.truth.as_ref()).map(|truth| TruthErrors::of(device, truth));
         Self {
             name: run.name.clone(),
             title: document.title.clone(),
             status: document.outcome.status,
             reason: document.outcome.reason.clone(),
-            verdict: verdict(&matching, errors.as_ref()),
-            is_matched: matching.is_matched(),
-            true_device: errors.as_ref().map(|e| e.within(RECOVERED)),
+            verdict: verdict(&response, errors.as_ref()),
+            is_matched: response.is_matched(),
+            is_true_system: errors.as_ref().map(|e| e.within(RECOVERED)),
             method: document.model.method.clone(),
             nodes: document.model.nodes,
             parameters: document.model.parameters,
@@ -107,8 +108,8 @@ impl Measures {
             max_violation: run.max_violation,
             roughness: Roughness::of(device, run.finished.system.grid.step()),
             predictions: document.predictions.clone(),
-            knowledge: document.identifiability.knowledge.clone(),
-            open: document.identifiability.open.clone(),
+            assumptions: document.identifiability.assumptions.clone(),
+            identifiability: document.identifiability.warnings.clone(),
             warnings: document.warnings.clone(),
         }
     }

@@ -1,8 +1,7 @@
-//! Several runs side by side: one table, overlaid figures, one page.
+//! Comparison of several runs: a table, overlaid figures, one page.
 //!
-//! Every run is read from its folder, whether it was just fitted or long ago, so all are treated
-//! alike and each keeps its own grid. [`Measures`] are the numbers of one run; terminal,
-//! `compare.csv` and `compare.html` show the same ones.
+//! Every run is read from its folder and keeps its own grid. [`Measures`] are the compared quantities of one run; the
+//! terminal, `compare.csv` and `compare.html` show the same ones.
 
 mod conclusions;
 mod figures;
@@ -21,15 +20,15 @@ use crate::results::{Claim, OutputFolder};
 use serde::Serialize;
 use std::io;
 
-/// Largest relative error of `k/m` and `c/m` below which a device counts as close to the true one:
-/// what a smooth fit of a record with a few per cent of noise can be asked for.
+/// Largest relative error of `k/m` and `c/m` of a system that counts as close to the true one: attainable for a smooth
+/// fit of a record with a few per cent of noise.
 pub const CLOSE: f64 = 0.05;
 
-/// Root-mean-square residual, as a share of the root-mean-square reading, up to which a motion
-/// without a sigma counts as matched: the paper's optimum leaves 0.9 %.
+/// Largest rms residual relative to the rms sample of a response without sigma that counts as fitted; 0.9 % for the
+/// optimum of the paper.
 pub const MATCHED: f64 = 0.01;
 
-/// Sizes below this are what rounding leaves: one digit says all there is to say.
+/// Relative errors below this are rounding errors and are printed with one digit.
 const ROUNDING: f64 = 1e-12;
 
 /// Version of the document's format.
@@ -44,12 +43,12 @@ pub struct Comparison {
     sequence: Option<String>,
 }
 
-/// A run that was asked for and left nothing to compare.
+/// A run without a result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct LeftOut {
-    /// What the comparison calls it.
+    /// Its name in the comparison.
     pub name: String,
-    /// Why, in one sentence.
+    /// The reason, as a sentence.
     pub reason: String,
 }
 
@@ -60,9 +59,9 @@ pub struct ComparisonDocument<'a> {
     pub format: u32,
     /// Version of kmcfit.
     pub version: &'static str,
-    /// The runs, in the order in which they were asked for.
+    /// The runs in the order of the arguments.
     pub runs: &'a [Measures],
-    /// The runs that left nothing to compare.
+    /// The runs without a result.
     pub left_out: &'a [LeftOut],
 }
 
@@ -77,26 +76,24 @@ impl Comparison {
         }
     }
 
-    /// The same as a sequence with a title: the order of the runs matters, and what each adds to those
-    /// before it is told.
+    /// The comparison as a sequence with a title, whose page lists the assumptions that each run adds.
     #[must_use]
-    pub fn told_as(mut self, title: impl Into<String>) -> Self {
+    pub fn as_sequence(mut self, title: impl Into<String>) -> Self {
         self.sequence = Some(title.into());
         self
     }
 
-    /// What the runs come to, in words: what each was told more than those before it, and whether that
-    /// led to the true device.
+    /// Conclusions: the assumptions that each run adds, its result, and the recovery of the true system.
     pub fn conclusions(&self) -> Vec<String> {
         conclusions::conclusions(&self.measures)
     }
 
-    /// The numbers of each run.
+    /// The measures of each run.
     pub fn measures(&self) -> &[Measures] {
         &self.measures
     }
 
-    /// The runs that left nothing to compare.
+    /// The runs without a result.
     pub fn left_out(&self) -> &[LeftOut] {
         &self.left_out
     }
@@ -111,13 +108,12 @@ impl Comparison {
         }
     }
 
-    /// For a terminal: what each run means in one line, then the table with one row per quantity and
-    /// one column per run.
+    /// The comparison as text: a line for each run, then the table.
     pub fn text(&self) -> String {
         text::text(self)
     }
 
-    /// The table with one row per run and units in the header; empty fields are not known.
+    /// The table as CSV: one row for each run, units in the headers, unknown values empty.
     pub fn to_csv(&self) -> String {
         let rows = table::csv_rows(&self.measures);
         let mut lines = vec![rows.iter().map(|r| field(&r.header)).collect::<Vec<_>>()];
@@ -128,12 +124,12 @@ impl Comparison {
         lines.collect()
     }
 
-    /// The page: one file without scripts and without anything to load.
+    /// The page: one HTML file without external resources.
     pub fn to_html(&self) -> String {
         page::page(self)
     }
 
-    /// The files that `command` writes with a comparison.
+    /// Files that `command` writes for a comparison.
     pub fn claim(command: &'static str) -> Claim {
         Claim::new(command)
             .files(["compare.csv", "compare.html"])
@@ -143,7 +139,7 @@ impl Comparison {
     /// Writes `figures/*.svg`, `compare.csv` and `compare.html`.
     ///
     /// # Errors
-    /// What the file system says.
+    /// An error of the file system.
     pub fn write(&self, folder: &OutputFolder) -> io::Result<()> {
         let mut stage = folder.stage()?;
         for figure in figures::all(self) {
@@ -155,7 +151,7 @@ impl Comparison {
     }
 }
 
-/// A field of a CSV file, quoted where it must be.
+/// A CSV field, quoted if necessary.
 fn field(text: &str) -> String {
     match text.contains([',', '"', '\n', '\r', '#']) {
         true => format!("\"{}\"", text.replace('"', "\"\"")),

@@ -3,7 +3,7 @@
 use super::conclusions::conclusions;
 use super::figures::{self, style};
 use super::measures::Measures;
-use super::table::{Row, known_rows};
+use super::table::{QuantityRow, known_rows};
 use super::{CLOSE, Comparison, MATCHED};
 use crate::report::chart::{Style, sample};
 use crate::report::page as shell;
@@ -19,7 +19,7 @@ pub(super) fn page(comparison: &Comparison) -> String {
     };
     let mut body = format!("<p>{}</p>\n", prose(&lead(comparison)));
     if comparison.sequence.is_some() {
-        body += "<h2>What it comes to</h2>\n";
+        body += "<h2>Conclusions</h2>\n";
         body += &shell::list(&conclusions(&comparison.measures));
     }
     body += "<h2>What each run means</h2>\n";
@@ -28,15 +28,15 @@ pub(super) fn page(comparison: &Comparison) -> String {
     }
     for left_out in &comparison.left_out {
         body += &format!(
-            "<section class=\"run\">\n<h3>{}</h3>\n<p class=\"verdict\">left out: {}</p>\n</section>\n",
+            "<section class=\"run\">\n<h3>{}</h3>\n<p class=\"verdict\">no result: {}</p>\n</section>\n",
             escape(&left_out.name),
             prose(&left_out.reason)
         );
     }
-    body += "<h2>In numbers</h2>\n";
+    body += "<h2>Table</h2>\n";
     body += &table(&comparison.measures);
     body += &format!("<p class=\"soft\">{}</p>\n", prose(&notes()));
-    body += "<h2>In pictures</h2>\n";
+    body += "<h2>Figures</h2>\n";
     body += &shell::help();
     body += &shell::figures(&figures::all(comparison));
     body += &format!(
@@ -46,21 +46,24 @@ pub(super) fn page(comparison: &Comparison) -> String {
     shell::page(&title, &body)
 }
 
-/// What the reader takes away.
+/// First sentence: the number of runs that recover the true system.
 fn lead(comparison: &Comparison) -> String {
     let runs = &comparison.measures;
-    let known = runs.iter().filter(|m| m.true_device.is_some()).count();
-    let reached = runs.iter().filter(|m| m.true_device == Some(true)).count();
+    let known = runs.iter().filter(|m| m.is_true_system.is_some()).count();
+    let reached = runs
+        .iter()
+        .filter(|m| m.is_true_system == Some(true))
+        .count();
     match (known, reached) {
-        (0, _) => "No run names a truth to be compared with.".into(),
-        (1, 0) => "The run that names the truth does not reach it.".into(),
-        (1, _) => "The run that names the truth reaches it.".into(),
-        (_, 0) => format!("None of the {known} runs that name the truth reaches it."),
-        _ if known == reached => format!("All {known} runs that name the truth reach it."),
+        (0, _) => "The true system is not known for any run.".into(),
+        (1, 0) => "The run with a known true system does not recover it.".into(),
+        (1, _) => "The run with a known true system recovers it.".into(),
+        (_, 0) => format!("None of the {known} runs with a known true system recovers it."),
+        _ if known == reached => format!("All {known} runs with a known true system recover it."),
         _ => format!(
-            "{reached} of the {known} runs that name the truth reach{} it.",
+            "{reached} of the {known} runs with a known true system recover{} it.",
             match reached {
-                1 => "es",
+                1 => "s",
                 _ => "",
             }
         ),
@@ -69,11 +72,10 @@ fn lead(comparison: &Comparison) -> String {
 
 fn notes() -> String {
     format!(
-        "Errors are the largest over the nodes of each run's own grid. The true device is one whose \
-         k/m and c/m are right to {RECOVERED:e} of their largest true values (c/m of critical damping \
-         where the truth has no damping), a close one to {} %. A motion without a sigma is matched \
-         when at most {} % of it is left. Only k/m and c/m show in free motion: a common factor of \
-         m, c and k does not.",
+        "Errors are maxima over the nodes of each run's grid. The true system counts as recovered if the errors \
+         of k/m and c/m are below {RECOVERED:e} of their largest true values (c/m: of critical damping if the true \
+         system is undamped), as close if they are below {} %. A response without sigma counts as fitted if the rms \
+         residual is at most {} % of the rms response. Without a force only k/m and c/m are identifiable.",
         100.0 * CLOSE,
         100.0 * MATCHED
     )
@@ -90,15 +92,15 @@ fn card(run: &Measures, look: Style) -> String {
         run.status.name(),
         prose(&run.reason),
     );
-    if !run.knowledge.is_empty() {
-        let known = prose(&run.knowledge.join("; "));
-        text += &format!("<p>What it was told: {known}.</p>\n");
+    if !run.assumptions.is_empty() {
+        let known = prose(&run.assumptions.join("; "));
+        text += &format!("<p>Assumptions: {known}.</p>\n");
     }
-    for open in &run.open {
-        text += &format!("<p>{}</p>\n", prose(&capital(open)));
+    for finding in &run.identifiability {
+        text += &format!("<p>{}</p>\n", prose(&capital(&finding.text)));
     }
     for warning in &run.warnings {
-        text += &format!("<p class=\"soft\">warning: {}</p>\n", prose(warning));
+        text += &format!("<p class=\"soft\">warning: {}</p>\n", prose(&warning.text));
     }
     text + "</section>\n"
 }
@@ -126,7 +128,7 @@ fn table(runs: &[Measures]) -> String {
     text + "</tbody>\n</table>\n</div>\n"
 }
 
-fn table_row(row: &Row) -> String {
+fn table_row(row: &QuantityRow) -> String {
     let part = if row.label.starts_with(' ') {
         " class=\"part\""
     } else {

@@ -1,34 +1,34 @@
-//! One of the runs that are compared, read from its folder.
+//! A compared run, read from its folder.
 
 use crate::error::InputError;
 use crate::report::{Columns, Run};
 use std::path::Path;
 
-/// A finished run and what the comparison needs beside it.
+/// A finished run with the data of its figures.
 #[derive(Debug, Clone)]
 pub struct ComparedRun {
-    /// What the comparison calls it; no two runs have the same name.
+    /// Its name in the comparison, unique.
     pub name: String,
-    /// Document, device and truth.
+    /// Document, estimated coefficients and true system.
     pub finished: Run,
-    /// Largest violation of a constraint relative to its scale, where the document says it.
+    /// Largest violation of a constraint relative to its scale, if the document has it.
     pub max_violation: Option<f64>,
     /// The iterations, from 1.
     pub iterations: Vec<f64>,
     /// `J/J0` after each iteration.
     pub cost_ratio: Vec<f64>,
-    /// How each measured motion is matched.
+    /// Fitted responses.
     pub motions: Vec<MatchedMotion>,
 }
 
-/// One measured motion and what a run leaves of it.
+/// A measured response and its residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatchedMotion {
     /// Name of the experiment.
     pub experiment: String,
-    /// Times of the readings, s.
+    /// Times of the samples, s.
     pub times: Vec<f64>,
-    /// Readings `y_obs`, m.
+    /// Samples `y_obs`, m.
     pub observed: Vec<f64>,
     /// `y - y_obs`, m.
     pub residual: Vec<f64>,

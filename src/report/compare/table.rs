@@ -1,4 +1,4 @@
-//! The table: one row per quantity, one cell per run; terminal, CSV and page show the same rows.
+//! Table of a comparison: one row for each quantity, one cell for each run, for terminal, CSV and page.
 
 use super::ROUNDING;
 use super::measures::Measures;
@@ -7,8 +7,8 @@ use kmcfit_core::internals::assessment::TruthErrors;
 
 /// One quantity of all runs.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Row {
-    /// What it is, in words and with its unit.
+pub(super) struct QuantityRow {
+    /// Label with its unit.
     pub label: String,
     /// Header in the CSV file, with its unit.
     pub header: String,
@@ -19,16 +19,16 @@ pub(super) struct Row {
 /// One quantity of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Cell {
-    /// A word or a sentence.
+    /// A text.
     Text(String),
     /// A count.
     Count(u64),
-    /// A measured number; not known where `None`.
+    /// A number; `None` if it is not known.
     Number(Option<f64>),
 }
 
 impl Cell {
-    /// For people: four digits.
+    /// The cell with four digits.
     pub fn short(&self) -> String {
         match self {
             Cell::Text(text) => text.clone(),
@@ -38,7 +38,7 @@ impl Cell {
         }
     }
 
-    /// For programs: all digits; empty where not known.
+    /// The cell with all digits; empty if not known.
     pub fn exact(&self) -> String {
         match self {
             Cell::Text(text) => text.clone(),
@@ -53,7 +53,7 @@ impl Cell {
     }
 }
 
-/// A number with four digits; with one where it is rounding.
+/// A number with four digits; with one if it is at the level of rounding errors.
 pub(super) fn short(x: f64) -> String {
     if x != 0.0 && x.abs() < ROUNDING {
         return format!("{x:.0e}");
@@ -85,13 +85,13 @@ impl<N: Into<Option<f64>>> From<(N,)> for Cell {
     }
 }
 
-/// Rows of a table in the making.
-struct Rows<'a> {
+/// Builder of the rows.
+struct RowBuilder<'a> {
     runs: &'a [Measures],
-    rows: Vec<Row>,
+    rows: Vec<QuantityRow>,
 }
 
-impl<'a> Rows<'a> {
+impl<'a> RowBuilder<'a> {
     fn of(runs: &'a [Measures]) -> Self {
         let rows = Vec::new();
         Self { runs, rows }
@@ -99,14 +99,14 @@ impl<'a> Rows<'a> {
 
     /// A row of texts, of counts, or of numbers: `(x,)`.
     fn add<C: Into<Cell>>(&mut self, label: &str, header: &str, of: impl Fn(&Measures) -> C) {
-        self.rows.push(Row {
+        self.rows.push(QuantityRow {
             label: label.into(),
             header: header.into(),
             cells: self.runs.iter().map(|run| of(run).into()).collect(),
         });
     }
 
-    /// A row of numbers with a unit, as people and as headers have it.
+    /// A row of numbers with a unit, `unit[0]` in the label and `unit[1]` in the header.
     fn add_in<N: Into<Option<f64>>>(
         &mut self,
         unit: [&str; 2],
@@ -119,16 +119,16 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// The quantities that are compared; the same ones for any runs, but for the initial states.
-fn rows(runs: &[Measures]) -> Vec<Row> {
-    let units = Units::of(runs);
+/// The compared quantities; the rows of predictions depend on the runs.
+fn rows(runs: &[Measures]) -> Vec<QuantityRow> {
+    let units = TableUnits::of(runs);
     let metre = units.metre;
     let error = |of: fn(&TruthErrors) -> f64| move |m: &Measures| m.errors.as_ref().map(of);
-    let mut t = Rows::of(runs);
+    let mut t = RowBuilder::of(runs);
     t.add("status", "status", |m| m.status.name().to_owned());
     t.add("method", "method", |m| m.method.clone());
     t.add("nodes", "nodes", |m| m.nodes as u64);
-    t.add("free values", "parameters", |m| m.parameters as u64);
+    t.add("parameters", "parameters", |m| m.parameters as u64);
     t.add(&misfit_label(runs, metre), "misfit", |m| (m.misfit,));
     let worst = "worst fit of a channel (%)";
     t.add(worst, "worst_fit_percent", |m| (m.worst_fit,));
@@ -137,7 +137,7 @@ fn rows(runs: &[Measures]) -> Vec<Row> {
     t.add("iterations", "iterations", |m| m.iterations);
     t.add_in(["s", "s"], "time", "seconds", |m| m.seconds);
     let (mass, damping, stiffness) = (units.mass, units.damping, units.stiffness);
-    t.add_in(mass, "largest error of m", "mass_error", error(|e| e.mass));
+    t.add_in(mass, "max error of m", "mass_error", error(|e| e.mass));
     t.add_in(damping, "  of c", "damping_error", error(|e| e.damping));
     t.add_in(
         stiffness,
@@ -177,16 +177,16 @@ fn rows(runs: &[Measures]) -> Vec<Row> {
     t.rows
 }
 
-/// The quantities that at least one run knows: those that people are shown.
-pub(super) fn known_rows(runs: &[Measures]) -> Vec<Row> {
-    let known = |row: &Row| row.cells.iter().any(|cell| *cell != Cell::Number(None));
+/// The rows with a value for at least one run, for terminal and page.
+pub(super) fn known_rows(runs: &[Measures]) -> Vec<QuantityRow> {
+    let known = |row: &QuantityRow| row.cells.iter().any(|cell| *cell != Cell::Number(None));
     rows(runs).into_iter().filter(known).collect()
 }
 
-/// The rows of the CSV file: what the page and the terminal say elsewhere comes with it.
-pub(super) fn csv_rows(runs: &[Measures]) -> Vec<Row> {
+/// The rows of the CSV file, with names, titles, relative errors and the one-line summaries.
+pub(super) fn csv_rows(runs: &[Measures]) -> Vec<QuantityRow> {
     let error = |of: fn(&TruthErrors) -> f64| move |m: &Measures| (m.errors.as_ref().map(of),);
-    let mut all = Rows::of(runs);
+    let mut all = RowBuilder::of(runs);
     all.add("", "name", |m| m.name.clone());
     all.add("", "title", |m| m.title.clone());
     for row in rows(runs) {
@@ -213,8 +213,8 @@ pub(super) fn csv_rows(runs: &[Measures]) -> Vec<Row> {
     all.rows
 }
 
-/// The units of the rows, as people and as headers have them: those of rotations where all runs are.
-struct Units {
+/// Units of the rows in labels and headers; those of a rotation if all runs have angular displacements.
+struct TableUnits {
     metre: &'static str,
     mass: [&'static str; 2],
     damping: [&'static str; 2],
@@ -223,7 +223,7 @@ struct Units {
     roughness: [[&'static str; 2]; 3],
 }
 
-impl Units {
+impl TableUnits {
     fn of(runs: &[Measures]) -> Self {
         match !runs.is_empty() && runs.iter().all(|run| run.is_rotation) {
             true => Self {
@@ -266,7 +266,7 @@ fn find(run: &Measures, state: (f64, f64)) -> Option<&Prediction> {
     run.predictions.iter().find(same)
 }
 
-/// The initial states (m, m/s) from which at least two runs know the cost; of a single run, all.
+/// Initial states (m, m/s) for which at least two runs have a cost; for a single run all its states.
 fn shared_states(runs: &[Measures]) -> Vec<(f64, f64)> {
     let needed = runs.len().min(2);
     let mut states: Vec<(f64, f64)> = Vec::new();
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_is_empty_in_a_file() {
+    fn unknown_numbers_are_empty_fields() {
         assert_eq!(Cell::Number(None).exact(), "");
         assert_eq!(Cell::Number(Some(f64::INFINITY)).exact(), "");
         assert_eq!(Cell::Number(Some(1e-300)).exact(), "1e-300");

@@ -1,15 +1,15 @@
-//! The comparison on a terminal.
+//! A comparison as text for the terminal.
 
 use super::Comparison;
-use super::table::{Row, known_rows};
+use super::table::{QuantityRow, known_rows};
 use crate::report::text::clean;
 use std::fmt::Write;
 
-/// Widest line, in characters: more runs go into a table of their own below.
+/// Widest line in characters; further runs form another table below.
 const WIDEST: usize = 100;
 const GAP: usize = 2;
 
-/// The line of each run, then the table.
+/// A line for each run, then the table.
 pub(super) fn text(comparison: &Comparison) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
@@ -28,17 +28,17 @@ fn write_runs(text: &mut String, comparison: &Comparison) -> std::fmt::Result {
     }
     for left_out in &comparison.left_out {
         let (name, reason) = (plain(&left_out.name), plain(&left_out.reason));
-        writeln!(text, "{name}: left out\n  {reason}")?;
+        writeln!(text, "{name}: no result\n  {reason}")?;
     }
     Ok(())
 }
 
-/// One line without control characters, which a terminal might obey.
+/// One line without control characters.
 fn plain(text: &str) -> String {
     clean(text).replace(['\n', '\t'], " ")
 }
 
-fn write_table(text: &mut String, names: &[String], rows: &[Row]) -> std::fmt::Result {
+fn write_table(text: &mut String, names: &[String], rows: &[QuantityRow]) -> std::fmt::Result {
     let labels = rows.iter().map(|row| width(&row.label)).max().unwrap_or(0);
     let widths: Vec<usize> = (0..names.len())
         .map(|j| {
@@ -67,13 +67,13 @@ fn width(text: &str) -> usize {
     text.chars().count()
 }
 
-/// Columns that fit beside each other; at least one.
-fn blocks(widths: &[usize], room: usize) -> Vec<std::ops::Range<usize>> {
+/// Ranges of columns that fit into the width, at least one column each.
+fn blocks(widths: &[usize], available: usize) -> Vec<std::ops::Range<usize>> {
     let mut blocks: Vec<std::ops::Range<usize>> = Vec::new();
     let mut used = 0;
     for (j, width) in widths.iter().enumerate() {
         match blocks.last_mut() {
-            Some(block) if used + width <= room => block.end = j + 1,
+            Some(block) if used + width <= available => block.end = j + 1,
             _ => {
                 blocks.push(j..j + 1);
                 used = 0;
@@ -89,13 +89,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn wide_tables_are_broken_between_runs() {
+    fn wide_tables_are_split_between_runs() {
         assert_eq!(blocks(&[10, 10, 10, 40], 25), [0..2, 2..3, 3..4]);
         assert!(blocks(&[], 25).is_empty());
     }
 
     #[test]
-    fn a_terminal_is_not_spoken_to() {
+    fn control_characters_are_removed() {
         assert_eq!(plain("a\u{1b}[31m\nb"), "a[31m b");
     }
 }

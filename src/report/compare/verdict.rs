@@ -1,4 +1,4 @@
-//! What the numbers of a run mean, in one line.
+//! Summary of a run in one line: fit of the response, and agreement with the true system.
 
 use super::run::ComparedRun;
 use super::{CLOSE, MATCHED, ROUNDING};
@@ -6,24 +6,23 @@ use crate::report::cost::CostKind;
 use kmcfit_core::internals::assessment::{RECOVERED, TruthErrors};
 use std::fmt;
 
-/// Fit in per cent from which a motion whose noise was estimated counts as matched.
+/// Smallest fit, per cent, of a response that counts as fitted, if sigma was estimated.
 const FITTED: f64 = 90.0;
 
-/// How well the measured motion is matched.
-pub(super) enum Match {
-    /// The noise was estimated from the motion, and the fit of the worst channel is so many per cent: chi-square is then
-    /// what it is by construction.
+/// Fit of the measured response.
+pub(super) enum ResponseFit {
+    /// Fit of the worst channel, per cent. Sigma was estimated, so chi-square carries no information.
     Fit(f64),
-    /// Chi-square of so many readings.
+    /// Chi-square of so many samples.
     ChiSquare { misfit: f64, readings: f64 },
-    /// The motion of the run is the measured one; `J/J0`.
+    /// `J/J0` of the equation error; no response was simulated.
     Equation(f64),
-    /// The share of the motion that is left, and `J/J0`.
-    Left { share: f64, ratio: f64 },
+    /// Root-mean-square residual over root-mean-square sample, and `J/J0`.
+    Residual { share: f64, ratio: f64 },
 }
 
-impl Match {
-    /// How well a run matches its motion.
+impl ResponseFit {
+    /// The fit of a run.
     pub fn of(run: &ComparedRun) -> Self {
         let document = &run.finished.document;
         let ratio = document.cost.ratio;
@@ -41,14 +40,15 @@ impl Match {
                 readings: document.experiments.iter().map(|e| e.readings as f64).sum(),
             },
             CostKind::EquationError => Self::Equation(ratio),
-            CostKind::Integral | CostKind::Mixed => Self::Left {
+            CostKind::Integral | CostKind::Mixed => Self::Residual {
                 share: residual_share(run),
                 ratio,
             },
         }
     }
 
-    /// Whether it is matched. For a chi-square by the discrepancy rule: mean and twice the standard deviation.
+    /// Whether the response counts as fitted; a chi-square by the discrepancy rule: at most its mean plus twice its standard
+    /// deviation.
     pub fn is_matched(&self) -> bool {
         match *self {
             Self::Fit(percent) => percent >= FITTED,
@@ -57,39 +57,38 @@ impl Match {
                 readings: n,
             } => misfit <= n + 2.0 * (2.0 * n).sqrt(),
             Self::Equation(_) => false,
-            Self::Left { share, .. } => share <= MATCHED,
+            Self::Residual { share, .. } => share <= MATCHED,
         }
     }
 }
 
-impl fmt::Display for Match {
+impl fmt::Display for ResponseFit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let verb = match self.is_matched() {
-            true => "matches the motion",
-            false => "does not match the motion",
+            true => "response fitted",
+            false => "response not fitted",
         };
         match self {
             Self::Fit(percent) => {
-                write!(
-                    f,
-                    "{verb} (fit {percent:.1} %; its noise was estimated from it)"
-                )
+                write!(f, "{verb} (fit {percent:.1} %, sigma estimated)")
             }
             Self::ChiSquare { misfit, readings } => write!(
                 f,
-                "{verb} within its noise (chi-square {misfit:.0} of {readings} readings)"
+                "{verb} within the noise (chi-square {misfit:.0} for {readings} samples)"
             ),
             Self::Equation(ratio) => {
                 write!(
                     f,
-                    "fits the equation of motion, not a motion (J/J0 {ratio:.1e})"
+                    "equation error fitted, no response simulated (J/J0 {ratio:.1e})"
                 )
             }
-            Self::Left { ratio, .. } if self.is_matched() => write!(f, "{verb} (J/J0 {ratio:.1e})"),
-            Self::Left { share, ratio } => {
+            Self::Residual { ratio, .. } if self.is_matched() => {
+                write!(f, "{verb} (J/J0 {ratio:.1e})")
+            }
+            Self::Residual { share, ratio } => {
                 write!(
                     f,
-                    "{verb} (J/J0 {ratio:.1e}, {} of it is left)",
+                    "{verb} (J/J0 {ratio:.1e}, rms residual {} of the rms response)",
                     percent(*share)
                 )
             }
@@ -97,40 +96,40 @@ impl fmt::Display for Match {
     }
 }
 
-/// The line: whether the motion is matched, and whether the device is the true one.
-pub(super) fn verdict(matching: &Match, errors: Option<&TruthErrors>) -> String {
-    let matched = matching.is_matched();
+/// The line: fit of the response and, if the true system is known, the errors of k/m, c/m and m.
+pub(super) fn verdict(response: &ResponseFit, errors: Option<&TruthErrors>) -> String {
+    let matched = response.is_matched();
     let Some(errors) = errors else {
-        return format!("{matching}; the truth is not known");
+        return format!("{response}; true system not known");
     };
     if errors.within(RECOVERED) {
         let mut text = format!(
-            "the true device: k/m and c/m to {}",
+            "true system recovered: relative error of k/m and c/m at most {}",
             size(errors.worst_ratio())
         );
         if errors.mass_relative >= RECOVERED {
             let off = percent(errors.mass_relative);
-            text += &format!(", but m, c and k off by a common factor (m by {off})");
+            text += &format!("; m, c and k are scaled by a common factor (error of m {off})");
         }
         return match matched {
             true => text,
-            false => format!("{text}; {matching}"),
+            false => format!("{text}; {response}"),
         };
     }
     let off = distances(errors);
     match (matched, errors.within(CLOSE)) {
         (_, true) if errors.mass_relative >= CLOSE => format!(
-            "close to the true device in k/m and c/m: {off}; m, c and k off by a common factor (m by \
-             {}); {matching}",
+            "close to the true system in k/m and c/m: {off}; m, c and k are scaled by a common factor (error of m \
+             {}); {response}",
             percent(errors.mass_relative)
         ),
-        (_, true) => format!("close to the true device: {off}; {matching}"),
-        (true, false) => format!("{matching} but is another device: {off}"),
-        (false, false) => format!("{matching}; another device: {off}"),
+        (_, true) => format!("close to the true system: {off}; {response}"),
+        (true, false) => format!("{response}, but not by the true system: {off}"),
+        (false, false) => format!("{response}; not the true system: {off}"),
     }
 }
 
-/// Root-mean-square residual over root-mean-square reading, the worst of all motions.
+/// Root-mean-square residual over root-mean-square sample, the largest of all records.
 fn residual_share(run: &ComparedRun) -> f64 {
     let squares = |f: &[f64]| f.iter().map(|x| x * x).sum::<f64>();
     let shares = run.motions.iter().map(|motion| {
@@ -144,15 +143,15 @@ fn residual_share(run: &ComparedRun) -> f64 {
     shares.fold(0.0, f64::max)
 }
 
-/// How far `k/m` and `c/m` are from the truth; only the one that is off, if the other is not.
+/// Errors of `k/m` and `c/m`; the one below the tolerance is left out.
 fn distances(errors: &TruthErrors) -> String {
-    let stiffness = format!("k/m off by {}", percent(errors.k_over_m_relative));
+    let stiffness = format!("error of k/m {}", percent(errors.k_over_m_relative));
     let of = if errors.undamped {
         " of critical damping"
     } else {
         ""
     };
-    let damping = format!("c/m off by {}{of}", percent(errors.c_over_m_relative));
+    let damping = format!("error of c/m {}{of}", percent(errors.c_over_m_relative));
     if errors.c_over_m_relative < RECOVERED {
         stiffness
     } else if errors.k_over_m_relative < RECOVERED {
@@ -162,7 +161,7 @@ fn distances(errors: &TruthErrors) -> String {
     }
 }
 
-/// A small number with two digits; with one where it is rounding.
+/// A small number with two digits; with one if it is at the level of rounding errors.
 fn size(x: f64) -> String {
     match x < ROUNDING {
         true => format!("{x:.0e}"),
@@ -170,11 +169,11 @@ fn size(x: f64) -> String {
     }
 }
 
-/// A share as a percentage with two or three digits.
+/// A ratio as a percentage with two or three digits.
 fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     match percent {
-        _ if !percent.is_finite() => "more than any number".into(),
+        _ if !percent.is_finite() => "unbounded".into(),
         p if p >= 1e4 => format!("a factor of {share:.0e}"),
         p if p >= 10.0 => format!("{p:.0} %"),
         p if p >= 1.0 => format!("{p:.1} %"),

@@ -16,10 +16,10 @@ pub struct ChannelSummary {
     /// Readings that are not used.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ignored: Vec<IgnoredSummary>,
-    /// Single readings far off ([`kmcfit_core::internals::diagnostics::far_off`]), under a robust loss: rms, fit and whiteness are those of
-    /// the others.
+    /// Number of samples rejected as outliers under a robust loss ([`kmcfit_core::internals::diagnostics::far_off`]);
+    /// rms, fit and whiteness are those of the other samples.
     #[serde(default, skip_serializing_if = "is_zero")]
-    pub left_aside: usize,
+    pub outliers: usize,
     /// Root-mean-square residual.
     #[serde(deserialize_with = "number_or_nan")]
     pub rms_residual: f64,
@@ -68,7 +68,7 @@ pub struct IgnoredSummary {
 
 /// A number that was fitted beside the functions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ScalarSummary {
+pub struct NuisanceParameter {
     /// Name.
     pub name: String,
     /// SI unit.
@@ -83,22 +83,22 @@ pub struct ScalarSummary {
 
 /// An experiment that took no part in the fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct HoldOutSummary {
+pub struct ValidationSummary {
     /// Name.
     pub name: String,
-    /// How well each channel is predicted.
+    /// Fit of each channel.
     pub channels: Vec<ChannelSummary>,
     /// What was found from its own readings: its initial state, its sensors.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub scalars: Vec<ScalarSummary>,
+    pub nuisance_parameters: Vec<NuisanceParameter>,
     /// Why there is no prediction, if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
 }
 
-impl HoldOutSummary {
+impl ValidationSummary {
     /// Its name in tables.
     pub(in crate::report) fn title(&self) -> String {
-        format!("{} (held out)", self.name)
+        format!("{} (validation)", self.name)
     }
 }

@@ -3,15 +3,16 @@
 mod channel;
 mod search;
 
-pub use channel::{ChannelSummary, HoldOutSummary, IgnoredSummary, ScalarSummary};
-pub use search::{PathSummary, RungSummary, WeightSummary};
+pub use channel::{ChannelSummary, IgnoredSummary, NuisanceParameter, ValidationSummary};
+pub use search::{AttemptSummary, PathSummary, WeightSummary};
 
+use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
 use kmcfit_core::internals::assessment::{FitStatistics, FunctionSummary, StepCheck};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::solvers::{Optimality, Status, number_or_nan};
-pub use kmcfit_core::internals::study::Prediction;
+pub use kmcfit_core::internals::study::PredictionSummary as Prediction;
 use kmcfit_core::internals::system::Grid;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -52,38 +53,41 @@ pub struct ResultDocument {
     /// The constraints at the best point.
     #[serde(default)]
     pub constraints: ConstraintSummary,
-    /// What the data can and cannot tell.
+    /// Identifiability of the parameters.
     #[serde(default)]
     pub identifiability: IdentifiabilitySummary,
-    /// How the weight of the smoothness was chosen, if by a rule.
+    /// Choice of the penalty weight by a rule.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<WeightSummary>,
-    /// The starts that were tried, in order.
+    /// Attempts from several starting points, in order.
     #[serde(default)]
-    pub rungs: Vec<RungSummary>,
-    /// How well each experiment is matched.
+    pub attempts: Vec<AttemptSummary>,
+    /// Fit of each experiment.
     pub experiments: Vec<ExperimentSummary>,
-    /// Experiments that took no part in the fit.
+    /// Validation records: predicted by the fit, not used in it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub held_out: Vec<HoldOutSummary>,
-    /// Numbers that were fitted beside the functions.
+    pub validation: Vec<ValidationSummary>,
+    /// Estimated initial states and sensor parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub scalars: Vec<ScalarSummary>,
-    /// All readings together.
+    pub nuisance_parameters: Vec<NuisanceParameter>,
+    /// Statistics of all samples.
     #[serde(default)]
     pub statistics: FitStatistics,
-    /// The optimum on a grid of half the step; `null` where it has no motion there.
+    /// Step-size check: the optimum simulated with half the step; `null` if there is no response.
     #[serde(default)]
-    pub half_step: Option<StepCheck>,
-    /// The motion of the found device from other initial states.
+    pub step_check: Option<StepCheck>,
+    /// Predicted free responses from other initial states.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub predictions: Vec<Prediction>,
-    /// What was chosen for the user, and why.
+    /// Automatic choices, such as the number of nodes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub remarks: Vec<String>,
-    /// What the user should know.
+    pub automatic: Vec<Finding>,
+    /// Warnings about data and specification.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Finding>,
+    /// Recommendations, the most urgent first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub suggestions: Vec<Finding>,
 }
 
 /// What was run.
@@ -198,11 +202,11 @@ impl ResultDocument {
         self.experiments.iter().flat_map(|e| &e.channels)
     }
 
-    /// The channels of all records with the names of these, those that were held out last.
+    /// The channels of all records with the names of the records, validation records last.
     pub(super) fn records(&self) -> impl Iterator<Item = (String, &ChannelSummary)> {
         let fitted = self.experiments.iter();
         let fitted = fitted.map(|e| (e.name.clone(), &e.channels));
-        let held = self.held_out.iter();
+        let held = self.validation.iter();
         let held = held.map(|e| (e.title(), &e.channels));
         let named = fitted.chain(held);
         named.flat_map(|(name, channels)| channels.iter().map(move |c| (name.clone(), c)))
@@ -265,27 +269,27 @@ pub struct ExperimentSummary {
     /// Root-mean-square residual of the first channel, in its SI unit.
     #[serde(deserialize_with = "number_or_nan")]
     pub rms_residual: f64,
-    /// How well each channel is matched.
+    /// Fit of each channel.
     #[serde(default)]
     pub channels: Vec<ChannelSummary>,
 }
 
-/// What the data can and cannot tell, as far as it is known before a fit.
+/// Identifiability: the structural rank, and findings and warnings on functions and ratios. Confidence intervals are
+/// computed for models of at most 64 parameters; `kmcfit study` covers the others.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct IdentifiabilitySummary {
-    /// Directions of the parameters that the data can show at most.
-    pub seen: usize,
+    /// Upper bound of the number of identifiable parameter combinations.
+    pub rank_bound: usize,
     /// Number of parameters.
-    pub of: usize,
-    /// What records, optimum and bands settle, in words; the bands are those of models of few free values, of others
-    /// `kmcfit study` tells.
+    pub parameters: usize,
+    /// Parameters and functions that records, constraints and penalties determine.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub settled: Vec<String>,
-    /// What is left open, and what would settle it, in words.
+    pub findings: Vec<Finding>,
+    /// Parameters and functions that are not identifiable, and limits of the confidence intervals.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub open: Vec<String>,
-    /// What the model says besides the readings, in words.
-    pub knowledge: Vec<String>,
+    pub warnings: Vec<Finding>,
+    /// Assumptions of the model beside the records: fixed functions, bases, constraints, penalties.
+    pub assumptions: Vec<String>,
 }
 
 /// The constraints at the best point.
@@ -296,7 +300,7 @@ pub struct ConstraintSummary {
     pub max_violation: f64,
     /// The groups with rows at their bounds.
     pub active: Vec<ActiveSummary>,
-    /// The soft groups that are broken.
+    /// Violated soft constraints.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub slack: Vec<SlackSummary>,
 }
@@ -304,29 +308,29 @@ pub struct ConstraintSummary {
 /// A group of constraints with rows at their bounds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActiveSummary {
-    /// What the constraint says.
+    /// Name of the constraint.
     pub name: String,
     /// Number of active rows.
     pub rows: usize,
     /// Spans of time on which rows are active, s.
     pub spans: Vec<[f64; 2]>,
-    /// Sum of the multipliers' sizes.
+    /// Sum of the absolute multipliers.
     pub multiplier: f64,
-    /// In words.
-    pub sentence: String,
+    /// The sentence.
+    pub text: String,
 }
 
-/// A soft constraint that is broken.
+/// A violated soft constraint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SlackSummary {
-    /// What the constraint says.
+    /// Name of the constraint.
     pub name: String,
-    /// Number of broken rows.
+    /// Number of violated rows.
     pub rows: usize,
-    /// By how much at most, in the unit of the row.
+    /// Largest violation, in the unit of the row.
     pub largest: f64,
-    /// Part of J that it costs.
-    pub price: f64,
+    /// Its penalty, a part of J.
+    pub penalty: f64,
 }
 
 /// What a run leaves behind that could not begin: its outcome and nothing else.

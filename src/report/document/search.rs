@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 /// One attempt of the start ladder.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RungSummary {
+pub struct AttemptSummary {
     /// Where it started.
     pub start: String,
     /// J at its start; absent if the start had no motion.

@@ -1,5 +1,5 @@
-//! The page of one run: what was found, how well, how sure, and all that is needed to trust it or to
-//! repeat it.
+//! The page of a fit, `report.html`: results first, then figures, constraints, identifiability, settings and the commands
+//! that reproduce the run.
 
 use super::table::{list, paragraph};
 use super::{figures, figures_without, help, opening, page as shell, repeat, settings};
@@ -8,14 +8,15 @@ use crate::report::chart::Figure;
 use crate::report::document::ResultDocument;
 use crate::report::figures::weight_path;
 use crate::report::summary::{
-    prediction_table, write_constraints, write_rungs, write_scalars, write_statistics,
+    prediction_table, write_attempts, write_constraints, write_nuisance_parameters,
+    write_statistics,
 };
 use crate::report::text::escape;
 
-/// Where a fit starts may be far from what it finds.
+/// Curves that are hidden at first: the start may be far from the estimate.
 const START: &[&str] = &["start"];
 
-/// A part of the page: its anchor, its heading, and what is in it.
+/// A section of the page: anchor, heading, body.
 type Section = (&'static str, &'static str, String);
 
 /// The page of a run.
@@ -24,7 +25,7 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
         ("fit", "Data and fit", data_and_fit(run, document)),
         (
             "functions",
-            "The functions",
+            "Coefficient functions",
             figures_without(START, &[run.functions_figure()]),
         ),
         (
@@ -36,20 +37,16 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
         ("constraints", "Constraints", constraints(run, document)),
         (
             "identifiability",
-            "What the readings can show",
+            "Identifiability",
             identifiability(run, document),
         ),
         (
             "predictions",
-            "From other initial states",
+            "Predicted free responses",
             predictions(document),
         ),
         ("settings", "Settings", settings::settings(run, document)),
-        (
-            "repeat",
-            "How to repeat this run",
-            repeat::repeat(run, document),
-        ),
+        ("repeat", "Reproduce", repeat::repeat(run, document)),
         ("cite", "How to cite", repeat::cite()),
     ]
     .into_iter()
@@ -74,20 +71,20 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
     shell(&document.title, &body)
 }
 
-/// Every record with its residuals, and how well it is matched.
+/// Records, fits and residuals.
 fn data_and_fit(run: &FittedModel, document: &ResultDocument) -> String {
     let mut drawn = Vec::new();
     for (experiment, channel) in run.channels() {
         let pair = run.seen(experiment, channel).figures();
         drawn.extend(pair.map(|figure| run.titled(figure, experiment, channel)));
     }
-    drawn.extend(run.held_out_figures());
+    drawn.extend(run.validation_figures());
     opening::records(document)
         + &list(&lines(|text| write_statistics(text, document)))
         + &figures(&drawn)
 }
 
-/// The way to the optimum.
+/// Convergence of the search.
 fn convergence(run: &FittedModel, document: &ResultDocument) -> String {
     let mut drawn: Vec<Figure> = run.weights.map(weight_path).into_iter().collect();
     if !run.fit.history.is_empty() {
@@ -102,7 +99,7 @@ fn convergence(run: &FittedModel, document: &ResultDocument) -> String {
         drawn.push(run.titled(motion, i, 0));
     }
     let work = paragraph(&opening::work(document));
-    work + &list(&lines(|text| write_rungs(text, document))) + &figures(&drawn)
+    work + &list(&lines(|text| write_attempts(text, document))) + &figures(&drawn)
 }
 
 fn constraints(run: &FittedModel, document: &ResultDocument) -> String {
@@ -113,26 +110,26 @@ fn constraints(run: &FittedModel, document: &ResultDocument) -> String {
     let said = lines(|text| write_constraints(text, document));
     let hold = match (asked, worst) {
         (0, _) => "The model has no constraints.".to_string(),
-        (_, 0.0) => "All constraints hold.".to_string(),
+        (_, 0.0) => "All constraints are satisfied.".to_string(),
         _ => {
-            format!("The largest violation of a constraint is {worst:.1e} of the scale of its row.")
+            format!("Largest constraint violation: {worst:.1e}, relative to the scale of its row.")
         }
     };
     let active = match (asked, document.constraints.active.is_empty()) {
-        (1.., true) => paragraph("None of them is active: the readings alone decide."),
+        (1.., true) => paragraph("No constraint is active."),
         _ => String::new(),
     };
     paragraph(&hold) + &active + &list(&said)
 }
 
-/// What the fit had beside the readings, the numbers beside the functions, and where more is told.
+/// Assumptions, nuisance parameters, notes on the bands, and the command of a study.
 fn identifiability(run: &FittedModel, document: &ResultDocument) -> String {
     let known = &document.identifiability;
-    let mut text = match known.knowledge.as_slice() {
+    let mut text = match known.assumptions.as_slice() {
         [] => String::new(),
-        told => paragraph(&format!("What the fit was told: {}.", told.join("; "))),
+        list => paragraph(&format!("Assumptions: {}.", list.join("; "))),
     };
-    text += &list(&lines(|text| write_scalars(text, document)));
+    text += &list(&lines(|text| write_nuisance_parameters(text, document)));
     if let Some(bands) = run.bands() {
         let notes = bands.functions.iter().chain(&bands.ratios);
         let notes = notes.flat_map(|b| b.notes.iter().map(|n| format!("{}: {n}", b.name)));
@@ -140,7 +137,7 @@ fn identifiability(run: &FittedModel, document: &ResultDocument) -> String {
     }
     if run.is_simulated() && document.model.parameters > 0 {
         text += &paragraph(
-            "Profiles, other devices with the same motion, and the experiment that would tell most:",
+            "Likelihood profiles, equivalent systems and the most informative next experiment:",
         );
         text += &repeat::command("study", document);
     }
@@ -157,7 +154,7 @@ fn predictions(document: &ResultDocument) -> String {
     }
 }
 
-/// What a writer of the summary says, line by line.
+/// Lines of a part of the summary.
 fn lines(write: impl Fn(&mut String) -> std::fmt::Result) -> Vec<String> {
     let mut text = String::new();
     // Writing to a String cannot fail.

@@ -33,9 +33,9 @@ const SCRIPTS: [&str; 6] = [
 ];
 
 /// How a chart is used; every chart refers to it.
-const KEYS: &str = "Point at a chart to read it off; drag to zoom in. Click it, then turn the wheel to zoom, with \
-     Shift upward. Keys: arrows, Home and End move the reading, with Shift further; + and - zoom; \
-     Escape or a double click shows everything again. The entries above a chart switch its curves.";
+const KEYS: &str = "Hover over a chart to show values; drag to zoom. Click, then use the wheel to zoom in time, with Shift \
+     in the value. Keys: arrows, Home and End move the cursor, with Shift in larger steps; + and - zoom; Escape or a \
+     double click resets the view. The legend entries show and hide curves.";
 
 /// A page: its title and what follows the heading, which must be escaped already.
 pub(super) fn page(title: &str, body: &str) -> String {

@@ -1,36 +1,34 @@
-//! What a person reads first: the outcome, the numbers that matter, what was found and how sure it is.
+//! First part of the page of a fit: status, main figures, estimates, identifiability, warnings, suggestions; and the
+//! tables of records and work.
 
 use super::table::{list, number, table};
-use crate::report::advice::{self, Advice};
+use crate::finding::Finding;
 use crate::report::document::{ChannelSummary, ResultDocument};
+use crate::report::suggestions;
 use crate::report::summary::{count, iterations};
 use crate::report::text::{escape, prose};
 use kmcfit_core::internals::assessment::FunctionSummary;
-use kmcfit_core::internals::identifiability::VerdictKind;
+use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::solvers::Status;
 
 /// Everything above the contents.
 pub(super) fn opening(document: &ResultDocument) -> String {
     let known = &document.identifiability;
-    let next = advice::next(document);
-    let notes = (document.warnings.iter().map(|w| format!("warning: {w}")))
-        .chain(document.remarks.iter().map(|r| format!("note: {r}")));
+    let mut warnings = Finding::texts(&known.warnings);
+    warnings.extend(Finding::texts(&document.warnings));
     let lists = [
-        ("How sure", known.settled.clone()),
-        ("What stays open", known.open.clone()),
-        (
-            "What to try next",
-            next.iter().map(Advice::to_string).collect(),
-        ),
-        ("Notes", notes.collect()),
+        ("Identifiability", Finding::texts(&known.findings)),
+        ("Warnings", warnings),
+        ("Suggestions", Finding::texts(&document.suggestions)),
+        ("Automatic choices", Finding::texts(&document.automatic)),
     ];
     let lists = lists.iter().filter(|(_, sentences)| !sentences.is_empty());
     let lists =
         lists.map(|(heading, sentences)| format!("<h3>{heading}</h3>\n{}", list(sentences)));
-    state(document) + &facts(document) + &found(document) + &lists.collect::<String>()
+    state(document) + &facts(document) + &estimates(document) + &lists.collect::<String>()
 }
 
-/// How it ended, as a coloured word and a reason.
+/// Status as a coloured word, and the reason.
 fn state(document: &ResultDocument) -> String {
     let outcome = &document.outcome;
     let colour = match outcome.status {
@@ -45,30 +43,30 @@ fn state(document: &ResultDocument) -> String {
     )
 }
 
-/// The numbers that matter.
+/// Main figures: cost ratio, fit, chi-square, samples, parameters, rank bound.
 fn facts(document: &ResultDocument) -> String {
     let readings: usize = document.experiments.iter().map(|e| e.readings).sum();
     let mut facts = Vec::new();
     if document.has_ratio() {
-        facts.push(("misfit left, J/J0", number(document.cost.ratio)));
+        facts.push(("cost ratio J/J0", number(document.cost.ratio)));
     }
     if let Some(worst) = document.worst_fit() {
         let name = match document.channels().count() {
-            1 => "fit of the readings",
+            1 => "fit",
             _ => "fit of the worst channel",
         };
-        facts.push((name, advice::percent(worst, 2)));
+        facts.push((name, suggestions::percent(worst, 2)));
     }
     if let Some(reduced) = document.statistics.reduced_chi_square {
         facts.push(("chi-square per degree of freedom", number(reduced)));
     }
-    facts.push(("readings", readings.to_string()));
-    facts.push(("free values", document.model.parameters.to_string()));
+    facts.push(("samples", readings.to_string()));
+    facts.push(("parameters", document.model.parameters.to_string()));
     let known = &document.identifiability;
-    if known.seen < known.of && document.is_simulated() {
+    if known.rank_bound < known.parameters && document.is_simulated() {
         facts.push((
-            "directions that can be seen",
-            format!("{} at most", known.seen),
+            "identifiable parameter combinations",
+            format!("at most {}", known.rank_bound),
         ));
     }
     let fact = |(name, value): &(&str, String)| {
@@ -82,27 +80,29 @@ fn facts(document: &ResultDocument) -> String {
     format!("<dl class=\"facts\">\n{facts}</dl>\n")
 }
 
-/// The functions in the order of the equation of motion, then those of single experiments.
-fn found(document: &ResultDocument) -> String {
+/// Table of the functions in the order of the equation of motion, then those of single experiments.
+fn estimates(document: &ResultDocument) -> String {
     let functions: Vec<(&str, &FunctionSummary)> = document.all_functions().collect();
     let has_truth = functions.iter().any(|(_, f)| f.truth_max_error.is_some());
     let has_error = functions.iter().any(|(_, f)| f.standard_error.is_some());
     let has_verdict = functions.iter().any(|(_, f)| f.verdict.is_some());
     let mut headings = vec!["function", "smallest", "largest", "unit"];
     headings.extend(has_error.then_some("standard error"));
-    headings.extend(has_verdict.then_some("known"));
+    headings.extend(has_verdict.then_some("identified"));
     if has_truth {
-        headings.extend(["largest error", "rms error"]);
+        headings.extend(["max error", "rms error"]);
     }
     let known = |x: Option<f64>| x.map_or(String::new(), number);
     let row = |(name, f): &(&str, &FunctionSummary)| {
-        let is_seen = f.verdict != Some(VerdictKind::NotSeen);
-        let [low, high] = match (is_seen, f.is_rounding) {
+        let is_identifiable = f.verdict != Some(ClassificationKind::NotIdentified);
+        let [low, high] = match (is_identifiable, f.negligible) {
             (false, _) => [String::new(), String::new()],
             (true, true) => [number(0.0), number(0.0)],
             (true, false) => [number(f.min), number(f.max)],
         };
-        let error = f.standard_error.filter(|_| is_seen && !f.is_rounding);
+        let error = f
+            .standard_error
+            .filter(|_| is_identifiable && !f.negligible);
         let mut cells = vec![name.to_string(), low, high, f.unit.clone()];
         cells.extend(has_error.then(|| known(error)));
         cells.extend(has_verdict.then(|| verdict_in_words(f.verdict).to_owned()));
@@ -115,19 +115,19 @@ fn found(document: &ResultDocument) -> String {
     table(&headings, &rows)
 }
 
-/// A verdict as a word of a table.
-fn verdict_in_words(verdict: Option<VerdictKind>) -> &'static str {
+/// A classification as an entry of the table.
+fn verdict_in_words(verdict: Option<ClassificationKind>) -> &'static str {
     match verdict {
-        Some(VerdictKind::Identified) => "yes",
-        Some(VerdictKind::OnlyRatio) => "only a ratio",
-        Some(VerdictKind::OnlyOn) => "at times",
-        Some(VerdictKind::NotSeen) => "not seen",
-        Some(VerdictKind::Fixed) => "given",
+        Some(ClassificationKind::Identified) => "yes",
+        Some(ClassificationKind::OnlyRatio) => "ratio only",
+        Some(ClassificationKind::PartlyIdentified) => "partly",
+        Some(ClassificationKind::NotIdentified) => "no",
+        Some(ClassificationKind::Fixed) => "fixed",
         None => "",
     }
 }
 
-/// How well each record is matched, those that were held out included.
+/// Table of the fit of each channel, validation records included.
 pub(super) fn records(document: &ResultDocument) -> String {
     let mut rows = Vec::new();
     let mut notes = Vec::new();
@@ -138,13 +138,13 @@ pub(super) fn records(document: &ResultDocument) -> String {
             notes.push(format!("{about}: {}", channel.whiteness));
         }
         notes.extend(channel.ignored.iter().map(|ignored| {
-            let readings = count(ignored.readings, "reading");
+            let readings = count(ignored.readings, "sample");
             format!("{about}: {readings} not used: {}", ignored.reason)
         }));
     }
-    for out in &document.held_out {
+    for out in &document.validation {
         let failure = out.failure.as_ref();
-        notes.extend(failure.map(|f| format!("{}: no motion: {f}", out.title())));
+        notes.extend(failure.map(|f| format!("{}: no response: {f}", out.title())));
     }
     let headings = [
         "record",
@@ -152,7 +152,7 @@ pub(super) fn records(document: &ResultDocument) -> String {
         "fit",
         "rms residual",
         "sigma",
-        "readings",
+        "samples",
     ];
     table(&headings, &rows) + &list(&notes)
 }
@@ -178,7 +178,7 @@ fn record(name: &str, channel: &ChannelSummary) -> Vec<String> {
     ]
 }
 
-/// The cost and the work in one line.
+/// Cost and work in one sentence.
 pub(super) fn work(document: &ResultDocument) -> String {
     let (cost, counts) = (&document.cost, &document.counts);
     format!(

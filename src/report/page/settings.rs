@@ -1,11 +1,11 @@
-//! What was asked for.
+//! Settings of a fit: grid, stepper, method, gradient, stopping tests and cost.
 
 use super::table::{number, pairs};
 use crate::report::FittedModel;
 use crate::report::document::ResultDocument;
 use kmcfit_core::internals::solvers::Stopping;
 
-/// Grid, method, cost and stopping rules.
+/// Table of the settings.
 pub(super) fn settings(run: &FittedModel, document: &ResultDocument) -> String {
     let model = &document.model;
     let end = model.start + model.duration;
@@ -30,29 +30,29 @@ pub(super) fn settings(run: &FittedModel, document: &ResultDocument) -> String {
                 .collect::<Vec<_>>()
                 .join(", "),
         ),
-        ("free values", model.parameters.to_string()),
+        ("parameters", model.parameters.to_string()),
         ("stop", stopping(&run.model.settings.stopping)),
         ("cost", model.cost_definition.clone()),
     ];
     if let Some(weights) = &document.weights {
         let weight = format!("{} by {}", number(weights.weight), weights.rule);
-        rows.push(("weight of the smoothness", weight));
+        rows.push(("penalty weight", weight));
     }
     pairs(&rows)
 }
 
-/// The rules by which the fit stops, in the words of the model file.
+/// Stopping tests, with the keys of the model file.
 fn stopping(rules: &Stopping) -> String {
-    let mut said = vec![format!("iterations {}", rules.iterations)];
+    let mut tests = vec![format!("iterations {}", rules.iterations)];
     let rule = |name: &str, value: Option<f64>| Some(format!("{name} {:e}", value?));
-    said.extend(rule("cost_ratio", rules.cost_ratio));
-    said.extend(rule("gradient_ratio", rules.gradient_ratio));
-    said.extend(rule("tolerance", rules.tolerance));
-    said.extend(rule("step", rules.step));
-    said.extend(
+    tests.extend(rule("cost_ratio", rules.cost_ratio));
+    tests.extend(rule("gradient_ratio", rules.gradient_ratio));
+    tests.extend(rule("tolerance", rules.tolerance));
+    tests.extend(rule("step", rules.step));
+    tests.extend(
         rules
             .limit
             .map(|limit| format!("seconds {}", limit.as_secs_f64())),
     );
-    said.join(", ")
+    tests.join(", ")
 }

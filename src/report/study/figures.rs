@@ -1,6 +1,8 @@
 //! The figures of a study.
 
-use super::{BandRecord, BandsPiece, DirectionRecord, EquivalentRecord, Numbers, StudyDocument};
+use super::{
+    BandRecord, BandsRecord, DirectionRecord, EquivalentSystemRecord, Numbers, StudyDocument,
+};
 use crate::report::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
 use crate::report::figures::truth;
 
@@ -10,21 +12,21 @@ pub const NAMES: [&str; 8] = [
     "spectrum",
     "directions",
     "profiles",
-    "tubes",
-    "equivalents",
+    "extremes",
+    "equivalent-systems",
     "waterfall",
     "study-predictions",
 ];
 
-/// All that the study has something for.
+/// The figures of all analyses that the study has.
 pub fn all(study: &StudyDocument) -> Vec<Figure> {
     let mut figures = Vec::new();
     figures.extend(bands(study));
     figures.extend(spectrum(study));
     figures.extend(directions(study));
     figures.extend(profiles(study));
-    figures.extend(tubes(study));
-    figures.extend(equivalents(study));
+    figures.extend(extremes(study));
+    figures.extend(equivalent_systems(study));
     figures.extend(waterfall(study));
     figures.extend(predictions(study));
     figures
@@ -39,15 +41,15 @@ fn bands(study: &StudyDocument) -> Option<Figure> {
     let bands = study.bands.as_ref()?;
     let figure = Figure::new(
         "bands",
-        "Functions and ratios with their bands",
-        "What was found against time, with the band of the stated confidence at each time; wider the \
-         band that holds at all times at once. Marks: turning points fix k/m, zero crossings c/m.",
+        "Estimates with confidence bands",
+        "Functions and ratios against time, with the pointwise confidence band and the wider simultaneous band. Marks: \
+         turning points, where a free response determines k/m, and zero crossings, where it determines c/m.",
     );
     let panels = bands.bands.iter().map(|band| band_panel(band, bands));
     Some(figure.columns(2).panels(panels))
 }
 
-/// The area between the ends of a band; where it has none it is not drawn: its note says so.
+/// The area between the ends of a band; times without ends are left out.
 fn area(
     times: &[f64],
     (low, high): (&Numbers, &Numbers),
@@ -60,7 +62,7 @@ fn area(
     (times.len() > 1).then(|| Mark::band(label, &times, &low, &high, colour))
 }
 
-fn band_panel(band: &BandRecord, all: &BandsPiece) -> Panel {
+fn band_panel(band: &BandRecord, all: &BandsRecord) -> Panel {
     let times = &all.times;
     let values = gaps(&band.values);
     let anchors: &[f64] = match band.name.as_str() {
@@ -74,10 +76,10 @@ fn band_panel(band: &BandRecord, all: &BandsPiece) -> Panel {
     let whole = (&band.simultaneous_low, &band.simultaneous_high);
     let each = (&band.low, &band.high);
     Panel::of_time(&band.name, &band.unit)
-        .marks(area(times, whole, "at all times at once", Colour::Grey))
-        .marks(area(times, each, "at each time", Colour::Sky))
+        .marks(area(times, whole, "simultaneous", Colour::Grey))
+        .marks(area(times, each, "pointwise", Colour::Sky))
         .mark(Mark::line(
-            "found",
+            "estimate",
             times,
             &values,
             Style::new(Colour::Blue).width(1.6),
@@ -85,7 +87,7 @@ fn band_panel(band: &BandRecord, all: &BandsPiece) -> Panel {
         .marks((!real.is_empty()).then(|| truth(times, &real)))
         .marks((!anchors.is_empty()).then(|| {
             let style = Style::new(Colour::Black).width(4.0);
-            Mark::points("fixed by the data", anchors, &anchored, style)
+            Mark::points("turning points, zero crossings", anchors, &anchored, style)
         }))
 }
 
@@ -95,14 +97,14 @@ fn ranks(count: usize) -> Vec<f64> {
 }
 
 fn spectrum(study: &StudyDocument) -> Option<Figure> {
-    let spectrum = study.spectrum.as_ref()?;
+    let spectrum = study.sensitivity.as_ref()?;
     let values = &spectrum.singular_values;
     let largest = values.first().copied().filter(|s| *s > 0.0)?;
     let relative: Vec<f64> = values.iter().map(|s| (s / largest).max(1e-20)).collect();
     let dashed = Style::new(Colour::Vermillion).dash(Dash::Dashed);
     let rank = spectrum.rank as f64;
     let panel = Panel::new(
-        Axis::linear("direction, best first", ""),
+        Axis::linear("parameter combination, largest singular value first", ""),
         Axis::log("singular value relative to the largest", ""),
     )
     .marks([
@@ -112,14 +114,14 @@ fn spectrum(study: &StudyDocument) -> Option<Figure> {
             &relative,
             Style::new(Colour::Blue),
         ),
-        Mark::vertical("last direction that is seen", rank, dashed),
+        Mark::vertical("rank", rank, dashed),
     ]);
-    let sentence = spectrum.sentence.as_str();
-    Some(Figure::new("spectrum", "What the readings see", sentence).panel(panel))
+    let text = spectrum.text.as_str();
+    Some(Figure::new("spectrum", "Singular values of the sensitivity", text).panel(panel))
 }
 
 fn directions(study: &StudyDocument) -> Vec<Figure> {
-    let Some(spectrum) = &study.spectrum else {
+    let Some(spectrum) = &study.sensitivity else {
         return Vec::new();
     };
     let figure = |(name, set): (&str, &[DirectionRecord])| {
@@ -138,8 +140,8 @@ fn directions(study: &StudyDocument) -> Vec<Figure> {
         });
         let figure = Figure::new(
             format!("directions-{name}"),
-            format!("The directions that are seen {name}"),
-            "Changes of the functions against time, one panel for each function.",
+            format!("Parameter combinations identified {name}"),
+            "Change of each function against time along these combinations.",
         );
         Some(figure.panels(panels))
     };
@@ -155,8 +157,8 @@ fn each<T>(records: &[T], figure: Figure, panel: impl Fn(&T) -> Panel) -> Option
 fn profiles(study: &StudyDocument) -> Option<Figure> {
     let figure = Figure::new(
         "profiles",
-        "Profiles",
-        "The least cost with one number held, above the optimum's, against that number.",
+        "Likelihood profiles",
+        "Rise of the minimal cost with one quantity held at a value, against that value.",
     );
     each(&study.profiles, figure.columns(2), |p| {
         let least = p.costs.iter().copied().fold(f64::INFINITY, f64::min);
@@ -169,20 +171,23 @@ fn profiles(study: &StudyDocument) -> Option<Figure> {
             .title(&p.verdict)
             .mark(Mark::line("", &p.values, &rise, Style::new(Colour::Blue)))
             .marks(ends.map(|end| Mark::vertical("interval", *end, dashed)))
-            .marks((p.marks.iter()).map(|(x, _)| Mark::vertical("another bound", *x, dotted)))
+            .marks(
+                (p.active_from.iter())
+                    .map(|a| Mark::vertical("constraint becomes active", a.value, dotted)),
+            )
     })
 }
 
-fn tubes(study: &StudyDocument) -> Option<Figure> {
+fn extremes(study: &StudyDocument) -> Option<Figure> {
     let figure = Figure::new(
-        "tubes",
-        "The widest tubes",
-        "Smallest and largest values among all devices that fit as well as stated, at chosen times.",
+        "extremes",
+        "Data-consistent extremes",
+        "Smallest and largest value at each time among all systems within the misfit limit.",
     );
     let dots = |colour| Style::new(colour).width(4.0);
-    each(&study.tubes, figure.columns(2), |tube| {
-        let (t, low, high) = (&tube.times, &tube.low, &tube.high);
-        Panel::of_time(&tube.name, &tube.unit).marks([
+    each(&study.extremes, figure.columns(2), |record| {
+        let (t, low, high) = (&record.times, &record.low, &record.high);
+        Panel::of_time(&record.name, &record.unit).marks([
             Mark::band("", t, low, high, Colour::Sky),
             Mark::points("smallest", t, low, dots(Colour::Blue)),
             Mark::points("largest", t, high, dots(Colour::Vermillion)),
@@ -190,24 +195,24 @@ fn tubes(study: &StudyDocument) -> Option<Figure> {
     })
 }
 
-fn equivalents(study: &StudyDocument) -> Option<Figure> {
+fn equivalent_systems(study: &StudyDocument) -> Option<Figure> {
     let figure = Figure::new(
-        "equivalents",
-        "Several devices, same motion",
-        "Mass, damping and stiffness of devices that all move like the fit.",
+        "equivalent-systems",
+        "Equivalent systems",
+        "Mass, damping and stiffness of systems with the same response as the fit.",
     );
-    type Pick = fn(&EquivalentRecord) -> &Vec<f64>;
+    type Pick = fn(&EquivalentSystemRecord) -> &Vec<f64>;
     let parts: [(&str, &str, Pick); 3] = [
         ("mass m", "kg", |e| &e.mass),
         ("damping c", "N s/m", |e| &e.damping),
         ("stiffness k", "N/m", |e| &e.stiffness),
     ];
     let panels = parts.into_iter().map(|(label, unit, pick)| {
-        let devices = study.equivalents.iter().enumerate();
+        let systems = study.equivalent_systems.iter().enumerate();
         Panel::of_time(label, unit)
-            .marks(devices.map(|(k, e)| Mark::line(&e.name, &e.times, pick(e), Style::nth(k))))
+            .marks(systems.map(|(k, e)| Mark::line(&e.name, &e.times, pick(e), Style::nth(k))))
     });
-    (!study.equivalents.is_empty()).then(|| figure.panels(panels))
+    (!study.equivalent_systems.is_empty()).then(|| figure.panels(panels))
 }
 
 fn waterfall(study: &StudyDocument) -> Option<Figure> {
@@ -218,8 +223,8 @@ fn waterfall(study: &StudyDocument) -> Option<Figure> {
     let panel = panel.mark(Mark::points("", &ranks(costs.len()), &costs, dots));
     let figure = Figure::new(
         "waterfall",
-        "Fits from many starts",
-        "Costs of all fits in rising order: steps are optima.",
+        "Fits from random starting points",
+        "Final costs in rising order; each step is a minimum.",
     );
     (!costs.is_empty()).then(|| figure.panel(panel))
 }
@@ -227,8 +232,8 @@ fn waterfall(study: &StudyDocument) -> Option<Figure> {
 fn predictions(study: &StudyDocument) -> Option<Figure> {
     let figure = Figure::new(
         "study-predictions",
-        "Motions from elsewhere",
-        "The displacement of the fitted device, with its band, and the envelope over the extreme devices.",
+        "Predicted responses",
+        "Displacement with its 95 % confidence band, and the envelope over the extreme systems.",
     );
     each(&study.predictions, figure, |p| {
         let area = |ends: &Option<Vec<[f64; 2]>>, label: &str, colour| {
@@ -237,11 +242,19 @@ fn predictions(study: &StudyDocument) -> Option<Figure> {
             Mark::band(label, &p.times, &low, &high, colour)
         };
         let worst = p
-            .worst
+            .envelope
             .is_some()
-            .then(|| area(&p.worst, "worst case", Colour::Orange));
-        let band = p.band.is_some().then(|| area(&p.band, "band", Colour::Sky));
-        let found = Mark::line("found", &p.times, &p.displacement, Style::new(Colour::Blue));
+            .then(|| area(&p.envelope, "extremes", Colour::Orange));
+        let band = p
+            .band
+            .is_some()
+            .then(|| area(&p.band, "95 % band", Colour::Sky));
+        let found = Mark::line(
+            "prediction",
+            &p.times,
+            &p.displacement,
+            Style::new(Colour::Blue),
+        );
         Panel::of_time("displacement y", "m")
             .title(&p.name)
             .marks(worst.into_iter().chain(band).chain([found]))

@@ -1,12 +1,12 @@
 //! The record of the fit that is studied, and the problem as it was fitted.
 
-use super::FitPiece;
+use super::StudiedFit;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Weighting};
 use kmcfit_core::internals::solvers::Fit;
 
-impl FitPiece {
-    /// The fit that is studied.
+impl StudiedFit {
+    /// The record of a fit.
     pub fn of(problem: &Problem, fit: &Fit) -> Self {
         let sigma = |c: &Channel| match c.weighting() {
             Weighting::Estimated { sigma } => Some(*sigma),
@@ -23,7 +23,7 @@ impl FitPiece {
         }
     }
 
-    /// Whether a fit that was kept has the shape of this problem's: a journal may be damaged.
+    /// Checks that a record from a journal, which may be damaged, has the dimensions of `problem`.
     pub fn is_of(&self, problem: &Problem) -> bool {
         let lengths = [self.parameters.len(), self.weights.len(), self.sigmas.len()];
         let expected = [
@@ -35,7 +35,7 @@ impl FitPiece {
         lengths == expected && self.sigmas.iter().flatten().all(is_positive)
     }
 
-    /// The problem with the sigmas that the fit estimated and the weights that it chose.
+    /// The problem with the estimated sigmas and the chosen penalty weights of the fit.
     pub fn problem(&self, problem: &Problem) -> Problem {
         let fitted = problem.clone().with(|parts| {
             for (penalty, weight) in parts.penalties.iter_mut().zip(&self.weights) {

@@ -1,16 +1,18 @@
-//! What a study found: pieces that are kept as they are finished, one document, figures, one page.
+//! Results of a study: `study.json`, `study.html` and figures. The records of finished analyses are kept in a journal.
 
+mod document;
 mod figures;
 mod fit;
 mod page;
-mod pieces;
 mod records;
 mod text;
 
-pub use pieces::{
-    BandRecord, BandsPiece, BootstrapRecord, CandidateRecord, ClusterRecord, DirectionRecord,
-    EquivalentRecord, FitPiece, JudgementRecord, MultistartPiece, NamedRecord, Numbers,
-    PredictionRecord, ProfilePiece, SpectrumPiece, StudyDocument, TubeRecord, VariesRecord,
+pub use document::{
+    ActiveFrom, AnalysisFailure, BandRecord, BandsRecord, BootstrapRecord, CandidateRecord,
+    ClassificationRecord, ClusterRecord, ConstancyRecord, DirectionRecord, EquivalentSystemRecord,
+    ExtremeSearch, ExtremeSystemRecord, ExtremesRecord, FurthestSystem, MultistartRecord, Numbers,
+    PredictionRecord, ProfileRecord, SensitivityRecord, StudiedFit, StudyDocument,
+    UnidentifiableRecord,
 };
 
 pub use records::*;
@@ -20,12 +22,12 @@ use crate::results::{Claim, OutputFolder};
 use std::io;
 
 impl StudyDocument {
-    /// The sentences of the study, for a terminal.
+    /// The study as text for a terminal.
     pub fn text(&self) -> String {
         text::text(self)
     }
 
-    /// The files that a study writes.
+    /// Files that a study writes.
     pub fn claim() -> Claim {
         Claim::new("study")
             .files(["study.html", "study.json"])
@@ -35,7 +37,7 @@ impl StudyDocument {
     /// Writes `study.json`, `study.html` and `figures/*.svg`.
     ///
     /// # Errors
-    /// What the file system says.
+    /// An error of the file system.
     pub fn write(&self, folder: &OutputFolder) -> io::Result<()> {
         let mut stage = folder.stage()?;
         for figure in figures::all(self) {

@@ -1,4 +1,4 @@
-//! A study as a page.
+//! The page of a study, `study.html`.
 
 use super::StudyDocument;
 use super::figures;
@@ -6,13 +6,13 @@ use super::text::sections;
 use crate::report::page as shell;
 use crate::report::text::escape;
 
-/// One file, nothing to load.
+/// The page: one HTML file without external resources.
 pub fn page(study: &StudyDocument) -> String {
     let mut body = String::new();
     for (heading, sentences) in sections(study) {
         body += &format!("<h2>{}</h2>\n{}", escape(heading), shell::list(&sentences));
     }
-    body += "<h2>In pictures</h2>\n";
+    body += "<h2>Figures</h2>\n";
     body += &shell::help();
     body += &shell::figures(&figures::all(study));
     body += &format!(
@@ -22,5 +22,5 @@ pub fn page(study: &StudyDocument) -> String {
         study.confidence,
         escape(&study.status)
     );
-    shell::page(&format!("What the data tell: {}", study.title), &body)
+    shell::page(&format!("Study of identifiability: {}", study.title), &body)
 }

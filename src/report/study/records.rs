@@ -1,35 +1,50 @@
-//! The records of a study from the analyses of the core.
+//! Records of a study from the analyses of the core.
 
-use super::pieces::*;
+use super::document::*;
 use crate::config::{Candidate, Equivalent, Model, StudyPlan, StudyTarget};
+use crate::finding::Finding;
 use crate::report::findings;
 use kmcfit_core::internals::assessment::Plausibility;
 use kmcfit_core::internals::diagnostics::{chi_square_one, normal_half_width};
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::identifiability::{
-    self, Band, BandSettings, Bands, CandidateChannel, Gauge, Sensitivity, anchors,
-    rank_experiments, residual_spread, verdicts,
+    self, Band, BandSettings, Bands, CandidateChannel, ScalingAmbiguity, Sensitivity, anchors,
+    classify_functions, rank_experiments, residual_spread,
 };
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::study::bootstrap::{NoRefits, Noise, NumberInterval, intervals};
+use kmcfit_core::internals::study::bootstrap::{
+    NoRefits, NumberInterval, ReplicateNoise, intervals,
+};
+use kmcfit_core::internals::study::constancy_test::{
+    ConstancySettings, ConstancyTest, constancy_tests,
+};
+use kmcfit_core::internals::study::extremes::{Extreme, ExtremeStatus, MisfitLimit, envelopes};
 use kmcfit_core::internals::study::multistart::{self, Multistart, Ranges};
 use kmcfit_core::internals::study::profile::{Interval, ProfileSettings};
-use kmcfit_core::internals::study::pull_apart::{Ended, Extreme, Level, envelopes};
-use kmcfit_core::internals::study::variation::{Asking, Varies, variation};
 use kmcfit_core::internals::study::{
     Choice, EquivalentSystem, Linear, equivalent_systems, prediction, profile,
 };
 use kmcfit_core::internals::system::NodalCoefficients;
 
-/// Directions that are drawn of each end of the spectrum.
+/// Parameter combinations in the figures, from each end of the spectrum.
 const DIRECTIONS: usize = 3;
-/// Unseen directions that are named one by one.
+/// Most unidentifiable combinations in the document.
 const NAMED: usize = 400;
-/// Draws of the simultaneous bands.
+/// Random draws for the simultaneous bands.
 const DRAWS: usize = 10_000;
 
-/// The problem with the weights and sigmas of the fit, the parameters of its optimum, and the evaluation there.
+/// Findings on the structural rank of a problem, the rank bound first.
+pub fn structural_rank(problem: &Problem) -> Vec<Finding> {
+    let count = identifiability::structural_rank(problem);
+    let bound = Finding::new("rank_bound", count.headline());
+    let bound = bound.with("rank_bound", count.rank_bound);
+    let bound = bound.with("parameters", count.parameters);
+    let others = count.findings.iter().map(findings::rank);
+    std::iter::once(bound).chain(others).collect()
+}
+
+/// The problem with the weights and sigmas of the fit, the parameters of its optimum, and the evaluation at them.
 #[derive(Debug, Clone, Copy)]
 pub struct Optimum<'a> {
     /// The problem.
@@ -40,29 +55,29 @@ pub struct Optimum<'a> {
     pub evaluation: &'a Evaluation,
 }
 
-fn known(values: &[f64]) -> Numbers {
+fn finite_numbers(values: &[f64]) -> Numbers {
     let finite = |x: &f64| x.is_finite().then_some(*x);
     values.iter().map(finite).collect()
 }
 
-/// What the readings see.
-pub fn spectrum(at: Optimum) -> SpectrumPiece {
+/// Sensitivity of the samples to the parameters.
+pub fn sensitivity(at: Optimum) -> SensitivityRecord {
     let spectrum = Sensitivity::of(at.problem, at.evaluation).spectrum();
-    let unseen = Gauge::at(at.problem, at.theta).unseen(&spectrum);
+    let unseen = ScalingAmbiguity::at(at.problem, at.theta).undetermined(&spectrum);
     let unseen = unseen.into_iter().take(NAMED);
-    let records = |list: Vec<identifiability::Seen>| {
-        let record = |seen: identifiability::Seen| DirectionRecord {
+    let records = |list: Vec<identifiability::ResolvedDirection>| {
+        let record = |seen: identifiability::ResolvedDirection| DirectionRecord {
             singular_value: seen.singular_value,
             functions: seen.functions,
         };
         list.into_iter().map(record).collect()
     };
-    SpectrumPiece {
-        sentence: spectrum.sentence(),
+    SensitivityRecord {
+        text: spectrum.sentence(),
         rank: spectrum.rank(),
-        of: spectrum.of(),
-        unseen: unseen
-            .map(|named| NamedRecord {
+        combinations: spectrum.of(),
+        unidentifiable: unseen
+            .map(|named| UnidentifiableRecord {
                 name: named.name,
                 share: named.share,
             })
@@ -74,8 +89,8 @@ pub fn spectrum(at: Optimum) -> SpectrumPiece {
     }
 }
 
-/// Bands, verdicts and anchors.
-pub fn bands(at: Optimum, plan: &StudyPlan, truth: Option<&NodalCoefficients>) -> BandsPiece {
+/// Confidence bands and the classification by them.
+pub fn bands(at: Optimum, plan: &StudyPlan, truth: Option<&NodalCoefficients>) -> BandsRecord {
     let (problem, evaluation) = (at.problem, at.evaluation);
     let settings = BandSettings {
         draws: DRAWS,
@@ -85,12 +100,12 @@ pub fn bands(at: Optimum, plan: &StudyPlan, truth: Option<&NodalCoefficients>) -
     let factor = normal_half_width(plan.confidence);
     let plausibility = Plausibility::at(problem, evaluation);
     let judged = match plausibility.errors_hold {
-        true => verdicts(problem, evaluation, &bands),
+        true => classify_functions(problem, evaluation, &bands),
         false => Vec::new(),
     };
     let mut notes = bands.notes.clone();
-    notes.extend(plausibility.unidentified.iter().map(findings::unidentified));
-    notes.extend(plausibility.warnings.iter().map(findings::warning));
+    notes.extend((plausibility.unidentified.iter()).map(|why| findings::unidentified(why).text));
+    notes.extend((plausibility.warnings.iter()).map(|w| findings::warning(w).text));
     let ratios = truth.map(Ratios::of);
     let of_ratio = |part: fn(&Ratios) -> &Vec<f64>| ratios.as_ref().map(|r| part(r).as_slice());
     let list = bands.functions.iter().chain(&bands.ratios);
@@ -108,15 +123,15 @@ pub fn bands(at: Optimum, plan: &StudyPlan, truth: Option<&NodalCoefficients>) -
     let fixed = evaluation.trajectories.first().map(|m| anchors(grid, m));
     let [turning_points, zero_crossings] =
         fixed.map_or_else(Default::default, |a| [a.turning_points, a.zero_crossings]);
-    BandsPiece {
+    BandsRecord {
         times: bands.times.clone(),
         bands: records.collect(),
         notes,
-        verdicts: (judged.into_iter())
-            .map(|j| JudgementRecord {
+        classification: (judged.into_iter())
+            .map(|j| ClassificationRecord {
                 verdict: j.verdict.name().into(),
                 name: j.name,
-                sentence: j.sentence,
+                text: j.sentence,
             })
             .collect(),
         turning_points,
@@ -128,24 +143,24 @@ fn band_record(band: &Band, factor: f64, truth: Option<&[f64]>) -> BandRecord {
     let ends = |factor: f64| -> [Numbers; 2] {
         let each = (0..band.values.len()).map(|t| band.ends(t, factor));
         let (low, high): (Vec<f64>, Vec<f64>) = each.map(|[low, high]| (low, high)).unzip();
-        [known(&low), known(&high)]
+        [finite_numbers(&low), finite_numbers(&high)]
     };
     let [low, high] = ends(factor);
     let [simultaneous_low, simultaneous_high] = band.simultaneous.map(ends).unwrap_or_default();
     BandRecord {
         name: band.name.clone(),
         unit: band.unit.clone(),
-        values: known(&band.values),
+        values: finite_numbers(&band.values),
         low,
         high,
         simultaneous_low,
         simultaneous_high,
-        truth: truth.map(known).unwrap_or_default(),
+        truth: truth.map(finite_numbers).unwrap_or_default(),
         notes: band.notes.clone(),
     }
 }
 
-/// The number that a target asks about.
+/// The linear functional of a target.
 pub fn linear(problem: &Problem, target: &StudyTarget) -> Option<Linear> {
     match target {
         StudyTarget::Value { function, time } => Linear::value(problem, *function, *time),
@@ -154,26 +169,31 @@ pub fn linear(problem: &Problem, target: &StudyTarget) -> Option<Linear> {
     }
 }
 
-/// One profile.
+/// Likelihood profile of one quantity.
 ///
 /// # Errors
-/// Why there is none.
-pub fn profile_of(at: Optimum, of: &Linear, plan: &StudyPlan) -> Result<ProfilePiece, String> {
+/// The reason for which there is none.
+pub fn profile_of(at: Optimum, of: &Linear, plan: &StudyPlan) -> Result<ProfileRecord, String> {
     let how = ProfileSettings {
         quantile: chi_square_one(plan.confidence),
         ..ProfileSettings::default()
     };
     let found = profile(at.problem, at.theta, of, &how).map_err(|error| error.to_string())?;
     let marks = found.marks.iter();
-    Ok(ProfilePiece {
-        sentence: found.sentence(),
+    Ok(ProfileRecord {
+        text: found.sentence(),
         verdict: match found.verdict {
             Interval::Identified => "identified",
             Interval::OneSided => "one-sided",
             Interval::Flat => "flat",
         }
         .into(),
-        marks: marks.map(|m| (m.value, m.constraint.clone())).collect(),
+        active_from: marks
+            .map(|m| ActiveFrom {
+                value: m.value,
+                constraint: m.constraint.clone(),
+            })
+            .collect(),
         name: found.name,
         unit: found.unit,
         optimum: found.optimum,
@@ -183,10 +203,10 @@ pub fn profile_of(at: Optimum, of: &Linear, plan: &StudyPlan) -> Result<ProfileP
     })
 }
 
-/// The candidates, best first.
+/// Candidate experiments, the most informative first.
 pub fn candidates(at: Optimum, list: &[Candidate]) -> Vec<CandidateRecord> {
     let spread = residual_spread(at.problem, at.evaluation);
-    let described = list.iter().map(|c| identifiability::Candidate {
+    let described = list.iter().map(|c| identifiability::CandidateExperiment {
         name: c.name.clone(),
         initial: c.experiment.initial,
         excitation: c.experiment.excitation.clone(),
@@ -203,19 +223,19 @@ pub fn candidates(at: Optimum, list: &[Candidate]) -> Vec<CandidateRecord> {
     let record = |r: identifiability::Ranked| {
         let gain = r.gain.as_ref().ok();
         CandidateRecord {
-            sentence: r.sentence(),
-            new_directions: gain.map(|g| g.new_directions),
-            volume: gain.and_then(|g| finite(g.volume)),
-            average: gain.and_then(|g| finite(g.average)),
-            worst: gain.and_then(|g| finite(g.worst)),
+            text: r.sentence(),
+            added_rank: gain.map(|g| g.new_directions),
+            d_ratio: gain.and_then(|g| finite(g.volume)),
+            a_ratio: gain.and_then(|g| finite(g.average)),
+            e_ratio: gain.and_then(|g| finite(g.worst)),
             name: r.name,
         }
     };
     ranked.into_iter().map(record).collect()
 }
 
-/// Devices with the same motion as the fit's.
-pub fn equivalents(at: Optimum, asked: &[Equivalent]) -> Vec<EquivalentRecord> {
+/// Equivalent systems: other coefficients with the response of the fit.
+pub fn equivalent(at: Optimum, asked: &[Equivalent]) -> Vec<EquivalentSystemRecord> {
     let choice = |asked: &Equivalent| Choice {
         name: asked.name.clone(),
         mass: asked.mass.clone(),
@@ -223,25 +243,25 @@ pub fn equivalents(at: Optimum, asked: &[Equivalent]) -> Vec<EquivalentRecord> {
     };
     let choices: Vec<Choice> = asked.iter().map(choice).collect();
     let record = |found: EquivalentSystem| {
-        let mut coefficients = found.device.coefficients.into_iter();
-        EquivalentRecord {
+        let mut coefficients = found.nodal.coefficients.into_iter();
+        EquivalentSystemRecord {
             name: found.name,
             times: at.problem.system.grid.times(),
-            mass: found.device.mass,
+            mass: found.nodal.mass,
             damping: coefficients.next().unwrap_or_default(),
             stiffness: coefficients.next().unwrap_or_default(),
-            motion_error: found.motion_error,
+            response_error: found.response_error,
         }
     };
     let found = equivalent_systems(at.problem, at.evaluation, &choices);
     found.into_iter().map(record).collect()
 }
 
-/// Fits from many starts.
-pub fn starts(model: &Model, at: Optimum, threads: usize) -> MultistartPiece {
+/// Fits from random starting points.
+pub fn starts(model: &Model, at: Optimum, threads: usize) -> MultistartRecord {
     let (plan, problem) = (&model.study, at.problem);
     let how = Multistart {
-        // Between the bounds, where all functions have them on both sides.
+        // Between the bounds, if every function has both, else around the start values.
         ranges: Ranges::of_bounds(problem)
             .unwrap_or_else(|| Ranges::around_starts(&problem.functions, plan.spread)),
         starts: plan.starts,
@@ -252,8 +272,8 @@ pub fn starts(model: &Model, at: Optimum, threads: usize) -> MultistartPiece {
     };
     let waterfall = multistart::multistart(problem, &how);
     let tolerance = multistart::Distance {
-        ratios: plan.same,
-        motions: plan.same,
+        ratios: plan.merge_tolerance,
+        responses: plan.merge_tolerance,
     };
     let clusters = waterfall.clusters(problem, tolerance);
     let findings = waterfall.findings(problem, at.theta, &clusters);
@@ -262,48 +282,53 @@ pub fn starts(model: &Model, at: Optimum, threads: usize) -> MultistartPiece {
         starts: c.members.len(),
         cost: c.cost,
     };
-    MultistartPiece {
+    MultistartRecord {
         costs: waterfall.costs(),
         failures: failed.map(|run| run.reason.clone()).collect(),
         clusters: clusters.iter().map(cluster).collect(),
-        sentences: (findings.iter())
+        findings: (findings.iter())
             .map(|finding| findings::of_starts(finding, plan.starts))
             .collect(),
     }
 }
 
-/// Whether each function varies.
+/// Likelihood-ratio test of a constant for each function.
 ///
 /// # Errors
-/// Why it cannot be said.
-pub fn varies(at: Optimum, plan: &StudyPlan, threads: usize) -> Result<Vec<VariesRecord>, String> {
-    let asking = Asking {
+/// The reason for which there is none.
+pub fn constancy_test(
+    at: Optimum,
+    plan: &StudyPlan,
+    threads: usize,
+) -> Result<Vec<ConstancyRecord>, String> {
+    let asking = ConstancySettings {
         level: 1.0 - plan.confidence,
         seed: plan.seed,
         threads,
-        ..Asking::default()
+        ..ConstancySettings::default()
     };
-    let found = variation(at.problem, at.theta, &asking).map_err(|error| error.to_string())?;
-    let record = |v: Varies| VariesRecord {
-        sentence: v.sentence(),
+    let found =
+        constancy_tests(at.problem, at.theta, &asking).map_err(|error| error.to_string())?;
+    let record = |v: ConstancyTest| ConstancyRecord {
+        text: v.sentence(),
         p_value: v.p_value,
         name: v.function,
     };
     Ok(found.into_iter().map(record).collect())
 }
 
-/// Intervals of the profiled numbers and of all constants and scalars from refits.
+/// Bootstrap intervals of the profiled quantities, the constants and the nuisance parameters.
 ///
 /// # Errors
-/// Why there are none.
+/// The reason for which there are none.
 pub fn refits(
     at: Optimum,
     plan: &StudyPlan,
     threads: usize,
 ) -> Result<Vec<BootstrapRecord>, String> {
     let noise = match plan.residual_noise {
-        true => Noise::Residual,
-        false => Noise::Parametric,
+        true => ReplicateNoise::Residual,
+        false => ReplicateNoise::Parametric,
     };
     let profiled = plan.profiles.iter().filter_map(|t| linear(at.problem, t));
     let how = (noise, plan.replicates, plan.seed);
@@ -317,8 +342,8 @@ pub fn refits(
     );
     let found = found.map_err(|why| match why {
         NoRefits::Undetermined => {
-            "the readings do not determine all parameters, or these are more than 64: refits from the \
-             optimum would not move where nothing is seen"
+            "bootstrap intervals need identifiable parameters, at most 64 of them: a refit does not move along a \
+             combination that is not identifiable"
                 .into()
         }
         NoRefits::NoResponse(error) => error.to_string(),
@@ -331,47 +356,51 @@ pub fn refits(
     Ok(found.into_iter().map(record).collect())
 }
 
-/// The tubes of all functions that are fitted and of k/m and c/m, and the motions that the model asks for and those in the
-/// experiments that might be made, with their envelopes over the extreme devices.
-pub fn tubes(
+/// Data-consistent extremes of all estimated functions and of k/m and c/m, and the predictions of the model file and of the
+/// candidate experiments with their envelopes over the extreme systems.
+pub fn extremes(
     model: &Model,
     at: Optimum,
     threads: usize,
-) -> (Vec<TubeRecord>, Vec<PredictionRecord>) {
+) -> (Vec<ExtremesRecord>, Vec<PredictionRecord>) {
     let plan = &model.study;
-    let level = Level::at(
+    let level = MisfitLimit::at(
         at.problem,
         at.theta,
         at.evaluation,
-        plan.level,
+        plan.misfit_limit,
         plan.confidence,
     );
     let mut records = Vec::new();
     let mut extremes = Vec::new();
-    for found in envelopes(at.problem, at.theta, &level, &plan.tubes, threads) {
+    for found in envelopes(at.problem, at.theta, &level, &plan.extremes, threads) {
         let ends = found.bands.iter().flat_map(|band| [&band.low, &band.high]);
-        let device = |e: &Extreme| (e.name(), e.misfit, ended(e.ended_at(&level)).to_owned());
-        records.push(TubeRecord {
+        let system = |e: &Extreme| ExtremeSystemRecord {
+            name: e.name(),
+            misfit: e.misfit,
+            status: status(e.ended_at(&level)),
+        };
+        records.push(ExtremesRecord {
             name: found.name,
             unit: found.unit.to_owned(),
-            times: plan.tubes.clone(),
+            times: plan.extremes.clone(),
             low: found.bands.iter().map(|band| band.low.value).collect(),
             high: found.bands.iter().map(|band| band.high.value).collect(),
-            level: level.misfit,
-            devices: ends.map(device).collect(),
+            misfit_limit: level.misfit,
+            systems: ends.map(system).collect(),
         });
         extremes.extend(found.bands.into_iter().flat_map(|b| [b.low, b.high]));
     }
     (records, predictions(model, at, &extremes))
 }
 
-/// How the search for an extreme device ended.
-fn ended(ended: Ended) -> &'static str {
+/// End of the search for an extreme.
+fn status(ended: ExtremeStatus) -> ExtremeSearch {
     match ended {
-        Ended::Settled => super::text::ENDED,
-        Ended::Reach => "at the reach that was stated: no end was met",
-        Ended::Stuck => "no trial could be brought back to the level",
-        Ended::Programs => "the programs ran out",
+        ExtremeStatus::Converged => ExtremeSearch::Converged,
+        ExtremeStatus::SearchLimit => ExtremeSearch::RangeLimit,
+        ExtremeStatus::NoFeasibleStep => ExtremeSearch::Stalled,
+        ExtremeStatus::ProgramLimit => ExtremeSearch::IterationLimit,
     }
 }
 
@@ -379,22 +408,27 @@ fn predictions(model: &Model, at: Optimum, extremes: &[Extreme]) -> Vec<Predicti
     let covariance = at.problem.covariance(at.evaluation);
     let free = model.predictions.iter().map(|state| {
         let (y, v) = (state.displacement, state.velocity);
-        prediction::Run::free(format!("from y = {y} m, v = {v} m/s"), *state)
+        prediction::PredictionCase::free(format!("from y = {y} m, v = {v} m/s"), *state)
     });
-    let candidates = model.study.candidates.iter().map(|c| prediction::Run {
-        excitation: c.experiment.excitation.clone(),
-        ..prediction::Run::free(format!("`{}`", c.name), c.experiment.initial)
-    });
+    let candidates = model
+        .study
+        .candidates
+        .iter()
+        .map(|c| prediction::PredictionCase {
+            excitation: c.experiment.excitation.clone(),
+            ..prediction::PredictionCase::free(format!("`{}`", c.name), c.experiment.initial)
+        });
     let each = free.chain(candidates).filter_map(|run| {
         let covariance = covariance.as_ref();
         let found = prediction::predict(at.problem, at.theta, &run, covariance, extremes).ok()?;
         Some(PredictionRecord {
             name: found.name,
             times: found.times,
-            displacement: found.motion.displacement,
+            displacement: found.response.displacement,
             band: found.band,
-            worst: found.worst,
-            furthest: found.furthest,
+            envelope: found.worst,
+            furthest: (found.furthest)
+                .map(|(name, difference)| FurthestSystem { name, difference }),
         })
     });
     each.collect()

@@ -1,16 +1,16 @@
-//! A study for a terminal: its sentences.
+//! Text of a study for the terminal and for its page.
 
 use super::{
-    BandsPiece, BootstrapRecord, PredictionRecord, SpectrumPiece, StudyDocument, TubeRecord,
+    BandsRecord, BootstrapRecord, ExtremeSearch, ExtremesRecord, PredictionRecord,
+    SensitivityRecord, StudyDocument,
 };
 use crate::digits::significant;
+use crate::finding::Finding;
 
-/// How the search for an extreme device ends when it has found it.
-pub const ENDED: &str = "no further";
-/// Most extreme devices of which it is told how their search ended otherwise.
+/// Most extremes that are listed because their search did not converge.
 const MOST_LISTED: usize = 6;
 
-/// What was found, a paragraph for each piece.
+/// The study as text: a heading for each analysis and its sentences.
 pub fn text(study: &StudyDocument) -> String {
     let mut text = format!("{}\n", study.title);
     for (heading, sentences) in sections(study) {
@@ -22,13 +22,16 @@ pub fn text(study: &StudyDocument) -> String {
     text
 }
 
-/// The headings and their sentences.
+/// Headings and their sentences; analyses that were not run are left out.
 pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
     let multistart = study.multistart.iter();
     let sections = [
-        ("Before the fit", study.before.clone()),
         (
-            "The fit",
+            "Structural rank (before the fit)",
+            Finding::texts(&study.structural_rank),
+        ),
+        (
+            "Fit",
             lines(study.fit.as_slice(), |fit| {
                 format!(
                     "{}: {}; J = {:.6e}",
@@ -39,42 +42,47 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
             }),
         ),
         (
-            "What the readings see",
-            study.spectrum.iter().flat_map(spectrum).collect(),
+            "Sensitivity",
+            study.sensitivity.iter().flat_map(sensitivity).collect(),
         ),
         (
-            "What is known of each function",
+            "Identifiability of functions and ratios",
             study.bands.iter().flat_map(bands).collect(),
         ),
-        ("Profiles", lines(&study.profiles, |p| p.sentence.clone())),
-        ("The widest tubes", tubes(study)),
         (
-            "Other devices with the same motion",
-            lines(&study.equivalents, |e| {
+            "Likelihood profiles",
+            lines(&study.profiles, |p| p.text.clone()),
+        ),
+        ("Data-consistent extremes", extremes(study)),
+        (
+            "Equivalent systems",
+            lines(&study.equivalent_systems, |e| {
                 format!(
-                    "{}: moves like the fit to {:.1e} of the largest displacement",
-                    e.name, e.motion_error
+                    "{}: response equal to the fit's within {:.1e} of the largest displacement",
+                    e.name, e.response_error
                 )
             }),
         ),
         (
-            "Fits from many starts",
-            multistart.flat_map(|m| m.sentences.clone()).collect(),
+            "Fits from random starting points",
+            multistart
+                .flat_map(|m| Finding::texts(&m.findings))
+                .collect(),
         ),
         (
-            "Does it vary?",
-            lines(&study.varies, |v| v.sentence.clone()),
+            "Constancy test",
+            lines(&study.constancy_test, |v| v.text.clone()),
         ),
-        ("Refits", lines(&study.bootstrap, interval)),
+        ("Bootstrap intervals", lines(&study.bootstrap, interval)),
         (
-            "Which experiment next",
-            lines(&study.candidates, |c| c.sentence.clone()),
+            "Candidate experiments",
+            lines(&study.candidates, |c| c.text.clone()),
         ),
+        ("Predicted responses", lines(&study.predictions, prediction)),
         (
-            "Motions from elsewhere",
-            lines(&study.predictions, prediction),
+            "Failed analyses",
+            lines(&study.failures, |f| format!("{}: {}", f.analysis, f.reason)),
         ),
-        ("Not done", study.failures.clone()),
     ];
     let mut sections = Vec::from(sections);
     sections.retain(|(_, lines)| !lines.is_empty());
@@ -85,51 +93,68 @@ fn lines<T>(list: &[T], line: impl Fn(&T) -> String) -> Vec<String> {
     list.iter().map(line).collect()
 }
 
-fn spectrum(spectrum: &SpectrumPiece) -> Vec<String> {
-    let mut lines = vec![spectrum.sentence.clone()];
-    let mut names: Vec<&str> = spectrum.unseen.iter().map(|n| n.name.as_str()).collect();
+fn sensitivity(sensitivity: &SensitivityRecord) -> Vec<String> {
+    let mut lines = vec![sensitivity.text.clone()];
+    let names = sensitivity.unidentifiable.iter();
+    let mut names: Vec<&str> = names.map(|n| n.name.as_str()).collect();
     names.sort_unstable();
     lines.extend(names.chunk_by(|a, b| a == b).map(|same| match same {
-        [name] => format!("one unseen direction is the {name}"),
-        _ => format!("{} unseen directions are the {}", same.len(), same[0]),
+        [name] => format!("not identifiable: {name}"),
+        _ => format!(
+            "not identifiable: {} ({} combinations)",
+            same[0],
+            same.len()
+        ),
     }));
     lines
 }
 
-fn bands(bands: &BandsPiece) -> Vec<String> {
-    let verdicts = bands.verdicts.iter().map(|v| v.sentence.clone());
-    verdicts.chain(bands.notes.iter().cloned()).collect()
+fn bands(bands: &BandsRecord) -> Vec<String> {
+    let classification = bands.classification.iter().map(|c| c.text.clone());
+    classification.chain(bands.notes.iter().cloned()).collect()
 }
 
-fn tubes(study: &StudyDocument) -> Vec<String> {
-    let mut lines = lines(&study.tubes, tube);
-    let open = study.tubes.iter().flat_map(|t| &t.devices);
-    let open = open
-        .filter(|(_, _, ended)| ended != ENDED)
-        .take(MOST_LISTED);
-    lines.extend(open.map(|(name, _, ended)| format!("{name}: {ended}")));
-    if !study.tubes.is_empty() && !study.budgeted {
+fn extremes(study: &StudyDocument) -> Vec<String> {
+    let mut lines = lines(&study.extremes, widest);
+    let systems = study.extremes.iter().flat_map(|e| &e.systems);
+    let unfinished = systems.filter(|s| s.status != ExtremeSearch::Converged);
+    lines.extend(
+        unfinished
+            .take(MOST_LISTED)
+            .map(|s| format!("{}: {}", s.name, search(s.status))),
+    );
+    if !study.extremes.is_empty() && !study.roughness_limited {
         lines.push(
-            "no smoothness bounds these devices: where constraints do not either, the tubes are the \
-             bounds"
+            "no penalty limits the roughness of these systems: without constraints the extremes are the bounds"
                 .into(),
         );
     }
     lines
 }
 
-fn tube(t: &TubeRecord) -> String {
-    let width = |i: &usize| t.high[*i] - t.low[*i];
-    let widest = (0..t.times.len().min(t.low.len())).max_by(|a, b| width(a).total_cmp(&width(b)));
+/// End of the search for an extreme as a phrase.
+fn search(status: ExtremeSearch) -> &'static str {
+    match status {
+        ExtremeSearch::Converged => "converged",
+        ExtremeSearch::RangeLimit => "search range reached; the extreme lies beyond it",
+        ExtremeSearch::Stalled => "search stalled at the misfit limit",
+        ExtremeSearch::IterationLimit => "iteration limit reached",
+    }
+}
+
+/// The extremes at the time where they differ most.
+fn widest(e: &ExtremesRecord) -> String {
+    let width = |i: &usize| e.high[*i] - e.low[*i];
+    let widest = (0..e.times.len().min(e.low.len())).max_by(|a, b| width(a).total_cmp(&width(b)));
     let widest = widest.unwrap_or(0);
     format!(
-        "{}: widest at {} s, from {} to {} {}, among devices with a misfit of at most {:.4e}",
-        t.name,
-        t.times[widest],
-        significant(t.low[widest], 6),
-        significant(t.high[widest], 6),
-        t.unit,
-        t.level
+        "{}: {} to {} {} at {} s, where the range is widest (misfit limit {:.4e})",
+        e.name,
+        significant(e.low[widest], 6),
+        significant(e.high[widest], 6),
+        e.unit,
+        e.times[widest],
+        e.misfit_limit
     )
 }
 
@@ -142,17 +167,18 @@ fn interval(b: &BootstrapRecord) -> String {
             significant(high, 6),
             b.unit
         ),
-        None => format!("{}: too few refits ended well", b.name),
+        None => format!("{}: too few refits converged", b.name),
     }
 }
 
 fn prediction(p: &PredictionRecord) -> String {
     match &p.furthest {
-        Some((name, distance)) => format!(
-            "{}: the device `{name}` moves up to {} m away",
+        Some(furthest) => format!(
+            "{}: differs by up to {} m for the system with the {}",
             p.name,
-            significant(*distance, 4)
+            significant(furthest.difference, 4),
+            furthest.name
         ),
-        None => format!("{}: no other device to compare with", p.name),
+        None => format!("{}: no extreme systems to compare with", p.name),
     }
 }

@@ -1,22 +1,22 @@
-//! One channel of a fit: outliers, residual diagnostics, and patterns that are neither noise nor response.
+//! Assessment of one channel: outliers, residual diagnostics, and systematic patterns of the residuals.
 
 use crate::diagnostics::{ResidualDiagnostics, ResidualRecord, far_off, offset_and_drift};
 use crate::record::{Channel, Loss};
 use crate::signal::{Spectrum, even_spacing};
 use serde::{Deserialize, Serialize};
 
-/// Residuals below this share of the largest reading are rounding.
+/// Residuals below this share of the largest sample are rounding errors.
 const ROUNDING: f64 = 1e-6;
-/// Half of the energy of a tone lies within this share of its frequency, which is further than that other share from
-/// that of the readings.
+/// Relative bandwidth that contains half of the energy of a tone, and the smallest relative distance of its frequency from that
+/// of the samples.
 const NARROW: f64 = 0.15;
 const APART: f64 = 0.25;
-/// A multiple of a frequency is met to within this share.
+/// Largest relative distance from a multiple of a frequency.
 const MULTIPLE: f64 = 0.1;
-/// A pattern that holds more than this share of the squares is the first thing to mend.
+/// Smallest share of the sum of squares that makes a pattern dominant.
 const HALF: f64 = 0.5;
 
-/// A pattern of residuals that is neither noise nor response.
+/// A systematic pattern of residuals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ResidualPattern {
@@ -24,13 +24,13 @@ pub enum ResidualPattern {
     #[serde(rename = "far-off")]
     Outliers {
         /// Number of outliers.
-        readings: usize,
+        samples: usize,
         /// Time of the first, s.
         first: f64,
     },
-    /// The mean holds more than half of the sum of squares.
+    /// The mean contains more than half of the sum of squares.
     Offset,
-    /// A straight line holds more than half of the sum of squares about the mean.
+    /// A straight line contains more than half of the sum of squares about the mean.
     Drift,
     /// Oscillation at a frequency away from that of the record.
     Tone {
@@ -41,12 +41,12 @@ pub enum ResidualPattern {
     },
 }
 
-/// The pattern of a channel's residuals that a robust loss, or a sensor's offset or drift, may explain.
+/// Dominant pattern of a channel's residuals, which a robust loss, or an offset or drift of the sensor, may explain.
 pub fn pattern(channel: &Channel, predicted: &[f64]) -> Option<ResidualPattern> {
     let residuals: Vec<f64> = channel.residuals(predicted).collect();
     let largest =
         |values: &mut dyn Iterator<Item = &f64>| values.fold(0.0f64, |m, v| m.max(v.abs()));
-    // Rounding may have any pattern.
+    // Rounding errors may have any pattern.
     let missed = channel.observed().iter().zip(predicted).map(|(o, p)| o - p);
     let missed: Vec<f64> = missed.collect();
     if largest(&mut missed.iter()) <= ROUNDING * largest(&mut channel.observed().iter()) {
@@ -55,7 +55,7 @@ pub fn pattern(channel: &Channel, predicted: &[f64]) -> Option<ResidualPattern> 
     let far = far_off(&residuals);
     if let (Some(first), Loss::Squares) = (far.first(), channel.loss()) {
         return Some(ResidualPattern::Outliers {
-            readings: far.len(),
+            samples: far.len(),
             first: channel.times()[*first],
         });
     }
@@ -67,14 +67,13 @@ pub fn pattern(channel: &Channel, predicted: &[f64]) -> Option<ResidualPattern> 
     }
 }
 
-/// The tone of residuals at equal distances, most of whose energy is near one frequency that is not the readings', nor
-/// a multiple of it, which is the nonlinearity's. Without a sigma nothing says that residuals are more than what a descent
-/// has left.
+/// Tone in equally spaced residuals: most of the energy is near one frequency that is neither that of the samples nor a multiple
+/// of it, which a nonlinearity causes. `None` without a sigma, because residuals may then be those of an unfinished descent.
 fn tone(channel: &Channel, residuals: &[f64]) -> Option<ResidualPattern> {
     channel.weighting().sigma(0)?;
     let spacing = even_spacing(channel.times())?;
-    let [own, readings] = [residuals, channel.observed()].map(|x| Spectrum::of(x, spacing));
-    let (own, beside) = (own?, readings?.dominant());
+    let [own, samples] = [residuals, channel.observed()].map(|x| Spectrum::of(x, spacing));
+    let (own, beside) = (own?, samples?.dominant());
     let [low, high] = own.band(HALF);
     let frequency = own.dominant();
     let is_narrow = high - low <= NARROW * frequency.max(own.resolution());
@@ -102,7 +101,7 @@ pub fn diagnostics(channel: &Channel, predicted: &[f64]) -> ResidualDiagnostics 
     })
 }
 
-/// Indices of outliers ([`far_off`]) under a robust loss: they are left out of the statistics of the fit. None under least
+/// Indices of outliers ([`far_off`]) under a robust loss, which are excluded from the statistics of the fit. Empty under least
 /// squares.
 pub fn outliers(channel: &Channel, residuals: &[f64]) -> Vec<usize> {
     match channel.loss() {

@@ -1,9 +1,9 @@
-//! What a fit says of each coefficient function.
+//! Summary of each coefficient function of a fit.
 
 use super::{FitAssessment, constant_probability, standard_error};
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction};
-use crate::identifiability::{VerdictKind, is_rounding, is_unhindered};
+use crate::identifiability::{ClassificationKind, is_negligible, is_unhindered};
 use crate::problem::Problem;
 use crate::solvers::{Fit, Status, number_or_nan};
 use crate::system::NodalCoefficients;
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// One function at the best point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FunctionSummary {
-    /// SI unit: that of a motion along a line, unless it is changed.
+    /// SI unit, that of a translation unless replaced.
     #[serde(default)]
     pub unit: String,
     /// Smallest value at a node.
@@ -21,37 +21,37 @@ pub struct FunctionSummary {
     /// Largest value at a node.
     #[serde(deserialize_with = "number_or_nan")]
     pub max: f64,
-    /// For a polynomial the factors `a_0, a_1, ...` of `sum_i a_i t^i`, `t` in s as in the file, `a_i`
-    /// in the unit of the function per s^i.
+    /// For a polynomial the coefficients `a_0, a_1, ...` of `sum_i a_i t^i`, `t` in s as in the file, `a_i` in the unit of the
+    /// function per s^i.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub powers: Option<Vec<f64>>,
-    /// Whether it is zero but for rounding, beside the size at which it would matter.
+    /// True if the function is zero to machine precision, relative to its natural scale.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub is_rounding: bool,
-    /// What is known of it: `identified`, `only-ratio`, `only-on`, `not-seen` or `fixed`; for models of few free values
-    /// whose errors can be believed.
+    pub negligible: bool,
+    /// Classification: `identified`, `only-ratio`, `partly-identified`, `not-identified` or `fixed`; for models with few parameters
+    /// and meaningful standard errors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub verdict: Option<VerdictKind>,
-    /// Its smallest and largest value at the nodes where it is known, if there are any.
+    pub verdict: Option<ClassificationKind>,
+    /// Smallest and largest value over the nodes where the function is identified, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub known_range: Option<[f64; 2]>,
-    /// For a constant its standard error from the linearised fit, without constraints, penalties and
-    /// priors, where the readings determine all parameters.
+    pub identified_range: Option<[f64; 2]>,
+    /// Standard error of a constant from the linearised fit, without constraints, penalties and priors, where the samples determine
+    /// all parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standard_error: Option<f64>,
-    /// The probability that noise alone lets the function vary as much, where the truth is constant: of a fit by least squares
-    /// that converged, with residuals that may be noise, where the readings determine all parameters and nothing else has a say.
+    /// p-value of a constant function under noise alone, for a converged least-squares fit with residuals compatible with noise, whose
+    /// samples alone determine all parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub constant_p_value: Option<f64>,
-    /// Largest distance from the truth at a node, where the truth is known.
+    /// Largest error over the nodes, where the truth is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth_max_error: Option<f64>,
-    /// Root-mean-square distance from the truth over the nodes, where the truth is known.
+    /// Root-mean-square error over the nodes, where the truth is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth_rms_error: Option<f64>,
 }
 
-/// A summary of each function of a fit, in their order; `truth` is the true system, where it is known.
+/// Summaries of the functions of a fit, in their order; `truth` is the true system, where known.
 pub fn function_summaries(
     problem: &Problem,
     fit: &Fit,
@@ -68,7 +68,7 @@ pub fn function_summaries(
     let functions = problem.functions.iter().zip(&values).enumerate();
     let summary = |(i, (function, values)): (usize, (&CoefficientFunction, &Vec<f64>))| {
         let range = problem.functions.ranges()[i].clone();
-        // The judgements on the functions come first, in their order.
+        // Classifications of the functions come first, in their order.
         let judged = assessment.and_then(|a| a.judgements.get(i));
         let largest = values.iter().fold(0.0f64, |most, x| most.max(x.abs()));
         let truth = truth.and_then(|truth| truth.functions().nth(i));
@@ -82,9 +82,9 @@ pub fn function_summaries(
             unit: function.quantity.unit().into(),
             min: values.iter().copied().fold(f64::INFINITY, f64::min),
             max: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-            is_rounding: largest > 0.0 && is_rounding(largest, sizes[i]),
+            negligible: largest > 0.0 && is_negligible(largest, sizes[i]),
             verdict: judged.map(|j| j.verdict.kind()),
-            known_range: judged.and_then(|j| j.known_range),
+            identified_range: judged.and_then(|j| j.identified_range),
             powers: match &function.basis {
                 Some(Basis::Polynomial { .. }) => {
                     Some(physical_powers(&problem.system.grid, &theta[range.clone()]))

@@ -1,7 +1,7 @@
 //! Assessment of a fit: statistics of the residuals, step-size check, plausibility, standard errors and bands.
 
 mod channel;
-mod constancy;
+mod constants;
 mod function;
 mod plausibility;
 mod recovery;
@@ -9,14 +9,14 @@ mod statistics;
 mod step_check;
 
 pub use channel::{ResidualPattern, diagnostics, outliers, pattern};
-pub use constancy::{constant_probability, standard_error};
+pub use constants::{constant_probability, standard_error};
 pub use function::{FunctionSummary, function_summaries};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
 pub use recovery::{RECOVERED, Roughness, TruthErrors, is_same_truth};
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
 
-use crate::identifiability::{BandSettings, Bands, Judgement, verdicts};
+use crate::identifiability::{BandSettings, Bands, FunctionClassification, classify_functions};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::{Fit, Status};
 use nalgebra::DMatrix;
@@ -24,7 +24,7 @@ use nalgebra::DMatrix;
 /// Assessment of a fit of a simulated response.
 #[derive(Debug, Clone)]
 pub struct FitAssessment {
-    /// The optimum with half the step.
+    /// Step-size check.
     pub step_check: StepCheckOutcome,
     /// Statistics of all channels.
     pub statistics: FitStatistics,
@@ -35,7 +35,7 @@ pub struct FitAssessment {
     /// Bands of functions and ratios, where standard errors are meaningful.
     pub bands: Option<Bands>,
     /// Classification of functions and ratios by their bands.
-    pub judgements: Vec<Judgement>,
+    pub judgements: Vec<FunctionClassification>,
 }
 
 impl FitAssessment {
@@ -45,7 +45,7 @@ impl FitAssessment {
         let step_check = step_check(problem, &best.evaluation);
         let statistics = statistics(problem, &best.evaluation);
         let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
-        let tells_errors = few && problem.reading_count() > problem.parameters();
+        let tells_errors = few && problem.sample_count() > problem.parameters();
         let mut plausibility = Plausibility::of(
             problem,
             &best.evaluation,
@@ -70,7 +70,7 @@ impl FitAssessment {
                 ..BandSettings::default()
             };
             let bands = Bands::at(problem, &best.parameters, &best.evaluation, &settings);
-            assessment.judgements = verdicts(problem, &best.evaluation, &bands);
+            assessment.judgements = classify_functions(problem, &best.evaluation, &bands);
             assessment.bands = Some(bands);
             assessment.covariance = problem.covariance(&best.evaluation);
         }

@@ -1,4 +1,4 @@
-//! Plausibility of a fit: reasons why its optimum identifies no system, and warnings about its intervals.
+//! Plausibility of a fit: conditions under which its optimum identifies no system, and warnings about its intervals.
 
 use super::channel::diagnostics;
 use super::statistics::{FitStatistics, statistics};
@@ -10,73 +10,80 @@ use crate::problem::Problem;
 use crate::record::{Channel, Loss};
 use crate::simulate::SimulationError;
 use crate::system::{Excitation, Term};
+use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::TAU;
 
-/// Half the step may change the model's readings by this share of the largest one; if by more, what was fitted is
-/// the stepper, and not the device.
+/// Largest change of the predictions by halving the step, as a share of the largest sample; beyond it the step-size error
+/// dominates the fit.
 const STEPPER: f64 = 0.1;
-/// A fit is absurd that misses all channels by more than twice what their readings vary, per cent.
+/// NRMSE fit, per cent, below which a channel is unrelated to the model: residuals more than twice the variation of the samples.
 const ABSURD: f64 = -100.0;
-/// Below this share of the readings the fit does not explain the record, per cent.
+/// NRMSE fit, per cent, below which a fit does not explain the record.
 pub const POOR: f64 = 90.0;
-/// Residuals may be this many times sigma before nothing is made of sigma any more.
+/// Root of the reduced chi-square above which the stated sigma is inconsistent with the residuals.
 pub const BEYOND_SIGMA: f64 = 3.0;
-/// The probability of such residuals under white noise below which they are certainly none.
+/// p-value of the residuals under white noise below which they are certainly coloured.
 const CERTAIN: f64 = 1e-6;
-/// What such a fit leaves is the rounding of the readings, per cent.
+/// NRMSE fit, per cent, above which the residuals are rounding errors of the samples.
 pub const EXACT: f64 = 99.99;
-/// Noise would do if it had this chance.
+/// Likelihood ratio above which white noise would be matched equally well.
 const CHANCE: f64 = 1e-3;
-/// A function is negative below this share of the size at which it matters.
+/// Share of its natural scale below which a negative function counts as zero.
 const NEGATIVE: f64 = 1e-3;
-/// A force is ignored that is smaller than this share of mass times acceleration.
+/// Share of mass times acceleration below which a force is negligible.
 const IGNORED: f64 = 1e-3;
-/// Two and a half readings a period: from there on the frequency is near to that of its first alias.
+/// Periods per sample from which on the frequency is close to that of its first alias: two and a half samples per period.
 const PERIODS_PER_READING: f64 = 0.4;
-/// Equally spaced readings are no further from their places than this part of the spacing.
+/// Largest deviation of equally spaced samples from their grid, as a share of the spacing.
 const EVEN: f64 = 0.01;
 
-/// Why an optimum identifies no system.
-#[derive(Debug, Clone, PartialEq)]
+/// Reason for which an optimum identifies no system.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Unidentified {
     /// The fit failed.
     Failed,
-    /// There is no response with half the step.
-    NoResponseOnHalfStep(SimulationError),
-    /// Half the step changes the response by more than a tenth of the largest reading.
+    /// The simulation with half the step fails.
+    NoResponseOnHalfStep {
+        /// Error of the simulation.
+        #[serde(skip)]
+        error: SimulationError,
+    },
+    /// Halving the step changes the response by more than a tenth of the largest sample.
     StepDependent,
-    /// All channels are missed by more than twice what their readings vary.
+    /// The residuals of all channels exceed twice the variation of their samples.
     Unrelated,
-    /// Noise of the size of the readings would be matched as well.
+    /// Noise of the size of the samples would be matched equally well.
     Noise,
 }
 
 /// A warning about a fit.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
 pub enum FitWarning {
-    /// The residuals are so many times sigma: standard errors are not known.
+    /// The residuals are a multiple of sigma: standard errors are unknown.
     BeyondSigma {
         /// Root of the reduced chi-square.
         times: f64,
     },
-    /// Half the step changes the response by so many times the residuals: standard errors are not known.
+    /// Halving the step changes the response by a multiple of the residuals: standard errors are unknown.
     CoarseSteps {
-        /// Change over the root-mean-square residual.
+        /// Change relative to the root-mean-square residual.
         times: f64,
     },
-    /// The residuals are large and not white: standard errors are not known.
+    /// The residuals are large and not white: standard errors are unknown.
     PoorFit,
     /// The residuals are not white: standard errors are too small.
     Coloured,
-    /// Systems of other frequencies match equally spaced readings as well: standard errors are not known.
+    /// Systems of other frequencies match equally spaced samples as well: standard errors are unknown.
     Aliased {
-        /// Readings in a period.
+        /// Samples per period.
         per_period: f64,
-        /// Natural frequency found, Hz.
+        /// Identified natural frequency, Hz.
         frequency: f64,
     },
-    /// A function is negative at most times, which is not passive.
+    /// A function is negative at most times, which violates passivity.
     Negative {
         /// Name of the function.
         function: String,
@@ -91,19 +98,19 @@ pub enum FitWarning {
 /// Plausibility of a fit.
 #[derive(Debug, Clone)]
 pub struct Plausibility {
-    /// Why the optimum identifies no system, if so.
+    /// Reason for which the optimum identifies no system, if any.
     pub unidentified: Option<Unidentified>,
     /// Warnings.
     pub warnings: Vec<FitWarning>,
-    /// Whether the standard errors of the linearised fit are meaningful.
+    /// True if the standard errors of the linearised fit are meaningful.
     pub errors_hold: bool,
-    /// Whether the residuals of a channel are certainly not white, so that standard errors are too small.
+    /// True if the residuals of a channel are certainly not white, so that standard errors are too small.
     pub is_coloured: bool,
 }
 
 impl Plausibility {
-    /// Of the optimum `evaluation` with its step-size check and statistics; `tells_errors` where standard errors are
-    /// reported also for readings without a sigma.
+    /// Plausibility of the optimum `evaluation`, given its step-size check and statistics; `tells_errors` is true if standard errors
+    /// are reported also for samples without sigma.
     pub fn of(
         problem: &Problem,
         evaluation: &Evaluation,
@@ -130,21 +137,21 @@ impl Plausibility {
         }
     }
 
-    /// Of the optimum `evaluation`, with standard errors reported for all readings.
+    /// Plausibility of the optimum `evaluation`, with standard errors reported for all samples.
     pub fn at(problem: &Problem, evaluation: &Evaluation) -> Self {
         let step_check = step_check(problem, evaluation);
         let statistics = statistics(problem, evaluation);
         Self::of(problem, evaluation, &step_check, &statistics, true)
     }
 
-    /// Of a fit that failed.
+    /// Marks a failed fit.
     pub fn fail(&mut self) {
         self.unidentified = Some(Unidentified::Failed);
         self.errors_hold = false;
     }
 }
 
-/// Whether there are channels whose residuals are certainly no noise, and whether these miss much of the readings, too.
+/// True if the residuals of a channel are certainly coloured; and if such a channel is also fitted poorly.
 fn residuals(problem: &Problem, evaluation: &Evaluation, tells_errors: bool) -> (bool, bool) {
     let (mut coloured, mut poor) = (false, false);
     for (channel, predicted) in problem.predicted(evaluation) {
@@ -158,15 +165,15 @@ fn residuals(problem: &Problem, evaluation: &Evaluation, tells_errors: bool) -> 
     (coloured, poor)
 }
 
-/// Why no statement on the functions means anything; `None` where they may.
+/// Reason for which no statement on the functions is meaningful, if any.
 fn meaningless(
     problem: &Problem,
     evaluation: &Evaluation,
     step_check: &StepCheckOutcome,
 ) -> Option<Unidentified> {
     match step_check {
-        Err(breakdown) => return Some(Unidentified::NoResponseOnHalfStep(*breakdown)),
-        Ok(Some(half)) if half.change_per_reading > STEPPER => {
+        Err(error) => return Some(Unidentified::NoResponseOnHalfStep { error: *error }),
+        Ok(Some(half)) if half.change_per_sample > STEPPER => {
             return Some(Unidentified::StepDependent);
         }
         Ok(_) => {}
@@ -179,11 +186,11 @@ fn meaningless(
     absurd.then_some(Unidentified::Unrelated)
 }
 
-/// Whether a fit with as many parameters would match white noise as well, by the ratio of likelihoods of the device and of
-/// a constant for each channel; a search among many frequencies has as many chances. Outliers tell nothing of either.
+/// True if a fit with as many parameters would match white noise as well, by the likelihood ratio of the system and of a constant
+/// for each channel; a search among many frequencies has as many chances. Outliers are excluded.
 fn noise_would_do(problem: &Problem, evaluation: &Evaluation) -> bool {
     let predictions = evaluation.predictions.iter().flatten();
-    let (mut gain, mut readings) = (0.0, 0);
+    let (mut gain, mut samples) = (0.0, 0);
     for (channel, predicted) in problem.channels().zip(predictions) {
         let n = channel.len() as f64;
         let mean = channel.observed().iter().sum::<f64>() / n;
@@ -194,21 +201,21 @@ fn noise_would_do(problem: &Problem, evaluation: &Evaluation) -> bool {
             return false;
         }
         gain += n * (constant / left).ln();
-        readings += channel.len();
+        samples += channel.len();
     }
-    // As many parameters as readings match anything: no ratio tells noise from a device then.
+    // With as many parameters as samples anything is matched, and the ratio carries no information.
     let Ok(law) = ChiSquared::new(problem.parameters() as f64) else {
         return false;
     };
-    if problem.parameters() >= readings {
+    if problem.parameters() >= samples {
         return false;
     }
-    let frequencies = readings as f64 / 2.0;
+    let frequencies = samples as f64 / 2.0;
     gain.is_finite() && frequencies * law.sf(gain.max(0.0)) > CHANCE
 }
 
-/// What is said where half the step changes the model's readings by more than what is left of them: then the steps decide
-/// what is found, and not the readings.
+/// Warning where halving the step changes the predictions by more than the residuals: the step-size error then dominates the
+/// estimates.
 fn coarse(
     problem: &Problem,
     evaluation: &Evaluation,
@@ -218,13 +225,13 @@ fn coarse(
     let predictions = evaluation.predictions.iter().flatten();
     let mut fits = (problem.channels().zip(predictions))
         .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent);
-    // Readings that were made with these steps are matched to their rounding.
+    // Samples simulated with these steps are matched to machine precision.
     let is_exact = fits.all(|fit| fit > EXACT);
     let times = half.change_per_residual;
     (times > 1.0 && !is_exact).then_some(FitWarning::CoarseSteps { times })
 }
 
-/// What is said of optima that are hardly devices.
+/// Warnings about implausible optima.
 fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
     let mut warnings = Vec::new();
     let sizes = problem.natural_scales(evaluation);
@@ -235,9 +242,9 @@ fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
     ];
     let values = problem
         .functions
-        .assembly(0)
+        .coefficient_set(0)
         .iter()
-        .zip(evaluation.device.functions());
+        .zip(evaluation.nodal.functions());
     for (&f, values) in values {
         let function = problem.functions.get(f);
         let mut sorted = values.to_vec();
@@ -250,7 +257,7 @@ fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
         }
     }
     let step = problem.system.grid.step();
-    for (experiment, motion) in problem.experiments.iter().zip(&evaluation.trajectories) {
+    for (experiment, response) in problem.experiments.iter().zip(&evaluation.trajectories) {
         let force = experiment
             .excitation
             .as_ref()
@@ -258,8 +265,8 @@ fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
         let Some(force) = force.filter(|force| !force.is_zero()) else {
             continue;
         };
-        let mass = &evaluation.device_of(experiment.device).mass;
-        let inertia = motion.velocity.windows(2).zip(mass);
+        let mass = &evaluation.nodal_of(experiment.coefficient_set).mass;
+        let inertia = response.velocity.windows(2).zip(mass);
         let inertia: Vec<f64> = inertia.map(|(v, m)| m * (v[1] - v[0]) / step).collect();
         if rms(&force.at_nodes()) < IGNORED * rms(&inertia) {
             warnings.push(FitWarning::NegligibleForce {
@@ -270,16 +277,16 @@ fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
     warnings
 }
 
-/// What is said where the residuals are larger than the readings' sigma allows: the errors of all functions are then
-/// too small. `None` where they are not, or nobody gave a sigma.
+/// Warning where the residuals exceed the stated sigma, so that standard errors are too small; `None` where they do not, or no
+/// sigma is stated.
 fn unexplained(statistics: &FitStatistics) -> Option<FitWarning> {
     let times = statistics.reduced_chi_square?.sqrt();
     (times > BEYOND_SIGMA).then_some(FitWarning::BeyondSigma { times })
 }
 
-/// What is said of a device that swings so fast that its readings are those of other devices as well; `None` where they
-/// are not. Readings of one kind on a raster, of a free motion of frequency `f`, are those of one of `1/spacing - f`;
-/// times off the raster, a force, or a second kind of reading tell them apart.
+/// Warning for a system whose frequency is too high for the sampling: equally spaced samples of one kind of a free response of
+/// frequency `f` equal those of a frequency `1/spacing - f`. Unequal spacing, a force, or a second kind of samples remove the
+/// ambiguity; then `None`.
 fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
     let mut channels = problem.channels();
     let first = channels.next()?;
@@ -295,11 +302,11 @@ fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
         return None;
     }
     let place = (problem.system.terms.iter()).position(|term| *term == Term::Stiffness)?;
-    let device = &evaluation.device;
-    let pairs = device.mass.iter().zip(&device.coefficients[place]);
+    let nodal = &evaluation.nodal;
+    let pairs = nodal.mass.iter().zip(&nodal.coefficients[place]);
     let mut squares: Vec<f64> = pairs.map(|(m, k)| (k / m).max(0.0)).collect();
     squares.sort_by(f64::total_cmp);
-    // That of most times: at the ends of a record k/m may be anything.
+    // Median over time, because k/m may be arbitrary at the ends of a record.
     let frequency = squares[squares.len() / 2].sqrt() / TAU;
     (frequency * spacing > PERIODS_PER_READING).then(|| FitWarning::Aliased {
         per_period: 1.0 / (frequency * spacing),
@@ -307,7 +314,7 @@ fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
     })
 }
 
-/// The shortest distance of readings, if all distances are multiples of it, s.
+/// Smallest distance of samples, if all distances are multiples of it, s.
 fn raster(channel: &Channel) -> Option<f64> {
     let times = channel.times();
     let distances = times.windows(2).map(|pair| pair[1] - pair[0]);

@@ -1,46 +1,46 @@
-//! A system beside the true one, and the roughness of its functions.
+//! Errors of an identified system against the true one, and roughness of its functions.
 
 use crate::functions::Ratios;
 use crate::system::{Grid, NodalCoefficients};
 use serde::Serialize;
 
-/// Largest relative error of `k/m` and `c/m` below which a system counts as the true one: well above
-/// what steppers and stopping tests leave, well below what is visible in a figure.
+/// Largest relative error of `k/m` and `c/m` of a recovered system: well above the errors of steppers and stopping tests, well
+/// below the resolution of a figure.
 pub const RECOVERED: f64 = 1e-3;
-/// Truths that differ by less than this share of their size are the same on two grids.
+/// Largest relative difference of equal true systems on two grids.
 const SAME_TRUTH: f64 = 2e-3;
 
-/// Largest distances from the truth over the nodes.
+/// Largest errors over the nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TruthErrors {
-    /// Of the mass, kg.
+    /// Error of the mass, kg.
     pub mass: f64,
-    /// Of the damping, N s/m.
+    /// Error of the damping, N s/m.
     pub damping: f64,
-    /// Of the stiffness, N/m.
+    /// Error of the stiffness, N/m.
     pub stiffness: f64,
-    /// Of `k/m`, 1/s^2.
+    /// Error of `k/m`, 1/s^2.
     pub k_over_m: f64,
-    /// Of `c/m`, 1/s.
+    /// Error of `c/m`, 1/s.
     pub c_over_m: f64,
-    /// Of the mass, relative to the largest true mass.
+    /// Error of the mass, relative to the largest true mass.
     pub mass_relative: f64,
-    /// Of `k/m`, relative to the largest true `|k/m|`.
+    /// Error of `k/m`, relative to the largest true `|k/m|`.
     pub k_over_m_relative: f64,
-    /// Of `c/m`, relative to the largest true `|c/m|`; where that is below
-    /// [`RECOVERED`] of critical damping `2 sqrt(k/m)`, relative to the latter.
+    /// Error of `c/m`, relative to the largest true `|c/m|`; relative to critical damping `2 sqrt(k/m)` where the former is below
+    /// [`RECOVERED`] of the latter.
     pub c_over_m_relative: f64,
-    /// Whether `c_over_m_relative` is relative to critical damping.
+    /// True if `c_over_m_relative` is relative to critical damping.
     pub undamped: bool,
 }
 
 impl TruthErrors {
-    /// The distances of `device` from `truth`, on the same grid.
-    pub fn of(device: &NodalCoefficients, truth: &NodalCoefficients) -> Self {
-        let (found, real) = (Ratios::of(device), Ratios::of(truth));
+    /// Errors of `nodal` against `truth`, on the same grid.
+    pub fn of(nodal: &NodalCoefficients, truth: &NodalCoefficients) -> Self {
+        let (found, real) = (Ratios::of(nodal), Ratios::of(truth));
         let k_over_m = largest_error(&found.k_over_m, &real.k_over_m);
         let c_over_m = largest_error(&found.c_over_m, &real.c_over_m);
-        let mass = largest_error(&device.mass, &truth.mass);
+        let mass = largest_error(&nodal.mass, &truth.mass);
         let stiffness_scale = largest(&real.k_over_m);
         let critical = 2.0 * stiffness_scale.sqrt();
         let undamped = largest(&real.c_over_m) < RECOVERED * critical;
@@ -51,8 +51,8 @@ impl TruthErrors {
         let relative = |error: f64, scale: f64| if error == 0.0 { 0.0 } else { error / scale };
         Self {
             mass,
-            damping: largest_error(&device.coefficients[0], &truth.coefficients[0]),
-            stiffness: largest_error(&device.coefficients[1], &truth.coefficients[1]),
+            damping: largest_error(&nodal.coefficients[0], &truth.coefficients[0]),
+            stiffness: largest_error(&nodal.coefficients[1], &truth.coefficients[1]),
             k_over_m,
             c_over_m,
             mass_relative: relative(mass, largest(&truth.mass)),
@@ -62,12 +62,12 @@ impl TruthErrors {
         }
     }
 
-    /// The larger of the relative errors of `k/m` and `c/m`.
+    /// Larger of the relative errors of `k/m` and `c/m`.
     pub fn worst_ratio(&self) -> f64 {
         self.k_over_m_relative.max(self.c_over_m_relative)
     }
 
-    /// Whether `k/m` and `c/m` are the true ones to a relative tolerance.
+    /// True if the relative errors of `k/m` and `c/m` are within a tolerance.
     pub fn within(&self, tolerance: f64) -> bool {
         self.k_over_m_relative < tolerance && self.c_over_m_relative < tolerance
     }
@@ -77,7 +77,7 @@ fn largest(f: &[f64]) -> f64 {
     f.iter().map(|x| x.abs()).fold(0.0, f64::max)
 }
 
-/// Largest distance; infinite where a ratio is not finite, because the mass is zero there.
+/// Largest absolute error; infinite where a ratio is not finite because the mass is zero.
 fn largest_error(found: &[f64], truth: &[f64]) -> f64 {
     let distance = |(a, b): (&f64, &f64)| {
         let distance = (a - b).abs();
@@ -90,21 +90,20 @@ fn largest_error(found: &[f64], truth: &[f64]) -> f64 {
     found.iter().zip(truth).map(distance).fold(0.0, f64::max)
 }
 
-/// `integral (m'')^2 dt`, `integral (c')^2 dt`, `integral (k')^2 dt` by differences of the values at
-/// the nodes, whatever the basis.
+/// Roughness integrals of the functions by finite differences of nodal values, independent of the basis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Roughness {
-    /// `integral (m'')^2 dt`, kg^2/s^3.
+    /// Integral `integral (m'')^2 dt`, kg^2/s^3.
     pub mass: f64,
-    /// `integral (c')^2 dt`, N^2 s/m^2.
+    /// Integral `integral (c')^2 dt`, N^2 s/m^2.
     pub damping: f64,
-    /// `integral (k')^2 dt`, N^2/(m^2 s).
+    /// Integral `integral (k')^2 dt`, N^2/(m^2 s).
     pub stiffness: f64,
 }
 
 impl Roughness {
-    /// The roughness of a system on a grid with this step, s.
-    pub fn of(device: &NodalCoefficients, step: f64) -> Self {
+    /// Roughness of nodal coefficients on a grid with this step, s.
+    pub fn of(nodal: &NodalCoefficients, step: f64) -> Self {
         let slope = |f: &[f64]| -> f64 {
             let squares = f.windows(2).map(|w| ((w[1] - w[0]) / step).powi(2));
             squares.sum::<f64>() * step
@@ -114,14 +113,14 @@ impl Roughness {
             f.windows(3).map(second).sum::<f64>() * step
         };
         Self {
-            mass: curvature(&device.mass),
-            damping: slope(&device.coefficients[0]),
-            stiffness: slope(&device.coefficients[1]),
+            mass: curvature(&nodal.mass),
+            damping: slope(&nodal.coefficients[0]),
+            stiffness: slope(&nodal.coefficients[1]),
         }
     }
 }
 
-/// Whether two true systems agree at the nodes of the second grid that the first covers.
+/// True if two true systems agree at the nodes of the second grid within the span of the first.
 pub fn is_same_truth(
     (one, grid): (&NodalCoefficients, &Grid),
     (other, other_grid): (&NodalCoefficients, &Grid),
@@ -139,7 +138,7 @@ pub fn is_same_truth(
         .all(|(f, g)| close(f, g))
 }
 
-/// The value between two nodes; `None` outside.
+/// Linear interpolation between nodes; `None` outside.
 fn interpolate(f: &[f64], place: f64) -> Option<f64> {
     let i = place.floor();
     if i < 0.0 || i + 1.0 >= f.len() as f64 {
@@ -153,7 +152,7 @@ fn interpolate(f: &[f64], place: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn device(mass: &[f64], damping: f64, stiffness: f64) -> NodalCoefficients {
+    fn nodal(mass: &[f64], damping: f64, stiffness: f64) -> NodalCoefficients {
         let constant = |value| vec![value; mass.len()];
         NodalCoefficients {
             mass: mass.to_vec(),
@@ -161,40 +160,40 @@ mod tests {
         }
     }
 
-    /// m = t^2 on [0, 1]: (m'')^2 = 4, counted at the inner nodes.
+    /// For m = t^2 on [0, 1], (m'')^2 = 4 at the inner nodes.
     #[test]
     fn roughness_of_a_parabola() {
         let step = 1e-3;
         let mass: Vec<f64> = (0..=1000)
             .map(|i| 1.0 + (i as f64 * step).powi(2))
             .collect();
-        let found = Roughness::of(&device(&mass, 0.3, 1.0), step);
+        let found = Roughness::of(&nodal(&mass, 0.3, 1.0), step);
         assert!((found.mass - 4.0 * 0.999).abs() < 1e-4, "{found:?}");
         assert_eq!((found.damping, found.stiffness), (0.0, 0.0));
     }
 
     #[test]
-    fn a_common_factor_is_the_same_device() {
-        let truth = device(&[1.0, 0.5, 0.8], 0.1, 1.0);
-        let doubled = device(&[2.0, 1.0, 1.6], 0.2, 2.0);
+    fn systems_with_a_common_factor_are_equal() {
+        let truth = nodal(&[1.0, 0.5, 0.8], 0.1, 1.0);
+        let doubled = nodal(&[2.0, 1.0, 1.6], 0.2, 2.0);
         let errors = TruthErrors::of(&doubled, &truth);
         assert!(errors.within(RECOVERED) && !errors.undamped);
         assert_eq!(errors.mass_relative, 1.0);
     }
 
     #[test]
-    fn damping_without_a_scale_of_its_own_is_measured_by_critical_damping() {
-        let truth = device(&[1.0, 1.0], 0.0, 1.0);
-        let errors = TruthErrors::of(&device(&[1.0, 1.0], 0.02, 1.0), &truth);
+    fn negligible_damping_is_compared_with_critical_damping() {
+        let truth = nodal(&[1.0, 1.0], 0.0, 1.0);
+        let errors = TruthErrors::of(&nodal(&[1.0, 1.0], 0.02, 1.0), &truth);
         assert!(errors.undamped);
         assert!((errors.c_over_m_relative - 0.01).abs() < 1e-15);
         assert!(!errors.within(RECOVERED));
     }
 
     #[test]
-    fn a_device_without_mass_is_no_true_device() {
-        let truth = device(&[1.0, 1.0], 0.0, 1.0);
-        let errors = TruthErrors::of(&device(&[1.0, 0.0], 0.0, 1.0), &truth);
+    fn a_system_without_mass_is_not_recovered() {
+        let truth = nodal(&[1.0, 1.0], 0.0, 1.0);
+        let errors = TruthErrors::of(&nodal(&[1.0, 0.0], 0.0, 1.0), &truth);
         assert!(!errors.within(RECOVERED));
     }
 }

@@ -9,33 +9,33 @@ use serde::{Deserialize, Serialize};
 /// Goodness of fit and information criteria of a fit.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct FitStatistics {
-    /// Number of readings.
-    pub readings: usize,
+    /// Number of samples.
+    pub samples: usize,
     /// Number of parameters of functions and scalars.
     pub parameters: usize,
-    /// `J / (n - p)` for a chi-square of readings with known sigma; `None` where it has no meaning.
+    /// Reduced chi-square `J / (n - p)` of samples with known sigma; `None` where undefined.
     pub reduced_chi_square: Option<f64>,
-    /// Akaike's criterion.
+    /// Akaike information criterion.
     pub aic: Option<f64>,
-    /// The same corrected for small records.
+    /// Akaike information criterion, corrected for small samples.
     pub aicc: Option<f64>,
-    /// Schwarz's criterion.
+    /// Bayesian information criterion.
     pub bic: Option<f64>,
 }
 
-/// Statistics at the point of `evaluation`; chi-square and criteria for least squares without penalties.
+/// Statistics at the point of `evaluation`; chi-square and criteria require least squares without penalties.
 pub fn statistics(problem: &Problem, evaluation: &Evaluation) -> FitStatistics {
-    let readings = problem.reading_count();
+    let samples = problem.sample_count();
     let parameters = problem.parameters();
     let mut summary = FitStatistics {
-        readings,
+        samples,
         parameters,
         ..FitStatistics::default()
     };
     // Penalties reduce the degrees of freedom by a number that is not computed here.
     let plain = problem.penalties.is_empty() && problem.variations.is_empty();
     let squares = problem.channels().all(|c| c.loss() == Loss::Squares);
-    if !(plain && squares) || readings <= parameters {
+    if !(plain && squares) || samples <= parameters {
         return summary;
     }
     let p = parameters as f64;
@@ -45,8 +45,8 @@ pub fn statistics(problem: &Problem, evaluation: &Evaluation) -> FitStatistics {
             .all(|c| matches!(c.weighting(), Weighting::Sigma(_) | Weighting::Sigmas(_)) == known)
     };
     let criteria: Option<InformationCriteria> = if sigma(true) {
-        summary.reduced_chi_square = Some(evaluation.misfit / (readings as f64 - p));
-        with_known_sigma(evaluation.misfit, readings, p)
+        summary.reduced_chi_square = Some(evaluation.misfit / (samples as f64 - p));
+        with_known_sigma(evaluation.misfit, samples, p)
     } else if sigma(false) && problem.channels().count() == 1 {
         let squares = problem
             .channels()
@@ -54,7 +54,7 @@ pub fn statistics(problem: &Problem, evaluation: &Evaluation) -> FitStatistics {
         let sum: f64 = squares
             .flat_map(|(c, predicted)| c.residuals(predicted).map(|r| r * r).collect::<Vec<f64>>())
             .sum();
-        with_estimated_sigma(sum, readings, p)
+        with_estimated_sigma(sum, samples, p)
     } else {
         None
     };

@@ -1,4 +1,4 @@
-//! Step-size check: the optimum on a grid of half the step.
+//! Step-size check: the optimum simulated on a grid of half the step.
 
 use crate::diagnostics::rms;
 use crate::objective::{Evaluation, Refined};
@@ -7,29 +7,29 @@ use crate::simulate::SimulationError;
 use crate::solvers::number_or_nan;
 use serde::{Deserialize, Serialize};
 
-/// The optimum on a grid of half the step.
+/// Result of the step-size check.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StepCheck {
     /// Half the step, s.
     pub step: f64,
-    /// Misfit there.
+    /// Misfit on the finer grid.
     #[serde(deserialize_with = "number_or_nan")]
     pub misfit: f64,
-    /// Largest change of a prediction as a share of the root-mean-square residual, over the channels.
+    /// Largest change of a prediction relative to the root-mean-square residual, over the channels.
     #[serde(deserialize_with = "number_or_nan")]
     pub change_per_residual: f64,
-    /// Largest change of a prediction as a share of the largest reading, over the channels.
+    /// Largest change of a prediction as a share of the largest sample, over the channels.
     #[serde(deserialize_with = "number_or_nan")]
-    pub change_per_reading: f64,
+    pub change_per_sample: f64,
 }
 
-/// The check: `None` where the readings do not lie on the finer grid, an error where there is no response on it.
+/// Outcome of the check: `None` where samples do not lie on the finer grid, an error where the simulation fails.
 pub type StepCheckOutcome = Result<Option<StepCheck>, SimulationError>;
 
 /// Simulates the optimum with half the step.
 ///
 /// # Errors
-/// A [`SimulationError`] if there is no response with half the step.
+/// A [`SimulationError`] if the simulation with half the step fails.
 pub fn step_check(problem: &Problem, evaluation: &Evaluation) -> StepCheckOutcome {
     let Some(Refined {
         step,
@@ -43,7 +43,7 @@ pub fn step_check(problem: &Problem, evaluation: &Evaluation) -> StepCheckOutcom
         step,
         misfit,
         change_per_residual: 0.0,
-        change_per_reading: 0.0,
+        change_per_sample: 0.0,
     };
     let channels = problem
         .channels()
@@ -57,7 +57,7 @@ pub fn step_check(problem: &Problem, evaluation: &Evaluation) -> StepCheckOutcom
             .fold(0.0f64, |m, y| m.max(y.abs()));
         let share = |of: f64| if change == 0.0 { 0.0 } else { change / of };
         summary.change_per_residual = summary.change_per_residual.max(share(rms));
-        summary.change_per_reading = summary.change_per_reading.max(share(largest));
+        summary.change_per_sample = summary.change_per_sample.max(share(largest));
     }
     Ok(Some(summary))
 }

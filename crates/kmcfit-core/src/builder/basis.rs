@@ -1,4 +1,4 @@
-//! Specification of a basis, and the basis that it becomes on a grid.
+//! Specification of a basis, and its construction on a grid.
 
 use super::BuildError;
 use crate::functions::basis::uniform_knots;
@@ -6,19 +6,19 @@ use crate::functions::{Basis, Design, Gram};
 use crate::system::Grid;
 use crate::system::quadrature::trapezoid_weights;
 
-/// Distance, in steps, within which the first and last knot are taken for the ends of the record.
+/// Largest distance, in steps, of the first and last knot from the ends of the record.
 const SAME_TIME: f64 = 1e-6;
 
 /// Knots of a basis.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Knots {
-    /// Their number: equally spaced over the record, both ends included.
+    /// Number of knots, equally spaced over the record, both ends included.
     Count(usize),
-    /// Their times, s: increasing, both ends of the record included.
+    /// Times of the knots, s: increasing, both ends of the record included.
     Times(Vec<f64>),
 }
 
-/// Basis of a coefficient function, before the grid is known.
+/// Basis of a coefficient function, independent of the grid.
 #[derive(Debug, Clone, PartialEq)]
 pub enum BasisSpec {
     /// One value per node.
@@ -33,13 +33,13 @@ pub enum BasisSpec {
     BSpline(Knots),
     /// A polynomial over the whole record.
     Polynomial {
-        /// Its degree.
+        /// Degree.
         degree: usize,
     },
 }
 
 impl BasisSpec {
-    /// The basis on a grid; errors are about keys below `key`.
+    /// Constructs the basis on a grid; errors name keys below `key`.
     pub(super) fn on(&self, key: &str, grid: &Grid) -> Result<Basis, BuildError> {
         let nodes = grid.nodes();
         let at = |given: &Knots, most: usize| given.on(&format!("{key}.knots"), grid, most);
@@ -75,7 +75,7 @@ impl BasisSpec {
 }
 
 impl Knots {
-    /// The times of the knots, the ends exactly those of the record.
+    /// Times of the knots, s; the first and last are exactly the ends of the record.
     fn on(&self, key: &str, grid: &Grid, most: usize) -> Result<Vec<f64>, BuildError> {
         let count = match self {
             Knots::Count(count) => *count,
@@ -104,7 +104,7 @@ fn listed(key: &str, given: &[f64], grid: &Grid) -> Result<Vec<f64>, BuildError>
     let at =
         |i: usize, problem: &str| BuildError::new(format!("{key}[{i}]"), problem).found(given[i]);
     for (i, &t) in given.iter().enumerate() {
-        // A NaN is not inside, either.
+        // False for NaN.
         if !(t >= start - slack && t <= end + slack) {
             return Err(at(i, "this knot lies outside the record").expected(format!(
                 "a time from {start} s to {} s",
@@ -134,7 +134,7 @@ fn listed(key: &str, given: &[f64], grid: &Grid) -> Result<Vec<f64>, BuildError>
     Ok(times)
 }
 
-/// Refuses a basis function that is zero at all nodes, and dependent basis functions.
+/// Error if a basis function is zero at all nodes, or basis functions are linearly dependent at the nodes.
 fn check_independent(key: &str, basis: &Basis, grid: &Grid) -> Result<(), BuildError> {
     let design = basis.design(grid);
     let Design::Sparse(rows) = &design else {
@@ -145,7 +145,7 @@ fn check_independent(key: &str, basis: &Basis, grid: &Grid) -> Result<(), BuildE
         rows.row(i).for_each(|(j, _)| at_nodes[j] = true);
     }
     if let Some(absent) = at_nodes.iter().position(|there| !there) {
-        // Function j is not zero between the knots j - reach and j + 1.
+        // Function j is nonzero between the knots j - reach and j + 1.
         let knots = basis.knot_times(grid);
         let reach = (at_nodes.len() + 1).saturating_sub(knots.len());
         let from = knots[absent.saturating_sub(reach)];
@@ -168,7 +168,7 @@ fn check_independent(key: &str, basis: &Basis, grid: &Grid) -> Result<(), BuildE
         Basis::Polynomial { .. } => ("degree", "a lower degree, or more nodes"),
         _ => ("knots", "fewer knots, or more nodes"),
     };
-    let problem = "the nodes cannot tell the functions of this basis apart";
+    let problem = "the functions of this basis are linearly dependent at the nodes";
     Err(BuildError::new(format!("{key}.{own}"), problem)
         .found(format!(
             "{} parameters on {} nodes",

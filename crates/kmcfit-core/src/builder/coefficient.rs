@@ -8,28 +8,28 @@ use crate::functions::{Basis, CoefficientFunction, CoefficientKind};
 use crate::solvers::WeightRule;
 use crate::system::Grid;
 
-/// Highest derivative that can be penalised.
+/// Highest order of a penalised derivative.
 const HIGHEST_ORDER: usize = 2;
 
-/// Start of the search for a coefficient function, in its unit.
+/// Start of a coefficient function, in its unit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Start {
-    /// The same value at all times.
+    /// Equal at all times.
     Constant(f64),
-    /// One value per parameter: per node, cell or knot; of a polynomial the factors of `t^0, t^1, …` (t in s).
+    /// One value per parameter: per node, cell or knot; for a polynomial the coefficients of `t^0, t^1, …` (t in s).
     Parameters(Vec<f64>),
-    /// The function of the basis nearest to these values at the nodes.
+    /// Nodal values, projected onto the basis.
     Nodal(Vec<f64>),
 }
 
 /// Weight of a penalty in J.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PenaltyWeight {
-    /// Given.
+    /// Fixed weight.
     Given(f64),
     /// Chosen by a rule.
     Rule(WeightRule),
-    /// Such that the function follows the samples within a dominant period (equation error only).
+    /// Weight whose smoothing time is one dominant period (equation error only).
     Period,
 }
 
@@ -42,28 +42,28 @@ pub enum PenaltySpec {
         order: usize,
         /// Weight.
         weight: PenaltyWeight,
-        /// Values that a penalty of order 0 pulls towards; zero without. Other orders have none.
+        /// Reference values of a penalty of order 0, zero by default; other orders have none.
         reference: Option<TimeHistory>,
     },
-    /// `weight * total variation of p`: a jump costs no more than a slow change.
+    /// `weight * total variation of p`: equal for jumps and slow changes of the same height.
     TotalVariation {
         /// Weight.
         weight: f64,
     },
 }
 
-/// Known, or estimated in a basis.
+/// Fixed values, or a basis with a start.
 #[derive(Debug, Clone, PartialEq)]
-enum Form {
+enum CoefficientForm {
     Fixed(TimeHistory),
     Estimated(BasisSpec, Start),
 }
 
-/// A coefficient function: mass (kg), damping (N s/m), stiffness (N/m) or the factor of a further term; known or estimated in a
-/// basis. The counterpart of one entry of `functions` in a model file.
+/// A coefficient function: mass (kg), damping (N s/m), stiffness (N/m) or the factor of a further term; fixed, or estimated in
+/// a basis. It corresponds to an entry of `functions` in a model file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoefficientSpec {
-    form: Form,
+    form: CoefficientForm,
     pub(super) min: Option<TimeHistory>,
     pub(super) max: Option<TimeHistory>,
     pub(super) penalties: Vec<PenaltySpec>,
@@ -71,7 +71,7 @@ pub struct CoefficientSpec {
 }
 
 impl CoefficientSpec {
-    fn new(form: Form) -> Self {
+    fn new(form: CoefficientForm) -> Self {
         Self {
             form,
             min: None,
@@ -81,17 +81,17 @@ impl CoefficientSpec {
         }
     }
 
-    /// Known values.
+    /// Fixed values.
     pub fn known(values: TimeHistory) -> Self {
-        Self::new(Form::Fixed(values))
+        Self::new(CoefficientForm::Fixed(values))
     }
 
-    /// Known, and the same at all times.
+    /// Fixed and constant.
     pub fn fixed(value: f64) -> Self {
         Self::known(TimeHistory::Constant(value))
     }
 
-    /// Known, one value per node.
+    /// Fixed, one value per node.
     pub fn fixed_at_nodes(values: Vec<f64>) -> Self {
         let name = "values at the nodes".to_owned();
         Self::known(TimeHistory::Nodal { name, values })
@@ -99,15 +99,15 @@ impl CoefficientSpec {
 
     /// Estimated in a basis.
     pub fn estimated(basis: BasisSpec, start: Start) -> Self {
-        Self::new(Form::Estimated(basis, start))
+        Self::new(CoefficientForm::Estimated(basis, start))
     }
 
-    /// One estimated value for all times.
+    /// Estimated, constant in time.
     pub fn constant(start: f64) -> Self {
         Self::estimated(BasisSpec::Constant, Start::Constant(start))
     }
 
-    /// An estimated value at every node: the paper's choice.
+    /// Estimated at every node, as in the paper.
     pub fn nodal(start: f64) -> Self {
         Self::estimated(BasisSpec::Nodal, Start::Constant(start))
     }
@@ -132,7 +132,7 @@ impl CoefficientSpec {
         )
     }
 
-    /// A polynomial that starts from these factors of `t^0, t^1, …` (t in s): one number for a constant, two for a line.
+    /// A polynomial with start coefficients of `t^0, t^1, …` (t in s): one number for a constant, two for a line.
     pub fn polynomial(start: &[f64]) -> Self {
         let degree = start.len().saturating_sub(1);
         Self::estimated(
@@ -141,19 +141,19 @@ impl CoefficientSpec {
         )
     }
 
-    /// Bounded below, in the unit of the function.
+    /// Lower bound, in the unit of the function.
     #[must_use]
     pub fn min(self, min: f64) -> Self {
         self.bounds(Some(TimeHistory::Constant(min)), None)
     }
 
-    /// Bounded above, in the unit of the function.
+    /// Upper bound, in the unit of the function.
     #[must_use]
     pub fn max(self, max: f64) -> Self {
         self.bounds(None, Some(TimeHistory::Constant(max)))
     }
 
-    /// Bounds that may change with time; `None` keeps the present one.
+    /// Bounds that may vary in time; `None` keeps the present one.
     #[must_use]
     pub fn bounds(mut self, min: Option<TimeHistory>, max: Option<TimeHistory>) -> Self {
         self.min = min.or(self.min);
@@ -171,32 +171,32 @@ impl CoefficientSpec {
         })
     }
 
-    /// Penalty `weight * total variation`: a jump costs no more than a slow change.
+    /// Penalty `weight * total variation`, equal for jumps and slow changes of the same height.
     #[must_use]
     pub fn total_variation(self, weight: f64) -> Self {
         self.penalty(PenaltySpec::TotalVariation { weight })
     }
 
-    /// A penalty; several add up.
+    /// Adds a penalty.
     #[must_use]
     pub fn penalty(mut self, penalty: PenaltySpec) -> Self {
         self.penalties.push(penalty);
         self
     }
 
-    /// Speed (m/s) over which the sign of the velocity is smoothed: of Coulomb friction only.
+    /// Smoothing speed of the sign of the velocity (m/s), for Coulomb friction only.
     #[must_use]
     pub fn width(mut self, width: f64) -> Self {
         self.width = Some(width);
         self
     }
 
-    /// Whether it is estimated.
+    /// True if the function is estimated.
     pub(super) fn is_estimated(&self) -> bool {
-        matches!(self.form, Form::Estimated(..))
+        matches!(self.form, CoefficientForm::Estimated(..))
     }
 
-    /// The function on a grid; errors are about keys below `key`.
+    /// Constructs the function on a grid; errors name keys below `key`.
     pub(super) fn on(
         &self,
         kind: CoefficientKind,
@@ -206,12 +206,12 @@ impl CoefficientSpec {
         self.check(key, grid)?;
         let nodes = grid.nodes();
         let (key, function) = match &self.form {
-            Form::Fixed(values) => {
+            CoefficientForm::Fixed(values) => {
                 let key = format!("{key}.fixed");
                 let values = values_at_nodes(values, &key, nodes)?;
                 (key, CoefficientFunction::fixed(kind, values))
             }
-            Form::Estimated(basis, start) => {
+            CoefficientForm::Estimated(basis, start) => {
                 let basis = basis.on(key, grid)?;
                 let key = format!("{key}.start");
                 let start = parameters(&key, &basis, start, grid)?;
@@ -225,7 +225,7 @@ impl CoefficientSpec {
         Ok(function)
     }
 
-    /// Refuses bounds that leave no values, penalties without meaning, and either on a fixed function.
+    /// Error for invalid bounds or penalties, and for either on a fixed function.
     fn check(&self, key: &str, grid: &Grid) -> Result<(), BuildError> {
         let given = [
             ("min", self.min.is_some()),
@@ -291,7 +291,7 @@ impl PenaltySpec {
     }
 }
 
-/// Refuses bounds of which the lower one is above the upper one; their keys are `min` and `max` below `key`.
+/// Error if a lower bound exceeds the upper one; the keys are `min` and `max` below `key`.
 pub(super) fn uncrossed(
     key: &str,
     min: Option<&TimeHistory>,
@@ -322,7 +322,7 @@ fn check_weight(key: &str, weight: f64) -> Result<(), BuildError> {
     }
 }
 
-/// Finite values at all nodes.
+/// Values at all nodes; error if one is not finite.
 pub(super) fn values_at_nodes(
     values: &TimeHistory,
     key: &str,
@@ -345,7 +345,7 @@ pub(super) fn values_at_nodes(
     }
 }
 
-/// Refuses values that are not finite, and a mass that is not positive: the equation of motion divides by it.
+/// Error for values that are not finite, and for a mass that is not positive.
 fn check_values(kind: CoefficientKind, key: &str, values: &[f64]) -> Result<(), BuildError> {
     if let Some(value) = values.iter().find(|value| !value.is_finite()) {
         return Err(BuildError::new(key, "not a finite number")
@@ -366,7 +366,7 @@ fn check_values(kind: CoefficientKind, key: &str, values: &[f64]) -> Result<(), 
     }
 }
 
-/// The parameters of a start.
+/// Parameters of a start.
 fn parameters(
     key: &str,
     basis: &Basis,

@@ -1,45 +1,45 @@
-//! Constraints of a builder: rows of its statements, and a start inside them.
+//! Constraints of a builder: their rows, and the projection of the start.
 
-use super::assembly::Slot;
 use super::coefficient::uncrossed;
+use super::coefficient_sets::FunctionEntry;
 use super::{BuildError, BuildNotice, Builder, Contradiction};
-use crate::constraints::{Constraints, Impossible, Shape, Statement, TOLERANCE, TimeHistory};
+use crate::constraints::{Constraint, ConstraintError, Constraints, Shape, TOLERANCE, TimeHistory};
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind};
 use crate::problem::Problem;
 use crate::solvers::StartProjection;
 
-/// A statement that must hold, or whose violation is penalised.
+/// A constraint, or a soft constraint with a penalty.
 #[derive(Debug, Clone)]
-pub(super) struct Constraint {
-    /// Key that states it.
+pub(super) struct ConstraintSpec {
+    /// Key.
     pub key: String,
-    pub statement: Statement,
-    /// Weight of its violation in J; it must hold without.
+    pub statement: Constraint,
+    /// Penalty weight of its violation in J; `None` for a constraint that must hold.
     pub soft: Option<f64>,
-    /// Index of the set of coefficient functions that it is about.
-    pub assembly: usize,
+    /// Index of the coefficient set.
+    pub coefficient_set: usize,
 }
 
-/// The name of a group of rows, and the key that states it.
+/// Name of a group of rows, with the key of its constraint.
 #[derive(Debug, Clone)]
 pub(super) struct RowKey {
     name: String,
     key: String,
 }
 
-/// The constraints of the bounds of a function.
-pub(super) fn of_bounds(slot: &Slot, assembly: usize) -> Vec<Constraint> {
-    let (of, key) = (slot.kind, slot.key.as_str());
-    let (min, max) = (slot.spec.min.clone(), slot.spec.max.clone());
-    let constraint = |name: &str, min, max| Constraint {
+/// Constraints from the bounds of a function.
+pub(super) fn of_bounds(entry: &FunctionEntry, coefficient_set: usize) -> Vec<ConstraintSpec> {
+    let (of, key) = (entry.kind, entry.key.as_str());
+    let (min, max) = (entry.spec.min.clone(), entry.spec.max.clone());
+    let constraint = |name: &str, min, max| ConstraintSpec {
         key: format!("{key}.{name}"),
-        statement: Statement::Bounds { of, min, max },
+        statement: Constraint::Bounds { of, min, max },
         soft: None,
-        assembly,
+        coefficient_set,
     };
     match (min, max) {
         (None, None) => Vec::new(),
-        // Both at once, so that equal ones become an equality.
+        // Both together, so that equal bounds become an equality.
         (min, max) if min == max => vec![constraint("min", min, max)],
         (min, max) => {
             let min = min.map(|min| constraint("min", Some(min), None));
@@ -53,7 +53,7 @@ impl Builder {
     /// Adds the rows of a constraint to the problem.
     pub(super) fn add(
         &self,
-        constraint: &Constraint,
+        constraint: &ConstraintSpec,
         problem: &mut Problem,
         keys: &mut Vec<RowKey>,
         notices: &mut Vec<BuildNotice>,
@@ -61,11 +61,11 @@ impl Builder {
         let key = &constraint.key;
         let grid = problem.system.grid;
         constraint.check()?;
-        if let Statement::Bounds { min, max, .. } = &constraint.statement {
+        if let Constraint::Bounds { min, max, .. } = &constraint.statement {
             uncrossed(key, min.as_ref(), max.as_ref(), &grid)?;
         }
         let statement = &constraint.statement;
-        let rows = statement.build_for(&grid, &problem.functions, constraint.assembly);
+        let rows = statement.build_for(&grid, &problem.functions, constraint.coefficient_set);
         let mut rows = rows.map_err(|why| impossible(key, why))?;
         if rows.is_empty() {
             notices.push(BuildNotice::AlwaysHolds { key: key.clone() });
@@ -81,21 +81,22 @@ impl Builder {
         added.map_err(|why| BuildError::new(key, why.to_string()))
     }
 
-    /// A notice where a constraint cannot be felt by free records. Without a force, `(m, c, k)` and `s(t) (m, c, k)` have the same
-    /// response for every positive `s(t)`. Passivity and a monotone mass or stiffness do not survive that change: unless something
-    /// else holds `s(t)`, they can be met by choosing it and say nothing about the system.
-    fn unfelt(&self, constraint: &Constraint, problem: &Problem) -> Option<BuildNotice> {
+    /// Notice for a constraint that the scaling ambiguity of free records can satisfy. Without a force, `(m, c, k)` and
+    /// `s(t) (m, c, k)` have the same response for every positive `s(t)`. Passivity and monotonicity of mass or stiffness are not
+    /// invariant under this change: unless `s(t)` is determined otherwise, a suitable `s(t)` satisfies them, and they carry no
+    /// information on the system.
+    fn unfelt(&self, constraint: &ConstraintSpec, problem: &Problem) -> Option<BuildNotice> {
         let what = match &constraint.statement {
-            Statement::Passive => "passivity",
-            Statement::Shape {
+            Constraint::Passive => "passivity",
+            Constraint::Shape {
                 of: CoefficientKind::Mass,
                 shape: Shape::NonIncreasing | Shape::NonDecreasing,
             } => "a monotone mass",
-            Statement::Shape {
+            Constraint::Shape {
                 of: CoefficientKind::Stiffness,
                 shape: Shape::NonIncreasing | Shape::NonDecreasing,
             } => "a monotone stiffness",
-            Statement::Slope { of, min, max } if one_way(*min, *max) => match of {
+            Constraint::Slope { of, min, max } if one_way(*min, *max) => match of {
                 CoefficientKind::Mass => "a slope of the mass in one direction",
                 CoefficientKind::Stiffness => "a slope of the stiffness in one direction",
                 _ => return None,
@@ -111,16 +112,18 @@ impl Builder {
         (!(forced || held || smoothed || self.bounded_on_both_sides())).then_some(notice)
     }
 
-    /// Whether bounds keep the common scale from falling and from rising.
+    /// True if bounds limit the common scale from below and from above.
     fn bounded_on_both_sides(&self) -> bool {
         let positive = |limit: &&TimeHistory| match limit {
             TimeHistory::Constant(value) => *value > 0.0,
             TimeHistory::Nodal { .. } => true,
         };
-        let slots = self.slots();
-        let own = slots.iter().map(|slot| (&slot.spec.min, &slot.spec.max));
+        let entries = self.entries();
+        let own = entries
+            .iter()
+            .map(|entry| (&entry.spec.min, &entry.spec.max));
         let listed = self.constraints.iter().filter_map(|c| match &c.statement {
-            Statement::Bounds { min, max, .. } => Some((min, max)),
+            Constraint::Bounds { min, max, .. } => Some((min, max)),
             _ => None,
         });
         let all: Vec<_> = own.chain(listed).collect();
@@ -130,8 +133,8 @@ impl Builder {
     }
 }
 
-impl Constraint {
-    /// Refuses a weight that is none, and a constraint that leaves no mass: the equation of motion divides by it.
+impl ConstraintSpec {
+    /// Error for an invalid weight, and for a constraint that excludes a positive mass.
     fn check(&self) -> Result<(), BuildError> {
         if let Some(weight) = self.soft {
             let key = format!("{}.soft", self.key);
@@ -142,7 +145,7 @@ impl Constraint {
                     .expected("a number greater than 0"));
             }
             return match self.statement {
-                Statement::DampingRatio { .. } => Err(BuildError::new(
+                Constraint::DampingRatio { .. } => Err(BuildError::new(
                     key,
                     "a cap on the damping ratio cannot be soft",
                 )
@@ -152,21 +155,21 @@ impl Constraint {
             };
         }
         let held = match &self.statement {
-            Statement::Bounds {
+            Constraint::Bounds {
                 of: CoefficientKind::Mass,
                 max: Some(max),
                 ..
             } => max.least(),
-            Statement::Value {
+            Constraint::Value {
                 of: CoefficientKind::Mass,
                 value,
                 ..
             }
-            | Statement::Mean {
+            | Constraint::Mean {
                 of: CoefficientKind::Mass,
                 value,
             }
-            | Statement::Integral {
+            | Constraint::Integral {
                 of: CoefficientKind::Mass,
                 value,
             } => *value,
@@ -175,20 +178,20 @@ impl Constraint {
         if held > 0.0 {
             return Ok(());
         }
-        let problem = "this leaves no mass: it must be positive at all times";
+        let problem = "this excludes a positive mass: the mass must be positive at all times";
         Err(BuildError::new(&self.key, problem)
             .found(held)
             .expected("a number greater than 0"))
     }
 }
 
-/// Whether limits of a slope leave one sign to it and no size.
+/// True for limits on the sign of a slope alone.
 fn one_way(min: Option<f64>, max: Option<f64>) -> bool {
     matches!((min, max), (None, Some(0.0)) | (Some(0.0), None))
 }
 
-/// Whether a function cannot follow a change of the common scale `s(t)`: it is known and not zero, or of a basis that is not
-/// closed under it.
+/// True if a function determines the common scale `s(t)`: it is fixed and nonzero, or its basis is not closed under
+/// multiplication by `s(t)`.
 fn holds_scale(function: &CoefficientFunction) -> bool {
     match &function.basis {
         None => function.offset.iter().any(|p| *p != 0.0),
@@ -201,12 +204,12 @@ fn names(constraints: &Constraints) -> impl Iterator<Item = &String> {
     rows.chain(constraints.cones.iter().map(|group| &group.name))
 }
 
-fn impossible(key: &str, why: Impossible) -> BuildError {
+fn impossible(key: &str, why: ConstraintError) -> BuildError {
     match why {
-        Impossible::Absent(kind) => {
-            BuildError::new(key, format!("the device has no {}", kind.name()))
+        ConstraintError::Absent(kind) => {
+            BuildError::new(key, format!("the system has no {}", kind.name()))
         }
-        Impossible::Fixed(list) => {
+        ConstraintError::Fixed(list) => {
             let names = listed(list.iter().map(|kind| kind.name()));
             let problem = match list.len() {
                 1 => format!("{names} is fixed, so it cannot be constrained"),
@@ -216,18 +219,18 @@ fn impossible(key: &str, why: Impossible) -> BuildError {
                 .found("a constraint on fixed functions only")
                 .expected("`basis` and `start` instead of `fixed`, or no such constraint")
         }
-        Impossible::Broken { name, time } => {
+        ConstraintError::Broken { name, time } => {
             BuildError::new(key, "no fit can satisfy this constraint")
-                .found(format!("`{name}` is broken at {time} s by what is given"))
+                .found(format!("fixed functions violate `{name}` at {time} s"))
                 .expected("functions with more freedom, or another constraint")
         }
     }
 }
 
-/// Moves the start of the search into the constraints; a notice unless it only was off by rounding.
+/// Projects the start onto the constraints, with a notice unless the change is a rounding error.
 ///
 /// # Errors
-/// Where the constraints contradict each other, or no start inside them was found.
+/// If the constraints contradict each other, or no feasible start is found.
 pub(super) fn move_start(
     problem: &mut Problem,
     keys: &[RowKey],
@@ -249,7 +252,7 @@ pub(super) fn move_start(
         StartProjection::Contradiction(names) => Err(contradiction(keys, &names, true)),
         StartProjection::ContradictionAmong(names) => Err(contradiction(keys, &names, false)),
         StartProjection::Unsolved(status) => {
-            let problem = "no start inside the constraints was found";
+            let problem = "no feasible start was found";
             Err(BuildError::new("constraints", problem)
                 .found(status.sentence())
                 .expected("constraints of moderate sizes that some functions satisfy"))
@@ -271,8 +274,8 @@ fn contradiction(keys: &[RowKey], names: &[String], minimal: bool) -> BuildError
         1 => BuildError::new("constraints", "this constraint contradicts itself"),
         _ => BuildError::new("constraints", "these constraints contradict each other").hint(
             match minimal {
-                true => "leaving out any one of them resolves it",
-                false => "some of them may have no part in it",
+                true => "removing any one of them resolves it",
+                false => "some of them may not take part in the contradiction",
             },
         ),
     };
@@ -288,7 +291,7 @@ fn contradiction(keys: &[RowKey], names: &[String], minimal: bool) -> BuildError
     }
 }
 
-/// Names in a row: `a`, `a and b`, `a, b and c`.
+/// Enumeration of names: `a`, `a and b`, `a, b and c`.
 pub fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.into_iter().collect();
     match names.split_last() {

@@ -1,32 +1,32 @@
-//! The error of a builder.
+//! Errors of a builder.
 
 use std::fmt;
 
-/// A part of a model that cannot be used: its key, what was found there and what was expected.
+/// An invalid part of a model: key, problem, value found and value expected.
 ///
-/// The key is that of the same part in a model file: `functions.mass.start`, `experiments[0].initial.velocity`.
+/// The key is that of a model file: `functions.mass.start`, `experiments[0].initial.velocity`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BuildError {
     /// Dotted path of the part; lists count from 0.
     pub key: String,
-    /// What is wrong, in one sentence without a full stop.
+    /// Problem, one sentence without a full stop.
     pub problem: String,
-    /// What was found there.
+    /// Value found.
     pub found: Option<String>,
-    /// What would be accepted.
+    /// Accepted values.
     pub expected: Option<String>,
-    /// What to try.
+    /// Advice.
     pub hint: Option<String>,
-    /// The constraints that contradict each other, where that is the problem.
+    /// Contradictory constraints, if they are the problem.
     pub contradiction: Option<Contradiction>,
 }
 
-/// Constraints that no parameters satisfy together.
+/// Constraints without a common feasible point.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Contradiction {
-    /// Name of each constraint, and the key that states it.
+    /// Name and key of each constraint.
     pub constraints: Vec<(String, Option<String>)>,
-    /// Whether the others can be satisfied without any one of them.
+    /// True if removing any one of them resolves the contradiction.
     pub minimal: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Scalars of records that no data can determine: gains and offsets that stand for the same freedom as something else.
+//! Identifiability of sensor gains and offsets: rejection of combinations that no data can determine.
 
 use super::BuildError;
 use crate::functions::CoefficientKind;
@@ -6,8 +6,8 @@ use crate::problem::Problem;
 use crate::record::{Channel, ChannelKind, Experiment};
 use crate::system::Term;
 
-/// Refuses gains that stand for the same freedom as something else: in a linear system a free response and its initial state, or a
-/// forced response and the scale of mass, damping and stiffness, can be multiplied by what the gain is divided by.
+/// Error for gains that cannot be estimated. In a linear system, a free response and its initial state, or a forced response
+/// and the inverse scale of mass, damping and stiffness, can be multiplied by a factor that the gain divides.
 pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
     let scalars = problem.functions.scalars();
     let open = |index: Option<usize>| index.is_some_and(|i| scalars[i].prior.is_none());
@@ -24,7 +24,7 @@ pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
     if let Some(place) = problem.experiments.iter().position(free_and_open) {
         let name = &problem.experiments[place].name;
         let problem = format!(
-            "the gain and the initial state of {name} cannot both be estimated: a larger motion seen by a weaker sensor looks \
+            "the gain and the initial state of {name} cannot both be estimated: a larger response measured by a weaker sensor looks \
              the same"
         );
         return Err(BuildError::new("experiments", problem)
@@ -40,10 +40,10 @@ pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
     match all && scale_is_open(problem) {
         true => Err(BuildError::new(
             "experiments",
-            "the gains and the scale of mass, damping and stiffness cannot both be estimated: a heavier device seen by a \
+            "the gains and the scale of mass, damping and stiffness cannot both be estimated: a heavier system measured by a \
              stronger sensor looks the same",
         )
-        .found("no known gain, no fixed function and no value that holds the scale")
+        .found("no known gain, no fixed function and no value that determines the scale")
         .expected(
             "a known gain or a `prior` in one forced experiment, a fixed function, or a constraint such as {function: mass, \
              mean: 1.0}",
@@ -54,7 +54,7 @@ pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
 
 fn gains_open(e: &Experiment, open: &dyn Fn(Option<usize>) -> bool) -> bool {
     let gain = |c: &Channel| {
-        // A base that is added to the response is a scale of its own.
+        // Added base motion has a known scale.
         open(c.sensor().gain.index()) && (0..c.len()).all(|i| c.base_at(i) == 0.0)
     };
     !e.channels.is_empty() && e.channels.iter().all(gain)
@@ -62,13 +62,13 @@ fn gains_open(e: &Experiment, open: &dyn Fn(Option<usize>) -> bool) -> bool {
 
 fn starts_open(e: &Experiment, open: &dyn Fn(Option<usize>) -> bool) -> bool {
     let rest = [e.initial.displacement, e.initial.velocity];
-    (0..2).all(|q| match e.sought[q] {
+    (0..2).all(|q| match e.initial_parameters[q] {
         Some(index) => open(Some(index)),
         None => rest[q] == 0.0,
     })
 }
 
-/// Whether neither a known function nor an equality holds the common scale of the functions.
+/// True if neither a fixed function nor an equality determines the common scale of the functions.
 fn scale_is_open(problem: &Problem) -> bool {
     let held = problem.constraints.groups.iter().any(|group| {
         (0..group.rows.len()).any(|r| {
@@ -80,8 +80,8 @@ fn scale_is_open(problem: &Problem) -> bool {
     !held && functions.all(|f| f.offset.iter().all(|p| *p == 0.0))
 }
 
-/// Refuses a force offset beside sensor offsets: a response that is shifted by `d`, a sensor that measures `d` less and a force
-/// that is `k d` larger look the same.
+/// Error for a static force together with unknown sensor offsets: a response shifted by `d`, a sensor offset lower by `d` and
+/// a force larger by `k d` give the same samples.
 fn check_offsets(
     problem: &Problem,
     open: &dyn Fn(Option<usize>) -> bool,
@@ -91,7 +91,7 @@ fn check_offsets(
     let shifted = |e: &Experiment| {
         let sees =
             |c: &Channel| c.kind() != ChannelKind::Displacement || open(c.sensor().offset.index());
-        open(e.sought[0]) && e.channels.iter().all(sees)
+        open(e.initial_parameters[0]) && e.channels.iter().all(sees)
     };
     if !(estimated && problem.experiments.iter().all(shifted)) {
         return Ok(());

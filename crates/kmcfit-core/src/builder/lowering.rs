@@ -1,32 +1,32 @@
-//! Lowering of a builder to a problem: grid, functions, records, penalties, constraints and the start of the search.
+//! Lowering of a builder to a problem: grid, functions, records, penalties, constraints and start.
 
-use super::assembly::Assemblies;
+use super::coefficient_sets::CoefficientSets;
 use super::constraints::of_bounds;
 use super::place::Placement;
 use super::{BuildError, BuildNotice, Builder, Built, Record, identifiable};
 use crate::functions::Parameterization;
 use crate::problem::Problem;
 use crate::signal::even_spacing;
-use crate::solvers::{Measurements, states_from_readings};
+use crate::solvers::{Measurements, estimate_states};
 use crate::system::{Grid, System, Term};
 
-/// Most nodes: more would be asked for by mistake, and end in a lack of memory.
+/// Largest number of nodes, a safeguard against mistyped numbers.
 const MOST_NODES: usize = 100_000_000;
 
 impl Builder {
-    /// The problem as it is specified, its start where it is given, with everything that belongs to it.
+    /// Lowers the specification to a problem, with the start as given, before its projection onto the constraints.
     ///
     /// # Errors
-    /// At the first part that cannot be used.
+    /// The first invalid part.
     pub fn lower(&self) -> Result<Built, BuildError> {
-        let assemblies = self.assemblies()?;
+        let coefficient_sets = self.coefficient_sets()?;
         self.check_records()?;
         let grid = match self.grid {
             Some(grid) => grid,
             None => self.grid_of_records()?,
         };
         let mut notices = Vec::new();
-        let functions = self.parameterization(&grid, &assemblies, &mut notices)?;
+        let functions = self.parameterization(&grid, &coefficient_sets, &mut notices)?;
         let system = System {
             grid,
             method: self.method,
@@ -40,7 +40,7 @@ impl Builder {
                 key: format!("experiments[{i}]"),
                 record,
                 grid: &grid,
-                assembly: assemblies.of_record[i],
+                coefficient_set: coefficient_sets.of_record[i],
                 is_equation_error: self.is_equation_error(),
                 simulation: self.simulation,
             };
@@ -56,9 +56,9 @@ impl Builder {
         let measured = self.measurements(&problem, &mut notices)?;
         let weight_search = self.add_penalties(&mut problem, measured.as_ref(), &mut notices)?;
         let mut rows = Vec::new();
-        for slot in self.slots() {
-            let assembly = slot.owner.map_or(0, |i| assemblies.of_record[i]);
-            for constraint in of_bounds(&slot, assembly) {
+        for entry in self.entries() {
+            let coefficient_set = entry.owner.map_or(0, |i| coefficient_sets.of_record[i]);
+            for constraint in of_bounds(&entry, coefficient_set) {
                 self.add(&constraint, &mut problem, &mut rows, &mut notices)?;
             }
         }
@@ -76,10 +76,10 @@ impl Builder {
         })
     }
 
-    /// Refuses records that cannot be used, two of one name, and records that start at different times.
+    /// Error for invalid records, duplicate names, and records that start at different times.
     fn check_records(&self) -> Result<(), BuildError> {
         if !self.records.is_empty() && self.records.iter().all(|r| r.validation) {
-            let problem = "every experiment is held out of the fit";
+            let problem = "all experiments are validation records";
             return Err(BuildError::new("experiments", problem)
                 .found("`validation: true` in all of them")
                 .expected("at least one experiment without"));
@@ -102,12 +102,12 @@ impl Builder {
         let slack = 1e-6 * self.records[first].spacing();
         match spans.find(|(_, other)| (other - start).abs() > slack) {
             Some((i, other)) => {
-                let problem = "this record begins at another time than the first one";
+                let problem = "this record starts at another time than the first one";
                 Err(BuildError::new(format!("experiments[{i}]"), problem)
                     .found(format!("{other} s"))
                     .expected(format!("{start} s, as the functions are shared"))
                     .hint(format!(
-                        "`time_zero: {}` counts its times from its beginning",
+                        "`time_zero: {}` sets the start of a record to time 0",
                         other - start
                     )))
             }
@@ -115,7 +115,7 @@ impl Builder {
         }
     }
 
-    /// A grid over the span of the records.
+    /// Grid over the span of the records.
     fn grid_of_records(&self) -> Result<Grid, BuildError> {
         let spans = self.records.iter().filter_map(Record::span);
         let Some([start, end]) = spans.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]) else {
@@ -147,7 +147,7 @@ impl Builder {
         })
     }
 
-    /// The times of all samples, where they are the same and equally spaced.
+    /// Times of all samples, if equal for all channels and equally spaced.
     fn common_times(&self) -> Option<&[f64]> {
         let mut times = self.records.iter().map(Record::common_times);
         let first = times.next()??;
@@ -155,39 +155,41 @@ impl Builder {
         (same && even_spacing(first).is_some()).then_some(first)
     }
 
-    /// The force terms of the system.
+    /// Force terms of the system.
     fn terms(&self) -> Result<Vec<Term>, BuildError> {
         let mut terms = Vec::new();
-        for slot in self.slots().iter().filter(|slot| slot.owner.is_none()) {
-            terms.extend(slot.kind.term(slot.width()?));
+        for entry in self.entries().iter().filter(|entry| entry.owner.is_none()) {
+            terms.extend(entry.kind.term(entry.width()?));
         }
         Ok(terms)
     }
 
-    /// The functions on the grid.
+    /// Functions on the grid.
     fn parameterization(
         &self,
         grid: &Grid,
-        assemblies: &Assemblies,
+        coefficient_sets: &CoefficientSets,
         notices: &mut Vec<BuildNotice>,
     ) -> Result<Parameterization, BuildError> {
         let mut list = Vec::new();
-        for slot in self.slots() {
-            let mut function = slot.spec.on(slot.kind, &slot.key, grid)?;
-            function.owner = slot.owner.map(|i| self.records[i].name.clone());
+        for entry in self.entries() {
+            let mut function = entry.spec.on(entry.kind, &entry.key, grid)?;
+            function.owner = entry.owner.map(|i| self.records[i].name.clone());
             list.push(function);
         }
         if list.iter().all(|f| f.parameters() == 0) {
             notices.push(BuildNotice::NothingToFit);
         }
-        let sets = assemblies.sets.clone();
-        Parameterization::with_devices(list, sets, grid.nodes(), grid.step()).ok_or_else(|| {
-            let problem = "a basis has functions that the grid cannot tell apart";
-            BuildError::new("functions", problem)
-        })
+        let sets = coefficient_sets.sets.clone();
+        Parameterization::with_coefficient_sets(list, sets, grid.nodes(), grid.step()).ok_or_else(
+            || {
+                let problem = "the functions of a basis are linearly dependent on the grid";
+                BuildError::new("functions", problem)
+            },
+        )
     }
 
-    /// The states of the records as the samples give them, for the equation error.
+    /// States estimated from the samples, for the equation error.
     fn measurements(
         &self,
         problem: &Problem,
@@ -204,29 +206,37 @@ impl Builder {
                 .filter(|(_, r)| !r.validation);
             let place = fitted.map(|(i, _)| i).nth(unsuited.experiment);
             let key = format!("experiments[{}]", place.unwrap_or_default());
-            let problem = "the method `equation-error` cannot tell the motion from these readings";
+            let problem =
+                "the method `equation-error` cannot derive the response from these samples";
             BuildError::new(key, problem)
                 .found(unsuited.reason.to_string())
-                .expected("readings from which displacement, velocity and acceleration follow")
+                .expected("samples from which displacement, velocity and acceleration follow")
         })?;
         let remarks = measurements.remarks(problem).into_iter();
-        notices.extend(remarks.map(BuildNotice::Measurement));
+        notices.extend(remarks.map(|remark| BuildNotice::Measurement { remark }));
         Ok(Some(measurements))
     }
 
-    /// Initial states that are estimated without a start or a prior start where the samples do.
+    /// Sets initial states without a start or prior to those estimated from the samples.
     fn start_at_samples(&self, problem: &mut Problem) {
-        if problem.experiments.iter().all(|e| e.sought == [None; 2]) {
+        if problem
+            .experiments
+            .iter()
+            .all(|e| e.initial_parameters == [None; 2])
+        {
             return;
         }
         let fitted = self.records.iter().filter(|record| !record.validation);
         let mut start = problem.start();
         let first = problem.functions.scalar_range().start;
-        let states = states_from_readings(problem);
+        let states = estimate_states(problem);
         for ((record, experiment), state) in fitted.zip(&problem.experiments).zip(states) {
             let Some(state) = state else { continue };
             for (q, value) in [state.displacement, state.velocity].into_iter().enumerate() {
-                if let (Some(index), true) = (experiment.sought[q], record.initial[q].is_open()) {
+                if let (Some(index), true) = (
+                    experiment.initial_parameters[q],
+                    record.initial[q].is_open(),
+                ) {
                     start[first + index] = value;
                 }
             }

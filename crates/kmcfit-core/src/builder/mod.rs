@@ -1,8 +1,8 @@
-//! Problems from specifications: the front door of the library, and the one lowering of a model file.
+//! Construction of problems from specifications.
 //!
 //! A [`Builder`] takes three [`CoefficientSpec`]s (mass, damping, stiffness; further terms are optional), [`Record`]s of the
-//! response and constraints, checks them, and builds the [`Problem`]. A model file is lowered to the same builder, so that both give
-//! the same problem and refuse the same mistakes; the key of a [`BuildError`] is that of the model file.
+//! response and constraints, checks them, and builds the [`Problem`]. Model files are lowered to the same builder, so both
+//! give the same problems and errors; the key of a [`BuildError`] is that of the model file.
 //!
 //! ```
 //! use kmcfit_core::{Builder, CoefficientKind, CoefficientSpec, Record};
@@ -29,9 +29,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod assembly;
 mod basis;
 mod coefficient;
+mod coefficient_sets;
 mod constraints;
 mod error;
 mod identifiable;
@@ -49,13 +49,13 @@ pub use notice::BuildNotice;
 pub use penalties::WeightSearch;
 pub use record::{ChannelSpec, Record, ScalarSpec, SensorSpec};
 
-use crate::constraints::Statement;
+use crate::constraints::Constraint;
 use crate::functions::{CoefficientKind, ScalarParameter};
 use crate::problem::Problem;
 use crate::record::Experiment;
 use crate::solvers::Solver;
 use crate::system::{Grid, Method};
-use constraints::{Constraint, RowKey, move_start};
+use constraints::{ConstraintSpec, RowKey, move_start};
 
 /// Specification of a problem.
 #[derive(Debug, Clone)]
@@ -67,28 +67,28 @@ pub struct Builder {
     method: Method,
     solver: Solver,
     simulation: bool,
-    constraints: Vec<Constraint>,
+    constraints: Vec<ConstraintSpec>,
 }
 
-/// A problem that was built, before its start is moved into the constraints.
+/// A problem with its notices, before the projection of its start onto the constraints.
 #[derive(Debug, Clone)]
 pub struct Built {
     /// The problem.
     pub problem: Problem,
-    /// Records that are kept out of the fit, each with the scalars that it estimates for itself.
+    /// Validation records, each with its own estimated scalars.
     pub validation: Vec<(Experiment, Vec<ScalarParameter>)>,
-    /// Weights that are to be chosen from the samples.
+    /// Weights to be chosen by a rule.
     pub weight_search: Option<WeightSearch>,
-    /// Remarks on the specification that are no errors.
+    /// Notices on the specification.
     pub notices: Vec<BuildNotice>,
     rows: Vec<RowKey>,
 }
 
 impl Built {
-    /// Moves the start of the search into the constraints.
+    /// Projects the start onto the constraints.
     ///
     /// # Errors
-    /// Where the constraints contradict each other, or no start inside them was found.
+    /// If the constraints contradict each other, or no feasible start is found.
     pub fn move_start(&mut self) -> Result<(), BuildError> {
         let notice = move_start(&mut self.problem, &self.rows)?;
         self.notices.extend(notice);
@@ -97,7 +97,7 @@ impl Built {
 }
 
 impl Builder {
-    /// A system with mass (kg), damping (N s/m) and stiffness (N/m), stepped by RK4.
+    /// A system with mass (kg), damping (N s/m) and stiffness (N/m), integrated by RK4.
     pub fn new([mass, damping, stiffness]: [CoefficientSpec; 3]) -> Self {
         Self::of(vec![
             (CoefficientKind::Mass, mass),
@@ -120,31 +120,31 @@ impl Builder {
         }
     }
 
-    /// A stiffness `k3` (N/m^3) on the cube of the displacement.
+    /// Adds a cubic stiffness `k3` (N/m^3), the factor of `y^3`.
     #[must_use]
     pub fn cubic_stiffness(self, spec: CoefficientSpec) -> Self {
         self.coefficient(CoefficientKind::CubicStiffness, spec)
     }
 
-    /// A damping (N s^2/m^2) on `|v| v`.
+    /// Adds a quadratic damping (N s^2/m^2), the factor of `|v| v`.
     #[must_use]
     pub fn quadratic_damping(self, spec: CoefficientSpec) -> Self {
         self.coefficient(CoefficientKind::QuadraticDamping, spec)
     }
 
-    /// A friction (N) on `v / sqrt(v^2 + width^2)`, `width` in m/s.
+    /// Adds Coulomb friction (N), the factor of `v / sqrt(v^2 + width^2)`, `width` in m/s.
     #[must_use]
     pub fn coulomb_friction(self, spec: CoefficientSpec, width: f64) -> Self {
         self.coefficient(CoefficientKind::CoulombFriction, spec.width(width))
     }
 
-    /// A constant force (N) against the direction of `y`.
+    /// Adds a static force (N), positive against the direction of `y`.
     #[must_use]
     pub fn offset(self, spec: CoefficientSpec) -> Self {
         self.coefficient(CoefficientKind::Offset, spec)
     }
 
-    /// A coefficient function of the system; replaces an earlier one of its kind.
+    /// Sets a coefficient function; replaces an earlier one of its kind.
     #[must_use]
     pub fn coefficient(mut self, kind: CoefficientKind, spec: CoefficientSpec) -> Self {
         self.coefficients.retain(|(known, _)| *known != kind);
@@ -154,71 +154,71 @@ impl Builder {
         self
     }
 
-    /// One more record of the same system.
+    /// Adds a record.
     #[must_use]
     pub fn record(mut self, record: Record) -> Self {
         self.records.push(record);
         self
     }
 
-    /// Number of time nodes; without, one per sample, for which the samples of all records must be at the same equally
-    /// spaced times.
+    /// Sets the number of nodes; by default one per sample, which requires samples at the same equally spaced times in all
+    /// records.
     #[must_use]
     pub fn nodes(mut self, nodes: usize) -> Self {
         self.nodes = Some(nodes);
         self
     }
 
-    /// The time grid, in place of one over the span of the records.
+    /// Sets the time grid; by default it covers the span of the records.
     #[must_use]
     pub fn grid(mut self, grid: Grid) -> Self {
         self.grid = Some(grid);
         self
     }
 
-    /// The stepper.
+    /// Sets the integrator.
     #[must_use]
     pub fn method(mut self, method: Method) -> Self {
         self.method = method;
         self
     }
 
-    /// The method that the fit will use, for checks that depend on it: the equation error compares no response with the samples.
+    /// Sets the solver of the later fit, for checks that depend on it: the equation error compares no response with the samples.
     #[must_use]
     pub fn solver(mut self, solver: Solver) -> Self {
         self.solver = solver;
         self
     }
 
-    /// For a simulation: channels tell how long a record is and where it starts, and are not compared.
+    /// Builds a problem for simulation: channels define the length and start of a record and are not compared.
     #[must_use]
     pub fn simulation(mut self) -> Self {
         self.simulation = true;
         self
     }
 
-    /// A constraint on the coefficient functions.
+    /// Adds a constraint.
     #[must_use]
-    pub fn constrain(self, statement: Statement) -> Self {
+    pub fn constrain(self, statement: Constraint) -> Self {
         let key = format!("constraints[{}]", self.constraints.len());
         self.constraint(key, statement, None)
     }
 
-    /// A soft constraint: its violation costs `weight * mean over its rows of the squared excess`.
+    /// Adds a soft constraint, with the penalty `weight * mean over its rows of the squared violation`.
     #[must_use]
-    pub fn penalize(self, statement: Statement, weight: f64) -> Self {
+    pub fn penalize(self, statement: Constraint, weight: f64) -> Self {
         let key = format!("constraints[{}]", self.constraints.len());
         self.constraint(key, statement, Some(weight))
     }
 
-    /// A constraint that the model states at `key`; soft with a weight.
+    /// Adds a constraint with the key `key` of a model file; soft with a weight.
     #[must_use]
-    pub fn constraint(mut self, key: String, statement: Statement, soft: Option<f64>) -> Self {
-        self.constraints.push(Constraint {
+    pub fn constraint(mut self, key: String, statement: Constraint, soft: Option<f64>) -> Self {
+        self.constraints.push(ConstraintSpec {
             key,
             statement,
             soft,
-            assembly: 0,
+            coefficient_set: 0,
         });
         self
     }
@@ -227,11 +227,10 @@ impl Builder {
         self.solver == Solver::EquationError
     }
 
-    /// The problem, its start moved into the constraints.
+    /// Builds the problem, with its start projected onto the constraints.
     ///
     /// # Errors
-    /// At the first part that cannot be used; also where a weight is left to a rule, which [`choose_weight`](crate::choose_weight)
-    /// needs beside the problem.
+    /// The first invalid part; also a weight chosen by a rule, which requires [`choose_weight`](crate::choose_weight).
     pub fn build(&self) -> Result<Problem, BuildError> {
         let empty = self.records.iter().position(|r| r.channels.is_empty());
         match empty {
@@ -241,7 +240,7 @@ impl Builder {
             }
             Some(i) => {
                 let key = format!("experiments[{i}]");
-                return Err(BuildError::new(key, "this experiment has no readings")
+                return Err(BuildError::new(key, "this experiment has no samples")
                     .found(format!("no channel of {}", self.records[i].name))
                     .expected("samples of displacement, velocity or acceleration"));
             }

@@ -1,36 +1,41 @@
-//! Remarks on a specification that are no errors.
+//! Notices on a specification: valid parts without effect, and changes of the start.
 
+use serde::Serialize;
 use std::fmt;
 
-/// A remark on a specification that is no error.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A notice on a specification.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
 pub enum BuildNotice {
-    /// Every coefficient function is fixed.
+    /// All coefficient functions are fixed.
     NothingToFit,
-    /// A constraint holds for all parameters.
+    /// A constraint satisfied by all parameters.
     AlwaysHolds {
-        /// Its key.
+        /// Key.
         key: String,
     },
-    /// A constraint that free records cannot feel: the scaling ambiguity can satisfy it.
+    /// A constraint without information in free records, which the scaling ambiguity can satisfy.
     Unfelt {
-        /// Its key.
+        /// Key.
         key: String,
-        /// What it states.
+        /// Description of the constraint.
         what: &'static str,
     },
     /// A penalty on a derivative that is zero for all parameters.
     NoRoughness {
-        /// Its key.
+        /// Key.
         key: String,
         /// Name of the basis.
         basis: &'static str,
     },
-    /// A remark on the states that the equation error takes from the samples.
-    Measurement(String),
-    /// The start of the search was moved into the constraints.
+    /// A note on states estimated for the equation error.
+    Measurement {
+        /// Note.
+        remark: String,
+    },
+    /// The start was projected onto the constraints.
     StartMoved {
-        /// The constraint that was violated most.
+        /// Constraint with the largest violation.
         constraint: String,
     },
 }
@@ -42,18 +47,18 @@ impl fmt::Display for BuildNotice {
                 f.write_str("every function is fixed, so there is nothing to fit")
             }
             Self::AlwaysHolds { key } => {
-                write!(f, "{key} says nothing: it holds for all functions")
+                write!(f, "{key} has no effect: it holds for all functions")
             }
             Self::Unfelt { key, what } => write!(
                 f,
-                "{key}: {what} says nothing about the device here. Without a force the motion shows only k/m and c/m, and any \
-                 s(t) may multiply all three functions; fix a function, bound the functions on both sides, or smooth them"
+                "{key}: {what} carries no information here. Without a force the response determines only k/m and c/m, and any \
+                 s(t) may multiply all three functions; fix a function, bound the functions on both sides, or add a penalty"
             ),
             Self::NoRoughness { key, basis } => write!(
                 f,
-                "{key} says nothing: this derivative of a {basis} function is zero"
+                "{key} has no effect: this derivative of a {basis} function is zero"
             ),
-            Self::Measurement(remark) => f.write_str(remark),
+            Self::Measurement { remark } => f.write_str(remark),
             Self::StartMoved { constraint } => {
                 write!(
                     f,

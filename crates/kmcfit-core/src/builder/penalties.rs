@@ -1,24 +1,24 @@
-//! Penalties of a builder: Tikhonov penalties and total variation of its functions.
+//! Penalties of a builder: Tikhonov and total-variation penalties of its functions.
 
 use super::coefficient::{PenaltySpec, PenaltyWeight, values_at_nodes};
 use super::{BuildError, BuildNotice, Builder};
 use crate::constraints::TimeHistory;
-use crate::functions::{Basis, Penalty, Variation};
+use crate::functions::{Basis, Penalty, TotalVariation};
 use crate::problem::Problem;
 use crate::record::Weighting;
 use crate::solvers::{Measurements, WeightRule};
 
-/// Weights that are to be chosen from the samples.
+/// Penalty weights to be chosen by a rule.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeightSearch {
-    /// Rule of the choice.
+    /// Rule.
     pub rule: WeightRule,
-    /// Indices of the penalties of the problem that the weight multiplies; their weight in the problem is 1.
+    /// Indices of the penalties that share the weight; their weight in the problem is 1.
     pub penalties: Vec<usize>,
 }
 
 impl Builder {
-    /// Adds the penalties to the problem; those whose weight is to be chosen have weight 1.
+    /// Adds the penalties to the problem; penalties whose weight is chosen by a rule have weight 1.
     pub(super) fn add_penalties(
         &self,
         problem: &mut Problem,
@@ -26,12 +26,12 @@ impl Builder {
         notices: &mut Vec<BuildNotice>,
     ) -> Result<Option<WeightSearch>, BuildError> {
         let mut search: Option<WeightSearch> = None;
-        for (j, slot) in self.slots().iter().enumerate() {
+        for (j, entry) in self.entries().iter().enumerate() {
             let Some(basis) = problem.functions.get(j).basis.clone() else {
                 continue;
             };
-            for (i, spec) in slot.spec.penalties.iter().enumerate() {
-                let key = format!("{}.penalty[{i}]", slot.key);
+            for (i, spec) in entry.spec.penalties.iter().enumerate() {
+                let key = format!("{}.penalty[{i}]", entry.key);
                 let (order, weight, reference) = match spec {
                     PenaltySpec::Tikhonov {
                         order,
@@ -85,10 +85,10 @@ impl Builder {
         Ok(search)
     }
 
-    /// Refuses the rule `period` where it has no meaning.
+    /// Error if the rule `period` does not apply.
     fn check_period(&self, key: &str, order: usize) -> Result<(), BuildError> {
         if !self.is_equation_error() {
-            let problem = "the rule `period` is a rule of the method `equation-error` alone";
+            let problem = "the rule `period` applies to the method `equation-error` only";
             return Err(BuildError::new(format!("{key}.weight"), problem)
                 .found(format!("`{}`", self.solver.name()))
                 .expected(
@@ -96,7 +96,7 @@ impl Builder {
                 ));
         }
         if order == 0 {
-            let problem = "the rule `period` is about a derivative";
+            let problem = "the rule `period` requires a penalty on a derivative";
             return Err(BuildError::new(format!("{key}.order"), problem)
                 .found(0)
                 .expected("order 1 or 2, or a number for the weight"));
@@ -104,7 +104,7 @@ impl Builder {
         Ok(())
     }
 
-    /// Refuses a second rule, and a rule for which the samples have no noise level.
+    /// Error for a second rule, and for a rule that needs the noise level of the samples where none is given.
     fn check_rule(
         &self,
         key: &str,
@@ -113,13 +113,13 @@ impl Builder {
     ) -> Result<(), BuildError> {
         let key = format!("{key}.weight");
         if self.is_equation_error() {
-            let problem = "the method `equation-error` knows no search for the weight";
+            let problem = "the method `equation-error` has no search for the weight";
             return Err(BuildError::new(key, problem)
                 .found(format!("`{}`", rule.name()))
-                .expected("`period`, which follows from the motion, or a number"));
+                .expected("`period`, which follows from the response, or a number"));
         }
         if let Some(first) = search.filter(|first| first.rule != rule) {
-            let problem = "there is one rule for all weights that are chosen";
+            let problem = "all weights chosen by a rule must have the same rule";
             return Err(BuildError::new(key, problem)
                 .found(format!("`{}` beside `{}`", rule.name(), first.rule.name()))
                 .expected("the same rule, or a number"));
@@ -132,7 +132,7 @@ impl Builder {
         match without {
             Some((i, _)) if rule == WeightRule::Discrepancy => Err(BuildError::new(
                 key,
-                "the rule `discrepancy` needs the noise of the readings",
+                "the rule `discrepancy` needs the noise of the samples",
             )
             .found(format!("no `sigma` in experiments[{i}]"))
             .expected("`sigma` in every experiment, or `l-curve` or `gcv`, which do without")),
@@ -141,12 +141,12 @@ impl Builder {
     }
 }
 
-/// Whether the standard deviation of the noise is not given.
+/// True if the standard deviation of the noise is not given.
 fn is_unknown(weighting: &Weighting) -> bool {
     !matches!(weighting, Weighting::Sigma(_) | Weighting::Sigmas(_))
 }
 
-/// Adds a penalty on total variation to the problem.
+/// Adds a total-variation penalty to the problem.
 fn penalize_variation(
     problem: &mut Problem,
     (function, basis): (usize, &Basis),
@@ -157,7 +157,7 @@ fn penalize_variation(
         return Ok(());
     }
     let rows = basis.changes(&problem.system.grid);
-    let added = problem.penalize_variation(Variation {
+    let added = problem.penalize_variation(TotalVariation {
         function,
         weight,
         rows,
@@ -176,7 +176,7 @@ fn residuals_at(
     let grid = &problem.system.grid;
     let key = format!("{key}.reference");
     let values = values_at_nodes(reference, &key, grid.nodes())?;
-    // The part of the reference outside the basis adds a constant to the cost and nothing else.
+    // The part of the reference outside the basis adds a constant to the cost.
     let nearest = basis.project(grid, &values).ok_or_else(|| {
         BuildError::new(&key, "the reference cannot be turned into this basis")
             .found(format!("`{}`", basis.name()))

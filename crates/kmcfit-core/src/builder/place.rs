@@ -1,29 +1,29 @@
-//! Records on the grid: experiments of the problem, with the scalars that they estimate.
+//! Experiments of a problem: records on the grid, with their scalar parameters.
 
 use super::BuildError;
 use super::record::{ChannelSpec, Record, ScalarSpec, SensorSpec};
-use crate::functions::{ScalarParameter, Value};
+use crate::functions::{ScalarParameter, ScalarValue};
 use crate::objective::state_scales;
 use crate::record::{Channel, ChannelKind, Experiment, Input, Sensor, Weighting, integral_over};
 use crate::signal::{even_spacing, median_spacing};
 use crate::system::{Grid, InputSample, State, TimePoint};
 
-/// One record to be put on a grid.
+/// A record to be placed on a grid.
 pub(super) struct Placement<'a> {
-    /// Its key.
+    /// Key.
     pub key: String,
     pub record: &'a Record,
     pub grid: &'a Grid,
-    /// Index of its set of coefficient functions.
-    pub assembly: usize,
-    /// Whether the fit compares the equation of motion, and no response, with the samples.
+    /// Index of the coefficient set.
+    pub coefficient_set: usize,
+    /// True if the fit minimises the equation error.
     pub is_equation_error: bool,
-    /// Whether the channels are left out of the experiment.
+    /// True to omit the channels, for a simulation.
     pub simulation: bool,
 }
 
-/// A scalar in the making.
-struct Scalar<'a> {
+/// A scalar to be created.
+struct PendingScalar<'a> {
     key: String,
     name: String,
     unit: &'a str,
@@ -31,15 +31,15 @@ struct Scalar<'a> {
     size: f64,
 }
 
-impl Scalar<'_> {
-    /// Its value: known, or one more of `scalars`.
+impl PendingScalar<'_> {
+    /// Known value, or a new parameter added to `scalars`.
     fn value(
         self,
         spec: ScalarSpec,
         scalars: &mut Vec<ScalarParameter>,
-    ) -> Result<Value, BuildError> {
+    ) -> Result<ScalarValue, BuildError> {
         let (start, prior) = match spec {
-            ScalarSpec::Known(number) => return Ok(Value::Known(number)),
+            ScalarSpec::Known(number) => return Ok(ScalarValue::Known(number)),
             ScalarSpec::Estimated { start, prior } => (start, prior),
         };
         if let Some(prior) = prior.filter(|prior| prior.sigma <= 0.0 || !prior.sigma.is_finite()) {
@@ -57,12 +57,12 @@ impl Scalar<'_> {
             size: if self.size > 0.0 { self.size } else { 1.0 },
             prior,
         });
-        Ok(Value::Sought(scalars.len() - 1))
+        Ok(ScalarValue::Estimated(scalars.len() - 1))
     }
 }
 
 impl Placement<'_> {
-    /// The experiment; numbers that it estimates are added to `scalars`.
+    /// Creates the experiment; its estimated parameters are added to `scalars`.
     pub fn experiment(&self, scalars: &mut Vec<ScalarParameter>) -> Result<Experiment, BuildError> {
         let record = self.record;
         let input = record.inputs(&self.key)?;
@@ -70,10 +70,10 @@ impl Placement<'_> {
             Some([_, end]) => nodes_until(self.grid, end),
             None => self.grid.nodes(),
         };
-        let (initial, sought) = self.initial(scalars)?;
+        let (initial, estimated) = self.initial(scalars)?;
         let mut experiment = Experiment::free(&record.name, initial, nodes);
-        experiment.sought = sought;
-        experiment.device = self.assembly;
+        experiment.initial_parameters = estimated;
+        experiment.coefficient_set = self.coefficient_set;
         experiment.excitation = (input != Input::default()).then(|| input.on(self.grid, nodes));
         experiment.drive = input;
         let compared = match self.simulation {
@@ -87,13 +87,13 @@ impl Placement<'_> {
         Ok(experiment)
     }
 
-    /// The initial state, and which scalars it is where it is estimated.
+    /// Initial state, and the scalar parameters of its estimated components.
     fn initial(
         &self,
         scalars: &mut Vec<ScalarParameter>,
     ) -> Result<(State, [Option<usize>; 2]), BuildError> {
         let channels = &self.record.channels;
-        // The channel nearest to a displacement tells the sizes.
+        // The channel nearest to a displacement gives the sizes.
         let nearest = channels.iter().min_by_key(|c| c.kind);
         let sizes = nearest.map_or([1.0; 2], |c| {
             state_scales(c.kind, &c.values, median_spacing(&c.times))
@@ -103,9 +103,9 @@ impl Placement<'_> {
         let angular = channels.iter().any(|c| c.angular);
         let kinds = [ChannelKind::Displacement, ChannelKind::Velocity];
         let mut state = [0.0; 2];
-        let mut sought = [None; 2];
+        let mut estimated = [None; 2];
         for (q, kind) in kinds.into_iter().enumerate() {
-            let scalar = Scalar {
+            let scalar = PendingScalar {
                 key: format!("{}.initial.{}", self.key, kind.name()),
                 name: format!("initial {} of {}", kind.name(), self.record.name),
                 unit: kind.unit_of(angular),
@@ -113,9 +113,9 @@ impl Placement<'_> {
                 size: sizes[q],
             };
             match scalar.value(self.record.initial[q], scalars)? {
-                Value::Known(number) => state[q] = number,
-                Value::Sought(index) => {
-                    sought[q] = Some(index);
+                ScalarValue::Known(number) => state[q] = number,
+                ScalarValue::Estimated(index) => {
+                    estimated[q] = Some(index);
                     state[q] = scalars[index].start;
                 }
             }
@@ -125,7 +125,7 @@ impl Placement<'_> {
             displacement,
             velocity,
         };
-        Ok((state, sought))
+        Ok((state, estimated))
     }
 
     fn channel(
@@ -135,7 +135,7 @@ impl Placement<'_> {
         scalars: &mut Vec<ScalarParameter>,
     ) -> Result<Channel, BuildError> {
         let (grid, times) = (self.grid, &spec.times);
-        // The paper's integral where the times are equally spaced.
+        // The paper's integral for equally spaced times.
         let weighting = match (&spec.weighting, even_spacing(times)) {
             (Some(weighting), _) => weighting.clone(),
             (None, Some(spacing)) => Weighting::Integral { spacing },
@@ -146,8 +146,8 @@ impl Placement<'_> {
         let nodes = experiment.nodes;
         let channel = Channel::new(spec.kind, times.clone(), values, weighting, grid, nodes);
         let channel = channel.ok_or_else(|| {
-            BuildError::new("grid", "the readings do not lie on the grid")
-                .found(format!("readings until {} s", times[times.len() - 1]))
+            BuildError::new("grid", "the samples do not lie on the grid")
+                .found(format!("samples until {} s", times[times.len() - 1]))
                 .expected(format!(
                     "a grid from {} s to {} s",
                     grid.start(),
@@ -172,7 +172,7 @@ impl Placement<'_> {
         Ok(channel)
     }
 
-    /// The motion of the base at the times of a sensor of absolute motion.
+    /// Motion of the base at the times of a sensor that measures absolute motion.
     fn base_motion(
         &self,
         spec: &ChannelSpec,
@@ -181,7 +181,7 @@ impl Placement<'_> {
         let (kind, asked) = (spec.kind, spec.sensor.absolute);
         let key = format!("{}.sensors.{}.absolute", self.key, kind.name());
         if input.base.is_none() {
-            let problem = "the base does not move, so there is only one motion to measure";
+            let problem = "the base is at rest, so relative and absolute motion are equal";
             return match asked {
                 None => Ok(None),
                 Some(_) => Err(BuildError::new(key, problem)
@@ -192,9 +192,9 @@ impl Placement<'_> {
         if !asked.unwrap_or(kind == ChannelKind::Acceleration) {
             return Ok(None);
         }
-        let motion = spec.times.iter().map(|t| input.base_motion_at(kind, *t));
-        let motion: Option<Vec<f64>> = motion.collect();
-        motion.map(Some).ok_or_else(|| {
+        let response = spec.times.iter().map(|t| input.base_motion_at(kind, *t));
+        let response: Option<Vec<f64>> = response.collect();
+        response.map(Some).ok_or_else(|| {
             BuildError::new(key, format!("the {} of the base is not known", kind.name()))
                 .found("the acceleration of the base only")
                 .expected("`columns: {base_displacement: …}`, or no `absolute: true`")
@@ -222,7 +222,7 @@ impl Placement<'_> {
         let key = format!("{}.sensors.{kind}", self.key);
         let mut value =
             |part: &str, spec: Option<ScalarSpec>, unit, [usual, start, size]: [f64; 3]| {
-                let scalar = Scalar {
+                let scalar = PendingScalar {
                     key: format!("{key}.{part}"),
                     name: format!("{part} of the {kind} of {}", self.record.name),
                     unit,
@@ -236,14 +236,14 @@ impl Placement<'_> {
             offset: value("offset", offset, unit, [0.0, mean, size])?,
             drift: value("drift", drift, &per_second, [0.0, 0.0, size])?,
         };
-        if sensor.gain == Value::Known(0.0) {
-            let problem = "a sensor with gain 0 sees nothing";
+        if sensor.gain == ScalarValue::Known(0.0) {
+            let problem = "a sensor with gain 0 measures nothing";
             return Err(BuildError::new(format!("{key}.gain"), problem)
                 .found("0")
                 .expected("another number, or `estimate`"));
         }
         if self.is_equation_error && sensor.indices().iter().any(Option::is_some) {
-            let problem = "the method `equation-error` needs sensors that are known";
+            let problem = "the method `equation-error` needs sensors with known parameters";
             return Err(BuildError::new(key, problem)
                 .found("`estimate`")
                 .expected("numbers, or another method"));
@@ -252,7 +252,7 @@ impl Placement<'_> {
     }
 }
 
-/// The nodes that a response needs to reach `end`.
+/// Number of nodes of a response until `end`.
 fn nodes_until(grid: &Grid, end: f64) -> usize {
     let steps = (end - grid.start()) / grid.step();
     let steps = (steps - TimePoint::SAME_TIME).ceil().max(0.0);

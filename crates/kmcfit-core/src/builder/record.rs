@@ -5,16 +5,16 @@ use crate::functions::{CoefficientKind, Prior};
 use crate::record::{BaseMotion, ChannelKind, Input, Loss, Waveform, Weighting};
 use crate::signal::{Interpolation, SecondOrder, Signal, median_spacing};
 
-/// A number that is known, or estimated with the coefficient functions.
+/// A scalar that is known, or estimated together with the coefficient functions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ScalarSpec {
     /// Known.
     Known(f64),
     /// Estimated.
     Estimated {
-        /// Start of the search; chosen from the samples without.
+        /// Start; estimated from the samples if `None`.
         start: Option<f64>,
-        /// Prior knowledge, which adds `((x - mean)/sigma)^2` to J.
+        /// Prior, which adds `((x - mean)/sigma)^2` to J.
         prior: Option<Prior>,
     },
 }
@@ -26,50 +26,51 @@ impl ScalarSpec {
         prior: None,
     };
 
-    /// Whether its start is to be chosen from the samples.
+    /// True if the start is to be estimated from the samples.
     pub(super) fn is_open(self) -> bool {
         self == Self::ESTIMATED
     }
 }
 
-/// Specification of a sensor: `sample = gain * response + offset + drift * time`; a perfect one without.
+/// Specification of a sensor: `sample = gain * response + offset + drift * time`; by default gain 1, offset and drift 0.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SensorSpec {
-    /// Factor; 1 without.
+    /// Gain; 1 by default.
     pub gain: Option<ScalarSpec>,
     /// Sample at rest, in the SI unit of the channel.
     pub offset: Option<ScalarSpec>,
     /// Change of the offset, in the SI unit of the channel per s.
     pub drift: Option<ScalarSpec>,
-    /// Whether it measures the absolute motion and not that relative to the base; so accelerometers do without it, others do not.
+    /// True for a sensor of absolute motion, false for one of motion relative to the base; by default absolute for accelerometers,
+    /// relative for others.
     pub absolute: Option<bool>,
 }
 
 /// Specification of one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelSpec {
-    /// What is measured.
+    /// Measured quantity.
     pub kind: ChannelKind,
     /// Times of the samples, s, increasing.
     pub times: Vec<f64>,
     /// Samples in the SI unit of the kind.
     pub values: Vec<f64>,
-    /// Weights of the residuals; without them `J = integral r^2 dt`.
+    /// Weights of the residuals; `None` for `J = integral r^2 dt`.
     pub weighting: Option<Weighting>,
     /// Loss of a residual.
     pub loss: Loss,
     /// Gain, offset and drift.
     pub sensor: SensorSpec,
-    /// Sections of a filter that samples and response pass alike.
+    /// Sections of a filter applied to samples and response.
     pub filter: Vec<SecondOrder>,
-    /// First and last time that the record covers, s: also where a sample is missing.
+    /// First and last time of the record, s, missing samples included.
     pub span: [f64; 2],
-    /// Whether the coordinate is an angle, for the names of units.
+    /// True for a rotation, which determines the names of units.
     pub angular: bool,
 }
 
 impl ChannelSpec {
-    /// Samples `values` (in the SI unit of `kind`) of a perfect sensor at `times` (s).
+    /// Samples `values` (in the SI unit of `kind`) of an ideal sensor at `times` (s).
     pub fn new(kind: ChannelKind, times: &[f64], values: &[f64]) -> Self {
         let end = |time: Option<&f64>| time.copied().unwrap_or_default();
         Self {
@@ -85,7 +86,7 @@ impl ChannelSpec {
         }
     }
 
-    /// Refuses samples that are no channel; `record` is the key of its record.
+    /// Error for invalid samples; `record` is the key of the record.
     fn check(&self, record: &str) -> Result<(), BuildError> {
         let kind = self.kind.name();
         let columns = || format!("{record}.columns.{kind}");
@@ -107,7 +108,7 @@ impl ChannelSpec {
                 .expected("at least 2"));
         }
         if !finite || !increasing {
-            return Err(BuildError::new(columns(), "these samples make no record")
+            return Err(BuildError::new(columns(), "these samples are invalid")
                 .found(match finite {
                     true => "times that do not increase",
                     false => "a time or sample that is not a finite number",
@@ -128,7 +129,7 @@ impl ChannelSpec {
             );
         }
         if self.weighting.is_none() && self.loss != Loss::Squares {
-            let problem = "a robust loss needs to know which residuals are large";
+            let problem = "a robust loss needs a sigma to identify large residuals";
             return Err(BuildError::new(format!("{record}.loss.{kind}"), problem)
                 .found("no `sigma`")
                 .expected(format!("`sigma: {{{kind}: …}}`")));
@@ -137,10 +138,10 @@ impl ChannelSpec {
     }
 }
 
-/// One record of the response, in SI units; the counterpart of one entry of `experiments` in a model file.
+/// One record of the response, in SI units; corresponds to an entry of `experiments` in a model file.
 ///
-/// A force is linear between its samples unless [`Record::interpolation`] says otherwise, and so is the acceleration of a base,
-/// relative to which displacement and velocity count; an accelerometer then measures `y'' + b''`.
+/// Force and base acceleration are linear between their samples unless [`Record::interpolation`] is set. Under base excitation,
+/// displacement and velocity are relative to the base, and an accelerometer measures `y'' + b''`.
 #[derive(Debug, Clone)]
 pub struct Record {
     pub(super) name: String,
@@ -170,75 +171,75 @@ impl Record {
         }
     }
 
-    /// A known initial state: displacement (m) and velocity (m/s) at the first time of all records, which share one time axis.
+    /// Sets a known initial state: displacement (m) and velocity (m/s) at the first time of all records, which share a time axis.
     #[must_use]
     pub fn from_state(self, displacement: f64, velocity: f64) -> Self {
         self.initial([displacement, velocity].map(ScalarSpec::Known))
     }
 
-    /// Initial displacement (m) and velocity (m/s), each known or estimated.
+    /// Sets the initial displacement (m) and velocity (m/s), each known or estimated.
     #[must_use]
     pub fn initial(mut self, state: [ScalarSpec; 2]) -> Self {
         self.initial = state;
         self
     }
 
-    /// A force (N) at `times` (s).
+    /// Sets a force (N) at `times` (s).
     #[must_use]
     pub fn force(mut self, times: &[f64], force: &[f64]) -> Self {
         self.force = Some([times.to_vec(), force.to_vec()]);
         self
     }
 
-    /// An acceleration of the base (m/s^2) at `times` (s).
+    /// Sets an acceleration of the base (m/s^2) at `times` (s).
     #[must_use]
     pub fn base_acceleration(mut self, times: &[f64], acceleration: &[f64]) -> Self {
         self.base = Some([times.to_vec(), acceleration.to_vec()]);
         self
     }
 
-    /// Interpolation of force and base between their samples: a converter holds its output, a sampled smooth force is nearer to
-    /// a cubic spline than to lines.
+    /// Sets the interpolation of force and base between samples: a zero-order hold for the output of a converter, a cubic spline
+    /// for a sampled smooth force.
     #[must_use]
     pub fn interpolation(mut self, interpolation: Interpolation) -> Self {
         self.interpolation = interpolation;
         self
     }
 
-    /// Any force and motion of the base.
+    /// Sets force and motion of the base.
     #[must_use]
     pub fn input(mut self, input: Input) -> Self {
         self.input = input;
         self
     }
 
-    /// Displacements (m) at `times` (s).
+    /// Adds displacements (m) at `times` (s).
     #[must_use]
     pub fn displacement(self, times: &[f64], values: &[f64]) -> Self {
         self.channel(ChannelSpec::new(ChannelKind::Displacement, times, values))
     }
 
-    /// Velocities (m/s) at `times` (s).
+    /// Adds velocities (m/s) at `times` (s).
     #[must_use]
     pub fn velocity(self, times: &[f64], values: &[f64]) -> Self {
         self.channel(ChannelSpec::new(ChannelKind::Velocity, times, values))
     }
 
-    /// Accelerations (m/s^2) at `times` (s).
+    /// Adds accelerations (m/s^2) at `times` (s).
     #[must_use]
     pub fn acceleration(self, times: &[f64], values: &[f64]) -> Self {
         self.channel(ChannelSpec::new(ChannelKind::Acceleration, times, values))
     }
 
-    /// One more channel.
+    /// Adds a channel.
     #[must_use]
     pub fn channel(mut self, channel: ChannelSpec) -> Self {
         self.channels.push(channel);
         self
     }
 
-    /// Standard deviation of the samples of the last channel, in its SI unit: its part of J is then a chi-square. Without it
-    /// it is `integral r^2 dt`.
+    /// Sets the standard deviation of the samples of the last channel, in its SI unit, which makes its part of J a chi-square;
+    /// without it that part is `integral r^2 dt`.
     #[must_use]
     pub fn sigma(mut self, sigma: f64) -> Self {
         if let Some(channel) = self.channels.last_mut() {
@@ -247,7 +248,7 @@ impl Record {
         self
     }
 
-    /// Loss of the residuals of the last channel; other than squares it needs a sigma.
+    /// Sets the loss of the last channel; a robust loss needs a sigma.
     #[must_use]
     pub fn loss(mut self, loss: Loss) -> Self {
         if let Some(channel) = self.channels.last_mut() {
@@ -256,14 +257,14 @@ impl Record {
         self
     }
 
-    /// A coefficient function that this record does not share with the others.
+    /// Sets a coefficient function of this record alone.
     #[must_use]
     pub fn coefficient(mut self, kind: CoefficientKind, spec: CoefficientSpec) -> Self {
         self.coefficients.push((kind, spec));
         self
     }
 
-    /// Kept out of the fit, to be predicted and scored.
+    /// Marks a validation record, which is predicted and scored but not fitted.
     #[must_use]
     pub fn validation(mut self) -> Self {
         self.validation = true;
@@ -276,20 +277,20 @@ impl Record {
         spans.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
     }
 
-    /// The smallest median spacing of its channels, s.
+    /// Smallest median spacing of the channels, s.
     pub(super) fn spacing(&self) -> f64 {
         let spacings = self.channels.iter().map(|c| median_spacing(&c.times));
         spacings.fold(f64::INFINITY, f64::min)
     }
 
-    /// The times of all samples, if they are the same for every channel.
+    /// Times of all samples, if equal for all channels.
     pub(super) fn common_times(&self) -> Option<&[f64]> {
         let (first, rest) = self.channels.split_first()?;
         let same = rest.iter().all(|c| c.times == first.times);
         same.then_some(&first.times)
     }
 
-    /// Refuses records that cannot be used; `key` is that of the record. An equation error is no sum of misfits.
+    /// Error for invalid records; `key` is that of the record. The equation error has no sum of misfits to check.
     pub(super) fn check(&self, key: &str, is_equation_error: bool) -> Result<(), BuildError> {
         self.channels.iter().try_for_each(|c| c.check(key))?;
         for (scalar, name) in self.initial.iter().zip(["displacement", "velocity"]) {
@@ -308,8 +309,8 @@ impl Record {
         }
     }
 
-    /// Without sigma J is the integral of the displacement's residual: other channels cannot be added to it, since metres and
-    /// metres per second cannot.
+    /// Error for a combination of channels without sigma: `J = integral r^2 dt` of the displacement has another unit than that of
+    /// other channels.
     fn check_misfit(&self, key: &str) -> Result<(), BuildError> {
         let without = self.channels.iter().find(|c| c.weighting.is_none());
         let alone = self.channels.len() == 1;
@@ -317,8 +318,8 @@ impl Record {
             Some(channel) if !(alone && channel.kind == ChannelKind::Displacement) => {
                 let name = channel.kind.name();
                 let problem = match alone {
-                    true => format!("readings of the {name} need a sigma"),
-                    false => "several channels need a sigma each, to be added up".to_owned(),
+                    true => format!("samples of the {name} need a sigma"),
+                    false => "several channels each need a sigma".to_owned(),
                 };
                 Err(BuildError::new(key, problem)
                     .found(format!("no `sigma.{name}`"))
@@ -339,7 +340,7 @@ impl Record {
             let signal = Signal::new(times.clone(), values.clone(), self.interpolation);
             signal.map(Some).ok_or_else(|| {
                 let key = format!("{key}.columns.{name}");
-                BuildError::new(key, "these samples make no signal")
+                BuildError::new(key, "these samples are invalid")
                     .found(format!("{} values at {} times", values.len(), times.len()))
                     .expected("finite values at increasing times")
             })
@@ -358,7 +359,7 @@ impl Record {
     }
 }
 
-/// Refuses a force or a motion of the base that does not cover the record.
+/// Error if a force or a motion of the base does not cover the record.
 fn check_cover(input: &Input, key: &str, [start, end]: [f64; 2]) -> Result<(), BuildError> {
     let force = match &input.force {
         Some(Waveform::Samples(signal)) => Some(("force", signal)),
@@ -376,7 +377,7 @@ fn check_cover(input: &Input, key: &str, [start, end]: [f64; 2]) -> Result<(), B
             Err(BuildError::new(format!("{key}.columns.{name}"), problem)
                 .found(format!("{} s to {} s", times[0], times[times.len() - 1]))
                 .expected(format!(
-                    "at least {start} s to {end} s: outside its samples nothing is known of it"
+                    "at least {start} s to {end} s: its values outside are unknown"
                 )))
         }
         None => Ok(()),

@@ -1,6 +1,6 @@
 //! Constraints: named linear rows and second-order cones on the parameters of all functions.
 //!
-//! What is demanded of the functions is a [`Statement`]; [`Statement::build`] turns it into rows.
+//! A [`Constraint`] is a condition on coefficient functions; [`Constraint::build`] computes its rows.
 
 mod build;
 mod set;
@@ -8,6 +8,6 @@ mod soft;
 mod violation;
 
 pub use crate::rows::Rows;
-pub use build::{Impossible, Shape, Statement, TimeHistory};
+pub use build::{Constraint, ConstraintError, Shape, TimeHistory};
 pub use set::{Cone, ConeGroup, Constraints, RowGroup};
 pub use violation::TOLERANCE;

@@ -2,38 +2,36 @@
 
 use super::Rows;
 
-/// `|(rows_1, ..., rows_k) z - right_{1..k}| <= rows_0 z - right_0`.
+/// Second-order cone `|(rows_1, ..., rows_k) z - right_{1..k}| <= rows_0 z - right_0`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cone {
-    /// The bound first, then the parts of the norm.
+    /// The bound first, then the components of the norm.
     pub rows: Rows,
 }
 
-/// Rows `lower <= g_i^T theta <= upper` that say one thing about the functions, at many times.
+/// Rows `lower <= g_i^T theta <= upper` of one constraint, at many times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RowGroup {
-    /// What the rows say, as in `damping >= 0`.
+    /// Name, as in `damping >= 0`.
     pub name: String,
-    /// The rows in the parameters of all functions; their right-hand sides are the lower bounds,
-    /// minus infinity where there is none.
+    /// Rows in the parameters of all functions; right-hand sides are the lower bounds, minus infinity for none.
     pub rows: Rows,
-    /// The upper bounds, infinity where there is none; equal to the lower ones for an equality.
+    /// Upper bounds, infinity for none; equal to the lower ones for an equality.
     pub upper: Vec<f64>,
-    /// The span of time that each row speaks of, s.
+    /// Interval of time of each row, s.
     pub times: Vec<[f64; 2]>,
-    /// For rows that may be broken at a price: the weight of their violation, greater than 0. `None`
-    /// is a constraint that holds.
+    /// Penalty weight of the violation of a soft constraint, greater than 0; `None` for a constraint that must hold.
     pub soft: Option<f64>,
 }
 
-/// Second-order cones that say one thing about the functions, at many times.
+/// Second-order cones of one constraint, at many times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConeGroup {
-    /// What the cones say.
+    /// Name.
     pub name: String,
-    /// The cones in the parameters of all functions.
+    /// Cones in the parameters of all functions.
     pub cones: Vec<Cone>,
-    /// The time that each cone speaks of, s.
+    /// Time of each cone, s.
     pub times: Vec<f64>,
 }
 
@@ -58,7 +56,7 @@ impl RowGroup {
         }
     }
 
-    /// Adds `lower <= entries theta <= upper` about the time span `times` (s).
+    /// Adds `lower <= entries theta <= upper` for the interval `times` (s).
     pub fn push(
         &mut self,
         entries: impl IntoIterator<Item = (usize, f64)>,
@@ -75,7 +73,7 @@ impl RowGroup {
         [self.rows.right()[i], self.upper[i]]
     }
 
-    /// The parameter and its coefficient, if row `i` is about a single one.
+    /// Parameter and coefficient of row `i`, if it has a single entry.
     pub fn single(&self, i: usize) -> Option<(usize, f64)> {
         let mut entries = self.rows.row(i).filter(|(_, a)| *a != 0.0);
         match (entries.next(), entries.next()) {
@@ -86,18 +84,18 @@ impl RowGroup {
 }
 
 impl Constraints {
-    /// Whether there are none.
+    /// True without constraints.
     pub fn is_empty(&self) -> bool {
         self.groups.is_empty() && self.cones.is_empty()
     }
 
-    /// Adds those of `other`.
+    /// Adds the constraints of `other`.
     pub fn extend(&mut self, other: Constraints) {
         self.groups.extend(other.groups);
         self.cones.extend(other.cones);
     }
 
-    /// Takes out the soft groups.
+    /// Removes and returns the soft groups.
     pub fn take_soft(&mut self) -> Vec<RowGroup> {
         let groups = std::mem::take(&mut self.groups);
         let (soft, hard) = groups.into_iter().partition(|group| group.soft.is_some());
@@ -105,21 +103,20 @@ impl Constraints {
         soft
     }
 
-    /// Whether every constraint bounds or fixes a single parameter, so that clipping projects onto
-    /// the set.
+    /// True if every constraint bounds or fixes a single parameter, so that clipping is the projection.
     pub fn are_simple(&self) -> bool {
         let simple = |g: &RowGroup| (0..g.rows.len()).all(|i| g.single(i).is_some());
         self.cones.is_empty() && self.groups.iter().all(simple)
     }
 
-    /// `theta` moved by a step, and then into the bounds of single parameters.
+    /// `theta` plus a step, clipped to the bounds of single parameters.
     pub fn moved(&self, theta: &[f64], step: &[f64]) -> Vec<f64> {
         let mut moved: Vec<f64> = theta.iter().zip(step).map(|(t, d)| t + d).collect();
         self.clip(&mut moved);
         moved
     }
 
-    /// Moves every parameter that a row bounds alone exactly into its bounds.
+    /// Clips every parameter to its bounds.
     pub fn clip(&self, theta: &mut [f64]) {
         for group in &self.groups {
             for i in 0..group.rows.len() {
@@ -133,7 +130,7 @@ impl Constraints {
                 } else {
                     (ends[1], ends[0])
                 };
-                // Not clamp(), which panics on contradictory bounds.
+                // Not clamp(), which panics for contradictory bounds.
                 theta[j] = theta[j].min(high).max(low);
             }
         }

@@ -1,21 +1,19 @@
-//! Soft constraints: violated at a penalty.
+//! Soft constraints: penalties on violations.
 
 use super::RowGroup;
 
-/// Violations no larger than this share of the row's scale are not reported as slack.
+/// Smallest violation reported as slack, relative to the row's scale.
 const SLACK: f64 = 1e-9;
 
 impl RowGroup {
-    /// The violation of row `i` with its sign: positive above the upper bound, negative below the
-    /// lower one, 0 inside.
+    /// Signed violation of row `i`: positive above the upper bound, negative below the lower one, 0 inside.
     pub fn excess(&self, i: usize, theta: &[f64]) -> f64 {
         let value: f64 = self.rows.row(i).map(|(j, a)| a * theta[j]).sum();
         let [lower, upper] = self.bounds(i);
         (value - upper).max(0.0) - (lower - value).max(0.0)
     }
 
-    /// What the group costs at `theta`: `weight * mean over its rows of excess^2`; 0 for a group
-    /// that is not soft.
+    /// Penalty of the group at `theta`, `weight * mean over its rows of excess^2`; 0 for a group that is not soft.
     pub fn price(&self, theta: &[f64]) -> f64 {
         let squares: f64 = (0..self.rows.len())
             .map(|i| self.excess(i, theta).powi(2))
@@ -38,7 +36,7 @@ impl RowGroup {
         }
     }
 
-    /// The rows that are broken at `theta`, and by how much at most.
+    /// Rows violated at `theta`, and the largest violation.
     pub fn slack(&self, theta: &[f64]) -> (Vec<usize>, f64) {
         let broken = |&i: &usize| self.relative_violation(i, theta) > SLACK;
         let rows: Vec<usize> = (0..self.rows.len()).filter(broken).collect();

@@ -2,33 +2,32 @@
 
 use super::{Cone, Constraints, RowGroup};
 
-/// A constraint holds if it is violated by no more than this, relative to its row's scale.
+/// Largest violation of a satisfied constraint, relative to its row's scale.
 pub const TOLERANCE: f64 = 1e-9;
 
-/// The row that is violated most.
+/// The largest violation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Violation {
     /// Violation relative to the row's scale; 0 if all constraints hold.
     pub relative: f64,
-    /// Name of its group.
+    /// Name of the group.
     pub name: String,
-    /// Time that it speaks of, s.
+    /// Time of the row, s.
     pub time: f64,
 }
 
 impl RowGroup {
-    /// What row `i`'s violation is measured against: the larger of its bounds' size and the sum of
-    /// its terms' sizes.
+    /// Scale of row `i`: the larger of the size of its bounds and the sum of the sizes of its terms.
     pub fn scale(&self, i: usize, theta: &[f64]) -> f64 {
         let terms: f64 = self.rows.row(i).map(|(j, a)| (a * theta[j]).abs()).sum();
         let finite = |b: f64| if b.is_finite() { b.abs() } else { 0.0 };
         let [lower, upper] = self.bounds(i);
-        // A row that is all zeros has the scale of its coefficients.
+        // A row whose terms are zero has the scale of its coefficients.
         let size = terms.max(finite(lower)).max(finite(upper));
         size.max(self.rows.scale(i))
     }
 
-    /// How far row `i` is outside its bounds, relative to its scale; not positive if it is inside.
+    /// Distance of row `i` outside its bounds, relative to its scale; not positive inside.
     pub fn relative_violation(&self, i: usize, theta: &[f64]) -> f64 {
         let value: f64 = self.rows.row(i).map(|(j, a)| a * theta[j]).sum();
         let [lower, upper] = self.bounds(i);
@@ -40,7 +39,7 @@ impl RowGroup {
 }
 
 impl Cone {
-    /// How far the cone is violated at `z`, relative to the size of its parts; not positive inside.
+    /// Violation of the cone at `z`, relative to the size of its components; not positive inside.
     pub fn violation(&self, z: &[f64]) -> f64 {
         let values = self.rows.multiply(z);
         let parts: Vec<f64> = values
@@ -60,7 +59,7 @@ impl Cone {
 }
 
 impl Constraints {
-    /// The largest violation at `theta`; `None` if there are no constraints.
+    /// Largest violation at `theta`; `None` without constraints.
     pub fn largest_violation(&self, theta: &[f64]) -> Option<Violation> {
         let rows = self.groups.iter().flat_map(|group| {
             (0..group.rows.len()).map(move |i| {
@@ -83,7 +82,7 @@ impl Constraints {
         })
     }
 
-    /// Whether all constraints hold to `tolerance` relative to their scales.
+    /// True if all constraints hold to `tolerance`, relative to their scales.
     pub fn hold(&self, theta: &[f64], tolerance: f64) -> bool {
         self.largest_violation(theta)
             .is_none_or(|v| v.relative <= tolerance)

@@ -1,30 +1,29 @@
 //! Autocorrelation of residuals.
 
-/// Number of lags that are looked at in a sequence of `count` readings: a tenth of them, at most 50.
+/// Default number of lags for `count` samples: a tenth of them, at most 50.
 ///
-/// The Ljung-Box statistic of more lags has a heavier tail than chi-square: at a quarter of 200
-/// readings it calls white noise coloured 8.5 times in a hundred instead of five; with this rule 4
-/// to 7 times, for 20 to 3000 readings (10,000 simulated sequences each).
+/// With more lags the Ljung–Box statistic has a heavier tail than chi-square: with a quarter of 200 samples it rejects white noise
+/// in 8.5 % of cases instead of 5 %; with this rule in 4 to 7 %, for 20 to 3000 samples (10,000 simulated sequences each).
 pub fn default_lags(count: usize) -> usize {
     (count / READINGS_PER_LAG).min(MOST_LAGS)
 }
 
-/// Readings for each lag that [`default_lags`] gives.
+/// Samples per lag in [`default_lags`].
 const READINGS_PER_LAG: usize = 10;
-/// The most lags that [`default_lags`] gives: what a figure shows well.
+/// Largest number of lags in [`default_lags`], for readable figures.
 const MOST_LAGS: usize = 50;
 
-/// The quantile of the standard normal distribution that leaves 2.5 % above it.
+/// 97.5 % quantile of the standard normal distribution.
 pub const NORMAL_975: f64 = 1.959_963_984_540_054;
 
 /// The normalised autocorrelation of a sequence at lags 0, 1, …, L.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Autocorrelation {
-    /// `r_k` at lag `k` (no unit): 1 at lag 0, 0 where no pair is that far apart.
+    /// Autocorrelation `r_k` at lag `k`, dimensionless: 1 at lag 0, 0 without pairs.
     pub values: Vec<f64>,
-    /// Number of pairs behind each value, `n_k`: `n - k` where nothing is missing.
+    /// Number of pairs `n_k` of each lag: `n - k` without missing values.
     pub pairs: Vec<usize>,
-    /// Number of values in the sequence that are not missing, `n`.
+    /// Number of values that are not missing, `n`.
     pub count: usize,
 }
 
@@ -34,19 +33,17 @@ pub struct Autocorrelation {
 /// r_k = (S_k / (n_k + k)) / (S_0 / n)          S_k = sum of x_i x_(i+k)
 /// ```
 ///
-/// A value that is not finite is missing: the sum runs over the `n_k` pairs in which none is, and
-/// `n = n_0` is the number of values that are there. Nothing missing, `n_k + k = n` and
-/// `r_k = S_k / S_0`, the usual (biased, positive definite) estimate. The denominator with gaps is
-/// that of `acf` with `na.action = na.pass` in R.
+/// Values that are not finite are missing: the sum runs over the `n_k` pairs without missing values, and `n = n_0` is the number of
+/// present values. Without missing values `n_k + k = n`, and `r_k = S_k / S_0` is the usual (biased, positive definite) estimate.
+/// The denominator for gaps is that of `acf` with `na.action = na.pass` in R.
 ///
-/// **The mean is not taken off.** The residuals of a right model have mean zero, so that an offset
-/// shows as a correlation at all lags, as it should; take the mean off first for other uses.
+/// **The mean is not subtracted.** Residuals of a correct model have zero mean, and an offset appears as a correlation at all
+/// lags.
 ///
-/// Lags at or beyond the length are left out. All values are 0 where the sequence is zero or
-/// missing throughout, that at lag 0 included.
+/// Lags at or beyond the length are omitted. All values are 0, also at lag 0, if the sequence is zero or missing throughout.
 pub fn autocorrelation(values: &[f64], lags: usize) -> Autocorrelation {
     let largest = (values.iter().filter(|x| x.is_finite())).fold(0.0f64, |m, x| m.max(x.abs()));
-    // Scaled so that squares neither overflow nor vanish.
+    // Scaled to avoid overflow and underflow of squares.
     let scale = if largest > 0.0 { largest } else { 1.0 };
     let scaled: Vec<f64> = values.iter().map(|x| x / scale).collect();
     let lags = lags.min(values.len().saturating_sub(1));
@@ -71,23 +68,22 @@ pub fn autocorrelation(values: &[f64], lags: usize) -> Autocorrelation {
 }
 
 impl Autocorrelation {
-    /// The largest lag.
+    /// Largest lag.
     pub fn lags(&self) -> usize {
         self.values.len().saturating_sub(1)
     }
 
-    /// Whether some value differs from zero, so that there is something to correlate.
+    /// True if a value is nonzero, so that correlations are defined.
     pub fn varies(&self) -> bool {
         self.values.first().is_some_and(|r| *r > 0.0)
     }
 
-    /// Half the width of the band that holds 95 % of the values of white noise, `1.96 / sqrt(n)`.
+    /// Half-width of the 95 % band of white noise, `1.96 / sqrt(n)`.
     pub fn band(&self) -> f64 {
         NORMAL_975 / (self.count as f64).sqrt()
     }
 
-    /// Whether the value at `lag` is outside the band, which is wider where pairs are missing:
-    /// `|r_k| > 1.96 / sqrt(n_k + k)`.
+    /// True if the value at `lag` is outside the band, which is wider with missing pairs: `|r_k| > 1.96 / sqrt(n_k + k)`.
     pub fn is_outside(&self, lag: usize) -> bool {
         match (self.values.get(lag), self.pairs.get(lag)) {
             (Some(r), Some(n)) if *n > 0 => r.abs() > NORMAL_975 / ((n + lag) as f64).sqrt(),
@@ -96,7 +92,7 @@ impl Autocorrelation {
     }
 }
 
-/// `S_k` and the number of its terms.
+/// Sum `S_k` and the number of its terms.
 fn sum_of_products(values: &[f64], lag: usize) -> (f64, usize) {
     let later = values.iter().skip(lag);
     let products = values.iter().zip(later).map(|(a, b)| a * b);
@@ -167,7 +163,7 @@ mod tests {
         let outside: usize = (0..100)
             .map(|seed| {
                 let mut values = white(seed, 2000);
-                // A third of the readings are missing where the noise itself, and so chance, says.
+                // A third of the samples are missing where the noise itself, and so chance, says.
                 let missing = white(seed + 1000, 2000);
                 for (x, gap) in values.iter_mut().zip(missing) {
                     if gap > 0.43 {

@@ -1,41 +1,39 @@
-//! Information criteria for several models of the same samples.
+//! Information criteria for the comparison of models of the same samples.
 //!
-//! With Gaussian errors, minus twice the log-likelihood is, up to a constant that all models of the
-//! same readings share, the chi-square where sigma is known, and `n ln(SSR/n)` where it is estimated
-//! from the residuals. Each criterion adds a price for the parameters; the model with the smallest
-//! value is preferred, and a difference below 2 says nothing. **Only differences mean something, and
-//! only between values of the same function and the same readings.**
+//! For Gaussian errors, minus twice the log-likelihood is, up to a constant common to all models of the same samples, the
+//! chi-square where sigma is known, and `n ln(SSR/n)` where it is estimated from the residuals. Each criterion adds a penalty for
+//! the parameters. The model with the smallest value is preferred; differences below 2 are not significant. **Only differences
+//! between values of the same function for the same samples are meaningful.**
 //!
-//! Parameters are a real number: a whole one for a plain fit, the effective number (the trace of the
-//! matrix from readings to model values) for a penalised one.
+//! The number of parameters is real: an integer for a plain fit, the effective number (trace of the matrix from samples to model
+//! values) for a penalised one.
 //!
 //! Sources: H. Akaike, "A new look at the statistical model identification", *IEEE Trans. Automatic
 //! Control* 19 (1974) 716-723; G. Schwarz, "Estimating the dimension of a model", *Annals of
 //! Statistics* 6 (1978) 461-464; C. M. Hurvich, C.-L. Tsai, "Regression and time series model
 //! selection in small samples", *Biometrika* 76 (1989) 297-307.
 
-/// The three criteria for one model. No units.
+/// The three criteria of one model, dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InformationCriteria {
-    /// Akaike's.
+    /// Akaike information criterion.
     pub aic: f64,
-    /// Akaike's, corrected for few readings; `None` where there are too few to correct.
+    /// Akaike information criterion corrected for small samples; `None` for too few samples.
     pub aicc: Option<f64>,
-    /// Bayesian (Schwarz's).
+    /// Bayesian (Schwarz) information criterion.
     pub bic: f64,
 }
 
-/// The criteria where the standard deviations of the readings are known:
+/// Criteria for known standard deviations of the samples:
 ///
 /// ```text
 /// AIC = chi^2 + 2 p          AICc = AIC          BIC = chi^2 + p ln n
 /// ```
 ///
-/// for `n = count` readings and `p = parameters`. The correction of Hurvich and Tsai makes up for the
-/// estimated sigma; known, AIC is already unbiased for a model that is linear in its parameters, at
-/// any n, and there is nothing to correct.
+/// for `n = count` samples and `p = parameters`. The correction of Hurvich and Tsai accounts for the estimation of sigma; with known
+/// sigma, AIC is unbiased at any n for a model that is linear in its parameters.
 ///
-/// `None` if there are no readings, or an argument is negative or not finite.
+/// `None` if there are no samples, or an argument is negative or not finite.
 pub fn with_known_sigma(
     chi_square: f64,
     count: usize,
@@ -51,8 +49,8 @@ pub fn with_known_sigma(
     })
 }
 
-/// The criteria where one standard deviation of all readings is estimated from the residuals, which
-/// is one more parameter, `q = p + 1`:
+/// Criteria where a common standard deviation of all samples is estimated from the residuals, one more parameter,
+/// `q = p + 1`:
 ///
 /// ```text
 /// AIC  = n ln(SSR/n) + 2 q
@@ -61,10 +59,10 @@ pub fn with_known_sigma(
 /// ```
 ///
 /// for the sum of squared residuals `SSR` (unweighted; the unit adds the same constant to all),
-/// `n = count` readings and `p = parameters`.
+/// `n = count` samples and `p = parameters`.
 ///
-/// `None` if there are no readings, an argument is negative or not finite, or the model goes through
-/// every reading (`SSR = 0`), where no sigma can be estimated. AICc is `None` unless `n > q + 1`.
+/// `None` if there are no samples, an argument is negative or not finite, or the model equals every sample (`SSR = 0`), where sigma
+/// cannot be estimated. AICc is `None` unless `n > q + 1`.
 pub fn with_estimated_sigma(
     squared_sum: f64,
     count: usize,
@@ -124,10 +122,10 @@ mod tests {
         near(difference(1e-3), difference(1.0));
     }
 
-    /// What the criteria estimate: the misfit of the fitted model to new readings, here for a mean
-    /// of `n` readings (one parameter), averaged over many experiments.
+    /// The criteria estimate the misfit of the fitted model to new samples, here for a mean of `n` samples (one parameter), averaged
+    /// over many experiments.
     #[test]
-    fn akaikes_criteria_are_the_expected_misfit_to_new_readings() {
+    fn akaikes_criteria_equal_the_expected_misfit_to_new_samples() {
         const N: usize = 8;
         const RUNS: u64 = 40_000;
         let n = N as f64;
@@ -141,7 +139,7 @@ mod tests {
             known += with_known_sigma(ssr, N, 1.0).unwrap().aic;
             new_known += ssr_new;
             corrected += with_estimated_sigma(ssr, N, 1.0).unwrap().aicc.unwrap();
-            // -2 ln L of the new readings, without n ln(2 pi) and the n that AIC drops too.
+            // -2 ln L of the new samples, without n ln(2 pi) and the n that AIC drops too.
             new_estimated += n * (ssr / n).ln() + ssr_new / (ssr / n) - n;
         }
         let runs = RUNS as f64;

@@ -1,7 +1,6 @@
-//! What the residuals say about a fit: how large they are, whether they are noise, and whether more
-//! parameters are worth it.
+//! Diagnostics of residuals: size, autocorrelation, whiteness, outliers, and information criteria.
 //!
-//! Everything here is a pure function of numbers; nothing knows of problems or files.
+//! All functions are pure functions of numbers, independent of problems and files.
 
 mod autocorrelation;
 mod information;
@@ -22,4 +21,6 @@ pub use quantiles::{chi_square_one, normal_half_width};
 pub use record::{ResidualDiagnostics, ResidualRecord};
 pub use residuals::{fit_percent, rms};
 pub use residuals::{spread, without_line};
-pub use whiteness::{FEWEST_READINGS, Reason, SIGNIFICANCE, Verdict, Whiteness, whiteness};
+pub use whiteness::{
+    FEWEST_READINGS, SIGNIFICANCE, UntestedReason, Whiteness, WhitenessResult, whiteness,
+};

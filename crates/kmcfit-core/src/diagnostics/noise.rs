@@ -11,7 +11,7 @@ pub fn white(seed: u64, count: usize) -> Vec<f64> {
     (0..count).map(|_| draw()).collect()
 }
 
-/// `x_i = coefficient x_(i-1) + e_i` with standard normal `e`, stationary from the first value.
+/// Autoregression `x_i = coefficient x_(i-1) + e_i` with standard normal `e`, stationary from the first value.
 pub fn auto_regression(seed: u64, count: usize, coefficient: f64) -> Vec<f64> {
     let mut state = 0.0;
     let first = (1.0 - coefficient * coefficient).sqrt();

@@ -1,22 +1,21 @@
-//! Patterns of residuals beside noise: outliers, an offset, a drift.
+//! Systematic patterns of residuals: outliers, an offset, a drift.
 
-/// Readings are far off beyond so many robust standard deviations: of white noise one in a billion is.
+/// Threshold of outliers in robust standard deviations; one in a billion samples of white noise exceeds it.
 const FAR: f64 = 6.0;
-/// From the median of absolute values to the standard deviation of normal numbers.
+/// Ratio of the standard deviation to the median absolute value, for normal numbers.
 const OF_MEDIAN: f64 = 1.482_602_218_505_602;
-/// Readings far off are more than the tail of a pattern if they hold this share of all squares, and are at most
-/// this share of all readings.
+/// Smallest share of the sum of squares and largest share of the samples for outliers, to distinguish them from the tail of a
+/// pattern.
 const SQUARES: f64 = 0.5;
 const AT_MOST: f64 = 0.05;
-/// Most that follow one another.
+/// Largest number of consecutive outliers.
 const TOGETHER: usize = 3;
-/// Fewest residuals that a pattern is looked for in.
+/// Smallest number of residuals for a pattern.
 const FEWEST: usize = 16;
 
-/// The numbers of the residuals that lie far off by themselves: both their size and their distance from the mean of
-/// their neighbours is more than six robust standard deviations of these (1.4826 times the median of the absolute
-/// values), together they hold half of all squares, and they are at most one in twenty, and no more than three follow
-/// one another. Empty where that is not so.
+/// Indices of isolated outliers: size and distance from the mean of the neighbours both exceed six robust standard deviations
+/// (1.4826 times the median absolute value). Together they contain at least half of the sum of squares; they are at most one
+/// sample in twenty, and at most three are consecutive. Empty otherwise.
 ///
 /// ```
 /// use kmcfit_core::internals::diagnostics::far_off;
@@ -42,13 +41,13 @@ pub fn far_off(residuals: &[f64]) -> Vec<usize> {
     let far: Vec<usize> = (0..=last)
         .filter(|i| residuals[*i].abs() > size && jumps[*i].abs() > jump)
         .collect();
-    // By the largest: squares of 1e200 are none.
+    // Relative to the largest, because squares of 1e200 overflow.
     let largest = residuals.iter().fold(0.0f64, |most, r| most.max(r.abs()));
     let square = |r: f64| (r / largest) * (r / largest);
     let held: f64 = far.iter().map(|i| square(residuals[*i])).sum();
     let all: f64 = residuals.iter().map(|r| square(*r)).sum();
     let few = far.len() as f64 <= AT_MOST * residuals.len() as f64;
-    // More in a row are a part of a motion.
+    // Longer sequences belong to a response.
     let alone = (far.windows(TOGETHER + 1)).all(|run| run[TOGETHER] - run[0] > TOGETHER);
     match held >= SQUARES * all && few && alone {
         true => far,
@@ -56,8 +55,8 @@ pub fn far_off(residuals: &[f64]) -> Vec<usize> {
     }
 }
 
-/// The shares of the sum of squares of residuals that their mean holds, and that the straight line through what is
-/// left holds: both from 0 to 1, and 0 for fewer than 16 residuals.
+/// Shares of the sum of squares of residuals contained in their mean, and in the straight line through the rest: both from 0 to 1,
+/// and 0 for fewer than 16 residuals.
 ///
 /// ```
 /// use kmcfit_core::internals::diagnostics::offset_and_drift;
@@ -91,7 +90,7 @@ pub fn offset_and_drift(times: &[f64], residuals: &[f64]) -> [f64; 2] {
     [offset, drift].map(|share| if share.is_finite() { share } else { 0.0 })
 }
 
-/// The median of the sizes of some values, 0 of none.
+/// Median absolute value, 0 for no values.
 pub(crate) fn median_size(values: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
     sizes.sort_by(f64::total_cmp);
@@ -103,9 +102,9 @@ mod tests {
     use super::*;
     use crate::diagnostics::noise::white;
 
-    /// Neither white noise nor a motion that was missed is a matter of single readings.
+    /// White noise and a systematic misfit contain no isolated outliers.
     #[test]
-    fn nothing_is_far_off_in_noise_and_in_a_pattern() {
+    fn noise_and_systematic_patterns_have_no_outliers() {
         for seed in 1..20 {
             assert!(far_off(&white(seed, 2000)).is_empty(), "{seed}");
         }
@@ -123,7 +122,7 @@ mod tests {
             residuals[i] = 60.0;
         }
         assert_eq!(far_off(&residuals), [0, 90, 91, 199]);
-        // One in ten is no outlier, but the way these readings are.
+        // One in ten is too frequent for outliers.
         for i in (0..200).step_by(10) {
             residuals[i] = 60.0;
         }

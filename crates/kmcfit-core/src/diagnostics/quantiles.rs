@@ -1,14 +1,14 @@
-//! Quantiles behind intervals of a stated confidence.
+//! Quantiles for intervals of a given confidence.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-/// Half-width of a two-sided interval of this confidence for a Gaussian, in standard deviations.
+/// Half-width of a two-sided interval of this confidence for a normal variable, in standard deviations.
 pub fn normal_half_width(confidence: f64) -> f64 {
     Normal::standard().inverse_cdf(0.5 + 0.5 * confidence)
 }
 
-/// Value below which a chi-square of one degree of freedom lies with this probability: the rise of
-/// chi-square at the ends of an interval for one number.
+/// Quantile of the chi-square distribution with one degree of freedom, the rise of chi-square at the ends of an interval for one
+/// quantity.
 pub fn chi_square_one(probability: f64) -> f64 {
     ChiSquared::new(1.0).map_or(f64::NAN, |chi| chi.inverse_cdf(probability))
 }

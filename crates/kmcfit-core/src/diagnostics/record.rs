@@ -2,31 +2,30 @@
 
 use super::{Whiteness, autocorrelation, default_lags, fit_percent, rms, whiteness};
 
-/// How far a reading may be from its place on an equally spaced grid, in steps.
+/// Largest distance of a sample from an equally spaced grid, in steps.
 const OFF_GRID: f64 = 0.05;
-/// A grid with gaps may have this many places for each reading.
+/// Largest number of grid points per sample, for a grid with gaps.
 const PLACES_PER_READING: usize = 10;
 
-/// The readings of one channel and the model's values for them, in step with one another.
+/// Samples of one channel with their predictions.
 #[derive(Debug, Clone, Copy)]
 pub struct ResidualRecord<'a> {
     /// Times (s), increasing.
     pub times: &'a [f64],
-    /// Residuals as they enter the cost: observed less model, divided by sigma where one is given.
-    /// One that is not finite is missing.
+    /// Residuals as they enter the cost: observed minus model, divided by sigma where stated. Values that are not finite are missing.
     pub residuals: &'a [f64],
-    /// Readings, in their unit.
+    /// Samples, in their unit.
     pub observed: &'a [f64],
-    /// The model's values at the readings, in the same unit.
+    /// Predictions, in the same unit.
     pub model: &'a [f64],
 }
 
-/// The figures that say whether a model leaves more than noise.
+/// Diagnostics of the residuals of one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResidualDiagnostics {
     /// Number of residuals that are not missing.
     pub count: usize,
-    /// Root mean square of observed less model, in the unit of the readings.
+    /// Root mean square of observed minus model, in the unit of the samples.
     pub rms: f64,
     /// [`fit_percent`] (%).
     pub fit_percent: f64,
@@ -34,20 +33,19 @@ pub struct ResidualDiagnostics {
     pub step: f64,
     /// Normalised autocorrelation of the residuals at lags 0, 1, …
     pub autocorrelation: Vec<f64>,
-    /// Half the width of the band that holds 95 % of the autocorrelations of white noise.
+    /// Half-width of the 95 % band of the autocorrelation of white noise.
     pub band: f64,
-    /// Whether the residuals are white.
+    /// Whiteness test.
     pub whiteness: Whiteness,
 }
 
 impl ResidualDiagnostics {
-    /// The diagnostics of one record.
+    /// Computes the diagnostics of one record.
     ///
-    /// Lags are multiples of the median spacing of the times. Where a time is missing from an equally
-    /// spaced sequence, so is its residual. Times that are not equally spaced have no lags: residuals
-    /// are then taken in order, one mean spacing apart.
+    /// Lags are multiples of the median spacing. A time missing from an equally spaced sequence is a missing residual. For unequally
+    /// spaced times the residuals are taken in order, one mean spacing apart.
     ///
-    /// Only as many readings are used as the shortest of the four slices has.
+    /// The shortest of the four slices determines the number of samples.
     pub fn new(record: &ResidualRecord) -> Self {
         let ResidualRecord {
             times,
@@ -76,7 +74,7 @@ impl ResidualDiagnostics {
     }
 }
 
-/// The residuals at equal spacing, NaN in the gaps, and the spacing.
+/// Residuals at equal spacing, NaN in gaps, and the spacing.
 fn on_grid(times: &[f64], residuals: &[f64]) -> (Vec<f64>, f64) {
     let (Some(step), &[first, .., last]) = (median_spacing(times), times) else {
         return (residuals.to_vec(), 0.0);
@@ -86,7 +84,7 @@ fn on_grid(times: &[f64], residuals: &[f64]) -> (Vec<f64>, f64) {
         (residuals.to_vec(), mean)
     };
     let places = ((last - first) / step).round();
-    // Written so that a step of zero or NaN does not pass.
+    // False for a step of zero or NaN.
     let fits = places >= 0.0 && places < (PLACES_PER_READING * times.len()) as f64;
     if !fits {
         return in_order();
@@ -106,8 +104,7 @@ fn on_grid(times: &[f64], residuals: &[f64]) -> (Vec<f64>, f64) {
     (sequence, step)
 }
 
-/// The median of the distances between neighbours, refined to the mean of those near it, so that
-/// times with few digits do not drift away from it.
+/// Median distance of neighbours, refined to the mean of the distances near it, so that rounding of the times does not accumulate.
 fn median_spacing(times: &[f64]) -> Option<f64> {
     let mut spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     spacings.sort_by(f64::total_cmp);
@@ -121,7 +118,7 @@ fn median_spacing(times: &[f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnostics::Verdict;
+    use crate::diagnostics::WhitenessResult;
     use crate::diagnostics::noise::white;
 
     fn diagnostics(times: &[f64], noise: &[f64]) -> ResidualDiagnostics {
@@ -153,13 +150,12 @@ mod tests {
         assert!((found.step - 0.02).abs() < 1e-12);
         assert_eq!(found.autocorrelation.len(), 51);
         assert!((found.band - 0.062).abs() < 1e-4);
-        assert_eq!(found.whiteness.verdict, Verdict::White);
+        assert_eq!(found.whiteness.verdict, WhitenessResult::White);
     }
 
     #[test]
     fn gaps_in_the_times_are_gaps_in_the_sequence() {
-        // White noise of which every third and fourth reading of five is missing, and a residual
-        // that is alike at a distance of five steps.
+        // White noise in which two of five samples are missing, with a correlation at a distance of five steps.
         let shocks = white(7, 3000);
         let noise: Vec<f64> = (5..3000).map(|i| shocks[i] + shocks[i - 5]).collect();
         let kept = |i: &usize| i % 5 != 2 && i % 5 != 3;
@@ -185,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn uneven_times_are_taken_in_order() {
+    fn unequally_spaced_residuals_are_taken_in_order() {
         let mut time = 0.0;
         let times: Vec<f64> = (0..300)
             .map(|i| {

@@ -1,17 +1,16 @@
-//! The size of residuals, in one number.
+//! Size of residuals in one number.
 //!
-//! Readings and model values come in pairs; a pair with a value that is not finite is a missing
-//! reading and is left out, and so are values beyond the end of the shorter slice.
+//! Samples and predictions are compared in pairs. Pairs with a value that is not finite are missing, and values beyond the end of
+//! the shorter slice are ignored.
 
-/// The NRMSE fit, in per cent:
+/// NRMSE fit, per cent:
 ///
 /// ```text
 /// 100 (1 - |observed - model| / |observed - mean of observed|)
 /// ```
 ///
-/// with Euclidean norms. 100 is a perfect model, 0 is as good as a flat line at the mean, a negative
-/// number is worse than that. No units. Readings that are all the same give 100 if the model has
-/// them exactly and minus infinity if not; no readings give NaN.
+/// with Euclidean norms. A perfect model has 100, the mean of the samples 0, worse models negative values. Constant samples give
+/// 100 for an exact model and minus infinity otherwise; without samples the result is NaN.
 ///
 /// Source: MathWorks, *System Identification Toolbox*, `compare` and `goodnessOfFit` (NRMSE).
 pub fn fit_percent(observed: &[f64], model: &[f64]) -> f64 {
@@ -30,14 +29,13 @@ pub fn fit_percent(observed: &[f64], model: &[f64]) -> f64 {
     }
 }
 
-/// The root mean square, `sqrt(sum of r_i^2 / n)` over the finite values, in their unit; NaN if
-/// there are none.
+/// Root mean square `sqrt(sum of r_i^2 / n)` over the finite values, in their unit; NaN without values.
 pub fn rms(residuals: &[f64]) -> f64 {
     let finite = || residuals.iter().copied().filter(|r| r.is_finite());
     norm(finite()) / (finite().count() as f64).sqrt()
 }
 
-/// The pairs in which both values are finite.
+/// Pairs with two finite values.
 fn pairs<'a>(
     observed: &'a [f64],
     model: &'a [f64],
@@ -46,7 +44,7 @@ fn pairs<'a>(
     both.filter(|(o, m)| o.is_finite() && m.is_finite())
 }
 
-/// The Euclidean norm, without overflow or underflow on the way.
+/// Euclidean norm without overflow or underflow.
 fn norm(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let largest = values.clone().fold(0.0f64, |most, v| most.max(v.abs()));
     if largest == 0.0 {
@@ -55,14 +53,14 @@ fn norm(values: impl Iterator<Item = f64> + Clone) -> f64 {
     largest * values.map(|v| (v / largest).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Standard deviation, 0 of none.
+/// Standard deviation, 0 for no values.
 pub fn spread(values: &[f64]) -> f64 {
     let n = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / n;
     (values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n).sqrt()
 }
 
-/// What is left of values without their straight line over the times.
+/// Values minus their straight line over the times.
 pub fn without_line(times: &[f64], values: &[f64]) -> Vec<f64> {
     let n = values.len() as f64;
     let [middle, level] = [times, values].map(|x| x.iter().sum::<f64>() / n);
@@ -87,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn a_perfect_model_fits_fully_and_the_mean_not_at_all() {
+    fn a_perfect_model_has_a_fit_of_100_and_the_mean_of_0() {
         let observed = [1.0, 2.0, 6.0];
         near(fit_percent(&observed, &observed), 100.0);
         near(fit_percent(&observed, &[3.0; 3]), 0.0);
@@ -101,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn the_fit_depends_neither_on_the_unit_nor_on_the_zero() {
+    fn the_fit_is_independent_of_unit_and_origin() {
         let observed = [0.3, -0.2, 0.9, 0.4];
         let model = [0.2, -0.1, 1.0, 0.1];
         let other = |x: &[f64]| x.iter().map(|x| 1e200 * x - 3e200).collect::<Vec<f64>>();
@@ -110,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_readings_do_not_count() {
+    fn missing_samples_are_ignored() {
         let observed = [2.0, f64::NAN, -2.0, 2.0, -2.0, 5.0];
         let model = [1.0, 7.0, -2.0, 3.0, -2.0, f64::NAN];
         near(
@@ -130,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_and_what_is_left_of_it() {
+    fn a_line_is_removed_completely() {
         let times: Vec<f64> = (0..5).map(f64::from).collect();
         let wiggle = [1.0, -2.0, 2.0, -2.0, 1.0];
         let values: Vec<f64> = times

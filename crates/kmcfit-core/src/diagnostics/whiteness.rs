@@ -1,70 +1,67 @@
-//! Whether residuals are white: what a right model leaves of readings with independent errors.
+//! Ljung–Box test of whiteness: residuals of a correct model with independent errors are white.
 
 use super::Autocorrelation;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Residuals whose probability under whiteness is below this are called correlated: one white
-/// sequence in twenty is, wrongly.
+/// Significance level of the test.
 pub const SIGNIFICANCE: f64 = 0.05;
-/// With fewer readings nothing is said.
+/// Smallest number of samples for a test.
 pub const FEWEST_READINGS: usize = 20;
 
-/// The outcome of the test.
+/// Outcome of the test.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Verdict {
-    /// Nothing speaks against whiteness.
+pub enum WhitenessResult {
+    /// Whiteness is not rejected.
     White,
-    /// Neighbours are alike: every lag up to this time, in the unit of the step, is outside the
-    /// band. Residuals that oscillate cross zero after a quarter of their period.
+    /// Neighbouring residuals are correlated: the autocorrelation is outside the band at every lag up to this time, in the unit of the
+    /// step. For an oscillation this is less than a quarter of the period.
     CorrelatedOver(f64),
-    /// Neighbours are not alike, but readings this far apart, in the unit of the step, are, more
-    /// than at any other lag.
+    /// Neighbouring residuals are not correlated, but residuals at this distance, in the unit of the step, are, more than at any other
+    /// lag.
     CorrelatedAt(f64),
-    /// Nothing can be said, for this reason.
-    Untested(Reason),
+    /// Not tested, for this reason.
+    Untested(UntestedReason),
 }
 
-/// Why residuals were not tested.
+/// Reason for an omitted test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reason {
+pub enum UntestedReason {
     /// Fewer than [`FEWEST_READINGS`].
     FewReadings,
-    /// No more lags with a pair of readings than fitted parameters of the noise.
+    /// No more lags with pairs than fitted parameters of the noise.
     FewLags,
-    /// All are zero: the model goes through every reading.
+    /// All residuals are zero: the model equals every sample.
     NoResiduals,
 }
 
-/// The test of whiteness, its numbers and its verdict; its `Display` says it in words.
+/// Result of the test; `Display` gives a sentence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Whiteness {
     /// The Ljung-Box statistic `Q`; 0 if untested.
     pub statistic: f64,
-    /// Its degrees of freedom: lags less parameters of the noise; 0 if untested.
+    /// Degrees of freedom: lags minus parameters of the noise; 0 if untested.
     pub degrees_of_freedom: usize,
-    /// Probability of a statistic as large or larger if the residuals are white; 1 if untested.
+    /// p-value: probability of a statistic at least as large for white residuals; 1 if untested.
     pub p_value: f64,
-    /// Share of the lags from 1 on that are outside their band; of white noise it is 0.05 or so.
+    /// Share of the lags from 1 on outside their band; about 0.05 for white noise.
     pub share_outside: f64,
-    /// What follows.
-    pub verdict: Verdict,
+    /// Outcome.
+    pub verdict: WhitenessResult,
 }
 
-/// The test of Ljung and Box on all lags from 1 on of an autocorrelation, where lag 1 is `step`
-/// (s, or any unit):
+/// Ljung–Box test on all lags from 1 of an autocorrelation, with lag 1 equal to `step` (s, or any unit):
 ///
 /// ```text
 /// Q = n (n + 2) sum over k of (S_k/S_0)^2 / n_k,        S_k/S_0 = r_k (n_k + k) / n
 /// ```
 ///
-/// which is chi-square with (lags less `fitted`) degrees of freedom for white noise. Nothing
-/// missing, `n_k = n - k` and `Q` is the statistic as Ljung and Box give it; with `n_k` pairs
-/// instead, `(S_k/S_0)^2` keeps its expectation. Lags without a pair are left out.
+/// For white noise `Q` is chi-square with (lags minus `fitted`) degrees of freedom. Without missing values, `n_k = n - k` and `Q` is
+/// the statistic of Ljung and Box; with `n_k` pairs the expectation of `(S_k/S_0)^2` is preserved. Lags without pairs are omitted.
 ///
-/// `fitted` counts parameters of a model *of the noise* (the coefficients of an autoregression whose
-/// shocks these are). The parameters of mass, damping and stiffness are not among them: use 0.
+/// `fitted` is the number of parameters of a model *of the noise* (coefficients of an autoregression whose innovations are
+/// tested). Parameters of mass, damping and stiffness do not count: use 0.
 ///
-/// The test holds for independent errors of one size; divide residuals by sigma if it varies.
+/// The test assumes independent errors of equal size; divide residuals by sigma if it varies.
 ///
 /// Sources: G. M. Ljung, G. E. P. Box, "On a measure of lack of fit in time series models",
 /// *Biometrika* 65 (1978) 297-303; D. S. Stoffer, C. M. C. Toloi, "A note on the
@@ -76,11 +73,11 @@ pub fn whiteness(autocorrelation: &Autocorrelation, step: f64, fitted: usize) ->
     let outside = (lags.iter()).filter(|lag| autocorrelation.is_outside(**lag));
     let share_outside = outside.count() as f64 / lags.len().max(1) as f64;
     let reason = if autocorrelation.count < FEWEST_READINGS {
-        Some(Reason::FewReadings)
+        Some(UntestedReason::FewReadings)
     } else if !autocorrelation.varies() {
-        Some(Reason::NoResiduals)
+        Some(UntestedReason::NoResiduals)
     } else {
-        (lags.len() <= fitted).then_some(Reason::FewLags)
+        (lags.len() <= fitted).then_some(UntestedReason::FewLags)
     };
     if let Some(reason) = reason {
         return Whiteness {
@@ -88,7 +85,7 @@ pub fn whiteness(autocorrelation: &Autocorrelation, step: f64, fitted: usize) ->
             degrees_of_freedom: 0,
             p_value: 1.0,
             share_outside,
-            verdict: Verdict::Untested(reason),
+            verdict: WhitenessResult::Untested(reason),
         };
     }
     let statistic = ljung_box(autocorrelation, &lags);
@@ -102,7 +99,7 @@ pub fn whiteness(autocorrelation: &Autocorrelation, step: f64, fitted: usize) ->
         verdict: if p_value < SIGNIFICANCE {
             correlated(autocorrelation, &lags, step)
         } else {
-            Verdict::White
+            WhitenessResult::White
         },
     }
 }
@@ -117,21 +114,21 @@ fn ljung_box(autocorrelation: &Autocorrelation, lags: &[usize]) -> f64 {
     n * (n + 2.0) * terms.sum::<f64>()
 }
 
-/// `P(chi-square > statistic)`.
+/// Probability `P(chi-square > statistic)`.
 fn probability_above(statistic: f64, degrees_of_freedom: usize) -> f64 {
     ChiSquared::new(degrees_of_freedom as f64).map_or(1.0, |law| law.sf(statistic))
 }
 
-/// How far the correlation reaches.
-fn correlated(autocorrelation: &Autocorrelation, lags: &[usize], step: f64) -> Verdict {
+/// Extent of the correlation.
+fn correlated(autocorrelation: &Autocorrelation, lags: &[usize], step: f64) -> WhitenessResult {
     let leading = (1..=autocorrelation.lags()).take_while(|lag| autocorrelation.is_outside(*lag));
     let reach = leading.count();
     if reach > 0 {
-        return Verdict::CorrelatedOver(reach as f64 * step);
+        return WhitenessResult::CorrelatedOver(reach as f64 * step);
     }
     let size = |lag: &usize| autocorrelation.values[*lag].abs();
     let most = (lags.iter().copied()).max_by(|a, b| size(a).total_cmp(&size(b)));
-    Verdict::CorrelatedAt(most.unwrap_or(0) as f64 * step)
+    WhitenessResult::CorrelatedAt(most.unwrap_or(0) as f64 * step)
 }
 
 #[cfg(test)]
@@ -201,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_leave_the_level_as_it_is() {
+    fn gaps_do_not_change_the_level() {
         let rejected = rejections(|seed| {
             let mut values = white(seed, 1000);
             for start in (0..1000).step_by(25) {
@@ -228,24 +225,27 @@ mod tests {
     }
 
     #[test]
-    fn parameters_of_the_noise_take_degrees_of_freedom() {
+    fn parameters_of_the_noise_reduce_the_degrees_of_freedom() {
         let r = autocorrelation(&white(1, 100), 10);
         let [none, one] = [0, 1].map(|fitted| whiteness(&r, 1.0, fitted));
         assert_eq!(none.statistic, one.statistic);
         assert_eq!([none.degrees_of_freedom, one.degrees_of_freedom], [10, 9]);
         assert!(one.p_value < none.p_value);
         let all = whiteness(&r, 1.0, 10);
-        assert_eq!(all.verdict, Verdict::Untested(Reason::FewLags));
+        assert_eq!(
+            all.verdict,
+            WhitenessResult::Untested(UntestedReason::FewLags)
+        );
     }
 
     #[test]
-    fn an_offset_is_seen() {
+    fn an_offset_is_detected() {
         let values: Vec<f64> = white(2, 500).iter().map(|x| x + 0.5).collect();
         assert!(test(&values).p_value < 1e-6);
     }
 
     #[test]
-    fn the_reach_of_a_correlation() {
+    fn the_extent_of_a_correlation_is_reported() {
         let found = |values: &[f64]| {
             let r = Autocorrelation {
                 values: values.to_vec(),
@@ -255,14 +255,14 @@ mod tests {
             whiteness(&r, 0.5, 0).verdict
         };
         // The band is 0.098.
-        assert_eq!(found(&[1.0, 0.05, -0.05, 0.0]), Verdict::White);
+        assert_eq!(found(&[1.0, 0.05, -0.05, 0.0]), WhitenessResult::White);
         assert_eq!(
             found(&[1.0, 0.6, -0.3, 0.0, 0.2]),
-            Verdict::CorrelatedOver(1.0)
+            WhitenessResult::CorrelatedOver(1.0)
         );
         assert_eq!(
             found(&[1.0, 0.05, 0.2, -0.4, 0.1]),
-            Verdict::CorrelatedAt(1.5)
+            WhitenessResult::CorrelatedAt(1.5)
         );
     }
 }

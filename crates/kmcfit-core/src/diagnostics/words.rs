@@ -1,36 +1,40 @@
-//! The test of whiteness in a sentence.
+//! Sentences of the whiteness test.
 
-use super::{FEWEST_READINGS, Reason, Verdict, Whiteness};
+use super::{FEWEST_READINGS, UntestedReason, Whiteness, WhitenessResult};
 use std::fmt;
 
-/// A probability below this is printed as a bound.
+/// Probability below which a bound is printed.
 const SMALLEST_PRINTED: f64 = 1e-6;
 
 impl fmt::Display for Whiteness {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let p = Probability(self.p_value);
         let over = match self.verdict {
-            Verdict::White => return write!(f, "the residuals look white ({p})"),
-            Verdict::Untested(reason) => {
+            WhitenessResult::White => return write!(f, "the residuals look white ({p})"),
+            WhitenessResult::Untested(reason) => {
                 return write!(f, "the residuals were not tested: {reason}");
             }
-            Verdict::CorrelatedOver(time) => format!("over {} s", short(time)),
-            Verdict::CorrelatedAt(time) => format!("at a distance of {} s", short(time)),
+            WhitenessResult::CorrelatedOver(time) => format!("over {} s", short(time)),
+            WhitenessResult::CorrelatedAt(time) => format!("at a distance of {} s", short(time)),
         };
         write!(
             f,
             "the residuals are not white: correlated {over} ({p}): \
-             the model misses something or the noise is coloured"
+             the model is incomplete or the noise is coloured"
         )
     }
 }
 
-impl fmt::Display for Reason {
+impl fmt::Display for UntestedReason {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Reason::FewReadings => write!(f, "there are fewer than {FEWEST_READINGS} readings"),
-            Reason::FewLags => write!(f, "there are too few lags for the parameters of the noise"),
-            Reason::NoResiduals => write!(f, "the model goes through every reading"),
+            UntestedReason::FewReadings => {
+                write!(f, "there are fewer than {FEWEST_READINGS} samples")
+            }
+            UntestedReason::FewLags => {
+                write!(f, "there are too few lags for the parameters of the noise")
+            }
+            UntestedReason::NoResiduals => write!(f, "the model equals every sample"),
         }
     }
 }
@@ -69,13 +73,13 @@ mod tests {
     }
 
     #[test]
-    fn in_words() {
+    fn outcomes_are_sentences() {
         let white = Whiteness {
             statistic: 10.2,
             degrees_of_freedom: 10,
             p_value: 0.4263,
             share_outside: 0.0,
-            verdict: Verdict::White,
+            verdict: WhitenessResult::White,
         };
         assert_eq!(white.to_string(), "the residuals look white (p = 0.43)");
         let sine: Vec<f64> = (0..600).map(|i| (f64::from(i) * 0.4).sin()).collect();
@@ -83,30 +87,30 @@ mod tests {
         assert_eq!(
             test(&sine).to_string(),
             "the residuals are not white: correlated over 0.3 s (p < 1e-6): \
-             the model misses something or the noise is coloured"
+             the model is incomplete or the noise is coloured"
         );
         let at = Whiteness {
             p_value: 0.012,
-            verdict: Verdict::CorrelatedAt(1.5),
+            verdict: WhitenessResult::CorrelatedAt(1.5),
             ..white
         };
         assert_eq!(
             at.to_string(),
             "the residuals are not white: correlated at a distance of 1.5 s (p = 0.012): \
-             the model misses something or the noise is coloured"
+             the model is incomplete or the noise is coloured"
         );
     }
 
     #[test]
-    fn what_is_not_tested() {
+    fn omitted_tests_state_their_reason() {
         let say = |values: &[f64]| test(values).to_string();
         assert_eq!(
             say(&[1.0; 19]),
-            "the residuals were not tested: there are fewer than 20 readings"
+            "the residuals were not tested: there are fewer than 20 samples"
         );
         assert_eq!(
             say(&[0.0; 40]),
-            "the residuals were not tested: the model goes through every reading"
+            "the residuals were not tested: the model equals every sample"
         );
     }
 

@@ -1,8 +1,8 @@
-//! Names and units of the functions.
+//! Kinds of coefficient functions, with names and units.
 
 use crate::system::Term;
 
-/// Which coefficient function of the equation of motion.
+/// Kind of a coefficient function of the equation of motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CoefficientKind {
     /// Mass `m(t)`.
@@ -11,17 +11,17 @@ pub enum CoefficientKind {
     Damping,
     /// Stiffness `k(t)`.
     Stiffness,
-    /// Cubic stiffness, of `y^3`.
+    /// Cubic stiffness, the factor of `y^3`.
     CubicStiffness,
-    /// Quadratic damping, of `|v| v`.
+    /// Quadratic damping, the factor of `|v| v`.
     QuadraticDamping,
-    /// Coulomb friction, of a smoothed sign of `v`.
+    /// Coulomb friction, the factor of a smoothed sign of `v`.
     CoulombFriction,
-    /// Constant offset of the force.
+    /// Static force.
     Offset,
 }
 
-/// Of each kind its key, symbol, unit and column header, and the last two where the response is a rotation.
+/// Key, symbol, unit and column header of each kind, then unit and column header for a rotation.
 const NAMES: [[&str; 6]; 7] = [
     ["mass", "m", "kg", "mass_kg", "kg m^2", "mass_kg_m2"],
     [
@@ -90,22 +90,22 @@ impl CoefficientKind {
         NAMES[self as usize][2]
     }
 
-    /// Column header with the unit of motion along a line.
+    /// Column header with the unit for a translation.
     pub fn column(self) -> &'static str {
         NAMES[self as usize][3]
     }
 
-    /// SI unit where the motion is a rotation: displacement in rad, force a moment.
+    /// SI unit for a rotation: displacement in rad, moment in place of force.
     pub fn angular_unit(self) -> &'static str {
         NAMES[self as usize][4]
     }
 
-    /// Column header with the unit of a rotation.
+    /// Column header with the unit for a rotation.
     pub fn angular_column(self) -> &'static str {
         NAMES[self as usize][5]
     }
 
-    /// All quantities, in the order in which the program holds them.
+    /// All kinds, in program order.
     pub const ALL: [Self; 7] = [
         Self::Mass,
         Self::Damping,
@@ -116,8 +116,7 @@ impl CoefficientKind {
         Self::Offset,
     ];
 
-    /// The force term that this function multiplies; `None` for the mass. `friction_width` is the
-    /// width of Coulomb friction, m/s.
+    /// Force term multiplied by this function; `None` for the mass. `friction_width` is the width of Coulomb friction, m/s.
     pub fn term(self, friction_width: f64) -> Option<Term> {
         match self {
             CoefficientKind::Mass => None,

@@ -1,4 +1,4 @@
-//! Design matrices: from parameters to values at the nodes.
+//! Design matrices: linear maps from parameters to nodal values.
 
 use crate::rows::Rows;
 use crate::simd::sum::largest;
@@ -10,7 +10,7 @@ pub enum Design {
     Empty,
     /// One parameter per node.
     Identity,
-    /// Anything else, by rows.
+    /// General sparse matrix, by rows.
     Sparse(Rows),
 }
 
@@ -25,12 +25,12 @@ impl Design {
         unit.into_iter().chain(entries.into_iter().flatten())
     }
 
-    /// Whether it is one column with the same entry at every node.
+    /// True for a single column with equal entries at all nodes.
     pub fn is_constant(&self) -> bool {
         matches!(self, Design::Sparse(rows) if rows.is_constant())
     }
 
-    /// The largest size that `B theta` has at any of the nodes.
+    /// Largest absolute value of `B theta` over the nodes.
     pub fn largest(&self, theta: &[f64]) -> f64 {
         match self {
             Design::Empty => 0.0,
@@ -39,14 +39,14 @@ impl Design {
         }
     }
 
-    /// `B theta`.
+    /// Product `B theta`.
     pub fn multiply(&self, theta: &[f64], nodes: usize) -> Vec<f64> {
         let mut values = vec![0.0; nodes];
         self.multiply_add(theta, &mut values);
         values
     }
 
-    /// `values += B theta`.
+    /// Adds `B theta` to `values`.
     pub fn multiply_add(&self, theta: &[f64], values: &mut [f64]) {
         match self {
             Design::Empty => {}
@@ -55,7 +55,7 @@ impl Design {
         }
     }
 
-    /// `out += B^T nodal`.
+    /// Adds `B^T nodal` to `out`.
     pub fn transpose_multiply_add(&self, nodal: &[f64], out: &mut [f64]) {
         match self {
             Design::Empty => {}
@@ -64,7 +64,7 @@ impl Design {
         }
     }
 
-    /// One parameter that is the value at all nodes.
+    /// One parameter, equal to the value at all nodes.
     pub fn ones(nodes: usize) -> Self {
         let mut rows = Rows::of_width(1);
         (0..nodes).for_each(|_| rows.push([(0, 1.0)], 0.0));

@@ -1,4 +1,4 @@
-//! The L2 inner product in parameters: `G = B^T W B` with trapezoid weights `W`.
+//! Gram matrices of the L2 inner product in parameters: `G = B^T W B` with trapezoid weights `W`.
 
 use super::Design;
 use crate::rows::Rows;
@@ -7,28 +7,27 @@ use nalgebra_sparse::csc::CscCol;
 use nalgebra_sparse::factorization::CscCholesky;
 use nalgebra_sparse::{CscMatrix, CsrMatrix, SparseEntry};
 
-/// Smallest squared sine of the angle between a column of the design and those before it at which
-/// they count as independent: rounding alone leaves 1e-15 or so, and gradients are enlarged by its
-/// inverse.
+/// Smallest squared sine of the angle between a column of the design matrix and the previous ones for which they count as
+/// independent. Rounding errors are about 1e-15, and gradients are amplified by the inverse.
 const INDEPENDENT: f64 = 1e-12;
 
-/// The Gram matrix of one basis in L2, and its inverse.
+/// Gram matrix of one basis in L2, with its factor.
 #[derive(Debug, Clone)]
 pub enum Gram {
-    /// One value per node: `G = W`.
+    /// Diagonal for nodal functions: `G = W`.
     Diagonal(Vec<f64>),
     /// Any other basis, with its Cholesky factor.
     Factored {
         /// `G`.
         matrix: Rows,
-        /// Its factor.
+        /// Cholesky factor.
         factor: Box<CscCholesky<f64>>,
     },
 }
 
 impl Gram {
-    /// The Gram matrix of `design` under the quadrature `weights` (s) at the nodes; `None` if the
-    /// columns are linearly dependent on the grid, or nearly so.
+    /// Gram matrix of `design` with the quadrature `weights` (s) at the nodes; `None` if the columns are (nearly) linearly
+    /// dependent on the grid.
     pub fn new(design: &Design, weights: &[f64]) -> Option<Self> {
         match design {
             Design::Empty => Some(Gram::Diagonal(Vec::new())),
@@ -55,7 +54,7 @@ impl Gram {
         }
     }
 
-    /// The diagonal of `G`.
+    /// Diagonal of `G`.
     pub fn diagonal(&self) -> Vec<f64> {
         match self {
             Gram::Diagonal(weights) => weights.clone(),
@@ -66,7 +65,7 @@ impl Gram {
         }
     }
 
-    /// `out = G theta`.
+    /// Computes `out = G theta`.
     pub fn multiply(&self, theta: &[f64], out: &mut [f64]) {
         match self {
             Gram::Diagonal(weights) => {
@@ -81,14 +80,14 @@ impl Gram {
         }
     }
 
-    /// `theta^T G theta`, the square of the function's size.
+    /// Squared L2 norm `theta^T G theta`.
     pub fn square(&self, theta: &[f64]) -> f64 {
         match self {
             Gram::Diagonal(weights) => {
                 let terms = weights.iter().zip(theta);
                 terms.map(|(w, t)| w * t * t).sum()
             }
-            // As |L^T theta|^2, in which nothing cancels.
+            // As |L^T theta|^2, which has no cancellation.
             Gram::Factored { factor, .. } => {
                 let columns = factor.l().col_iter();
                 let product = |column: &CscCol<'_, f64>| -> f64 {
@@ -100,8 +99,7 @@ impl Gram {
         }
     }
 
-    /// `out = G^-1 dual`: from a Euclidean gradient in parameters to the parameters of the L2
-    /// gradient.
+    /// Computes `out = G^-1 dual`, which converts a Euclidean gradient to the parameters of the L2 gradient.
     pub fn solve(&self, dual: &[f64], out: &mut [f64]) {
         match self {
             Gram::Diagonal(weights) => {
@@ -126,7 +124,7 @@ fn rows_of(matrix: &CsrMatrix<f64>) -> Rows {
     rows
 }
 
-/// Whether no pivot `L_jj^2` is negligible beside the diagonal entry `G_jj` it came from.
+/// True if no pivot `L_jj^2` is negligible relative to the diagonal entry `G_jj`.
 fn independent(gram: &CsrMatrix<f64>, lower: &CscMatrix<f64>) -> bool {
     let diagonal = |matrix: Option<SparseEntry<'_, f64>>| matrix.map_or(0.0, |e| e.into_value());
     (0..gram.nrows()).all(|j| {
@@ -138,9 +136,9 @@ fn independent(gram: &CsrMatrix<f64>, lower: &CscMatrix<f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    /// The square of a size is the sum over the nodes, in whatever basis.
+    /// The squared norm equals the weighted sum over the nodes for every basis.
     #[test]
-    fn squares_are_those_of_the_values() {
+    fn squared_norms_equal_those_of_the_nodal_values() {
         let weights = [0.5, 1.0, 1.0, 1.0, 0.5];
         let theta = [1.5, -2.0];
         let mut rows = Rows::new();

@@ -1,8 +1,8 @@
 //! Coefficient functions: a sparse design matrix times parameters plus a fixed part.
 //!
-//! `p_j(t_i) = (B_j theta_j)_i + b_j,i` at the nodes `t_i`. So gradients with respect to parameters are
-//! `B_j^T` times gradients with respect to nodal values, and the L2 inner product of two functions
-//! is `theta^T (B^T W B) theta'` with the trapezoid weights `W`.
+//! Nodal values are `p_j(t_i) = (B_j theta_j)_i + b_j,i` at the nodes `t_i`. Gradients with respect to parameters are `B_j^T`
+//! times gradients with respect to nodal values, and the L2 inner product of two functions is `theta^T (B^T W B) theta'` with
+//! trapezoid weights `W`.
 
 pub mod basis;
 mod coefficient_kind;
@@ -12,7 +12,7 @@ mod parameterization;
 mod penalty;
 mod ratios;
 mod scalar;
-mod variation;
+mod total_variation;
 
 pub use basis::Basis;
 pub use coefficient_kind::CoefficientKind;
@@ -21,33 +21,33 @@ pub use gram::Gram;
 pub use parameterization::Parameterization;
 pub use penalty::Penalty;
 pub use ratios::Ratios;
-pub use scalar::{Prior, ScalarParameter, Value};
-pub use variation::Variation;
+pub use scalar::{Prior, ScalarParameter, ScalarValue};
+pub use total_variation::TotalVariation;
 
 use crate::system::Grid;
 
-/// One coefficient function and where its search starts.
+/// One coefficient function with its start.
 #[derive(Debug, Clone)]
 pub struct CoefficientFunction {
-    /// Which function this is.
+    /// Kind.
     pub quantity: CoefficientKind,
-    /// The experiment that has it for itself; `None` if it belongs to the main device.
+    /// Name of the experiment with its own function; `None` for a function of the shared coefficient set.
     pub owner: Option<String>,
-    /// The space that the function is sought in; `None` if it is fixed.
+    /// Basis; `None` for a fixed function.
     pub basis: Option<Basis>,
-    /// How parameters become values at the nodes.
+    /// Design matrix.
     pub design: Design,
     /// Fixed part at the nodes, in the unit of the quantity.
     pub offset: Vec<f64>,
     /// Start of the parameters, in the unit of the quantity.
     pub start: Vec<f64>,
-    /// Whether positive parameters make the function positive everywhere (a basis of non-negative
-    /// functions without a fixed part), so that a search may run in their logarithms.
+    /// True if positive parameters make the function positive at all times (nonnegative basis functions without a fixed part), so
+    /// that a search may use their logarithms.
     pub positive_parameters: bool,
 }
 
 impl CoefficientFunction {
-    /// A function known at all nodes: no parameters.
+    /// A fixed function, without parameters.
     pub fn fixed(quantity: CoefficientKind, values: Vec<f64>) -> Self {
         Self {
             quantity,
@@ -60,7 +60,7 @@ impl CoefficientFunction {
         }
     }
 
-    /// A function of `basis` on `grid`, starting from the parameters `start`.
+    /// A function in `basis` on `grid`, with start parameters `start`.
     ///
     /// # Panics
     /// If `start` has another number of parameters than the basis.
@@ -74,13 +74,13 @@ impl CoefficientFunction {
         Self::with_design(quantity, basis, design, grid.nodes(), start)
     }
 
-    /// One value per node, starting from `start`.
+    /// A nodal function with start `start`.
     pub fn nodal(quantity: CoefficientKind, start: Vec<f64>) -> Self {
         let nodes = start.len();
         Self::with_design(quantity, Basis::Nodal, Design::Identity, nodes, start)
     }
 
-    /// One value for all `nodes` nodes, starting from `start`.
+    /// A constant function on `nodes` nodes with start `start`.
     pub fn constant(quantity: CoefficientKind, start: f64, nodes: usize) -> Self {
         let design = Design::ones(nodes);
         Self::with_design(quantity, Basis::Constant, design, nodes, vec![start])
@@ -104,7 +104,7 @@ impl CoefficientFunction {
         }
     }
 
-    /// What reports call it: its quantity, and the experiment that has it for itself.
+    /// Name in reports: kind and, if any, its experiment.
     pub fn name(&self) -> String {
         match &self.owner {
             None => self.quantity.name().to_owned(),
@@ -117,17 +117,17 @@ impl CoefficientFunction {
         self.start.len()
     }
 
-    /// The value of the fixed part and the entry of the design, if both are the same at every node.
+    /// Fixed part and design entry, if both are equal at all nodes.
     fn flat(&self) -> Option<[f64; 2]> {
         let is_flat = self.offset.windows(2).all(|pair| pair[0] == pair[1]);
         let (_, entry) = self.design.row(0).next()?;
         (self.design.is_constant() && is_flat).then_some([*self.offset.first()?, entry])
     }
 
-    /// Values at the nodes for the parameters `theta`.
+    /// Computes the nodal values for the parameters `theta`.
     pub fn values_into(&self, theta: &[f64], values: &mut [f64]) {
         match &self.design {
-            // One value per node without a fixed part: a copy, so that no bit changes.
+            // A nodal function without a fixed part is copied, which preserves all bits.
             Design::Identity => values.copy_from_slice(theta),
             Design::Empty => values.copy_from_slice(&self.offset),
             Design::Sparse(_) => {

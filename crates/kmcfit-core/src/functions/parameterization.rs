@@ -1,4 +1,4 @@
-//! All functions and scalars that are fitted, their parameters in one vector.
+//! Parameterization of a problem: all functions and scalars, with their parameters in one vector.
 
 use super::{CoefficientFunction, Design, Gram, ScalarParameter};
 use crate::simd::sum::largest_difference;
@@ -6,57 +6,62 @@ use crate::system::NodalCoefficients;
 use crate::system::quadrature::{trapezoid, trapezoid_weights};
 use std::ops::Range;
 
-/// The functions to be found and the scalars beside them. Their parameters stand one after the other
-/// in one vector `theta`, functions first.
+/// Coefficient functions and scalar parameters. Their parameters form one vector `theta`, functions first.
 ///
-/// The first functions make up the main device: mass, then one per force term. Further ones belong
-/// to single experiments and replace one of the main device there: each device is a list of
-/// functions ([`Parameterization::assembly`]).
+/// The first functions of the list are the shared coefficient set: mass, then one per force term. Further functions belong to
+/// single experiments, where they replace a shared one: each coefficient set is a list of indices
+/// ([`Parameterization::coefficient_set`]).
 #[derive(Debug, Clone)]
 pub struct Parameterization {
     list: Vec<CoefficientFunction>,
     ranges: Vec<Range<usize>>,
     grams: Vec<Gram>,
-    devices: Vec<Vec<usize>>,
+    coefficient_sets: Vec<Vec<usize>>,
     scalars: Vec<ScalarParameter>,
     nodes: usize,
     step: f64,
-    /// Of each parameter of a function the first node at which it matters.
+    /// First node affected by each parameter of a function.
     first_nodes: Vec<u32>,
-    /// Whether each function is constant.
+    /// True for constant functions.
     constant: Vec<bool>,
-    /// The fixed part and the only entry of the design of each function that has the same value at every node.
+    /// Fixed part and single design entry of each function that is equal at all nodes.
     flat: Vec<Option<[f64; 2]>>,
 }
 
 impl Parameterization {
-    /// Collects `list` (mass first) on `nodes` nodes of step `step` (s), as the functions of one
-    /// device; `None` if some basis is linearly dependent on the grid or the list is empty.
+    /// Parameterization with `list` (mass first) on `nodes` nodes of step `step` (s) as the shared coefficient set; `None` if a basis
+    /// is linearly dependent on the grid or the list is empty.
     pub fn new(list: Vec<CoefficientFunction>, nodes: usize, step: f64) -> Option<Self> {
         let main = (0..list.len()).collect();
-        Self::with_devices(list, vec![main], nodes, step)
+        Self::with_coefficient_sets(list, vec![main], nodes, step)
     }
 
-    /// [`Parameterization::new`] with several devices: each is a list of indices into `list`, mass first.
+    /// [`Parameterization::new`] with several coefficient sets: each is a list of indices into `list`, mass first.
     ///
     /// # Panics
-    /// If there is no device, or one names a function that is not there, or one twice.
-    pub fn with_devices(
+    /// If there is no coefficient set, or a set has an index outside the list or twice.
+    pub fn with_coefficient_sets(
         list: Vec<CoefficientFunction>,
-        devices: Vec<Vec<usize>>,
+        coefficient_sets: Vec<Vec<usize>>,
         nodes: usize,
         step: f64,
     ) -> Option<Self> {
-        assert!(!devices.is_empty(), "at least the main device");
         assert!(
-            devices.iter().flatten().all(|f| *f < list.len()),
-            "devices of the functions in the list"
+            !coefficient_sets.is_empty(),
+            "at least the shared coefficient set"
         );
-        let is_once = |device: &Vec<usize>| {
-            let first = |f: &usize| device.iter().position(|g| g == f);
-            device.iter().enumerate().all(|(i, f)| first(f) == Some(i))
+        assert!(
+            coefficient_sets.iter().flatten().all(|f| *f < list.len()),
+            "coefficient sets with functions of the list"
+        );
+        let is_once = |nodal: &Vec<usize>| {
+            let first = |f: &usize| nodal.iter().position(|g| g == f);
+            nodal.iter().enumerate().all(|(i, f)| first(f) == Some(i))
         };
-        assert!(devices.iter().all(is_once), "each function once a device");
+        assert!(
+            coefficient_sets.iter().all(is_once),
+            "each function once in a coefficient set"
+        );
         let weights = trapezoid_weights(nodes, step);
         let grams: Option<Vec<Gram>> = list
             .iter()
@@ -85,45 +90,45 @@ impl Parameterization {
             list,
             ranges,
             grams: grams?,
-            devices,
+            coefficient_sets,
             scalars: Vec::new(),
             nodes,
             step,
         })
     }
 
-    /// The same functions with numbers to be fitted beside them.
+    /// Adds scalar parameters.
     #[must_use]
     pub fn with_scalars(mut self, scalars: Vec<ScalarParameter>) -> Self {
         self.scalars = scalars;
         self
     }
 
-    /// The numbers that are fitted beside the functions.
+    /// Scalar parameters.
     pub fn scalars(&self) -> &[ScalarParameter] {
         &self.scalars
     }
 
-    /// Where the scalars stand in `theta`.
+    /// Range of the scalars in `theta`.
     pub fn scalar_range(&self) -> Range<usize> {
         let first = self.function_parameters();
         first..first + self.scalars.len()
     }
 
-    /// The functions that make up each device, mass first; the main device is the first.
-    pub fn assemblies(&self) -> &[Vec<usize>] {
-        &self.devices
+    /// Coefficient sets as indices of functions, mass first; the first is the shared one.
+    pub fn coefficient_sets(&self) -> &[Vec<usize>] {
+        &self.coefficient_sets
     }
 
-    /// The functions that make up device `device`, mass first.
-    pub fn assembly(&self, device: usize) -> &[usize] {
-        &self.devices[device]
+    /// Functions of coefficient set `set`, mass first.
+    pub fn coefficient_set(&self, set: usize) -> &[usize] {
+        &self.coefficient_sets[set]
     }
 
     /// Function `index` of the list.
     ///
     /// # Panics
-    /// If there is none.
+    /// If there is no such function.
     pub fn get(&self, index: usize) -> &CoefficientFunction {
         &self.list[index]
     }
@@ -131,12 +136,12 @@ impl Parameterization {
     /// The Gram matrix of function `index` of the list.
     ///
     /// # Panics
-    /// If there is none.
+    /// If there is no such function.
     pub(crate) fn gram(&self, index: usize) -> &Gram {
         &self.grams[index]
     }
 
-    /// The functions: those of the main device, mass first, then those of single experiments.
+    /// All functions: those of the shared coefficient set, mass first, then those of single experiments.
     pub fn iter(&self) -> impl Iterator<Item = &CoefficientFunction> {
         self.list.iter()
     }
@@ -146,7 +151,7 @@ impl Parameterization {
         self.nodes
     }
 
-    /// Number of all parameters, scalars included.
+    /// Number of parameters, scalars included.
     pub fn parameters(&self) -> usize {
         self.function_parameters() + self.scalars.len()
     }
@@ -155,24 +160,24 @@ impl Parameterization {
         self.ranges.last().map_or(0, |r| r.end)
     }
 
-    /// Where each function's parameters stand in `theta`.
+    /// Range of each function's parameters in `theta`.
     pub fn ranges(&self) -> &[Range<usize>] {
         &self.ranges
     }
 
-    /// The first node at which each parameter matters; the scalars matter from the beginning.
+    /// First node affected by each parameter; 0 for scalars.
     pub fn first_nodes(&self) -> Vec<u32> {
         let mut first = self.first_nodes.clone();
         first.resize(self.parameters(), 0);
         first
     }
 
-    /// Whether function `index` of the list has the same value at every node, whatever its parameter is.
+    /// True if function `index` is equal at all nodes for every parameter value.
     pub fn is_constant(&self, index: usize) -> bool {
         self.constant[index]
     }
 
-    /// The largest size at any node of what function `index` changes by from its parameters `from` to `after`.
+    /// Largest change at any node of function `index` between the parameters `from` and `after`.
     pub(crate) fn largest_change(&self, index: usize, from: &[f64], after: &[f64]) -> f64 {
         let design = &self.list[index].design;
         if matches!(design, Design::Identity) {
@@ -185,12 +190,12 @@ impl Parameterization {
         }
     }
 
-    /// Whether function `index` of the list is constant, or has no parameters.
+    /// True if function `index` is constant or fixed.
     pub fn is_constant_or_known(&self, index: usize) -> bool {
         self.constant[index] || matches!(self.list[index].design, Design::Empty)
     }
 
-    /// The start of the search.
+    /// Start parameters.
     pub fn start(&self) -> Vec<f64> {
         let functions = self.list.iter().flat_map(|f| f.start.iter().copied());
         functions
@@ -198,17 +203,17 @@ impl Parameterization {
             .collect()
     }
 
-    /// The same functions with another start of the search.
+    /// The parameterization with another start.
     ///
     /// # Panics
-    /// If `theta` has another number of parameters.
+    /// If `theta` has a wrong number of parameters.
     #[must_use]
     pub fn with_start(mut self, theta: &[f64]) -> Self {
         self.set_start(theta);
         self
     }
 
-    /// Moves the start of the search.
+    /// Sets the start.
     pub(crate) fn set_start(&mut self, theta: &[f64]) {
         assert_eq!(theta.len(), self.parameters(), "one start per parameter");
         for (function, range) in self.list.iter_mut().zip(&self.ranges) {
@@ -220,21 +225,24 @@ impl Parameterization {
         }
     }
 
-    /// A device of the right shape, all zero.
-    pub fn empty_device(&self) -> NodalCoefficients {
-        NodalCoefficients::zeros(self.nodes, self.devices[0].len() - 1)
+    /// Nodal coefficients of the right shape, all zero.
+    pub fn empty_nodal(&self) -> NodalCoefficients {
+        NodalCoefficients::zeros(self.nodes, self.coefficient_sets[0].len() - 1)
     }
 
-    /// The main device with parameters `theta`.
-    pub fn device(&self, theta: &[f64]) -> NodalCoefficients {
-        let mut device = self.empty_device();
-        self.device_into(theta, 0, &mut device);
-        device
+    /// Nodal values of the shared coefficient set at the parameters `theta`.
+    pub fn nodal(&self, theta: &[f64]) -> NodalCoefficients {
+        let mut nodal = self.empty_nodal();
+        self.nodal_into(theta, 0, &mut nodal);
+        nodal
     }
 
-    /// Device `which` with parameters `theta`, into storage that is used again.
-    pub fn device_into(&self, theta: &[f64], which: usize, device: &mut NodalCoefficients) {
-        for (&f, values) in self.devices[which].iter().zip(device.functions_mut()) {
+    /// Computes the nodal values of coefficient set `which` at the parameters `theta`, in existing storage.
+    pub fn nodal_into(&self, theta: &[f64], which: usize, nodal: &mut NodalCoefficients) {
+        for (&f, values) in self.coefficient_sets[which]
+            .iter()
+            .zip(nodal.functions_mut())
+        {
             let theta = &theta[self.ranges[f].clone()];
             match (self.flat[f], theta) {
                 (Some([offset, entry]), [theta]) => values.fill(offset + entry * theta),
@@ -243,7 +251,7 @@ impl Parameterization {
         }
     }
 
-    /// Every function of the list at the nodes, for the parameters `theta`.
+    /// Nodal values of all functions of the list at the parameters `theta`.
     pub fn values(&self, theta: &[f64]) -> Vec<Vec<f64>> {
         let each = self.ranges.iter().enumerate().map(|(index, range)| {
             let mut values = vec![0.0; self.nodes];
@@ -253,48 +261,49 @@ impl Parameterization {
         each.collect()
     }
 
-    /// `B theta` of device `which` without the fixed parts: its change along a direction.
+    /// Linear part `B theta` of coefficient set `which`, without fixed parts: its change along a direction.
     pub fn direction(&self, theta: &[f64], which: usize) -> NodalCoefficients {
-        let mut device = self.empty_device();
-        for (&f, values) in self.devices[which].iter().zip(device.functions_mut()) {
+        let mut nodal = self.empty_nodal();
+        for (&f, values) in self.coefficient_sets[which]
+            .iter()
+            .zip(nodal.functions_mut())
+        {
             let range = self.ranges[f].clone();
             self.list[f].design.multiply_add(&theta[range], values);
         }
-        device
+        nodal
     }
 
-    /// Adds `B^T` applied to nodal values of device `which` to `out`: Euclidean gradient in nodal
-    /// values to Euclidean gradient in parameters.
+    /// Adds `B^T` times the nodal values of coefficient set `which` to `out`, which converts Euclidean gradients from nodal values
+    /// to parameters.
     pub fn add_transpose(&self, nodal: &NodalCoefficients, which: usize, out: &mut [f64]) {
-        for (&f, values) in self.devices[which].iter().zip(nodal.functions()) {
+        for (&f, values) in self.coefficient_sets[which].iter().zip(nodal.functions()) {
             let out = &mut out[self.ranges[f].clone()];
             self.list[f].design.transpose_multiply_add(values, out);
         }
     }
 
-    /// [`Parameterization::add_transpose`] of the main device to zero.
+    /// [`Parameterization::add_transpose`] of the shared coefficient set, added to zero.
     pub fn transpose(&self, nodal: &NodalCoefficients) -> Vec<f64> {
         let mut out = vec![0.0; self.parameters()];
         self.add_transpose(nodal, 0, &mut out);
         out
     }
 
-    /// Length of the record, s: a scalar weighs as much as a constant function of its value.
+    /// Length of the record, s, the weight of a scalar; it equals that of a constant function of the same value.
     fn duration(&self) -> f64 {
         self.step * (self.nodes - 1) as f64
     }
 
-    /// Diagonal of `G`: the squared L2 norm of each parameter's function, s. That of a scalar is the
-    /// length of the record.
+    /// Diagonal of `G`: squared L2 norms of the basis functions, s; the length of the record for scalars.
     pub fn gram_diagonal(&self) -> Vec<f64> {
         let scalars = self.scalars.iter().map(|_| self.duration());
         let functions = self.grams.iter().flat_map(Gram::diagonal);
         functions.chain(scalars).collect()
     }
 
-    /// Diagonal of `sum_f 1/T integral (p_f / size_f)^2 dt + sum_s (x_s / size_s)^2` in the
-    /// parameters, with a size for each function of the list and `T = duration`. A function of size
-    /// zero takes the largest size of all.
+    /// Diagonal of `sum_f 1/T integral (p_f / size_f)^2 dt + sum_s (x_s / size_s)^2` in the parameters, with a size for each
+    /// function of the list and `T = duration`. A size of zero is replaced by the largest size.
     pub fn relative_metric(&self, sizes: &[f64], duration: f64) -> Vec<f64> {
         let largest = sizes
             .iter()
@@ -314,7 +323,7 @@ impl Parameterization {
         metric
     }
 
-    /// `G theta`, all functions and scalars.
+    /// Product `G theta`, functions and scalars.
     pub fn gram_multiply(&self, theta: &[f64]) -> Vec<f64> {
         let mut out = self.each_gram(theta, Gram::multiply);
         let scalars = self.scalar_range();
@@ -324,7 +333,7 @@ impl Parameterization {
         out
     }
 
-    /// `G^-1 dual`, all functions and scalars.
+    /// Solution `G^-1 dual`, functions and scalars.
     pub fn gram_solve(&self, dual: &[f64]) -> Vec<f64> {
         let mut out = self.each_gram(dual, Gram::solve);
         let scalars = self.scalar_range();
@@ -342,8 +351,8 @@ impl Parameterization {
         out
     }
 
-    /// `integral sum_j (B_j theta_j)^2 dt` by the trapezoid rule, plus `T x^2` for each scalar: G^2 of the paper when
-    /// `theta` is the L2 gradient. Functions with one value a node are summed node by node.
+    /// Squared norm `integral sum_j (B_j theta_j)^2 dt` by the trapezoid rule, plus `T x^2` for each scalar: G^2 of the paper if
+    /// `theta` is the L2 gradient. Nodal functions are summed node by node.
     pub fn norm_squared(&self, theta: &[f64]) -> f64 {
         let mut squares = Vec::new();
         let mut others = 0.0;

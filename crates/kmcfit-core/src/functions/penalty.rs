@@ -1,12 +1,11 @@
-//! Penalties on the roughness of a function.
+//! Tikhonov penalties on the roughness of a function.
 
 use crate::rows::Rows;
 
-/// `weight * |L theta_j - target|^2` for one function `j`.
+/// Penalty `weight * |L theta_j - target|^2` on one function `j`.
 ///
-/// With `L` the roughness rows of order `q` of a basis and no target this is
-/// `weight * integral (d^q p/dt^q)^2 dt`: the same for every basis and number of nodes. It stays in
-/// residual form: `L^T L` holds powers of `1/dt^4` and loses the digits of a smooth function.
+/// For the roughness rows `L` of order `q` and no target this is `weight * integral (d^q p/dt^q)^2 dt`, independent of basis and
+/// number of nodes. It is kept in residual form: `L^T L` contains powers of `1/dt^4` and loses the digits of a smooth function.
 #[derive(Debug, Clone)]
 pub struct Penalty {
     /// Index of the function, mass 0.
@@ -30,14 +29,14 @@ impl Penalty {
         }
     }
 
-    /// `L theta - target`.
+    /// Residuals `L theta - target`.
     pub fn residuals(&self, theta: &[f64]) -> Vec<f64> {
         let mut residuals: Vec<f64> = self.rows.right().iter().map(|t| -t).collect();
         self.rows.multiply_add(theta, &mut residuals);
         residuals
     }
 
-    /// `|L theta - target|^2`, without the weight.
+    /// Roughness `|L theta - target|^2`, without the weight.
     pub fn roughness(&self, theta: &[f64]) -> f64 {
         self.residuals(theta).iter().map(|r| r * r).sum()
     }

@@ -2,7 +2,7 @@
 
 use crate::system::NodalCoefficients;
 
-/// Ratios of stiffness and damping to mass at the nodes, and what engineers call them.
+/// `k/m`, `c/m`, natural frequency and damping ratio at the nodes.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Ratios {
     /// `k/m`, 1/s^2.
@@ -16,16 +16,12 @@ pub struct Ratios {
 }
 
 impl Ratios {
-    /// The ratios of a device whose first two coefficients are damping and stiffness.
+    /// Ratios of nodal coefficients whose first two terms are damping and stiffness.
     ///
     /// # Panics
-    /// If the device has fewer coefficients.
-    pub fn of(device: &NodalCoefficients) -> Self {
-        let (m, c, k) = (
-            &device.mass,
-            &device.coefficients[0],
-            &device.coefficients[1],
-        );
+    /// If there are fewer than two terms.
+    pub fn of(nodal: &NodalCoefficients) -> Self {
+        let (m, c, k) = (&nodal.mass, &nodal.coefficients[0], &nodal.coefficients[1]);
         let over_mass = |f: &[f64]| -> Vec<f64> { f.iter().zip(m).map(|(f, m)| f / m).collect() };
         let k_over_m = over_mass(k);
         let c_over_m = over_mass(c);

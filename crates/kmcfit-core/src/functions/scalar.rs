@@ -1,31 +1,31 @@
-//! Numbers that are fitted beside the functions: initial states, gains and offsets of sensors.
+//! Scalar parameters: initial states, gains and offsets of sensors, estimated together with the functions.
 
-/// What is known of a number before the record is looked at.
+/// Gaussian prior of a scalar.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
-    /// Expected value.
+    /// Mean.
     pub mean: f64,
-    /// Standard deviation; J grows by `((x - mean) / sigma)^2`.
+    /// Standard deviation; the prior adds `((x - mean) / sigma)^2` to J.
     pub sigma: f64,
 }
 
-/// A number to be fitted.
+/// A scalar parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScalarParameter {
     /// Name for reports.
     pub name: String,
-    /// Its unit.
+    /// Unit.
     pub unit: String,
-    /// Where the search starts.
+    /// Start.
     pub start: f64,
-    /// How large a change of it is large: steps are measured by it.
+    /// Scale of changes.
     pub size: f64,
-    /// What is known of it beforehand.
+    /// Prior, if any.
     pub prior: Option<Prior>,
 }
 
 impl ScalarParameter {
-    /// What the prior charges for the value `x`.
+    /// Contribution of the prior to J at the value `x`.
     pub fn price(&self, x: f64) -> f64 {
         self.prior.map_or(0.0, |p| {
             let u = (x - p.mean) / p.sigma;
@@ -34,33 +34,33 @@ impl ScalarParameter {
     }
 }
 
-/// A number that is known, or fitted as one of the [`ScalarParameter`]s.
+/// A scalar that is known, or estimated as one of the [`ScalarParameter`]s.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Value {
-    /// Known.
+pub enum ScalarValue {
+    /// Known value.
     Known(f64),
-    /// The scalar of this index.
-    Sought(usize),
+    /// Index of the estimated scalar.
+    Estimated(usize),
 }
 
-impl Value {
-    /// The number, for the values `scalars` of all scalars.
+impl ScalarValue {
+    /// Value, given the values `scalars` of all scalars.
     ///
     /// # Panics
-    /// If it is a scalar that is not among them.
+    /// If the index is out of range.
     #[inline]
     pub fn of(self, scalars: &[f64]) -> f64 {
         match self {
             Self::Known(value) => value,
-            Self::Sought(index) => scalars[index],
+            Self::Estimated(index) => scalars[index],
         }
     }
 
-    /// The index of the scalar, if it is sought.
+    /// Index of the scalar, if estimated.
     pub fn index(self) -> Option<usize> {
         match self {
             Self::Known(_) => None,
-            Self::Sought(index) => Some(index),
+            Self::Estimated(index) => Some(index),
         }
     }
 }

@@ -1,24 +1,24 @@
-//! The constraint rows that hold with equality at a point.
+//! Active constraints: the rows that hold with equality at a point, cones linearised.
 
 use crate::constraints::{Cone, RowGroup};
 use crate::problem::Problem;
 
-/// A row is active if it is this near to its bound, relative to its scale
-/// ([`crate::solvers::active_constraints`] uses the same).
+/// Largest distance from the bound of an active row, relative to its scale ([`crate::solvers::active_constraints`] uses the
+/// same).
 const NEAR: f64 = 1e-6;
 
-/// A row `a^T theta` that cannot change, or only to one side.
+/// Row `a^T theta` of an active constraint.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ActiveRow {
-    /// Columns and coefficients; pointing inwards for an inequality.
+    /// Columns and coefficients; for an inequality the row points inwards.
     pub entries: Vec<(usize, f64)>,
-    /// Whether it is an equality.
+    /// True for an equality.
     pub equality: bool,
     /// Name of its group.
     pub name: String,
 }
 
-/// All active rows; those of cones linearised.
+/// All active rows; cones are linearised.
 pub(super) fn active_rows(problem: &Problem, theta: &[f64]) -> Vec<ActiveRow> {
     let groups = problem.constraints.groups.iter();
     let rows = groups.flat_map(|g| (0..g.rows.len()).filter_map(move |i| row(g, i, theta)));
@@ -78,14 +78,14 @@ fn cone_row(cone: &Cone, theta: &[f64]) -> Option<Vec<(usize, f64)>> {
 mod tests {
     use super::*;
     use crate::builder::{Builder, CoefficientSpec, Record};
-    use crate::constraints::Statement;
+    use crate::constraints::Constraint;
 
-    fn problem(statement: Statement) -> Problem {
+    fn problem(statement: Constraint) -> Problem {
         let times: Vec<f64> = (0..=50).map(|i| 0.1 * f64::from(i)).collect();
-        let readings: Vec<f64> = times.iter().map(|t| (2.0 * t).cos()).collect();
+        let samples: Vec<f64> = times.iter().map(|t| (2.0 * t).cos()).collect();
         let record = Record::new("decay")
             .from_state(1.0, 0.0)
-            .displacement(&times, &readings);
+            .displacement(&times, &samples);
         let parts = [
             CoefficientSpec::constant(1.0),
             CoefficientSpec::constant(0.4),
@@ -95,8 +95,8 @@ mod tests {
         builder.build().unwrap()
     }
 
-    fn at_most(max: f64) -> Statement {
-        Statement::DampingRatio { max }
+    fn at_most(max: f64) -> Constraint {
+        Constraint::DampingRatio { max }
     }
 
     #[test]
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_point_inwards_and_only_those_that_are_met_are_there() {
+    fn rows_point_inwards_and_only_active_ones_are_listed() {
         let problem = problem(at_most(0.5));
         assert_eq!(active_rows(&problem, &[1.0, 0.4, 4.0]), []);
         let rows = active_rows(&problem, &[1.0, 0.4, 5.0]);

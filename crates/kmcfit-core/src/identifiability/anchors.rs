@@ -1,31 +1,29 @@
-//! The instants at which a free motion fixes one ratio whatever the other is.
+//! Instants at which a response determines `k/m` or `c/m` alone.
 //!
-//! `y'' + (c/m) y' + (k/m) y = f/m`: where `y' = 0` the motion says `k/m = (f/m - y'')/y`, where `y = 0`
-//! it says `c/m = (f/m - y'')/y'`.
+//! The equation of motion is `y'' + (c/m) y' + (k/m) y = f/m`. At a turning point, `y' = 0`, it gives
+//! `k/m = (f/m - y'')/y`; at a zero crossing, `y = 0`, it gives `c/m = (f/m - y'')/y'`.
 
 use crate::simulate::Trajectory;
 use crate::system::Grid;
 
-/// Those instants, s, increasing.
+/// Turning points and zero crossings of a response, s, increasing.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Anchors {
-    /// Turning points, `y' = 0`: there `k/m` is fixed.
+    /// Turning points, `y' = 0`, which determine `k/m`.
     pub turning_points: Vec<f64>,
-    /// Zero crossings, `y = 0`: there `c/m` is fixed.
+    /// Zero crossings, `y = 0`, which determine `c/m`.
     pub zero_crossings: Vec<f64>,
 }
 
-/// The anchors of a motion, by cubic Hermite interpolation of displacement and velocity: of order 4 in
-/// the step for zero crossings, of order 3 for turning points.
-///
-/// A motion at rest has none.
-pub fn anchors(grid: &Grid, motion: &Trajectory) -> Anchors {
-    let (y, v, h) = (&motion.displacement, &motion.velocity, grid.step());
+/// Turning points and zero crossings by cubic Hermite interpolation of displacement and velocity; fourth-order accurate in
+/// the step for zero crossings, third-order for turning points. Empty for a system at rest.
+pub fn anchors(grid: &Grid, response: &Trajectory) -> Anchors {
+    let (y, v, h) = (&response.displacement, &response.velocity, grid.step());
     let mut anchors = Anchors::default();
-    for i in 0..motion.nodes().saturating_sub(1) {
+    for i in 0..response.nodes().saturating_sub(1) {
         let ends = [y[i], h * v[i], y[i + 1], h * v[i + 1]];
         let time = |x: f64| grid.time(i) + x * h;
-        let last = i + 2 == motion.nodes();
+        let last = i + 2 == response.nodes();
         if let Some(x) = root(last, |x| value(ends, x)) {
             anchors.zero_crossings.push(time(x));
         }
@@ -36,10 +34,10 @@ pub fn anchors(grid: &Grid, motion: &Trajectory) -> Anchors {
     anchors
 }
 
-/// Halvings of a step: down to rounding.
+/// Bisections of a step, enough for machine precision.
 const HALVINGS: usize = 50;
 
-/// The zero of `f` on `[0, 1)`, or `[0, 1]`, if its sign changes.
+/// Zero of `f` on `[0, 1)`, or `[0, 1]` if `closed`, where its sign changes.
 fn root(closed: bool, f: impl Fn(f64) -> f64) -> Option<f64> {
     let (left, right) = (f(0.0), f(1.0));
     if left == 0.0 && right == 0.0 {
@@ -75,7 +73,7 @@ fn value([y0, v0, y1, v1]: [f64; 4], x: f64) -> f64 {
         + v1 * (x3 - x2)
 }
 
-/// Its slope in `x`.
+/// Derivative of the cubic in `x`.
 fn slope([y0, v0, y1, v1]: [f64; 4], x: f64) -> f64 {
     let bend = 6.0 * (x - x * x);
     bend * (y1 - y0) + v0 * (1.0 - 4.0 * x + 3.0 * x * x) + v1 * (3.0 * x * x - 2.0 * x)
@@ -86,13 +84,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cosine_turns_and_crosses_where_it_should() {
+    fn turning_points_and_crossings_of_a_cosine_are_exact_to_interpolation_error() {
         let grid = Grid::new(0.0, 10.0, 401).unwrap();
-        let motion = Trajectory {
+        let response = Trajectory {
             displacement: grid.times().iter().map(|t| t.cos()).collect(),
             velocity: grid.times().iter().map(|t| -t.sin()).collect(),
         };
-        let found = anchors(&grid, &motion);
+        let found = anchors(&grid, &response);
         let pi = std::f64::consts::PI;
         let turning = [0.0, pi, 2.0 * pi, 3.0 * pi];
         let crossing = [0.5 * pi, 1.5 * pi, 2.5 * pi];
@@ -109,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_at_rest_has_no_anchors() {
+    fn a_system_at_rest_has_no_fixed_instants() {
         let grid = Grid::new(0.0, 1.0, 11).unwrap();
         assert_eq!(anchors(&grid, &Trajectory::zeros(11)), Anchors::default());
     }

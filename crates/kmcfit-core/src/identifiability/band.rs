@@ -1,8 +1,8 @@
-//! The band of one function or ratio.
+//! Confidence band of one function or ratio over time.
 
 use crate::diagnostics::NORMAL_975;
 
-/// To which sides of the value its band reaches.
+/// Sides of the value on which a band extends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
     /// Both.
@@ -11,28 +11,28 @@ pub enum Side {
     Above,
     /// Only below: an upper bound is active.
     Below,
-    /// Neither: an equality, or nothing is sought.
+    /// Neither: an equality is active, or nothing is estimated.
     Neither,
 }
 
-/// The band of one function or ratio over time.
+/// Confidence band of one function or ratio over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Band {
     /// `mass`, ..., `k/m`, `c/m`, `natural frequency`, `damping ratio`.
     pub name: String,
     /// Unit of the values.
     pub unit: String,
-    /// Values at the times of [`Bands::times`](super::Bands::times); NaN where a frequency or damping ratio is not defined,
-    /// which a note says.
+    /// Values at the times of [`Bands::times`](super::Bands::times); NaN where a frequency or damping ratio is undefined, as
+    /// reported in a note.
     pub values: Vec<f64>,
-    /// Standard errors; infinite where not seen.
+    /// Standard errors; infinite where the value is not identifiable.
     pub standard_error: Vec<f64>,
-    /// Sides that the band reaches to.
+    /// Sides of each value on which the band extends.
     pub sides: Vec<Side>,
-    /// Number of standard errors of the band that holds at all times at once with probability 95 %;
+    /// Half-width, in standard errors, of the simultaneous 95 % band, which contains the curve at all times;
     /// `None` if not simulated.
     pub simultaneous: Option<f64>,
-    /// What is to be said of it.
+    /// Notes on the band.
     pub notes: Vec<String>,
 }
 
@@ -48,7 +48,7 @@ impl Band {
         }
     }
 
-    /// The band that holds at each time with probability 95 %.
+    /// Pointwise 95 % band at index `i`.
     pub fn pointwise(&self, i: usize) -> [f64; 2] {
         self.ends(i, NORMAL_975)
     }

@@ -1,10 +1,10 @@
-//! Bands as curves over time.
+//! Bands interpolated to given times.
 
 use super::band::Band;
 use super::bands::Bands;
 
 impl Bands {
-    /// The lower and upper ends of the 95 % bands of a list at `times`, by straight lines between those of the bands.
+    /// Lower and upper ends of the 95 % bands in `list` at `times` (s), interpolated linearly.
     pub fn curves(&self, list: &[Band], times: &[f64]) -> Vec<[Vec<f64>; 2]> {
         let known = &self.times;
         if known.is_empty() {

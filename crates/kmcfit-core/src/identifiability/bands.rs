@@ -7,14 +7,13 @@
 //! Cov = H^-1 (J^T W J) H^-1,    H = J^T W J + sum_j weight_j L_j^T L_j
 //! ```
 //!
-//! the scatter of the estimate from one set of noise to the next. It **leaves out the smoothing bias**: how
-//! far the penalties pull the mean of the estimates from the truth. Priors of scalars count as
-//! measurements. Total variation is left out, and so is the curvature of the predictions.
+//! which describes the scatter of the estimates between repetitions of the noise. It **excludes the smoothing bias**, the
+//! shift of the mean estimate caused by penalties. Priors of scalars count as measurements. Total-variation penalties and
+//! the curvature of the predictions are neglected.
 //!
-//! Rows that hold with equality at the point cannot change (the covariance is that in their null space);
-//! where that leaves a function no freedom because a bound is active, the band is one-sided, as wide
-//! as it would be without the bound. Where a direction that is not seen changes a function, its
-//! band is infinite.
+//! Active rows hold with equality: the covariance is that in their null space. Where an active bound leaves a function no
+//! freedom, the band is one-sided, with the width it has without the bound. Where an undetermined direction changes a
+//! function, its band is infinite.
 
 use super::active::{ActiveRow, active_rows};
 use super::band::{Band, Side};
@@ -31,26 +30,26 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
-/// Most parameters for which the whole covariance is formed; beyond, that of smooth directions.
+/// Largest number of parameters with a full covariance; beyond it, smooth directions are used.
 const MOST_PARAMETERS: usize = 800;
-/// Most of these.
+/// Largest number of smooth directions.
 const MOST_SMOOTH: usize = 400;
-/// Most work of their decomposition, readings x directions^2.
+/// Largest work of the decomposition of smooth directions, samples x directions^2.
 const MOST_WORK: f64 = 2e9;
-/// Most nodes at which bands are computed; beyond, at every second, third, ...
+/// Largest number of nodes with bands; longer grids are thinned evenly.
 const MOST_NODES: usize = 4000;
-/// Most nodes whose maximum a simultaneous band is simulated for: bands are smooth between.
+/// Largest number of nodes in the maximum of a simultaneous band; bands vary slowly between nodes.
 const MOST_SIMULATED: usize = 300;
-/// Draws that are simulated at once.
+/// Number of draws simulated at once.
 const BLOCK: usize = 250;
-/// A value depends on an unseen direction if more than this share of its slope lies there.
+/// Smallest share of the slope of a value in undetermined directions that makes the value undetermined.
 const UNSEEN_SHARE: f64 = 1e-6;
-/// A standard error below this share of that without bounds is none at all.
+/// Standard errors below this share of those without bounds count as zero.
 const HELD: f64 = 1e-6;
-/// Probability of the bands.
+/// Confidence level.
 const LEVEL: f64 = 0.95;
 
-/// How simultaneous bands are simulated.
+/// Simulation of simultaneous bands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BandSettings {
     /// Number of draws; 0 for no simultaneous bands.
@@ -68,44 +67,43 @@ impl Default for BandSettings {
     }
 }
 
-/// Bands of all functions and of the ratios of the main device.
+/// Bands of all functions and of the ratios of the shared coefficient set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bands {
-    /// s.
+    /// Times, s.
     pub times: Vec<f64>,
     /// One per function of the list.
     pub functions: Vec<Band>,
-    /// `k/m`, `c/m`, natural frequency, damping ratio; those whose terms the oscillator has.
+    /// `k/m`, `c/m`, natural frequency and damping ratio, as far as the system has these terms.
     pub ratios: Vec<Band>,
-    /// Estimated standard deviation of the readings that have none, in their unit.
+    /// Estimated standard deviation of samples without sigma, in their unit.
     pub sigma: Option<f64>,
-    /// Number of directions that nothing sees.
-    pub unseen: usize,
-    /// What is to be said of all.
+    /// Number of undetermined directions.
+    pub undetermined: usize,
+    /// Notes on all bands.
     pub notes: Vec<String>,
 }
 
-/// A value over time that is linear in the parameters, to first order.
-struct Linearised {
-    /// Answer to each column of the covariance's root, with all active rows held, and with only the
-    /// equalities held.
+/// A curve over time, linearised in the parameters.
+struct LinearisedCurve {
+    /// Products with the columns of the covariance root, with all active rows fixed, and with only the equalities fixed.
     roots: [DMatrix<f64>; 2],
-    /// Norm of the part in the unseen directions of both.
+    /// Norm of the slope in undetermined directions, in both cases.
     hidden: [DMatrix<f64>; 2],
-    /// Norm of the whole slope.
+    /// Norm of the full slope.
     sizes: Vec<f64>,
 }
 
 impl Bands {
-    /// The bands at the parameters `theta`, of which `evaluation` is the evaluation.
+    /// Computes the bands at the parameters `theta`, evaluated in `evaluation`.
     pub fn at(
         problem: &Problem,
         theta: &[f64],
         evaluation: &Evaluation,
         settings: &BandSettings,
     ) -> Self {
-        let readings = problem.reading_count().max(1) as f64;
-        let affordable = (MOST_WORK / readings).sqrt() as usize;
+        let samples = problem.sample_count().max(1) as f64;
+        let affordable = (MOST_WORK / samples).sqrt() as usize;
         let smooth = affordable.min(MOST_SMOOTH);
         let directions = Directions::new(problem, evaluation, MOST_PARAMETERS, smooth);
         let sensitivity = Sensitivity::along(problem, evaluation, directions);
@@ -130,7 +128,7 @@ impl Bands {
             active: &active,
             settings,
         };
-        let linearised: Vec<Linearised> = (0..problem.functions.ranges().len())
+        let linearised: Vec<LinearisedCurve> = (0..problem.functions.ranges().len())
             .map(|f| maker.function(f))
             .collect();
         let values = problem.functions.values(theta);
@@ -141,46 +139,46 @@ impl Bands {
             maker.band(function.name(), unit, at_nodes, linear, Some(f))
         });
         let functions = functions.collect();
-        let unseen = loose.unseen.ncols();
+        let undetermined = loose.undetermined.ncols();
         let mut notes = notes(problem, &information, &active);
-        if unseen > 0 {
+        if undetermined > 0 {
             notes.push(format!(
-                "directions seen by nothing: {unseen}; the bands of what they change are infinite"
+                "parameter combinations that are not identifiable: {undetermined}; the bands of the functions they change are infinite"
             ));
         }
         Self {
             functions,
             ratios: maker.ratios(&values, &linearised),
             sigma: tight.variance.map(f64::sqrt),
-            unseen,
+            undetermined,
             notes,
             times: maker.times,
         }
     }
 
-    /// The band of a ratio by its name.
+    /// Band of the ratio `name`.
     pub fn ratio(&self, name: &str) -> Option<&Band> {
         self.ratios.iter().find(|b| b.name == name)
     }
 }
 
-/// Remarks on all bands: what they leave out, and the bounds that are active.
+/// Notes on all bands: neglected contributions and active bounds.
 fn notes(problem: &Problem, information: &Information, active: &[ActiveRow]) -> Vec<String> {
     let mut notes = Vec::new();
     if information.sensitivity().directions.is_coarse() {
         notes.push(
-            "the parameters are many: bands are those of smooth changes, rougher ones are not counted"
+            "the model has many parameters: the bands are those of smooth changes and neglect rougher ones"
                 .to_owned(),
         );
     }
     if information.is_pulled() {
         notes.push(
-            "bands are the scatter of the estimate; the bias of its smoothing is not in them"
+            "the bands describe the scatter of the estimates and exclude the smoothing bias"
                 .to_owned(),
         );
     }
     if !problem.variations.is_empty() {
-        notes.push("total variation is left out of the bands".to_owned());
+        notes.push("the bands neglect the total-variation penalty".to_owned());
     }
     let bounds = active.iter().filter(|r| !r.equality);
     let mut names: Vec<&str> = bounds.map(|r| r.name.as_str()).collect();
@@ -202,7 +200,7 @@ struct Maker<'a> {
 }
 
 impl Maker<'_> {
-    /// Slopes of the values of function `f` at node `i`, in the scaled directions.
+    /// Slopes of the value of function `f` at node `i` along the scaled directions.
     fn slope(&self, f: usize, i: usize) -> Vec<f64> {
         let functions = &self.problem.functions;
         let first = functions.ranges()[f].start;
@@ -210,7 +208,7 @@ impl Maker<'_> {
         self.directions.row(row.map(|(j, b)| (first + j, b)))
     }
 
-    fn function(&self, f: usize) -> Linearised {
+    fn function(&self, f: usize) -> LinearisedCurve {
         let functions = &self.problem.functions;
         let range = functions.ranges()[f].clone();
         let image = |columns: &DMatrix<f64>| {
@@ -229,9 +227,9 @@ impl Maker<'_> {
             let slope = self.slope(f, *i);
             slope.iter().map(|x| x * x).sum::<f64>().sqrt()
         };
-        Linearised {
+        LinearisedCurve {
             roots: self.factors.map(|factor| image(&factor.root)),
-            hidden: self.factors.map(|factor| image(&factor.unseen)),
+            hidden: self.factors.map(|factor| image(&factor.undetermined)),
             sizes: self.nodes.iter().map(size).collect(),
         }
     }
@@ -241,7 +239,7 @@ impl Maker<'_> {
         name: String,
         unit: &str,
         values: Vec<f64>,
-        linear: &Linearised,
+        linear: &LinearisedCurve,
         function: Option<usize>,
     ) -> Band {
         let count = self.nodes.len();
@@ -276,10 +274,10 @@ impl Maker<'_> {
             }
         };
         note("not defined", &|i| !values[i].is_finite());
-        note("not seen", &|i| {
+        note("not identifiable", &|i| {
             values[i].is_finite() && errors[i].is_infinite()
         });
-        note("one-sided, for a bound is active,", &|i| {
+        note("one-sided, because a bound is active,", &|i| {
             matches!(sides[i], Side::Above | Side::Below)
         });
         Band {
@@ -293,7 +291,7 @@ impl Maker<'_> {
         }
     }
 
-    /// To which side function `f` may move at node `i`, where the active rows leave it no freedom.
+    /// Sides on which function `f` may change at node `i`, where the active rows leave it no freedom.
     fn side(&self, f: usize, i: usize) -> Side {
         let slope = self.slope(f, i);
         let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -309,12 +307,17 @@ impl Maker<'_> {
                 };
             }
         }
-        // Held by several rows together.
+        // Several rows together fix the value.
         Side::Both
     }
 
-    /// The factor of the simultaneous band: the 95 % point of `max |z_i|` over the nodes.
-    fn simultaneous(&self, linear: &Linearised, errors: &[f64], sides: &[Side]) -> Option<f64> {
+    /// Factor of the simultaneous band: the 95 % quantile of `max |z_i|` over the nodes.
+    fn simultaneous(
+        &self,
+        linear: &LinearisedCurve,
+        errors: &[f64],
+        sides: &[Side],
+    ) -> Option<f64> {
         if self.settings.draws == 0 {
             return None;
         }
@@ -332,7 +335,7 @@ impl Maker<'_> {
             row /= norm.max(f64::MIN_POSITIVE);
         }
         if rows.ncols() > rows.nrows() {
-            // The same joint distribution from fewer numbers.
+            // A factor of smaller dimension has the same joint distribution.
             rows = rows.transpose().qr().r().transpose();
         }
         let mut random = ChaCha8Rng::seed_from_u64(self.settings.seed);
@@ -348,9 +351,9 @@ impl Maker<'_> {
         Some(most[index.clamp(1, most.len()) - 1])
     }
 
-    /// Ratios of the main system by the delta method.
-    fn ratios(&self, values: &[Vec<f64>], linearised: &[Linearised]) -> Vec<Band> {
-        let assembly = self.problem.functions.assembly(0);
+    /// Ratios of the shared coefficient set, by the delta method.
+    fn ratios(&self, values: &[Vec<f64>], linearised: &[LinearisedCurve]) -> Vec<Band> {
+        let assembly = self.problem.functions.coefficient_set(0);
         let terms = &self.problem.system.terms;
         let of = |term: Term| {
             let place = terms.iter().position(|t| *t == term)?;
@@ -377,7 +380,7 @@ impl Maker<'_> {
     }
 }
 
-/// A function of the coefficients at a node: its value, and its derivatives with respect to each of them.
+/// A ratio at a node: its value and its derivatives with respect to the coefficients.
 type Ratio = fn(&[f64]) -> (f64, Vec<f64>);
 
 /// `p/m`.
@@ -405,9 +408,13 @@ fn damping_ratio(at: &[f64]) -> (f64, Vec<f64>) {
     (zeta, vec![1.0 / root, -0.5 * zeta / k, -0.5 * zeta / m])
 }
 
-/// `sum_f slope_f(t) p_f(t)`, with the slopes at each node.
-fn combine(linearised: &[Linearised], functions: &[usize], slopes: &[Vec<f64>]) -> Linearised {
-    let sum = |of: &dyn Fn(&Linearised) -> &DMatrix<f64>| {
+/// Linear combination `sum_f slope_f(t) p_f(t)`, with slopes at each node.
+fn combine(
+    linearised: &[LinearisedCurve],
+    functions: &[usize],
+    slopes: &[Vec<f64>],
+) -> LinearisedCurve {
+    let sum = |of: &dyn Fn(&LinearisedCurve) -> &DMatrix<f64>| {
         let parts = functions.iter().enumerate().map(|(p, f)| {
             let mut part = of(&linearised[*f]).clone();
             for (mut row, slopes) in part.row_iter_mut().zip(slopes) {
@@ -424,7 +431,7 @@ fn combine(linearised: &[Linearised], functions: &[usize], slopes: &[Vec<f64>]) 
         let each = each.map(|(f, by)| (linearised[*f].sizes[i] * by).abs());
         each.fold(0.0, f64::max)
     };
-    Linearised {
+    LinearisedCurve {
         roots: [sum(&|l| &l.roots[0]), sum(&|l| &l.roots[1])],
         hidden: [sum(&|l| &l.hidden[0]), sum(&|l| &l.hidden[1])],
         sizes: slopes.iter().enumerate().map(size).collect(),

@@ -1,24 +1,28 @@
-//! Connected records: functions that share one scale, and where it is fixed.
+//! Connected records: groups of functions that share one scale, and the forces and fixed functions that determine it.
 
 use crate::functions::CoefficientFunction;
 use crate::problem::Problem;
 use crate::record::Experiment;
 use crate::system::StageSamples;
 
-/// Functions that one factor multiplies: those of devices that have a function in common.
+/// Functions with one common factor: those of coefficient sets that share a function.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Component {
     /// Indices into the list of functions.
     pub functions: Vec<usize>,
-    /// Indices of the devices.
-    pub devices: Vec<usize>,
+    /// Indices of the coefficient sets.
+    pub coefficient_sets: Vec<usize>,
 }
 
-/// The components of the devices that take part in an experiment.
+/// Components of the coefficient sets used by an experiment.
 pub(super) fn components(problem: &Problem) -> Vec<Component> {
     let mut found: Vec<Component> = Vec::new();
-    for (which, assembly) in problem.functions.assemblies().iter().enumerate() {
-        if !problem.experiments.iter().any(|e| e.device == which) {
+    for (which, assembly) in problem.functions.coefficient_sets().iter().enumerate() {
+        if !problem
+            .experiments
+            .iter()
+            .any(|e| e.coefficient_set == which)
+        {
             continue;
         }
         let shares = |c: &Component| c.functions.iter().any(|f| assembly.contains(f));
@@ -26,32 +30,32 @@ pub(super) fn components(problem: &Problem) -> Vec<Component> {
         found = others;
         let mut union = Component {
             functions: assembly.clone(),
-            devices: vec![which],
+            coefficient_sets: vec![which],
         };
         for part in joined {
             union.functions.extend(part.functions);
-            union.devices.extend(part.devices);
+            union.coefficient_sets.extend(part.coefficient_sets);
         }
         union.functions.sort_unstable();
         union.functions.dedup();
-        union.devices.sort_unstable();
+        union.coefficient_sets.sort_unstable();
         found.push(union);
     }
-    found.sort_by_key(|c| c.devices[0]);
+    found.sort_by_key(|c| c.coefficient_sets[0]);
     found
 }
 
 impl Component {
-    /// Its experiments.
+    /// Experiments of the component.
     pub fn experiments<'a>(
         &'a self,
         problem: &'a Problem,
     ) -> impl Iterator<Item = &'a Experiment> + 'a {
-        let mine = |e: &&Experiment| self.devices.contains(&e.device);
+        let mine = |e: &&Experiment| self.coefficient_sets.contains(&e.coefficient_set);
         problem.experiments.iter().filter(mine)
     }
 
-    /// Symbols of its functions, `(m, c, k)`.
+    /// Symbols of the functions, `(m, c, k)`.
     pub fn symbols(&self, problem: &Problem) -> String {
         let symbol = |f: &usize| {
             let function = problem.functions.get(*f);
@@ -64,8 +68,8 @@ impl Component {
         format!("({})", symbols.join(", "))
     }
 
-    /// The nodes at which a force acts in one of its experiments: at the node itself or in a step
-    /// beside it. Motion of the base is no force here: it pushes with `m b''`, which scales with `m`.
+    /// Nodes at which a force acts in an experiment of the component, at the node itself or in an adjacent step. Motion of the
+    /// base is excluded: its inertia force `m b''` scales with `m`.
     pub fn forced(&self, problem: &Problem) -> Vec<bool> {
         let mut forced = vec![false; problem.functions.nodes()];
         for experiment in self.experiments(problem) {
@@ -80,7 +84,7 @@ impl Component {
         forced
     }
 
-    /// The nodes at which a function that is known is not zero.
+    /// Nodes at which a fixed function is nonzero.
     pub fn known(&self, problem: &Problem) -> Vec<bool> {
         let mut known = vec![false; problem.functions.nodes()];
         for function in self.given(problem) {
@@ -90,7 +94,7 @@ impl Component {
         known
     }
 
-    /// Its functions that are known, and not zero throughout.
+    /// Fixed functions that are nonzero somewhere.
     pub fn given<'a>(
         &'a self,
         problem: &'a Problem,
@@ -100,11 +104,10 @@ impl Component {
     }
 }
 
-/// Functions in words: `the mass and the stiffness, which are given`.
+/// Enumeration of fixed functions: `the fixed mass and the fixed stiffness`.
 pub(super) fn given_words(names: &[String]) -> String {
-    let names: Vec<String> = names.iter().map(|name| format!("the {name}")).collect();
-    let is = if names.len() == 1 { "is" } else { "are" };
-    format!("{}, which {is} given", names.join(" and "))
+    let names: Vec<String> = (names.iter().map(|name| format!("the fixed {name}"))).collect();
+    names.join(" and ")
 }
 
 /// The force of an experiment, where there is one.

@@ -1,5 +1,5 @@
-//! The covariance of the parameters: its one factorisation, with the directions that the measurements do not bound.
-//! Standard errors ([`Problem::covariance`]) and bands ([`super::Bands`]) are both taken from it.
+//! Covariance of the parameters from one factorisation of the weighted Jacobian, and the directions that the data leave
+//! undetermined. Standard errors ([`Problem::covariance`]) and bands ([`super::Bands`]) are computed from it.
 
 use super::active::ActiveRow;
 use super::directions::Directions;
@@ -10,26 +10,25 @@ use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use nalgebra::{DMatrix, DVector};
 
-/// What is known of the parameters, in the scaled directions.
+/// Information on the parameters, in scaled directions.
 pub(super) struct Information {
     sensitivity: Sensitivity,
-    /// Rows that are measurements: readings, then priors.
+    /// Rows of measurements: samples, then priors.
     measured: DMatrix<f64>,
-    /// Rows that only pull: penalties and broken soft constraints.
+    /// Rows of penalties and violated soft constraints.
     pulled: DMatrix<f64>,
-    /// Rounding of a motion as large as the largest reading, which at worst adds up from step to
-    /// step.
+    /// Bound of the accumulated rounding error of a response as large as the largest sample.
     rounding: f64,
 }
 
-/// `Cov = F F^T` on the directions that are seen, nothing on the others.
+/// Covariance root, `Cov = F F^T` on determined directions and zero on the others.
 #[derive(Clone)]
 pub(super) struct Factor {
-    /// Directions x rank.
+    /// `F`, directions x rank.
     pub root: DMatrix<f64>,
-    /// Orthonormal basis of the unseen directions, as columns.
-    pub unseen: DMatrix<f64>,
-    /// Estimated variance of a reading without sigma, in the square of its unit; `None` if all have one.
+    /// Orthonormal basis of the undetermined directions, as columns.
+    pub undetermined: DMatrix<f64>,
+    /// Estimated variance of samples without sigma, in the square of their unit; `None` if all samples have one.
     pub variance: Option<f64>,
 }
 
@@ -59,8 +58,8 @@ impl Information {
         for penalty in &problem.penalties {
             pulled = stacked(&pulled, &roughness(problem, penalty, directions));
         }
-        let readings = problem.channels().flat_map(|c| c.observed());
-        let largest = readings.fold(0.0f64, |most, y| most.max(y.abs()));
+        let samples = problem.channels().flat_map(|c| c.observed());
+        let largest = samples.fold(0.0f64, |most, y| most.max(y.abs()));
         Self {
             measured,
             pulled,
@@ -69,7 +68,7 @@ impl Information {
         }
     }
 
-    /// Readings, priors and penalties as rows of one matrix.
+    /// Rows of samples, priors and penalties, stacked.
     pub fn rows(&self) -> DMatrix<f64> {
         stacked(&self.measured, &self.pulled)
     }
@@ -78,14 +77,13 @@ impl Information {
         &self.sensitivity
     }
 
-    /// Whether something only pulls, so that the covariance is a sandwich.
+    /// True with penalties or violated soft constraints, where the covariance is a sandwich.
     pub fn is_pulled(&self) -> bool {
         self.pulled.nrows() > 0
     }
 
-    /// The covariance where the rows `held` cannot change: `H^+ M H^+` in the null space of these rows,
-    /// with `H = J^T W J + R` and `M = J^T W J` (`W` times the estimated variance for readings without a
-    /// sigma).
+    /// Covariance with the rows `held` fixed: `H^+ M H^+` in the null space of these rows, with `H = J^T W J + R` and
+    /// `M = J^T W J` (`W` multiplied by the estimated variance for samples without sigma).
     pub fn factor(&self, held: &[&ActiveRow]) -> Factor {
         let directions = &self.sensitivity.directions;
         let n = directions.len();
@@ -100,25 +98,25 @@ impl Information {
             })
             .collect();
         let all = self.rows();
-        let (inverse_root, unseen) = match rows.is_empty() {
+        let (inverse_root, undetermined) = match rows.is_empty() {
             true => split(&Factorisation::complete(&all)),
             false => {
                 let held = DMatrix::from_fn(rows.len(), n, |i, k| rows[i][k]);
                 let held = Factorisation::complete(&held);
                 let free = held.undetermined();
-                let (root, unseen) = split(&Factorisation::complete(&(all * free)));
-                (free * root, free * unseen)
+                let (root, undetermined) = split(&Factorisation::complete(&(all * free)));
+                (free * root, free * undetermined)
             }
         };
         let mut answers = &self.measured * &inverse_root;
         let variance = self.variance(&answers);
         if let Some(variance) = variance {
-            let readings = self
+            let samples = self
                 .sensitivity
                 .roots
                 .iter()
                 .zip(&self.sensitivity.has_sigma);
-            for (mut row, (root, has_sigma)) in answers.row_iter_mut().zip(readings) {
+            for (mut row, (root, has_sigma)) in answers.row_iter_mut().zip(samples) {
                 if !has_sigma {
                     row *= root * variance.sqrt();
                 }
@@ -131,14 +129,14 @@ impl Information {
         };
         Factor {
             root,
-            unseen,
+            undetermined,
             variance,
         }
     }
 
-    /// `sum r^2 / (n - effective parameters)` over the readings without a sigma; infinite where there
-    /// are no more readings than that. A fit that leaves nothing leaves the rounding of the motion:
-    /// else all would be known for certain, also what they do not see.
+    /// Estimated variance `sum r^2 / (n - effective parameters)` of samples without sigma; infinite if the difference is not
+    /// positive. The rounding error of the response is a lower bound, so that an exact fit does not make every parameter
+    /// appear determined.
     fn variance(&self, answers: &DMatrix<f64>) -> Option<f64> {
         let s = &self.sensitivity;
         let without: Vec<usize> = (0..s.roots.len()).filter(|i| !s.has_sigma[*i]).collect();
@@ -159,21 +157,20 @@ impl Information {
     }
 }
 
-/// A root of the inverse, and the combinations that are not determined.
+/// Root of the inverse, and basis of the undetermined combinations.
 fn split(factorisation: &Factorisation) -> (DMatrix<f64>, DMatrix<f64>) {
-    let unseen = factorisation.undetermined().into_owned();
-    (factorisation.inverse_root(), unseen)
+    let undetermined = factorisation.undetermined().into_owned();
+    (factorisation.inverse_root(), undetermined)
 }
 
 impl Problem {
-    /// Covariance of the parameters at an evaluated point, from the linearised predictions:
-    /// `(J^T W J)^-1` with `W = 1/sigma^2` where the readings have a sigma (the Cramer-Rao bound for
-    /// Gaussian noise), else times the residuals' mean square. Penalties, constraints and priors do
-    /// not count. `None` where some direction is not identifiable, there are too many parameters, or
-    /// noise is neither given nor left by the fit.
+    /// Covariance of the parameters at an evaluated point, from the linearised predictions: `(J^T W J)^-1` with
+    /// `W = 1/sigma^2` where the samples have a sigma (the Cramér–Rao bound for Gaussian noise), otherwise multiplied by the
+    /// mean square of the residuals. Penalties, constraints and priors are not included. `None` where a combination of
+    /// parameters is not identifiable, there are too many parameters, or the noise level is unknown.
     pub fn covariance(&self, evaluation: &Evaluation) -> Option<DMatrix<f64>> {
-        let (n, readings) = (self.parameters(), self.reading_count());
-        if n == 0 || n > FEW_PARAMETERS || readings <= n {
+        let (n, samples) = (self.parameters(), self.sample_count());
+        if n == 0 || n > FEW_PARAMETERS || samples <= n {
             return None;
         }
         let directions = Directions::new(self, evaluation, n, n);
@@ -182,9 +179,9 @@ impl Problem {
         let squares: f64 = sensitivity.residuals.iter().map(|r| r * r).sum();
         let scale = match self.channels().all(|c| c.weighting().is_sigma()) {
             true => 1.0,
-            false => squares / (readings - n) as f64,
+            false => squares / (samples - n) as f64,
         };
-        // A fit that leaves nothing says nothing of the noise.
+        // An exact fit gives no estimate of the noise.
         (factorisation.rank == n && scale > 0.0).then(|| {
             let root = factorisation.inverse_root();
             let column = |z: &[f64]| DVector::from_vec(sensitivity.directions.to_parameters(z));
@@ -195,8 +192,7 @@ impl Problem {
     }
 }
 
-/// `sqrt(weight) L` of a penalty along the directions, or its triangular factor where that has fewer
-/// rows.
+/// Rows `sqrt(weight) L` of a penalty along the directions, or their triangular factor where that has fewer rows.
 fn roughness(problem: &Problem, penalty: &Penalty, directions: &Directions) -> DMatrix<f64> {
     let range = problem.functions.ranges()[penalty.function].clone();
     let (rows, n) = (penalty.rows.len(), directions.len());
@@ -213,7 +209,7 @@ fn roughness(problem: &Problem, penalty: &Penalty, directions: &Directions) -> D
     if rows > n { out.qr().r() } else { out }
 }
 
-/// One matrix above the other.
+/// Matrix `a` above `b`.
 pub(super) fn stacked(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(a.nrows() + b.nrows(), a.ncols());
     out.rows_mut(0, a.nrows()).copy_from(a);

@@ -1,30 +1,28 @@
-//! The directions of the parameters along which predictions are differentiated.
+//! Scaled directions in parameter space, along which predictions are differentiated.
 
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Directions `d_k` of the parameters, `theta = sum_k z_k d_k`, scaled so that `z` has no unit.
+/// Directions `d_k` of the parameters, `theta = sum_k z_k d_k`, scaled so that `z` is dimensionless.
 ///
-/// With sizes `P_j` of the functions ([`Problem::natural_scales`]) each direction has length one in
-/// `sum_j 1/T integral (delta p_j / P_j)^2 dt + sum_s (delta x_s / size_s)^2`: one unit of `z_k` is a
-/// change by 100 % of the natural size, root mean square over the record. So a singular value says by
-/// how many standard deviations all readings together answer to such a change, whatever the basis.
+/// With sizes `P_j` of the functions ([`Problem::natural_scales`]) each direction has unit length in the metric
+/// `sum_j 1/T integral (delta p_j / P_j)^2 dt + sum_s (delta x_s / size_s)^2`: one unit of `z_k` is a root-mean-square
+/// change over the record by 100 % of the natural size. A singular value is therefore the response of all samples, in
+/// standard deviations, to such a change, independent of the basis.
 ///
-/// There is one direction per parameter, or, where these would be too many, hat functions over groups
-/// of neighbouring parameters: a coarser set of smooth directions. What is said of those holds for
-/// changes that are smooth on their scale; rougher ones are not looked at.
+/// There is one direction per parameter. For problems with too many parameters, hat functions over groups of neighbouring
+/// parameters replace them; results then apply to changes that are smooth on the scale of the hats.
 #[derive(Debug, Clone)]
 pub struct Directions {
     columns: Vec<Vec<(usize, f64)>>,
     metric: Vec<f64>,
-    /// Of the inner products of hats; `None` for one direction per parameter, which are orthonormal.
+    /// Cholesky factor of the inner products of hats; `None` for one direction per parameter, which are orthonormal.
     gram: Option<Cholesky<f64, Dyn>>,
 }
 
 impl Directions {
-    /// One direction per parameter if there are at most `most`, else hats: so many that there are
-    /// about `coarse` directions in all.
+    /// One direction per parameter for at most `most` parameters, otherwise hats, about `coarse` directions in all.
     pub fn new(problem: &Problem, evaluation: &Evaluation, most: usize, coarse: usize) -> Self {
         let sizes = problem.natural_scales(evaluation);
         let duration = problem.system.grid.duration();
@@ -64,8 +62,7 @@ impl Directions {
         directions
     }
 
-    /// The factor of the inner products of the hats, which are independent; that of 1 where the square of a function's size
-    /// overflows and nothing can be told of them.
+    /// Cholesky factor of the inner products of the hats; of the identity where the square of a function's size overflows.
     fn inner_products(&self) -> Option<Cholesky<f64, Dyn>> {
         let n = self.len();
         let mut gram = DMatrix::zeros(n, n);
@@ -83,12 +80,12 @@ impl Directions {
         self.columns.len()
     }
 
-    /// Whether there are none.
+    /// True without directions.
     pub fn is_empty(&self) -> bool {
         self.columns.is_empty()
     }
 
-    /// Whether they are fewer than the parameters.
+    /// True if there are fewer directions than parameters.
     pub fn is_coarse(&self) -> bool {
         self.gram.is_some()
     }
@@ -105,7 +102,7 @@ impl Directions {
         theta
     }
 
-    /// A Jacobian with respect to the parameters along the directions, of which there is one for each parameter.
+    /// Jacobian along the directions, from the Jacobian with respect to the parameters; for one direction per parameter.
     pub(super) fn of_jacobian(&self, mut jacobian: DMatrix<f64>) -> DMatrix<f64> {
         for (mut column, direction) in jacobian.column_iter_mut().zip(&self.columns) {
             direction.iter().for_each(|(_, d)| column *= *d);
@@ -113,7 +110,7 @@ impl Directions {
         jacobian
     }
 
-    /// The change of the parameters that `z` stands for.
+    /// Change of the parameters for coordinates `z`.
     pub fn to_parameters(&self, z: &[f64]) -> Vec<f64> {
         let mut theta = vec![0.0; self.parameters()];
         for (column, z) in self.columns.iter().zip(z) {
@@ -122,8 +119,7 @@ impl Directions {
         theta
     }
 
-    /// The `z` that comes nearest to a change of the parameters, in the length that the directions
-    /// are scaled by.
+    /// Coordinates `z` of the combination of directions nearest to a change of the parameters, in the metric of the directions.
     pub fn nearest(&self, theta: &[f64]) -> Vec<f64> {
         let weighted: Vec<f64> = (theta.iter().zip(&self.metric))
             .map(|(t, m)| t * m)
@@ -135,13 +131,13 @@ impl Directions {
         factor.solve(&DVector::from_vec(dual)).as_slice().to_vec()
     }
 
-    /// A linear function of the parameters, given by its slopes, as one of `z`.
+    /// Linear functional of the parameters, given by its slopes, in the coordinates `z`.
     pub fn functional(&self, slopes: &[f64]) -> Vec<f64> {
         let of = |column: &Vec<(usize, f64)>| column.iter().map(|(j, d)| d * slopes[*j]).sum();
         self.columns.iter().map(of).collect()
     }
 
-    /// A linear function of the parameters with few slopes, as one of `z`.
+    /// Sparse linear functional of the parameters in the coordinates `z`.
     pub(super) fn row(&self, entries: impl Iterator<Item = (usize, f64)>) -> Vec<f64> {
         let mut slopes = vec![0.0; self.parameters()];
         entries.for_each(|(j, a)| slopes[j] += a);
@@ -149,10 +145,10 @@ impl Directions {
     }
 }
 
-/// Fewest hats that a function is coarsened to.
+/// Smallest number of hats per function.
 const FEWEST_HATS: usize = 8;
 
-/// `count` hats over `parameters` neighbouring parameters: where each is not zero, and its height.
+/// `count` hats over `parameters` neighbouring parameters, as pairs of index and height.
 fn hats(parameters: usize, count: usize) -> Vec<Vec<(usize, f64)>> {
     let spacing = (parameters - 1) as f64 / (count - 1) as f64;
     let hat = |k: usize| {
@@ -169,11 +165,11 @@ mod tests {
     use super::*;
     use crate::builder::{Builder, CoefficientSpec, Record};
 
-    /// One value a node, on so many that hats stand for them, a constant beside them, and a state that is sought.
+    /// A problem with nodal functions coarsened to hats, a constant and an estimated initial state.
     fn coarse() -> (Problem, Directions) {
         let times: Vec<f64> = (0..=200).map(|i| 0.05 * f64::from(i)).collect();
-        let readings: Vec<f64> = times.iter().map(|t| (1.1 * t).cos()).collect();
-        let record = Record::new("decay").displacement(&times, &readings);
+        let samples: Vec<f64> = times.iter().map(|t| (1.1 * t).cos()).collect();
+        let record = Record::new("decay").displacement(&times, &samples);
         let parts = [
             CoefficientSpec::nodal(1.0),
             CoefficientSpec::constant(0.1),
@@ -190,10 +186,10 @@ mod tests {
     }
 
     #[test]
-    fn hats_are_of_length_one_and_as_many_as_are_asked_for() {
+    fn hats_have_unit_length_and_the_requested_number() {
         let (problem, directions) = coarse();
         assert!(directions.is_coarse() && !directions.is_empty());
-        // Three functions share the 33: eleven hats for each of many values, and the constant by itself.
+        // Three functions share the 33 directions: eleven hats for each nodal function, and the constant by itself.
         let scalars = problem.functions.scalars().len();
         assert_eq!(directions.len(), 11 + 1 + 11 + scalars);
         assert_eq!(directions.parameters(), problem.parameters());
@@ -205,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn what_hats_hold_comes_back() {
+    fn a_combination_of_hats_is_its_own_nearest_combination() {
         let (_, directions) = coarse();
         let z: Vec<f64> = (0..directions.len())
             .map(|k| (1.7 * k as f64).sin())
@@ -222,7 +218,7 @@ mod tests {
         assert_eq!(row, functional);
     }
 
-    /// What is smooth on the scale of the hats is one of their sums, what is rough has a nearest one.
+    /// Smooth functions are combinations of hats; others have a nearest combination.
     #[test]
     fn constants_and_lines_are_sums_of_hats() {
         let (problem, directions) = coarse();
@@ -235,7 +231,7 @@ mod tests {
         for (there, theta) in nearest.iter().zip(&theta) {
             assert!((there - theta).abs() < 1e-10, "{there} {theta}");
         }
-        // The residual of the nearest one is orthogonal to every hat.
+        // The difference from the nearest combination is orthogonal to every hat.
         for j in range {
             theta[j] = if j % 3 == 0 { 1.0 } else { 0.0 };
         }

@@ -1,19 +1,19 @@
-//! Experiment design: the information that a further record adds.
+//! Experiment design: information gained by an additional record.
 //!
-//! At the present parameters each candidate is simulated and its Jacobian put below that of the records
-//! there are. **New directions** are those by which the rank grows. For the directions that are seen
-//! already the bands shrink: with singular values `s` before and `t` after, restricted to what is seen now,
+//! Each candidate is simulated at the present parameters, and its Jacobian is appended to that of the existing records.
+//! **New directions** are the increase of the rank. For directions that are determined already, standard errors
+//! decrease: with singular values `s` before and `t` after, restricted to the directions determined before,
 //!
 //! ```text
-//! volume  (D) = exp(mean(ln s - ln t))        average (A) = sqrt(sum 1/t^2 / sum 1/s^2)
+//! volume  (D) = exp(mean(ln s - ln t))  average (A) = sqrt(sum 1/t^2 / sum 1/s^2)
 //! worst   (E) = s_min / t_min
 //! ```
 //!
-//! as ratios of standard errors after and before: 1 is no gain (Pukelsheim, *Optimal Design of Experiments*).
+//! are ratios of standard errors, after to before; 1 is no gain (Pukelsheim, *Optimal Design of Experiments*).
 
 use super::covariance::{Information, stacked};
 use super::factorisation::Factorisation;
-use super::gauge::Gauge;
+use super::scaling_ambiguity::ScalingAmbiguity;
 use super::sensitivity::Sensitivity;
 use crate::diagnostics::rms;
 use crate::objective::Evaluation;
@@ -22,29 +22,29 @@ use crate::record::{Channel, ChannelKind, Experiment, Weighting};
 use crate::system::{Excitation, State};
 use nalgebra::{DMatrix, DVector};
 
-/// What a candidate would measure, at all nodes.
+/// Measured channel of a candidate, with a sample at every node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CandidateChannel {
-    /// What.
+    /// Measured quantity.
     pub kind: ChannelKind,
-    /// Standard deviation of a reading, in the unit of the kind.
+    /// Standard deviation of a sample, in the unit of the kind.
     pub sigma: f64,
 }
 
-/// A record that could be made, of the main device over the whole grid.
+/// A possible additional record, with the shared coefficient set over the whole grid.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
-    /// Its name.
+pub struct CandidateExperiment {
+    /// Name.
     pub name: String,
     /// Displacement and velocity at the first node.
     pub initial: State,
-    /// What drives it; `None` is free motion.
+    /// Excitation; `None` for a free response.
     pub excitation: Option<Excitation>,
-    /// What is measured.
+    /// Measured channels.
     pub channels: Vec<CandidateChannel>,
 }
 
-/// Root-mean-square residual of the first channel: the noise of candidates without a sigma.
+/// Root-mean-square residual of the first channel, used as noise level of candidates without sigma.
 pub fn residual_spread(problem: &Problem, evaluation: &Evaluation) -> f64 {
     let pairs = problem
         .channels()
@@ -56,15 +56,15 @@ pub fn residual_spread(problem: &Problem, evaluation: &Evaluation) -> f64 {
     spreads.next().unwrap_or(1.0).max(f64::MIN_POSITIVE.sqrt())
 }
 
-/// What a candidate adds.
+/// Information gained by a candidate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gain {
-    /// Directions that are seen with it and not without.
+    /// Number of additional directions determined.
     pub new_directions: usize,
-    /// Directions that are seen with it.
+    /// Number of directions determined with the candidate.
     pub rank: usize,
-    /// Whether it fixes the common scale of the functions, at some times at least: only a force does.
-    /// `None` where the scale is not free.
+    /// True if the candidate determines the common scale of the functions, at least at some times, which requires a force;
+    /// `None` where the scale is determined already.
     pub sees_scale: Option<bool>,
     /// D: ratio of the geometric mean of the standard errors, after to before.
     pub volume: f64,
@@ -74,28 +74,28 @@ pub struct Gain {
     pub worst: f64,
 }
 
-/// A candidate with what it adds, or why it cannot be simulated.
+/// A candidate with its gain, or the reason for a failed simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ranked {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// What it adds.
+    /// Gain.
     pub gain: Result<Gain, String>,
 }
 
 impl Ranked {
-    /// In words.
+    /// Gain as a sentence.
     pub fn sentence(&self) -> String {
         match &self.gain {
             Err(reason) => format!("`{}` cannot be simulated: {reason}", self.name),
             Ok(gain) => {
                 let scale = match gain.sees_scale {
-                    Some(true) => ", the scale among them",
-                    Some(false) => ", not the scale",
+                    Some(true) => ", including the common scale",
+                    Some(false) => ", excluding the common scale",
                     None => "",
                 };
                 format!(
-                    "`{}` adds {} directions{scale}; what is seen already becomes {:.3} times as wide",
+                    "`{}` determines {} more parameter combinations{scale}; standard errors of the others change by a factor {:.3}",
                     self.name, gain.new_directions, gain.volume
                 )
             }
@@ -103,14 +103,14 @@ impl Ranked {
     }
 }
 
-/// The candidates, best first: by new directions, then by the volume of the bands. Those that cannot be
-/// simulated come last. With `penalties` these count as seen when the bands are compared; new
-/// directions are always those of the readings.
+/// Ranks the candidates: by new directions, then by `volume`; candidates that cannot be simulated come last. With
+/// `penalties` these count as information in the comparison of standard errors; new directions are always those of the
+/// samples.
 pub fn rank_experiments(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
-    candidates: &[Candidate],
+    candidates: &[CandidateExperiment],
     penalties: bool,
 ) -> Vec<Ranked> {
     let sensitivity = Sensitivity::of(problem, evaluation);
@@ -121,29 +121,29 @@ pub fn rank_experiments(
         false => now.clone(),
     };
     let known = Factorisation::of(&rows);
-    let seen = known.rank;
+    let determined = known.rank;
     let rank_now = match penalties {
         true => Factorisation::of(now).rank,
-        false => seen,
+        false => determined,
     };
-    let gauge = Gauge::at(problem, theta);
-    let gain = |candidate: &Candidate| -> Result<Gain, String> {
+    let ambiguity = ScalingAmbiguity::at(problem, theta);
+    let gain = |candidate: &CandidateExperiment| -> Result<Gain, String> {
         let experiment = simulated(problem, candidate)?;
         let added = jacobian(problem, theta, experiment.clone(), &information)?;
         let rank = Factorisation::of(&stacked(now, &added)).rank;
-        let before = &known.singular_values[..seen];
+        let before = &known.singular_values[..determined];
         let old = DMatrix::from_diagonal(&DVector::from_column_slice(before));
         let both = stacked(&old, &(&added * known.determined()));
         let after = Factorisation::of(&both).singular_values;
         let inverse = |values: &[f64]| values.iter().map(|s| 1.0 / (s * s)).sum::<f64>();
-        let shrinks = |ratio: f64| if seen == 0 { 1.0 } else { ratio };
+        let shrinks = |ratio: f64| if determined == 0 { 1.0 } else { ratio };
         let logs = before.iter().zip(&after).map(|(s, t)| s.ln() - t.ln());
         Ok(Gain {
             new_directions: rank.saturating_sub(rank_now),
             rank,
-            sees_scale: (!gauge.is_empty())
-                .then(|| fixes_scale(problem, theta, experiment, &gauge)),
-            volume: shrinks((logs.sum::<f64>() / seen as f64).exp()),
+            sees_scale: (!ambiguity.is_empty())
+                .then(|| fixes_scale(problem, theta, experiment, &ambiguity)),
+            volume: shrinks((logs.sum::<f64>() / determined as f64).exp()),
             average: shrinks((inverse(&after) / inverse(before)).sqrt()),
             worst: match (before.last(), after.last()) {
                 (Some(s), Some(t)) => s / t,
@@ -167,19 +167,24 @@ pub fn rank_experiments(
     ranked
 }
 
-/// Whether the gauge is smaller with one more record.
-fn fixes_scale(problem: &Problem, theta: &[f64], record: Experiment, gauge: &Gauge) -> bool {
+/// True if one more record reduces the scaling ambiguity.
+fn fixes_scale(
+    problem: &Problem,
+    theta: &[f64],
+    record: Experiment,
+    ambiguity: &ScalingAmbiguity,
+) -> bool {
     let mut with = problem.clone();
     with.parts_mut().experiments.push(record);
-    Gauge::at(&with, theta).directions.len() < gauge.directions.len()
+    ScalingAmbiguity::at(&with, theta).directions.len() < ambiguity.directions.len()
 }
 
-/// The candidate as an experiment; why it is none otherwise.
-fn simulated(problem: &Problem, candidate: &Candidate) -> Result<Experiment, String> {
+/// The candidate as an experiment; `Err` holds the reason for an invalid one.
+fn simulated(problem: &Problem, candidate: &CandidateExperiment) -> Result<Experiment, String> {
     let grid = &problem.system.grid;
     let nodes = grid.nodes();
     if candidate.channels.is_empty() {
-        return Err("it measures nothing".into());
+        return Err("it has no channels".into());
     }
     let State {
         displacement,
@@ -194,10 +199,13 @@ fn simulated(problem: &Problem, candidate: &Candidate) -> Result<Experiment, Str
         for part in parts.into_iter().flatten() {
             if part.steps() + 1 < nodes {
                 let steps = part.steps();
-                return Err(format!("its drive covers {steps} of {} steps", nodes - 1));
+                return Err(format!(
+                    "its excitation covers {steps} of {} steps",
+                    nodes - 1
+                ));
             }
             if !part.values().iter().flatten().all(|x| x.is_finite()) {
-                return Err("its drive is not finite".into());
+                return Err("its excitation is not finite".into());
             }
         }
         experiment.excitation = Some(excitation.clone());
@@ -216,12 +224,12 @@ fn simulated(problem: &Problem, candidate: &Candidate) -> Result<Experiment, Str
             grid,
             nodes,
         );
-        experiment = experiment.with_channel(made.ok_or("its readings are not on the grid")?);
+        experiment = experiment.with_channel(made.ok_or("its samples are not on the grid")?);
     }
     Ok(experiment)
 }
 
-/// The record's Jacobian along the directions of the records there are.
+/// Jacobian of the record along the directions of the existing records.
 fn jacobian(
     problem: &Problem,
     theta: &[f64],

@@ -1,33 +1,34 @@
-//! The factorisation of weighted rows, and the rank at which standard errors, bands, verdicts, the constancy test,
-//! predictions, extremes and the ranking of experiments call a combination of the parameters determined.
+//! Singular value decomposition of weighted rows, with the rank threshold that decides which combinations of parameters
+//! are determined: for standard errors, bands, classification, constancy test, predictions, extremes and experiment design.
 
 use nalgebra::{DMatrix, DMatrixView};
 
-/// Singular values above this share of the largest count.
+/// Rank threshold relative to the largest singular value.
 ///
-/// A singular value is wrong by at most the norm of the error of the matrix. Tangents, and so the columns of a Jacobian,
-/// round by a few machine precisions for each step, whose signs vary: over 10^5 steps some hundred times
-/// `f64::EPSILON` of the largest column. The decomposition itself adds less. The scale of a free response, which nothing
-/// determines, comes out at 1e-14 of the largest singular value over 400,000 steps; the threshold is a hundred times that.
+/// The error of a singular value is bounded by the norm of the error of the matrix. The rounding errors of tangents, and
+/// so of the columns of a Jacobian, are a few units of machine precision per step with varying signs: some hundred times
+/// `f64::EPSILON` of the largest column over 10^5 steps; the decomposition adds less. The scale of a free response, which
+/// is undetermined, has a computed singular value of 1e-14 of the largest over 400,000 steps; the threshold is a hundred
+/// times larger.
 pub const RANK: f64 = 1e-12;
 
-/// Singular values and right singular vectors of rows `A = U S V^T`, and their rank.
+/// Singular values and right singular vectors of `A = U S V^T`, and the numerical rank.
 #[derive(Debug, Clone)]
 pub(crate) struct Factorisation {
-    /// Decreasing.
+    /// Singular values, decreasing.
     pub singular_values: Vec<f64>,
-    /// Number of those that count: above [`RANK`] times the largest, unless another threshold is set.
+    /// Number of singular values above the threshold: [`RANK`] times the largest, unless another is set.
     pub rank: usize,
-    /// As columns.
+    /// Right singular vectors, as columns.
     vectors: DMatrix<f64>,
 }
 
 impl Factorisation {
-    /// Of as many singular values as the smaller of rows and columns.
+    /// Decomposition with as many singular values as the smaller of rows and columns.
     ///
-    /// A tall matrix is first reduced to its triangular factor, a wide one to that of its transpose, so
-    /// that the decomposition is of a square of the smaller dimension. Of a matrix with entries that are
-    /// not finite nothing is known: all values are zero.
+    /// A tall matrix is first reduced to its triangular factor, a wide one to that of its transpose, so that the
+    /// decomposition is of a square matrix of the smaller dimension. For a matrix with non-finite entries all singular values
+    /// are zero.
     pub fn of(rows: &DMatrix<f64>) -> Self {
         let (singular_values, vectors) = right_svd(rows);
         let whole = Self {
@@ -38,7 +39,7 @@ impl Factorisation {
         whole.above(RANK)
     }
 
-    /// With a singular vector for every column: [`Factorisation::undetermined`] needs all.
+    /// Decomposition with a singular vector for every column, as [`Factorisation::undetermined`] requires.
     pub fn complete(rows: &DMatrix<f64>) -> Self {
         let (count, columns) = rows.shape();
         match count < columns {
@@ -47,7 +48,7 @@ impl Factorisation {
         }
     }
 
-    /// The same with the rank at another share of the largest singular value.
+    /// The same decomposition with another threshold, relative to the largest singular value.
     pub fn above(self, share: f64) -> Self {
         let most = self.singular_values.first().copied().unwrap_or(0.0);
         self.above_size(share * most)
@@ -59,23 +60,23 @@ impl Factorisation {
         self
     }
 
-    /// The right singular vectors as columns, in the order of their values.
+    /// Right singular vectors as columns, in the order of the singular values.
     pub fn vectors(&self) -> &DMatrix<f64> {
         &self.vectors
     }
 
-    /// Orthonormal basis of the combinations of columns that the rows determine.
+    /// Orthonormal basis of the combinations of columns determined by the rows.
     pub fn determined(&self) -> DMatrixView<'_, f64> {
         self.vectors.columns(0, self.rank)
     }
 
-    /// Orthonormal basis of those that they do not; the factorisation must be [`Factorisation::complete`].
+    /// Orthonormal basis of the undetermined combinations; the factorisation must be [`Factorisation::complete`].
     pub fn undetermined(&self) -> DMatrixView<'_, f64> {
         let count = self.vectors.ncols() - self.rank;
         self.vectors.columns(self.rank, count)
     }
 
-    /// A root of `(A^T A)^-1` on the combinations that are determined: `F F^T` is the inverse.
+    /// Root `F` of `(A^T A)^-1` on the determined combinations: `F F^T` is the inverse.
     pub fn inverse_root(&self) -> DMatrix<f64> {
         let mut root = self.determined().into_owned();
         for (mut column, s) in root.column_iter_mut().zip(&self.singular_values) {
@@ -85,29 +86,24 @@ impl Factorisation {
     }
 }
 
-/// An orthonormal basis of the span of the columns, with the rank at the share `tolerance` of the largest singular value.
+/// Orthonormal basis of the column space, with the rank threshold `tolerance` relative to the largest singular value.
 pub(super) fn column_space(matrix: &DMatrix<f64>, tolerance: f64) -> DMatrix<f64> {
     let factorisation = Factorisation::of(&matrix.transpose()).above(tolerance);
     factorisation.determined().into_owned()
 }
 
-/// An orthonormal basis of the vectors that `matrix` takes to no more than `tolerance` times their
-/// length, as columns.
+/// Orthonormal basis, as columns, of the vectors `x` with `|matrix x| <= tolerance |x|`.
 pub(super) fn null_space(matrix: &DMatrix<f64>, tolerance: f64) -> DMatrix<f64> {
     let factorisation = Factorisation::complete(matrix).above_size(tolerance);
     factorisation.undetermined().into_owned()
 }
 
-/// Whether all entries are finite: an iteration for singular values of others would not end.
+/// True if all entries are finite, which the iteration for singular values requires to terminate.
 fn is_finite(matrix: &DMatrix<f64>) -> bool {
     matrix.iter().all(|x| x.is_finite())
 }
 
-/// Singular values, decreasing, and the right singular vectors that belong to them as columns.
-///
-/// A tall matrix is first reduced to its triangular factor, a wide one to that of its transpose, so
-/// that the decomposition is of a square of the smaller dimension. Of a matrix with entries that are
-/// not finite nothing is known: all values are zero.
+/// Singular values, decreasing, and right singular vectors as columns; see [`Factorisation::of`].
 fn right_svd(matrix: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
     let (rows, columns) = matrix.shape();
     if rows == 0 || columns == 0 {
@@ -151,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn the_null_space_is_orthonormal_and_goes_to_zero() {
+    fn the_null_space_is_orthonormal_and_maps_to_zero() {
         let wide = DMatrix::from_row_slice(2, 4, &[1.0, 2.0, 0.0, 1.0, 2.0, 4.0, 0.0, 2.0]);
         let null = null_space(&wide, 1e-12);
         assert_eq!(null.ncols(), 3);

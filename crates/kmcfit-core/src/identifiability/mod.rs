@@ -1,34 +1,32 @@
-//! What the readings can show of the functions, before a fit and after it, and which experiment would
-//! show more.
+//! Identifiability: the parameters and functions that records determine, before a fit and at its optimum.
 //!
-//! * [`count`]: from the problem alone, how many directions of the parameters can be seen at most, and
-//!   which scale stays free;
-//! * [`Sensitivity`] and [`Spectrum`]: how well each direction is seen at a point;
-//! * [`Gauge`]: the directions that leave the motion unchanged, and whether an unseen direction is one;
-//! * [`Bands`]: how far each function and ratio may be off;
-//! * [`verdicts`]: the same in words; [`anchors`]: the instants at which a ratio is fixed;
-//! * [`rank_experiments`]: which further record adds most.
+//! * [`structural_rank()`]: upper bound of the number of identifiable parameter combinations, without a simulation;
+//! * [`Sensitivity`] and [`SingularSpectrum`]: singular values of the weighted Jacobian;
+//! * [`ScalingAmbiguity`]: scaling ambiguity, directions that leave the response unchanged;
+//! * [`Bands`]: confidence bands of functions and ratios; [`classify_functions`]: their classification;
+//! * [`anchors()`]: instants at which a response determines one ratio;
+//! * [`rank_experiments`]: experiment design.
 
 mod active;
 mod anchors;
 mod band;
 mod band_curves;
 mod bands;
+mod classification;
 mod components;
-mod counting;
 mod covariance;
 mod directions;
 mod experiments;
 mod factorisation;
-mod gauge;
+mod scaling_ambiguity;
 mod sensitivity;
 mod spans;
-mod verdict;
-pub use verdict::is_rounding;
+mod structural_rank;
+pub use classification::is_negligible;
 
 use crate::problem::Problem;
 
-/// Whether the readings alone decide on a point: nothing but the misfit is in the cost, and no constraint is active.
+/// True if the samples alone determine a point: the cost has no penalties, and no constraint is active.
 pub fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
     !problem.is_regularised() && active::active_rows(problem, theta).is_empty()
 }
@@ -36,11 +34,13 @@ pub fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
 pub use anchors::anchors;
 pub use band::{Band, Side};
 pub use bands::{BandSettings, Bands};
-pub use counting::{Symmetry, count};
+pub use classification::{
+    Classification, ClassificationKind, FunctionClassification, classify_functions,
+};
 pub use experiments::{
-    Candidate, CandidateChannel, Gain, Ranked, rank_experiments, residual_spread,
+    CandidateChannel, CandidateExperiment, Gain, Ranked, rank_experiments, residual_spread,
 };
 pub(crate) use factorisation::Factorisation;
-pub use gauge::Gauge;
-pub use sensitivity::{Seen, Sensitivity, Spectrum};
-pub use verdict::{Judgement, Verdict, VerdictKind, verdicts};
+pub use scaling_ambiguity::ScalingAmbiguity;
+pub use sensitivity::{ResolvedDirection, Sensitivity, SingularSpectrum};
+pub use structural_rank::{RankFinding, RankFindingKind, Symmetry, structural_rank};

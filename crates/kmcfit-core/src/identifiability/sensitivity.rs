@@ -1,4 +1,4 @@
-//! The weighted Jacobian of all predictions and its singular values.
+//! Sensitivity: the weighted Jacobian of all predictions, and its singular values.
 
 use super::directions::Directions;
 use super::factorisation::Factorisation;
@@ -7,44 +7,43 @@ use crate::problem::Problem;
 use nalgebra::DMatrix;
 use std::ops::Range;
 
-/// Singular values above this share of the largest count along smooth directions of many parameters, where the error of
-/// the stepper, some 1e-5 of a motion, makes the scale over time faintly seen.
+/// Rank threshold along smooth directions of many parameters, relative to the largest singular value. The error of the
+/// stepper, about 1e-5 of a response, otherwise makes the scale over time appear determined.
 pub const COARSE_RANK: f64 = 1e-5;
-/// Most work of a decomposition, rows x columns x the smaller of both, for it to take some seconds: 1000
-/// readings of 3000 parameters. Beyond it the directions are made coarser.
+/// Largest work of a decomposition, rows x columns x the smaller of both: some seconds, as for 1000 samples of 3000
+/// parameters. Beyond it, smooth directions are used.
 const MOST_WORK: f64 = 3.1e9;
-/// Number of smooth directions, then.
+/// Number of smooth directions.
 const COARSE: usize = 600;
 
-/// `sqrt(w_i) dz_i/dtheta . d_k` for all readings `i` and directions `k`.
+/// Weighted Jacobian `sqrt(w_i) dz_i/dtheta . d_k` for all samples `i` and directions `k`.
 ///
-/// `w` are the weights of the readings (`1/sigma^2`, or the quadrature weights of the integral cost; of
-/// a robust loss those of the squares that stand for it), and the directions `d_k` have natural sizes
-/// ([`Directions`]), so the entries have no unit with sigmas, and that of `sqrt(J)` without.
+/// `w` are the weights of the samples: `1/sigma^2`, or the quadrature weights of the integral cost, for a robust loss
+/// those of its quadratic majorant. The directions `d_k` have natural sizes ([`Directions`]), so the entries are
+/// dimensionless with sigmas, and otherwise have the unit of `sqrt(J)`.
 #[derive(Debug, Clone)]
 pub struct Sensitivity {
-    /// Readings x directions.
+    /// Samples x directions.
     pub jacobian: DMatrix<f64>,
-    /// `sqrt(w_i) r_i` with the residuals `r = model - reading`.
+    /// Weighted residuals `sqrt(w_i) r_i`, `r = model - sample`.
     pub residuals: Vec<f64>,
     /// `sqrt(w_i)`, in the inverse unit of the channel or with the root of a second.
     pub roots: Vec<f64>,
-    /// Whether each reading has a standard deviation.
+    /// True for each sample with a standard deviation.
     pub has_sigma: Vec<bool>,
-    /// What the columns differentiate along.
+    /// Directions of the columns.
     pub directions: Directions,
-    /// The name of each function of the list.
+    /// Names of the functions.
     names: Vec<String>,
 }
 
 impl Sensitivity {
-    /// At an evaluated point, along all parameters; along some 600 smooth directions where these are
-    /// more than about 1000 readings of 3000 parameters ([`Directions::is_coarse`] says so): their rank is
-    /// that of functions on as many knots. The whole Jacobian is still to be had by
-    /// [`Sensitivity::along`], 2000 readings of 6000 parameters in a second; its decomposition takes a
-    /// minute.
+    /// Sensitivity at an evaluated point along all parameters; along about 600 smooth directions for problems larger than 1000
+    /// samples of 3000 parameters ([`Directions::is_coarse`]), whose rank is that of functions with as many knots.
+    /// [`Sensitivity::along`] computes the full Jacobian of 2000 samples of 6000 parameters in a second; its decomposition
+    /// takes a minute.
     pub fn of(problem: &Problem, evaluation: &Evaluation) -> Self {
-        let (rows, columns) = (problem.reading_count() as f64, problem.parameters() as f64);
+        let (rows, columns) = (problem.sample_count() as f64, problem.parameters() as f64);
         let fits = rows * columns * rows.min(columns) <= MOST_WORK;
         let most = if fits { usize::MAX } else { COARSE };
         Self::along(
@@ -83,14 +82,14 @@ impl Sensitivity {
         }
     }
 
-    /// Singular values and directions.
-    pub fn spectrum(&self) -> Spectrum {
+    /// Singular value decomposition.
+    pub fn spectrum(&self) -> SingularSpectrum {
         let mut factorisation = Factorisation::of(&self.jacobian);
         if self.directions.is_coarse() {
-            // Along smooth directions the scale over time shows through the error of the stepper.
+            // Along smooth directions the error of the stepper makes the scale over time appear determined.
             factorisation = factorisation.above(COARSE_RANK);
         }
-        Spectrum {
+        SingularSpectrum {
             factorisation,
             directions: self.directions.clone(),
             names: self.names.clone(),
@@ -98,14 +97,14 @@ impl Sensitivity {
     }
 }
 
-/// One tangent solve for each direction.
+/// Jacobian from one tangent solve for each direction.
 fn by_tangents(
     problem: &Problem,
     evaluation: &Evaluation,
     directions: &Directions,
-    readings: usize,
+    samples: usize,
 ) -> DMatrix<f64> {
-    let mut jacobian = DMatrix::zeros(readings, directions.len());
+    let mut jacobian = DMatrix::zeros(samples, directions.len());
     for k in 0..directions.len() {
         let changes = problem.predictions_tangent(evaluation, &directions.column(k));
         let all = changes.iter().flatten().flatten();
@@ -114,18 +113,18 @@ fn by_tangents(
     jacobian
 }
 
-/// What the readings see: `J = U S V^T`.
+/// Singular value decomposition `J = U S V^T` of a sensitivity.
 #[derive(Debug, Clone)]
-pub struct Spectrum {
+pub struct SingularSpectrum {
     factorisation: Factorisation,
     directions: Directions,
     names: Vec<String>,
 }
 
-/// A direction of the parameters with what the readings make of it.
+/// A right singular vector with its singular value.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Seen {
-    /// Its singular value.
+pub struct ResolvedDirection {
+    /// Singular value.
     pub singular_value: f64,
     /// Change of the parameters, in their units.
     pub change: Vec<f64>,
@@ -133,53 +132,53 @@ pub struct Seen {
     pub functions: Vec<(String, Vec<f64>)>,
 }
 
-impl Spectrum {
-    /// Decreasing; as many as the smaller of readings and directions. In standard deviations of all
-    /// readings together per change by 100 % of the natural sizes ([`Directions`]).
+impl SingularSpectrum {
+    /// Singular values, decreasing, as many as the smaller of samples and directions: the response of all samples, in standard
+    /// deviations, to a change by 100 % of the natural sizes ([`Directions`]).
     pub fn singular_values(&self) -> &[f64] {
         &self.factorisation.singular_values
     }
 
-    /// Number of those that count.
+    /// Numerical rank.
     pub fn rank(&self) -> usize {
         self.factorisation.rank
     }
 
-    /// Number of directions that were looked at: that of the parameters, unless it is coarse.
+    /// Number of directions: that of the parameters, unless smooth directions are used.
     pub fn of(&self) -> usize {
         self.directions.len()
     }
 
-    /// Number of directions that are not seen.
-    pub fn unseen(&self) -> usize {
+    /// Number of undetermined directions.
+    pub fn undetermined(&self) -> usize {
         self.of() - self.rank()
     }
 
-    /// The directions that it is about.
+    /// Directions of the columns.
     pub fn directions(&self) -> &Directions {
         &self.directions
     }
 
-    /// The part of `z` that is not seen.
+    /// Component of `z` in the undetermined directions.
     pub fn unseen_part(&self, z: &DMatrix<f64>) -> DMatrix<f64> {
-        let seen = self.factorisation.determined();
+        let determined = self.factorisation.determined();
         let mut rest = z.clone();
-        // Twice: what the first pass leaves to rounding.
+        // A second pass removes the rounding errors of the first.
         for _ in 0..2 {
-            let inside = seen.tr_mul(&rest);
-            rest -= seen * inside;
+            let inside = determined.tr_mul(&rest);
+            rest -= determined * inside;
         }
         rest
     }
 
-    /// The directions of these ranks, best first, as changes of every function over time.
-    pub fn at(&self, problem: &Problem, ranks: Range<usize>) -> Vec<Seen> {
+    /// Singular vectors of these ranks, best determined first, as changes of every function over time.
+    pub fn at(&self, problem: &Problem, ranks: Range<usize>) -> Vec<ResolvedDirection> {
         let each = ranks
             .filter(|k| *k < self.factorisation.vectors().ncols())
             .map(|k| {
                 let z = self.factorisation.vectors().column(k);
                 let change = self.directions.to_parameters(z.as_slice());
-                Seen {
+                ResolvedDirection {
                     singular_value: self.singular_values()[k],
                     functions: functions_along(problem, &change, &self.names),
                     change,
@@ -188,24 +187,24 @@ impl Spectrum {
         each.collect()
     }
 
-    /// The `count` directions that the readings see best.
-    pub fn best(&self, problem: &Problem, count: usize) -> Vec<Seen> {
+    /// The `count` best determined directions.
+    pub fn best(&self, problem: &Problem, count: usize) -> Vec<ResolvedDirection> {
         self.at(problem, 0..count)
     }
 
-    /// The `count` directions that they see worst, the worst last, of those they do see.
-    pub fn worst(&self, problem: &Problem, count: usize) -> Vec<Seen> {
+    /// The `count` worst determined directions among those determined, the worst last.
+    pub fn worst(&self, problem: &Problem, count: usize) -> Vec<ResolvedDirection> {
         self.at(problem, self.rank().saturating_sub(count)..self.rank())
     }
 
-    /// In words.
+    /// Rank as a sentence.
     pub fn sentence(&self) -> String {
         let (rank, of) = (self.rank(), self.of());
         match self.directions.is_coarse() {
-            false => format!("the readings see {rank} of {of} directions"),
+            false => format!("the samples determine {rank} of {of} parameter combinations"),
             true => format!(
-                "the readings see {rank} of {of} smooth directions to better than {COARSE_RANK:e} of the \
-                 best (of {} parameters; below that the stepper's own error shows)",
+                "the samples determine {rank} of {of} smooth parameter combinations at a threshold of {COARSE_RANK:e} of the \
+                 largest singular value (of {} parameters; the step-size error limits the threshold)",
                 self.directions.parameters()
             ),
         }

@@ -1,6 +1,6 @@
-//! Spans of time.
+//! Intervals of time and their text.
 
-/// Spans of time on which `holds` is true at consecutive nodes, s.
+/// Intervals of time, s, over consecutive nodes for which `holds` is true.
 pub(super) fn spans(times: &[f64], holds: impl Fn(usize) -> bool) -> Vec<[f64; 2]> {
     let mut spans: Vec<[f64; 2]> = Vec::new();
     let mut open = false;
@@ -19,10 +19,10 @@ pub(super) fn spans(times: &[f64], holds: impl Fn(usize) -> bool) -> Vec<[f64; 2
     spans
 }
 
-/// Most spans that a sentence lists.
+/// Largest number of intervals in a sentence.
 const MOST_SPANS: usize = 4;
 
-/// Spans in words.
+/// Intervals as text.
 pub(super) fn span_words(spans: &[[f64; 2]]) -> String {
     let word = |&[from, to]: &[f64; 2]| match from == to {
         true => format!("t = {from:.3} s"),

@@ -1,4 +1,4 @@
-//! The cost and its gradient and nothing else.
+//! Cost and Euclidean gradient of a problem in one call, for use with other optimisers.
 
 use crate::functions::Design;
 use crate::problem::Problem;
@@ -7,20 +7,18 @@ use crate::simulate::{SimulationError, least_squares};
 use crate::system::Excitation;
 
 impl Problem {
-    /// The cost `J` at `theta`, and its Euclidean gradient `dJ/dtheta` by the discrete adjoint into
-    /// `gradient`: what an optimiser of one's own asks for.
+    /// Cost `J` at `theta`; writes its Euclidean gradient `dJ/dtheta`, by the discrete adjoint, into `gradient`.
     ///
-    /// One record of a device with one value a node, in linear free motion by the midpoint rule and
-    /// seen at every node, is never written down: forward and adjoint solve run in blocks of the
-    /// record at once, and memory is what `theta` and `gradient` take. A record of some 100,000 nodes or more is
-    /// shared with a second thread, where a processor is to spare; the bits are the same. Everything
-    /// else is [`Problem::evaluate`] and [`Problem::gradient`].
+    /// For one record with nodal functions, a linear free response by the midpoint rule and a displacement sample at every
+    /// node, forward and adjoint solve run in blocks without storing the response; memory is that of `theta` and
+    /// `gradient`. Records of about 100,000 nodes or more use a second thread where a processor is free; results do not
+    /// depend on it. All other problems use [`Problem::evaluate`] and [`Problem::gradient`].
     ///
     /// # Errors
-    /// As [`Problem::evaluate`]; what `gradient` holds then means nothing.
+    /// As [`Problem::evaluate`]; the contents of `gradient` are then undefined.
     ///
     /// # Panics
-    /// If `theta` or `gradient` has another length than the parameters.
+    /// If `theta` or `gradient` has a length other than the number of parameters.
     pub fn cost_and_gradient(
         &self,
         theta: &[f64],
@@ -40,8 +38,7 @@ impl Problem {
         Ok(evaluation.cost)
     }
 
-    /// The misfit and its gradient where both can be had in blocks; `None` where not, or where they leave the
-    /// finite numbers.
+    /// Misfit and gradient by the block algorithm; `None` where it does not apply, or where a result is not finite.
     fn fused_least_squares(&self, theta: &[f64], gradient: &mut [f64]) -> Option<f64> {
         let (experiment, channel, weights) = self.one_full_record()?;
         let nodes = experiment.nodes;
@@ -65,8 +62,8 @@ impl Problem {
         finite.then_some(cost)
     }
 
-    /// The only record, with its channel and the weights of its readings, if it is of free motion, has a
-    /// reading at every node, and its device has the functions as they are listed, with one value a node.
+    /// The record, its channel and the weights of its samples, if the problem has a single free record with a sample at
+    /// every node and nodal functions in the order of the list.
     pub(crate) fn one_full_record(&self) -> Option<(&Experiment, &Channel, [f64; 2])> {
         let [experiment] = self.experiments.as_slice() else {
             return None;
@@ -80,7 +77,7 @@ impl Problem {
             && channel.len() == nodes
             && channel.stride() == Some(1)
             && self.functions.scalars().is_empty()
-            && matches!(self.functions.assemblies(), [only] if only == &[0, 1, 2])
+            && matches!(self.functions.coefficient_sets(), [only] if only == &[0, 1, 2])
             && designs.all(|d| matches!(d, Design::Identity))
             && experiment
                 .excitation
@@ -97,14 +94,14 @@ mod tests {
     use crate::functions::Parameterization;
     use crate::system::{Grid, Method};
 
-    /// The paper's problem, on few nodes.
+    /// The paper's problem on a coarse grid.
     fn problem() -> Problem {
         let grid = Grid::new(0.0, 25.0, 200).unwrap();
         let times = grid.times();
-        let readings: Vec<f64> = times.iter().map(|t| 3.3 * (0.9 * t).cos()).collect();
+        let samples: Vec<f64> = times.iter().map(|t| 3.3 * (0.9 * t).cos()).collect();
         let record = Record::new("free decay")
             .from_state(3.3, 1.0)
-            .displacement(&times, &readings);
+            .displacement(&times, &samples);
         Builder::new([2.0, 0.5, 1.0].map(CoefficientSpec::nodal))
             .record(record)
             .method(Method::Midpoint)
@@ -112,16 +109,16 @@ mod tests {
             .unwrap()
     }
 
-    /// The short way is twenty times as fast, and gives the same numbers: no other test would see it lost.
+    /// The block algorithm is twenty times as fast with equal results; no other test detects that it is not used.
     #[test]
-    fn the_paper_s_problem_takes_the_short_way() {
+    fn the_paper_s_problem_uses_the_block_algorithm() {
         let problem = problem();
         let theta = problem.start();
         let mut gradient = vec![0.0; theta.len()];
         assert!(problem.fused_least_squares(&theta, &mut gradient).is_some());
     }
 
-    /// A device that takes its functions in another order than they are listed in.
+    /// A system whose functions are in another order than in the list.
     #[test]
     fn functions_in_any_order() {
         let mut problem = problem();
@@ -133,7 +130,7 @@ mod tests {
             .try_into()
             .unwrap();
         let grid = problem.system.grid;
-        let functions = Parameterization::with_devices(
+        let functions = Parameterization::with_coefficient_sets(
             vec![k, m, c],
             vec![vec![1, 2, 0]],
             grid.nodes(),

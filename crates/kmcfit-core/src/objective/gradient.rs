@@ -1,4 +1,4 @@
-//! The gradient of the cost, by either adjoint.
+//! Gradient of the cost by the discrete or the continuous adjoint.
 
 use super::Evaluation;
 use crate::functions::{CoefficientFunction, Design};
@@ -7,12 +7,12 @@ use crate::simulate::{CoefficientGradient, Engine, Trajectory, continuous_adjoin
 use crate::system::quadrature::trapezoid_weights;
 use crate::system::{NodalCoefficients, State};
 
-/// Which adjoint computes the gradient.
+/// Adjoint that computes the gradient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GradientKind {
-    /// The exact transpose of the stepper.
+    /// Exact transpose of the linearised stepper.
     Discrete,
-    /// Eq. 13 of the paper, consistent but not exact.
+    /// Eq. 13 of the paper, discretised; consistent with the cost but not its exact derivative.
     Continuous,
 }
 
@@ -26,15 +26,15 @@ impl GradientKind {
     }
 }
 
-/// The gradient of `J` in both inner products.
+/// Gradient of `J` in the Euclidean and the L2 inner product.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gradient {
-    /// `dJ/dtheta`: the Euclidean gradient in the parameters.
+    /// Euclidean gradient `dJ/dtheta`.
     pub euclidean: Vec<f64>,
-    /// Parameters of the L2 gradient `g`: `dJ = sum_j integral g_j dp_j dt`. For one value per node
-    /// these are the nodal values of the functions `dI/dm`, `dI/dc`, `dI/dk` of Eqs. 15-17.
+    /// Parameters of the L2 gradient `g`: `dJ = sum_j integral g_j dp_j dt`. For nodal functions these are the values of
+    /// `dI/dm`, `dI/dc`, `dI/dk` of Eqs. 15-17 at the nodes.
     pub l2: Vec<f64>,
-    /// `G^2 = sum_j integral g_j^2 dt`.
+    /// Squared norm `G^2 = sum_j integral g_j^2 dt`.
     pub norm_squared: f64,
 }
 
@@ -42,7 +42,7 @@ impl Problem {
     /// Gradient at an evaluated point.
     ///
     /// # Panics
-    /// If the continuous kind is asked of a problem without [`Problem::supports_continuous`].
+    /// If `kind` is continuous and the problem does not satisfy [`Problem::supports_continuous`].
     pub fn gradient(&self, theta: &[f64], evaluation: &Evaluation, kind: GradientKind) -> Gradient {
         match kind {
             GradientKind::Discrete => {
@@ -55,13 +55,13 @@ impl Problem {
         }
     }
 
-    /// The gradient at `theta` from the Euclidean one of the misfit.
+    /// Gradient at `theta` from the Euclidean gradient of the misfit.
     pub(crate) fn gradient_of_misfit(&self, theta: &[f64], misfit: Vec<f64>) -> Gradient {
         let l2 = self.functions.gram_solve(&misfit);
         self.completed(theta, misfit, l2)
     }
 
-    /// The gradient at `theta` from that of the misfit in both inner products.
+    /// Gradient at `theta` from that of the misfit in both inner products.
     fn completed(&self, theta: &[f64], mut euclidean: Vec<f64>, mut l2: Vec<f64>) -> Gradient {
         if self.is_regularised() {
             let push = self.penalty_gradient(theta);
@@ -77,7 +77,7 @@ impl Problem {
         }
     }
 
-    /// `dJ/dtheta` by the discrete adjoint at an evaluated point.
+    /// Euclidean gradient `dJ/dtheta` by the discrete adjoint at an evaluated point.
     pub fn euclidean_gradient(&self, theta: &[f64], evaluation: &Evaluation) -> Vec<f64> {
         let mut gradient = self.discrete_gradient(evaluation);
         if self.is_regularised() {
@@ -87,7 +87,7 @@ impl Problem {
         gradient
     }
 
-    /// Whether the cost has parts beside the misfit.
+    /// True if the cost has terms besides the misfit.
     pub fn is_regularised(&self) -> bool {
         let priors = self.functions.scalars().iter().any(|s| s.prior.is_some());
         priors || !(self.penalties.is_empty() && self.variations.is_empty() && self.soft.is_empty())
@@ -119,7 +119,7 @@ impl Problem {
     fn discrete_gradient(&self, evaluation: &Evaluation) -> Vec<f64> {
         let mut gradient = vec![0.0; self.parameters()];
         let mut nodal: Vec<Option<NodalCoefficients>> =
-            vec![None; self.functions.assemblies().len()];
+            vec![None; self.functions.coefficient_sets().len()];
         let mut scalars = vec![0.0; evaluation.scalars.len()];
         for (e, experiment) in self.experiments.iter().enumerate() {
             if experiment.channels.is_empty()
@@ -128,13 +128,13 @@ impl Problem {
                 continue;
             }
             let view = self.view(evaluation, e);
-            let empty = || self.functions.empty_device();
-            let total = nodal[experiment.device].get_or_insert_with(empty);
+            let empty = || self.functions.empty_nodal();
+            let total = nodal[experiment.coefficient_set].get_or_insert_with(empty);
             let direct = &mut CoefficientGradient::AtNodes(total);
             let source = self.source(evaluation, e, direct, &mut scalars);
             let share = view.discrete_adjoint(&source);
-            add(total, &share.device);
-            add_initial(experiment.sought, share.initial, &mut scalars);
+            add(total, &share.nodal);
+            add_initial(experiment.initial_parameters, share.initial, &mut scalars);
         }
         for (which, nodal) in nodal.iter().enumerate() {
             if let Some(nodal) = nodal {
@@ -145,7 +145,7 @@ impl Problem {
         gradient
     }
 
-    /// The derivative of the misfit of experiment `e` with respect to its motion; those at fixed states are added to
+    /// Derivative of the misfit of experiment `e` with respect to its response. Derivatives at fixed states are added to
     /// `direct` and `scalars`.
     fn source(
         &self,
@@ -163,8 +163,8 @@ impl Problem {
         source
     }
 
-    /// Adds the part of experiment `e` if all functions of its device are constants: nothing is then written to the
-    /// nodes. Whether that was possible; if not, nothing is added.
+    /// Adds the gradient of experiment `e` from sums over the nodes if all functions of its coefficient set are constants.
+    /// Returns false, and adds nothing, otherwise.
     fn add_gradient_of_constants(
         &self,
         evaluation: &Evaluation,
@@ -173,7 +173,7 @@ impl Problem {
         scalars: &mut [f64],
     ) -> bool {
         let (experiment, functions) = (&self.experiments[e], &self.functions);
-        let assembly = functions.assembly(experiment.device);
+        let assembly = functions.coefficient_set(experiment.coefficient_set);
         let view = self.view(evaluation, e);
         if view.engine() != Engine::Prefactored
             || !assembly.iter().all(|f| functions.is_constant_or_known(*f))
@@ -190,9 +190,9 @@ impl Problem {
         );
         let found = view.engine().discrete_adjoint_sums(
             view.system,
-            view.device,
+            view.nodal,
             view.excitation,
-            view.motion,
+            view.response,
             &source,
         );
         let Some((sums, initial)) = found else {
@@ -204,44 +204,44 @@ impl Problem {
                 gradient[first + j] += entry * (direct + sum);
             }
         }
-        add_initial(experiment.sought, initial, &mut own);
+        add_initial(experiment.initial_parameters, initial, &mut own);
         scalars.iter_mut().zip(&own).for_each(|(s, own)| *s += own);
         true
     }
 
-    /// Euclidean gradient in the parameters, and the parameters of the L2 gradient.
+    /// Euclidean gradient in the parameters, and parameters of the L2 gradient.
     fn continuous_gradient(&self, evaluation: &Evaluation) -> (Vec<f64>, Vec<f64>) {
         assert!(
             self.supports_continuous(),
-            "Eq. 13 needs one reading per node and no sigma"
+            "Eq. 13 needs one sample per node and no sigma"
         );
         let mut nodal: Vec<Option<NodalCoefficients>> =
-            vec![None; self.functions.assemblies().len()];
+            vec![None; self.functions.coefficient_sets().len()];
         let mut scalars = vec![0.0; evaluation.scalars.len()];
         for (e, experiment) in self.experiments.iter().enumerate() {
             let view = self.view(evaluation, e);
             let share = continuous_adjoint(
                 &self.system,
-                view.device,
+                view.nodal,
                 view.excitation,
-                view.motion,
+                view.response,
                 experiment.channels[0].observed(),
             );
-            match &mut nodal[experiment.device] {
-                Some(total) => add(total, &share.device),
-                none => *none = Some(share.device),
+            match &mut nodal[experiment.coefficient_set] {
+                Some(total) => add(total, &share.nodal),
+                none => *none = Some(share.nodal),
             }
-            add_initial(experiment.sought, share.initial, &mut scalars);
+            add_initial(experiment.initial_parameters, share.initial, &mut scalars);
         }
-        let or_empty = |device: Option<NodalCoefficients>| {
-            device.unwrap_or_else(|| self.functions.empty_device())
+        let or_empty = |nodal: Option<NodalCoefficients>| {
+            nodal.unwrap_or_else(|| self.functions.empty_nodal())
         };
         let nodal: Vec<NodalCoefficients> = nodal.into_iter().map(or_empty).collect();
         let grid = &self.system.grid;
         let weights = trapezoid_weights(grid.nodes(), grid.step());
         let identity = |f: &CoefficientFunction| matches!(f.design, Design::Identity);
         if let ([total], true) = (nodal.as_slice(), self.functions.iter().all(identity)) {
-            // One value per node: the functions themselves, without a round trip through the weights.
+            // Nodal functions: the gradients themselves, without multiplication and division by quadrature weights.
             let mut l2 = Vec::with_capacity(self.parameters());
             let mut euclidean = Vec::with_capacity(self.parameters());
             for values in total.functions() {
@@ -263,7 +263,7 @@ impl Problem {
                 .add_transpose(&weighted, which, &mut euclidean);
         }
         let mut l2 = self.functions.gram_solve(&euclidean);
-        // The same for those that have one.
+        // The remaining functions, projected onto their bases.
         if let [total] = nodal.as_slice() {
             let parts = self.functions.iter().zip(self.functions.ranges());
             for ((function, range), values) in parts.zip(total.functions()) {
@@ -276,9 +276,9 @@ impl Problem {
     }
 }
 
-/// Adds a gradient with respect to an initial state to the scalars that it is.
-fn add_initial(sought: [Option<usize>; 2], gradient: State, scalars: &mut [f64]) {
-    for (index, slope) in sought
+/// Adds the gradient with respect to an initial state to those of its scalar parameters.
+fn add_initial(estimated: [Option<usize>; 2], gradient: State, scalars: &mut [f64]) {
+    for (index, slope) in estimated
         .into_iter()
         .zip([gradient.displacement, gradient.velocity])
     {

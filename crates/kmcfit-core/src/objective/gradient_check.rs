@@ -1,45 +1,45 @@
-//! Check of a gradient: the steps of its differences, and whether its errors are those of an exact gradient.
+//! Gradient check against finite differences: step sizes, errors and the pass criterion.
 
 use super::GradientKind;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
 
-/// Most step sizes: where the error still falls after 40 decades, nothing can be said of the gradient.
+/// Largest number of step sizes, 40 decades.
 const MOST_STEPS: usize = 81;
-/// A curve that ends by falling in proportion to the step, by sqrt(10) from one to the next, has not
-/// met a floor yet; this is a little less.
+/// Decrease of the error from one step to the next (a factor sqrt(10) in the step) from which the error counts as still
+/// proportional to the step.
 const FALLS: f64 = 2.5;
 
-/// The errors of one gradient on one grid.
+/// Errors of one gradient on one grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GradientCheck {
     /// Nodes of the time grid.
     pub nodes: usize,
-    /// Which adjoint gave the gradient.
+    /// Adjoint that computed the gradient.
     pub kind: GradientKind,
-    /// Step along the negative L2 gradient.
+    /// Steps `a` along the negative L2 gradient.
     pub step: Vec<f64>,
-    /// `|(J(p - a g) - J(p))/a + G^2| / G^2` at each step `a`.
+    /// Errors `|(J(p - a g) - J(p))/a + G^2| / G^2` at each step `a`.
     pub error: Vec<f64>,
 }
 
 impl GradientCheck {
-    /// The discrete gradient passes if its error falls below this at some step. An error in the gradient is a floor; an
-    /// exact gradient is only limited by truncation and rounding, which leave 1e-7 or less at N = 128,000.
+    /// Largest error of a correct discrete gradient at its best step. An incorrect gradient has an error floor; a correct one
+    /// is limited by truncation and rounding errors, 1e-7 or less at N = 128,000.
     pub const PASS: f64 = 1e-6;
 
-    /// Whether the error is as small as that of an exact gradient.
+    /// True if the error at the best step is below [`GradientCheck::PASS`].
     pub fn passes(&self) -> bool {
         self.best().1 <= Self::PASS
     }
 
-    /// Whether the error still falls with the step at the smallest one, so that smaller steps show more of it.
+    /// True if the error still decreases at the smallest step, where smaller steps are needed.
     fn falls(&self) -> bool {
         let tail = &self.error[self.error.len().saturating_sub(4)..];
         tail.len() == 4 && tail.windows(2).all(|w| w[0] > FALLS * w[1])
     }
 
-    /// The step with the least error, and that error.
+    /// Step with the least error, and the error.
     pub fn best(&self) -> (f64, f64) {
         let pairs = self.step.iter().copied().zip(self.error.iter().copied());
         pairs.fold((f64::NAN, f64::INFINITY), |best, pair| {
@@ -50,11 +50,11 @@ impl GradientCheck {
 
 impl Problem {
     /// Step sizes of a check: two per decade over ten decades, the largest being the power of ten nearest to `10 J/G^2`. A
-    /// step `a` lowers J by `a G^2` to first order, so the same part of J is lowered whatever the unit of J; for the
-    /// paper's run the steps are 1 to 1e-10. `None` where the gradient vanishes.
+    /// step `a` lowers J by `a G^2` to first order, so the steps lower the same share of J in every unit; for the paper's run
+    /// they are 1 to 1e-10. `None` where the gradient vanishes.
     ///
     /// # Errors
-    /// A [`SimulationError`] if there is no response.
+    /// A [`SimulationError`] if the simulation at `theta` fails.
     pub fn check_steps(&self, theta: &[f64]) -> Result<Option<Vec<f64>>, SimulationError> {
         let here = self.evaluate(theta)?;
         let norm_squared = self
@@ -66,10 +66,10 @@ impl Problem {
         Ok((norm_squared > 0.0).then(|| (0..=20).map(step).collect()))
     }
 
-    /// The errors of a gradient at these steps, and at smaller ones where the error still falls at the last.
+    /// Computes the errors of a gradient at `steps`, and at smaller steps where the error still decreases at the last one.
     ///
     /// # Errors
-    /// A [`SimulationError`] if there is no response.
+    /// A [`SimulationError`] if the simulation at `theta` fails.
     pub fn check_gradient(
         &self,
         theta: &[f64],

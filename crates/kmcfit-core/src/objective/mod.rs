@@ -1,22 +1,22 @@
-//! The cost of a parameter vector and its derivatives, from one trajectory per point.
+//! Cost function of a problem and its derivatives, from one simulation per point.
 
 mod cost_and_gradient;
 mod gradient;
 mod gradient_check;
+mod gradient_error;
 mod jacobian;
 mod node_aligned;
 mod prediction;
-mod refine;
 mod scales;
 mod simulated_record;
-mod verify;
+mod step_halving;
 
 pub use gradient::{Gradient, GradientKind};
 pub use gradient_check::GradientCheck;
-pub use refine::Refined;
+pub use gradient_error::GradientError;
 pub use scales::state_scales;
 pub use simulated_record::{RecordTangent, SimulatedRecord};
-pub use verify::GradientError;
+pub use step_halving::Refined;
 
 use crate::problem::Problem;
 use crate::record::Channel;
@@ -24,47 +24,48 @@ use crate::simulate::reference::tangent;
 use crate::simulate::{Cause, Engine, Purpose, SimulationError, Trajectory};
 use crate::system::{NodalCoefficients, State, SystemTangent, TimePoint};
 
-/// The cost at one point and everything that it was computed from.
+/// Cost at one point, with the simulation it was computed from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
-    /// Cost `J`, the sum of the next two.
+    /// Cost `J`, the sum of misfit and regularisation.
     pub cost: f64,
-    /// Part of the readings.
+    /// Misfit of the samples.
     pub misfit: f64,
-    /// Part of the penalties.
+    /// Penalties, soft constraints and priors.
     pub regularisation: f64,
-    /// The main device at this point.
-    pub device: NodalCoefficients,
-    /// The other devices of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies).
-    pub own_devices: Vec<NodalCoefficients>,
-    /// The scalars at this point.
+    /// Nodal values of the shared coefficient set.
+    pub nodal: NodalCoefficients,
+    /// Nodal values of the other coefficient sets of
+    /// [`Parameterization::coefficient_sets`](crate::functions::Parameterization::coefficient_sets).
+    pub own_nodal: Vec<NodalCoefficients>,
+    /// Scalar parameters.
     pub scalars: Vec<f64>,
-    /// The motion in each experiment.
+    /// Response of each experiment.
     pub trajectories: Vec<Trajectory>,
-    /// What the model says of the readings, for each experiment and each of its channels.
+    /// Predicted samples of each experiment and channel.
     pub predictions: Vec<Vec<Vec<f64>>>,
 }
 
 impl Evaluation {
-    /// Device `which` of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies).
-    pub fn device_of(&self, which: usize) -> &NodalCoefficients {
+    /// Nodal values of coefficient set `which`.
+    pub fn nodal_of(&self, which: usize) -> &NodalCoefficients {
         match which {
-            0 => &self.device,
-            own => &self.own_devices[own - 1],
+            0 => &self.nodal,
+            own => &self.own_nodal[own - 1],
         }
     }
 }
 
 impl Problem {
-    /// Storage for evaluations, used again and again by [`Problem::evaluate_into`].
+    /// Storage for evaluations by [`Problem::evaluate_into`].
     pub fn workspace(&self) -> Evaluation {
-        let devices = self.functions.assemblies().len();
+        let nodal_sets = self.functions.coefficient_sets().len();
         Evaluation {
             cost: f64::NAN,
             misfit: f64::NAN,
             regularisation: f64::NAN,
-            device: self.functions.empty_device(),
-            own_devices: vec![self.functions.empty_device(); devices - 1],
+            nodal: self.functions.empty_nodal(),
+            own_nodal: vec![self.functions.empty_nodal(); nodal_sets - 1],
             scalars: vec![0.0; self.functions.scalars().len()],
             trajectories: (self.experiments.iter())
                 .map(|e| Trajectory::zeros(e.nodes))
@@ -75,25 +76,22 @@ impl Problem {
         }
     }
 
-    /// Cost, devices and motions for the parameters `theta`.
+    /// Evaluates the cost at the parameters `theta`.
     ///
-    /// The cost is the sum over the channels of [`Channel::cost`](crate::record::Channel::cost) plus the sum over the penalties
-    /// of `weight |L theta - target|^2` ([`crate::functions::Penalty`]) plus the sum over the variations
-    /// of `weight sum |D theta|` ([`crate::functions::Variation`]) plus the price of the soft
-    /// constraints ([`crate::constraints::RowGroup::price`]) plus that of the scalars' priors
-    /// ([`crate::functions::ScalarParameter::price`]).
+    /// The cost is the sum of [`Channel::cost`](crate::record::Channel::cost) over the channels, of
+    /// `weight |L theta - target|^2` over the penalties ([`crate::functions::Penalty`]), of `weight sum |D theta|` over the
+    /// total-variation penalties ([`crate::functions::TotalVariation`]), of the soft constraints
+    /// ([`crate::constraints::RowGroup::price`]) and of the priors ([`crate::functions::ScalarParameter::price`]).
     ///
     /// # Errors
-    /// A [`SimulationError`] if a motion does not exist (the mass is not positive, or it overflows), or the
-    /// cost overflows.
+    /// A [`SimulationError`] if the mass is not positive at some node, or the response or the cost overflows.
     pub fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, SimulationError> {
         let mut evaluation = self.workspace();
         self.evaluate_into(theta, &mut evaluation)?;
         Ok(evaluation)
     }
 
-    /// [`Problem::evaluate`] into storage that is used again; its contents are meaningless after an
-    /// error.
+    /// [`Problem::evaluate`] into existing storage, whose contents are undefined after an error.
     ///
     /// # Errors
     /// As [`Problem::evaluate`].
@@ -105,7 +103,7 @@ impl Problem {
         self.evaluate_for(Purpose::Estimation, theta, evaluation)
     }
 
-    /// [`Problem::evaluate_into`] by the engine of a [`Purpose`].
+    /// [`Problem::evaluate_into`] with the engine for a [`Purpose`].
     ///
     /// # Errors
     /// As [`Problem::evaluate`].
@@ -116,7 +114,7 @@ impl Problem {
         evaluation: &mut Evaluation,
     ) -> Result<(), SimulationError> {
         self.set_parameters(theta, evaluation);
-        self.motions(purpose, evaluation)?;
+        self.responses(purpose, evaluation)?;
         evaluation.regularisation = self.regularisation(theta);
         evaluation.cost = evaluation.misfit + evaluation.regularisation;
         if !evaluation.cost.is_finite() {
@@ -125,16 +123,16 @@ impl Problem {
         Ok(())
     }
 
-    /// Functions and scalars for the parameters `theta`.
+    /// Sets functions and scalars to those of the parameters `theta`.
     pub(crate) fn set_parameters(&self, theta: &[f64], evaluation: &mut Evaluation) {
-        self.functions.device_into(theta, 0, &mut evaluation.device);
-        for (i, own) in evaluation.own_devices.iter_mut().enumerate() {
-            self.functions.device_into(theta, i + 1, own);
+        self.functions.nodal_into(theta, 0, &mut evaluation.nodal);
+        for (i, own) in evaluation.own_nodal.iter_mut().enumerate() {
+            self.functions.nodal_into(theta, i + 1, own);
         }
         evaluation.scalars.copy_from_slice(self.scalars(theta));
     }
 
-    /// The channels of all experiments, each with its predictions.
+    /// Channels of all experiments, each with its predictions.
     pub(crate) fn predicted<'a>(
         &'a self,
         evaluation: &'a Evaluation,
@@ -142,27 +140,27 @@ impl Problem {
         self.channels().zip(evaluation.predictions.iter().flatten())
     }
 
-    fn motions(
+    fn responses(
         &self,
         purpose: Purpose,
         evaluation: &mut Evaluation,
     ) -> Result<(), SimulationError> {
         evaluation.misfit = 0.0;
         for (e, experiment) in self.experiments.iter().enumerate() {
-            let device = match experiment.device {
-                0 => &evaluation.device,
-                own => &evaluation.own_devices[own - 1],
+            let nodal = match experiment.coefficient_set {
+                0 => &evaluation.nodal,
+                own => &evaluation.own_nodal[own - 1],
             };
-            let motion = &mut evaluation.trajectories[e];
+            let response = &mut evaluation.trajectories[e];
             let initial = experiment.initial_state(&evaluation.scalars);
             let (system, excitation) = (&self.system, experiment.excitation.as_ref());
-            let engine = Engine::choose(system, excitation, motion.nodes(), purpose);
-            engine.forward_into(system, device, initial, excitation, motion)?;
+            let engine = Engine::choose(system, excitation, response.nodes(), purpose);
+            engine.forward_into(system, nodal, initial, excitation, response)?;
             let view = SimulatedRecord {
                 system,
-                device,
+                nodal,
                 excitation,
-                motion,
+                response,
                 scalars: &evaluation.scalars,
             };
             let predictions = experiment
@@ -177,44 +175,43 @@ impl Problem {
         Ok(())
     }
 
-    /// What the channels of experiment `e` look at, at an evaluated point.
+    /// Simulated record of experiment `e` at an evaluated point.
     pub fn view<'a>(&'a self, evaluation: &'a Evaluation, e: usize) -> SimulatedRecord<'a> {
         let experiment = &self.experiments[e];
         SimulatedRecord {
             system: &self.system,
-            device: evaluation.device_of(experiment.device),
+            nodal: evaluation.nodal_of(experiment.coefficient_set),
             excitation: experiment.excitation.as_ref(),
-            motion: &evaluation.trajectories[e],
+            response: &evaluation.trajectories[e],
             scalars: &evaluation.scalars,
         }
     }
 
-    /// The change of all predictions along a direction of the parameters, for each experiment and
-    /// each of its channels: one tangent solve.
+    /// Directional derivative of all predictions, for each experiment and channel, by one tangent solve.
     pub fn predictions_tangent(
         &self,
         evaluation: &Evaluation,
         along: &[f64],
     ) -> Vec<Vec<Vec<f64>>> {
         let scalars = self.scalars(along);
-        let devices: Vec<NodalCoefficients> = (0..self.functions.assemblies().len())
+        let nodal_sets: Vec<NodalCoefficients> = (0..self.functions.coefficient_sets().len())
             .map(|d| self.functions.direction(along, d))
             .collect();
         let each = self.experiments.iter().enumerate().map(|(e, experiment)| {
             let view = self.view(evaluation, e);
-            let change = |sought: Option<usize>| sought.map_or(0.0, |i| scalars[i]);
+            let change = |estimated: Option<usize>| estimated.map_or(0.0, |i| scalars[i]);
             let direction = SystemTangent {
-                device: devices[experiment.device].clone(),
+                nodal: nodal_sets[experiment.coefficient_set].clone(),
                 initial: State {
-                    displacement: change(experiment.sought[0]),
-                    velocity: change(experiment.sought[1]),
+                    displacement: change(experiment.initial_parameters[0]),
+                    velocity: change(experiment.initial_parameters[1]),
                 },
             };
-            let (device, excitation) = (view.device, view.excitation);
-            let motion = tangent(view.system, device, excitation, view.motion, &direction);
+            let (nodal, excitation) = (view.nodal, view.excitation);
+            let response = tangent(view.system, nodal, excitation, view.response, &direction);
             let along = RecordTangent {
-                device: &direction.device,
-                motion: &motion,
+                nodal: &direction.nodal,
+                response: &response,
                 scalars,
             };
             let channels = experiment.channels.iter();
@@ -223,7 +220,7 @@ impl Problem {
         each.collect()
     }
 
-    /// Where the largest residual stands, for a cost that has left the finite numbers.
+    /// Error with the location of the largest residual, for a cost that is not finite.
     fn cost_overflow(&self, evaluation: &Evaluation) -> SimulationError {
         let mut worst = (
             TimePoint {
@@ -248,8 +245,8 @@ impl Problem {
         }
     }
 
-    /// What the functions pay: smoothness `weight |L theta - target|^2` plus total variation
-    /// `weight sum |D theta|` plus soft constraints `weight mean excess^2` plus priors of scalars.
+    /// Regularisation at `theta`: penalties `weight |L theta - target|^2`, total variation `weight sum |D theta|`, soft
+    /// constraints `weight mean excess^2` and priors of scalars.
     pub fn regularisation(&self, theta: &[f64]) -> f64 {
         let ranges = self.functions.ranges();
         let smooth = self.penalties.iter().map(|penalty| {

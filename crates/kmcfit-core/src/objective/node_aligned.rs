@@ -1,4 +1,4 @@
-//! Accelerations read on every node, eight at a time.
+//! Predicted accelerations at nodes and their transpose, eight nodes at a time.
 
 use super::SimulatedRecord;
 use crate::record::{Channel, ChannelKind};
@@ -9,13 +9,12 @@ use crate::simulate::{CoefficientGradient, Trajectory};
 use crate::system::{Excitation, FUNCTIONS};
 
 impl Channel {
-    /// Whether reading `i` is the acceleration at node `i`.
+    /// True if sample `i` of every `i` is the acceleration at node `i`.
     pub(super) fn is_acceleration_on_nodes(&self) -> bool {
         self.is_on_every_node() && self.kind() == ChannelKind::Acceleration
     }
 
-    /// Force and acceleration of the base at eight readings from reading `i` on; beyond the last one they mean
-    /// nothing.
+    /// Force and acceleration of the base at eight samples from sample `i`; undefined beyond the last sample.
     #[inline(always)]
     fn around_eight<A: Arithmetic>(
         &self,
@@ -31,33 +30,33 @@ impl Channel {
             let [forces, bases] = &mut rows;
             let lanes = forces.iter_mut().zip(bases).enumerate();
             for (l, (force, base)) in lanes.take(self.len() - i) {
-                let around = self.around_reading(excitation, i + l);
+                let around = self.around_sample(excitation, i + l);
                 (*force, *base) = (around.force, around.base);
             }
         }
         rows.map(|row| Eight::load(arithmetic, &row))
     }
 
-    /// The accelerations on eight nodes from node `i` on.
+    /// Accelerations at eight nodes from node `i`.
     #[inline(always)]
     pub(super) fn accelerations<A: Arithmetic>(
         &self,
         arithmetic: A,
         view: SimulatedRecord,
         i: usize,
-        seen: &mut Accelerations,
+        observed: &mut Accelerations,
     ) {
         let nodes = NodalObservations {
             system: view.system,
-            device: view.device,
-            states: view.motion,
+            nodal: view.nodal,
+            states: view.response,
         };
         let around = self.around_eight(arithmetic, view.excitation, i);
-        nodes.accelerations(arithmetic, i, around, seen);
+        nodes.accelerations(arithmetic, i, around, observed);
     }
 }
 
-/// Appends what the model says of the readings of `channel`.
+/// Appends the predicted samples of `channel` to `out`.
 pub(super) struct Predict<'a> {
     pub channel: &'a Channel,
     pub view: SimulatedRecord<'a>,
@@ -72,11 +71,11 @@ impl Kernel for Predict<'_> {
         let Self { channel, view, out } = self;
         let [gain, offset, drift] = channel.sensor().values(view.scalars);
         let factor = Eight::splat(arithmetic, gain);
-        let mut seen = Accelerations::NOTHING;
+        let mut observed = Accelerations::NOTHING;
         for from in (0..channel.len()).step_by(LANES) {
             let count = LANES.min(channel.len() - from);
-            channel.accelerations(arithmetic, view, from, &mut seen);
-            let mut value = Eight::load(arithmetic, &seen.value);
+            channel.accelerations(arithmetic, view, from, &mut observed);
+            let mut value = Eight::load(arithmetic, &observed.value);
             if !channel.base().is_empty() {
                 value += padded_loads::eight(arithmetic, channel.base(), from);
             }
@@ -94,7 +93,7 @@ impl Kernel for Predict<'_> {
     }
 }
 
-/// [`Channel::add_transpose`] of such readings, after the filter.
+/// [`Channel::add_transpose`] for accelerations at nodes, after the filter.
 pub(super) struct AddTranspose<'a, 'b> {
     pub channel: &'a Channel,
     pub view: SimulatedRecord<'a>,
@@ -121,14 +120,14 @@ impl Kernel for AddTranspose<'_, '_> {
         let sensor = channel.sensor();
         let seeks = sensor.indices().iter().any(Option::is_some);
         let factor = Eight::splat(arithmetic, gain);
-        let mut seen = Accelerations::NOTHING;
+        let mut observed = Accelerations::NOTHING;
         let mut sums = [[0.0; LANES]; FUNCTIONS];
         for (from, slopes) in (0..).step_by(LANES).zip(slopes.chunks(LANES)) {
-            channel.accelerations(arithmetic, view, from, &mut seen);
+            channel.accelerations(arithmetic, view, from, &mut observed);
             let mut row = [0.0; LANES];
             row[..slopes.len()].copy_from_slice(slopes);
             let push = factor * Eight::load(arithmetic, &row);
-            let [by_y, by_v] = &seen.states;
+            let [by_y, by_v] = &observed.states;
             let nodes = from..from + slopes.len();
             add_products(
                 arithmetic,
@@ -138,14 +137,14 @@ impl Kernel for AddTranspose<'_, '_> {
             );
             add_products(arithmetic, push, by_v, &mut source.velocity[nodes.clone()]);
             match direct {
-                CoefficientGradient::AtNodes(device) => {
-                    for (values, by) in device.functions_mut().zip(&seen.functions) {
+                CoefficientGradient::AtNodes(nodal) => {
+                    for (values, by) in nodal.functions_mut().zip(&observed.functions) {
                         add_products(arithmetic, push, by, &mut values[nodes.clone()]);
                     }
                 }
-                // Lanes without a reading have no slope.
+                // Lanes without a sample have zero slope.
                 CoefficientGradient::Summed(_) => {
-                    for (sums, by) in sums.iter_mut().zip(&seen.functions) {
+                    for (sums, by) in sums.iter_mut().zip(&observed.functions) {
                         add_products(arithmetic, push, by, sums);
                     }
                 }
@@ -153,7 +152,7 @@ impl Kernel for AddTranspose<'_, '_> {
             if seeks {
                 for (l, slope) in slopes.iter().enumerate() {
                     let i = from + l;
-                    let factors = [seen.value[l] + channel.base_at(i), 1.0, channel.age(i)];
+                    let factors = [observed.value[l] + channel.base_at(i), 1.0, channel.age(i)];
                     sensor.add_gradient(factors, *slope, scalars);
                 }
             }

@@ -1,4 +1,4 @@
-//! Predictions of a channel, their tangent and its transpose.
+//! Predicted samples of a channel, their tangent and its transpose.
 
 use super::node_aligned::{AddTranspose, Predict};
 use super::{RecordTangent, SimulatedRecord};
@@ -10,16 +10,16 @@ use crate::simulate::{CoefficientGradient, Trajectory};
 use crate::system::TimePoint;
 
 impl Channel {
-    /// What the sensor sees at reading `i`, before gain, offset and drift, and its derivatives.
+    /// Observation at sample `i` with its derivatives, before gain, offset and drift.
     pub fn sensed(&self, view: SimulatedRecord, i: usize) -> Observation {
         let mut sensed = observe(
             view.system,
             self.kind(),
-            view.device,
+            view.nodal,
             view.excitation,
-            view.motion,
+            view.response,
             self.places()[i],
-            self.around_reading(view.excitation, i),
+            self.around_sample(view.excitation, i),
         );
         if let Some(base) = self.base().get(i) {
             sensed.value += base;
@@ -27,30 +27,30 @@ impl Channel {
         sensed
     }
 
-    /// The value alone of [`Channel::sensed`].
-    fn seen(&self, view: SimulatedRecord, i: usize) -> f64 {
+    /// Value of [`Channel::sensed`].
+    fn observed_value(&self, view: SimulatedRecord, i: usize) -> f64 {
         match (
             self.kind(),
             self.places()[i].as_node(),
             self.base().is_empty(),
         ) {
-            (ChannelKind::Displacement, Some(node), true) => view.motion.displacement[node],
+            (ChannelKind::Displacement, Some(node), true) => view.response.displacement[node],
             _ => self.sensed(view, i).value,
         }
     }
 
-    /// What the model says of the readings.
+    /// Predicted samples.
     pub fn predict(&self, view: SimulatedRecord) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.len());
         self.predict_into(view, &mut out);
         out
     }
 
-    /// [`Channel::predict`] into storage that is used again.
+    /// [`Channel::predict`] into existing storage.
     pub fn predict_into(&self, view: SimulatedRecord, out: &mut Vec<f64>) {
         out.clear();
         if self.is_on_every_node() && self.is_plain() {
-            out.extend_from_slice(&view.motion.displacement[..self.len()]);
+            out.extend_from_slice(&view.response.displacement[..self.len()]);
             return;
         }
         if self.is_acceleration_on_nodes() {
@@ -58,10 +58,11 @@ impl Channel {
             out.reserve_exact(self.len());
             simd::run(Predict { channel, view, out });
         } else if self.sensor() == Sensor::default() {
-            out.extend((0..self.len()).map(|i| self.seen(view, i)));
+            out.extend((0..self.len()).map(|i| self.observed_value(view, i)));
         } else {
             let [gain, offset, drift] = self.sensor().values(view.scalars);
-            let model = |i: usize| gain * self.seen(view, i) + offset + drift * self.age(i);
+            let model =
+                |i: usize| gain * self.observed_value(view, i) + offset + drift * self.age(i);
             out.extend((0..self.len()).map(model));
         }
         if !self.filter().is_empty() {
@@ -69,7 +70,7 @@ impl Channel {
         }
     }
 
-    /// The change of [`Channel::predict`] along a direction.
+    /// Directional derivative of [`Channel::predict`].
     pub fn predict_tangent(&self, view: SimulatedRecord, along: RecordTangent) -> Vec<f64> {
         let [gain, ..] = self.sensor().values(view.scalars);
         let [by_gain, by_offset, by_drift] = self.sensor().changes(along.scalars);
@@ -89,9 +90,8 @@ impl Channel {
         }
     }
 
-    /// Transpose of [`Channel::predict_tangent`]: takes derivatives of a cost with respect to the
-    /// predictions to `source` (with respect to the states), `direct` (with respect to the functions,
-    /// at fixed states) and `scalars`, adding to each.
+    /// Transpose of [`Channel::predict_tangent`]. Given derivatives of a cost with respect to the predictions, adds those with
+    /// respect to the states to `source`, to the functions at fixed states to `direct`, and to the scalars to `scalars`.
     pub fn add_transpose(
         &self,
         view: SimulatedRecord,
@@ -139,7 +139,7 @@ impl Channel {
         }
     }
 
-    /// Whether the predictions depend on the functions also at fixed states.
+    /// True if the predictions depend on the functions also at fixed states, as accelerations do.
     pub fn sees_functions(&self) -> bool {
         match self.kind() {
             ChannelKind::Displacement => false,
@@ -149,15 +149,15 @@ impl Channel {
     }
 }
 
-/// The change of what is sensed when the motion and the device change.
+/// Directional derivative of an observation.
 fn answer(sensed: &Observation, step: usize, along: RecordTangent) -> f64 {
-    let (y, v) = (&along.motion.displacement, &along.motion.velocity);
+    let (y, v) = (&along.response.displacement, &along.response.velocity);
     let by_states = sensed.states[0] * y[step]
         + sensed.states[1] * v[step]
         + sensed.states[2] * y[step + 1]
         + sensed.states[3] * v[step + 1];
     let mut change = by_states;
-    for (f, values) in along.device.functions().enumerate() {
+    for (f, values) in along.nodal.functions().enumerate() {
         for side in 0..2 {
             let slope = sensed.functions[side][f];
             if slope != 0.0 {

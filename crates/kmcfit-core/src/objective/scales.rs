@@ -1,4 +1,4 @@
-//! Natural scales of the functions: the size at which a change of one matters.
+//! Natural scales of the functions: sizes at which their forces equal the inertia force.
 
 use super::Evaluation;
 use crate::diagnostics::median_size;
@@ -13,16 +13,16 @@ use crate::system::quadrature::curvature_at;
 use std::f64::consts::TAU;
 
 impl Problem {
-    /// For each function of the list the larger of its own largest value and of the value at which
-    /// its force would be as large as the mass's: `max m * rms(y'') / rms(phi)` along the motions of
-    /// the experiments that it takes part in and that were read (all, if none was). So a damping on its way to zero still has a size, that
-    /// of a damping that matters.
+    /// Natural scale of each function of the list: the larger of its largest value and of the value whose force equals the
+    /// inertia force, `max m * rms(y'') / rms(phi)`. The mean squares are over the responses of the measured experiments of the
+    /// coefficient set (of all experiments if none has samples). A damping close to zero thus has the scale of a relevant
+    /// damping.
     pub fn natural_scales(&self, evaluation: &Evaluation) -> Vec<f64> {
         self.sizes(evaluation, largest)
     }
 
-    /// [`Problem::natural_scales`] with the median of the sizes of a function's own values in place of the largest one: what
-    /// a function is like at most times, whatever it does where nothing is seen of it.
+    /// [`Problem::natural_scales`] with the median of a function's values in place of the largest, which is insensitive to
+    /// values at times without information.
     pub(crate) fn median_scales(&self, evaluation: &Evaluation) -> Vec<f64> {
         self.sizes(evaluation, median_size)
     }
@@ -31,26 +31,27 @@ impl Problem {
         let terms = &self.system.terms;
         let step = self.system.grid.step();
         let squares: Vec<Vec<f64>> = (evaluation.trajectories.iter())
-            .map(|motion| squares(motion, terms, step))
+            .map(|response| squares(response, terms, step))
             .collect();
         let any_read = self.experiments.iter().any(Experiment::is_read);
         let mut sizes = vec![0.0f64; self.functions.ranges().len()];
-        for (which, assembly) in self.functions.assemblies().iter().enumerate() {
-            let device = evaluation.device_of(which);
-            // Of the accelerations first, then of what each term sees.
+        for (which, assembly) in self.functions.coefficient_sets().iter().enumerate() {
+            let nodal = evaluation.nodal_of(which);
+            // Mean square of the accelerations first, then of `phi` of each term.
             let root = |what: usize| -> f64 {
                 let own = self.experiments.iter().zip(&squares);
-                let own = own.filter(|(e, _)| e.device == which && (e.is_read() || !any_read));
+                let own =
+                    own.filter(|(e, _)| e.coefficient_set == which && (e.is_read() || !any_read));
                 own.map(|(_, squares)| squares[what]).sum::<f64>().sqrt()
             };
-            let mass = size_of(&device.mass);
+            let mass = size_of(&nodal.mass);
             let inertia = mass * root(0);
             let natural = |j: usize| match root(j + 1) {
                 response if response > 0.0 => inertia / response,
                 _ => 0.0,
             };
             let natural = std::iter::once(mass).chain((0..terms.len()).map(natural));
-            let own = device.functions().map(size_of);
+            let own = nodal.functions().map(size_of);
             for (&f, (own, natural)) in assembly.iter().zip(own.zip(natural)) {
                 sizes[f] = sizes[f].max(own).max(natural);
             }
@@ -58,13 +59,13 @@ impl Problem {
         sizes
     }
 
-    /// The largest change of a function or scalar from one point to the parameters `after`, relative
-    /// to [`Problem::natural_scales`] at the first, or to the scalar's own size.
+    /// Largest change of a function or scalar between two points, relative to [`Problem::natural_scales`] at the first, or to
+    /// the scalar's own size.
     pub fn relative_change(&self, before: &Evaluation, from: &[f64], after: &[f64]) -> f64 {
         self.change_in_scales(&self.natural_scales(before), from, after)
     }
 
-    /// [`Problem::relative_change`] with the natural sizes at hand.
+    /// [`Problem::relative_change`] for given natural scales.
     pub(crate) fn change_in_scales(&self, sizes: &[f64], from: &[f64], after: &[f64]) -> f64 {
         let ranges = self.functions.ranges().iter().zip(sizes);
         let mut most = 0.0f64;
@@ -85,12 +86,12 @@ impl Problem {
     }
 }
 
-/// The sums over the nodes of `y''^2` and of `phi^2` of each term.
-fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
-    let (y, v) = (&motion.displacement, &motion.velocity);
+/// Sums over the nodes of `y''^2` and of `phi^2` of each term.
+fn squares(response: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
+    let (y, v) = (&response.displacement, &response.velocity);
     let nodes = y.len();
     if nodes <= LONG_RECORD_STEPS {
-        return squares_in_order(motion, terms, step);
+        return sequential_squares(response, terms, step);
     }
     let inertia = sum_of_squares(nodes, |i| curvature_at(y, step, i));
     let of = |term: &Term| match term {
@@ -102,11 +103,11 @@ fn squares(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
     std::iter::once(inertia).chain(terms).collect()
 }
 
-/// [`squares`] of a short record: descents along the gradient alone depend on every bit, so all are added in order, those of
-/// four columns side by side, as each sum waits for itself.
-fn squares_in_order(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
+/// [`squares`] of a short record. Steepest descent depends on every bit, so sums are sequential; four columns are
+/// interleaved, because each sum is a chain of dependent operations.
+fn sequential_squares(response: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> {
     const PART: usize = 256;
-    let (y, v) = (&motion.displacement, &motion.velocity);
+    let (y, v) = (&response.displacement, &response.velocity);
     let mut sums = vec![0.0; terms.len() + 1];
     let mut part = [[0.0; PART]; 4];
     for (first, sums) in (0..).step_by(4).zip(sums.chunks_mut(4)) {
@@ -134,7 +135,7 @@ fn squares_in_order(motion: &Trajectory, terms: &[Term], step: f64) -> Vec<f64> 
     sums
 }
 
-/// Sum of the squares of `count` values, in eight sums side by side.
+/// Sum of the squares of `count` values, in eight interleaved partial sums.
 fn sum_of_squares(count: usize, value: impl Fn(usize) -> f64) -> f64 {
     let mut sums = [0.0; LANES];
     for i in 0..count {
@@ -144,8 +145,8 @@ fn sum_of_squares(count: usize, value: impl Fn(usize) -> f64) -> f64 {
     sums.into_iter().fold(0.0, |sum, x| sum + x)
 }
 
-/// How large displacement and velocity of a motion are, from readings of one `kind` that are `spacing`
-/// (s) apart: their rms, and their dominant frequency.
+/// Sizes of displacement and velocity of a response, from samples of one `kind` with spacing `spacing` (s): root mean
+/// squares, from the dominant frequency.
 pub fn state_scales(kind: ChannelKind, values: &[f64], spacing: f64) -> [f64; 2] {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let centred: Vec<f64> = values.iter().map(|v| v - mean).collect();
@@ -167,12 +168,11 @@ mod tests {
     use crate::builder::{Builder, CoefficientSpec, Record};
     use crate::system::Grid;
 
-    /// `A sin(w t)` over whole periods: its rms is `A / sqrt(2)`, whatever was read of it, by a sensor with
-    /// an offset.
+    /// `A sin(w t)` over whole periods has the rms `A / sqrt(2)` for every kind of sensor, also with an offset.
     #[test]
     fn the_state_of_a_sine_has_its_size_whatever_was_read() {
         let (amplitude, omega, spacing) = (0.3, TAU / 0.4, 0.01);
-        let readings = |size: f64, phase: f64| -> Vec<f64> {
+        let samples = |size: f64, phase: f64| -> Vec<f64> {
             let at = |i: usize| size * (5.0 + (omega * spacing * i as f64 + phase).sin());
             (0..400).map(at).collect()
         };
@@ -188,26 +188,26 @@ mod tests {
         ];
         let rms = amplitude / 2f64.sqrt();
         for (kind, size, phase) in cases {
-            let [displacement, velocity] = state_scales(kind, &readings(size, phase), spacing);
-            // The dominant frequency is known to a small part of its distance to the next.
+            let [displacement, velocity] = state_scales(kind, &samples(size, phase), spacing);
+            // The dominant frequency is accurate to a small part of the frequency spacing.
             assert!((displacement / rms - 1.0).abs() < 0.02, "{kind:?}");
             assert!((velocity / (rms * omega) - 1.0).abs() < 0.02, "{kind:?}");
             assert_eq!(state_scales(kind, &[2.0; 400], spacing), [0.0; 2]);
         }
     }
 
-    /// One period of `y = size cos(w t)` with m = 1 and k = w^2, a cubic stiffness of next to nothing, and
-    /// another such motion of three times the size, read or not.
+    /// One period of `y = size cos(w t)` with m = 1 and k = w^2 and a negligible cubic stiffness, and a second response of
+    /// three times the size, with or without samples.
     fn swinging(size: f64, other_is_read: bool) -> Problem {
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
         let record = |name: &str, size: f64| {
-            let readings: Vec<f64> = times
+            let samples: Vec<f64> = times
                 .iter()
                 .map(|t| size * (TAU * t / 10.0).cos())
                 .collect();
             Record::new(name)
                 .from_state(size, 0.0)
-                .displacement(&times, &readings)
+                .displacement(&times, &samples)
         };
         let stiffness = (TAU / 10.0).powi(2);
         let parts = [1.0, 0.0, stiffness].map(CoefficientSpec::fixed);
@@ -227,13 +227,12 @@ mod tests {
         problem.natural_scales(&problem.evaluate(&problem.start()).unwrap())
     }
 
-    /// A force as large as the mass's, in the mean of squares: that of a damping is `m w`, that of a
-    /// cubic stiffness `m w^2 / y^2` with `mean y^6 / mean y^2 = 5/8 y^4`.
+    /// The root mean square of the force equals that of the inertia force: a damping `m w`, a cubic stiffness `m w^2 / y^2`
+    /// with `mean y^6 / mean y^2 = 5/8 y^4`.
     #[test]
     fn the_natural_size_makes_a_force_as_large_as_that_of_the_mass() {
         let omega = TAU / 10.0;
-        // One motion of size 0.5; and together with one of size 1.5: 10 times the squares, 730 times the
-        // sixth powers.
+        // A response of size 0.5 alone, and with one of size 1.5: 10 times the squares, 730 times the sixth powers.
         for (read, six_over_two) in [(false, 1.0), (true, 73.0)] {
             let found = sizes(&swinging(0.5, read));
             let cubic = omega * omega / (0.625f64 * 0.0625 * six_over_two).sqrt();
@@ -245,10 +244,10 @@ mod tests {
         }
     }
 
-    /// A motion of 1e-60 m, whose third power has no square among the numbers: a cubic stiffness has
-    /// then the size of its own values, and not an infinite one.
+    /// The square of the third power of a response of 1e-60 m underflows: a cubic stiffness then has the scale of its own
+    /// values, not an infinite one.
     #[test]
-    fn a_term_that_sees_nothing_has_its_own_size() {
+    fn a_term_with_vanishing_response_has_the_scale_of_its_values() {
         assert_eq!(sizes(&swinging(1e-60, true))[3], 1e-9);
     }
 }

@@ -1,4 +1,4 @@
-//! A simulated record, and its change along a direction.
+//! A simulated record with the system that produced it, and its directional derivative.
 
 use crate::simulate::{Engine, Purpose, Trajectory};
 use crate::system::{Excitation, NodalCoefficients, System, SystemTangent};
@@ -8,43 +8,43 @@ use crate::system::{Excitation, NodalCoefficients, System, SystemTangent};
 pub struct SimulatedRecord<'a> {
     /// Grid, stepper and terms.
     pub system: &'a System,
-    /// The device that moves.
-    pub device: &'a NodalCoefficients,
-    /// What drives it.
+    /// Nodal values of mass and coefficients.
+    pub nodal: &'a NodalCoefficients,
+    /// Excitation.
     pub excitation: Option<&'a Excitation>,
-    /// Its motion.
-    pub motion: &'a Trajectory,
+    /// Response.
+    pub response: &'a Trajectory,
     /// Values of all scalars.
     pub scalars: &'a [f64],
 }
 
-/// How a view changes along a direction.
+/// Directional derivative of a simulated record.
 #[derive(Debug, Clone, Copy)]
 pub struct RecordTangent<'a> {
-    /// Change of the device.
-    pub device: &'a NodalCoefficients,
-    /// Change of the motion.
-    pub motion: &'a Trajectory,
+    /// Change of the nodal values.
+    pub nodal: &'a NodalCoefficients,
+    /// Change of the response.
+    pub response: &'a Trajectory,
     /// Change of the scalars.
     pub scalars: &'a [f64],
 }
 
 impl SimulatedRecord<'_> {
-    /// The engine of its response and derivatives.
+    /// Engine of the response and its derivatives.
     pub(crate) fn engine(&self) -> Engine {
-        let nodes = self.motion.nodes();
+        let nodes = self.response.nodes();
         Engine::choose(self.system, self.excitation, nodes, Purpose::Estimation)
     }
 
-    /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) of its motion.
+    /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) of the response.
     pub(crate) fn discrete_adjoint(&self, source: &Trajectory) -> SystemTangent {
         let Self {
             system,
-            device,
+            nodal,
             excitation,
-            motion,
+            response,
             ..
         } = self;
-        (self.engine()).discrete_adjoint(system, device, *excitation, motion, source)
+        (self.engine()).discrete_adjoint(system, nodal, *excitation, response, source)
     }
 }

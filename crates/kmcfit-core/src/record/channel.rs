@@ -4,35 +4,33 @@ use super::{ChannelKind, Loss, Sensor, Weighting};
 use crate::signal::{SecondOrder, zero_phase};
 use crate::system::{Excitation, Grid, InputSample, TimePoint};
 
-/// The readings of one sensor.
+/// The samples of one sensor.
 ///
-/// The model of reading `i` is `gain * (h_i + b_i) + offset + drift * (t_i - t_0)`, where `h_i` is
-/// displacement, velocity or acceleration of the motion ([`observe`](crate::simulate::reference::observe())), `b_i` the same of the
-/// base where the sensor does not move with it, and `t_0` the time of the first reading. With a
-/// filter, model and readings are filtered alike before they are compared.
+/// The model of sample `i` is `gain * (h_i + b_i) + offset + drift * (t_i - t_0)`. Here `h_i` is displacement, velocity or
+/// acceleration of the response ([`observe`](crate::simulate::reference::observe())), `b_i` the same of the base for a sensor of
+/// absolute motion, and `t_0` the time of the first sample. A filter, if any, is applied to model and samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
     kind: ChannelKind,
     times: Vec<f64>,
     places: Vec<TimePoint>,
     observed: Vec<f64>,
-    /// The readings before the filter; none without one.
+    /// Samples before the filter; empty without a filter.
     unfiltered: Vec<f64>,
     weighting: Weighting,
     loss: Loss,
     sensor: Sensor,
-    /// Forces and accelerations of the base at the readings, if they are given.
+    /// Forces and accelerations of the base at the samples, if given.
     around: Option<[Vec<f64>; 2]>,
     base: Vec<f64>,
     filter: Vec<SecondOrder>,
-    /// Whether reading `i` stands on node `i`.
+    /// True if sample `i` lies on node `i`.
     on_every_node: bool,
 }
 
 impl Channel {
-    /// Readings `values` (in the SI unit of `kind`) at `times` (s, increasing), a motion over the
-    /// first `nodes` nodes of `grid`; `None` unless there is a reading, one time for each, and all
-    /// times are within the motion.
+    /// A channel of samples `values` (in the SI unit of `kind`) at `times` (s, increasing), for a response over the first `nodes` nodes
+    /// of `grid`; `None` unless there is at least one sample, one time for each, and all times are within the response.
     pub fn new(
         kind: ChannelKind,
         times: Vec<f64>,
@@ -68,7 +66,7 @@ impl Channel {
         })
     }
 
-    /// Displacements `values` (m) at the nodes `0, stride, 2 stride, ...` of `grid`.
+    /// A channel of displacements `values` (m) at the nodes `0, stride, 2 stride, ...` of `grid`.
     ///
     /// # Panics
     /// If `stride` is zero, there are no values, or they do not fit on the grid.
@@ -81,15 +79,15 @@ impl Channel {
         let times = (0..values.len()).map(|i| grid.time(i * stride)).collect();
         let kind = ChannelKind::Displacement;
         let channel = Self::new(kind, times, values, weighting, grid, grid.nodes());
-        let channel = channel.expect("readings on the nodes of the grid");
-        assert!(stride > 0, "readings advance");
+        let channel = channel.expect("samples on the nodes of the grid");
+        assert!(stride > 0, "samples advance");
         channel
     }
 
-    /// With what a residual costs; only readings with a sigma can have another loss than squares.
+    /// Sets the loss; a robust loss needs samples with a sigma.
     ///
     /// # Panics
-    /// If a robust loss meets readings without a sigma.
+    /// If the loss is robust and the samples have no sigma.
     #[must_use]
     pub fn with_loss(mut self, loss: Loss) -> Self {
         assert!(
@@ -100,59 +98,57 @@ impl Channel {
         self
     }
 
-    /// With gain, offset and drift.
+    /// Sets gain, offset and drift.
     #[must_use]
     pub fn with_sensor(mut self, sensor: Sensor) -> Self {
         self.sensor = sensor;
         self
     }
 
-    /// With force and acceleration of the base at the times of the readings, which an acceleration
-    /// depends on; without them both are taken as linear over each step.
+    /// Sets force and acceleration of the base at the times of the samples, on which accelerations depend; otherwise both are linear
+    /// over each step.
     ///
     /// # Panics
-    /// If there is not one for each reading.
+    /// If there is not one for each sample.
     #[must_use]
     pub fn with_surroundings(mut self, around: Vec<InputSample>) -> Self {
-        assert_eq!(around.len(), self.times.len(), "one for each reading");
+        assert_eq!(around.len(), self.times.len(), "one for each sample");
         let forces = around.iter().map(|a| a.force).collect();
         let bases = around.iter().map(|a| a.base).collect();
         self.around = Some([forces, bases]);
         self
     }
 
-    /// With the motion of the base (of the channel's kind) added to the relative one: a sensor on
-    /// the mass that does not move with the base.
+    /// Adds the motion of the base (of the channel's kind) to the relative one, for a sensor of absolute motion.
     ///
     /// # Panics
-    /// If there is not one for each reading.
+    /// If there is not one for each sample.
     #[must_use]
     pub fn with_base(mut self, base: Vec<f64>) -> Self {
-        assert_eq!(base.len(), self.times.len(), "one for each reading");
+        assert_eq!(base.len(), self.times.len(), "one for each sample");
         self.base = base;
         self
     }
 
-    /// With a zero-phase filter for readings and model; the readings given so far are filtered.
+    /// Sets a zero-phase filter for samples and model, and filters the samples.
     #[must_use]
     pub fn with_filter(mut self, filter: Vec<SecondOrder>) -> Self {
         if self.unfiltered.is_empty() {
             self.unfiltered = std::mem::take(&mut self.observed);
         }
         self.filter = filter;
-        self.filter_readings();
+        self.filter_samples();
         self
     }
 
-    /// With other readings: `predicted`, as the model says them (after the filter), plus `noise` as a
-    /// sensor adds it (before the filter).
+    /// Replaces the samples by simulated ones: `predicted`, after the filter, plus `noise`, before the filter.
     ///
     /// # Panics
-    /// If there is not one of each for every reading.
+    /// If there is not one of each for every sample.
     #[must_use]
     pub fn with_simulated(mut self, predicted: &[f64], noise: &[f64]) -> Self {
-        assert_eq!(predicted.len(), self.len(), "one for each reading");
-        assert_eq!(noise.len(), self.len(), "one for each reading");
+        assert_eq!(predicted.len(), self.len(), "one for each sample");
+        assert_eq!(noise.len(), self.len(), "one for each sample");
         let filtered = match self.filter.is_empty() {
             true => noise.to_vec(),
             false => zero_phase(&self.filter, noise),
@@ -163,20 +159,20 @@ impl Channel {
         self
     }
 
-    fn filter_readings(&mut self) {
+    fn filter_samples(&mut self) {
         if !self.unfiltered.is_empty() {
             self.observed = zero_phase(&self.filter, &self.unfiltered);
         }
     }
 
-    /// With the weighting exchanged.
+    /// Replaces the weighting.
     #[must_use]
     pub fn with_weighting(mut self, weighting: Weighting) -> Self {
         self.weighting = weighting;
         self
     }
 
-    /// The first `count` readings, at least one; filtered as if there had been no more.
+    /// The first `count` samples, at least one, filtered without the later ones.
     #[must_use]
     pub fn first(&self, count: usize) -> Self {
         let count = count.max(1);
@@ -197,23 +193,22 @@ impl Channel {
             filter: self.filter.clone(),
             on_every_node: self.on_every_node,
         };
-        part.filter_readings();
+        part.filter_samples();
         part
     }
 
-    /// The readings within the first `steps` steps, if there are any; what stands on the node behind them
-    /// belongs to the next.
+    /// Samples within the first `steps` steps, if any; a sample at their last node belongs to the next step.
     pub(crate) fn within(&self, steps: usize) -> Option<Self> {
         let count = self.count_within(steps);
         (count > 0).then(|| self.first(count))
     }
 
-    /// How many readings [`Channel::within`] takes.
+    /// Number of samples of [`Channel::within`].
     pub(crate) fn count_within(&self, steps: usize) -> usize {
         self.places.partition_point(|p| p.step < steps)
     }
 
-    /// The same readings on another grid over the same time; `None` if they are not all on it.
+    /// The channel on another grid over the same time; `None` if a sample does not lie on it.
     pub fn on(&self, grid: &Grid, nodes: usize) -> Option<Self> {
         let unfiltered = Self::new(
             self.kind,
@@ -230,42 +225,42 @@ impl Channel {
         })
     }
 
-    /// What is measured.
+    /// Measured quantity.
     pub fn kind(&self) -> ChannelKind {
         self.kind
     }
 
-    /// Times of the readings, s.
+    /// Times of the samples, s.
     pub fn times(&self) -> &[f64] {
         &self.times
     }
 
-    /// Where they are on the grid.
+    /// Positions of the samples on the grid.
     pub fn places(&self) -> &[TimePoint] {
         &self.places
     }
 
-    /// The readings, filtered if the channel has a filter, in the SI unit of the kind.
+    /// Samples, filtered if the channel has a filter, in the SI unit of the kind.
     pub fn observed(&self) -> &[f64] {
         &self.observed
     }
 
-    /// Number of readings; at least one.
+    /// Number of samples; at least one.
     pub fn len(&self) -> usize {
         self.observed.len()
     }
 
-    /// Never: a channel has a reading.
+    /// False: a channel has at least one sample.
     pub fn is_empty(&self) -> bool {
         self.observed.is_empty()
     }
 
-    /// How residuals are weighed.
+    /// Weights of the residuals.
     pub fn weighting(&self) -> &Weighting {
         &self.weighting
     }
 
-    /// What a residual costs.
+    /// Loss of a residual.
     pub fn loss(&self) -> Loss {
         self.loss
     }
@@ -275,13 +270,13 @@ impl Channel {
         self.sensor
     }
 
-    /// The filter's sections; none for no filter.
+    /// Sections of the filter; empty without a filter.
     pub fn filter(&self) -> &[SecondOrder] {
         &self.filter
     }
 
-    /// Force and base at reading `i`: as given, or else linear over the step.
-    pub(crate) fn around_reading(&self, excitation: Option<&Excitation>, i: usize) -> InputSample {
+    /// Force and acceleration of the base at sample `i`: as given, or linear over the step.
+    pub(crate) fn around_sample(&self, excitation: Option<&Excitation>, i: usize) -> InputSample {
         match (&self.around, excitation) {
             (Some([forces, bases]), _) => InputSample {
                 force: forces[i],
@@ -292,25 +287,23 @@ impl Channel {
         }
     }
 
-    /// [`Channel::base_at`] every reading; empty for none.
+    /// [`Channel::base_at`] for every sample; empty if zero.
     #[inline(always)]
     pub(crate) fn base(&self) -> &[f64] {
         &self.base
     }
 
-    /// Motion of the base that a sensor fixed in space adds to reading `i`; zero for one that moves
-    /// with the base.
+    /// Motion of the base that a sensor of absolute motion adds to sample `i`; zero for other sensors.
     pub fn base_at(&self, i: usize) -> f64 {
         self.base.get(i).copied().unwrap_or(0.0)
     }
 
-    /// Time since the first reading, s.
+    /// Time since the first sample, s.
     pub fn age(&self, i: usize) -> f64 {
         self.times[i] - self.times[0]
     }
 
-    /// Whether the readings are displacements of a plain sensor, and nothing is between model and
-    /// readings.
+    /// True for displacements of an ideal sensor without a filter.
     pub(crate) fn is_plain(&self) -> bool {
         self.kind == ChannelKind::Displacement
             && self.sensor == Sensor::default()
@@ -318,30 +311,29 @@ impl Channel {
             && self.filter.is_empty()
     }
 
-    /// Whether all readings are displacements at nodes.
+    /// True if all samples are displacements at nodes.
     pub(crate) fn is_displacement_at_nodes(&self) -> bool {
         let all = || self.places.iter().all(|p| p.as_node().is_some());
         self.kind == ChannelKind::Displacement && (self.on_every_node || all())
     }
 
-    /// Whether reading `i` stands on node `i`.
+    /// True if sample `i` lies on node `i`.
     pub(crate) fn is_on_every_node(&self) -> bool {
         self.on_every_node
     }
 
-    /// Forces and accelerations of the base at the readings, if they are given.
+    /// Forces and accelerations of the base at the samples, if given.
     #[inline(always)]
     pub(crate) fn surroundings(&self) -> Option<&[Vec<f64>; 2]> {
         self.around.as_ref()
     }
 
-    /// What the filter makes of a series over the readings.
+    /// Filtered series of values at the samples.
     pub(crate) fn filtered(&self, series: &[f64]) -> Vec<f64> {
         zero_phase(&self.filter, series)
     }
 
-    /// The nodes from one reading to the next, if the readings are displacements of a plain sensor at
-    /// the nodes `0, stride, 2 stride, ...`, and nothing else is between model and readings.
+    /// Number of nodes between samples, for unfiltered displacements of an ideal sensor at the nodes `0, stride, 2 stride, ...`.
     pub fn stride(&self) -> Option<usize> {
         if self.is_plain() && self.on_every_node {
             return Some(1);

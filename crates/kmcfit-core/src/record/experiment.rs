@@ -1,69 +1,70 @@
-//! One record: input, initial state and channels.
+//! Experiments: input, initial state and channels of one record.
 
 use super::{Channel, Input};
 use crate::system::{Excitation, Grid, State};
 
-/// One record of a device's motion.
+/// One record of a system.
 #[derive(Debug, Clone)]
 pub struct Experiment {
     /// Name for reports.
     pub name: String,
-    /// Displacement and velocity at the first node; where they are sought, the start of the search.
+    /// Displacement and velocity at the first node; their starts where estimated.
     pub initial: State,
-    /// The scalars that displacement and velocity at the first node are, where they are sought.
-    pub sought: [Option<usize>; 2],
-    /// What drives the motion, on the grid; `None` is free motion.
+    /// Scalar parameters of displacement and velocity at the first node, where estimated.
+    pub initial_parameters: [Option<usize>; 2],
+    /// Excitation on the grid; `None` for a free response.
     pub excitation: Option<Excitation>,
-    /// What it was made from; empty where it was given on the grid.
+    /// Input from which the excitation was sampled; empty where the excitation was given on the grid.
     pub drive: Input,
-    /// Number of nodes of its motion: a record may end before the grid does.
+    /// Number of nodes of the response; a record may be shorter than the grid.
     pub nodes: usize,
-    /// Which device of [`Parameterization::assemblies`](crate::functions::Parameterization::assemblies) moves.
-    pub device: usize,
-    /// What was measured; none for an experiment that is only simulated.
+    /// Index of the coefficient set in
+    /// [`Parameterization::coefficient_sets`](crate::functions::Parameterization::coefficient_sets).
+    pub coefficient_set: usize,
+    /// Measured channels; empty for a simulation.
     pub channels: Vec<Channel>,
 }
 
 impl Experiment {
-    /// Free motion of the main device over `nodes` nodes from a known state, without readings.
+    /// Free response with the shared coefficient set over `nodes` nodes from a known state, without samples.
     pub fn free(name: impl Into<String>, initial: State, nodes: usize) -> Self {
         Self {
             name: name.into(),
             initial,
-            sought: [None; 2],
+            initial_parameters: [None; 2],
             excitation: None,
             drive: Input::default(),
             nodes,
-            device: 0,
+            coefficient_set: 0,
             channels: Vec::new(),
         }
     }
 
-    /// With one more channel of readings.
+    /// Adds a channel.
     #[must_use]
     pub fn with_channel(mut self, channel: Channel) -> Self {
         self.channels.push(channel);
         self
     }
 
-    /// Under an excitation.
+    /// Sets the excitation.
     #[must_use]
     pub fn with_excitation(mut self, excitation: Excitation) -> Self {
         self.excitation = Some(excitation);
         self
     }
 
-    /// The state at the first node, for the values `scalars` of all scalars.
+    /// State at the first node, given the values `scalars` of all scalars.
     pub fn initial_state(&self, scalars: &[f64]) -> State {
-        let value = |sought: Option<usize>, known: f64| sought.map_or(known, |i| scalars[i]);
+        let value = |estimated: Option<usize>, known: f64| estimated.map_or(known, |i| scalars[i]);
         State {
-            displacement: value(self.sought[0], self.initial.displacement),
-            velocity: value(self.sought[1], self.initial.velocity),
+            displacement: value(self.initial_parameters[0], self.initial.displacement),
+            velocity: value(self.initial_parameters[1], self.initial.velocity),
         }
     }
 
-    /// The same experiment on a grid of half the step; `None` if its readings are not on it. An
-    /// excitation that was given on the old grid is linear between its stages.
+    /// The experiment on a grid of half the step; `None` if a sample does not lie on it. An excitation given on the old grid is linear
+    /// between its stages.
     pub fn halved(&self, grid: &Grid) -> Option<Self> {
         let nodes = 2 * self.nodes - 1;
         let channels: Option<Vec<Channel>> =
@@ -83,18 +84,18 @@ impl Experiment {
         })
     }
 
-    /// Whether nothing drives the motion.
+    /// True without excitation.
     pub fn is_free(&self) -> bool {
         self.excitation.as_ref().is_none_or(Excitation::is_zero)
     }
 
-    /// Whether anything was measured.
+    /// True with samples.
     pub fn is_read(&self) -> bool {
         !self.channels.is_empty()
     }
 
-    /// Number of readings of all channels.
-    pub fn reading_count(&self) -> usize {
+    /// Number of samples of all channels.
+    pub fn sample_count(&self) -> usize {
         self.channels.iter().map(Channel::len).sum()
     }
 }

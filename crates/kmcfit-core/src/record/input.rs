@@ -1,7 +1,7 @@
-//! Inputs over time, from which the excitation on any grid is made.
+//! Inputs as functions of time, from which excitations on any grid are sampled.
 
 use super::ChannelKind;
-use crate::signal::{Shape, Signal};
+use crate::signal::{ExcitationShape, Signal};
 use crate::system::{Excitation, Grid, StageSamples};
 
 /// A force over time.
@@ -10,7 +10,7 @@ pub enum Waveform {
     /// Measured, N.
     Samples(Signal),
     /// A formula, N.
-    Shape(Shape),
+    Shape(ExcitationShape),
 }
 
 /// A measured motion of the base.
@@ -22,7 +22,7 @@ pub enum BaseMotion {
     Displacement(Signal),
 }
 
-/// What drives a motion, at any time: from it the excitation on any grid is made.
+/// Force and motion of the base as functions of time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Input {
     /// The force.
@@ -32,7 +32,7 @@ pub struct Input {
 }
 
 impl Input {
-    /// The excitation at the stages of the steps of a motion over the first `nodes` nodes of `grid`.
+    /// Excitation at the stages of the steps of a response over the first `nodes` nodes of `grid`.
     pub fn on(&self, grid: &Grid, nodes: usize) -> Excitation {
         let sample = |at: &dyn Fn(f64) -> f64, before: &dyn Fn(f64) -> f64| {
             let step = |i: usize| {
@@ -55,7 +55,7 @@ impl Input {
         }
     }
 
-    /// The force at time `t` (s), N.
+    /// Force at time `t` (s), N.
     pub fn force_at(&self, t: f64) -> f64 {
         match &self.force {
             None => 0.0,
@@ -64,13 +64,13 @@ impl Input {
         }
     }
 
-    /// The acceleration of the base at time `t` (s), m/s^2.
+    /// Acceleration of the base at time `t` (s), m/s^2.
     pub fn base_acceleration_at(&self, t: f64) -> f64 {
         self.base_motion_at(ChannelKind::Acceleration, t)
             .unwrap_or(0.0)
     }
 
-    /// The motion of the base at time `t` (s) in the SI unit of `kind`; `None` where it is not known.
+    /// Motion of the base at time `t` (s) in the SI unit of `kind`; `None` where unknown.
     pub fn base_motion_at(&self, kind: ChannelKind, t: f64) -> Option<f64> {
         match (&self.base, kind) {
             (None, _) => Some(0.0),

@@ -1,6 +1,6 @@
 //! Kinds of measured quantities.
 
-/// What a channel measures.
+/// Measured quantity of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ChannelKind {
     /// Displacement `y`, m.
@@ -33,7 +33,7 @@ impl ChannelKind {
         }
     }
 
-    /// SI unit of motion along a line, or of turning.
+    /// SI unit for a translation or, if `angular`, a rotation.
     pub fn unit_of(self, angular: bool) -> &'static str {
         match (self, angular) {
             (_, false) => self.unit(),
@@ -43,7 +43,7 @@ impl ChannelKind {
         }
     }
 
-    /// SI unit of motion along a line.
+    /// SI unit for a translation.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Displacement => "m",

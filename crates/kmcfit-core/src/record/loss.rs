@@ -1,17 +1,17 @@
 //! Losses of residuals in units of their standard deviation.
 
-/// The cost `rho(u)` of a residual `u = r / sigma`.
+/// Loss `rho(u)` of a residual `u = r / sigma`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Loss {
-    /// `u^2`: least squares.
+    /// Least squares, `u^2`.
     #[default]
     Squares,
-    /// `u^2` up to the threshold, `2 threshold |u| - threshold^2` beyond (Huber 1964).
+    /// Huber loss: `u^2` up to the threshold, `2 threshold |u| - threshold^2` beyond (Huber 1964).
     Huber {
-        /// In standard deviations; 1.345 keeps 95 % of the efficiency of least squares.
+        /// Threshold in standard deviations; 1.345 keeps 95 % of the efficiency of least squares.
         threshold: f64,
     },
-    /// `(nu + 1) ln(1 + u^2 / nu)`: twice the negative log-likelihood of Student's t.
+    /// Student's t: `(nu + 1) ln(1 + u^2 / nu)`, twice the negative log-likelihood.
     StudentT {
         /// Degrees of freedom `nu`.
         degrees: f64,
@@ -19,7 +19,7 @@ pub enum Loss {
 }
 
 impl Loss {
-    /// `rho(u)`.
+    /// Value `rho(u)`.
     #[inline]
     pub fn cost(self, u: f64) -> f64 {
         match self {
@@ -32,8 +32,8 @@ impl Loss {
         }
     }
 
-    /// `rho'(u) / (2 u)`: the weight with which `u` enters a least-squares problem that has the same
-    /// gradient. `rho` is concave in `u^2`, so that problem lies above it and touches it at `u`.
+    /// Weight `rho'(u) / (2 u)` of `u` in the least-squares problem with the same gradient. `rho` is concave in `u^2`, so that problem is
+    /// a majorant that touches it at `u`.
     #[inline]
     pub fn weight(self, u: f64) -> f64 {
         match self {

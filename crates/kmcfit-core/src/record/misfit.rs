@@ -6,26 +6,25 @@ use crate::system::quadrature::trapezoid_weights_at;
 use std::ops::Range;
 
 impl Channel {
-    /// Residuals `r = model - reading`, one per reading.
+    /// Residuals `r = model - sample`, one per sample.
     pub fn residuals<'a>(&'a self, predicted: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         predicted.iter().zip(self.observed()).map(|(y, o)| y - o)
     }
 
-    /// The residuals of some readings.
+    /// The residuals of some samples.
     pub(crate) fn residuals_of<'a>(
         &'a self,
         predicted: &'a [f64],
-        readings: Range<usize>,
+        samples: Range<usize>,
     ) -> impl Iterator<Item = f64> + 'a {
-        let pairs = predicted[readings.clone()].iter();
-        pairs.zip(&self.observed()[readings]).map(|(y, o)| y - o)
+        let pairs = predicted[samples.clone()].iter();
+        pairs.zip(&self.observed()[samples]).map(|(y, o)| y - o)
     }
 
-    /// The misfit of the predictions: `integral r^2 dt` in the square of the kind's unit times s, or
-    /// `sum rho(r / sigma)`.
+    /// Misfit of the predictions: `integral r^2 dt`, in the square of the kind's unit times s, or `sum rho(r / sigma)`.
     ///
-    /// The equally spaced integral sums in the paper's order, both ends first: its run depends on
-    /// every bit. Many squares are summed in lanes.
+    /// The integral over equally spaced samples is summed in the paper's order, both ends first, because the paper's run depends on
+    /// every bit. Long sums use SIMD.
     pub fn cost(&self, predicted: &[f64]) -> f64 {
         if let Weighting::Integral { spacing } = self.weighting() {
             let square = |i: usize| {
@@ -51,8 +50,7 @@ impl Channel {
             .sum()
     }
 
-    /// `cost(to) - cost(from)`, as `sum w (y' - y) (y' + y - 2 y_obs)`: where the motions are close,
-    /// the difference of two rounded costs would be lost in their rounding.
+    /// Difference `cost(to) - cost(from)`, as `sum w (y' - y) (y' + y - 2 y_obs)`, which avoids the cancellation of two rounded costs.
     pub fn cost_difference(&self, from: &[f64], to: &[f64]) -> f64 {
         let pairs = from.iter().zip(to).zip(self.observed()).enumerate();
         let difference = |(i, ((y, moved), observed)): (usize, ((&f64, &f64), &f64))| match (
@@ -70,8 +68,7 @@ impl Channel {
         pairs.map(difference).sum()
     }
 
-    /// The weights of the readings within and at both ends, if the cost is a sum of squares and all
-    /// within have the same.
+    /// Weights of the inner samples and of both ends, for a sum of squares with equal inner weights.
     pub fn uniform_weights(&self) -> Option<[f64; 2]> {
         match (self.weighting(), self.loss()) {
             (Weighting::Integral { spacing }, _) => Some([*spacing, 0.5 * spacing]),
@@ -82,8 +79,7 @@ impl Channel {
         }
     }
 
-    /// Weight of the residual `r` of reading `i` in the least-squares problem that has the gradient
-    /// of the cost: `sum w r^2`.
+    /// Weight of the residual `r` of sample `i` in the least-squares problem `sum w r^2` with the gradient of the cost.
     pub fn weight(&self, i: usize, r: f64) -> f64 {
         let weight = self.weighting().weight(i, self.len());
         match (self.loss(), self.weighting().sigma(i)) {
@@ -92,7 +88,7 @@ impl Channel {
         }
     }
 
-    /// `dJ/d model = 2 w r` of every reading.
+    /// Derivatives `dJ/d model = 2 w r` of all samples.
     pub fn slopes(&self, predicted: &[f64]) -> Vec<f64> {
         if let Some([inner, ends]) = self.uniform_weights() {
             let residuals = self.residuals(predicted);
@@ -110,8 +106,7 @@ impl Channel {
     }
 }
 
-/// Weights of the trapezoid rule over times that need not be equally spaced: the paper's cost for
-/// irregular readings.
+/// Trapezoid weights over unequally spaced times: the paper's cost for irregular samples.
 pub fn integral_over(times: &[f64]) -> Weighting {
     Weighting::Trapezoid(trapezoid_weights_at(times))
 }

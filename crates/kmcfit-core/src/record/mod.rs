@@ -18,5 +18,5 @@ pub use misfit::integral_over;
 pub use sensor::Sensor;
 pub use weighting::Weighting;
 
-/// Steps from which on a record is long: it is then worth being gone through in parts.
+/// Number of steps from which a record is processed in parts.
 pub(crate) const LONG_RECORD_STEPS: usize = 1 << 15;

@@ -1,31 +1,31 @@
-//! Sensors: gain, offset and drift between a response and its samples.
+//! Sensors: gain, offset and drift.
 
-use crate::functions::Value;
+use crate::functions::ScalarValue;
 
-/// Reading `= gain * motion + offset + drift * time`.
+/// Sensor model `sample = gain * response + offset + drift * time`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensor {
-    /// Factor, without unit.
-    pub gain: Value,
-    /// Reading at rest, in the unit of the channel.
-    pub offset: Value,
-    /// Change of the offset, in the unit of the channel per s.
-    pub drift: Value,
+    /// Gain, dimensionless.
+    pub gain: ScalarValue,
+    /// Offset, in the unit of the channel.
+    pub offset: ScalarValue,
+    /// Drift, in the unit of the channel per s.
+    pub drift: ScalarValue,
 }
 
 impl Default for Sensor {
-    /// A perfect sensor.
+    /// An ideal sensor.
     fn default() -> Self {
         Self {
-            gain: Value::Known(1.0),
-            offset: Value::Known(0.0),
-            drift: Value::Known(0.0),
+            gain: ScalarValue::Known(1.0),
+            offset: ScalarValue::Known(0.0),
+            drift: ScalarValue::Known(0.0),
         }
     }
 }
 
 impl Sensor {
-    fn list(self) -> [Value; 3] {
+    fn list(self) -> [ScalarValue; 3] {
         [self.gain, self.offset, self.drift]
     }
 
@@ -34,15 +34,15 @@ impl Sensor {
         self.list().map(|value| value.of(scalars))
     }
 
-    /// Their changes along a change of the scalars.
+    /// Changes of gain, offset and drift along a change of the scalars.
     pub fn changes(self, scalars: &[f64]) -> [f64; 3] {
         self.indices()
             .map(|index| index.map_or(0.0, |i| scalars[i]))
     }
 
-    /// Which scalars they are, where they are sought.
+    /// Indices of the estimated scalars.
     pub fn indices(self) -> [Option<usize>; 3] {
-        self.list().map(Value::index)
+        self.list().map(ScalarValue::index)
     }
 
     /// Adds the gradient with respect to the scalars: `slope` times the `factors` of gain, offset and drift.

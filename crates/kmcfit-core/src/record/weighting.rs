@@ -1,42 +1,42 @@
 //! Weights of residuals.
 
-/// How the residuals of a channel are weighed.
+/// Weights of the residuals of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Weighting {
-    /// `J = integral r^2 dt` by the trapezoid rule over equally spaced readings (Eq. 1), in m^2 s.
+    /// `J = integral r^2 dt` by the trapezoid rule over equally spaced samples (Eq. 1), in m^2 s.
     Integral {
-        /// Spacing of the readings, s.
+        /// Spacing of the samples, s.
         spacing: f64,
     },
-    /// The same over readings at any times: the weight of each, s.
+    /// The same integral over samples at arbitrary times.
     Trapezoid(
-        /// One weight per reading, s.
+        /// One weight per sample, s.
         Vec<f64>,
     ),
-    /// `J = sum (r / sigma)^2`: chi-square, without a factor 1/2 and without `dt`.
+    /// Chi-square `J = sum (r / sigma)^2`, without a factor 1/2 and without `dt`.
     Sigma(
-        /// Standard deviation of a reading, in the unit of the channel.
+        /// Standard deviation of a sample, in the unit of the channel.
         f64,
     ),
-    /// The same with a standard deviation that is estimated: its present value.
+    /// Chi-square with an estimated standard deviation, at its present value.
     Estimated {
-        /// In the unit of the channel.
+        /// Standard deviation, in the unit of the channel.
         sigma: f64,
     },
-    /// The same with a standard deviation for each reading.
+    /// Chi-square with a standard deviation for each sample.
     Sigmas(
-        /// One per reading.
+        /// One standard deviation per sample.
         Vec<f64>,
     ),
 }
 
 impl Weighting {
-    /// Whether readings have a standard deviation, so that J is a chi-square.
+    /// True if samples have a standard deviation, so that J is a chi-square.
     pub fn is_sigma(&self) -> bool {
         !matches!(self, Self::Integral { .. } | Self::Trapezoid(_))
     }
 
-    /// Standard deviation of reading `i`; `None` for the integral cost.
+    /// Standard deviation of sample `i`; `None` for the integral cost.
     #[inline]
     pub fn sigma(&self, i: usize) -> Option<f64> {
         match self {
@@ -46,7 +46,7 @@ impl Weighting {
         }
     }
 
-    /// Weight `w_i` of reading `i` of `count`, so that `J = sum w_i r_i^2`.
+    /// Weight `w_i` of sample `i` of `count`, so that `J = sum w_i r_i^2`.
     #[inline]
     pub fn weight(&self, i: usize, count: usize) -> f64 {
         match self {
@@ -58,7 +58,7 @@ impl Weighting {
         }
     }
 
-    /// Keeps the first `count` readings.
+    /// Keeps the first `count` samples.
     pub(super) fn truncate(&mut self, count: usize) {
         match self {
             Self::Trapezoid(list) | Self::Sigmas(list) => list.truncate(count),

@@ -1,24 +1,24 @@
-//! Readings at the end of a sensor's range.
+//! Detection of clipped samples.
 
-/// Fewest readings at an end, and fewest in a row somewhere.
+/// Smallest number of samples at the limit, and of consecutive ones.
 const FEWEST: usize = 8;
 const ROW: usize = 3;
-/// The end holds so many times the readings of the next level inwards: a sine of coarse resolution reaches 2.4.
+/// Ratio of the samples at the limit to those at the next level inwards; a coarsely quantised sine has up to 2.4.
 const PILED_UP: usize = 5;
-/// More than this share at one end is no motion that was cut, but a sensor at rest or a switch.
+/// Largest share of samples at one limit; a larger share belongs to a sensor at rest or a switch.
 const AT_MOST: f64 = 0.5;
 
-/// The number of readings that lie exactly at the largest or smallest value, and that value, if they pile up there as
-/// those of a motion do that goes beyond the range of the sensor; of both ends that with more of them.
+/// Number of samples exactly at the largest or smallest value, and that value, if they accumulate there as those of a response
+/// beyond the range of the sensor; for both limits, the one with more samples. `None` without clipping.
 ///
 /// ```
 /// use kmcfit_core::internals::signal::clipped;
 /// let wave: Vec<f64> = (0..400).map(|i| (0.1 * f64::from(i)).sin()).collect();
 /// assert_eq!(clipped(&wave), None);
 /// let cut: Vec<f64> = wave.iter().map(|y| y.min(0.9)).collect();
-/// let (readings, level) = clipped(&cut).expect("it is cut");
+/// let (samples, level) = clipped(&cut).expect("it is cut");
 /// assert_eq!(level, 0.9);
-/// assert_eq!(readings, wave.iter().filter(|y| **y >= 0.9).count());
+/// assert_eq!(samples, wave.iter().filter(|y| **y >= 0.9).count());
 /// let coarse: Vec<f64> = wave.iter().map(|y| (10.0 * y).round() / 10.0).collect();
 /// assert_eq!(clipped(&coarse), None);
 /// ```
@@ -39,5 +39,5 @@ pub fn clipped(values: &[f64]) -> Option<(usize, f64)> {
     let ends = [piled_up(1.0), piled_up(-1.0)];
     ends.into_iter()
         .flatten()
-        .max_by_key(|(readings, _)| *readings)
+        .max_by_key(|(samples, _)| *samples)
 }

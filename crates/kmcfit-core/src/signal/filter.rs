@@ -1,4 +1,4 @@
-//! Butterworth filters as chains of sections of second order, and how they are applied.
+//! Butterworth filters as cascades of second-order sections, and zero-phase filtering.
 //!
 //! The coefficients of the sections are from the crate `biquad`: bilinear transforms of the
 //! sections of the analogue filter, at exact cutoffs.
@@ -7,10 +7,10 @@ use std::f64::consts::PI;
 
 use biquad::{Coefficients, Type};
 
-/// How far a filter's answer has decayed where the padding ends.
+/// Decay of the impulse response at the end of the padding.
 const SETTLED: f64 = 1e-8;
 
-/// A section of a filter:
+/// A second-order section of a filter:
 ///
 /// ```text
 /// y_i = b0 x_i + b1 x_{i-1} + b2 x_{i-2} - a1 y_{i-1} - a2 y_{i-2}
@@ -24,12 +24,12 @@ pub struct SecondOrder {
 }
 
 impl SecondOrder {
-    /// What it makes of a constant.
+    /// Gain of a constant.
     fn gain_of_constants(&self) -> f64 {
         self.b.iter().sum::<f64>() / (1.0 + self.a[0] + self.a[1])
     }
 
-    /// The size of its larger pole: by which factor its answer decays per sample in the end.
+    /// Magnitude of the larger pole, the decay of the impulse response per sample.
     fn decay(&self) -> f64 {
         let [a1, a2] = self.a;
         let discriminant = a1 * a1 / 4.0 - a2;
@@ -54,8 +54,7 @@ impl SecondOrder {
 
 /// A Butterworth low-pass filter: `|H(f)|² = 1/(1 + (tan(π f/rate)/tan(π cutoff/rate))^(2 order))`.
 ///
-/// Low cutoffs cost digits, as the square of cutoff/rate: the gain is right to some 1e-8 where the
-/// cutoff is 1e-4 of the rate.
+/// Low cutoffs lose digits with the square of cutoff/rate: the gain is accurate to about 1e-8 for a cutoff of 1e-4 of the rate.
 ///
 /// `None` unless the order is at least 1 and the cutoff, in Hz, lies between zero and half of the
 /// sampling rate, in Hz.
@@ -71,8 +70,7 @@ pub fn high_pass(order: usize, cutoff: f64, rate: f64) -> Option<Vec<SecondOrder
     butterworth(order, cutoff, rate, Type::HighPass, rest)
 }
 
-/// A high-pass filter at `low` and a low-pass filter at `high`, both of this order, one after the
-/// other.
+/// A high-pass filter at `low` and a low-pass filter at `high`, both of this order, in series.
 ///
 /// `None` unless `low < high`, or as [`low_pass`].
 pub fn band_pass(order: usize, low: f64, high: f64, rate: f64) -> Option<Vec<SecondOrder>> {
@@ -81,8 +79,8 @@ pub fn band_pass(order: usize, low: f64, high: f64, rate: f64) -> Option<Vec<Sec
     (low < high).then_some(sections)
 }
 
-/// The sections of a Butterworth filter: pairs of poles of quality `1/(2 sin((2 k + 1) π/(2 n)))`,
-/// and one of first order where the order n is odd.
+/// Sections of a Butterworth filter: pairs of poles of quality `1/(2 sin((2 k + 1) π/(2 n)))`, and one first-order section for odd
+/// order n.
 fn butterworth(
     order: usize,
     cutoff: f64,
@@ -90,7 +88,7 @@ fn butterworth(
     kind: Type<f64>,
     first_order: impl Fn(f64) -> Option<SecondOrder>,
 ) -> Option<Vec<SecondOrder>> {
-    // As a part of half the rate, which is what the crate takes.
+    // As a share of half the rate, as the crate requires.
     let cutoff = 2.0 * cutoff / rate;
     if order == 0 || !(rate > 0.0 && cutoff > 0.0 && cutoff < 1.0) {
         return None;
@@ -116,11 +114,11 @@ fn section(kind: Type<f64>, cutoff: f64, quality: f64) -> Option<SecondOrder> {
 }
 
 fn first_order_low_pass(cutoff: f64) -> Option<SecondOrder> {
-    // It has no quality, but the crate wants a positive one.
+    // A first-order section has no quality, but the crate requires a positive one.
     section(Type::SinglePoleLowPass, cutoff, 1.0)
 }
 
-/// What a section of first order leaves out: `1 - H`, which makes a high-pass of a low-pass.
+/// Complement `1 - H` of a first-order section, which turns a low-pass into a high-pass.
 fn complement(low: SecondOrder) -> SecondOrder {
     SecondOrder {
         b: [1.0 - low.b[0], low.a[0] - low.b[1], 0.0],
@@ -128,16 +126,16 @@ fn complement(low: SecondOrder) -> SecondOrder {
     }
 }
 
-/// Filters a series from rest, in its place.
+/// Filters a series from rest, in place.
 pub fn apply(sections: &[SecondOrder], values: &mut [f64]) {
     for section in sections {
         section.apply(values);
     }
 }
 
-/// Filters a series forward and then backward, from rest at both ends: no phase, gain `|H|²`.
+/// Filters a series forward and then backward, from rest at both ends: zero phase, gain `|H|²`.
 ///
-/// It is a linear map of the series. The ends are filtered as if zeros surrounded the series.
+/// A linear map of the series, with zeros beyond both ends.
 pub fn zero_phase(sections: &[SecondOrder], values: &[f64]) -> Vec<f64> {
     let mut values = values.to_vec();
     for _ in 0..2 {
@@ -147,17 +145,16 @@ pub fn zero_phase(sections: &[SecondOrder], values: &[f64]) -> Vec<f64> {
     values
 }
 
-/// The transpose of [`zero_phase`].
+/// Transpose of [`zero_phase`].
 ///
-/// Filtering from rest, `H`, is a Toeplitz matrix, so that filtering backward, with `R` for
-/// reversal, is its transpose, `R H R = Hᵀ`. So `zero_phase` is `Hᵀ H`: it is its own transpose.
+/// Filtering from rest, `H`, is a Toeplitz matrix; with the reversal `R`, filtering backward is `R H R = Hᵀ`. Hence `zero_phase` is
+/// `Hᵀ H`, its own transpose.
 pub fn zero_phase_transpose(sections: &[SecondOrder], values: &[f64]) -> Vec<f64> {
     zero_phase(sections, values)
 }
 
-/// As [`zero_phase`], for the preparation of data: the series is continued at both ends by its
-/// reflection, `2 x_0 - x_i`, until the filter's answer has decayed to 1e-8 or for as long as the
-/// series is, and both passes begin as if the first value had been there for ever.
+/// [`zero_phase`] with padding, for the preparation of data: the series is extended at both ends by its reflection, `2 x_0 - x_i`,
+/// until the impulse response has decayed to 1e-8 or by its own length, and both passes start in the steady state of the first value.
 pub fn zero_phase_padded(sections: &[SecondOrder], values: &[f64]) -> Vec<f64> {
     let [first, .., last] = *values else {
         let gain: f64 = sections
@@ -179,7 +176,7 @@ pub fn zero_phase_padded(sections: &[SecondOrder], values: &[f64]) -> Vec<f64> {
     padded[pad..pad + n].to_vec()
 }
 
-/// Filters as if the first value had been there for ever.
+/// Filters from the steady state of the first value.
 fn apply_from_constant(sections: &[SecondOrder], values: &mut [f64]) {
     for section in sections {
         let Some(&first) = values.first() else {
@@ -192,7 +189,7 @@ fn apply_from_constant(sections: &[SecondOrder], values: &mut [f64]) {
     }
 }
 
-/// Samples after which the answer of a filter has decayed.
+/// Number of samples after which the impulse response has decayed.
 fn settling(sections: &[SecondOrder]) -> usize {
     let slowest = sections.iter().map(SecondOrder::decay).fold(0.0, f64::max);
     match slowest > 0.0 && slowest < 1.0 {
@@ -206,7 +203,7 @@ mod tests {
     use super::*;
     use std::f64::consts::TAU;
 
-    /// `|H(f)|` of a chain, from its transfer function.
+    /// Gain `|H(f)|` of a cascade, from its transfer function.
     fn gain(sections: &[SecondOrder], frequency: f64, rate: f64) -> f64 {
         let turn = TAU * frequency / rate;
         let at = |c0: f64, c1: f64, c2: f64| {
@@ -221,7 +218,7 @@ mod tests {
         gains.product()
     }
 
-    /// A series without structure, from a fixed seed.
+    /// Reproducible noise from a seed.
     fn noise(n: usize, mut state: u64) -> Vec<f64> {
         let mut next = || {
             state = state
@@ -233,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn gains_are_those_of_butterworth() {
+    fn gains_are_those_of_butterworth_filters() {
         let rate = 1000.0;
         for order in 1..=8 {
             for cutoff in [10.0, 120.0, 450.0] {
@@ -244,7 +241,7 @@ mod tests {
                     let ratio = (PI * f / rate).tan() / (PI * cutoff / rate).tan();
                     let power = ratio.powi(2 * order as i32);
                     let (l, h) = (1.0 / (1.0 + power), power / (1.0 + power));
-                    // 1 - cos of the cutoff loses some three digits at 10 Hz.
+                    // Cancellation in 1 - cos of the cutoff loses about three digits at 10 Hz.
                     let near = |g: f64, p: f64| (g - p.sqrt()).abs() < 1e-10 * p.sqrt() + 1e-13;
                     assert!(near(gain(&low, f, rate), l), "low {order} {cutoff} {f}");
                     assert!(near(gain(&high, f, rate), h), "high {order} {cutoff} {f}");
@@ -260,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_band_is_passed() {
+    fn a_band_pass_has_its_gain() {
         let band = band_pass(4, 10.0, 100.0, 1000.0).unwrap();
         assert!((gain(&band, 31.0, 1000.0) - 1.0).abs() < 1e-3);
         for edge in [10.0, 100.0] {
@@ -272,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_filter_is_refused() {
+    fn invalid_filters_are_rejected() {
         assert_eq!(low_pass(0, 10.0, 100.0), None);
         for cutoff in [0.0, -1.0, 50.0, 60.0, f64::NAN, f64::INFINITY] {
             assert_eq!(low_pass(2, cutoff, 100.0), None, "{cutoff}");
@@ -283,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn the_answer_to_tones_has_the_gain_and_no_phase() {
+    fn tones_have_the_gain_and_zero_phase() {
         let rate = 200.0;
         let filter = low_pass(4, 12.0, rate).unwrap();
         let tone: Vec<f64> = (0..2000)
@@ -291,14 +288,14 @@ mod tests {
             .collect();
         let filtered = zero_phase(&filter, &tone);
         let expected = gain(&filter, 10.0, rate).powi(2);
-        // In the middle, 500 samples from the ends: the slowest pole decays by 0.87 a sample.
+        // In the middle, 500 samples from the ends: the slowest pole decays by a factor 0.87 per sample.
         for i in 500..1500 {
             assert!((filtered[i] - expected * tone[i]).abs() < 1e-12);
         }
     }
 
     #[test]
-    fn zero_phase_is_linear_with_its_transpose() {
+    fn zero_phase_is_its_own_transpose() {
         let (x, y) = (noise(300, 1), noise(300, 2));
         for filter in [
             low_pass(8, 8.0, 100.0).unwrap(),
@@ -308,7 +305,7 @@ mod tests {
             let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
             let (fx, ty) = (zero_phase(&filter, &x), zero_phase_transpose(&filter, &y));
             let scale = dot(&fx, &fx).sqrt() * dot(&y, &y).sqrt();
-            // Sums of 300 terms, filtered by poles near the circle.
+            // Sums of 300 terms, filtered by poles near the unit circle.
             assert!((dot(&fx, &y) - dot(&x, &ty)).abs() < 1e-13 * scale);
             let sum: Vec<f64> = x.iter().zip(&y).map(|(x, y)| 2.0 * x - 3.0 * y).collect();
             let (fsum, fy) = (zero_phase(&filter, &sum), zero_phase(&filter, &y));
@@ -319,10 +316,10 @@ mod tests {
     }
 
     #[test]
-    fn padding_keeps_lines_and_removes_constants() {
+    fn padding_preserves_lines_and_removes_constants() {
         let line: Vec<f64> = (0..400).map(|i| 5.0 + 0.1 * f64::from(i)).collect();
         let low = zero_phase_padded(&low_pass(4, 10.0, 100.0).unwrap(), &line);
-        // The reflected line is the same line; at the far end of the padding it begins at rest.
+        // The reflected line is the same line; the far end of the padding starts from rest.
         for (filtered, x) in low.iter().zip(&line) {
             assert!((filtered - x).abs() < 1e-6, "{filtered} {x}");
         }

@@ -1,28 +1,26 @@
-//! A signal between its samples.
+//! Interpolation of a signal between its samples.
 
 use super::spline;
 
-/// How far, as a part of the nearest spacing, a time may be from a sample to be taken for it, and
-/// outside the samples to be taken for their end: times are printed and computed with rounding.
+/// Largest distance, relative to the nearest spacing, of a time that is taken as a sample, and of a time outside the samples that is
+/// taken as their end, because times are rounded.
 const NEARNESS: f64 = 1e-6;
 
-/// What a signal does between its samples.
+/// Interpolation between samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Interpolation {
-    /// It stays at the last sample until the next one: it jumps there.
+    /// Zero-order hold: the last sample until the next one, with jumps.
     Hold,
-    /// It goes in lines.
+    /// Piecewise linear.
     #[default]
     Linear,
-    /// It is the cubic spline through the samples that is not bent at the second and the last but
-    /// one ("not a knot"): exact for cubics, of order 4 in the spacing for smooth signals.
+    /// Cubic spline with not-a-knot end conditions: exact for cubics, fourth-order accurate for smooth signals.
     Cubic,
 }
 
-/// Samples at increasing times and what lies between them.
+/// Samples at increasing times, with interpolation between them.
 ///
-/// Outside the samples it is clamped: a time before the first or after the last is taken for it.
-/// Ask [`covers`](Self::covers) first.
+/// Outside the samples the first or last value holds; [`covers`](Self::covers) tests a span.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signal {
     times: Vec<f64>,
@@ -35,11 +33,10 @@ pub struct Signal {
 impl Signal {
     /// A signal through samples at times in s.
     ///
-    /// Two samples of a cubic signal are joined by a line, three by a parabola. A single sample
-    /// is a constant at one time.
+    /// Two samples of a cubic signal define a line, three a parabola; a single sample is a constant.
     ///
-    /// `None` where there is no sample, the numbers of times and values differ, a time or value is
-    /// not finite, the times do not increase, or they are so close that a spline overflows.
+    /// `None` if there is no sample, the numbers of times and values differ, a time or value is not finite, the times do not increase, or
+    /// they are so close that a spline overflows.
     pub fn new(times: Vec<f64>, values: Vec<f64>, interpolation: Interpolation) -> Option<Self> {
         let increasing = times.windows(2).all(|pair| pair[0] < pair[1]);
         let finite = times.iter().chain(&values).all(|x| x.is_finite());
@@ -77,18 +74,17 @@ impl Signal {
         &self.times
     }
 
-    /// The samples.
+    /// Values of the samples.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// What it does between the samples.
+    /// Interpolation between the samples.
     pub fn interpolation(&self) -> Interpolation {
         self.interpolation
     }
 
-    /// Whether the samples reach from `from` to `to`, but for rounding: 1e-6 of the spacing at the
-    /// end in question.
+    /// True if the samples cover `from` to `to`, to within 1e-6 of the spacing at each end.
     pub fn covers(&self, from: f64, to: f64) -> bool {
         let n = self.times.len();
         let (first, last) = (self.times[0], self.times[n - 1]);
@@ -99,7 +95,7 @@ impl Signal {
         from >= first - NEARNESS * spacings.0 && to <= last + NEARNESS * spacings.1
     }
 
-    /// The value at a time; where it jumps, the value after the jump.
+    /// Value at a time; at a jump the value after it.
     pub fn value(&self, t: f64) -> f64 {
         match self.interpolation {
             Interpolation::Hold => self.values[self.held(t, false)],
@@ -107,7 +103,7 @@ impl Signal {
         }
     }
 
-    /// The limit of the value from the left: where it jumps, the value before the jump.
+    /// Left limit of the value: at a jump the value before it.
     pub fn value_before(&self, t: f64) -> f64 {
         match self.interpolation {
             Interpolation::Hold => self.values[self.held(t, true)],
@@ -115,9 +111,9 @@ impl Signal {
         }
     }
 
-    /// The first derivative at a time, per s; where it jumps, the one after.
+    /// First derivative at a time, per s; at a kink the one after it.
     ///
-    /// Zero for a signal that is held, whose jumps are not counted.
+    /// Zero for a zero-order hold, without its jumps.
     pub fn derivative(&self, t: f64) -> f64 {
         match (self.interpolation, self.cell(t)) {
             (Interpolation::Hold, _) | (_, None) => 0.0,
@@ -129,7 +125,7 @@ impl Signal {
         }
     }
 
-    /// The second derivative at a time, per s²; zero unless cubic, as kinks are not counted.
+    /// Second derivative at a time, per s²; zero unless cubic, without kinks.
     pub fn second_derivative(&self, t: f64) -> f64 {
         match (self.interpolation, self.cell(t)) {
             (Interpolation::Cubic, Some(cell)) => {
@@ -157,21 +153,21 @@ impl Signal {
         }
     }
 
-    fn piece(&self, cell: usize) -> spline::Piece {
-        spline::Piece {
+    fn piece(&self, cell: usize) -> spline::SplineSegment {
+        spline::SplineSegment {
             times: [self.times[cell], self.times[cell + 1]],
             values: [self.values[cell], self.values[cell + 1]],
             curvatures: [self.curvatures[cell], self.curvatures[cell + 1]],
         }
     }
 
-    /// The sample that is held at a time, or just before it.
+    /// Index of the sample held at a time, or just before it.
     fn held(&self, t: f64, before: bool) -> usize {
         let Some(cell) = self.cell(t) else {
             return 0;
         };
         let near = NEARNESS * (self.times[cell + 1] - self.times[cell]);
-        // A time that is a sample but for rounding is the sample.
+        // A time that differs from a sample by rounding is that sample.
         if (t - self.times[cell]).abs() <= near {
             cell.saturating_sub(usize::from(before))
         } else if t >= self.times[cell + 1] - near {
@@ -182,11 +178,11 @@ impl Signal {
         }
     }
 
-    /// The interval between samples that a time lies in, the first or the last one outside of
-    /// them; of two the later one. `None` where there is only one sample.
+    /// Interval between samples that contains a time, the first or the last one outside the samples; at a sample the later interval.
+    /// `None` for a single sample.
     fn cell(&self, t: f64) -> Option<usize> {
         let last = self.times.len().checked_sub(2)?;
-        // Where the samples are equally spaced, the place is known but for rounding.
+        // For equally spaced samples the index is known except for rounding.
         let span = self.times[last + 1] - self.times[0];
         let guess = ((t - self.times[0]) / span * (last + 1) as f64) as usize;
         for cell in [guess, guess.saturating_sub(1), guess + 1] {
@@ -229,8 +225,7 @@ mod tests {
             for i in 0..=200 {
                 let part = f64::from(i) / 200.0;
                 let t = times[0] + part * (times[count - 1] - times[0]);
-                // Values of some 100 at most; a second derivative divides their rounding by the
-                // square of the shortest spacing, 1/400.
+                // Values up to about 100; a second derivative divides their rounding errors by the square of the shortest spacing, 1/400.
                 assert!((signal.value(t) - cubic(t)).abs() < 1e-12, "{count} {t}");
                 let slope = -2.0 + t - 2.25 * t * t;
                 assert!((signal.derivative(t) - slope).abs() < 1e-11, "{count} {t}");
@@ -244,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn few_samples_make_lines_and_parabolas() {
+    fn few_samples_define_lines_and_parabolas() {
         let times = irregular(3);
         let parabola = |t: f64| 3.0 - t + 2.0 * t * t;
         let signal = sampled(&times, parabola, Interpolation::Cubic);
@@ -293,13 +288,13 @@ mod tests {
     }
 
     #[test]
-    fn held_signals_jump_at_the_samples() {
+    fn held_signals_jump_at_samples() {
         let spacing = 0.1;
         let values: Vec<f64> = (0..1001).map(f64::from).collect();
         let signal = Signal::equally_spaced(0.0, spacing, values, Interpolation::Hold).unwrap();
         for i in 1..1000 {
             let index = f64::from(i);
-            // Also where the time was computed in another way and differs by rounding.
+            // Also where a time computed differently differs by rounding.
             for t in [
                 index * spacing,
                 index / 10.0,
@@ -335,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn spans_are_covered_but_for_rounding() {
+    fn spans_are_covered_to_within_rounding() {
         let signal =
             Signal::equally_spaced(0.0, 0.1, vec![0.0; 11], Interpolation::Linear).unwrap();
         assert!(signal.covers(0.0, 1.0));
@@ -345,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_signal_is_refused() {
+    fn invalid_signals_are_rejected() {
         for (times, values) in [
             (vec![], vec![]),
             (vec![0.0, 1.0], vec![1.0]),

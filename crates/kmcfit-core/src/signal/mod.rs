@@ -1,5 +1,4 @@
-//! Signals over time, without knowledge of the device: values between samples, shapes of
-//! excitation, filters, spectra.
+//! Signals over time: interpolation, excitation shapes, filters, decimation, spectra, and checks of samples.
 //!
 //! ```
 //! use kmcfit_core::{Interpolation, Signal};
@@ -25,6 +24,6 @@ pub use decimate::{decimate, decimation_filter};
 pub use filter::{SecondOrder, band_pass, high_pass, low_pass, zero_phase, zero_phase_transpose};
 pub use interpolate::{Interpolation, Signal};
 pub use onset::onset;
-pub use shape::{Shape, SweepLaw};
+pub use shape::{ExcitationShape, SweepLaw};
 pub use spacing::{even_spacing, median, median_spacing};
 pub use spectrum::Spectrum;

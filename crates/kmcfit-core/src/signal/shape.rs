@@ -1,96 +1,95 @@
-//! Shapes of excitation that are given by a formula.
+//! Excitation shapes given by formulas.
 
 use std::f64::consts::{PI, TAU};
 
-/// How far, relative to a time, one that is computed on a grid may be from it and still be it.
+/// Largest distance, relative to a time, of a computed time that is taken as equal.
 const ROUNDING: f64 = 1e-12;
 
-/// How the frequency of a sweep goes from its first to its last value.
+/// Frequency of a sweep over time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SweepLaw {
-    /// By equal differences in equal times: `f = f0 + (f1 - f0) s/T`.
+    /// Linear: `f = f0 + (f1 - f0) s/T`.
     #[default]
     Linear,
-    /// By equal factors in equal times: `f = f0 (f1/f0)^(s/T)`.
+    /// Logarithmic: `f = f0 (f1/f0)^(s/T)`.
     Logarithmic,
 }
 
-/// A shape over time. Amplitudes are in the unit of the signal, times in s, frequencies in Hz,
-/// phases in rad.
+/// An excitation shape. Amplitudes are in the unit of the signal, times in s, frequencies in Hz, phases in rad.
 ///
 /// ```
-/// use kmcfit_core::internals::signal::Shape;
-/// let step = Shape::Step { amplitude: 2.0, at: 1.0 };
+/// use kmcfit_core::internals::signal::ExcitationShape;
+/// let step = ExcitationShape::Step { amplitude: 2.0, at: 1.0 };
 /// assert_eq!((step.value_before(1.0), step.value(1.0)), (0.0, 2.0));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Shape {
-    /// `a`.
+pub enum ExcitationShape {
+    /// Constant `a`.
     Constant {
-        /// `a`.
+        /// Amplitude `a`.
         amplitude: f64,
     },
-    /// `a sin(2π f t + phase)`.
+    /// Sine `a sin(2π f t + phase)`.
     Sine {
-        /// `a`.
+        /// Amplitude `a`.
         amplitude: f64,
-        /// `f`, Hz.
+        /// Frequency `f`, Hz.
         frequency: f64,
-        /// At time zero, rad.
+        /// Phase at time zero, rad.
         phase: f64,
     },
-    /// `a sin(2π ∫ f ds)` for `0 <= s < T`, zero elsewhere, with `s = t - start`:
+    /// Sweep `a sin(2π ∫ f ds)` for `0 <= s < T`, zero elsewhere, with `s = t - start`:
     ///
     /// ```text
     /// linear       ∫ f ds = f0 s + (f1 - f0) s²/(2 T)
     /// logarithmic  ∫ f ds = f0 T/ln(f1/f0) ((f1/f0)^(s/T) - 1)
     /// ```
     ///
-    /// It may jump at the end. A logarithmic one needs frequencies above zero.
+    /// It may jump at the end. A logarithmic sweep needs positive frequencies.
     Sweep {
-        /// `a`.
+        /// Amplitude `a`.
         amplitude: f64,
-        /// `f0`, Hz.
+        /// Initial frequency `f0`, Hz.
         from: f64,
-        /// `f1`, Hz.
+        /// Final frequency `f1`, Hz.
         to: f64,
-        /// Where it begins, s.
+        /// Start, s.
         start: f64,
-        /// `T`, s.
+        /// Duration `T`, s.
         duration: f64,
-        /// How the frequency goes from `f0` to `f1`.
+        /// Frequency law.
         law: SweepLaw,
     },
-    /// Zero before `at`, `a` from there.
+    /// Step: zero before `at`, `a` from there.
     Step {
-        /// `a`.
+        /// Height `a`.
         amplitude: f64,
-        /// Where it jumps, s.
+        /// Time of the step, s.
         at: f64,
     },
-    /// `a sin(π (t - at)/T)` for `at <= t < at + T`, zero elsewhere: a soft blow.
+    /// Half sine `a sin(π (t - at)/T)` for `at <= t < at + T`, zero elsewhere.
     HalfSine {
-        /// `a`.
+        /// Amplitude `a`.
         amplitude: f64,
-        /// Where it begins, s.
+        /// Start, s.
         at: f64,
-        /// `T`, s.
+        /// Duration `T`, s.
         duration: f64,
     },
 }
 
-impl Shape {
-    /// The value at a time; where it jumps, the value after the jump.
+impl ExcitationShape {
+    /// Value at a time; at a jump the value after it.
     pub fn value(&self, t: f64) -> f64 {
         self.on(t, |time| t >= time - ROUNDING * time.abs())
     }
 
-    /// The limit of the value from the left: where it jumps, the value before the jump.
+    /// Left limit of the value: at a jump the value before it.
     pub fn value_before(&self, t: f64) -> f64 {
         self.on(t, |time| t > time + ROUNDING * time.abs())
     }
 
-    /// The times, increasing, where it jumps or has a kink, so that no step should cross them.
+    /// Times of jumps and kinks, increasing, which no step should cross.
     pub fn breaks(&self) -> Vec<f64> {
         match *self {
             Self::Constant { .. } | Self::Sine { .. } => Vec::new(),
@@ -104,7 +103,7 @@ impl Shape {
         }
     }
 
-    /// The value at `t`, where `has_come` says whether a break is past.
+    /// Value at `t`; `has_come` is true for breaks at or before the time.
     fn on(&self, t: f64, has_come: impl Fn(f64) -> bool) -> f64 {
         let during = |from: f64, to: f64| has_come(from) && !has_come(to);
         match *self {
@@ -135,11 +134,11 @@ impl Shape {
     }
 }
 
-/// Cycles of a sweep after `s` seconds.
+/// Number of cycles of a sweep after `s` seconds.
 fn cycles(from: f64, to: f64, duration: f64, law: SweepLaw, s: f64) -> f64 {
     let octaves = (to / from).ln();
     match law {
-        // Without change of frequency, the two laws are one.
+        // Without a change of frequency both laws are equal.
         SweepLaw::Logarithmic if octaves != 0.0 => {
             from * duration / octaves * (octaves * s / duration).exp_m1()
         }
@@ -151,7 +150,7 @@ fn cycles(from: f64, to: f64, duration: f64, law: SweepLaw, s: f64) -> f64 {
 mod tests {
     use super::*;
 
-    const SWEEP: Shape = Shape::Sweep {
+    const SWEEP: ExcitationShape = ExcitationShape::Sweep {
         amplitude: 2.0,
         from: 1.0,
         to: 4.0,
@@ -162,8 +161,11 @@ mod tests {
 
     #[test]
     fn shapes_have_their_values() {
-        assert_eq!(Shape::Constant { amplitude: 3.0 }.value(-1.0), 3.0);
-        let sine = Shape::Sine {
+        assert_eq!(
+            ExcitationShape::Constant { amplitude: 3.0 }.value(-1.0),
+            3.0
+        );
+        let sine = ExcitationShape::Sine {
             amplitude: 2.0,
             frequency: 0.25,
             phase: PI / 2.0,
@@ -171,7 +173,7 @@ mod tests {
         assert_eq!(sine.value(0.0), 2.0);
         assert!(sine.value(1.0).abs() < 1e-15);
         assert!((sine.value(2.0) + 2.0).abs() < 1e-15);
-        let blow = Shape::HalfSine {
+        let blow = ExcitationShape::HalfSine {
             amplitude: 5.0,
             at: 1.0,
             duration: 0.5,
@@ -185,7 +187,7 @@ mod tests {
 
     #[test]
     fn jumps_have_two_sides() {
-        let step = Shape::Step {
+        let step = ExcitationShape::Step {
             amplitude: 2.0,
             at: 0.3,
         };
@@ -201,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn sweeps_have_the_frequencies_they_say() {
+    fn sweeps_have_their_frequencies() {
         for (law, middle) in [(SweepLaw::Linear, 2.5), (SweepLaw::Logarithmic, 2.0)] {
             let h = 1e-5;
             let frequency = |s: f64| {

@@ -1,9 +1,9 @@
-//! The spacing of sampling times.
+//! Spacing of sampling times.
 
-/// How far readings may be from equal spacing, in spacings.
+/// Largest deviation from equal spacing, in spacings.
 const REGULAR: f64 = 1e-6;
 
-/// The spacing of equally spaced times; `None` where they are not, or fewer than two.
+/// Spacing of equally spaced times; `None` for unequal spacing or fewer than two times.
 pub fn even_spacing(times: &[f64]) -> Option<f64> {
     let (&[first, .., last], intervals) = (times, times.len().checked_sub(1)?) else {
         return None;
@@ -14,7 +14,7 @@ pub fn even_spacing(times: &[f64]) -> Option<f64> {
     (!times.iter().enumerate().any(astray)).then_some(spacing)
 }
 
-/// The median distance of neighbours.
+/// Median distance of neighbouring times.
 ///
 /// # Panics
 /// If there are fewer than two times.
@@ -23,7 +23,7 @@ pub fn median_spacing(times: &[f64]) -> f64 {
     median(&spacings)
 }
 
-/// The median of values that are not empty.
+/// Median of a nonempty list of values.
 pub fn median(values: &[f64]) -> f64 {
     let mut values = values.to_vec();
     let middle = values.len() / 2;

@@ -5,25 +5,24 @@ use std::f64::consts::TAU;
 use rustfft::FftPlannerScalar;
 use rustfft::num_complex::Complex;
 
-/// One density of white noise in twenty thousand is so many times the mean of all.
+/// Ratio to the mean that one density of white noise in twenty thousand exceeds.
 const ABOVE_NOISE: f64 = 10.0;
-/// A motion stands out of noise with this share of the energy; of noise alone 1 in 2000 parts does.
+/// Smallest share of the energy of a response above noise; noise alone has 1 part in 2000.
 const STANDS_OUT: f64 = 0.02;
-/// Fewest values of which a spectrum is made.
+/// Smallest number of values for a spectrum.
 const FEWEST: usize = 4;
 
-/// The one-sided periodogram of an equally spaced series, without its mean, under a Hann window.
+/// One-sided periodogram of an equally spaced series, without its mean, with a Hann window.
 ///
-/// With the window `w_j = (1 - cos(2π j/n))/2` and spacing h, the power density at `f_k = k/(n h)`,
+/// With the window `w_j = (1 - cos(2π j/n))/2` and spacing h, the power spectral density at `f_k = k/(n h)`,
 /// `0 <= k <= n/2`, is
 ///
 /// ```text
 /// S_k = c h |sum_j w_j (x_j - mean) exp(-2π i j k/n)|² / sum_j w_j²
 /// ```
 ///
-/// in the squared unit of the series per Hz, with c = 1 at zero and at half the sampling rate and
-/// 2 elsewhere; the sum of `S_k/(n h)` is the variance, for a stationary series. The transform does
-/// not depend on the instructions of the processor.
+/// in the squared unit of the series per Hz, with c = 1 at zero and at half the sampling rate and 2 elsewhere; the sum of `S_k/(n h)`
+/// is the variance of a stationary series. The transform does not depend on the instruction set of the processor.
 ///
 /// ```
 /// use kmcfit_core::internals::signal::Spectrum;
@@ -39,10 +38,9 @@ pub struct Spectrum {
 }
 
 impl Spectrum {
-    /// The spectrum of values that are `spacing` seconds apart.
+    /// Computes the spectrum of values that are `spacing` seconds apart.
     ///
-    /// `None` where there are fewer than four values, one is not finite, all are the same, or the
-    /// spacing is not positive.
+    /// `None` if there are fewer than four values, one is not finite, all are equal, or the spacing is not positive.
     pub fn of(values: &[f64], spacing: f64) -> Option<Self> {
         let n = values.len();
         let varies = values.iter().any(|x| *x != values[0]);
@@ -71,24 +69,23 @@ impl Spectrum {
         })
     }
 
-    /// The distance of the frequencies, Hz.
+    /// Frequency spacing, Hz.
     pub fn resolution(&self) -> f64 {
         self.resolution
     }
 
-    /// The frequencies, from zero, Hz.
+    /// Frequencies from zero, Hz.
     pub fn frequencies(&self) -> impl Iterator<Item = f64> {
         (0..self.density.len()).map(|k| k as f64 * self.resolution)
     }
 
-    /// The power density at the frequencies, squared unit per Hz.
+    /// Power spectral densities at the frequencies, squared unit per Hz.
     pub fn density(&self) -> &[f64] {
         &self.density
     }
 
-    /// The frequency of the highest peak, Hz: the top of the parabola through the logarithms of the
-    /// highest value and its neighbours. A tone is found within 0.02 of the resolution, if its
-    /// frequency is at least three resolutions away from zero and from half the sampling rate.
+    /// Frequency of the highest peak, Hz, from the parabola through the logarithms of the highest value and its neighbours. The error for
+    /// a tone is below 0.02 of the frequency spacing, if its frequency is at least three spacings away from zero and half the sampling rate.
     pub fn dominant(&self) -> f64 {
         let mut peak = 1;
         for (k, density) in self.density.iter().enumerate().skip(2) {
@@ -99,15 +96,15 @@ impl Spectrum {
         (peak as f64 + self.off_centre(peak)) * self.resolution
     }
 
-    /// The frequencies, in Hz, between which this share of the energy lies, with equal parts of the
-    /// rest below and above: `band(0.999)` leaves out 0.05 % at either end.
+    /// Frequency band, in Hz, that contains this share of the energy, with equal parts of the rest below and above: `band(0.999)`
+    /// excludes 0.05 % at either end.
     pub fn band(&self, share: f64) -> [f64; 2] {
         let rest = 0.5 * (1.0 - share.clamp(0.0, 1.0));
         [self.energy_quantile(rest), self.energy_quantile(1.0 - rest)]
     }
 
-    /// The frequency, in Hz, below which the part `q` of the energy lies, `0 <= q <= 1`; the energy
-    /// of each frequency is spread evenly over half a resolution on both sides.
+    /// Frequency, in Hz, below which the share `q` of the energy lies, `0 <= q <= 1`; the energy of each frequency is distributed evenly
+    /// over one frequency spacing.
     pub fn energy_quantile(&self, q: f64) -> f64 {
         let last = self.density.len() - 1;
         let mut left = q.clamp(0.0, 1.0) * self.density.iter().sum::<f64>();
@@ -121,9 +118,9 @@ impl Spectrum {
         last as f64 * self.resolution
     }
 
-    /// The spectrum without white noise: densities below ten times its floor are zero. The floor is the mean of the
-    /// exponential distribution of a density of noise whose median is that of all densities. Where a motion fills half of
-    /// the frequencies, or there is nothing but noise, next to nothing stands out of it: then the spectrum as it is.
+    /// Spectrum without white noise: densities below ten times the noise floor are set to zero. The floor is the mean of the exponential
+    /// distribution of noise densities with the median of all densities. The spectrum is unchanged where almost nothing exceeds the noise:
+    /// for noise alone, or a response that fills half of the frequencies.
     ///
     /// ```
     /// use kmcfit_core::internals::signal::Spectrum;
@@ -154,7 +151,7 @@ impl Spectrum {
         }
     }
 
-    /// How far the top is from the highest value, in resolutions, from -1/2 to 1/2.
+    /// Offset of the peak from the highest value, in frequency spacings, from -1/2 to 1/2.
     fn off_centre(&self, peak: usize) -> f64 {
         let Some(&[left, top, right]) = self
             .density
@@ -187,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn the_dominant_frequency_is_found_between_the_lines() {
+    fn the_dominant_frequency_is_accurate_between_the_lines() {
         let (n, spacing) = (600, 0.01);
         let mut worst: f64 = 0.0;
         for i in 0..500 {
@@ -201,23 +198,23 @@ mod tests {
     }
 
     #[test]
-    fn the_density_has_the_variance() {
+    fn the_density_sums_to_the_variance() {
         for n in [1000, 1001, 997] {
             let values = tones(n, 0.01, &[(2.0, 10.0), (1.0, 31.0)]);
             let spectrum = Spectrum::of(&values, 0.01).unwrap();
             let energy: f64 = spectrum.density().iter().sum::<f64>() * spectrum.resolution();
-            // 2²/2 + 1²/2, but for parts of a period.
+            // 2²/2 + 1²/2, except for incomplete periods.
             assert!((energy - 2.5).abs() < 2e-3, "{n} {energy}");
             assert_eq!(spectrum.frequencies().count(), spectrum.density().len());
         }
     }
 
     #[test]
-    fn bands_hold_the_energy() {
+    fn bands_contain_the_energy() {
         let spacing = 0.01;
         let values = tones(2000, spacing, &[(1.0, 5.0), (1.0, 20.0)]);
         let spectrum = Spectrum::of(&values, spacing).unwrap();
-        // A tone under the window is four resolutions wide.
+        // A tone with a Hann window is four frequency spacings wide.
         let width = 2.0 * spectrum.resolution();
         let [low, high] = spectrum.band(0.999);
         assert!(
@@ -232,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_spectrum_is_refused() {
+    fn invalid_series_are_rejected() {
         assert_eq!(Spectrum::of(&[], 0.1), None);
         assert_eq!(Spectrum::of(&[1.0, 2.0, 3.0], 0.1), None);
         assert_eq!(Spectrum::of(&[1.0; 10], 0.1), None);

@@ -1,5 +1,5 @@
-//! Cubic splines that are not bent at the second and the last but one sample ("not a knot"),
-//! by their second derivatives `M_i` at the samples (de Boor, A Practical Guide to Splines, ch. IV).
+//! Cubic splines with not-a-knot end conditions, represented by their second derivatives `M_i` at the samples (de Boor, A Practical
+//! Guide to Splines, ch. IV).
 
 /// Second derivatives of the spline at the samples.
 ///
@@ -9,9 +9,8 @@
 /// h_{i-1} M_{i-1} + 2 (h_{i-1} + h_i) M_i + h_i M_{i+1} = 6 (d_i - d_{i-1})
 /// ```
 ///
-/// and one third derivative on both sides of the second sample gives
-/// `M_0 = (1 + h_0/h_1) M_1 - h_0/h_1 M_2`, likewise at the other end. With these the system is
-/// diagonally dominant for any spacings, and needs no pivots.
+/// and a third derivative that is continuous at the second sample gives `M_0 = (1 + h_0/h_1) M_1 - h_0/h_1 M_2`, likewise at the other
+/// end. The resulting system is diagonally dominant for any spacings and needs no pivoting.
 pub fn curvatures(times: &[f64], values: &[f64]) -> Vec<f64> {
     let n = times.len();
     if n < 3 {
@@ -43,7 +42,7 @@ pub fn curvatures(times: &[f64], values: &[f64]) -> Vec<f64> {
     }
     let mut bends = vec![0.0; n];
     for i in (0..inner).rev() {
-        // Beyond the last row the entry above belongs to the end, which was eliminated.
+        // In the last row the superdiagonal entry belongs to the eliminated end.
         let next = if i + 1 < inner {
             above[i] * bends[i + 2]
         } else {
@@ -56,22 +55,22 @@ pub fn curvatures(times: &[f64], values: &[f64]) -> Vec<f64> {
     bends
 }
 
-/// The spline between two samples.
+/// Spline between two samples.
 #[derive(Debug, Clone, Copy)]
-pub struct Piece {
+pub struct SplineSegment {
     pub times: [f64; 2],
     pub values: [f64; 2],
     pub curvatures: [f64; 2],
 }
 
-impl Piece {
-    /// Parts `A`, `B` of the interval on the right and the left of a time, and its length.
+impl SplineSegment {
+    /// Shares `A`, `B` of the interval on the right and the left of a time, and its length.
     fn parts(&self, t: f64) -> (f64, f64, f64) {
         let h = self.times[1] - self.times[0];
         ((self.times[1] - t) / h, (t - self.times[0]) / h, h)
     }
 
-    /// `A y_0 + B y_1 + ((A³ - A) M_0 + (B³ - B) M_1) h²/6`.
+    /// Value `A y_0 + B y_1 + ((A³ - A) M_0 + (B³ - B) M_1) h²/6`.
     pub fn value(&self, t: f64) -> f64 {
         let (a, b, h) = self.parts(t);
         let line = a * self.values[0] + b * self.values[1];
@@ -79,7 +78,7 @@ impl Piece {
         line + ((a * a * a - a) * left + (b * b * b - b) * right) * h * h / 6.0
     }
 
-    /// Its derivative.
+    /// First derivative.
     pub fn derivative(&self, t: f64) -> f64 {
         let (a, b, h) = self.parts(t);
         let slope = (self.values[1] - self.values[0]) / h;
@@ -87,7 +86,7 @@ impl Piece {
         slope + ((1.0 - 3.0 * a * a) * left + (3.0 * b * b - 1.0) * right) * h / 6.0
     }
 
-    /// `A M_0 + B M_1`.
+    /// Second derivative `A M_0 + B M_1`.
     pub fn second_derivative(&self, t: f64) -> f64 {
         let (a, b, _) = self.parts(t);
         a * self.curvatures[0] + b * self.curvatures[1]

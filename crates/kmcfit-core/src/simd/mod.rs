@@ -1,11 +1,10 @@
-//! Eight numbers at a time, with whatever the processor offers for it.
+//! SIMD arithmetic: eight numbers at a time, with the widest instruction set of the processor.
 //!
-//! A kernel ([`Kernel`]) is written once, in terms of [`Eight`], and compiled for AVX-512, for
-//! AVX2 and for plain numbers; which of them runs is decided when the program runs. All do the same IEEE
-//! operations on the same eight lanes in the same order and none contracts a product and a sum, so
-//! **all give the same bits**: the processor decides how fast an answer comes, never what it is.
+//! A kernel ([`Kernel`]) is written once, in terms of [`Eight`], and compiled for AVX-512, AVX2 and scalar arithmetic; the choice is
+//! made at run time. All variants do the same IEEE operations on the same eight lanes in the same order, without fused
+//! multiply-add, so **results are bit-identical** on all processors.
 //!
-//! [`pulp`] proves the presence of instructions by its types, so there is no `unsafe` here.
+//! [`pulp`] proves the presence of instructions by its types, so no `unsafe` code is needed.
 
 mod portable;
 pub(crate) mod sum;
@@ -21,14 +20,14 @@ use std::ffi::OsString;
 use std::ops::{Add, AddAssign, Deref, DerefMut, Div, Mul, Neg, Sub};
 use std::sync::LazyLock;
 
-/// Number of lanes.
+/// Number of SIMD lanes.
 pub(crate) const LANES: usize = 8;
 
-/// One value a lane, in memory.
+/// One value per lane, in memory.
 pub(crate) type Row = [f64; LANES];
 
-/// What lies on a boundary of 64 bytes, so that no row in it stands across two lines of the processor's memory: to read a
-/// row that has just been written takes several times as long there.
+/// Value aligned to 64 bytes, so that no row spans two cache lines; reading a recently written row that does takes several times as
+/// long.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 pub(crate) struct Aligned<T>(pub T);
@@ -51,7 +50,7 @@ impl<T> DerefMut for Aligned<T> {
 
 /// Arithmetic on [`LANES`] numbers at once.
 pub(crate) trait Arithmetic: Copy {
-    /// The numbers, in registers.
+    /// Register type.
     type Registers: Copy;
     fn splat(self, x: f64) -> Self::Registers;
     fn load(self, row: &Row) -> Self::Registers;
@@ -60,7 +59,7 @@ pub(crate) trait Arithmetic: Copy {
     fn sub(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
     fn mul(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
     fn div(self, a: Self::Registers, b: Self::Registers) -> Self::Registers;
-    /// Rows to columns.
+    /// Transposes eight rows.
     #[inline(always)]
     fn transpose(self, rows: [Self::Registers; LANES]) -> [Self::Registers; LANES] {
         let rows = rows.map(|row| self.store(row));
@@ -97,7 +96,7 @@ impl<A: Arithmetic> Eight<A> {
         self.arithmetic.store(self.registers)
     }
 
-    /// Rows to columns.
+    /// Transposes eight rows.
     #[inline(always)]
     pub fn transpose(arithmetic: A, rows: [Self; LANES]) -> [Self; LANES] {
         let mut registers = [rows[0].registers; LANES];
@@ -112,7 +111,7 @@ impl<A: Arithmetic> Eight<A> {
     }
 }
 
-/// Rows to columns, in memory.
+/// Transposes eight rows in memory.
 #[inline(always)]
 pub(crate) fn transposed<A: Arithmetic>(arithmetic: A, rows: &[Row; LANES]) -> [Row; LANES] {
     let mut eights = [Eight::splat(arithmetic, 0.0); LANES];
@@ -126,7 +125,7 @@ pub(crate) fn transposed<A: Arithmetic>(arithmetic: A, rows: &[Row; LANES]) -> [
     columns
 }
 
-/// Eight values from the one at `from` on; behind the end the last again.
+/// Values `from` to `from + 7`; the last value is repeated beyond the end.
 #[inline(always)]
 pub(crate) fn window(f: &[f64], from: usize) -> Row {
     if let Some(row) = f.get(from..).and_then(|f| f.first_chunk()) {
@@ -176,21 +175,21 @@ impl<A: Arithmetic> Neg for Eight<A> {
     }
 }
 
-/// Work that is done in eight lanes.
+/// A computation in eight lanes.
 pub(crate) trait Kernel {
-    /// What it gives.
+    /// Result.
     type Output;
 
-    /// Does it. Must be `#[inline(always)]`, like all that it calls, to be compiled for the
-    /// instructions of `arithmetic`.
+    /// Runs the computation. It must be `#[inline(always)]`, like all functions it calls, to be compiled for the instructions of
+    /// `arithmetic`.
     fn run<A: Arithmetic>(self, arithmetic: A) -> Self::Output;
 }
 
-/// The variable of the environment that holds the arithmetic down: `AVX-512`, `AVX2` or `scalar`. What comes
-/// out is the same; it is for tests, and for processors that are slower with wide registers.
+/// Environment variable that limits the instruction set to `AVX-512`, `AVX2` or `scalar`, for tests and for processors that are slower
+/// with wide registers. Results do not depend on it.
 pub const LIMIT: &str = "KMCFIT_ARITHMETIC";
 
-/// How wide the registers may be.
+/// Width of the registers.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Width {
     Scalar,
@@ -209,7 +208,7 @@ impl Width {
         }
     }
 
-    /// What this processor has.
+    /// Widest registers of the processor.
     fn here() -> Width {
         #[cfg(target_arch = "x86_64")]
         {
@@ -223,7 +222,7 @@ impl Width {
         Width::Scalar
     }
 
-    /// What is used: the widest that there is, within the limit if there is a good one.
+    /// Width in use: the widest available, within a valid limit.
     fn used() -> Width {
         static USED: LazyLock<Width> = LazyLock::new(|| {
             limit()
@@ -236,13 +235,12 @@ impl Width {
     }
 }
 
-/// The limit that [`LIMIT`] sets; its text where that is no arithmetic.
+/// Limit set by [`LIMIT`]; its text if it is invalid.
 fn limit() -> Result<Option<Width>, String> {
     parse_limit(std::env::var_os(LIMIT))
 }
 
-/// The limit of a text. An empty one sets none, like a variable that is not set: shells and job
-/// files clear a variable so.
+/// Limit in a text. An empty text sets none, because shells and job files clear variables in this way.
 fn parse_limit(text: Option<OsString>) -> Result<Option<Width>, String> {
     let Some(text) = text.filter(|text| !text.is_empty()) else {
         return Ok(None);
@@ -254,20 +252,20 @@ fn parse_limit(text: Option<OsString>) -> Result<Option<Width>, String> {
     }
 }
 
-/// Checks that [`LIMIT`], if it is set, names an arithmetic.
+/// Checks that [`LIMIT`], if set, names an arithmetic.
 ///
 /// # Errors
-/// The text found, if it names none of [`arithmetics`].
+/// The text, if it is none of [`arithmetics`].
 pub fn check_limit() -> Result<(), String> {
     limit().map(|_| ())
 }
 
-/// The names of all arithmetics.
+/// Names of all arithmetics.
 pub fn arithmetics() -> [&'static str; 3] {
     Width::ALL.map(Width::name)
 }
 
-/// Runs a kernel with the widest arithmetic that this processor has.
+/// Runs a kernel with the widest arithmetic of the processor.
 pub(crate) fn run<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     {
@@ -286,8 +284,7 @@ pub(crate) fn run<K: Kernel>(kernel: K) -> K::Output {
     kernel.run(Portable)
 }
 
-/// A plain loop over numbers that do not wait for each other, compiled for the widest arithmetic by
-/// the compiler itself.
+/// A loop over independent numbers, vectorised by the compiler for the widest arithmetic.
 pub(crate) struct Elementwise<F: FnOnce()>(pub F);
 
 impl<F: FnOnce()> Kernel for Elementwise<F> {
@@ -299,12 +296,12 @@ impl<F: FnOnce()> Kernel for Elementwise<F> {
     }
 }
 
-/// The name of the arithmetic that [`run`] uses.
+/// Name of the arithmetic of [`run`].
 pub(crate) fn name() -> &'static str {
     Width::used().name()
 }
 
-/// What a kernel gives with every arithmetic that this processor has.
+/// Results of a kernel with every arithmetic of the processor.
 #[cfg(test)]
 pub(crate) fn on_each<K: Kernel>(kernel: impl Fn() -> K) -> Vec<K::Output> {
     let mut outputs = vec![kernel().run(Portable)];

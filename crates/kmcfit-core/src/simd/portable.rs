@@ -1,9 +1,9 @@
-//! Eight lanes without particular instructions.
+//! Scalar arithmetic on eight lanes, for any processor.
 
 use super::{Arithmetic, LANES, Row};
 use std::array::from_fn;
 
-/// Plain numbers.
+/// Scalar arithmetic.
 #[derive(Clone, Copy)]
 pub(crate) struct Portable;
 

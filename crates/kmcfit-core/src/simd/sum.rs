@@ -1,11 +1,11 @@
-//! Sums and largest values in eight lanes.
+//! Sums, maxima and checks of long vectors, in eight lanes.
 
 use super::{Arithmetic, Kernel, LANES};
 
-/// Values that are folded side by side: four rows, as one would wait for itself.
+/// Number of independent partial results: four rows, which hide the latency of an operation.
 const AT_ONCE: usize = 4 * LANES;
 
-/// Folds pairs of values by a function that the compiler puts into lanes: pair `i` into fold `i % AT_ONCE`.
+/// Folds pairs of values by a function that the compiler vectorises: pair `i` into partial result `i % AT_ONCE`.
 struct Fold<'a, F>(&'a [f64], &'a [f64], F);
 
 impl<F: Fn(f64, f64, f64) -> f64> Kernel for Fold<'_, F> {
@@ -25,13 +25,13 @@ impl<F: Fn(f64, f64, f64) -> f64> Kernel for Fold<'_, F> {
     }
 }
 
-/// The pairs that are too few for another round of [`Fold`].
+/// Remaining pairs, too few for another round of [`Fold`].
 fn left_over(a: &[f64], b: &[f64]) -> impl Iterator<Item = (f64, f64)> {
     let (a, b) = (a.as_chunks::<AT_ONCE>().1, b.as_chunks::<AT_ONCE>().1);
     a.iter().copied().zip(b.iter().copied())
 }
 
-/// The sum of the terms of all pairs, each lane by itself and then the lanes.
+/// Sum of the terms of all pairs, first within lanes and then over the lanes.
 fn sum(a: &[f64], b: &[f64], term: impl Fn(f64, f64) -> f64) -> f64 {
     let sums = super::run(Fold(a, b, |sum, a, b| sum + term(a, b)));
     let rows = sums.as_chunks::<LANES>().0;
@@ -40,17 +40,17 @@ fn sum(a: &[f64], b: &[f64], term: impl Fn(f64, f64) -> f64) -> f64 {
     left_over(a, b).fold(whole, |sum, (a, b)| sum + term(a, b))
 }
 
-/// `sum_i a_i b_i`.
+/// Inner product `sum_i a_i b_i`.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sum(a, b, |a, b| a * b)
 }
 
-/// The root mean square; zero of no values.
+/// Root mean square; zero without values.
 pub(crate) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-/// `sum_i (factor (a_i - b_i))^2`.
+/// Squared distance `sum_i (factor (a_i - b_i))^2`.
 pub(crate) fn squared_distance(a: &[f64], b: &[f64], factor: f64) -> f64 {
     sum(a, b, |a, b| {
         let part = factor * (a - b);
@@ -58,12 +58,12 @@ pub(crate) fn squared_distance(a: &[f64], b: &[f64], factor: f64) -> f64 {
     })
 }
 
-/// The larger of two, or the second where one of them is no number.
+/// Larger of two numbers, or `b` if one is NaN.
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// The larger of the size of `x` and `most`; `most` where `x` is no number.
+/// Larger of `|x|` and `most`; `most` if `x` is NaN.
 fn larger_size(x: f64, most: f64) -> f64 {
     larger(x, larger(0.0 - x, most))
 }
@@ -74,26 +74,26 @@ fn largest_of(a: &[f64], b: &[f64], value: impl Fn(f64, f64) -> f64) -> f64 {
     left_over(a, b).fold(most, |most, (a, b)| larger(value(a, b).abs(), most))
 }
 
-/// The largest size of the numbers; those that are none are passed over.
+/// Largest absolute value; NaN is ignored.
 pub(crate) fn largest(values: &[f64]) -> f64 {
     largest_of(values, values, |a, _| a)
 }
 
-/// The largest size of `a_i - b_i`; what is no number is passed over.
+/// Largest `|a_i - b_i|`; NaN is ignored.
 pub(crate) fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     largest_of(a, b, |a, b| a - b)
 }
 
-/// Whether all numbers are positive, and are numbers.
+/// True if all numbers are positive; false for NaN.
 pub(crate) fn are_positive(values: &[f64]) -> bool {
     let next = |others, x, _| others + if x > 0.0 { 0.0 } else { 1.0 };
     let others = super::run(Fold(values, values, next));
     others == [0.0; AT_ONCE] && left_over(values, values).all(|(x, _)| x > 0.0)
 }
 
-/// Whether all numbers are finite.
+/// True if all numbers are finite.
 pub(crate) fn are_finite(values: &[f64]) -> bool {
-    // Zero times what is not finite is not a number, and stays so.
+    // Zero times a non-finite number is NaN, which persists in the sum.
     let zeros = super::run(Fold(values, values, |sum, x, _| sum + 0.0 * x));
     zeros == [0.0; AT_ONCE] && left_over(values, values).all(|(x, _)| x.is_finite())
 }
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn largest_sizes_pass_over_what_is_no_number() {
+    fn largest_values_ignore_nan() {
         for nodes in [0, 1, 7, 32, 45, 100] {
             let mut a: Vec<f64> = (0..nodes).map(|i| f64::from(i * i % 29) - 14.0).collect();
             let b: Vec<f64> = (0..nodes).map(|i| f64::from(i * 7 % 31)).collect();
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn one_number_that_is_not_positive_is_found_anywhere() {
+    fn one_number_that_is_not_positive_is_detected_at_any_position() {
         for count in 1..100 {
             let mut values = vec![1e-300; count];
             assert!(are_positive(&values), "{count}");
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn one_number_that_is_not_finite_is_found_anywhere() {
+    fn one_number_that_is_not_finite_is_detected_at_any_position() {
         for count in 1..100 {
             let mut values = vec![f64::MAX; count];
             assert!(are_finite(&values), "{count}");

@@ -1,6 +1,6 @@
 use super::*;
 
-/// The operations of the lanes that all arithmetics do alike, as bits.
+/// All operations of the arithmetics, as bits.
 struct Everything {
     a: [Row; LANES],
     b: Row,

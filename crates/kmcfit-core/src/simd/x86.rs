@@ -1,4 +1,4 @@
-//! Eight lanes on x86-64: one register of AVX-512 or two of AVX2.
+//! SIMD arithmetic on x86-64: one register of AVX-512 or two of AVX2.
 
 use super::{Arithmetic, Kernel, LANES, Row};
 use pulp::NullaryFnOnce;
@@ -14,7 +14,7 @@ pub(crate) struct Avx512(V4);
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(V3);
 
-/// A kernel about to be run with the instructions of `A`.
+/// A kernel to be run with the instructions of `A`.
 struct Call<A, K>(A, K);
 
 impl<A: Arithmetic, K: Kernel> NullaryFnOnce for Call<A, K> {
@@ -27,32 +27,32 @@ impl<A: Arithmetic, K: Kernel> NullaryFnOnce for Call<A, K> {
 }
 
 impl Avx512 {
-    /// `None` on a processor without it.
+    /// `None` on a processor without AVX-512.
     #[inline]
     pub fn find() -> Option<Self> {
         V4::try_new().map(Self)
     }
 
-    /// Runs a kernel that is compiled for it.
+    /// Runs a kernel compiled for AVX-512.
     pub fn run<K: Kernel>(self, kernel: K) -> K::Output {
         self.0.vectorize(Call(self, kernel))
     }
 }
 
 impl Avx2 {
-    /// `None` on a processor without it.
+    /// `None` on a processor without AVX2.
     #[inline]
     pub fn find() -> Option<Self> {
         V3::try_new().map(Self)
     }
 
-    /// Runs a kernel that is compiled for it.
+    /// Runs a kernel compiled for AVX2.
     pub fn run<K: Kernel>(self, kernel: K) -> K::Output {
         self.0.vectorize(Call(self, kernel))
     }
 }
 
-/// Operators of two registers by one instruction each: of AVX-512 at once, of AVX2 one half after the other.
+/// Operators with one instruction per register: one for AVX-512, two halves for AVX2.
 macro_rules! operators {
     (at_once $registers:ty; $($name:ident $instruction:ident),*) => {$(
         #[inline(always)]
@@ -90,7 +90,7 @@ impl Arithmetic for Avx512 {
     operators!(at_once __m512d; add _mm512_add_pd, sub _mm512_sub_pd, mul _mm512_mul_pd,
         div _mm512_div_pd);
 
-    /// Pairs within 128 bits, then the 128-bit parts in two rounds.
+    /// Transposes pairs within 128 bits, then 128-bit parts in two rounds.
     #[inline(always)]
     fn transpose(self, r: [__m512d; LANES]) -> [__m512d; LANES] {
         // Even and odd columns of two rows each.
@@ -126,7 +126,7 @@ impl Avx512 {
 }
 
 impl Avx2 {
-    /// Transposes a square of four.
+    /// Transposes a 4 x 4 block.
     #[inline(always)]
     fn transpose_four(self, r: [__m256d; 4]) -> [__m256d; 4] {
         let f = self.0.avx;
@@ -168,7 +168,7 @@ impl Arithmetic for Avx2 {
     operators!(in_halves [__m256d; 2]; add _mm256_add_pd, sub _mm256_sub_pd, mul _mm256_mul_pd,
         div _mm256_div_pd);
 
-    /// Four squares of four: each is transposed, and the two off the diagonal change places.
+    /// Transposes four 4 x 4 blocks and exchanges the two off the diagonal.
     #[inline(always)]
     fn transpose(self, r: [[__m256d; 2]; LANES]) -> [[__m256d; 2]; LANES] {
         let a = self.transpose_four([r[0][0], r[1][0], r[2][0], r[3][0]]);

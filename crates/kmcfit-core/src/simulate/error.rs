@@ -1,33 +1,32 @@
-//! Simulations that end early.
+//! Errors of simulations.
 
 use super::Trajectory;
 use crate::simd::sum::are_positive;
 use crate::system::{Grid, NodalCoefficients};
 use thiserror::Error;
 
-/// Why a motion could not be computed.
+/// Cause of a failed simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cause {
-    /// The mass is zero, negative or not a number: the equation of motion has no meaning there.
+    /// The mass is zero, negative or not a number.
     Mass,
-    /// The motion left the range of floating-point numbers.
+    /// The response exceeds the floating-point range.
     Overflow,
-    /// The motion exists, but the square of a residual leaves the range of floating-point numbers.
+    /// The square of a residual exceeds the floating-point range.
     CostOverflow,
 }
 
-/// An evaluation that ended early: an outcome of a trial, not a misuse. Line searches step back.
+/// A failed simulation. Trial points of a fit may fail; line searches then shorten the step.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error("{}", self.sentence())]
 pub struct SimulationError {
-    /// What happened.
+    /// Cause.
     pub cause: Cause,
-    /// Node at which it happened.
+    /// Node of the failure.
     pub node: usize,
-    /// Time of that node, s.
+    /// Time of the node, s.
     pub time: f64,
-    /// The value found there: the mass in kg, the last finite displacement in m or the largest residual
-    /// in its own unit.
+    /// Value at the failure: the mass in kg, the last finite displacement in m, or the largest residual in its unit.
     pub value: f64,
 }
 
@@ -36,31 +35,30 @@ impl SimulationError {
         let (time, value) = (self.time, self.value);
         match self.cause {
             Cause::Mass => format!("the mass is {value} kg at t = {time:.6} s, not positive"),
-            Cause::Overflow => format!("the motion overflows at t = {time:.6} s"),
-            Cause::CostOverflow => format!(
-                "the cost overflows: the motion and a reading are {value:.3e} apart at t = \
-                 {time:.6} s"
-            ),
+            Cause::Overflow => format!("the response overflows at t = {time:.6} s"),
+            Cause::CostOverflow => {
+                format!("the cost overflows: the residual at t = {time:.6} s is {value:.3e}")
+            }
         }
     }
 }
 
-/// Refuses a mass that is not positive at some node.
+/// Error if the mass is not positive at some node.
 pub(super) fn require_positive_mass(
     grid: &Grid,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
 ) -> Result<(), SimulationError> {
-    if are_positive(&device.mass) {
+    if are_positive(&nodal.mass) {
         return Ok(());
     }
     let broken = |m: &f64| m.is_nan() || *m <= 0.0;
-    match device.mass.iter().position(broken) {
-        Some(node) => Err(at(grid, Cause::Mass, node, device.mass[node])),
+    match nodal.mass.iter().position(broken) {
+        Some(node) => Err(at(grid, Cause::Mass, node, nodal.mass[node])),
         None => Ok(()),
     }
 }
 
-/// Refuses a response that leaves the finite numbers.
+/// Error if the response is not finite.
 pub(super) fn require_finite(grid: &Grid, trajectory: &Trajectory) -> Result<(), SimulationError> {
     if trajectory.is_finite() {
         return Ok(());

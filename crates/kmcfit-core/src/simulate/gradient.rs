@@ -2,12 +2,12 @@
 
 use crate::system::NodalCoefficients;
 
-/// Where derivatives with respect to the functions of a device are added.
+/// Storage for derivatives with respect to the functions.
 #[derive(Debug)]
 pub enum CoefficientGradient<'a> {
-    /// To those with respect to the values at the nodes.
+    /// Derivatives with respect to nodal values.
     AtNodes(&'a mut NodalCoefficients),
-    /// To their sums over the nodes, one a function, mass first: all that a constant asks for.
+    /// Sums over the nodes, one per function, mass first: the derivatives with respect to constant functions.
     Summed(&'a mut [f64]),
 }
 
@@ -15,7 +15,7 @@ impl CoefficientGradient<'_> {
     /// Number of functions.
     pub(crate) fn functions(&self) -> usize {
         match self {
-            CoefficientGradient::AtNodes(device) => 1 + device.coefficients.len(),
+            CoefficientGradient::AtNodes(nodal) => 1 + nodal.coefficients.len(),
             CoefficientGradient::Summed(sums) => sums.len(),
         }
     }
@@ -24,7 +24,7 @@ impl CoefficientGradient<'_> {
     #[inline(always)]
     pub(crate) fn add(&mut self, f: usize, node: usize, slope: f64) {
         match self {
-            CoefficientGradient::AtNodes(device) => device.function_mut(f)[node] += slope,
+            CoefficientGradient::AtNodes(nodal) => nodal.function_mut(f)[node] += slope,
             CoefficientGradient::Summed(sums) => sums[f] += slope,
         }
     }

@@ -1,7 +1,7 @@
-//! Responses, their linearisation and their adjoints.
+//! Simulation: responses, their linearisation and their adjoints.
 //!
-//! [`reference`] has the equations, one plain function each; [`fast`] has specialisations, each equal to a reference
-//! function to a stated tolerance; [`Engine`] chooses among them.
+//! [`reference`] implements each equation as one plain function; [`fast`] has specialisations that agree with the reference
+//! to a stated tolerance; [`Engine`] chooses among them.
 
 mod engine;
 mod error;
@@ -19,27 +19,27 @@ pub use trajectory::Trajectory;
 
 use crate::system::{Excitation, NodalCoefficients, State, System};
 
-/// The vector instructions of responses, adjoints and tangents: `AVX-512`, `AVX2` or `scalar`, the widest that this
-/// processor has and the environment's `KMCFIT_ARITHMETIC`, if it names one of them, allows. All give the
-/// same bits.
+/// SIMD instruction set of responses, adjoints and tangents: `AVX-512`, `AVX2` or `scalar`, the widest that the processor
+/// supports and the environment variable `KMCFIT_ARITHMETIC`, if it names one of them, permits. Results do not depend on
+/// it.
 pub fn arithmetic() -> &'static str {
     crate::simd::name()
 }
 
 impl System {
-    /// [`reference::forward`].
+    /// Response, as [`reference::forward`].
     ///
     /// # Errors
     /// A [`SimulationError`] if the mass is not positive at some node or the response overflows.
     ///
     /// # Panics
-    /// If `device` or `excitation` does not fit the grid and the terms.
+    /// If `system` or `excitation` does not fit the grid and the terms.
     pub fn forward(
         &self,
-        device: &NodalCoefficients,
+        nodal: &NodalCoefficients,
         initial: State,
         excitation: Option<&Excitation>,
     ) -> Result<Trajectory, SimulationError> {
-        reference::forward(self, device, initial, excitation)
+        reference::forward(self, nodal, initial, excitation)
     }
 }

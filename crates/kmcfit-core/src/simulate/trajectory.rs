@@ -1,4 +1,4 @@
-//! Responses at the nodes.
+//! Responses at the nodes of the grid.
 
 /// Displacement and velocity at all nodes.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -10,7 +10,7 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// A motion of zeros over `nodes` nodes.
+    /// Trajectory of zeros over `nodes` nodes.
     pub fn zeros(nodes: usize) -> Self {
         Self {
             displacement: vec![0.0; nodes],
@@ -23,8 +23,7 @@ impl Trajectory {
         self.displacement.len()
     }
 
-    /// Whether all of it is finite. A response that has left the finite numbers never returns, so the last node
-    /// decides.
+    /// True if all values are finite. Once not finite, a response remains so; the last node decides.
     pub(crate) fn is_finite(&self) -> bool {
         let last = self.nodes() - 1;
         self.displacement[last].is_finite() && self.velocity[last].is_finite()

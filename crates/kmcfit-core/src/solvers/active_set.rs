@@ -1,18 +1,18 @@
-//! The active set of constraints at a point, with multipliers.
+//! Active constraints at a point, with multipliers.
 
 use crate::constraints::{Cone, ConeGroup, RowGroup};
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 use crate::solvers::iterate::Iterate;
 
-/// A row is active if it is this near to its bound, relative to its scale: nearer than a quadratic
-/// program brings a row that it does not mean to touch.
+/// Largest distance from the bound of an active row, relative to its scale; larger than the accuracy with which a quadratic
+/// program satisfies an active row.
 const NEAR: f64 = 1e-6;
-/// A push counts if giving way by one per cent of the row's scale would lower J by more than this
-/// share of it, and by more than [`ROUNDING`] of what there is to explain.
+/// A bound is pushed against if relaxing it by one per cent of the row's scale lowers J by more than this share of J, and by
+/// more than [`ROUNDING`] of the zero-response misfit.
 const PUSH: f64 = 1e-6;
-/// Rounding of a change of J, as a share of the misfit of no motion: residuals are rounded in the
-/// last digits of the motion, and a change of the motion in the thousands of steps that make it.
+/// Rounding error of a change of J, as a share of the zero-response misfit: residuals carry the accumulated rounding errors
+/// of thousands of steps.
 const ROUNDING: f64 = 1e-12;
 
 /// A group of constraints with active rows.
@@ -24,15 +24,14 @@ pub struct ActiveGroup {
     pub rows: usize,
     /// Spans of time on which rows are active, s.
     pub spans: Vec<[f64; 2]>,
-    /// Spans on which the data push against the bound, s.
+    /// Spans on which relaxing the bound lowers J significantly, s.
     pub pushed: Vec<[f64; 2]>,
-    /// Sum of the sizes of the rows' multipliers: what J would lose per unit by which all bounds
-    /// give way.
+    /// Sum of the absolute multipliers of the rows: decrease of J per unit by which all bounds are relaxed.
     pub multiplier: f64,
 }
 
 impl ActiveGroup {
-    /// In words.
+    /// The active rows as a sentence.
     pub fn sentence(&self) -> String {
         let list = |spans: &[[f64; 2]]| -> String {
             let words: Vec<String> = spans.iter().take(MOST_SPANS).map(span).collect();
@@ -45,7 +44,7 @@ impl ActiveGroup {
         };
         match self.pushed.as_slice() {
             [] => format!(
-                "`{}` is touched but not pushed on {}",
+                "`{}` is active without a significant multiplier on {}",
                 self.name,
                 list(&self.spans)
             ),
@@ -54,7 +53,7 @@ impl ActiveGroup {
     }
 }
 
-/// Most spans that a sentence lists.
+/// Largest number of spans in a sentence.
 const MOST_SPANS: usize = 4;
 
 fn span(&[from, to]: &[f64; 2]) -> String {
@@ -65,10 +64,10 @@ fn span(&[from, to]: &[f64; 2]) -> String {
     }
 }
 
-/// The active constraints at `point`.
+/// Active constraints at `point`.
 ///
-/// The multipliers solve the optimality conditions `dJ + G^T lambda = 0` in the least-squares sense
-/// of a projection: they are those of the step of steepest descent that the constraints stop.
+/// The multipliers are the least-squares solution of the optimality conditions `dJ + G^T lambda = 0`, obtained from the
+/// projection of the steepest-descent step.
 pub fn active_constraints(problem: &Problem, point: &Iterate) -> Vec<ActiveGroup> {
     let constraints = &problem.constraints;
     let near: Vec<Vec<usize>> = (constraints.groups.iter())
@@ -114,7 +113,7 @@ pub fn active_constraints(problem: &Problem, point: &Iterate) -> Vec<ActiveGroup
     rows.chain(cones).filter(|active| active.rows > 0).collect()
 }
 
-/// The size of a cone's bound at the point.
+/// Size of the bound of a cone at the point.
 fn bound(cone: &Cone, point: &Iterate) -> f64 {
     let values = cone.rows.multiply(&point.parameters);
     values
@@ -132,7 +131,7 @@ fn near_rows(group: &RowGroup, point: &Iterate) -> Vec<usize> {
     (0..group.rows.len()).filter(is_near).collect()
 }
 
-/// Joins the time spans of rows that follow each other.
+/// Joins the time spans of consecutive rows.
 fn spans(times: &[[f64; 2]], rows: &[usize]) -> Vec<[f64; 2]> {
     let mut joined: Vec<[f64; 2]> = Vec::new();
     let mut last = None;
@@ -155,14 +154,14 @@ struct Multipliers {
     cones: Vec<Vec<f64>>,
 }
 
-/// The multipliers at `point`; `None` if the quadratic program fails.
+/// Multipliers at `point`; `None` if the quadratic program fails.
 fn multipliers(problem: &Problem, point: &Iterate) -> Option<Multipliers> {
     if problem.constraints.are_simple() {
         return Some(simple_multipliers(problem, point));
     }
     let metric = point.relative_metric(problem);
     let gradient = &point.gradient.euclidean;
-    // Scaled so that the largest entry of the right-hand side is near 1.
+    // Scaled to a largest entry of about 1 on the right-hand side.
     let steepest = gradient
         .iter()
         .zip(&metric)
@@ -188,12 +187,12 @@ fn multipliers(problem: &Problem, point: &Iterate) -> Option<Multipliers> {
     })
 }
 
-/// [`multipliers`] where every row bounds one parameter: then J falls into each parameter's bounds by
-/// itself, and the nearest bound that it falls into, if it is near, takes all of the derivative.
+/// [`multipliers`] for constraints on single parameters: the nearest bound in the descent direction of each parameter, if
+/// active, takes the whole derivative.
 fn simple_multipliers(problem: &Problem, point: &Iterate) -> Multipliers {
     let groups = &problem.constraints.groups;
     let gradient = &point.gradient.euclidean;
-    // How far each parameter's nearest bound lies in the direction in which J falls, and its row.
+    // Distance and row of each parameter's nearest bound in the descent direction of J.
     let mut stops: Vec<Option<(f64, [usize; 2], f64)>> = vec![None; gradient.len()];
     for (g, group) in groups.iter().enumerate() {
         for i in 0..group.rows.len() {

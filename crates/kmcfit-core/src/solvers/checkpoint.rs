@@ -1,127 +1,122 @@
-//! Checkpoints, from which a killed fit continues to the same bits.
+//! Checkpoints, from which an interrupted fit continues with bit-identical results.
 //!
-//! A fit is a fixed sequence of units: searches, and long computations between them. Whoever goes on
-//! walks the same sequence again. A unit that had ended is not computed again but recalled, the search
-//! that had not ended goes on from where it last stood, and everything after it is computed. What is
-//! recalled is parameters and the memory of the solver, bit by bit; motions and gradients are computed
-//! from these again, and what does not come out with the bits that were noted is not used: its unit is
-//! computed from its beginning. So what is kept decides how long a fit takes and never how it ends.
+//! A fit is a fixed sequence of units: searches, and long computations between them. A continued fit repeats the sequence.
+//! A completed unit is read from the checkpoint, an incomplete search continues from its last saved state, and later units
+//! are computed. Checkpoints hold parameters and the state of the method with all bits; responses and gradients are
+//! recomputed. If a recomputed value differs from its saved fingerprint, the checkpoint of that unit is discarded and the
+//! unit is computed from its beginning. A checkpoint therefore affects the duration of a fit and never its result.
 
-use super::counts::Counts;
 use super::history::IterationRecord;
 use super::settings::StartStrategy;
+use super::solve_counts::SolveCounts;
 use super::termination::Outcome;
 use super::timings::Timings;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 use std::fmt;
 use std::time::Duration;
 
-/// Numbers that are written at once.
+/// Number of values written at once.
 const PIECE: usize = 64;
 
-/// Numbers that are kept with all their bits, also where they are not finite: as a text of 16
-/// hexadecimal digits each.
+/// Numbers stored with all their bits, also where not finite: as text of 16 hexadecimal digits each.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ExactF64s(pub Vec<f64>);
 
-/// Where a search stands: all that decides how it goes on, but for its history.
+/// State of a search, without its history.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SolverState {
-    /// Iterations so far; the history has one row for each.
+    /// Iterations done; the history has one row for each.
     pub iterations: u64,
     /// The best point.
     pub parameters: ExactF64s,
-    /// Of the cost and the gradient there ([`Iterate::fingerprint`](super::Iterate::fingerprint)).
+    /// Fingerprint of cost and gradient at the point ([`Iterate::fingerprint`](super::Iterate::fingerprint)).
     pub fingerprint: u64,
-    /// What the solver remembers.
+    /// State of the method.
     pub memory: MethodState,
-    /// `J0`, the cost from which the search set out, and `G0^2`.
+    /// `J0`, the cost at the start of the search, and `G0^2`.
     pub references: ExactF64s,
-    /// The points whose motions are kept for figures, by iteration.
+    /// Parameters of the response snapshots, by iteration.
     pub snapshots: Vec<(u64, ExactF64s)>,
-    /// Work done.
-    pub counts: Counts,
-    /// What that work took.
+    /// Number of solves.
+    pub counts: SolveCounts,
+    /// Time by kind of work.
     pub timings: Timings,
-    /// Wall-clock time so far.
+    /// Wall-clock time.
     pub elapsed: Duration,
-    /// How it ended, if it has.
+    /// Outcome, if the search has ended.
     pub outcome: Option<Outcome>,
 }
 
-/// What a solver remembers of the iterations before.
+/// State of a method between iterations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum MethodState {
-    /// Nothing.
+    /// No state.
     Nothing,
-    /// Of L-BFGS.
+    /// L-BFGS.
     Lbfgs {
-        /// The coordinates of the point, as the last step left them.
+        /// Coordinates of the point.
         x: ExactF64s,
-        /// Which of them are logarithms.
+        /// True for logarithmic coordinates.
         logarithmic: Vec<bool>,
-        /// Step, change of the gradient, its dual, and the curvature alone in the last; the oldest first.
+        /// Pairs, oldest first: step, change of the gradient, its dual, and the curvature alone in the last.
         pairs: Vec<[ExactF64s; 4]>,
     },
-    /// Of the projected gradient: metric; first and last length.
+    /// Projected gradient.
     ProjectedGradient {
-        /// The diagonal metric of the search.
+        /// Diagonal metric of the search.
         metric: ExactF64s,
-        /// First and last step.
+        /// First and last step length.
         lengths: ExactF64s,
     },
-    /// Of Gauss-Newton.
+    /// Gauss–Newton.
     GaussNewton {
-        /// Weight of the proximal term, and the cost at the first point, if there was one.
+        /// Weight of the proximal term, and the cost at the first point, if any.
         numbers: ExactF64s,
-        /// Parameters of the point whose Jacobian is used, if it is not the one where the search stands.
+        /// Parameters at which the Jacobian in use was computed, if they differ from the current point.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         made_at: Option<ExactF64s>,
     },
 }
 
-/// What was kept of a unit.
+/// Saved result of a unit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CheckpointUnit {
-    /// A search: its history and where it stood.
+    /// A search: history and state.
     Search(Vec<IterationRecord>, Box<SolverState>),
-    /// Numbers that were computed between searches.
+    /// Numbers computed between searches.
     Piece(Vec<f64>),
-    /// The unit ended at once, without a result.
+    /// A unit without a result.
     Nothing,
 }
 
-/// A place where a fit keeps what it needs to go on. Trouble with the place is the keeper's to report:
-/// it must not end a fit.
+/// Storage of checkpoints. Storage errors are reported by the implementation and must not end a fit.
 pub trait CheckpointStore {
-    /// Begins the next unit; what was kept of it by whoever was here before. What is told of a unit that
-    /// had ended is not kept twice.
+    /// Begins the next unit and returns its saved result, if any. Results of a completed unit are not saved again.
     fn begin(&mut self) -> Option<CheckpointUnit>;
-    /// What was recalled of the unit does not belong here: it is dropped, with all later units.
+    /// Discards the saved result of the unit, and of all later units.
     fn refuse(&mut self);
-    /// Keeps an iteration of the search.
+    /// Saves an iteration of the search.
     fn row(&mut self, row: &IterationRecord);
-    /// Whether it is time to keep where a search for so many parameters stands.
+    /// True if the state of a search with so many parameters should be saved now.
     fn is_due(&self, parameters: usize) -> bool;
-    /// Keeps where the search stands, in the place of where it stood before, or how it ended.
+    /// Saves the state of the search, replacing the previous one, or its final state.
     fn stand(&mut self, standing: SolverState);
-    /// Ends the unit with numbers that were computed, or with nothing.
+    /// Ends the unit with computed numbers, or without a result.
     fn end(&mut self, piece: Option<&[f64]>);
 }
 
-/// An iteration, and where in a fit it stands.
+/// An iteration and its context in the fit.
 #[derive(Debug, Clone, Copy)]
 pub struct IterationEvent<'a> {
-    /// The iteration.
+    /// Iteration.
     pub row: &'a IterationRecord,
-    /// Where its search started: the strategy of its starting point, if it has one.
+    /// Start strategy of the search, if any.
     pub start: Option<StartStrategy>,
-    /// The largest violation of a constraint after it, relative to its row's scale; `None` without
-    /// constraints.
+    /// Largest violation of a constraint after the iteration, relative to the row's scale; `None` without constraints.
     pub violation: Option<f64>,
 }
 
-/// Who looks on while a fit runs.
+/// Observer of a fit: callbacks for iterations, and storage of checkpoints.
 pub struct Observer<'a> {
     observe: &'a mut dyn FnMut(&IterationRecord),
     look: Option<&'a mut dyn FnMut(&IterationEvent)>,
@@ -131,7 +126,7 @@ pub struct Observer<'a> {
 }
 
 impl<'a> Observer<'a> {
-    /// Somebody who is shown every iteration and keeps nothing.
+    /// Observer with a callback for every iteration, without checkpoints.
     pub fn new(observe: &'a mut dyn FnMut(&IterationRecord)) -> Self {
         Self {
             observe,
@@ -142,21 +137,21 @@ impl<'a> Observer<'a> {
         }
     }
 
-    /// And somebody who is also told where in the fit an iteration stands.
+    /// Adds a callback that receives the context of each iteration.
     #[must_use]
     pub fn looking(mut self, look: &'a mut dyn FnMut(&IterationEvent)) -> Self {
         self.look = Some(look);
         self
     }
 
-    /// And a place where the fit keeps what it needs to go on.
+    /// Adds storage for checkpoints.
     #[must_use]
     pub fn keeping(mut self, keeper: &'a mut dyn CheckpointStore) -> Self {
         self.keeper = Some(keeper);
         self
     }
 
-    /// A search whose iterations are kept and not shown.
+    /// Runs a search whose iterations are saved but not reported.
     pub(super) fn unseen<T>(&mut self, search: impl FnOnce(&mut Self) -> T) -> T {
         let before = std::mem::replace(&mut self.is_shown, false);
         let result = search(self);
@@ -164,7 +159,7 @@ impl<'a> Observer<'a> {
         result
     }
 
-    /// Nothing is kept from here on: what follows an interrupt is not what an uninterrupted fit does.
+    /// Stops saving: results after an interrupt differ from those of an uninterrupted fit.
     pub(super) fn close(&mut self) {
         self.keeper = None;
     }
@@ -173,7 +168,7 @@ impl<'a> Observer<'a> {
         self.observe
     }
 
-    /// Begins a search; its history and standing, if they were kept.
+    /// Begins a search; returns its history and state, if saved.
     pub(super) fn begin_search(&mut self) -> Option<(Vec<IterationRecord>, SolverState)> {
         match self.keeper.as_mut()?.begin()? {
             CheckpointUnit::Search(rows, standing) => Some((rows, *standing)),
@@ -191,7 +186,7 @@ impl<'a> Observer<'a> {
         }
     }
 
-    /// The searches from here on start by this strategy.
+    /// Sets the start strategy of the following searches.
     pub(super) fn begin_attempt(&mut self, start: StartStrategy) {
         self.start = Some(start);
     }
@@ -221,7 +216,7 @@ impl<'a> Observer<'a> {
         keeper.is_some_and(|keeper| keeper.is_due(parameters))
     }
 
-    /// Keeps a standing, which is made only where there is a keeper.
+    /// Saves the state of the search, which is built only if checkpoints are stored.
     pub(super) fn stand(&mut self, standing: impl FnOnce() -> SolverState) {
         if let Some(keeper) = &mut self.keeper {
             keeper.stand(standing());
@@ -235,8 +230,7 @@ impl<'a> Observer<'a> {
         }
     }
 
-    /// The numbers that `compute` gives, `len` of them, recalled if they were kept; what was `cut_short`
-    /// is not kept.
+    /// Returns `len` numbers from the checkpoint, or from `compute`; results that were `cut_short` are not saved.
     pub(super) fn piece(
         &mut self,
         len: usize,
@@ -266,7 +260,7 @@ impl Serialize for ExactF64s {
     }
 }
 
-/// Numbers as digits, written piece by piece: long ones never stand in memory as a text.
+/// Numbers as hexadecimal digits, written without a copy of the whole text in memory.
 struct Digits<'a>(&'a [f64]);
 
 impl fmt::Display for Digits<'_> {
@@ -305,7 +299,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bits_come_back_and_damaged_ones_do_not() {
+    fn exact_numbers_are_restored_and_damaged_ones_rejected() {
         let numbers = ExactF64s(vec![-0.0, f64::INFINITY, 0.1 + 0.2, 5e-324]);
         let text = serde_json::to_string(&numbers).expect("text");
         let read: ExactF64s = serde_json::from_str(&text).expect("bits");

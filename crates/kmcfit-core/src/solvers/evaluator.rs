@@ -1,9 +1,9 @@
 //! Counted and timed evaluations: all solves of a search.
 
-use super::counts::{ADJOINT, FORWARD, QP, TANGENT};
 use super::iterate::Iterate;
 use super::linearization::{Linearization, halfway, in_halves};
 use super::settings::{FitSettings, Solver};
+use super::solve_counts::{ADJOINT, FORWARD, QP, TANGENT};
 use super::timings::{Timings, timed};
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
@@ -11,16 +11,16 @@ use crate::record::{Channel, Loss};
 use crate::simulate::{Purpose, SimulationError, Trajectory};
 use std::sync::OnceLock;
 
-/// The problem behind argmin's counters: the one door through which solvers evaluate.
+/// Evaluator of a problem with argmin's counters; the solvers evaluate through it alone.
 pub(crate) struct CountedEvaluator<'a, 'p> {
     problem: &'a mut argmin::core::Problem<&'p Problem>,
     kind: GradientKind,
     purpose: Purpose,
-    /// Where the record is cut in two, so that iterates need tangent solves and no adjoint.
+    /// Step at which the record is divided in two, for gradients from tangent solves without an adjoint.
     halfway: Option<usize>,
-    /// Most iterations of one quadratic program.
+    /// Iteration limit of a quadratic program.
     pub program_iterations: u32,
-    /// What the work took.
+    /// Time by kind of work.
     pub timings: Timings,
 }
 
@@ -50,15 +50,15 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         }
     }
 
-    /// The problem itself, for what costs no solve.
+    /// The problem, for operations without a solve.
     pub fn problem(&self) -> &'p Problem {
         self.problem
             .problem
             .expect("the executor holds the problem")
     }
 
-    /// A point that was there before, computed again without counting: the way its gradient had been computed shows by
-    /// the `fingerprint`. `None` if there is no such point.
+    /// Recomputes an earlier point without counting; the `fingerprint` identifies the method that computed its gradient. `None`
+    /// if the point cannot be reproduced.
     pub fn again(&self, parameters: Vec<f64>, fingerprint: u64) -> Option<Iterate> {
         let problem = self.problem();
         let mut evaluation = problem.workspace();
@@ -67,7 +67,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         if point.fingerprint() == fingerprint || self.halfway.is_none() {
             return Some(point).filter(|point| point.fingerprint() == fingerprint);
         }
-        // After a short step the gradient was computed by an adjoint solve.
+        // After a short step the gradient came from an adjoint solve.
         let Iterate {
             parameters,
             evaluation,
@@ -78,8 +78,8 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         (point.fingerprint() == fingerprint).then_some(point)
     }
 
-    /// The motions at a point that was there before, computed again without counting.
-    pub fn motions_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, SimulationError> {
+    /// Recomputes the responses at an earlier point without counting.
+    pub fn responses_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, SimulationError> {
         let problem = self.problem();
         let mut evaluation = problem.workspace();
         problem.evaluate_for(self.purpose, parameters, &mut evaluation)?;
@@ -99,7 +99,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         })
     }
 
-    /// Several forward solves at once.
+    /// Several forward solves together.
     pub fn forwards<T>(&mut self, solves: u64, solve: impl FnOnce() -> T) -> T {
         self.count(FORWARD, solves);
         timed(&mut self.timings.forward, solve)
@@ -114,7 +114,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         })
     }
 
-    /// Counts the tangent solves of a linearisation, where those of its point have not been counted.
+    /// Counts the tangent solves of a linearisation that is not yet counted at its point.
     pub fn count_linearisation(&mut self, solves: u64) {
         if self.halfway.is_none() {
             self.count_tangents(solves);
@@ -132,12 +132,12 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         timed(&mut self.timings.qp, solve)
     }
 
-    /// Linear algebra between the solves.
+    /// Times linear algebra between solves.
     pub fn algebra<T>(&mut self, work: impl FnOnce() -> T) -> T {
         timed(&mut self.timings.linear_algebra, work)
     }
 
-    /// The linearisation that a step from `point` uses.
+    /// Linearisation for a step from `point`.
     pub fn linearization(&mut self, point: &Iterate) -> Linearization {
         match point.linearization() {
             Linearization::Fresh if self.halfway.is_some() => self.linearise_again(point),
@@ -145,13 +145,12 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         }
     }
 
-    /// The linearisation at `point` itself, without counting.
+    /// Linearisation at `point` itself, without counting.
     pub fn linearise_again(&mut self, point: &Iterate) -> Linearization {
         Linearization::at(self.problem(), &point.evaluation, &mut self.timings)
     }
 
-    /// [`CountedEvaluator::complete`] after a short step from `before`: its `linearization` is taken for that of the new point where
-    /// that can be done.
+    /// [`CountedEvaluator::complete`] after a short step from `before`, whose `linearization` is reused where possible.
     pub fn complete_nearby(
         &mut self,
         before: &Iterate,
@@ -176,7 +175,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         }
     }
 
-    /// The point that an evaluation belongs to, completed by its gradient.
+    /// Iterate from an evaluation, completed by its gradient.
     pub fn complete(&mut self, parameters: Vec<f64>, evaluation: Evaluation) -> Iterate {
         let mut timings = Timings::default();
         let point = self.completed(parameters, evaluation, &mut timings);
@@ -190,7 +189,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         point
     }
 
-    /// [`CountedEvaluator::complete`] without counting: by the linearised halves of a long record, otherwise by an adjoint solve.
+    /// [`CountedEvaluator::complete`] without counting: from the linearised halves of a long record, otherwise by an adjoint solve.
     fn completed(
         &self,
         parameters: Vec<f64>,

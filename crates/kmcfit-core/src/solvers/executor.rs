@@ -1,7 +1,6 @@
-//! The loop around every solver, run by argmin's executor.
+//! Loop of a search: initialisation, iterations, stopping tests and checkpoints, run by argmin's executor.
 
 use super::checkpoint::{ExactF64s, MethodState, Observer, SolverState};
-use super::counts::Counts;
 use super::evaluator::CountedEvaluator;
 use super::fit::{Fit, measured};
 use super::history::{IterationRecord, Recorder, Reference};
@@ -9,6 +8,7 @@ use super::iterate::Iterate;
 use super::methods::{Step, StepRule, equation_error, step_rule};
 use super::reason::Reason;
 use super::settings::{FitSettings, Solver};
+use super::solve_counts::SolveCounts;
 use super::termination::{Outcome, Status};
 use super::timings::Timings;
 use crate::host::Instant;
@@ -20,15 +20,14 @@ use argmin::core::{Error, Executor, IterState, KV, TerminationReason, Terminatio
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// Runs one solver from `start`; `watch` sees every iteration, and where it remembers this search, the
-/// search goes on from there. `reference` is what the
-/// ratios of cost and gradient are taken to, by default the start itself.
+/// Runs one solver from `start`, reporting to `watch`. If `watch` holds a checkpoint of this search, the search continues
+/// from it. Ratios of cost and gradient refer to `reference`, by default the start.
 ///
-/// Every method accepts only points of lower cost, so the last point is the best one. The equation
-/// error is no search: it is minimised at once.
+/// Every method accepts only points of lower cost, so the last point is the best one. The equation error is not a search;
+/// it is minimised directly.
 ///
 /// # Errors
-/// A [`SimulationError`] if the start itself cannot be evaluated.
+/// A [`SimulationError`] if the simulation at the start fails.
 pub(super) fn search(
     problem: &Problem,
     start: &[f64],
@@ -44,17 +43,17 @@ pub(super) fn search(
     search_prepared(problem, prepared, settings, reference, watch)
 }
 
-/// Where a search starts.
+/// Starting point of a search.
 pub(super) struct Prepared {
     /// The parameters.
     pub parameters: Vec<f64>,
-    /// Their evaluation, if there is one already.
+    /// Evaluation, if already computed.
     pub evaluation: Option<Evaluation>,
-    /// Storage for the first trial, if there is some.
+    /// Storage for the first trial, if available.
     pub spare: Option<Evaluation>,
 }
 
-/// [`search`] from a start that is `prepared`.
+/// [`search`] from a prepared starting point.
 pub(super) fn search_prepared(
     problem: &Problem,
     prepared: Prepared,
@@ -69,7 +68,7 @@ pub(super) fn search_prepared(
             watch.observe(),
         ));
     }
-    // A part of a record has not a reading at every node of the grid.
+    // Samples of a part of a record do not cover all nodes of the grid.
     let mut settings = settings.clone();
     if !problem.supports_continuous() {
         settings.gradient = GradientKind::Discrete;
@@ -80,7 +79,7 @@ pub(super) fn search_prepared(
     if let Some(spare) = prepared.spare {
         method.recycle(spare);
     }
-    let run = Run {
+    let run = SearchDriver {
         method,
         settings,
         reference,
@@ -91,7 +90,7 @@ pub(super) fn search_prepared(
         trouble: None,
         outcome: None,
         kept,
-        before: Before::default(),
+        before: PriorWork::default(),
         watch,
     };
     let result = Executor::new(problem, run)
@@ -99,16 +98,16 @@ pub(super) fn search_prepared(
         .ctrlc(false)
         .timer(false)
         .run()
-        .expect("Run reports by outcome and never returns an error to the executor");
-    let counts = Counts::of(&result.problem);
+        .expect("SearchDriver reports by outcome and never returns an error to the executor");
+    let counts = SolveCounts::of(&result.problem);
     result.solver.finish(counts)
 }
 
-/// One search from `start` alone, without the other starting points of [`fit`](super::fit()): for fits whose start is
-/// near an optimum, or whose start is the question.
+/// One search from `start`, without the other starting points of [`fit`](super::fit()): for a start near a minimum, and for
+/// multistart analyses.
 ///
 /// # Errors
-/// A [`SimulationError`] if the start itself has no motion.
+/// A [`SimulationError`] if the simulation at the start fails.
 pub fn fit_from(
     problem: &Problem,
     start: &[f64],
@@ -118,7 +117,7 @@ pub fn fit_from(
     Ok(measured(problem, fit, settings))
 }
 
-/// [`search`] by itself, without an observer.
+/// [`search`] without an observer.
 pub(super) fn search_unobserved(
     problem: &Problem,
     start: &[f64],
@@ -128,48 +127,48 @@ pub(super) fn search_unobserved(
     search(problem, start, settings, None, &mut Observer::new(nothing))
 }
 
-/// One method at work, seen by argmin as a solver.
-struct Run<'a, 'w> {
+/// A method in the form of an argmin solver.
+struct SearchDriver<'a, 'w> {
     method: Box<dyn StepRule>,
     settings: &'a FitSettings,
     reference: Option<Reference>,
-    /// The evaluation at the start, if there is one already.
+    /// Evaluation at the start, if already computed.
     at_start: Option<Evaluation>,
     clock: Instant,
     timings: Timings,
-    /// `None` before argmin calls `init`, and where the start has no response.
-    progress: Option<Progress>,
-    /// Why the start has no response.
+    /// `None` before initialisation, and where the simulation at the start fails.
+    progress: Option<SearchProgress>,
+    /// Error of the simulation at the start.
     trouble: Option<SimulationError>,
     outcome: Option<Outcome>,
-    /// What was kept of this search when it ran before.
+    /// Saved history and state of this search.
     kept: Option<(Vec<IterationRecord>, SolverState)>,
-    before: Before,
+    before: PriorWork,
     watch: &'a mut Observer<'w>,
 }
 
-/// What a search did before it was ended from outside.
+/// Work of a search before it was interrupted.
 #[derive(Default)]
-struct Before {
-    counts: Counts,
+struct PriorWork {
+    counts: SolveCounts,
     timings: Timings,
     elapsed: Duration,
 }
 
-struct Progress {
+struct SearchProgress {
     point: Iterate,
     recorder: Recorder,
 }
 
-/// argmin's view of the search: parameters and cost; the rest lives in [`Run`].
+/// State passed to argmin: parameters and cost; the remaining state is in [`SearchDriver`].
 type SearchState = IterState<Vec<f64>, (), (), (), (), f64>;
 
-impl Run<'_, '_> {
+impl SearchDriver<'_, '_> {
     fn start(
         &mut self,
         work: &mut CountedEvaluator,
         parameters: Vec<f64>,
-    ) -> Result<Progress, SimulationError> {
+    ) -> Result<SearchProgress, SimulationError> {
         let evaluation = match self.at_start.take() {
             Some(evaluation) => work.forwards(1, || evaluation),
             None => {
@@ -179,19 +178,18 @@ impl Run<'_, '_> {
             }
         };
         let point = work.complete(parameters, evaluation);
-        Ok(Progress {
+        Ok(SearchProgress {
             recorder: Recorder::new(&point, self.reference),
             point,
         })
     }
 
-    /// The search where it stood when it was ended from outside, if that was kept and comes out with
-    /// the same bits.
-    fn restored(&mut self, work: &CountedEvaluator) -> Option<Progress> {
+    /// The search continued from its saved state; `None` if none is saved or it cannot be reproduced bit by bit.
+    fn restored(&mut self, work: &CountedEvaluator) -> Option<SearchProgress> {
         let (rows, standing) = self.kept.take()?;
         let progress = self.stand_again(work, rows, standing);
         if progress.is_none() {
-            // The search begins anew, with nothing of a state that does not fit the problem.
+            // A saved state that does not fit the problem is not used in part.
             self.method = step_rule(self.settings.solver);
             self.watch.refuse();
         }
@@ -203,13 +201,13 @@ impl Run<'_, '_> {
         work: &CountedEvaluator,
         rows: Vec<IterationRecord>,
         standing: SolverState,
-    ) -> Option<Progress> {
+    ) -> Option<SearchProgress> {
         let fits = |parameters: &[f64]| parameters.len() == work.problem().parameters();
         if !fits(&standing.parameters.0) {
             return None;
         }
-        let motions = |parameters: &[f64]| match fits(parameters) {
-            true => work.motions_again(parameters).ok(),
+        let responses = |parameters: &[f64]| match fits(parameters) {
+            true => work.responses_again(parameters).ok(),
             false => None,
         };
         if rows.len() as u64 != standing.iterations {
@@ -217,7 +215,7 @@ impl Run<'_, '_> {
         }
         let snapshots = standing.snapshots.into_iter();
         let snapshots = snapshots.map(|(iteration, at)| (iteration, at.0)).collect();
-        let recorder = Recorder::restored(rows, &standing.references.0, snapshots, motions)?;
+        let recorder = Recorder::restored(rows, &standing.references.0, snapshots, responses)?;
         let mut point = work.again(standing.parameters.0, standing.fingerprint)?;
         if standing.outcome.is_none()
             && !(self.method).restore(standing.memory, work.problem(), &mut point)
@@ -225,16 +223,16 @@ impl Run<'_, '_> {
             return None;
         }
         self.outcome = standing.outcome;
-        self.before = Before {
+        self.before = PriorWork {
             counts: standing.counts,
             timings: standing.timings,
             elapsed: standing.elapsed,
         };
-        Some(Progress { point, recorder })
+        Some(SearchProgress { point, recorder })
     }
 
-    /// Keeps where the search stands: when it is time to, and before it ends by an interrupt.
-    fn keep(&mut self, counts: Counts) {
+    /// Saves the state of the search when due, and before an interrupt ends it.
+    fn keep(&mut self, counts: SolveCounts) {
         let interrupted = |o: &Outcome| o.status == Status::Interrupted;
         let now = match &self.outcome {
             Some(outcome) => interrupted(outcome),
@@ -251,8 +249,8 @@ impl Run<'_, '_> {
         }
     }
 
-    fn stand(&mut self, counts: Counts, outcome: Option<Outcome>) {
-        let Some(Progress { point, recorder }) = &self.progress else {
+    fn stand(&mut self, counts: SolveCounts, outcome: Option<Outcome>) {
+        let Some(SearchProgress { point, recorder }) = &self.progress else {
             return;
         };
         let standing = || SolverState {
@@ -319,7 +317,7 @@ impl Run<'_, '_> {
         }
     }
 
-    /// The outcome of a search that is over before its first iteration.
+    /// Outcome of a search that ends before its first iteration.
     fn nothing_to_do(&self, problem: Option<&Problem>) -> Option<Outcome> {
         let cost = self.progress.as_ref()?.point.evaluation.cost;
         let converged = |reason| Some(Outcome::new(Status::Converged, reason));
@@ -327,12 +325,12 @@ impl Run<'_, '_> {
             return converged(Reason::NoParameters);
         }
         if cost == 0.0 {
-            // Beside an infinite sigma, which is what squares beyond 1e308 come to, every residual is zero.
+            // With an infinite sigma, the result of squares beyond 1e308, every residual is zero.
             let infinite = |c: &Channel| c.weighting().sigma(0).is_some_and(|s| !s.is_finite());
             if problem.is_some_and(|p| p.channels().any(infinite)) {
                 return Some(Outcome::new(Status::Failed, Reason::Overflow));
             }
-            // Squares of readings below 1e-154 are zero.
+            // Squares of samples below 1e-154 underflow.
             return match problem.is_some_and(|p| p.zero_response_misfit() == 0.0) {
                 true => converged(Reason::ZeroReadings),
                 false => converged(Reason::ExactStart),
@@ -351,15 +349,15 @@ impl Run<'_, '_> {
         is_over.then(|| Outcome::new(Status::TimeLimit, Reason::TimeLimit(limit)))
     }
 
-    fn finish(mut self, counts: Counts) -> Result<Fit, SimulationError> {
+    fn finish(mut self, counts: SolveCounts) -> Result<Fit, SimulationError> {
         match &self.outcome {
             _ if self.progress.is_none() => self.watch.nothing(),
-            // It goes on from where it was kept to stand.
+            // Saved, so that the search can continue from here.
             Some(outcome) if outcome.status == Status::Interrupted => {}
             outcome => self.stand(counts, outcome.clone()),
         }
         let elapsed = self.elapsed();
-        let Some(Progress { point, recorder }) = self.progress else {
+        let Some(SearchProgress { point, recorder }) = self.progress else {
             return Err(self.trouble.expect("a search starts, or there is a reason"));
         };
         Ok(Fit {
@@ -380,7 +378,7 @@ impl Run<'_, '_> {
 
     fn view(&self, state: SearchState) -> SearchState {
         match &self.progress {
-            Some(Progress { point, .. }) => state
+            Some(SearchProgress { point, .. }) => state
                 .param(point.parameters.clone())
                 .cost(point.evaluation.cost),
             None => state,
@@ -388,7 +386,7 @@ impl Run<'_, '_> {
     }
 }
 
-impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
+impl<'p> argmin::core::Solver<&'p Problem, SearchState> for SearchDriver<'_, '_> {
     fn name(&self) -> &str {
         self.settings.solver.name()
     }
@@ -425,7 +423,7 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for Run<'_, '_> {
         let mut work = CountedEvaluator::new(problem, self.settings);
         self.advance(&mut work);
         self.timings += work.timings;
-        self.keep(Counts::of(problem));
+        self.keep(SolveCounts::of(problem));
         Ok((self.view(state), None))
     }
 

@@ -1,11 +1,11 @@
-//! A finished fit.
+//! Result of a fit.
 
-use super::counts::Counts;
-use super::history::{IterationRecord, Snapshot, ratio};
+use super::history::{IterationRecord, ResponseSnapshot, ratio};
 use super::iterate::Iterate;
 use super::optimality::{Optimality, judged};
 use super::reason::Reason;
 use super::settings::{FitSettings, Solver, StartStrategy};
+use super::solve_counts::SolveCounts;
 use super::termination::{Outcome, Status};
 use super::timings::Timings;
 use crate::host::Instant;
@@ -13,38 +13,43 @@ use crate::problem::Problem;
 use crate::simulate::SimulationError;
 use std::time::Duration;
 
-/// A finished fit: the best point, how it was reached and how it ended.
+/// Result of a fit: best point, history and outcome.
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// The point with the lowest cost.
     pub best: Iterate,
-    /// Cost at the start values of the functions, whatever start the search took.
+    /// Cost at the start values of the functions, also if the search started elsewhere.
     pub initial_cost: f64,
-    /// Cost at the point from which the search set out.
+    /// Cost at the starting point of the search.
     pub started_from: f64,
     /// `G^2` at the start values.
     pub initial_norm_squared: f64,
-    /// One row per iteration.
+    /// Iterations.
     pub history: Vec<IterationRecord>,
-    /// Motions on the way.
-    pub snapshots: Vec<Snapshot>,
-    /// How it ended.
+    /// Responses during the search.
+    pub snapshots: Vec<ResponseSnapshot>,
+    /// Outcome.
     pub outcome: Outcome,
-    /// Work done.
-    pub counts: Counts,
-    /// What that work took; the rest of `elapsed` is bookkeeping.
+    /// Number of solves.
+    pub counts: SolveCounts,
+    /// Time by kind of work; the rest of `elapsed` is overhead.
     pub timings: Timings,
     /// Wall-clock time.
     pub elapsed: Duration,
-    /// The starts that were tried, in order.
+    /// Attempts, in order.
     pub attempts: Vec<Attempt>,
-    /// The first-order condition at the best point, once it is measured.
+    /// First-order condition at the best point, if measured.
     pub optimality: Option<Optimality>,
 }
 
 impl Fit {
-    /// This fit with the work of another one besides.
-    pub(super) fn with_work_of(self, counts: Counts, timings: Timings, elapsed: Duration) -> Self {
+    /// The fit with the work of another one added.
+    pub(super) fn with_work_of(
+        self,
+        counts: SolveCounts,
+        timings: Timings,
+        elapsed: Duration,
+    ) -> Self {
         Self {
             counts: self.counts + counts,
             timings: self.timings + timings,
@@ -53,29 +58,29 @@ impl Fit {
         }
     }
 
-    /// `J / J0`.
+    /// Ratio `J / J0`.
     pub fn cost_ratio(&self) -> f64 {
         ratio(self.best.evaluation.cost, self.initial_cost)
     }
 }
 
-/// One of several attempts: a search from one starting point.
+/// One attempt: a search from one starting point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attempt {
-    /// Where it started.
+    /// Start strategy.
     pub start: StartStrategy,
-    /// J at its start; NaN if the start had no motion.
+    /// Cost at the starting point; NaN if the simulation failed.
     pub initial_cost: f64,
-    /// J at its end; NaN if the start had no motion.
+    /// Cost at the end; NaN if the simulation at the starting point failed.
     pub cost: f64,
-    /// Iterations it took.
+    /// Iterations.
     pub iterations: u64,
-    /// How it ended.
+    /// Outcome.
     pub outcome: Outcome,
 }
 
 impl Attempt {
-    /// The attempt that ended with `fit`.
+    /// Attempt that ended with `fit`.
     pub(super) fn of(start: StartStrategy, fit: &Fit) -> Self {
         Self {
             start,
@@ -86,7 +91,7 @@ impl Attempt {
         }
     }
 
-    /// An attempt without a response at its start.
+    /// Attempt whose simulation at the starting point failed.
     pub(super) fn failed(start: StartStrategy, breakdown: SimulationError) -> Self {
         Self {
             start,
@@ -98,18 +103,17 @@ impl Attempt {
     }
 }
 
-/// `fit` with its first-order condition measured, and `converged` taken back where it does not hold.
+/// Measures the first-order condition of `fit` and revokes `converged` where it does not hold.
 ///
-/// A fit that ended by a limit on `J / J0` or `G^2 / G0^2` did what was asked of it, whether there is a minimum or not.
-/// The work is not counted: it is no part of the search.
+/// A fit that ended by a limit on `J / J0` or `G^2 / G0^2` claims no minimum and is not measured. The work is not counted.
 pub(super) fn measured(problem: &Problem, mut fit: Fit, settings: &FitSettings) -> Fit {
     let status = fit.outcome.status;
     let cost = fit.best.evaluation.cost;
     let is_asked = |row: &IterationRecord| settings.stopping.ratios_met(row).is_some();
-    // The equation error is measured by its own method; where J is zero there is nothing to be lowered.
+    // The equation error has its own measure; with J = 0 nothing can be lowered.
     let is_search = settings.solver != Solver::EquationError && problem.parameters() > 0;
     let is_measurable = cost > 0.0 && cost.is_finite();
-    // A fit that has done what it was asked for claims no minimum, and linearising takes time and memory.
+    // A fit that claims no minimum is not measured, which saves the linearisation.
     let is_claimed = status == Status::Converged && !fit.history.last().is_some_and(is_asked);
     if !is_search || !is_measurable || !is_claimed {
         return fit;

@@ -1,65 +1,65 @@
-//! The history of a fit: one record for each iteration.
+//! History of a fit: one record per iteration.
 
 use super::iterate::Iterate;
 use crate::problem::Problem;
 use crate::simulate::Trajectory;
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// One iteration: the cost after it, the gradient before it.
+/// One iteration: cost after it, gradient before it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct IterationRecord {
     /// Iteration, from 1.
     pub iteration: u64,
-    /// `J` after the iteration.
+    /// Cost `J` after the iteration.
     #[serde(deserialize_with = "number_or_nan")]
     pub cost: f64,
-    /// `J / J0`.
+    /// Ratio `J / J0`.
     #[serde(deserialize_with = "number_or_nan")]
     pub cost_ratio: f64,
-    /// `G^2` before the iteration over its first value.
+    /// `G^2` before the iteration, relative to its first value.
     #[serde(deserialize_with = "number_or_nan")]
     pub gradient_norm_squared_ratio: f64,
     /// Step length along the solver's direction.
     #[serde(deserialize_with = "number_or_nan")]
     pub step: f64,
-    /// Largest change of a function relative to its natural size ([`Problem::relative_change`]).
+    /// Largest change of a function, relative to its natural size ([`Problem::relative_change`]).
     #[serde(deserialize_with = "number_or_nan")]
     pub relative_change: f64,
 }
 
-/// A motion on the way.
+/// Responses after an iteration.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Snapshot {
-    /// After which iteration; 0 is the start.
+pub struct ResponseSnapshot {
+    /// Iteration; 0 is the start.
     pub iteration: u64,
-    /// The motion in each experiment.
+    /// Response of each experiment.
     pub trajectories: Vec<Trajectory>,
 }
 
-/// Iterations after which the motion is kept for figures: the paper's Fig. 3b and its continuation.
+/// Iterations whose responses are kept for figures: the paper's Fig. 3b and its continuation.
 pub const SNAPSHOT_ITERATIONS: [u64; 8] = [0, 10, 30, 100, 300, 1000, 3000, 10_000];
 
-/// What the ratios of a run are taken to: `J0` and `G0^2`.
+/// Reference values `J0` and `G0^2` of the ratios.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Reference {
     pub cost: f64,
     pub norm_squared: f64,
 }
 
-/// History and snapshots of one run.
+/// History and snapshots of one search.
 #[derive(Debug)]
 pub(super) struct Recorder {
     pub rows: Vec<IterationRecord>,
-    pub snapshots: Vec<Snapshot>,
+    pub snapshots: Vec<ResponseSnapshot>,
     pub initial_cost: f64,
     pub started_from: f64,
     pub initial_norm_squared: f64,
-    /// The parameters of the snapshots.
+    /// Parameters of the snapshots.
     snapshot_parameters: Vec<Vec<f64>>,
 }
 
 impl Recorder {
-    /// A record that begins at `start`, with ratios to `reference`, by default the start itself.
+    /// Starts at `start`, with ratios to `reference`, by default the start.
     pub fn new(start: &Iterate, reference: Option<Reference>) -> Self {
         let reference = reference.unwrap_or(Reference {
             cost: start.evaluation.cost,
@@ -77,8 +77,8 @@ impl Recorder {
         recorder
     }
 
-    /// The record of a search that stood here: `references` are [`Recorder::references`], `snapshots` those of
-    /// [`Recorder::snapshot_points`], with the responses that `at` computes. `None` where it is incomplete.
+    /// Restores the history of a saved search from [`Recorder::references`] and [`Recorder::snapshot_points`], with responses
+    /// computed by `at`; `None` where it is incomplete.
     pub fn restored(
         rows: Vec<IterationRecord>,
         references: &[f64],
@@ -95,7 +95,7 @@ impl Recorder {
             return None;
         }
         let restored = snapshots.iter().map(|(iteration, parameters)| {
-            Some(Snapshot {
+            Some(ResponseSnapshot {
                 iteration: *iteration,
                 trajectories: at(parameters)?,
             })
@@ -110,7 +110,7 @@ impl Recorder {
         })
     }
 
-    /// `J0`, the cost from which the search set out, and `G0^2`.
+    /// `J0`, the cost at the start of the search, and `G0^2`.
     pub fn references(&self) -> Vec<f64> {
         vec![
             self.initial_cost,
@@ -119,13 +119,13 @@ impl Recorder {
         ]
     }
 
-    /// The parameters at the snapshots, by iteration.
+    /// Parameters of the snapshots, by iteration.
     pub fn snapshot_points(&self) -> impl Iterator<Item = (u64, &[f64])> {
         let iterations = self.snapshots.iter().map(|s| s.iteration);
         iterations.zip(self.snapshot_parameters.iter().map(Vec::as_slice))
     }
 
-    /// Records the iteration that led from `before` to `after`.
+    /// Records the iteration from `before` to `after`.
     pub fn record(&mut self, problem: &Problem, before: &Iterate, after: &Iterate, step: f64) {
         let iteration = self.rows.len() as u64 + 1;
         self.rows.push(IterationRecord {
@@ -144,7 +144,7 @@ impl Recorder {
 
     fn keep_snapshot(&mut self, iteration: u64, point: &Iterate) {
         if SNAPSHOT_ITERATIONS.contains(&iteration) {
-            self.snapshots.push(Snapshot {
+            self.snapshots.push(ResponseSnapshot {
                 iteration,
                 trajectories: point.evaluation.trajectories.clone(),
             });
@@ -153,12 +153,12 @@ impl Recorder {
     }
 }
 
-/// `value / reference`, and 0 where both are zero: a start without misfit stays without misfit.
+/// Ratio `value / reference`, and 0 where both are zero.
 pub(super) fn ratio(value: f64, reference: f64) -> f64 {
     if value == 0.0 { 0.0 } else { value / reference }
 }
 
-/// JSON has no word for a number that is not finite.
+/// Reads a number; NaN for JSON's `null`, which stands for numbers that are not finite.
 pub fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }

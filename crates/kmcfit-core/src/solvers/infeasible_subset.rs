@@ -1,30 +1,29 @@
-//! Infeasible subsets of the constraints.
+//! Infeasible subsets: minimal sets of constraints that contradict each other.
 
 use crate::constraints::{Constraints, TOLERANCE};
 use crate::qp::{ConicStatus, project};
 
-/// What is known about whether some point satisfies a set of constraints.
+/// Feasibility of a set of constraints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Feasibility {
-    /// A point that does was found.
+    /// A feasible point was found.
     Feasible,
-    /// It was shown that none does.
+    /// The set is proved to be empty.
     Infeasible,
-    /// Neither: the projection ended without an answer.
+    /// The projection ended without a decision.
     Undecided,
 }
 
-/// Constraints shown to contradict each other.
+/// Constraints that contradict each other.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Conflict {
-    /// Their names.
+    /// Names of the constraints.
     pub names: Vec<String>,
-    /// Whether leaving out any one of them was seen to resolve it; if not, some may have no part in
-    /// it.
+    /// True if removing any one of them resolves the contradiction; otherwise some may not take part in it.
     pub minimal: bool,
 }
 
-/// What projecting `theta` in the metric `metric` tells about `constraints`.
+/// Feasibility of `constraints`, from the projection of `theta` in the metric `metric`.
 pub(super) fn feasibility(constraints: &Constraints, theta: &[f64], metric: &[f64]) -> Feasibility {
     if bounds_cross(constraints, theta.len()) {
         return Feasibility::Infeasible;
@@ -41,8 +40,8 @@ pub(super) fn feasibility(constraints: &Constraints, theta: &[f64], metric: &[f6
     }
 }
 
-/// Whether rows about one parameter alone leave it no value. A projection is solved to about the
-/// distance of bounds that cross by little, and does not tell.
+/// True if rows on single parameters contradict each other. The accuracy of a projection is too low to detect bounds that
+/// cross by little.
 fn bounds_cross(constraints: &Constraints, parameters: usize) -> bool {
     let mut bounds = vec![[f64::NEG_INFINITY, f64::INFINITY]; parameters];
     for group in &constraints.groups {
@@ -58,14 +57,13 @@ fn bounds_cross(constraints: &Constraints, parameters: usize) -> bool {
             bounds[j][1] = bounds[j][1].min(high);
         }
     }
-    // Each of the two may be broken by the tolerance.
+    // Each of the two may be violated by the tolerance.
     let crosses = |[low, high]: &[f64; 2]| low - high > TOLERANCE * (low.abs() + high.abs());
     bounds.iter().any(crosses)
 }
 
-/// The constraints of a contradiction in `all`: each group is left out in turn, for good where the
-/// rest is shown to contradict itself. A group without which nothing is shown stays, since without it
-/// there may be no contradiction. `None` if `all` itself is not shown to contradict itself.
+/// Infeasible subset of `all` by deletion: each group is removed in turn, permanently where the remaining set is proved
+/// infeasible. A group stays where the set without it is undecided. `None` if `all` is not proved infeasible.
 pub(super) fn conflict(
     all: &Constraints,
     judge: &dyn Fn(&Constraints) -> Feasibility,
@@ -96,7 +94,7 @@ pub(super) fn conflict(
     })
 }
 
-/// The constraints without their `i`-th group; the cones come after the rows.
+/// The constraints without group `i`; cones follow the rows.
 fn without(constraints: &Constraints, i: usize) -> Constraints {
     let mut rest = constraints.clone();
     match i.checked_sub(rest.groups.len()) {
@@ -122,7 +120,7 @@ mod tests {
         constraints.groups.iter().any(|g| g.name == name)
     }
 
-    /// `a` and `c` contradict each other; where `silent` is missing nothing is found out.
+    /// `a` and `c` contradict each other; a set without `silent` is undecided.
     fn judge(silent: &'static str) -> impl Fn(&Constraints) -> Feasibility {
         move |set| match (has(set, "a") && has(set, "c"), has(set, silent)) {
             (_, false) => Feasibility::Undecided,
@@ -132,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_decided_contradiction_is_as_small_as_can_be() {
+    fn a_decided_contradiction_is_minimal() {
         let decided = |set: &Constraints| match has(set, "a") && has(set, "c") {
             true => Feasibility::Infeasible,
             false => Feasibility::Feasible,
@@ -143,9 +141,9 @@ mod tests {
         assert_eq!(found, Some(Conflict { names, minimal }));
     }
 
-    /// Without `b` nothing is found out: it stays, and nobody says that leaving it out would help.
+    /// The set without `b` is undecided: `b` stays, and the subset is not marked as minimal.
     #[test]
-    fn what_is_not_decided_is_said() {
+    fn a_subset_with_undecided_parts_is_not_minimal() {
         let found = conflict(&named(&["a", "b", "c", "d"]), &judge("b"));
         let names = ["a", "b", "c"].map(String::from).to_vec();
         let minimal = false;
@@ -153,14 +151,13 @@ mod tests {
     }
 
     #[test]
-    fn no_contradiction_is_made_of_an_undecided_set() {
+    fn an_undecided_set_is_no_contradiction() {
         assert_eq!(conflict(&named(&["a", "c"]), &judge("b")), None);
     }
 
-    /// Bounds that cross by a millionth, from rows with factors of their own: no projection tells, as
-    /// its own accuracy is no better.
+    /// Bounds that cross by a millionth, in rows with different factors: below the accuracy of a projection.
     #[test]
-    fn bounds_that_nearly_meet_are_decided() {
+    fn bounds_that_cross_by_little_are_a_contradiction() {
         let set = |low: f64| {
             let mut constraints = named(&["low", "high", "other"]);
             let infinity = f64::INFINITY;

@@ -1,16 +1,16 @@
-//! An iterate: parameters with cost, gradient and what follows from them.
+//! Iterate of a search: parameters with cost, gradient and linearisation.
 
 use super::linearization::Linearization;
 use crate::objective::{Evaluation, Gradient};
 use crate::problem::Problem;
 use std::sync::OnceLock;
 
-/// Parameters with everything known about them.
+/// Parameters with their evaluation and gradient.
 #[derive(Debug, Clone)]
 pub struct Iterate {
     /// Parameters of all functions.
     pub parameters: Vec<f64>,
-    /// Cost, device and motions.
+    /// Cost, coefficients and responses.
     pub evaluation: Evaluation,
     /// Gradient of the cost.
     pub gradient: Gradient,
@@ -27,7 +27,7 @@ impl Iterate {
         }
     }
 
-    /// With the natural sizes and the linearisation there.
+    /// The iterate with natural sizes and linearisation.
     pub(super) fn with_cached(
         self,
         sizes: OnceLock<Vec<f64>>,
@@ -40,7 +40,7 @@ impl Iterate {
         Self { cached, ..self }
     }
 
-    /// Takes the Jacobian computed at the parameters `at` nearby for that of this iterate; whether it can be.
+    /// Adopts the Jacobian computed at the nearby parameters `at`; returns false where that is not possible.
     pub(super) fn reuse_linearization(&mut self, problem: &Problem, at: Vec<f64>) -> bool {
         let reused = Linearization::reused(problem, at, &self.evaluation, &self.gradient);
         let is_usable = reused.is_some();
@@ -48,33 +48,33 @@ impl Iterate {
         is_usable
     }
 
-    /// The linearisation that a step from here uses.
+    /// Linearisation for a step from the iterate.
     pub(super) fn linearization(&self) -> &Linearization {
         &self.cached.linearization
     }
 
-    /// [`Problem::natural_scales`] here.
+    /// [`Problem::natural_scales`] at the iterate.
     fn natural_scales(&self, problem: &Problem) -> &[f64] {
         (self.cached.sizes).get_or_init(|| problem.natural_scales(&self.evaluation))
     }
 
-    /// [`Parameterization::relative_metric`](crate::functions::Functions::relative_metric) with the sizes here, over the
-    /// whole grid.
+    /// [`Parameterization::relative_metric`](crate::functions::Parameterization::relative_metric) with the sizes at the iterate,
+    /// over the whole grid.
     pub(crate) fn relative_metric(&self, problem: &Problem) -> Vec<f64> {
         let duration = problem.system.grid.duration();
         (problem.functions).relative_metric(self.natural_scales(problem), duration)
     }
 
-    /// [`Problem::relative_change`] from here to the parameters `after`.
+    /// [`Problem::relative_change`] from the iterate to the parameters `after`.
     pub(crate) fn relative_change(&self, problem: &Problem, after: &[f64]) -> f64 {
         self.distance(problem, &self.parameters, after)
     }
 
-    /// [`Problem::relative_change`] between two lists of parameters, by the sizes here.
+    /// [`Problem::relative_change`] between two parameter vectors, with the sizes at the iterate.
     pub(crate) fn distance(&self, problem: &Problem, from: &[f64], to: &[f64]) -> f64 {
         problem.change_in_scales(self.natural_scales(problem), from, to)
     }
-    /// A number that two points share if cost and gradient have the same bits, and hardly otherwise.
+    /// Hash of the bits of cost and gradient.
     pub fn fingerprint(&self) -> u64 {
         let Self {
             evaluation,
@@ -83,7 +83,7 @@ impl Iterate {
         } = self;
         let gradients = gradient.euclidean.iter().chain(&gradient.l2);
         let numbers = [&evaluation.cost, &gradient.norm_squared].into_iter();
-        // FNV-1a by words.
+        // FNV-1a, word by word.
         let hash = numbers
             .chain(gradients)
             .fold(0xcbf2_9ce4_8422_2325_u64, |hash, x| {
@@ -93,7 +93,7 @@ impl Iterate {
     }
 }
 
-/// Values that follow from parameters, evaluation and gradient.
+/// Values derived from parameters, evaluation and gradient.
 #[derive(Clone, Default)]
 struct Cached {
     sizes: OnceLock<Vec<f64>>,
@@ -101,7 +101,7 @@ struct Cached {
 }
 
 impl std::fmt::Debug for Cached {
-    /// Nothing: which values are computed already is no part of an iterate.
+    /// Placeholder, because cached values are not part of an iterate's identity.
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         f.write_str("…")
     }

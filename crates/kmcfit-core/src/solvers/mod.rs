@@ -1,11 +1,10 @@
-//! Fits: methods, each a direction and a step rule, their common loop, starting points, and what is built on fits.
+//! Fits: methods, each a search direction and a step rule, their common loop, starting points, and analyses based on fits.
 //!
-//! Imports run one way: settings, termination, history and checkpoint; linearisation; iterate and counted evaluations; methods;
-//! executor (the loop); starts; start strategy; and on that noise estimation, weight path and validation.
+//! Order of imports: settings, termination, history and checkpoint; linearisation; iterate and counted evaluations;
+//! methods; executor (the loop); starts; start strategy; noise estimation, weight path and validation.
 
 mod active_set;
 mod checkpoint;
-mod counts;
 mod evaluator;
 mod executor;
 mod fit;
@@ -19,6 +18,7 @@ mod noise_estimation;
 mod optimality;
 mod reason;
 mod settings;
+mod solve_counts;
 mod start_projection;
 mod start_strategy;
 mod starts;
@@ -32,34 +32,34 @@ pub use active_set::{ActiveGroup, active_constraints};
 pub use checkpoint::{
     CheckpointStore, CheckpointUnit, ExactF64s, IterationEvent, Observer, SolverState,
 };
-pub use counts::Counts;
 pub use executor::fit_from;
 pub use fit::{Attempt, Fit};
 pub use history::{IterationRecord, number_or_nan};
 pub use iterate::Iterate;
-pub(crate) use linearization::{add_penalties, add_priors, linear_readings, weighted_jacobian};
+pub(crate) use linearization::{add_penalties, add_priors, linear_predictions, weighted_jacobian};
 pub use methods::equation_error::{Measurements, equation_error};
-pub use no_response::without_motion;
+pub use no_response::no_response;
 pub use noise_estimation::{fit_with_noise, fit_with_noise_watched};
 pub use optimality::Optimality;
 pub use reason::Reason;
 pub use settings::{FitSettings, Initial, Solver, StartStrategy};
+pub use solve_counts::SolveCounts;
 pub use start_projection::StartProjection;
 pub use start_strategy::fit;
-pub use state_estimation::states_from_readings;
+pub use state_estimation::estimate_states;
 pub use termination::{Outcome, Status, Stopping};
 pub use timings::{Timings, timed};
-pub use validation::predict_held_out;
+pub use validation::predict_validation;
 pub use weight_path::{PathPoint, WeightPath, WeightRule, choose_weight, choose_weight_watched};
 
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
 
 impl Problem {
-    /// Fits from the problem's start with the usual settings.
+    /// Fits from the problem's start with default settings.
     ///
     /// # Errors
-    /// A [`SimulationError`] if the start itself has no motion.
+    /// A [`SimulationError`] if the simulation at the start fails.
     pub fn fit(&self) -> Result<Fit, SimulationError> {
         self.fit_with(&FitSettings::default())
     }

@@ -1,7 +1,7 @@
-//! The end of a fit without a feasible response.
+//! Result of a fit whose feasible starting points cannot be simulated.
 //!
-//! The constraint set is convex, and whether it is empty is decided by a projection. Which of its
-//! points have a motion is not: only that the mass must be positive is a constraint of its own.
+//! The constraint set is convex, and a projection decides if it is empty. The set of parameters that can be simulated is
+//! not convex; of its conditions only the positive mass is a constraint.
 
 use super::executor::search_unobserved;
 use super::fit::Fit;
@@ -12,16 +12,14 @@ use crate::constraints::TOLERANCE;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
 
-/// The end of a fit none of whose starts in the constraint set has a motion, the first for the reason
-/// `breakdown`: `infeasible`, with the start `given` before it was moved into the constraints as the
-/// only point with a motion that is known.
+/// Result of a fit whose starting points in the constraint set cannot be simulated, the first because of `breakdown`: status
+/// `infeasible`, with the start `given`, before projection onto the constraints, as the only point with a response.
 ///
-/// This is no proof that every device in the set is without motion; the reason says what was seen.
+/// This is no proof that no feasible point can be simulated; the reason states the facts.
 ///
 /// # Errors
-/// The `breakdown`, if `given` satisfies the constraints or has no motion either: then the start is
-/// to blame, and there is nothing to keep.
-pub fn without_motion(
+/// The `breakdown`, if `given` satisfies the constraints or cannot be simulated either.
+pub fn no_response(
     problem: &Problem,
     given: &[f64],
     settings: &FitSettings,

@@ -1,4 +1,4 @@
-//! Sigmas that are estimated from the residuals.
+//! Estimation of sigmas from the residuals, in alternation with fits.
 
 use super::checkpoint::Observer;
 use super::executor::search;
@@ -12,20 +12,19 @@ use crate::record::{Channel, Loss, Weighting};
 use crate::simd::sum::rms;
 use crate::simulate::SimulationError;
 
-/// Most rounds of fit and estimate.
+/// Largest number of rounds of fit and estimation.
 const ROUNDS: usize = 20;
-/// Sigmas that change by less than this share are found: chi-square then changes by twice that.
+/// Relative change of a sigma below which it has converged; chi-square changes by twice that.
 const SETTLED: f64 = 1e-6;
-/// From the median of the absolute residuals to the standard deviation of Gaussian noise.
+/// Ratio of the standard deviation to the median absolute value, for Gaussian noise.
 const MEDIAN_TO_SIGMA: f64 = 1.4826;
 
-/// [`fit`](super::fit()), with every sigma that is to be estimated ([`Weighting::Estimated`]) found together with the
-/// parameters: fit and estimate in turn until the sigmas rest, which is the maximum of the likelihood
-/// but for the factor `n / (n - p)` that makes each sigma's square unbiased (with `p` of the
-/// parameters in proportion to the channel's readings). Returns the problem with its sigmas.
+/// [`fit`](super::fit()) with estimation of each sigma ([`Weighting::Estimated`]): fit and estimation alternate until the
+/// sigmas converge. The result is the maximum of the likelihood except for the factor `n / (n - p)` that makes each squared
+/// sigma unbiased, with `p` the share of the parameters in proportion to the channel's samples. Returns the problem with its
+/// sigmas.
 ///
-/// With a robust loss sigma is that of the bulk of the readings, from the median of the absolute
-/// residuals.
+/// With a robust loss, sigma describes the majority of the samples: it follows from the median absolute residual.
 ///
 /// # Errors
 /// As [`fit`](super::fit()).
@@ -38,8 +37,7 @@ pub fn fit_with_noise(
     fit_with_noise_watched(problem, start, settings, &mut Observer::new(observe))
 }
 
-/// [`fit_with_noise`], and where `watch` has a [`CheckpointStore`](super::CheckpointStore), one that goes on from what
-/// was kept.
+/// [`fit_with_noise`] with an observer, which may hold checkpoints.
 ///
 /// # Errors
 /// As [`fit_with_noise`].
@@ -70,7 +68,7 @@ pub fn fit_with_noise_watched(
             break;
         }
     }
-    // All costs are told with the sigmas that were found.
+    // All costs refer to the final sigmas.
     if let Ok(evaluation) = problem.evaluate(start) {
         found.initial_cost = evaluation.cost;
     }
@@ -78,8 +76,8 @@ pub fn fit_with_noise_watched(
     Ok((problem, found))
 }
 
-/// The fit `found`, gone on with by another round, `next`: the last place, with the work of both. Rounds
-/// that were `ended` from outside are not at their end, wherever the last one came to.
+/// The fit `found` continued by another round, `next`: the last point, with the work of both. Rounds that were `ended` from
+/// outside have not converged, whatever the status of the last fit.
 fn with_round(found: Fit, next: Fit, ended: bool) -> Fit {
     let next = next.with_work_of(found.counts, found.timings, found.elapsed);
     Fit {
@@ -97,10 +95,10 @@ fn with_round(found: Fit, next: Fit, ended: bool) -> Fit {
     }
 }
 
-/// Puts the sigmas of the residuals into the problem; the largest relative change.
+/// Sets the sigmas of the residuals; returns the largest relative change.
 fn update(problem: &mut Problem, found: &Fit) -> f64 {
-    let readings = problem.reading_count() as f64;
-    let share = (problem.parameters() as f64 / readings).min(0.5);
+    let samples = problem.sample_count() as f64;
+    let share = (problem.parameters() as f64 / samples).min(0.5);
     let mut largest = 0.0f64;
     let experiments = problem.parts_mut().experiments.iter_mut();
     for (experiment, predictions) in experiments.zip(&found.best.evaluation.predictions) {
@@ -109,7 +107,7 @@ fn update(problem: &mut Problem, found: &Fit) -> f64 {
                 continue;
             };
             let sigma = spread(channel, predicted) / (1.0 - share).sqrt();
-            // Readings that are fitted exactly still need a scale.
+            // Samples that are fitted exactly still need a scale.
             let sigma = sigma.max(f64::EPSILON * rms(channel.observed()));
             if sigma > 0.0 {
                 largest = largest.max((sigma / before).ln().abs());
@@ -142,15 +140,15 @@ mod tests {
     use crate::system::Grid;
     use std::time::Duration;
 
-    /// Work and time of both, the motions of the first, and the place of the second.
+    /// The work and time of both rounds, the initial values of the first, and the point of the second.
     #[test]
     fn a_fit_with_another_round_has_the_work_of_both() {
         crate::host::provide_clock();
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
-        let readings: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let samples: Vec<f64> = times.iter().map(|t| t.cos()).collect();
         let record = Record::new("free decay")
             .from_state(1.0, 0.0)
-            .displacement(&times, &readings);
+            .displacement(&times, &samples);
         let parts = [
             CoefficientSpec::fixed(1.0),
             CoefficientSpec::constant(0.5),

@@ -1,8 +1,7 @@
-//! The first-order condition of the constrained problem, measured at the end of a fit.
+//! First-order condition of the constrained problem, measured at the end of a fit.
 //!
-//! A stopping test sees the last steps, and steps may be short for other reasons than a minimum. So the problem is
-//! linearised once more at the point that is returned, and solved under its constraints; how much of J that solution promises is
-//! what the point is short of a minimum.
+//! A stopping test uses the last steps, which may be short without a minimum. Therefore the problem is linearised once more at
+//! the final point and solved under its constraints; the predicted decrease of J measures the distance from a minimum.
 
 use super::history::number_or_nan;
 use super::iterate::Iterate;
@@ -16,15 +15,14 @@ use crate::problem::Problem;
 use crate::qp::{Solution, Subproblem};
 use serde::{Deserialize, Serialize};
 
-/// A fit is exact where J is below this share of the misfit of zero response: its residuals are then ten digits below the
-/// measurements.
+/// Share of the zero-response misfit below which a fit is exact: its residuals are then ten digits below the measurements.
 const NEGLIGIBLE: f64 = 1e-20;
-/// Relative rounding of a computed motion, in units of the machine precision: some thousand steps.
+/// Relative rounding error of a computed response, in units of machine precision: some thousand steps.
 const MOTION_ROUNDING: f64 = 1000.0;
-/// Memory of a linearised problem: 3564 bytes a node were measured for one value per node.
+/// Memory of a linearised problem: 3564 bytes per node were measured for nodal functions.
 const BYTES_PER_NODE: u64 = 4000;
 
-/// The first-order condition at a point, all numbers without unit.
+/// First-order condition at a point; all values are dimensionless.
 ///
 /// With the linearised predictions `z + Z delta`, the linearised problem at the parameters `theta` is
 ///
@@ -33,37 +31,36 @@ const BYTES_PER_NODE: u64 = 4000;
 /// under the constraints at theta + delta,
 /// ```
 ///
-/// `|delta|^2 = sum_f 1/T integral (delta p_f / size of p_f)^2 dt`: a change of a function by its size costs as
-/// much as J, so that directions that the readings do not show promise nothing. Without constraints
-/// the decrease is `g' (4 H)^-1 g` with the gradient `g` and the Gauss-Newton Hessian `2 H`, penalties and `J |.|^2` included.
-/// It is zero exactly where the conditions of Karush, Kuhn and Tucker hold.
+/// `|delta|^2 = sum_f 1/T integral (delta p_f / size of p_f)^2 dt`: a change of a function by its size costs J, so that
+/// undetermined directions predict no decrease. Without constraints the decrease is `g' (4 H)^-1 g` with the gradient `g`
+/// and the Gauss–Newton Hessian `2 H`, penalties and `J |.|^2` included. It is zero exactly where the Karush–Kuhn–Tucker
+/// conditions hold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Optimality {
-    /// `(J - min L) / J`, less the rounding of the response: the share of J that the linearised problem promises. With the
-    /// residuals of the optimality conditions of the program that it was solved by, if there was one.
+    /// Predicted decrease `(J - min L) / J`, less the rounding error of the response, plus the residuals of the optimality
+    /// conditions of the program, if one was solved.
     #[serde(deserialize_with = "number_or_nan")]
     pub stationarity: f64,
-    /// The largest change of a function by that step, relative to its size. In a fit without residuals it is this
-    /// that goes to zero.
+    /// Largest change of a function by that step, relative to its size; it converges to zero in a fit without residuals.
     #[serde(deserialize_with = "number_or_nan")]
     pub step: f64,
     /// Largest violation of a constraint, relative to its scale.
     #[serde(deserialize_with = "number_or_nan")]
     pub feasibility: f64,
-    /// `sum |multiplier| distance / J` of all bounds at the point, with the multipliers of the linearised problem.
+    /// Complementarity `sum |multiplier| distance / J` of all bounds, with the multipliers of the linearised problem.
     #[serde(deserialize_with = "number_or_nan")]
     pub complementarity: f64,
-    /// What `complementarity` and one of `stationarity` and `step` may be at a minimum: the tolerance of the stopping test,
-    /// or [`Optimality::LEAST`].
+    /// Limit of `complementarity` and of one of `stationarity` and `step` at a minimum: the tolerance of the stopping test, or
+    /// [`Optimality::LEAST`].
     #[serde(deserialize_with = "number_or_nan")]
     pub tolerance: f64,
 }
 
 impl Optimality {
-    /// Least tolerance: ten times the share of J that is the accuracy of a program ([`crate::qp::Kkt::COST`] is a third of it).
+    /// Smallest tolerance: ten times the accuracy of a program as a share of J ([`crate::qp::Kkt::COST`] is a third of it).
     pub const LEAST: f64 = 1e-8;
 
-    /// Whether the point satisfies the first-order condition.
+    /// True if the point satisfies the first-order condition.
     pub fn holds(&self) -> bool {
         let is_flat = self.stationarity <= self.tolerance;
         let is_settled = self.step <= self.tolerance;
@@ -72,7 +69,7 @@ impl Optimality {
             && self.feasibility <= TOLERANCE
     }
 
-    /// The part of the condition that does not hold.
+    /// Part of the condition that is violated.
     fn failure(&self) -> ConditionFailure {
         if self.feasibility > TOLERANCE {
             return ConditionFailure::Violation(self.feasibility);
@@ -83,19 +80,18 @@ impl Optimality {
         ConditionFailure::Stationarity(self.stationarity)
     }
 
-    /// The cost of which shares are taken: J, or 1e-12 of the misfit of zero response where J is less. A fit whose residuals
-    /// are below 1e-10 of the measurements then has a share below [`Optimality::LEAST`], for no step lowers J by
-    /// more than J.
+    /// Reference cost of the shares: J, or 1e-12 of the zero-response misfit where J is less. No step lowers J by more than J, so
+    /// a fit whose residuals are below 1e-10 of the measurements has a share below [`Optimality::LEAST`].
     pub fn reference(problem: &Problem, cost: f64) -> f64 {
         cost.max(NEGLIGIBLE * problem.zero_response_misfit() / Self::LEAST)
     }
 
-    /// Whether J is so small that no step can lower it by a share that counts.
+    /// True if J is so small that no step can lower it by a significant share.
     pub fn is_exact(problem: &Problem, cost: f64) -> bool {
         cost <= NEGLIGIBLE * problem.zero_response_misfit()
     }
 
-    /// At `point`; `None` if the linearised problem could not be solved, or does not fit into memory.
+    /// Measures the condition at `point`; `None` if the linearised problem cannot be solved, or exceeds the memory limit.
     pub fn at(problem: &Problem, point: &Iterate, tolerance: f64) -> Option<Self> {
         let cost = point.evaluation.cost;
         let worst = problem.constraints.largest_violation(&point.parameters);
@@ -125,7 +121,7 @@ impl Optimality {
         for (d, s) in sub.proximal.iter_mut().zip(&scales) {
             *d = cost * s;
         }
-        let found = Minimum::of(&sub)?;
+        let found = LinearisedMinimum::of(&sub)?;
         let parameters: Vec<f64> = point
             .parameters
             .iter()
@@ -145,23 +141,23 @@ impl Optimality {
     }
 }
 
-/// A change of the cost that is within the rounding of the response, which changes a sum of squared residuals by their
+/// Change of the cost caused by the rounding error of the response, which changes a sum of squared residuals by their
 /// product.
 pub(super) fn response_rounding(problem: &Problem, cost: f64) -> f64 {
     let rounding = MOTION_ROUNDING * f64::EPSILON * problem.zero_response_misfit().sqrt();
     2.0 * rounding * cost.sqrt() + rounding * rounding
 }
 
-/// The minimum of a linearised problem.
-struct Minimum {
+/// Minimum of a linearised problem.
+struct LinearisedMinimum {
     z: Vec<f64>,
-    /// `sum |multiplier| distance` at zero, of the whole cost.
+    /// Complementarity `sum |multiplier| distance` at zero, of the full cost.
     complementarity: f64,
-    /// The residuals of its own optimality conditions.
+    /// Residuals of the optimality conditions.
     accuracy: f64,
 }
 
-impl Minimum {
+impl LinearisedMinimum {
     fn of(sub: &Subproblem) -> Option<Self> {
         if let Some(z) = sub.solve_plain().filter(|z| sub.holds(z, 0.1 * TOLERANCE)) {
             return Some(Self {
@@ -183,7 +179,7 @@ impl Minimum {
     }
 }
 
-/// `2 sum |multiplier| distance` at zero: multipliers are those of half the cost.
+/// Complementarity `2 sum |multiplier| distance` at zero; multipliers refer to half the cost.
 fn complementarity(sub: &Subproblem, solution: &Solution) -> f64 {
     let bounds = sub.inequalities.right().iter().zip(&sub.upper);
     let rows = bounds.zip(&solution.multipliers);
@@ -195,7 +191,7 @@ fn complementarity(sub: &Subproblem, solution: &Solution) -> f64 {
     2.0 * rows.map(distance).sum::<f64>()
 }
 
-/// A `converged` that asserts a minimum, or `stalled` where the first-order condition contradicts it.
+/// `converged` where the outcome claims a minimum and the condition holds, `stalled` where it does not.
 pub(super) fn judged(outcome: Outcome, optimality: Option<&Optimality>) -> Outcome {
     if optimality.is_some_and(Optimality::holds) {
         return outcome;

@@ -1,4 +1,4 @@
-//! Reasons for which a fit ended.
+//! Reasons for the end of a fit, and their sentences.
 
 use crate::qp::ConicStatus;
 use crate::simulate::SimulationError;
@@ -6,25 +6,25 @@ use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use thiserror::Error;
 
-/// A value and the limit that it is within.
+/// A value and its limit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Within {
+pub struct BoundedValue {
     /// The value.
     pub value: f64,
     /// The limit.
     pub limit: f64,
 }
 
-/// Why a fit ended; as text, one sentence.
+/// Reason for the end of a fit; displayed as one sentence.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Error)]
 pub enum Reason {
     /// The ratios of cost and gradient to those at the start are within their limits.
     #[error("{}", ratios(cost.as_ref(), gradient.as_ref()))]
     Ratios {
         /// `J / J0`, if there is a limit.
-        cost: Option<Within>,
+        cost: Option<BoundedValue>,
         /// `G^2 / G0^2`, if there is a limit.
-        gradient: Option<Within>,
+        gradient: Option<BoundedValue>,
     },
     /// The last iteration changed every function by at most this share of its size.
     #[error("the last iteration changed no function by more than {0:.1e} of its size")]
@@ -39,29 +39,29 @@ pub enum Reason {
         /// Largest change of a function, relative to its size.
         change: f64,
     },
-    /// The iterations ran out before a stopping test was met.
+    /// The iteration limit was reached before a stopping test was met.
     #[error("no stopping test was met in {0} iterations")]
     IterationLimit(u64),
-    /// There is no stopping test, and all iterations were run.
+    /// All requested iterations were run without a stopping test.
     #[error("ran the {0} iterations asked for")]
     AllIterations(u64),
     /// The wall-clock limit was reached.
     #[error("the limit of {} s is reached", .0.as_secs_f64())]
     TimeLimit(Duration),
-    /// Ended from outside.
+    /// Interrupted by the user.
     #[error("asked to stop; the best point so far is kept")]
     Interrupted,
     /// All functions are fixed.
     #[error("there is nothing to fit: every function is fixed")]
     NoParameters,
-    /// The readings, or their squares, are zero.
-    #[error("there is nothing to explain: the readings, or their squares, are zero")]
+    /// The samples, or their squares, are zero.
+    #[error("there is nothing to explain: the samples, or their squares, are zero")]
     ZeroReadings,
     /// The cost at the start is zero.
     #[error("the start fits exactly")]
     ExactStart,
-    /// The squares of the readings overflow.
-    #[error("the squares of the readings leave the range of numbers: give them in a larger unit")]
+    /// The squares of the samples overflow.
+    #[error("the squares of the samples leave the range of numbers: give them in a larger unit")]
     Overflow,
     /// The cost is zero to machine precision.
     #[error("the cost is zero to rounding")]
@@ -78,7 +78,7 @@ pub enum Reason {
     /// No Gauss-Newton step lowers the cost.
     #[error("no Gauss-Newton step lowers the cost")]
     NoLowerGaussNewtonStep,
-    /// None of so many trial steps lowers the cost.
+    /// None of the trial steps, of the given number, lowers the cost.
     #[error("none of the {0} trial steps lowers the cost")]
     NoLowerTrial(u32),
     /// No step of the line search lowers the cost enough.
@@ -93,52 +93,52 @@ pub enum Reason {
     /// No step towards the projected gradient lowers the cost.
     #[error("no step towards the projected gradient lowers the cost")]
     NoLowerStepToProjection,
-    /// How a quadratic program ended.
+    /// Status of a quadratic program.
     #[error("{}", .0.sentence())]
     Program(ConicStatus),
     /// The minimum of the equation error.
     #[error("{}", equation_error(*program, *has_mass))]
     EquationError {
-        /// How the quadratic program ended, if one was needed.
+        /// Status of the quadratic program, if one was needed.
         program: Option<ConicStatus>,
-        /// Whether the mass is positive at all times.
+        /// True if the mass is positive at all times.
         has_mass: bool,
     },
-    /// The start has no response.
+    /// The simulation at the start fails.
     #[serde(skip)]
     #[error("{0}")]
     NoResponse(SimulationError),
-    /// No start within the constraints has a response.
+    /// The simulation fails at all feasible starting points.
     #[serde(skip)]
     #[error(
-        "no start within the constraints has a motion ({0}); what is kept is the start as given, which breaks them"
+        "the simulation fails at all starting points within the constraints ({0}); the result is the start as given, which violates them"
     )]
     NoFeasibleResponse(SimulationError),
     /// A record has no equation error.
     #[serde(skip)]
     #[error("{0}")]
     UnsupportedRecord(UnsupportedRecord),
-    /// A stopping test was met where the first-order condition does not hold.
+    /// A stopping test was met, but the first-order condition is violated.
     #[serde(skip)]
     #[error("{met}; {}", no_minimum(failure.as_ref()))]
     NoMinimum {
-        /// The test.
+        /// Stopping test.
         met: Box<Reason>,
-        /// The part of the condition that fails; `None` where it could not be measured.
+        /// Violated part of the condition; `None` where it could not be measured.
         failure: Option<ConditionFailure>,
     },
 }
 
-/// A part of the first-order condition that does not hold.
+/// A violated part of the first-order condition.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum ConditionFailure {
-    /// A constraint is violated by this share of its scale.
+    /// Violation of a constraint, relative to its scale.
     #[error("a constraint is violated by {0:.1e} of its scale")]
     Violation(f64),
-    /// Moving to the bounds promises to lower J by this share.
+    /// Predicted decrease of J by moving to the bounds, as a share of J.
     #[error("moving to its bounds promises to lower J by a fraction of {0:.1e}")]
     Complementarity(f64),
-    /// The linearised problem promises to lower J by this share.
+    /// Predicted decrease of J by the linearised problem, as a share of J.
     #[error("the linearised cost can be lowered by a fraction of {0:.1e}")]
     Stationarity(f64),
 }
@@ -149,13 +149,13 @@ pub enum ConditionFailure {
 pub struct UnsupportedRecord {
     /// Index of the experiment.
     pub experiment: usize,
-    /// Its name.
+    /// Name of the experiment.
     pub name: String,
-    /// What is missing.
+    /// Missing measurement.
     pub reason: MissingMeasurement,
 }
 
-/// What a record lacks for its equation error.
+/// Measurement that a record lacks for its equation error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum MissingMeasurement {
     /// A quadratic loss.
@@ -164,26 +164,26 @@ pub enum MissingMeasurement {
     /// Sensors with known gain and offset.
     #[error("the equation error takes the sensors as known")]
     KnownSensors,
-    /// An acceleration that oscillates for long enough.
+    /// An acceleration that oscillates long enough.
     #[error("the acceleration is too short or does not oscillate")]
     Oscillation,
-    /// A displacement, or accelerations of equal spacing alone: others leave no way to filter force and base alike.
+    /// A displacement, or equally spaced accelerations alone; force and base cannot be filtered consistently with other channels.
     #[error(
-        "its force or base cannot be filtered as its motion is, which is integrated from other channels than one of equally spaced accelerations"
+        "its force or base cannot be filtered like its response, which is integrated from channels other than one of equally spaced accelerations"
     )]
     FilteredDrive,
-    /// Readings.
-    #[error("there are too few readings")]
+    /// Samples.
+    #[error("there are too few samples")]
     Readings,
-    /// Anything that moves.
+    /// A nonzero response.
     #[error("nothing moves")]
     Motion,
 }
 
-fn ratios(cost: Option<&Within>, gradient: Option<&Within>) -> String {
+fn ratios(cost: Option<&BoundedValue>, gradient: Option<&BoundedValue>) -> String {
     let named = [("J/J0", cost), ("G^2/G0^2", gradient)];
     let given = named.into_iter().filter_map(|(name, test)| {
-        let Within { value, limit } = test?;
+        let BoundedValue { value, limit } = test?;
         Some(format!("{name} {value:.3e} <= {limit:.3e}"))
     });
     given.collect::<Vec<_>>().join(" and ")
@@ -191,7 +191,7 @@ fn ratios(cost: Option<&Within>, gradient: Option<&Within>) -> String {
 
 fn no_minimum(failure: Option<&ConditionFailure>) -> String {
     match failure {
-        Some(failure) => format!("but this is no minimum: {failure}"),
+        Some(failure) => format!("but the first-order condition is violated: {failure}"),
         None => format!(
             "whether this is a minimum could not be measured: {}",
             ConicStatus::Stalled.sentence()
@@ -208,7 +208,7 @@ fn equation_error(program: Option<ConicStatus>, has_mass: bool) -> String {
     let but = match has_mass {
         true => "",
         false => {
-            "; its mass is not positive at all times, so no device moves so: give the mass a `min`"
+            "; its mass is not positive at all times, so the equation of motion cannot be solved: give the mass a `min`"
         }
     };
     format!("the equation error is convex, and its minimum was found by {how}{but}")

@@ -5,22 +5,22 @@ use crate::objective::GradientKind;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Which solver, with its own settings.
+/// Solver of a fit, with its settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Solver {
-    /// The paper's: 50 trial steps `5 sqrt(G^2) / i^4` along the L2 gradient, the best is taken.
+    /// The paper's method: 50 trial steps `5 sqrt(G^2) / i^4` along the negative L2 gradient, of which the best is taken.
     SteepestDescent,
-    /// Limited-memory BFGS in the L2 inner product, in the logarithm of the mass.
+    /// Limited-memory BFGS in the L2 inner product, with the logarithm of the mass.
     Lbfgs {
-        /// Number of pairs kept.
+        /// Number of stored pairs.
         memory: usize,
     },
-    /// Spectral projected gradient, under constraints.
+    /// Spectral projected gradient, with constraints.
     ProjectedGradient,
-    /// Gauss–Newton with a proximal term, under constraints.
+    /// Gauss–Newton with a proximal term, with constraints.
     GaussNewton,
-    /// The minimum of the equation error ([`Measurements`](super::Measurements)), a convex problem that is solved once: the
-    /// cost is another one, and neither start, gradient nor stopping test has a part in it.
+    /// Minimum of the equation error ([`Measurements`](super::Measurements)), a convex problem with another cost; independent of
+    /// start, gradient and stopping test.
     EquationError,
 }
 
@@ -37,12 +37,12 @@ impl Solver {
     }
 }
 
-/// Where a fit starts.
+/// Initial parameters of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Initial {
-    /// From the start values of the functions.
+    /// Start values of the functions.
     Functions,
-    /// From the equation error of the readings.
+    /// Minimum of the equation error of the samples.
     Data,
 }
 
@@ -56,23 +56,23 @@ impl Initial {
     }
 }
 
-/// The strategies for starting points, which a fit tries in turn.
+/// Start strategies, tried in turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StartStrategy {
-    /// The parameters that fit the first steps of a long record.
+    /// Parameters fitted to the first steps of a long record.
     Truncated {
-        /// How many.
+        /// Number of steps.
         steps: usize,
     },
-    /// The start values of the functions.
+    /// Start values of the functions.
     StartValues,
-    /// The minimum of the equation error.
+    /// Minimum of the equation error.
     EquationError,
-    /// The minimum of the equation error, fitted to growing parts of the record.
+    /// Minimum of the equation error, fitted to growing parts of the record.
     GrowingHorizon,
-    /// States and parameters that fit together, from a response near the measurements.
+    /// Collocation: states and parameters fitted together, from a response near the measurements.
     Collocation,
-    /// The end of the attempt with the lowest cost.
+    /// End of the attempt with the lowest cost.
     Continued,
 }
 
@@ -84,30 +84,29 @@ impl StartStrategy {
             Self::StartValues => "start values",
             Self::EquationError => "equation error",
             Self::GrowingHorizon => "growing horizon",
-            Self::Collocation => "motion of the readings",
+            Self::Collocation => "motion of the samples",
             Self::Continued => "best of these, continued",
         }
     }
 }
 
-/// How a fit is run.
+/// Settings of a fit.
 #[derive(Debug, Clone)]
 pub struct FitSettings {
-    /// The solver.
+    /// Solver.
     pub solver: Solver,
-    /// Where it starts.
+    /// Initial parameters.
     pub initial: Initial,
-    /// Which adjoint gives its gradients.
+    /// Adjoint for gradients.
     pub gradient: GradientKind,
-    /// When it ends.
+    /// Stopping tests and limits.
     pub stopping: Stopping,
-    /// Set from outside (Ctrl-C) to end the run after the current iteration.
+    /// Flag set by the application (Ctrl-C) to end the fit after the current iteration.
     pub interrupt: Option<Arc<AtomicBool>>,
 }
 
 impl Default for FitSettings {
-    /// Those of a model file that says nothing of them: Gauss–Newton from the functions' start, with exact
-    /// gradients, until nothing changes.
+    /// Default settings of a model file: Gauss–Newton from the start values with exact gradients, a tolerance of 1e-10.
     fn default() -> Self {
         Self {
             solver: Solver::GaussNewton,

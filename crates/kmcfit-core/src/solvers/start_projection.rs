@@ -1,45 +1,43 @@
-//! A start that satisfies the constraints, or the constraints that contradict each other.
+//! Projection of a start onto the constraints, or the infeasible subset if there is no feasible point.
 
 use super::infeasible_subset::{conflict, feasibility};
 use crate::constraints::{Constraints, RowGroup, TOLERANCE};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, project};
 
-/// Smallest mass that counts as positive, as a share of the start's largest: a lighter device swings
-/// a thousand times in the time of one swing of the start, which no grid that suits the start resolves.
+/// Smallest positive mass, as a share of the start's largest: a lighter system oscillates a thousand times faster than the
+/// start, which a grid suitable for the start does not resolve.
 const POSITIVE: f64 = 1e-6;
 
-/// What became of a start.
+/// Result of projecting a start.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StartProjection {
-    /// It satisfies the constraints as it is.
+    /// The start is feasible.
     Kept(Vec<f64>),
-    /// It was moved to the nearest point that does.
+    /// The start was moved to the nearest feasible point.
     Moved {
-        /// That point.
+        /// Feasible point.
         parameters: Vec<f64>,
-        /// Name of the constraint that was violated most.
+        /// Name of the constraint with the largest violation.
         constraint: String,
     },
-    /// No point does: these constraints contradict each other, and would not without any one of
-    /// them.
+    /// No point is feasible: these constraints contradict each other, and removing any one of them resolves it.
     Contradiction(Vec<String>),
-    /// No point does: a contradiction is among these constraints, but some of them may have no part
-    /// in it.
+    /// No point is feasible: the contradiction is among these constraints, some of which may not take part in it.
     ContradictionAmong(Vec<String>),
     /// The projection could not be solved.
     Unsolved(ConicStatus),
 }
 
 impl Problem {
-    /// Moves `start` into the constraint set, in the L2 metric relative to the functions' sizes.
+    /// Projects `start` onto the constraint set, in the L2 metric relative to the functions' sizes.
     pub fn feasible_start(&self, start: &[f64]) -> StartProjection {
         let worst = match self.constraints.largest_violation(start) {
             Some(violation) if violation.relative > 0.0 => violation,
             _ => return StartProjection::Kept(start.to_vec()),
         };
-        let device = self.functions.device(start);
-        let sizes: Vec<f64> = (device.functions())
+        let nodal = self.functions.nodal(start);
+        let sizes: Vec<f64> = (nodal.functions())
             .map(|f| f.iter().fold(0.0f64, |most, p| most.max(p.abs())))
             .collect();
         let metric = self
@@ -63,8 +61,8 @@ impl Problem {
         }
     }
 
-    /// The projection of `start`. Where its program stalls, any point that it reached inside the set,
-    /// or the nearest one in another metric, is as good to start from.
+    /// Projection of `start`. If the program fails, any feasible point that it reached, or the projection in another metric,
+    /// serves as well.
     fn inside(&self, start: &[f64], metric: &[f64]) -> Result<Vec<f64>, ConicStatus> {
         let mut first = None;
         for metric in [
@@ -84,10 +82,9 @@ impl Problem {
         Err(first.unwrap_or(ConicStatus::Stalled))
     }
 
-    /// `moved`, or where that has no positive mass the nearest point to `start` that has one, if there
-    /// is any in the constraint set.
+    /// `moved`, or where its mass is not positive the nearest point to `start` with positive mass, if one is feasible.
     fn with_mass(&self, start: &[f64], metric: &[f64], moved: Vec<f64>) -> Vec<f64> {
-        let positive = |theta: &[f64]| self.functions.device(theta).mass.iter().all(|m| *m > 0.0);
+        let positive = |theta: &[f64]| self.functions.nodal(theta).mass.iter().all(|m| *m > 0.0);
         if positive(&moved) || !positive(start) {
             return moved;
         }
@@ -99,8 +96,7 @@ impl Problem {
         }
     }
 
-    /// What is known about constraints into which `start` could not be moved: its projection ended
-    /// with `status`.
+    /// Infeasible subset of constraints for a `start` whose projection ended with `status`.
     fn contradiction(&self, start: &[f64], metric: &[f64], status: ConicStatus) -> StartProjection {
         let judge = |candidate: &Constraints| feasibility(candidate, start, metric);
         match conflict(&self.constraints, &judge) {
@@ -110,10 +106,10 @@ impl Problem {
         }
     }
 
-    /// The constraints and a mass that is positive at every node; `start` tells what is small.
+    /// Constraints plus a positive mass at every node, relative to the mass of `start`.
     fn constraints_with_mass(&self, start: &[f64]) -> Constraints {
-        let device = self.functions.device(start);
-        let largest = device.mass.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        let nodal = self.functions.nodal(start);
+        let largest = nodal.mass.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let least = POSITIVE * largest;
         let mut group = RowGroup::new("mass > 0");
         let parts = self.functions.iter().zip(self.functions.ranges());

@@ -1,17 +1,16 @@
-//! The start strategy, which guards against local minima: if a fit from one starting point does not explain the record, the
-//! next one is tried.
+//! Start strategy: a safeguard against local minima that tries further starting points until a fit explains the record.
 //!
-//! A response whose period is off by a few per cent fits worse than zero response, so descent from
-//! a wrong start ends in a minimum that means nothing. The order: for constants and a long record, its
-//! first steps; the start as given; the equation error; a horizon that grows from an eighth of the record to all of it; states
-//! and parameters together, from a response near the measurements.
+//! A response whose period is off by a few per cent fits worse than the zero response, so a descent from a wrong start ends in
+//! a spurious local minimum. Order of the starting points: the first steps of a long record, for constant functions; the
+//! start as given; the equation error; a horizon that grows from an eighth of the record to all of it; collocation from a
+//! response near the measurements.
 
 use super::checkpoint::Observer;
-use super::counts::Counts;
 use super::executor::{Prepared, search, search_prepared};
 use super::fit::{Attempt, Fit, measured};
 use super::history::{IterationRecord, Reference};
 use super::settings::{FitSettings, Initial, Solver, StartStrategy};
+use super::solve_counts::SolveCounts;
 use super::start_projection::StartProjection;
 use super::starts::{
     Referred, collocation_start, data_start, growing_horizon_start, reference, truncated_start,
@@ -28,18 +27,19 @@ use crate::simulate::SimulationError;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// A fit explains the readings of a channel if its misfit is below this share of that of zero response, or if noise of the given sigma alone would leave as much. False minima leave per cents (a mass that
-/// goes near zero) to tens of per cent (a wrong period); a fit in between costs another attempt.
+/// Misfit of a channel, as a share of its zero-response misfit, below which a fit explains the samples; a misfit within the
+/// stated noise also does. Spurious minima leave per cents (a mass close to zero) to tens of per cent (a wrong period); a
+/// fit in between costs another attempt.
 const EXPLAINED: f64 = 1e-3;
-/// Most iterations of an attempt before the next is tried: Gauss-Newton from a good start takes some ten.
+/// Iteration limit of an attempt; Gauss–Newton from a good start takes about ten.
 const PROBING_ITERATIONS: u64 = 60;
 /// Fits `problem` from `start`; `observe` is called after every iteration.
 ///
-/// Gauss–Newton tries starting points until a fit explains the record; the fit with the lowest cost
-/// is returned. The other solvers take the first one only, and the equation error needs none.
+/// Gauss–Newton tries starting points until a fit explains the record and returns the fit with the lowest cost. The other
+/// solvers use the first starting point only, and the equation error needs none.
 ///
 /// # Errors
-/// A [`SimulationError`] if no starting point has a response.
+/// A [`SimulationError`] if no starting point can be simulated.
 pub fn fit(
     problem: &Problem,
     start: &[f64],
@@ -50,8 +50,7 @@ pub fn fit(
     Ok(measured(problem, fit, settings))
 }
 
-/// [`fit`] without a measurement of its end; where `watch` has a [`CheckpointStore`](super::CheckpointStore), it goes on
-/// from what was kept.
+/// [`fit`] without measuring the first-order condition; `watch` may hold checkpoints, from which it continues.
 pub(super) fn search_from_starts(
     problem: &Problem,
     start: &[f64],
@@ -73,21 +72,21 @@ pub(super) fn search_from_starts(
     Ok(fit)
 }
 
-/// Attempts from one starting point after the other.
+/// Attempts from successive starting points.
 struct Attempts<'a, 'w> {
     problem: &'a Problem,
     start: &'a [f64],
     settings: &'a FitSettings,
-    /// The settings of one attempt: a search stuck in a false valley creeps, so the others are tried before it goes on.
+    /// Settings of one attempt. Searches in a spurious minimum converge slowly, so the other starts are tried first.
     probing: FitSettings,
     watch: &'a mut Observer<'w>,
-    /// Whether more than one starting point is tried.
+    /// True if several starting points may be tried.
     has_several: bool,
     truncated: Option<(StartStrategy, Prepared)>,
-    /// Cost and gradient at the start values, which all attempts are compared to.
+    /// Cost and gradient at the start values, the reference of all attempts.
     reference: Option<Reference>,
     /// Work before and between the searches.
-    counts: Counts,
+    counts: SolveCounts,
     timings: Timings,
     best: Option<Fit>,
     attempts: Vec<Attempt>,
@@ -115,7 +114,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
             has_several,
             truncated: None,
             reference: None,
-            counts: Counts::default(),
+            counts: SolveCounts::default(),
             timings: Timings::default(),
             best: None,
             attempts: Vec::new(),
@@ -123,8 +122,8 @@ impl<'a, 'w> Attempts<'a, 'w> {
         }
     }
 
-    /// Cost and gradient at the start values, and a truncated start; the first attempt finds the former itself if it
-    /// starts there. Returns the time that it took, also before an interrupt.
+    /// Computes cost and gradient at the start values, and a truncated start; an attempt from the start values computes the former
+    /// itself. Returns the time, including that before an interrupt.
     fn prepare(&mut self) -> Duration {
         let (problem, start, settings) = (self.problem, self.start, self.settings);
         let is_discrete = settings.gradient == GradientKind::Discrete;
@@ -156,7 +155,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
         self.reference = referred.reference;
     }
 
-    /// The strategies in the order in which they are tried.
+    /// Strategies in the order of the attempts.
     fn strategies(&self) -> Vec<StartStrategy> {
         use StartStrategy::{Collocation, EquationError, GrowingHorizon, StartValues};
         let first = match self.settings.initial {
@@ -168,7 +167,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
         order.collect()
     }
 
-    /// Searches from one starting point; whether it was the last attempt.
+    /// Searches from one starting point; returns true after the last attempt.
     fn attempt(&mut self, strategy: StartStrategy) -> bool {
         let clock = Instant::now();
         self.watch.begin_attempt(strategy);
@@ -182,7 +181,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
         );
         match found {
             Ok(mut fit) => {
-                // With the work that made the start, and what was done before it was continued.
+                // Including the work of the starting point, and that before an interrupt.
                 fit.elapsed = fit.elapsed.max(clock.elapsed());
                 self.take(strategy, fit)
             }
@@ -194,7 +193,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
         }
     }
 
-    /// Takes the end of an attempt; whether it was the last one.
+    /// Adds the result of an attempt; returns true after the last one.
     fn take(&mut self, strategy: StartStrategy, fit: Fit) -> bool {
         self.attempts.push(Attempt::of(strategy, &fit));
         self.reference.get_or_insert(Reference {
@@ -206,7 +205,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
         let is_last = !self.has_several || is_ended || explains(self.problem, &fit);
         let mut lower = better(self.best.take(), fit);
         if outcome.status == Status::Interrupted {
-            // An earlier attempt may have come further, but not all were made.
+            // An earlier attempt may be better, but the remaining ones were not made.
             lower.outcome = outcome;
         }
         self.best = Some(lower);
@@ -255,8 +254,8 @@ impl<'a, 'w> Attempts<'a, 'w> {
         }
     }
 
-    /// A starting point made from the data, moved into the constraint set if its program ended outside, which rows of very
-    /// different scales cause; the start values if it cannot be moved.
+    /// Starting point from the data, projected onto the constraints if its program violates them, which rows of very different
+    /// scales cause; the start values if the projection fails.
     fn inside(&self, parameters: Vec<f64>) -> Vec<f64> {
         if self.problem.constraints.hold(&parameters, TOLERANCE) {
             return parameters;
@@ -268,7 +267,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
         }
     }
 
-    /// The best fit, continued if it reached the iteration limit of an attempt, with all work.
+    /// Best fit, continued if it reached the iteration limit of an attempt, with all work.
     fn finish(mut self) -> Result<Fit, SimulationError> {
         let Some(mut fit) = self.best else {
             return Err(self
@@ -292,7 +291,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
     }
 }
 
-/// The fit that came furthest, given the iterations that it was not given as one of several attempts.
+/// Continues the best fit with the iterations beyond the limit of an attempt.
 fn continued(
     problem: &Problem,
     fit: Fit,
@@ -324,7 +323,7 @@ fn continued(
     })
 }
 
-/// The fit with the lower cost, with the work of both.
+/// Fit with the lower cost, with the work of both.
 fn better(best: Option<Fit>, fit: Fit) -> Fit {
     let Some(best) = best else {
         return fit;
@@ -336,7 +335,7 @@ fn better(best: Option<Fit>, fit: Fit) -> Fit {
     winner.with_work_of(other.counts, other.timings, other.elapsed)
 }
 
-/// Each channel for itself: beside the velocity of a stiff device its displacement weighs nothing.
+/// Tests each channel separately: in a joint sum, the velocity of a stiff system would hide its displacement.
 fn explains(problem: &Problem, fit: &Fit) -> bool {
     let evaluation = &fit.best.evaluation;
     let noise = problem.largest_chi_square();
@@ -351,24 +350,24 @@ fn explains(problem: &Problem, fit: &Fit) -> bool {
 }
 
 impl Problem {
-    /// The largest chi-square that noise alone explains, its mean plus two standard deviations,
-    /// `n + 2 sqrt(2 n)`; `None` unless all readings have a sigma.
+    /// Largest chi-square explained by noise alone, its mean plus two standard deviations, `n + 2 sqrt(2 n)`; `None` unless all
+    /// samples have a sigma.
     pub fn largest_chi_square(&self) -> Option<f64> {
         let known = self.channels().all(|c| c.weighting().is_sigma());
-        known.then(|| largest_chi_square(self.reading_count()))
+        known.then(|| largest_chi_square(self.sample_count()))
     }
 }
 
 impl Channel {
-    /// [`Problem::largest_chi_square`] of its own readings; `None` unless they have a sigma.
+    /// [`Problem::largest_chi_square`] of the channel's samples; `None` unless they have a sigma.
     pub fn largest_chi_square(&self) -> Option<f64> {
         let known = self.weighting().is_sigma();
         known.then(|| largest_chi_square(self.len()))
     }
 }
 
-fn largest_chi_square(readings: usize) -> f64 {
-    let n = readings as f64;
+fn largest_chi_square(samples: usize) -> f64 {
+    let n = samples as f64;
     n + 2.0 * (2.0 * n).sqrt()
 }
 
@@ -379,15 +378,15 @@ mod tests {
     use crate::solvers::{Stopping, fit_from};
     use crate::system::Grid;
 
-    /// Iterations, work and time of both parts, and the numbers of the iterations one after the other.
+    /// Iterations, work and time of both parts, with consecutive iteration numbers.
     #[test]
-    fn a_fit_that_is_gone_on_with_has_the_work_of_both() {
+    fn a_continued_fit_has_the_work_of_both() {
         crate::host::provide_clock();
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
-        let readings: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let samples: Vec<f64> = times.iter().map(|t| t.cos()).collect();
         let record = Record::new("free decay")
             .from_state(1.0, 0.0)
-            .displacement(&times, &readings);
+            .displacement(&times, &samples);
         let parts = [
             CoefficientSpec::fixed(1.0),
             CoefficientSpec::constant(0.5),
@@ -426,7 +425,7 @@ mod tests {
             panic!("{attempts:?}");
         };
         assert_eq!((attempt.iterations, attempt.initial_cost), (3, cost));
-        // Every iteration of steepest descent has one gradient at least.
+        // Every iteration of steepest descent has at least one gradient.
         assert!(whole.counts.adjoint >= before.adjoint + 3);
         assert!(whole.timings.start >= hours && whole.timings.adjoint > Duration::ZERO);
         assert!(whole.elapsed > hours);

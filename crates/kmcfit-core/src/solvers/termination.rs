@@ -1,35 +1,35 @@
-//! Termination of a fit: stopping tests, and how a fit ended.
+//! Stopping tests and outcome of a fit.
 
 use super::history::IterationRecord;
-use super::reason::{Reason, Within};
+use super::reason::{BoundedValue, Reason};
 use crate::qp::Subproblem;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// How a fit ended, in one word.
+/// Status of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// A stopping test of the model was met.
     Converged,
-    /// Exactly the iterations asked for were run, and no test was asked for.
+    /// Exactly the requested iterations were run, without a stopping test.
     Completed,
-    /// The iterations ran out before a stopping test was met.
+    /// The iteration limit was reached before a stopping test was met.
     MaxIterations,
     /// The wall-clock limit was reached.
     TimeLimit,
     /// No step lowers the cost although no stopping test is met.
     Stalled,
-    /// Ended from outside.
+    /// Interrupted by the user.
     Interrupted,
-    /// No device satisfies the constraints and the motion.
+    /// No feasible point can be simulated.
     Infeasible,
-    /// The start cannot be evaluated.
+    /// The start cannot be simulated.
     Failed,
 }
 
 impl Status {
-    /// The word in `result.json`.
+    /// Name in `result.json`.
     pub fn name(self) -> &'static str {
         match self {
             Status::Converged => "converged",
@@ -44,12 +44,12 @@ impl Status {
     }
 }
 
-/// How a fit ended, and why.
+/// Status of a fit and its reason.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
-    /// In one word.
+    /// Status.
     pub status: Status,
-    /// The reason, which is one sentence as text.
+    /// Reason; displayed as one sentence.
     pub reason: Reason,
 }
 
@@ -59,27 +59,25 @@ impl Outcome {
     }
 }
 
-/// Stopping tests. The iteration limit always holds; of the others those that are given.
+/// Stopping tests and limits. The iteration limit always applies, the others where set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stopping {
-    /// Most iterations. Without any other test the run takes exactly so many and is `completed`.
+    /// Iteration limit. Without another test the fit runs exactly so many iterations and is `completed`.
     pub iterations: u64,
     /// Converged when `J / J0` is at most this (and `gradient_ratio` holds, if given).
     pub cost_ratio: Option<f64>,
     /// Converged when `G^2 / G0^2` is at most this (and `cost_ratio` holds, if given). `G^2` is taken
     /// at the start of the iteration, as in the paper.
     pub gradient_ratio: Option<f64>,
-    /// Converged when an iteration lowers `J` by at most this fraction and changes no function by
-    /// more than the square root of this, relative to its natural size; or when it changes none by
-    /// more than this.
+    /// Converged when an iteration lowers `J` by at most this fraction and changes no function by more than its square root,
+    /// relative to its natural size; or when it changes none by more than this.
     pub tolerance: Option<f64>,
     /// Converged when an iteration changes no function by more than this, relative to its natural
     /// size ([`crate::problem::Problem::relative_change`]).
     pub step: Option<f64>,
     /// Wall-clock limit.
     pub limit: Option<Duration>,
-    /// Most iterations of one quadratic program ([`Subproblem::ITERATIONS`] by default); one that needs
-    /// more has stalled.
+    /// Iteration limit of a quadratic program ([`Subproblem::ITERATIONS`] by default), beyond which it has stalled.
     pub program_iterations: u32,
 }
 
@@ -107,7 +105,7 @@ impl Stopping {
         }
     }
 
-    /// Whether any convergence test is asked for.
+    /// True if any convergence test is set.
     pub fn has_test(&self) -> bool {
         let tests = [
             self.cost_ratio,
@@ -118,8 +116,8 @@ impl Stopping {
         tests.iter().any(Option::is_some)
     }
 
-    /// The outcome that the latest iteration brings, if any. `previous_cost` is J before it; a small
-    /// step that was `limited` is no sign of convergence.
+    /// Outcome after the latest iteration, if the fit ends. `previous_cost` is J before it; a small step that was `limited` is no
+    /// sign of convergence.
     pub(crate) fn after(
         &self,
         row: &IterationRecord,
@@ -141,13 +139,13 @@ impl Stopping {
         })
     }
 
-    /// The ratios of cost and gradient of `row`, if they are within all limits that are given: what was asked
-    /// for, but no sign of a minimum.
+    /// Ratios of cost and gradient of `row`, if within all limits that are set; no sign of a minimum.
     pub(super) fn ratios_met(&self, row: &IterationRecord) -> Option<Reason> {
-        let test = |value: f64, limit: Option<f64>| limit.map(|limit| Within { value, limit });
+        let test =
+            |value: f64, limit: Option<f64>| limit.map(|limit| BoundedValue { value, limit });
         let cost = test(row.cost_ratio, self.cost_ratio);
         let gradient = test(row.gradient_norm_squared_ratio, self.gradient_ratio);
-        let is_met = |test: &Within| test.value <= test.limit;
+        let is_met = |test: &BoundedValue| test.value <= test.limit;
         let mut given = cost.iter().chain(&gradient).peekable();
         (given.peek().is_some() && given.all(is_met)).then_some(Reason::Ratios { cost, gradient })
     }

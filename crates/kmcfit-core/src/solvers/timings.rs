@@ -5,30 +5,29 @@ use serde::{Deserialize, Serialize};
 use std::ops::{Add, AddAssign};
 use std::time::Duration;
 
-/// Wall-clock time by what it was spent on. No time is in two of them; what is in none of them is
-/// bookkeeping.
+/// Wall-clock time by kind of work, without overlap; the rest of the elapsed time is overhead.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Timings {
-    /// Forward solves: motions, predictions and costs.
+    /// Forward solves: responses, predictions and costs.
     pub forward: Duration,
     /// Adjoint solves: gradients.
     pub adjoint: Duration,
-    /// Tangent solves, and the step Jacobians that stand for them where there are many parameters.
+    /// Tangent solves, and step Jacobians, which replace them for many parameters.
     pub tangent: Duration,
     /// Quadratic programs.
     pub qp: Duration,
-    /// The plain Gauss-Newton step (assembled, factored and solved), the recursion of L-BFGS, the
-    /// plain solution of the equation error.
+    /// Plain Gauss–Newton steps (assembly, factorisation, solution), the recursion of L-BFGS, the plain solution of the equation
+    /// error.
     pub linear_algebra: Duration,
-    /// Starts from the readings, with all that is solved for them.
+    /// Starting points from the samples.
     pub start: Duration,
-    /// Checkpoints, and where the search stood at its end; not the lines of its iterations.
+    /// Checkpoints and the final state of the search, without the rows of iterations.
     #[serde(default)]
     pub keeping: Duration,
 }
 
 impl Timings {
-    /// The sum of all.
+    /// Sum of all.
     pub fn sum(&self) -> Duration {
         self.forward
             + self.adjoint
@@ -62,7 +61,7 @@ impl AddAssign for Timings {
     }
 }
 
-/// What `work` gives; the time that it takes is added to `sum`.
+/// Result of `work`; adds its duration to `sum`.
 pub fn timed<T>(sum: &mut Duration, work: impl FnOnce() -> T) -> T {
     let clock = Instant::now();
     let result = work();

@@ -1,21 +1,20 @@
-//! Experiments that took no part in the fit.
+//! Prediction of validation records, which take no part in the fit.
 
 use super::executor::search_unobserved;
 use super::settings::{FitSettings, Solver};
-use super::state_estimation::states_from_readings;
+use super::state_estimation::estimate_states;
 use crate::functions::{CoefficientFunction, Parameterization, ScalarParameter};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::Experiment;
 use crate::simulate::SimulationError;
 
-/// Predicts `experiment` with the functions that `evaluation` found for `problem`. What the experiment
-/// leaves open besides (its initial state, its sensors: the `scalars`) is found from its own readings.
-/// Returns the problem of that experiment alone and the point found.
+/// Predicts `experiment` with the functions of `evaluation`. Its initial state and sensor parameters, if unknown, are
+/// estimated from its own samples (`scalars`). Returns the problem of that experiment alone and the evaluated point.
 ///
 /// # Errors
-/// A [`SimulationError`] if there is no motion.
-pub fn predict_held_out(
+/// A [`SimulationError`] if the simulation fails.
+pub fn predict_validation(
     problem: &Problem,
     evaluation: &Evaluation,
     experiment: &Experiment,
@@ -26,23 +25,27 @@ pub fn predict_held_out(
     let known = |(f, values): (&usize, &[f64])| {
         CoefficientFunction::fixed(problem.functions.get(*f).quantity, values.to_vec())
     };
-    let main = problem.functions.assembly(0);
-    let list = main.iter().zip(evaluation.device.functions()).map(known);
+    let main = problem.functions.coefficient_set(0);
+    let list = main.iter().zip(evaluation.nodal.functions()).map(known);
     let functions = Parameterization::new(list.collect(), grid.nodes(), grid.step())
         .expect("known functions have no basis that could be dependent")
         .with_scalars(scalars.to_vec());
     let mut alone = Experiment {
-        device: 0,
+        coefficient_set: 0,
         ..experiment.clone()
     };
     alone.name.clone_from(&experiment.name);
     let alone = Problem::new(problem.system.clone(), functions, vec![alone])
         .expect("a record that fits the grid and its own scalars");
     let mut start = alone.start();
-    let first = states_from_readings(&alone).into_iter().next().flatten();
+    let first = estimate_states(&alone).into_iter().next().flatten();
     if let Some(state) = first {
         let values = [state.displacement, state.velocity];
-        for (index, value) in alone.experiments[0].sought.into_iter().zip(values) {
+        for (index, value) in alone.experiments[0]
+            .initial_parameters
+            .into_iter()
+            .zip(values)
+        {
             if let Some(index) = index.filter(|i| scalars[*i].prior.is_none()) {
                 start[index] = value;
             }

@@ -1,13 +1,13 @@
-//! Choosing the weight of the smoothness: fits along a path of weights, and three rules on it.
+//! Choice of penalty weights: fits along a path of weights, and three selection rules.
 
 use super::checkpoint::Observer;
-use super::counts::Counts;
 use super::executor::search;
 use super::fit::{Attempt, Fit, measured};
 use super::history::IterationRecord;
 use super::iterate::Iterate;
 use super::linearization::{Linearization, linearisation_tangents, linearise};
 use super::settings::FitSettings;
+use super::solve_counts::SolveCounts;
 use super::start_strategy::search_from_starts;
 use super::termination::{Outcome, Status};
 use super::timings::{Timings, timed};
@@ -17,14 +17,14 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::time::Duration;
 
-/// Which rule chooses the weight.
+/// Rule for the choice of the weight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WeightRule {
     /// The largest weight with chi-square at most `n + 2 sqrt(2 n)` (Morozov).
     Discrepancy,
-    /// The corner of misfit against roughness on log axes (Hansen).
+    /// Corner of misfit against roughness on logarithmic axes (Hansen).
     LCurve,
-    /// The least generalised cross-validation score `n misfit / (n - dof)^2` (Golub, Heath, Wahba).
+    /// Least generalised cross-validation score `n misfit / (n - dof)^2` (Golub, Heath, Wahba).
     Gcv,
 }
 
@@ -42,59 +42,59 @@ impl WeightRule {
     }
 }
 
-/// The fit at one weight.
+/// Fit at one weight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PathPoint {
     /// Factor on the penalties.
     pub weight: f64,
-    /// Iterations of the fit, all its starts together.
+    /// Iterations of the fit, over all attempts.
     pub iterations: u64,
-    /// Misfit of the readings; chi-square where they have a sigma.
+    /// Misfit of the samples; chi-square where they have a sigma.
     pub misfit: f64,
-    /// `sum |L theta - target|^2` of the penalties on the path, without the weight.
+    /// Roughness `sum |L theta - target|^2` of the penalties on the path, without the weight.
     pub roughness: f64,
-    /// Effective number of parameters that the data determine.
+    /// Effective number of parameters determined by the data.
     pub degrees_of_freedom: f64,
     /// `n misfit / (n - dof)^2`.
     pub gcv: f64,
-    /// The parameters found.
+    /// Fitted parameters.
     pub parameters: Vec<f64>,
 }
 
-/// The path, from the largest weight to the smallest, and what each rule picks on it.
+/// Fits from the largest weight to the smallest, and the choice of each rule.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeightPath {
     /// Fits, by falling weight.
     pub points: Vec<PathPoint>,
-    /// Index that each rule of [`WeightRule::ALL`] picks; `None` where it picks none.
+    /// Index chosen by each rule of [`WeightRule::ALL`]; `None` where a rule chooses none.
     pub picks: [Option<usize>; 3],
     /// Index of the point whose weight is used.
     pub chosen: usize,
-    /// Seed of the random vectors behind the degrees of freedom.
+    /// Seed of the random vectors of the degrees of freedom.
     pub seed: u64,
-    /// What the user should know about the choice.
+    /// Note on the choice.
     pub remark: Option<String>,
 }
 
 impl WeightPath {
-    /// The weight that is used.
+    /// Chosen weight.
     pub fn chosen_weight(&self) -> f64 {
         self.points[self.chosen].weight
     }
 }
 
-/// Largest weight of the path, relative to the misfit of no motion over a roughness of one.
+/// Largest weight of the path, relative to the zero-response misfit over a roughness of one.
 const LARGEST: f64 = 1e4;
-/// Decades that the path spans, and points per decade.
+/// Decades of the path, and points per decade.
 const DECADES: f64 = 8.0;
 const PER_DECADE: f64 = 1.0;
-/// Random vectors of the trace estimate (Hutchinson); its error is about sqrt(2 dof / 16).
+/// Number of random vectors of the trace estimate (Hutchinson); its error is about sqrt(2 dof / 16).
 const PROBES: usize = 16;
 /// Seed of those vectors.
 const SEED: u64 = 1;
 
 impl Problem {
-    /// The same problem with the weights of the penalties `which` multiplied by `factor`.
+    /// The problem with the weights of the penalties `which` multiplied by `factor`.
     #[must_use]
     pub fn with_penalty_factor(&self, which: &[usize], factor: f64) -> Self {
         let mut problem = self.clone();
@@ -105,11 +105,11 @@ impl Problem {
     }
 }
 
-/// Fits `problem` for a path of factors on the penalties `which`, each from its neighbour, and once
-/// more at the factor that `rule` picks. Returns the path, the problem at that factor, and its fit.
+/// Fits `problem` along a path of factors on the penalties `which`, each fit started from its neighbour, and again at the
+/// factor chosen by `rule`. Returns the path, the problem at that factor, and its fit.
 ///
 /// # Errors
-/// A [`SimulationError`] if the fit at the middle weight, the first, has no motion at its start.
+/// A [`SimulationError`] if the simulation at the start of the first fit, at the middle weight, fails.
 pub fn choose_weight(
     problem: &Problem,
     start: &[f64],
@@ -128,8 +128,7 @@ pub fn choose_weight(
     )
 }
 
-/// [`choose_weight`], and where `watch` has a [`CheckpointStore`](super::CheckpointStore), one that goes on from what was
-/// kept.
+/// [`choose_weight`] with an observer, which may hold checkpoints.
 ///
 /// # Errors
 /// As [`choose_weight`].
@@ -141,7 +140,7 @@ pub fn choose_weight_watched(
     which: &[usize],
     watch: &mut Observer,
 ) -> Result<(WeightPath, Problem, Fit), SimulationError> {
-    let mut walk = Walk {
+    let mut walk = WeightPathSearch {
         problem,
         settings: settings.clone(),
         which,
@@ -149,7 +148,7 @@ pub fn choose_weight_watched(
         from: start.to_vec(),
         last: None,
         attempts: Vec::new(),
-        counts: Counts::default(),
+        counts: SolveCounts::default(),
         timings: Timings::default(),
         elapsed: Duration::ZERO,
     };
@@ -165,7 +164,7 @@ pub fn choose_weight_watched(
         .position(|r| *r == rule)
         .and_then(|i| picks[i]);
     let remark = remark(problem, rule, index, &points);
-    // Without a pick the weakest smoothing comes nearest to what the rule asks for.
+    // Without a choice, the weakest smoothing is closest to the rule.
     let chosen = index.unwrap_or(points.len() - 1);
     let weighted = problem.with_penalty_factor(which, points[chosen].weight);
     let mut found = walk.again(&weighted, &points[chosen].parameters)?;
@@ -184,10 +183,9 @@ pub fn choose_weight_watched(
     Ok((path, weighted, found))
 }
 
-/// A walk along the path. The first fit tries the starting points of [`fit`]; every other starts where its
-/// neighbour ended, and needs none: a fit that explains the record is followed while its weight
-/// changes, also to weights so large that it explains the record no longer.
-struct Walk<'a, 'w> {
+/// Fits along the path. The first fit uses the start strategy of [`fit`]; every other starts at its neighbour's result: a fit
+/// that explains the record is continued as its weight changes, also to weights at which it no longer explains it.
+struct WeightPathSearch<'a, 'w> {
     problem: &'a Problem,
     settings: FitSettings,
     which: &'a [usize],
@@ -195,15 +193,14 @@ struct Walk<'a, 'w> {
     from: Vec<f64>,
     last: Option<Outcome>,
     attempts: Vec<Attempt>,
-    counts: Counts,
+    counts: SolveCounts,
     timings: Timings,
     elapsed: Duration,
 }
 
-impl Walk<'_, '_> {
-    /// Fits from the middle of the path to the largest weight, then from the middle to the smallest:
-    /// at the middle a fit explains the record, which it need not at the largest weight, and
-    /// converges fast, which it need not at the smallest.
+impl WeightPathSearch<'_, '_> {
+    /// Fits from the middle of the path to the largest weight, then from the middle to the smallest. The fit at the middle
+    /// explains the record, unlike that at the largest weight, and converges fast, unlike that at the smallest.
     fn both_ways(&mut self, weights: &[f64]) -> Result<Vec<PathPoint>, SimulationError> {
         let middle = weights.len() / 2;
         let mut points = vec![self.visit(weights[middle])?];
@@ -239,7 +236,7 @@ impl Walk<'_, '_> {
         self.elapsed += found.elapsed;
         self.from.clone_from(&found.best.parameters);
         let misfit = found.best.evaluation.misfit;
-        let n = problem.reading_count() as f64;
+        let n = problem.sample_count() as f64;
         self.counts.tangent += linearisation_tangents(&problem);
         let timings = &mut self.timings;
         let compute = || vec![degrees_of_freedom(&problem, &found, timings)];
@@ -255,13 +252,13 @@ impl Walk<'_, '_> {
         })
     }
 
-    /// The fit at a point of the path once more, with the attempts that led onto the path.
+    /// Repeats the fit at a point of the path, with the attempts of the first fit.
     fn again(&mut self, problem: &Problem, from: &[f64]) -> Result<Fit, SimulationError> {
         let mut found = search(problem, from, &self.settings, None, self.watch)?;
         if self.ended()
             && let Some(outcome) = self.last.take()
         {
-            // Only a part of the path was walked, wherever this fit came to.
+            // Only a part of the path was computed.
             found.outcome = outcome;
         }
         Ok(Fit {
@@ -276,7 +273,7 @@ impl Walk<'_, '_> {
     }
 }
 
-/// The iterations of a fit: those of all attempts where there are several.
+/// Iterations of a fit over all attempts.
 fn iterations(found: &Fit) -> u64 {
     let attempts: u64 = found
         .attempts
@@ -303,7 +300,7 @@ fn roughness(problem: &Problem, which: &[usize], theta: &[f64]) -> f64 {
         .sum()
 }
 
-/// Trace of the matrix that takes the readings to their fitted values, by random signs.
+/// Trace of the matrix that maps samples to fitted values, estimated with random signs.
 fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> f64 {
     let Iterate {
         parameters,
@@ -311,8 +308,8 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> 
         ..
     } = &found.best;
     let fresh = Linearization::Fresh;
-    let (mut sub, readings) = linearise(problem, parameters, evaluation, &fresh, timings);
-    // The proximal term of a fit that has ended is gone.
+    let (mut sub, samples) = linearise(problem, parameters, evaluation, &fresh, timings);
+    // The linearisation at the end has no proximal term.
     sub.proximal.fill(0.0);
     let rows = sub.residuals.len();
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
@@ -320,7 +317,7 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> 
     let probes: Vec<Vec<f64>> = (0..PROBES)
         .map(|_| {
             (0..rows)
-                .map(|i| if i < readings { sign() } else { 0.0 })
+                .map(|i| if i < samples { sign() } else { 0.0 })
                 .collect()
         })
         .collect();
@@ -334,7 +331,7 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> 
         fitted
             .iter()
             .zip(probe)
-            .take(readings)
+            .take(samples)
             .map(|(a, b)| a * b)
             .sum::<f64>()
     });
@@ -346,12 +343,12 @@ fn discrepancy(problem: &Problem, points: &[PathPoint]) -> Option<usize> {
     points.iter().position(|p| p.misfit <= limit)
 }
 
-/// The point of largest curvature of (log misfit, log roughness) along the path.
+/// Point of largest curvature of (log misfit, log roughness) along the path.
 fn l_curve(points: &[PathPoint]) -> Option<usize> {
     let place = |p: &PathPoint| (p.misfit.ln(), p.roughness.ln());
     let curvature = |w: &[PathPoint]| {
         let [(x0, y0), (x1, y1), (x2, y2)] = [place(&w[0]), place(&w[1]), place(&w[2])];
-        // Menger's curvature with the sign of the turn; the corner turns right as the weight falls.
+        // Menger curvature, signed by the turn; the corner turns right as the weight falls.
         let cross = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0);
         let side = |ax: f64, ay: f64, bx: f64, by: f64| (ax - bx).hypot(ay - by);
         let sides = side(x0, y0, x1, y1) * side(x1, y1, x2, y2) * side(x0, y0, x2, y2);
@@ -379,8 +376,8 @@ fn remark(
 ) -> Option<String> {
     match (rule, index) {
         (WeightRule::Discrepancy, Some(0)) => Some(
-            "every weight on the path explains the readings, so the largest is taken: the data \
-             ask for no roughness at all"
+                "every weight on the path explains the samples, so the largest is chosen: the data require no \
+                 roughness"
                 .into(),
         ),
         (WeightRule::Discrepancy, None) => {
@@ -389,13 +386,13 @@ fn remark(
                 .map(|p| p.misfit)
                 .fold(f64::INFINITY, f64::min);
             Some(format!(
-                "no weight on the path brings chi-square to {:.1}; the least is {least:.1}. The \
-                 sigma may be too small, or the model cannot explain the readings",
+                "no weight on the path lowers chi-square to {:.1}; the least is {least:.1}. The sigma may be too \
+                 small, or the model cannot explain the samples",
                 problem.largest_chi_square().unwrap_or(f64::NAN)
             ))
         }
         (rule, None) => Some(format!(
-            "the rule `{}` picks no weight on this path; the smallest is taken",
+            "the rule `{}` chooses no weight on this path; the smallest is used",
             rule.name()
         )),
         _ => None,
@@ -406,7 +403,7 @@ fn remark(
 mod tests {
     use super::*;
 
-    /// Points of a path at these natural logarithms of misfit and roughness.
+    /// Points of a path with these natural logarithms of misfit and roughness.
     fn path(places: impl IntoIterator<Item = [f64; 2]>) -> Vec<PathPoint> {
         let point = |[misfit, roughness]: [f64; 2]| PathPoint {
             weight: 1.0,
@@ -429,7 +426,7 @@ mod tests {
                 [3.0 + 2.0 * left as f64, 2.0 * right as f64 - 5.0]
             };
             assert_eq!(l_curve(&path((0..9).map(place))), Some(corner));
-            // The other way round it turns to the other side, and has no corner.
+            // In the opposite order the path turns to the other side and has no corner.
             assert_eq!(l_curve(&path((0..9).rev().map(place))), None);
         }
     }
@@ -450,10 +447,10 @@ mod tests {
         }
     }
 
-    /// Two arcs: one of radius 3 by chords of 40 degrees, then one of radius 1 by chords of 10 degrees. The
-    /// turns from chord to chord are sharper on the first, and the second has the larger curvature.
+    /// Two arcs: one of radius 3 by chords of 40 degrees, then one of radius 1 by chords of 10 degrees. The angles between chords
+    /// are larger on the first, the curvature is larger on the second.
     #[test]
-    fn the_corner_is_that_of_curvature_however_dense_the_points() {
+    fn the_corner_has_the_largest_curvature_for_any_density_of_points() {
         let chord = |radius: f64, degrees: f64| 2.0 * radius * (0.5 * degrees).to_radians().sin();
         let wide = [160.0, 120.0].map(|heading| (heading, chord(3.0, 40.0)));
         let narrow = [95.0, 85.0, 75.0, 65.0].map(|heading| (heading, chord(1.0, 10.0)));

@@ -1,10 +1,9 @@
-//! Intervals from fits to simulated readings.
+//! Bootstrap intervals: percentiles of parameters refitted to simulated samples.
 //!
-//! Every replicate is a full refit (Gauss–Newton under the constraints, from the optimum) to readings
-//! made from the optimum's predictions plus noise: normal with the readings' sigma (parametric), or
-//! the residuals themselves drawn with replacement within each channel, after their mean is taken off
-//! and they are widened by `sqrt(n / (n - p))` (residual). What is not in the predictions, a prior or
-//! a penalty, stays as it is.
+//! Each replicate is a full refit (Gauss–Newton under the constraints, started at the optimum) to simulated samples, the
+//! predictions at the optimum plus noise. The parametric bootstrap draws normal noise with the standard deviation of each
+//! sample. The residual bootstrap draws residuals with replacement within each channel, after subtracting their mean and
+//! multiplying them by `sqrt(n / (n - p))`. Priors and penalties are the same in every replicate.
 //!
 //! Source: B. Efron, R. J. Tibshirani, *An Introduction to the Bootstrap*, Chapman & Hall 1993,
 //! chapters 6, 9 and 13.
@@ -12,7 +11,7 @@
 use super::functional::Linear;
 use super::parallel::map;
 use super::refit::settings;
-use super::simulate::{normal, sigmas, stream, with_readings};
+use super::simulate::{normal, sigmas, stream, with_samples};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
@@ -21,22 +20,22 @@ use nalgebra::DMatrix;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Where the noise of a replicate comes from.
+/// Source of the noise in a replicate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Noise {
-    /// Normal, with the sigma of the readings or that of the residuals.
+pub enum ReplicateNoise {
+    /// Normal noise with the sigma of the samples, or of the residuals where no sigma is stated.
     Parametric,
-    /// The residuals, drawn again.
+    /// Residuals, drawn with replacement.
     Residual,
 }
 
-/// Why there are no refits.
+/// Reason for which no refits are made.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NoRefits {
-    /// The readings do not determine all parameters, or these are too many: refits from the optimum would not move along
-    /// the others.
+    /// The samples do not determine all parameters, or there are too many parameters. Refits from the optimum would not
+    /// move along the undetermined directions.
     Undetermined,
-    /// The optimum has no response.
+    /// The simulation at the optimum fails.
     NoResponse(SimulationError),
 }
 
@@ -46,18 +45,18 @@ impl From<SimulationError> for NoRefits {
     }
 }
 
-/// The interval of a number; `None` where too few refits ended well.
+/// A quantity and its interval; `None` where fewer than two refits succeeded.
 pub type NumberInterval = (Linear, Option<[f64; 2]>);
 
-/// The intervals of all constants and scalars and of further numbers, each once, from refits.
+/// Intervals of all constants and scalar parameters and of `further` quantities, each listed once.
 ///
 /// # Errors
-/// Why there are none.
+/// [`NoRefits`], the reason.
 pub fn intervals(
     problem: &Problem,
     optimum: &[f64],
     further: impl Iterator<Item = Linear>,
-    (noise, count, seed): (Noise, usize, u64),
+    (noise, count, seed): (ReplicateNoise, usize, u64),
     level: f64,
     threads: usize,
 ) -> Result<Vec<NumberInterval>, NoRefits> {
@@ -81,25 +80,25 @@ pub fn intervals(
     Ok(intervals)
 }
 
-/// The refits.
+/// Results of the refits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bootstrap {
     /// The optimum that the replicates start from.
     pub optimum: Vec<f64>,
-    /// Parameters of each refit, in the order of the replicates; `Err` says why there is none.
+    /// Parameters of each refit, in the order of the replicates; `Err` holds the reason for a failure.
     pub replicates: Vec<Result<Vec<f64>, String>>,
     /// The seed.
     pub seed: u64,
 }
 
-/// `count` refits about `optimum`, on up to `threads` threads; the same bits for any number of them.
+/// Computes `count` refits about `optimum` on up to `threads` threads; results do not depend on the number of threads.
 ///
 /// # Errors
-/// A [`SimulationError`] if the optimum has no motion.
+/// A [`SimulationError`] if the simulation at the optimum fails.
 pub fn bootstrap(
     problem: &Problem,
     optimum: &[f64],
-    noise: Noise,
+    noise: ReplicateNoise,
     count: usize,
     seed: u64,
     threads: usize,
@@ -109,13 +108,13 @@ pub fn bootstrap(
     let job = |index: usize| {
         let mut random = stream(seed, index);
         let errors = match noise {
-            Noise::Parametric => {
+            ReplicateNoise::Parametric => {
                 let unit = normal(&mut random, sigmas.len());
                 unit.iter().zip(&sigmas).map(|(u, s)| u * s).collect()
             }
-            Noise::Residual => drawn(problem, &evaluation, &mut random),
+            ReplicateNoise::Residual => drawn(problem, &evaluation, &mut random),
         };
-        let simulated = with_readings(problem, &evaluation, &errors);
+        let simulated = with_samples(problem, &evaluation, &errors);
         match fit_from(&simulated, optimum, &settings()) {
             Err(breakdown) => Err(breakdown.to_string()),
             Ok(fit) => match fit.outcome.status {
@@ -131,13 +130,13 @@ pub fn bootstrap(
     })
 }
 
-/// Residuals of every channel, centred, widened and drawn again. Readings with sigmas of their own
-/// keep them: what is drawn is the residual in units of sigma.
+/// Noise drawn from the residuals of each channel, centred and widened. For samples with individual sigmas the normalised
+/// residuals (residual over sigma) are drawn.
 fn drawn(problem: &Problem, evaluation: &Evaluation, random: &mut ChaCha8Rng) -> Vec<f64> {
-    let readings = problem.reading_count() as f64;
-    let freedom = (readings - problem.parameters() as f64).max(1.0);
-    let wider = (readings / freedom).sqrt();
-    let mut all = Vec::with_capacity(problem.reading_count());
+    let samples = problem.sample_count() as f64;
+    let freedom = (samples - problem.parameters() as f64).max(1.0);
+    let wider = (samples / freedom).sqrt();
+    let mut all = Vec::with_capacity(problem.sample_count());
     for (channel, predicted) in problem.predicted(evaluation) {
         let sigma = |i: usize| channel.weighting().sigma(i).unwrap_or(1.0);
         let residuals = channel.residuals(predicted).enumerate();
@@ -157,12 +156,12 @@ impl Bootstrap {
         self.replicates.iter().filter_map(|r| r.as_ref().ok())
     }
 
-    /// How many refits failed.
+    /// Number of failed refits.
     pub fn failures(&self) -> usize {
         self.replicates.iter().filter(|r| r.is_err()).count()
     }
 
-    /// Covariance of the refits about their mean; `None` with fewer than two.
+    /// Covariance of the refitted parameters about their mean; `None` with fewer than two refits.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
         let n = self.optimum.len();
         let count = self.found().count();
@@ -186,8 +185,8 @@ impl Bootstrap {
         Some(covariance / (count - 1) as f64)
     }
 
-    /// The interval of `of` that leaves `(1 - level)/2` of the refits on either side, linear between
-    /// them; `None` with fewer than two refits.
+    /// Percentile interval of `of`: a share `(1 - level)/2` of the refits lies on either side, with linear interpolation
+    /// between them; `None` with fewer than two refits.
     pub fn interval(&self, of: &Linear, level: f64) -> Option<[f64; 2]> {
         let mut values: Vec<f64> = self.found().map(|theta| of.of(theta)).collect();
         values.sort_by(f64::total_cmp);
@@ -198,7 +197,7 @@ impl Bootstrap {
     }
 }
 
-/// The quantile of sorted values, linear between them.
+/// Quantile of sorted values, interpolated linearly.
 pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
     let place = share.clamp(0.0, 1.0) * (sorted.len() - 1) as f64;
     let low = place.floor() as usize;

@@ -1,13 +1,13 @@
-//! Equivalent systems of a fit: those with chosen masses, each checked by a simulation of its own.
+//! Equivalent systems of a fit: different coefficients with the same response, each confirmed by a simulation.
 
-use super::equivalent::{Motion, Wish, equivalent};
+use super::equivalent_coefficients::{EquivalentOptions, TargetResponse, equivalent_coefficients};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::system::{NodalCoefficients, State};
 
-/// Least stiffness of an equivalent system, as a share of the fit's largest.
+/// Lower bound of the stiffness of an equivalent system, as a share of the fit's maximum.
 const LEAST_STIFFNESS: f64 = 1e-3;
-/// Largest distance between the response of an equivalent system and that of the fit, as a share of the largest displacement.
+/// Largest accepted difference between the responses of an equivalent system and the fit, as a share of the peak displacement.
 const SAME_MOTION: f64 = 0.1;
 
 /// The mass, and possibly the damping, of an equivalent system at the nodes.
@@ -17,7 +17,7 @@ pub struct Choice {
     pub name: String,
     /// Mass, kg.
     pub mass: Vec<f64>,
-    /// Damping, N s/m; the fit's where `None`.
+    /// Damping, N s/m; `None` for that of the fit.
     pub damping: Option<Vec<f64>>,
 }
 
@@ -27,13 +27,13 @@ pub struct EquivalentSystem {
     /// Name of the choice, or `the fit`.
     pub name: String,
     /// Its coefficients.
-    pub device: NodalCoefficients,
-    /// Largest distance of its response from the fit's, as a share of the largest displacement.
-    pub motion_error: f64,
+    pub nodal: NodalCoefficients,
+    /// Largest difference from the response of the fit, as a share of the peak displacement.
+    pub response_error: f64,
 }
 
-/// The fit itself and the equivalent systems of the choices, or of some masses that are the fit's times a factor over time;
-/// none for nonlinear systems, for records that end before the grid, and where no system is found.
+/// The fit and its equivalent systems for the given choices, or for default masses (the fit's mass times a factor over time)
+/// where `choices` is empty. Empty for nonlinear systems, for records shorter than the grid, and where no system is found.
 pub fn equivalent_systems(
     problem: &Problem,
     evaluation: &Evaluation,
@@ -46,32 +46,37 @@ pub fn equivalent_systems(
     if !is_linear || experiment.nodes != problem.system.grid.nodes() {
         return Vec::new();
     }
-    let motion = Motion::of(problem, evaluation, 0);
-    let device = evaluation.device_of(experiment.device);
+    let response = TargetResponse::of(problem, evaluation, 0);
+    let nodal = evaluation.nodal_of(experiment.coefficient_set);
     let initial = State {
-        displacement: motion.displacement[0],
-        velocity: motion.velocity[0],
+        displacement: response.displacement[0],
+        velocity: response.velocity[0],
     };
-    let least = LEAST_STIFFNESS * device.coefficients[1].iter().copied().fold(0.0, f64::max);
+    let least = LEAST_STIFFNESS * nodal.coefficients[1].iter().copied().fold(0.0, f64::max);
     let find = |choice: Choice| {
         let damping = choice.damping;
-        let damping = damping.unwrap_or_else(|| device.coefficients[0].clone());
-        let found = equivalent(&choice.mass, &motion, &Wish::near(damping, least)).ok()?;
+        let damping = damping.unwrap_or_else(|| nodal.coefficients[0].clone());
+        let found = equivalent_coefficients(
+            &choice.mass,
+            &response,
+            &EquivalentOptions::near(damping, least),
+        )
+        .ok()?;
         let excitation = experiment.excitation.as_ref();
         let moved = problem.system.forward(&found, initial, excitation).ok()?;
-        let largest = (motion.displacement.iter()).fold(0.0f64, |m, y| m.max(y.abs()));
-        let pairs = moved.displacement.iter().zip(&motion.displacement);
+        let largest = (response.displacement.iter()).fold(0.0f64, |m, y| m.max(y.abs()));
+        let pairs = moved.displacement.iter().zip(&response.displacement);
         let off = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
-        // Steps that are too long for the system change its response.
-        let motion_error = if off == 0.0 { 0.0 } else { off / largest };
-        (motion_error <= SAME_MOTION).then_some(EquivalentSystem {
+        // A step too long for the system changes its response.
+        let response_error = if off == 0.0 { 0.0 } else { off / largest };
+        (response_error <= SAME_MOTION).then_some(EquivalentSystem {
             name: choice.name,
-            device: found,
-            motion_error,
+            nodal: found,
+            response_error,
         })
     };
     let choices = match choices {
-        [] => factors(&device.mass),
+        [] => factors(&nodal.mass),
         choices => choices.to_vec(),
     };
     let found: Vec<EquivalentSystem> = choices.into_iter().filter_map(find).collect();
@@ -80,20 +85,20 @@ pub fn equivalent_systems(
     }
     let fit = EquivalentSystem {
         name: "the fit".into(),
-        device: device.clone(),
-        motion_error: 0.0,
+        nodal: nodal.clone(),
+        response_error: 0.0,
     };
     std::iter::once(fit).chain(found).collect()
 }
 
-/// Masses that grow, fall and swing away from the fit's.
+/// Default masses: growing, falling and oscillating about that of the fit.
 fn factors(mass: &[f64]) -> Vec<Choice> {
     let last = (mass.len() - 1) as f64;
     type Factor = fn(f64) -> f64;
     let choices: [(&str, Factor); 3] = [
-        ("mass that grows by a half", |x| 1.0 + 0.5 * x),
-        ("mass that falls by a third", |x| 1.0 - x / 3.0),
-        ("mass that swings by a fifth", |x| {
+        ("mass growing by half", |x| 1.0 + 0.5 * x),
+        ("mass falling by a third", |x| 1.0 - x / 3.0),
+        ("mass oscillating by a fifth", |x| {
             1.0 + 0.2 * (12.0 * x).sin()
         }),
     ];

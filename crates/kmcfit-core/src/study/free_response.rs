@@ -1,13 +1,13 @@
-//! Free responses of a system from other initial states, beside those of the true system.
+//! Free responses of the identified system from given initial states, compared with those of the true system.
 
 use crate::simulate::{SimulationError, Trajectory};
 use crate::system::quadrature::trapezoid;
 use crate::system::{NodalCoefficients, State, System};
 use serde::{Deserialize, Serialize};
 
-/// The motion of the found device from one initial state, against the true device's. Of a rotation rad stands for m.
+/// Key numbers of one free response, compared with that of the true system. Rotations are in rad in place of m.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Prediction {
+pub struct PredictionSummary {
     /// Initial displacement, m.
     pub displacement: f64,
     /// Initial velocity, m/s.
@@ -18,49 +18,49 @@ pub struct Prediction {
     /// `integral y_true^2 dt`, m^2 s, where the truth is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub energy: Option<f64>,
-    /// Largest distance of the motion from zero, m; `None` where there is no motion.
+    /// Peak displacement, m; `None` where the simulation fails.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest: Option<f64>,
-    /// Displacement at the last node, m; `None` where there is no motion.
+    /// Displacement at the last node, m; `None` where the simulation fails.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub last: Option<f64>,
-    /// Why there is no motion from there, if there is none.
+    /// Reason for a failed simulation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
 }
 
-/// A prediction and the motions that it sums up.
+/// A free response and its key numbers.
 #[derive(Debug, Clone)]
-pub struct PredictedMotion {
-    /// In numbers.
-    pub summary: Prediction,
-    /// The found device's motion.
-    pub motion: Trajectory,
-    /// The true device's motion, where the truth is known.
+pub struct PredictedResponse {
+    /// Key numbers.
+    pub summary: PredictionSummary,
+    /// Response of the identified system.
+    pub response: Trajectory,
+    /// Response of the true system, where known.
     pub truth: Option<Trajectory>,
 }
 
-/// The free motion of `device` from each of `states`; `truth` is the true device, where known. The
-/// cost is `integral (y - y_true)^2 dt`, the energy `integral y_true^2 dt`, by the trapezoid rule.
+/// Free responses of `system` with coefficients `nodal` from each of `states`, compared with those of the coefficients
+/// `truth`, where known. Integrals use the trapezoid rule.
 ///
 /// # Errors
-/// A [`SimulationError`] if a motion does not exist.
+/// A [`SimulationError`] if a simulation fails.
 pub fn predict(
     system: &System,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     truth: Option<&NodalCoefficients>,
     states: &[State],
-) -> Result<Vec<PredictedMotion>, SimulationError> {
+) -> Result<Vec<PredictedResponse>, SimulationError> {
     states
         .iter()
         .map(|&state| {
-            let motion = system.forward(device, state, None)?;
+            let response = system.forward(nodal, state, None)?;
             let truth = truth
                 .map(|truth| system.forward(truth, state, None))
                 .transpose()?;
-            Ok(PredictedMotion {
-                summary: summarise(system, state, &motion, truth.as_ref()),
-                motion,
+            Ok(PredictedResponse {
+                summary: summarise(system, state, &response, truth.as_ref()),
+                response,
                 truth,
             })
         })
@@ -70,22 +70,22 @@ pub fn predict(
 fn summarise(
     system: &System,
     state: State,
-    motion: &Trajectory,
+    response: &Trajectory,
     truth: Option<&Trajectory>,
-) -> Prediction {
+) -> PredictionSummary {
     let integral = |f: &dyn Fn(usize) -> f64| {
-        let squares: Vec<f64> = (0..motion.displacement.len())
+        let squares: Vec<f64> = (0..response.displacement.len())
             .map(|i| f(i).powi(2))
             .collect();
         trapezoid(&squares, system.grid.step())
     };
-    Prediction {
+    PredictionSummary {
         displacement: state.displacement,
         velocity: state.velocity,
-        cost: truth.map(|t| integral(&|i| motion.displacement[i] - t.displacement[i])),
+        cost: truth.map(|t| integral(&|i| response.displacement[i] - t.displacement[i])),
         energy: truth.map(|t| integral(&|i| t.displacement[i])),
-        largest: Some((motion.displacement.iter()).fold(0.0, |most, y| most.max(y.abs()))),
-        last: motion.displacement.last().copied(),
+        largest: Some((response.displacement.iter()).fold(0.0, |most, y| most.max(y.abs()))),
+        last: response.displacement.last().copied(),
         failure: None,
     }
 }

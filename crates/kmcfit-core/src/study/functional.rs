@@ -1,22 +1,22 @@
-//! A number that is linear in the parameters.
+//! Quantities derived from the parameters: linear functionals and ratios of two of them.
 
 use crate::functions::Basis;
 use crate::problem::Problem;
 use crate::system::TimePoint;
 use crate::system::quadrature::trapezoid_weights;
 
-/// `q(theta) = constant + sum_j a_j theta_j`: a parameter, a scalar, a function's value or its mean.
+/// Linear functional `q(theta) = constant + sum_j a_j theta_j`: a parameter, a scalar, the value of a function or its mean.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Linear {
     /// Name for reports, as in `mass at 3 s`.
     pub name: String,
-    /// Its unit.
+    /// Unit.
     pub unit: String,
-    /// The time that it speaks of, s; `None` if it speaks of no single one.
+    /// Time of the value, s; `None` for parameters, scalars and means.
     pub time: Option<f64>,
-    /// `(j, a_j)`.
+    /// Entries `(j, a_j)`.
     pub entries: Vec<(usize, f64)>,
-    /// The part that no parameter changes, in its unit.
+    /// Constant part, in the unit of `q`.
     pub constant: f64,
 }
 
@@ -48,8 +48,7 @@ impl Linear {
         }
     }
 
-    /// Value of function `function` at `time` (s), linear between the nodes as the stepper sees it;
-    /// `None` outside the grid.
+    /// Value of function `function` at `time` (s), by linear interpolation between nodes; `None` outside the grid.
     pub fn value(problem: &Problem, function: usize, time: f64) -> Option<Self> {
         let place = TimePoint::of(&problem.system.grid, time)?;
         let weights = [
@@ -64,7 +63,7 @@ impl Linear {
         })
     }
 
-    /// `1/T integral p dt` of function `function` by the trapezoid rule over the grid.
+    /// Mean `1/T integral p dt` of function `function`, by the trapezoid rule over the grid.
     pub fn mean(problem: &Problem, function: usize) -> Self {
         let grid = &problem.system.grid;
         let weights = trapezoid_weights(grid.nodes(), grid.step());
@@ -77,7 +76,7 @@ impl Linear {
         Self::combine(problem, function, name, shares.enumerate())
     }
 
-    /// `sum_i w_i p(t_i)` over nodes.
+    /// Sum `sum_i w_i p(t_i)` over nodes.
     fn combine(
         problem: &Problem,
         function: usize,
@@ -111,7 +110,7 @@ impl Linear {
         self.constant + self.entries.iter().map(|(j, a)| a * theta[*j]).sum::<f64>()
     }
 
-    /// `sqrt(a^T C a)`: its standard deviation for the covariance `C` of the parameters.
+    /// Standard deviation `sqrt(a^T C a)` for the covariance `C` of the parameters.
     pub fn deviation(&self, covariance: &nalgebra::DMatrix<f64>) -> f64 {
         let row = |&(i, a): &(usize, f64)| -> f64 {
             let sum: f64 = self
@@ -125,12 +124,12 @@ impl Linear {
     }
 }
 
-/// A number to be pushed to its extremes.
+/// A quantity whose extremes are computed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Target {
-    /// A linear one.
+    /// A linear functional.
     Linear(Linear),
-    /// A quotient of two, as `k/m` at a time; the second is positive.
+    /// A ratio of two linear functionals, as `k/m` at one time; the denominator is positive.
     Ratio(Linear, Linear),
 }
 
@@ -143,14 +142,14 @@ impl Target {
         }
     }
 
-    /// The time that it speaks of, s.
+    /// Time of the quantity, s.
     pub fn time(&self) -> Option<f64> {
         match self {
             Self::Linear(q) | Self::Ratio(q, _) => q.time,
         }
     }
 
-    /// Its value.
+    /// Value at `theta`.
     pub fn of(&self, theta: &[f64]) -> f64 {
         match self {
             Self::Linear(q) => q.of(theta),

@@ -1,32 +1,32 @@
-//! What the readings say beyond one fit.
+//! Further analyses of a fit.
 //!
-//! * [`Linear`]: a number that is linear in the parameters, the thing asked about;
-//! * [`profile()`]: which values of it the readings allow, by fits with it held fixed;
-//! * [`pull_apart`]: the extreme devices among all that explain the readings as well as stated;
-//! * [`equivalent`]: other devices with the very same motion; [`equivalent_systems`] finds and checks those of a fit;
-//! * [`multistart`]: fits from many starts, their clusters, and whether two optima share a valley;
-//! * [`variation`]: whether a function varies at all;
-//! * [`bootstrap`]: intervals from fits to simulated readings;
-//! * [`prediction`]: what an optimum says of an unseen run, and how surely.
+//! * [`Linear`]: a quantity that is linear in the parameters;
+//! * [`profile()`]: its likelihood profile, by fits with the quantity fixed at a series of values;
+//! * [`extremes`]: its smallest and largest values over all parameters compatible with the data;
+//! * [`equivalent_coefficients`]: other coefficients with the same response; [`equivalent_systems`] computes and confirms
+//!   those of a fit;
+//! * [`multistart`]: fits from many starting points, their clusters, and paths between minima;
+//! * [`constancy_test`]: likelihood-ratio test of a constant against a time-varying function;
+//! * [`bootstrap`]: intervals from fits to simulated samples;
+//! * [`prediction`]: response to another excitation or initial state, with its uncertainty.
 //!
-//! What is random is seeded, and what runs on several threads gives the same bits on any number of
-//! them.
+//! Random numbers are seeded, and results do not depend on the number of threads.
 
 pub mod bootstrap;
-pub mod equivalent;
+pub mod constancy_test;
+pub mod equivalent_coefficients;
 mod equivalent_systems;
+pub mod extremes;
 mod free_response;
 mod functional;
 pub mod multistart;
 mod parallel;
 pub mod prediction;
 pub mod profile;
-pub mod pull_apart;
 mod refit;
 mod simulate;
-pub mod variation;
 
 pub use equivalent_systems::{Choice, EquivalentSystem, equivalent_systems};
-pub use free_response::{PredictedMotion, Prediction, predict};
+pub use free_response::{PredictedResponse, PredictionSummary, predict};
 pub use functional::{Linear, Target};
 pub use profile::{Profile, ProfileSettings, profile, profiles};

@@ -3,11 +3,11 @@
 use crate::threads::{share, sharing, spawn_scoped};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Most threads: each has a stack of its own, and no machine at hand has more processors.
+/// Largest number of threads, which bounds the memory of their stacks.
 const MOST_THREADS: usize = 256;
 
-/// `work(0), work(1), ...` in this order, computed on up to `threads` threads. Every job depends on its
-/// index alone, so the results are the same bits for any number of threads.
+/// Computes `work(0), work(1), ...` on up to `threads` threads and returns the results in order. Each job depends on its
+/// index alone, so results do not depend on the number of threads.
 ///
 /// # Panics
 /// If a job does.
@@ -29,7 +29,7 @@ pub fn map<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T + Sy
             share();
             turn()
         };
-        // Where the system refuses a thread, the others do its jobs.
+        // Remaining threads do the jobs of a thread that the operating system refuses.
         let others = (1..workers).map_while(|_| spawn_scoped(scope, work).ok());
         let others: Vec<_> = others.collect();
         let mut done = match others.is_empty() {

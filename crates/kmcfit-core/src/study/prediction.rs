@@ -1,84 +1,82 @@
-//! Prediction of an unseen run, with its uncertainty.
+//! Prediction of the response to another excitation or initial state, with its uncertainty.
 //!
-//! The band is that of the linearised motion, `y(t) +- z sqrt(J(t) C J(t)^T)` for a given covariance
-//! `C` of the parameters (delta method; z = 1.96 for 95 %), displacement alone. The worst case is the
-//! envelope of the motions of given extreme devices ([`super::pull_apart`]): the readings rule
-//! none of them out, however unlikely the linearisation calls them.
+//! The 95 % confidence band is that of the linearised response, `y(t) +- z sqrt(J(t) C J(t)^T)`, with the covariance `C`
+//! of the parameters and `z = 1.96` (delta method); displacements only. The envelope is that of the responses of given
+//! data-consistent extreme systems ([`super::extremes`]).
 
-use super::pull_apart::Extreme;
+use super::extremes::Extreme;
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, Weighting};
 use crate::simulate::{SimulationError, Trajectory};
 use crate::system::{Excitation, State};
 use nalgebra::{DMatrix, DVector};
 
-/// Half width of a 95 % band of a normal number, in standard deviations.
+/// Half-width of the 95 % interval of a normal variable, in standard deviations.
 const Z_95: f64 = 1.959_963_984_540_054;
 
-/// An unseen run.
+/// Initial state and excitation of a prediction.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Run {
-    /// Its name.
+pub struct PredictionCase {
+    /// Name.
     pub name: String,
     /// State at the first node.
     pub initial: State,
-    /// What drives it, on the problem's grid; `None` for free motion.
+    /// Excitation on the grid of the problem; `None` for a free response.
     pub excitation: Option<Excitation>,
-    /// Which device of the problem moves.
-    pub device: usize,
+    /// Index of the coefficient set.
+    pub coefficient_set: usize,
 }
 
-impl Run {
-    /// Free motion of the main device.
+impl PredictionCase {
+    /// A free response with the shared coefficient set.
     pub fn free(name: impl Into<String>, initial: State) -> Self {
         Self {
             name: name.into(),
             initial,
             excitation: None,
-            device: 0,
+            coefficient_set: 0,
         }
     }
 }
 
-/// The prediction of one run.
+/// Predicted response of one case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prediction {
-    /// Name of the run.
+    /// Name of the case.
     pub name: String,
     /// Times of the nodes, s.
     pub times: Vec<f64>,
-    /// The optimum's motion.
-    pub motion: Trajectory,
+    /// Response at the optimum.
+    pub response: Trajectory,
     /// 95 % band of the displacement at each node, m; `None` without a covariance.
     pub band: Option<Vec<[f64; 2]>>,
-    /// Envelope of the displacements of the optimum and the extreme devices, m; `None` without
-    /// extreme devices that have a motion.
+    /// Envelope of the displacements of the optimum and the extreme systems, m; `None` if no extreme system could be
+    /// simulated.
     pub worst: Option<Vec<[f64; 2]>>,
-    /// The extreme device that is furthest from the optimum, and the largest distance, m.
+    /// Name of the extreme system with the largest difference from the optimum, and the difference, m.
     pub furthest: Option<(String, f64)>,
-    /// Extreme devices without a motion in this run.
-    pub without_motion: Vec<String>,
+    /// Extreme systems whose simulation fails.
+    pub no_response: Vec<String>,
 }
 
-/// Predicts `run` from the parameters `theta`, with the band of `covariance` and the worst case over
-/// `extremes`.
+/// Predicts `run` at the parameters `theta`, with the confidence band of `covariance` and the envelope of `extremes`.
 ///
 /// # Errors
-/// A [`SimulationError`] if the optimum has no motion in the run.
+/// A [`SimulationError`] if the simulation at the optimum fails.
 ///
 /// # Panics
 /// If the covariance is not one of the parameters.
 pub fn predict(
     problem: &Problem,
     theta: &[f64],
-    run: &Run,
+    run: &PredictionCase,
     covariance: Option<&DMatrix<f64>>,
     extremes: &[Extreme],
 ) -> Result<Prediction, SimulationError> {
     let seen = with_run(problem, run);
     let evaluation = seen.evaluate(theta)?;
-    let motion = evaluation.trajectories[0].clone();
-    let y = &motion.displacement;
+    let response = evaluation.trajectories[0].clone();
+    let y = &response.displacement;
     let band = covariance.map(|covariance| {
         assert_eq!(covariance.nrows(), theta.len(), "one row per parameter");
         let n = theta.len();
@@ -101,10 +99,10 @@ pub fn predict(
     });
     let mut envelope: Vec<[f64; 2]> = y.iter().map(|y| [*y, *y]).collect();
     let mut furthest: Option<(String, f64)> = None;
-    let mut without_motion = Vec::new();
+    let mut no_response = Vec::new();
     for extreme in extremes {
         let Ok(other) = seen.evaluate(&extreme.parameters) else {
-            without_motion.push(extreme.name());
+            no_response.push(extreme.name());
             continue;
         };
         let mut distance = 0.0f64;
@@ -123,13 +121,13 @@ pub fn predict(
         band,
         worst: furthest.is_some().then_some(envelope),
         furthest,
-        without_motion,
-        motion,
+        no_response,
+        response,
     })
 }
 
-/// The problem with the run as its only experiment, its displacement read at all nodes.
-fn with_run(problem: &Problem, run: &Run) -> Problem {
+/// The problem with the case as its only experiment and displacements at all nodes.
+fn with_run(problem: &Problem, run: &PredictionCase) -> Problem {
     let mut seen = problem.clone();
     let grid = problem.system.grid;
     let nodes = grid.nodes();
@@ -137,7 +135,7 @@ fn with_run(problem: &Problem, run: &Run) -> Problem {
     let channel = Channel::displacement_at_nodes(zeros, 1, Weighting::Sigma(1.0), &grid);
     let mut experiment = Experiment::free(run.name.clone(), run.initial, nodes);
     experiment.excitation.clone_from(&run.excitation);
-    experiment.device = run.device;
+    experiment.coefficient_set = run.coefficient_set;
     seen.parts_mut().experiments = vec![experiment.with_channel(channel)];
     seen
 }

@@ -1,4 +1,4 @@
-//! Fits near an optimum, as all studies run them.
+//! Refits near an optimum, with common settings for all analyses.
 
 use crate::objective::GradientKind;
 use crate::problem::Problem;
@@ -6,13 +6,12 @@ use crate::qp::project;
 use crate::simd::sum::rms;
 use crate::solvers::{FitSettings, Initial, Solver, Stopping};
 
-/// A refit ends when an iteration lowers J by at most this share: far below a change of chi-square
-/// that means anything.
+/// Relative decrease of J per iteration that ends a refit, far below any significant change of chi-square.
 const TOLERANCE: f64 = 1e-13;
-/// Most iterations of a refit; near an optimum it takes three to six.
+/// Iteration limit of a refit; near an optimum three to six iterations suffice.
 const ITERATIONS: u64 = 60;
 
-/// Gauss–Newton to the last digits that count.
+/// Gauss–Newton with a tolerance near machine precision.
 pub fn settings() -> FitSettings {
     FitSettings {
         solver: Solver::GaussNewton,
@@ -26,8 +25,7 @@ pub fn settings() -> FitSettings {
     }
 }
 
-/// How large a change of each parameter is large: the natural size of its function, or the scalar's
-/// own. `theta` must have a motion; else all sizes are 1.
+/// Natural size of each parameter: that of its function, or the scalar's own; 1 for all if `theta` cannot be simulated.
 pub fn sizes(problem: &Problem, theta: &[f64]) -> Vec<f64> {
     let Ok(evaluation) = problem.evaluate(theta) else {
         return vec![1.0; theta.len()];
@@ -48,13 +46,13 @@ pub fn sizes(problem: &Problem, theta: &[f64]) -> Vec<f64> {
     sizes
 }
 
-/// The root mean square of values, and no less than what squares keep above zero.
+/// Root mean square of values, bounded below to keep squares positive.
 pub fn positive_rms(values: &[f64]) -> f64 {
     rms(values).max(f64::MIN_POSITIVE.sqrt())
 }
 
-/// The point of the constraints nearest to `theta`, where changes are measured by `sizes`; `theta`
-/// itself where there are none, `None` where they contradict each other.
+/// Feasible point nearest to `theta`, with changes scaled by `sizes`; `theta` itself without constraints, `None` where
+/// the constraints contradict each other.
 pub fn nearest(problem: &Problem, theta: &[f64], sizes: &[f64]) -> Option<Vec<f64>> {
     if problem.constraints.is_empty() {
         return Some(theta.to_vec());

@@ -1,4 +1,4 @@
-//! Readings that a device would have given, with seeded noise.
+//! Simulated samples: predictions of a system plus seeded noise.
 
 use crate::objective::Evaluation;
 use crate::problem::Problem;
@@ -6,16 +6,15 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// The random numbers of job `index` under `seed`: a stream of its own, whatever thread runs it.
+/// Random number generator of job `index` under `seed`; independent of the thread.
 pub fn stream(seed: u64, index: usize) -> ChaCha8Rng {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(index as u64);
     random
 }
 
-/// Standard deviation of every reading, in the order of experiments, channels and readings: the
-/// stated one, or where none is stated the root of the unweighted residuals' mean square, all
-/// channels without sigma together, made unbiased by `n / (n - p)`.
+/// Standard deviation of every sample, ordered by experiment, channel and sample: the stated sigma, or else the root mean
+/// square of the unweighted residuals of all channels without sigma, corrected by `n / (n - p)`.
 pub fn sigmas(problem: &Problem, evaluation: &Evaluation) -> Vec<f64> {
     let (mut squares, mut count) = (0.0, 0usize);
     for (channel, predicted) in problem.predicted(evaluation) {
@@ -37,8 +36,8 @@ pub fn normal(random: &mut ChaCha8Rng, count: usize) -> Vec<f64> {
     (0..count).map(|_| StandardNormal.sample(random)).collect()
 }
 
-/// The problem with the readings `predictions + noise`, noise in the order of [`sigmas`].
-pub fn with_readings(problem: &Problem, evaluation: &Evaluation, noise: &[f64]) -> Problem {
+/// The problem with samples `predictions + noise`; noise in the order of [`sigmas`].
+pub fn with_samples(problem: &Problem, evaluation: &Evaluation, noise: &[f64]) -> Problem {
     let mut simulated = problem.clone();
     let mut first = 0;
     let experiments = simulated.parts_mut().experiments.iter_mut();

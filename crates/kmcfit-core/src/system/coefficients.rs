@@ -1,4 +1,4 @@
-//! Nodal values of the coefficient functions, and a state of the response.
+//! Nodal values of the coefficient functions, and the state of the system.
 
 /// Displacement (m) and velocity (m/s) at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -15,21 +15,21 @@ impl State {
     }
 }
 
-/// Values of the mass and of every term's coefficient function at all nodes.
+/// Nodal values of the mass and of each term's coefficient function.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodalCoefficients {
     /// Mass at the nodes, kg.
     pub mass: Vec<f64>,
-    /// One coefficient function per [`Term`](super::Term), in the system's order, at the nodes.
+    /// Nodal values of one coefficient function per [`Term`](super::Term), in the system's order.
     pub coefficients: Vec<Vec<f64>>,
 }
 
 impl NodalCoefficients {
-    /// A device with all values zero: `nodes` nodes, `terms` terms.
+    /// Zero coefficients: `nodes` nodes, `terms` terms.
     pub fn zeros(nodes: usize, terms: usize) -> Self {
         Self {
             mass: vec![0.0; nodes],
-            // One by one: zeros come from the system as they are, copies of them are made.
+            // One by one: zeroed memory comes from the operating system, copies would be written.
             coefficients: (0..terms).map(|_| vec![0.0; nodes]).collect(),
         }
     }
@@ -54,11 +54,11 @@ impl NodalCoefficients {
     }
 }
 
-/// A direction in which device and initial state change.
+/// A direction of change of the coefficients and the initial state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SystemTangent {
-    /// Change of every function at the nodes.
-    pub device: NodalCoefficients,
+    /// Change of the nodal values.
+    pub nodal: NodalCoefficients,
     /// Change of the initial state.
     pub initial: State,
 }
@@ -66,6 +66,6 @@ pub struct SystemTangent {
 impl SystemTangent {
     pub(crate) fn is_finite(&self) -> bool {
         let finite = |values: &[f64]| values.iter().fold(true, |all, x| all & x.is_finite());
-        self.device.functions().all(finite) && self.initial.is_finite()
+        self.nodal.functions().all(finite) && self.initial.is_finite()
     }
 }

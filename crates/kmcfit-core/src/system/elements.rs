@@ -1,4 +1,4 @@
-//! Elements: forces `p(t) phi(y, v)` of the equation of motion, each with its response and partial derivatives.
+//! Elements: force terms `p(t) phi(y, v)` of the equation of motion, with `phi` and its partial derivatives.
 
 /// A force term `p(t) phi(y, v)` of the equation of motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,23 +11,23 @@ pub enum Term {
     CubicStiffness,
     /// `p(t) |v| v`, p in N s^2/m^2.
     QuadraticDamping,
-    /// `p(t) v / sqrt(v^2 + width^2)`, p in N: a sign of `v` that is smooth over the width.
+    /// `p(t) v / sqrt(v^2 + width^2)`, p in N: smoothed Coulomb friction.
     CoulombFriction {
-        /// Speed below which friction gives way, m/s; positive.
+        /// Smoothing speed, m/s; positive.
         width: f64,
     },
-    /// `p(t)`, in N: a constant push to the left.
+    /// `p(t)`, in N: a static force, positive in the direction of negative `y`.
     Offset,
 }
 
-/// The most terms that an oscillator can have: one of each kind.
+/// Largest number of terms of a system: one of each kind.
 pub const MOST_TERMS: usize = 6;
 
 impl Term {
-    /// The response `phi(y, v)`.
+    /// Element response `phi(y, v)`.
     ///
-    /// Coulomb friction differs from the sign of `v` by `width^2 / (2 v^2)` at speeds well above the width; a
-    /// square root, unlike a hyperbolic tangent, has the same bits on every machine.
+    /// Smoothed Coulomb friction differs from the sign of `v` by `width^2 / (2 v^2)` at speeds well above the width. A square root,
+    /// unlike a hyperbolic tangent, has the same bits on every machine.
     #[inline(always)]
     pub fn phi(self, y: f64, v: f64) -> f64 {
         match self {
@@ -40,7 +40,7 @@ impl Term {
         }
     }
 
-    /// `(d phi/d y, d phi/d v)`. The second derivative of quadratic damping jumps at `v = 0`, its first does not.
+    /// Partial derivatives `(d phi/d y, d phi/d v)`. The first derivative of quadratic damping is continuous at `v = 0`, the second is not.
     #[inline(always)]
     pub fn partials(self, y: f64, v: f64) -> (f64, f64) {
         match self {
@@ -56,7 +56,7 @@ impl Term {
         }
     }
 
-    /// Whether the response is proportional to the motion.
+    /// True if `phi` is linear in the state.
     pub fn is_linear(self) -> bool {
         matches!(self, Term::Damping | Term::Stiffness)
     }

@@ -1,7 +1,7 @@
-//! Equally spaced time nodes, and times between them.
+//! Equally spaced time grid, and points of time on it.
 
-/// `nodes` equally spaced times from `start` to `start + duration`: `t_i = start + i dt`,
-/// `dt = duration / (nodes - 1)`. `nodes` counts nodes, so there are `nodes - 1` steps.
+/// Grid of `nodes` equally spaced times from `start` to `start + duration`: `t_i = start + i dt`, `dt = duration / (nodes - 1)`,
+/// with `nodes - 1` steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
     start: f64,
@@ -10,7 +10,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// The fewest nodes that second differences can be taken on.
+    /// Smallest number of nodes, as second differences require.
     pub const FEWEST_NODES: usize = 3;
 
     /// A grid of `nodes` nodes over `[start, start + duration]` (s), or `None` unless the numbers
@@ -38,12 +38,12 @@ impl Grid {
         self.duration / (self.nodes - 1) as f64
     }
 
-    /// First time in s.
+    /// Start in s.
     pub fn start(&self) -> f64 {
         self.start
     }
 
-    /// Length in s.
+    /// Duration in s.
     pub fn duration(&self) -> f64 {
         self.duration
     }
@@ -53,44 +53,43 @@ impl Grid {
         self.start + i as f64 * self.step()
     }
 
-    /// All times in s.
+    /// Times of all nodes in s.
     pub fn times(&self) -> Vec<f64> {
         (0..self.nodes).map(|i| self.time(i)).collect()
     }
 
-    /// A time without the rounding in its digits beyond a tenth of a step.
+    /// Time rounded to a decimal place below a tenth of a step.
     pub fn round_time(&self, time: f64) -> f64 {
         round_time(time, self.step())
     }
 
-    /// The same interval with another number of nodes; `None` as in [`Grid::new`].
+    /// Grid over the same interval with another number of nodes; `None` as in [`Grid::new`].
     pub fn with_nodes(&self, nodes: usize) -> Option<Self> {
         Self::new(self.start, self.duration, nodes)
     }
 }
 
-/// A time without the rounding in its digits beyond a tenth of `spacing`, both in s: a sample that is written so is still the one
-/// at that time, however late it is.
+/// Time rounded to a decimal place below a tenth of `spacing`, both in s, so that a written time still identifies its sample.
 pub fn round_time(time: f64, spacing: f64) -> f64 {
     let decimals = (1.0 - spacing.log10().floor()).clamp(0.0, 12.0);
     let written = format!("{time:.*}", decimals as usize);
     written.parse().unwrap_or(time)
 }
 
-/// A time on a grid: `fraction` of a step after the left node of step `step`.
+/// A point of time on a grid: `fraction` of a step after the left node of step `step`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimePoint {
     /// Step, from 0.
     pub step: usize,
-    /// From 0 at the left node to 1 at the right one.
+    /// Fraction of the step, 0 at the left node to 1 at the right one.
     pub fraction: f64,
 }
 
 impl TimePoint {
-    /// How near a time must be to a node, in steps, to be taken as the node itself.
+    /// Largest distance from a node, in steps, of a time that is taken as the node.
     pub const SAME_TIME: f64 = 1e-6;
 
-    /// The place of `time` (s) on `grid`; `None` outside it.
+    /// Point of `time` (s) on `grid`; `None` outside.
     pub fn of(grid: &Grid, time: f64) -> Option<Self> {
         let x = (time - grid.start()) / grid.step();
         let last = grid.nodes() - 1;
@@ -109,7 +108,7 @@ impl TimePoint {
         })
     }
 
-    /// Node `node` of a motion over `nodes` nodes: the left node of a step, but for the last.
+    /// Node `node` of a response over `nodes` nodes: the left node of a step, except for the last.
     pub fn node(node: usize, nodes: usize) -> Self {
         match node + 1 < nodes {
             true => Self {
@@ -123,7 +122,7 @@ impl TimePoint {
         }
     }
 
-    /// The node that this place is, if it is one.
+    /// Node of this point, if it is one.
     pub fn as_node(self) -> Option<usize> {
         match self.fraction {
             0.0 => Some(self.step),

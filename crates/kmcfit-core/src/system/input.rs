@@ -1,10 +1,10 @@
-//! The input of a record: force and motion of the base.
+//! Excitation of a system: force and base acceleration at the stages of the steps.
 
 use super::TimePoint;
-use super::integrator::Position;
+use super::integrator::StagePosition;
 
-/// A function of time at the left end, the middle and the right end of every step. The value at a
-/// right end is the limit from the left, so that a jump at a node belongs to the step after it.
+/// A function of time at the left end, the middle and the right end of every step. The value at a right end is the limit from the
+/// left, so a jump at a node belongs to the following step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageSamples(Vec<[f64; 3]>);
 
@@ -30,41 +30,41 @@ impl StageSamples {
         &self.0
     }
 
-    /// Whether it is zero at all times that the stepper sees.
+    /// True if zero at all stages.
     pub fn is_zero(&self) -> bool {
         self.0.iter().flatten().all(|value| *value == 0.0)
     }
 
-    /// The values at the nodes, each as the step after it sees it; the last as the last step does.
+    /// Values at the nodes: left values of the steps, and the right value of the last step.
     pub fn at_nodes(&self) -> Vec<f64> {
         let last = self.0.last().map(|step| step[2]);
         self.0.iter().map(|step| step[0]).chain(last).collect()
     }
 
     #[inline(always)]
-    pub(crate) fn at(&self, i: usize, position: Position) -> f64 {
+    pub(crate) fn at(&self, i: usize, position: StagePosition) -> f64 {
         self.0[i][match position {
-            Position::Left => 0,
-            Position::Middle => 1,
-            Position::Right => 2,
+            StagePosition::Left => 0,
+            StagePosition::Middle => 1,
+            StagePosition::Right => 2,
         }]
     }
 }
 
-/// Force and motion of the base in one experiment.
+/// Force and base acceleration of one experiment.
 ///
-/// Under base excitation `y` is the motion relative to the base `b(t)`, so the equation of motion is
-/// `m (y'' + b'') + sum_j p_j phi_j(y, y') = f`: the base pushes with `-m b''`.
+/// Under base excitation `y` is relative to the base `b(t)`, and the equation of motion is
+/// `m (y'' + b'') + sum_j p_j phi_j(y, y') = f`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Excitation {
-    /// Force, N; `None` is no force.
+    /// Force, N; `None` for no force.
     pub force: Option<StageSamples>,
-    /// Acceleration `b''` of the base, m/s^2; `None` is a base at rest.
+    /// Acceleration `b''` of the base, m/s^2; `None` for a base at rest.
     pub base: Option<StageSamples>,
 }
 
 impl Excitation {
-    /// A force that is linear between its values at the nodes (N), and a base at rest.
+    /// A force that is linear between its nodal values (N), with the base at rest.
     pub fn force_at_nodes(nodes: &[f64]) -> Self {
         Self {
             force: Some(StageSamples::linear(nodes)),
@@ -72,14 +72,13 @@ impl Excitation {
         }
     }
 
-    /// Whether nothing drives the motion.
+    /// True without force and base motion.
     pub fn is_zero(&self) -> bool {
         let zero = |part: &Option<StageSamples>| part.as_ref().is_none_or(StageSamples::is_zero);
         zero(&self.force) && zero(&self.base)
     }
 
-    /// On steps of half the length, each stage of the old step being the end of a new one; linear in
-    /// between.
+    /// Excitation on steps of half the length: old stages become ends of new steps, with linear interpolation between them.
     #[must_use]
     pub fn halved(&self) -> Self {
         let halves = |part: &StageSamples| {
@@ -97,7 +96,7 @@ impl Excitation {
         }
     }
 
-    /// Both at any place, linear between the ends of its step.
+    /// Force and base acceleration at a point, linear between the ends of its step.
     pub fn around(&self, place: TimePoint) -> InputSample {
         let at = |part: &Option<StageSamples>| {
             part.as_ref().map_or(0.0, |p| {
@@ -111,7 +110,7 @@ impl Excitation {
         }
     }
 
-    /// Whether it covers the steps of a motion over `nodes` nodes.
+    /// True if the excitation covers a response over `nodes` nodes.
     pub(crate) fn covers(&self, nodes: usize) -> bool {
         let parts = [&self.force, &self.base];
         parts.into_iter().flatten().all(|p| p.steps() + 1 >= nodes)

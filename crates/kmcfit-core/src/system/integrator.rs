@@ -1,11 +1,11 @@
-//! Explicit Runge–Kutta tableaux whose stages sit on nodes or half-way between them.
+//! Explicit Runge–Kutta methods whose stages are at nodes or half-way between them.
 
-/// Which explicit Runge–Kutta method steps the motion.
+/// Explicit Runge–Kutta method of the forward solve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
-    /// Explicit midpoint rule, order 2: the paper's.
+    /// Explicit midpoint rule, second order: that of the paper.
     Midpoint,
-    /// Classical Runge–Kutta method, order 4.
+    /// Classical Runge–Kutta method, fourth order.
     Rk4,
 }
 
@@ -18,7 +18,7 @@ impl Method {
         }
     }
 
-    /// Order of the error in the step.
+    /// Order of accuracy.
     pub fn order(self) -> u32 {
         match self {
             Method::Midpoint => 2,
@@ -27,45 +27,45 @@ impl Method {
     }
 }
 
-/// Where in a step a stage sits. Coefficients there: a node's value, or the mean of two.
+/// Position of a stage in a step; coefficients there are a nodal value, or the mean of two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Position {
+pub(crate) enum StagePosition {
     Left,
     Middle,
     Right,
 }
 
-impl Position {
-    /// The piecewise linear function `f` at this position of step `i`.
+impl StagePosition {
+    /// Value of the piecewise linear function `f` at this position of step `i`.
     #[inline(always)]
     pub fn of(self, f: &[f64], i: usize) -> f64 {
         match self {
-            Position::Left => f[i],
-            Position::Middle => (f[i + 1] + f[i]) * 0.5,
-            Position::Right => f[i + 1],
+            StagePosition::Left => f[i],
+            StagePosition::Middle => (f[i + 1] + f[i]) * 0.5,
+            StagePosition::Right => f[i + 1],
         }
     }
 
-    /// How much of a node's value, at either end of a step, is seen at this position.
+    /// Weight of the value at the node `node`, an end of the step, at this position.
     #[inline(always)]
-    pub fn share(self, node: Position) -> f64 {
+    pub fn share(self, node: StagePosition) -> f64 {
         match (self, node) {
-            (Position::Middle, _) => 0.5,
+            (StagePosition::Middle, _) => 0.5,
             (here, node) if here == node => 1.0,
             _ => 0.0,
         }
     }
 
-    /// Transpose of [`Position::of`]: adds `value` to the nodes that the position reads.
+    /// Transpose of [`StagePosition::of`]: adds `value` to the nodes of the position.
     #[inline(always)]
     pub fn spread(self, f: &mut [f64], i: usize, value: f64) {
         match self {
-            Position::Left => f[i] += value,
-            Position::Middle => {
+            StagePosition::Left => f[i] += value,
+            StagePosition::Middle => {
                 f[i] += 0.5 * value;
                 f[i + 1] += 0.5 * value;
             }
-            Position::Right => f[i + 1] += value,
+            StagePosition::Right => f[i + 1] += value,
         }
     }
 }
@@ -76,13 +76,13 @@ impl Position {
 pub(crate) struct Tableau<const S: usize> {
     pub a: [[f64; S]; S],
     pub b: [f64; S],
-    pub position: [Position; S],
+    pub position: [StagePosition; S],
 }
 
 pub(crate) const MIDPOINT: Tableau<2> = Tableau {
     a: [[0.0, 0.0], [0.5, 0.0]],
     b: [0.0, 1.0],
-    position: [Position::Left, Position::Middle],
+    position: [StagePosition::Left, StagePosition::Middle],
 };
 
 pub(crate) const RK4: Tableau<4> = Tableau {
@@ -94,9 +94,9 @@ pub(crate) const RK4: Tableau<4> = Tableau {
     ],
     b: [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
     position: [
-        Position::Left,
-        Position::Middle,
-        Position::Middle,
-        Position::Right,
+        StagePosition::Left,
+        StagePosition::Middle,
+        StagePosition::Middle,
+        StagePosition::Right,
     ],
 };

@@ -1,8 +1,8 @@
-//! The oscillator: time grid, integrator, force terms, coefficient functions and input.
+//! The system: time grid, integrator, force terms, coefficient functions and excitation.
 //!
-//! `m(t) (y'' + b''(t)) + sum_j p_j(t) phi_j(y, y') = f(t)` with `y(0)`, `y'(0)` given, stepped by an explicit
-//! Runge-Kutta method ([`Method`]) on an equally spaced [`Grid`]. Coefficient functions live on the
-//! nodes and are linear in between, so a stage at mid-step has the mean of two nodes.
+//! `m(t) (y'' + b''(t)) + sum_j p_j(t) phi_j(y, y') = f(t)` with given `y(0)`, `y'(0)`, integrated by an explicit Runge–Kutta method
+//! ([`Method`]) on an equally spaced [`Grid`]. Coefficient functions are given at the nodes and linear in between, so a stage at
+//! mid-step uses the mean of two nodes.
 
 mod coefficients;
 mod elements;
@@ -11,7 +11,7 @@ mod input;
 mod integrator;
 pub mod quadrature;
 
-pub(crate) use integrator::{MIDPOINT, Position, RK4, Tableau};
+pub(crate) use integrator::{MIDPOINT, RK4, StagePosition, Tableau};
 
 pub use coefficients::{NodalCoefficients, State, SystemTangent};
 pub use elements::{MOST_TERMS, Term};
@@ -19,22 +19,22 @@ pub use grid::{Grid, TimePoint, round_time};
 pub use input::{Excitation, InputSample, StageSamples};
 pub use integrator::Method;
 
-/// Most functions of a device: the mass and one for each term.
+/// Largest number of functions of a system: the mass and one per term.
 pub(crate) const FUNCTIONS: usize = MOST_TERMS + 1;
 
-/// Grid, stepper and force terms of an oscillator. The values of the coefficient functions are a [`NodalCoefficients`].
+/// Grid, integrator and force terms of a single-degree-of-freedom system; its coefficients are a [`NodalCoefficients`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct System {
     /// Time nodes.
     pub grid: Grid,
-    /// Stepper.
+    /// Integrator.
     pub method: Method,
     /// Force terms, in the order of [`NodalCoefficients::coefficients`].
     pub terms: Vec<Term>,
 }
 
 impl System {
-    /// Whether the response is linear in the initial state and nothing drives it.
+    /// True if the response is linear in the initial state and there is no excitation.
     pub fn is_linear_and_free(&self, excitation: Option<&Excitation>) -> bool {
         let is_free = || excitation.is_none_or(Excitation::is_zero);
         self.terms.iter().all(|term| term.is_linear()) && is_free()

@@ -1,4 +1,4 @@
-//! Sums and differences on an equally spaced grid, in the paper's order of operations.
+//! Quadrature and finite differences on an equally spaced grid, in the paper's order of operations.
 
 use crate::simd::{self, Elementwise};
 
@@ -12,7 +12,7 @@ pub fn trapezoid(f: &[f64], dt: f64) -> f64 {
     inner.iter().fold(ends, |sum, f| sum + dt * 0.5 * (2.0 * f))
 }
 
-/// The weights of [`trapezoid`] for `nodes` nodes: `dt`, halved at both ends.
+/// Weights of [`trapezoid`] for `nodes` nodes: `dt`, halved at both ends.
 pub fn trapezoid_weights(nodes: usize, dt: f64) -> Vec<f64> {
     let mut weights = vec![dt; nodes];
     if let [first, .., last] = weights.as_mut_slice() {
@@ -22,7 +22,7 @@ pub fn trapezoid_weights(nodes: usize, dt: f64) -> Vec<f64> {
     weights
 }
 
-/// The weights of the trapezoid rule over any increasing `times`.
+/// Trapezoid weights over increasing `times`.
 pub fn trapezoid_weights_at(times: &[f64]) -> Vec<f64> {
     let mut weights = vec![0.0; times.len()];
     for (i, pair) in times.windows(2).enumerate() {
@@ -50,7 +50,7 @@ pub fn slope(f: &[f64], dt: f64) -> Vec<f64> {
     d
 }
 
-/// Second differences; the ends use the stencil of their neighbours, mirrored.
+/// Second differences; the ends use the stencil of their neighbours.
 ///
 /// # Panics
 /// If there are fewer than three values.

@@ -31,8 +31,8 @@ pub fn system(nodes: usize, method: Method) -> System {
     }
 }
 
-/// The device that made the paper's data: m_i = 1 - 0.5 (i+1)/N, c = 0, k = 1.
-pub fn paper_device(nodes: usize) -> NodalCoefficients {
+/// The system that made the paper's data: m_i = 1 - 0.5 (i+1)/N, c = 0, k = 1.
+pub fn paper_system(nodes: usize) -> NodalCoefficients {
     let mass = (0..nodes)
         .map(|i| 1.0 - 0.5 * (i + 1) as f64 / nodes as f64)
         .collect();
@@ -47,7 +47,7 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
     let system = system(nodes, Method::Midpoint);
     let step = system.grid.step();
     let observed = system
-        .forward(&paper_device(nodes), INITIAL, None)
+        .forward(&paper_system(nodes), INITIAL, None)
         .unwrap()
         .displacement;
     let quantities = [
@@ -70,7 +70,7 @@ pub fn paper_problem(nodes: usize, start: [f64; 3]) -> Problem {
 /// Provides the clock of the process, without which timings are zero.
 pub fn provide_clock() {
     static START: LazyLock<Instant> = LazyLock::new(Instant::now);
-    host::provide(Host {
+    host::set_host(Host {
         clock: || START.elapsed(),
         has_memory: |_| true,
         may_start_thread: || Ok(()),
@@ -106,21 +106,21 @@ pub fn csv(path: &std::path::Path) -> Vec<Vec<f64>> {
     text.lines().skip(1).map(row).collect()
 }
 
-/// Simulated displacement of `device` with Gaussian noise.
-pub fn noisy(system: &System, device: &NodalCoefficients, sigma: f64, seed: u64) -> Vec<f64> {
+/// Simulated displacement of `system` with Gaussian noise.
+pub fn noisy(system: &System, nodal: &NodalCoefficients, sigma: f64, seed: u64) -> Vec<f64> {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-    let motion = system.forward(device, INITIAL, None).unwrap();
+    let response = system.forward(nodal, INITIAL, None).unwrap();
     let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
-    motion
+    response
         .displacement
         .iter()
         .map(|y| y + sigma * noise())
         .collect()
 }
 
-/// A problem over `DURATION` from `INITIAL` with the given functions and readings at all nodes.
+/// A problem over `DURATION` from `INITIAL` with the given functions and samples at all nodes.
 pub fn problem_of(
     system: System,
     list: Vec<CoefficientFunction>,

@@ -12,7 +12,7 @@ pub struct Inputs<D> {
 }
 
 /// Displacement and velocity at all nodes.
-pub fn motion<D: DualNum<Primitive = f64> + Copy>(
+pub fn response<D: DualNum<Primitive = f64> + Copy>(
     method: Method,
     inputs: &Inputs<D>,
     (y0, v0): (D, D),

@@ -35,7 +35,7 @@ impl Response {
     }
 }
 
-/// A device, what drives it, and where it starts.
+/// A system, what drives it, and where it starts.
 pub struct Record<D> {
     pub method: Method,
     pub dt: f64,
@@ -68,7 +68,7 @@ impl<D: Real> Record<D> {
     }
 
     /// Displacement and velocity at all nodes.
-    pub fn motion(&self) -> Vec<(D, D)> {
+    pub fn response(&self) -> Vec<(D, D)> {
         let dt = self.dt;
         let mut states = vec![self.initial];
         for i in 0..self.mass.len() - 1 {

@@ -1,4 +1,4 @@
-//! Records of known devices by the independent evaluation of [`super::sensed`], and how they are
+//! Records of known systems by the independent evaluation of [`super::sensed`], and how they are
 //! fitted.
 
 use super::sensed::{Record, Response};
@@ -17,19 +17,19 @@ use rand_distr::{Distribution, StandardNormal};
 /// What moves, what drives it and where it starts.
 pub struct Truth<'a> {
     pub system: &'a System,
-    pub device: &'a NodalCoefficients,
+    pub nodal: &'a NodalCoefficients,
     pub excitation: Option<&'a Excitation>,
     pub initial: State,
 }
 
 impl Truth<'_> {
-    /// Readings of a perfect sensor at `times`; force and base there are `around`, or else linear
+    /// Samples of a perfect sensor at `times`; force and base there are `around`, or else linear
     /// over each step.
     pub fn seen(&self, kind: ChannelKind, times: &[f64], around: &[InputSample]) -> Vec<f64> {
         let record = self.record();
-        let states = record.motion();
+        let states = record.response();
         let grid = &self.system.grid;
-        let reading = |(n, t): (usize, &f64)| {
+        let sample = |(n, t): (usize, &f64)| {
             let x = (t - grid.start()) / grid.step();
             let nearest = x.round();
             let x = if (x - nearest).abs() < 1e-9 {
@@ -46,7 +46,7 @@ impl Truth<'_> {
             };
             record.seen(kind, &states, (step, share), driven)
         };
-        times.iter().enumerate().map(reading).collect()
+        times.iter().enumerate().map(sample).collect()
     }
 
     fn record(&self) -> Record<f64> {
@@ -61,10 +61,8 @@ impl Truth<'_> {
         Record {
             method: self.system.method,
             dt: self.system.grid.step(),
-            mass: self.device.mass.clone(),
-            terms: terms
-                .zip(self.device.coefficients.iter().cloned())
-                .collect(),
+            mass: self.nodal.mass.clone(),
+            terms: terms.zip(self.nodal.coefficients.iter().cloned()).collect(),
             force: part(&|e| e.force.clone()),
             base: part(&|e| e.base.clone()),
             initial: (self.initial.displacement, self.initial.velocity),
@@ -122,7 +120,7 @@ pub fn rms(values: &[f64]) -> f64 {
 }
 
 /// Covariance of the parameters by Cramer and Rao, `(J' W J)^-1` with the Jacobian of all predictions
-/// at `theta` and the weights of the readings.
+/// at `theta` and the weights of the samples.
 pub fn cramer_rao(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
     let jacobian = weighted_jacobian(problem, theta);
     let information = jacobian.transpose() * &jacobian;
@@ -130,13 +128,11 @@ pub fn cramer_rao(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
     let scale = information.diagonal().map(|x| 1.0 / x.sqrt());
     let scale = DMatrix::from_diagonal(&scale);
     let scaled = &scale * information * &scale;
-    let inverse = scaled
-        .try_inverse()
-        .expect("parameters that can be told apart");
+    let inverse = scaled.try_inverse().expect("independent parameters");
     &scale * inverse * &scale
 }
 
-/// `dz / dtheta` of all predictions, each row by the root of its reading's weight.
+/// `dz / dtheta` of all predictions, each row by the root of its sample's weight.
 pub fn weighted_jacobian(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
     let here = problem.evaluate(theta).unwrap();
     let roots: Vec<f64> = (problem.channels())

@@ -3,7 +3,7 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Weighting};
 use kmcfit_core::internals::solvers::fit_from;
 use kmcfit_core::internals::study::Linear;
-use kmcfit_core::internals::study::bootstrap::{Noise, bootstrap};
+use kmcfit_core::internals::study::bootstrap::{ReplicateNoise, bootstrap};
 
 fn optimum(problem: &Problem) -> Vec<f64> {
     let settings = crate::common::synthetic::settings();
@@ -16,10 +16,10 @@ fn optimum(problem: &Problem) -> Vec<f64> {
 /// 2000 replicates know a standard deviation to 1/sqrt(4000), 1.6 %; ten per cent is six of those,
 /// and leaves room for the model's curvature.
 #[test]
-fn the_refits_spread_as_the_covariance_says() {
+fn the_scatter_of_the_refits_agrees_with_the_covariance() {
     let problem = regular(7);
     let best = optimum(&problem);
-    let check = |problem: &Problem, noise: Noise| {
+    let check = |problem: &Problem, noise: ReplicateNoise| {
         let evaluation = problem.evaluate(&best).unwrap();
         let exact = problem.covariance(&evaluation).unwrap();
         let found = bootstrap(problem, &best, noise, 2000, 11, 2).unwrap();
@@ -36,8 +36,8 @@ fn the_refits_spread_as_the_covariance_says() {
             assert!(low < best[j] && best[j] < high);
         }
     };
-    check(&problem, Noise::Parametric);
-    // The residuals of 51 readings know their own spread to a tenth: the covariance from them.
+    check(&problem, ReplicateNoise::Parametric);
+    // The residuals of 51 samples know their own spread to a tenth: the covariance from them.
     let problem = problem
         .with(|parts| {
             for experiment in &mut parts.experiments {
@@ -49,14 +49,14 @@ fn the_refits_spread_as_the_covariance_says() {
             }
         })
         .unwrap();
-    check(&problem, Noise::Residual);
+    check(&problem, ReplicateNoise::Residual);
 }
 
 #[test]
 fn the_threads_change_no_bit() {
     let problem = regular(8);
     let best = optimum(&problem);
-    for noise in [Noise::Parametric, Noise::Residual] {
+    for noise in [ReplicateNoise::Parametric, ReplicateNoise::Residual] {
         let [one, three] =
             [1, 3].map(|threads| bootstrap(&problem, &best, noise, 20, 5, threads).unwrap());
         assert_eq!(one, three);

@@ -1,5 +1,7 @@
 use kmcfit_core::internals::qp::ConicStatus;
-use kmcfit_core::internals::study::equivalent::{Motion, Wish, anchors, equivalent, imbalance};
+use kmcfit_core::internals::study::equivalent_coefficients::{
+    EquivalentOptions, TargetResponse, anchors, equivalent_coefficients, imbalance,
+};
 use kmcfit_core::internals::system::{
     Excitation, Grid, Method, NodalCoefficients, State, System, Term,
 };
@@ -32,22 +34,22 @@ fn force(grid: &Grid) -> Excitation {
     Excitation::force_at_nodes(&values)
 }
 
-/// The true motion at `nodes` nodes, by the fourth-order rule on a grid 32 times as fine.
-fn motion(nodes: usize) -> Motion {
+/// The true response at `nodes` nodes, by the fourth-order rule on a grid 32 times as fine.
+fn response(nodes: usize) -> TargetResponse {
     let fine = system(32 * (nodes - 1) + 1, Method::Rk4);
-    let device = truth(&fine.grid);
+    let nodal = truth(&fine.grid);
     let excitation = force(&fine.grid);
     let forces = excitation.force.as_ref().unwrap().at_nodes();
-    let moved = fine.forward(&device, INITIAL, Some(&excitation)).unwrap();
+    let moved = fine.forward(&nodal, INITIAL, Some(&excitation)).unwrap();
     let pick = |f: &[f64]| -> Vec<f64> { f.iter().step_by(32).copied().collect() };
     let (y, v) = (&moved.displacement, &moved.velocity);
     let acceleration: Vec<f64> = (0..y.len())
         .map(|i| {
-            let [c, k] = [0, 1].map(|j| device.coefficients[j][i]);
-            (forces[i] - c * v[i] - k * y[i]) / device.mass[i]
+            let [c, k] = [0, 1].map(|j| nodal.coefficients[j][i]);
+            (forces[i] - c * v[i] - k * y[i]) / nodal.mass[i]
         })
         .collect();
-    Motion {
+    TargetResponse {
         grid: system(nodes, Method::Rk4).grid,
         displacement: pick(y),
         velocity: pick(v),
@@ -76,29 +78,29 @@ fn random_mass(seed: u64, grid: &Grid) -> Vec<f64> {
     grid.times().iter().map(|t| at(*t)).collect()
 }
 
-/// Largest error of the equivalent device's motion by the midpoint rule.
-fn error(nodes: usize, seed: u64) -> (f64, NodalCoefficients, Motion) {
-    let motion = motion(nodes);
-    let mass = random_mass(seed, &motion.grid);
-    let wish = Wish::near(vec![0.1; nodes], 0.05);
-    let device = equivalent(&mass, &motion, &wish).unwrap();
-    let excitation = Excitation::force_at_nodes(&motion.force);
+/// Largest error of the equivalent system's response by the midpoint rule.
+fn error(nodes: usize, seed: u64) -> (f64, NodalCoefficients, TargetResponse) {
+    let response = response(nodes);
+    let mass = random_mass(seed, &response.grid);
+    let options = EquivalentOptions::near(vec![0.1; nodes], 0.05);
+    let nodal = equivalent_coefficients(&mass, &response, &options).unwrap();
+    let excitation = Excitation::force_at_nodes(&response.force);
     let system = system(nodes, Method::Midpoint);
-    let moved = system.forward(&device, INITIAL, Some(&excitation)).unwrap();
-    let pairs = moved.displacement.iter().zip(&motion.displacement);
+    let moved = system.forward(&nodal, INITIAL, Some(&excitation)).unwrap();
+    let pairs = moved.displacement.iter().zip(&response.displacement);
     let error = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
-    (error, device, motion)
+    (error, nodal, response)
 }
 
 /// The midpoint rule is of order two: half the step, a quarter of the error, from 3 to 5.5 for the
 /// higher orders that are left at these steps.
 #[test]
-fn random_masses_have_the_motion_to_the_order_of_the_stepper() {
+fn random_masses_have_the_response_to_the_order_of_the_stepper() {
     for seed in 0..4 {
         let (coarse, ..) = error(401, seed);
-        let (fine, device, motion) = error(801, seed);
+        let (fine, nodal, response) = error(801, seed);
         let rate = coarse / fine;
-        let k = &device.coefficients[1];
+        let k = &nodal.coefficients[1];
         let least = k.iter().copied().fold(f64::INFINITY, f64::min);
         let most = k.iter().copied().fold(0.0, f64::max);
         println!(
@@ -108,31 +110,31 @@ fn random_masses_have_the_motion_to_the_order_of_the_stepper() {
         assert!(fine < 1e-2, "{fine}");
         assert!(least >= 0.05 - 1e-7 && most < 50.0, "{least} {most}");
         // The equation holds at the nodes: forces are of the size of some newtons.
-        let off = imbalance(&device, &motion)
+        let off = imbalance(&nodal, &response)
             .iter()
             .fold(0.0f64, |m, r| m.max(r.abs()));
         assert!(off < 1e-6, "{off}");
         // Where y crosses zero the damping is what the anchor says, to the square of the step.
-        for (t, c) in anchors(&device.mass, &motion) {
-            let i = (t / motion.grid.step()).round() as usize;
-            let found = device.coefficients[0][i];
+        for (t, c) in anchors(&nodal.mass, &response) {
+            let i = (t / response.grid.step()).round() as usize;
+            let found = nodal.coefficients[0][i];
             assert!((found - c).abs() < 0.05, "at {t}: {found} {c}");
         }
-        // It is another device.
-        let truth = truth(&motion.grid);
-        assert!(crate::common::errors(&device, &truth)[0] > 0.1);
+        // It is another system.
+        let truth = truth(&response.grid);
+        assert!(crate::common::errors(&nodal, &truth)[0] > 0.1);
     }
 }
 
-/// With the true mass the wish for the true damping is granted, and the true stiffness comes back.
+/// With the true mass the options for the true damping is granted, and the true stiffness comes back.
 #[test]
 fn the_true_mass_and_damping_bring_the_true_stiffness() {
-    let motion = motion(401);
-    let truth = truth(&motion.grid);
-    let mut wish = Wish::near(truth.coefficients[0].clone(), 0.05);
-    wish.least_damping = Some(0.0);
-    let device = equivalent(&truth.mass, &motion, &wish).unwrap();
-    let errors = crate::common::errors(&device, &truth);
+    let response = response(401);
+    let truth = truth(&response.grid);
+    let mut options = EquivalentOptions::near(truth.coefficients[0].clone(), 0.05);
+    options.least_damping = Some(0.0);
+    let nodal = equivalent_coefficients(&truth.mass, &response, &options).unwrap();
+    let errors = crate::common::errors(&nodal, &truth);
     println!("{errors:?}");
     // The smoothness of k, 1e-9 of T^4 k''^2, bends it by thousandths.
     assert!(errors[1] < 5e-3 && errors[2] < 2e-2, "{errors:?}");
@@ -140,13 +142,18 @@ fn the_true_mass_and_damping_bring_the_true_stiffness() {
 
 /// A mass that grows fast asks for negative damping at the crossings: with c >= 0 there is none.
 #[test]
-fn what_no_device_can_do_is_said() {
-    let motion = motion(401);
-    let mass: Vec<f64> = motion.grid.times().iter().map(|t| 0.5 + 0.5 * t).collect();
-    let mut wish = Wish::near(vec![0.1; 401], 0.05);
-    wish.least_damping = Some(0.0);
-    let negative = anchors(&mass, &motion).iter().any(|(_, c)| *c < -1e-3);
-    let found = equivalent(&mass, &motion, &wish);
+fn impossible_responses_are_infeasible() {
+    let response = response(401);
+    let mass: Vec<f64> = response
+        .grid
+        .times()
+        .iter()
+        .map(|t| 0.5 + 0.5 * t)
+        .collect();
+    let mut options = EquivalentOptions::near(vec![0.1; 401], 0.05);
+    options.least_damping = Some(0.0);
+    let negative = anchors(&mass, &response).iter().any(|(_, c)| *c < -1e-3);
+    let found = equivalent_coefficients(&mass, &response, &options);
     println!("{negative} {:?}", found.as_ref().err());
     assert!(negative);
     assert_eq!(found, Err(ConicStatus::Infeasible));

@@ -1,13 +1,13 @@
-//! What the readings say beyond one fit.
+//! What the samples say beyond one fit.
 
 #[path = "../common/mod.rs"]
 mod common;
 
 mod bootstrap;
+mod constancy_test;
 mod equivalent;
+mod extremes;
 mod multistart;
 mod prediction;
 mod problems;
 mod profile;
-mod pull_apart;
-mod variation;

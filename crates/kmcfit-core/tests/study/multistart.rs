@@ -1,16 +1,16 @@
-use crate::problems::{REST, Record, bound, constants, device, problem, readings, system};
+use crate::problems::{REST, Record, bound, constants, nodal, problem, samples, system};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Weighting;
 use kmcfit_core::internals::study::multistart::{
     Distance, Multistart, Ranges, between, multistart,
 };
 
-/// One reading per second of an undamped motion from rest, `cos(w n)`: the frequencies
-/// `2 pi j +- w` give the same readings. k from 1 to 60, w = 1.5: 2.25, 22.9, 60.6 are exact.
+/// One sample per second of an undamped response from rest, `cos(w n)`: the frequencies
+/// `2 pi j +- w` give the same samples. k from 1 to 60, w = 1.5: 2.25, 22.9, 60.6 are exact.
 pub fn aliased(noise: f64) -> Problem {
     let system = system(6.0, 601);
     assert_eq!(REST.velocity, 0.0);
-    let values = readings(&system, &device(601, [1.0, 0.0, 2.25]), None, 100, noise, 1);
+    let values = samples(&system, &nodal(601, [1.0, 0.0, 2.25]), None, 100, noise, 1);
     let list = constants(601, [None, None, Some(2.0)], [1.0, 0.0, 0.0]);
     let record = Record {
         weighting: Weighting::Sigma(0.05),
@@ -56,7 +56,7 @@ fn the_aliases_of_a_period_are_found_and_counted() {
         &problem,
         Distance {
             ratios: 1e-3,
-            motions: 1e-2,
+            responses: 1e-2,
         },
     );
     let mut k: Vec<f64> = clusters
@@ -83,7 +83,7 @@ fn the_aliases_of_a_period_are_found_and_counted() {
     assert_eq!(exact, 3);
     let costs = found.costs();
     assert!(costs.windows(2).all(|w| w[0] <= w[1]));
-    // A ridge of thousands lies between two of them; an optimum and itself share a valley.
+    // A ridge of thousands lies between two of them; an optimum is connected with itself.
     let best = |i: usize| {
         found.runs[clusters[i].members[0]]
             .found
@@ -110,11 +110,11 @@ fn the_threads_change_no_bit() {
     assert_eq!(bits(&one), bits(&two));
 }
 
-/// Starts with a negative mass have no motion: they are records, and the others are fitted.
+/// Starts with a negative mass have no response: they are records, and the others are fitted.
 #[test]
-fn starts_without_a_motion_are_kept_with_their_reason() {
+fn starts_that_cannot_be_simulated_are_listed_with_their_reason() {
     let system = system(6.0, 301);
-    let values = readings(&system, &device(301, [1.0, 0.1, 2.0]), None, 5, 0.01, 1);
+    let values = samples(&system, &nodal(301, [1.0, 0.1, 2.0]), None, 5, 0.01, 1);
     let list = constants(301, [Some(1.0), Some(0.1), None], [0.0, 0.0, 2.0]);
     let problem = problem(system, list, Vec::new(), Record::of(values, 5));
     let how = Multistart {
@@ -128,13 +128,13 @@ fn starts_without_a_motion_are_kept_with_their_reason() {
     assert!(failed.reason.contains("mass"), "{}", failed.reason);
 }
 
-/// Free motion: two devices of which one is twice the other fit alike, and the gauge joins them.
+/// Free response: two systems of which one is twice the other fit alike, and the scaling path connects them.
 #[test]
-fn a_device_and_its_multiple_share_the_valley_of_the_gauge() {
+fn a_system_and_its_multiple_are_connected_by_the_scaling_path() {
     let problem = crate::common::paper_problem(200, [2.0, 1.0, 1.0]);
     let n = 200;
     let truth: Vec<f64> = {
-        let d = crate::common::paper_device(n);
+        let d = crate::common::paper_system(n);
         [&d.mass[..], &d.coefficients[0], &d.coefficients[1]].concat()
     };
     // Another common factor, s(t) = 1 + t/25, which the midpoint rule follows to its order.
@@ -142,10 +142,10 @@ fn a_device_and_its_multiple_share_the_valley_of_the_gauge() {
         .map(|j| truth[j] * (1.0 + (j % n) as f64 / n as f64))
         .collect();
     let paths = between(&problem, &truth, &other, 20);
-    let gauge = paths.gauge.as_ref().unwrap();
-    let most = gauge.iter().fold(0.0f64, |m, c| m.max(*c));
+    let scaling = paths.scaling.as_ref().unwrap();
+    let most = scaling.iter().fold(0.0f64, |m, c| m.max(*c));
     println!(
-        "gauge {most:.2e}, straight {:.2e}",
+        "scaling {most:.2e}, straight {:.2e}",
         paths.straight.iter().fold(0.0f64, |m, c| m.max(*c))
     );
     assert!(paths.one_valley(1e-6), "{paths:?}");

@@ -2,18 +2,18 @@ use crate::common;
 use crate::problems::regular;
 use kmcfit_core::internals::functions::{Basis, Penalty};
 use kmcfit_core::internals::solvers::fit_from;
-use kmcfit_core::internals::study::bootstrap::{Noise, bootstrap};
-use kmcfit_core::internals::study::prediction::{Run, predict};
+use kmcfit_core::internals::study::bootstrap::{ReplicateNoise, bootstrap};
+use kmcfit_core::internals::study::extremes::{MisfitLimit, extreme_pairs, ratios_at};
+use kmcfit_core::internals::study::prediction::{PredictionCase, predict};
 use kmcfit_core::internals::study::profile::QUANTILE_95;
-use kmcfit_core::internals::study::pull_apart::{Level, ratios_at, tube};
 use kmcfit_core::internals::study::{Linear, Target};
 use kmcfit_core::internals::system::{Excitation, State};
 
-/// The band is as wide as the spread of the motions of refitted devices; the worst case over the
-/// extreme devices, which are at the ends of the same ellipse, is a little narrower than the band
-/// where the motion depends on both numbers, and never wider.
+/// The band is as wide as the spread of the responses of refitted systems; the worst case over the
+/// extreme systems, which are at the ends of the same ellipse, is a little narrower than the band
+/// where the response depends on both numbers, and never wider.
 #[test]
-fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
+fn the_band_of_a_prediction_agrees_with_refits() {
     let problem = regular(3);
     let settings = crate::common::synthetic::settings();
     let best = fit_from(&problem, &problem.start(), &settings)
@@ -27,19 +27,19 @@ fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
         .iter()
         .map(|t| (1.1 * t).sin())
         .collect();
-    let run = Run {
+    let run = PredictionCase {
         excitation: Some(Excitation::force_at_nodes(&force)),
-        ..Run::free(
-            "unseen",
+        ..PredictionCase::free(
+            "another state",
             State {
                 displacement: -0.5,
                 velocity: 2.0,
             },
         )
     };
-    let level = Level::of(best.evaluation.misfit + QUANTILE_95);
+    let level = MisfitLimit::of(best.evaluation.misfit + QUANTILE_95);
     let targets = [0, 1].map(|j| Target::Linear(Linear::parameter(j)));
-    let bands = tube(
+    let bands = extreme_pairs(
         &problem,
         std::slice::from_ref(&best.parameters),
         &targets,
@@ -58,24 +58,32 @@ fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
     .unwrap();
     let band = found.band.as_ref().unwrap();
     let worst = found.worst.as_ref().unwrap();
-    assert!(found.without_motion.is_empty());
+    assert!(found.no_response.is_empty());
     assert_eq!(band[0], [-0.5, -0.5], "the state at the start is known");
 
-    let refits = bootstrap(&problem, &best.parameters, Noise::Parametric, 1000, 3, 2).unwrap();
-    let motions: Vec<Vec<f64>> = refits
+    let refits = bootstrap(
+        &problem,
+        &best.parameters,
+        ReplicateNoise::Parametric,
+        1000,
+        3,
+        2,
+    )
+    .unwrap();
+    let responses: Vec<Vec<f64>> = refits
         .found()
         .map(|theta| {
             predict(&problem, theta, &run, None, &[])
                 .unwrap()
-                .motion
+                .response
                 .displacement
         })
         .collect();
     for i in (10..101).step_by(10) {
-        let y = found.motion.displacement[i];
-        let count = motions.len() as f64;
-        let mean = motions.iter().map(|m| m[i]).sum::<f64>() / count;
-        let spread = (motions.iter().map(|m| (m[i] - mean).powi(2)).sum::<f64>() / count).sqrt();
+        let y = found.response.displacement[i];
+        let count = responses.len() as f64;
+        let mean = responses.iter().map(|m| m[i]).sum::<f64>() / count;
+        let spread = (responses.iter().map(|m| (m[i] - mean).powi(2)).sum::<f64>() / count).sqrt();
         let half = 0.5 * (band[i][1] - band[i][0]);
         let ratio = half / (1.96 * spread);
         println!(
@@ -95,10 +103,10 @@ fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
     assert!(name.contains("parameter") && distance > 0.0);
 }
 
-/// On the paper's data the extreme devices at its misfit move alike from nearly the same state, and
+/// On the paper's data the extreme systems at its misfit move alike from nearly the same state, and
 /// apart from another one.
 #[test]
-fn devices_that_fit_alike_predict_apart() {
+fn systems_of_equal_fit_differ_in_prediction() {
     let nodes = 200;
     let mut problem = common::paper_problem(nodes, [2.0, 1.0, 1.0]);
     let grid = problem.system.grid;
@@ -107,22 +115,22 @@ fn devices_that_fit_alike_predict_apart() {
             crate::problems::bound(&mut problem, "positive", j, [0.05, f64::INFINITY]);
         }
     }
-    let device = common::paper_device(nodes);
-    let [c, k] = [0, 1].map(|j| &device.coefficients[j][..]);
-    let truth = [&device.mass[..], c, k].concat();
+    let nodal = common::paper_system(nodes);
+    let [c, k] = [0, 1].map(|j| &nodal.coefficients[j][..]);
+    let truth = [&nodal.mass[..], c, k].concat();
     let rows = |f: usize| Penalty::new(f, 2, 1.0, Basis::Nodal.roughness(&grid, 2));
-    let level = Level {
+    let level = MisfitLimit {
         budgets: (0..3).map(|f| (rows(f), 1e-3)).collect(),
         reach: 3.0,
         programs: 15,
-        ..Level::of(0.0114)
+        ..MisfitLimit::of(0.0114)
     };
-    // What free motion shows: c/m and k/m, pushed apart.
+    // What free response shows: c/m and k/m, pushed apart.
     let targets: Vec<Target> = [1, 2]
         .iter()
         .flat_map(|f| ratios_at(&problem, *f, 0, &[12.0]))
         .collect();
-    let bands = tube(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap();
+    let bands = extreme_pairs(&problem, std::slice::from_ref(&truth), &targets, &level, 2).unwrap();
     for band in &bands {
         println!(
             "{}: {:.3} .. {:.3}, {} + {} programs",
@@ -135,7 +143,7 @@ fn devices_that_fit_alike_predict_apart() {
     }
     let extremes: Vec<_> = bands.into_iter().flat_map(|b| [b.low, b.high]).collect();
     let distance = |displacement: f64, velocity: f64| {
-        let run = Run::free(
+        let run = PredictionCase::free(
             "other",
             State {
                 displacement,
@@ -144,10 +152,10 @@ fn devices_that_fit_alike_predict_apart() {
         );
         let found = predict(&problem, &truth, &run, None, &extremes).unwrap();
         let worst = found.worst.unwrap();
-        let motion = &found.motion.displacement;
+        let response = &found.response.displacement;
         let inside = worst
             .iter()
-            .zip(motion)
+            .zip(response)
             .all(|(w, y)| w[0] <= *y && *y <= w[1]);
         assert!(inside && found.band.is_none());
         found.furthest.unwrap().1

@@ -2,7 +2,8 @@
 
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Parameterization, Prior, ScalarParameter, Value,
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, Prior, ScalarParameter,
+    ScalarValue,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Experiment, Sensor, Weighting};
@@ -25,17 +26,17 @@ pub fn system(duration: f64, nodes: usize) -> System {
 }
 
 /// One value for each function.
-pub fn device(nodes: usize, [m, c, k]: [f64; 3]) -> NodalCoefficients {
+pub fn nodal(nodes: usize, [m, c, k]: [f64; 3]) -> NodalCoefficients {
     NodalCoefficients {
         mass: vec![m; nodes],
         coefficients: vec![vec![c; nodes], vec![k; nodes]],
     }
 }
 
-/// Constants: sought from the value where it is `Some`, else known to be the number beside it.
+/// Constants: estimated from the value where it is `Some`, else known to be the number beside it.
 pub fn constants(
     nodes: usize,
-    sought: [Option<f64>; 3],
+    starts: [Option<f64>; 3],
     known: [f64; 3],
 ) -> Vec<CoefficientFunction> {
     let quantities = [
@@ -43,16 +44,16 @@ pub fn constants(
         CoefficientKind::Damping,
         CoefficientKind::Stiffness,
     ];
-    let each = quantities.into_iter().zip(sought).zip(known);
-    each.map(|((quantity, sought), known)| match sought {
+    let each = quantities.into_iter().zip(starts).zip(known);
+    each.map(|((quantity, estimated), known)| match estimated {
         Some(start) => CoefficientFunction::constant(quantity, start, nodes),
         None => CoefficientFunction::fixed(quantity, vec![known; nodes]),
     })
     .collect()
 }
 
-/// Readings of `truth` at every `stride`-th node with noise of the seed.
-pub fn readings(
+/// Samples of `truth` at every `stride`-th node with noise of the seed.
+pub fn samples(
     system: &System,
     truth: &NodalCoefficients,
     excitation: Option<&Excitation>,
@@ -60,8 +61,8 @@ pub fn readings(
     sigma: f64,
     seed: u64,
 ) -> Vec<f64> {
-    let motion = system.forward(truth, REST, excitation).unwrap();
-    let every: Vec<f64> = motion
+    let response = system.forward(truth, REST, excitation).unwrap();
+    let every: Vec<f64> = response
         .displacement
         .iter()
         .step_by(stride)
@@ -70,7 +71,7 @@ pub fn readings(
     crate::common::synthetic::with_noise(&every, sigma, seed)
 }
 
-/// Readings from rest at one metre, every `stride` nodes, sigma `SIGMA` unless none is asked for.
+/// Samples from rest at one metre, every `stride` nodes, sigma `SIGMA` unless none is asked for.
 pub fn problem(
     system: System,
     list: Vec<CoefficientFunction>,
@@ -80,32 +81,32 @@ pub fn problem(
     let grid = system.grid;
     let functions = Parameterization::new(list, grid.nodes(), grid.step()).unwrap();
     let channel =
-        Channel::displacement_at_nodes(record.readings, record.stride, record.weighting, &grid)
+        Channel::displacement_at_nodes(record.samples, record.stride, record.weighting, &grid)
             .with_sensor(record.sensor);
     let mut experiment = Experiment::free("record", REST, grid.nodes()).with_channel(channel);
     experiment.excitation = record.excitation;
-    experiment.sought = record.sought;
+    experiment.initial_parameters = record.initial_parameters;
     Problem::new(system, functions.with_scalars(scalars), vec![experiment]).unwrap()
 }
 
 pub struct Record {
-    pub readings: Vec<f64>,
+    pub samples: Vec<f64>,
     pub stride: usize,
     pub weighting: Weighting,
     pub sensor: Sensor,
     pub excitation: Option<Excitation>,
-    pub sought: [Option<usize>; 2],
+    pub initial_parameters: [Option<usize>; 2],
 }
 
 impl Record {
-    pub fn of(readings: Vec<f64>, stride: usize) -> Self {
+    pub fn of(samples: Vec<f64>, stride: usize) -> Self {
         Self {
-            readings,
+            samples,
             stride,
             weighting: Weighting::Sigma(SIGMA),
             sensor: Sensor::default(),
             excitation: None,
-            sought: [None; 2],
+            initial_parameters: [None; 2],
         }
     }
 }
@@ -120,19 +121,19 @@ pub fn scalar(name: &str, start: f64, prior: Option<Prior>) -> ScalarParameter {
     }
 }
 
-/// Initial displacement and velocity and the offset of the sensor are sought, the device is known:
+/// Initial displacement and velocity and the offset of the sensor are estimated, the system is known:
 /// the predictions are linear in all three.
 pub fn linear(seed: u64) -> Problem {
     let system = system(10.0, 201);
     let truth = [1.0, 0.1, 2.0];
-    let values = readings(&system, &device(201, truth), None, 4, SIGMA, seed);
+    let values = samples(&system, &nodal(201, truth), None, 4, SIGMA, seed);
     let sensor = Sensor {
-        offset: Value::Sought(2),
+        offset: ScalarValue::Estimated(2),
         ..Sensor::default()
     };
     let record = Record {
         sensor,
-        sought: [Some(0), Some(1)],
+        initial_parameters: [Some(0), Some(1)],
         ..Record::of(values, 4)
     };
     let names = ["displacement", "velocity", "offset"];
@@ -143,8 +144,8 @@ pub fn linear(seed: u64) -> Problem {
 /// Damping and stiffness of a known mass.
 pub fn regular(seed: u64) -> Problem {
     let system = system(10.0, 101);
-    let truth = device(101, [1.0, 0.2, 2.0]);
-    let values = readings(&system, &truth, None, 2, SIGMA, seed);
+    let truth = nodal(101, [1.0, 0.2, 2.0]);
+    let values = samples(&system, &truth, None, 2, SIGMA, seed);
     let list = constants(101, [None, Some(0.1), Some(1.9)], [1.0, 0.0, 0.0]);
     problem(system, list, Vec::new(), Record::of(values, 2))
 }
@@ -163,9 +164,9 @@ pub fn bound(problem: &mut Problem, name: &str, j: usize, bounds: [f64; 2]) {
 pub fn knots(truth: &dyn Fn(f64) -> f64, knots: usize, sigma: f64, seed: u64) -> Problem {
     let system = system(10.0, 201);
     let grid = system.grid;
-    let mut moving = device(201, [1.0, 0.1, 2.0]);
+    let mut moving = nodal(201, [1.0, 0.1, 2.0]);
     moving.coefficients[1] = grid.times().iter().map(|t| truth(*t)).collect();
-    let values = readings(&system, &moving, None, 2, sigma, seed);
+    let values = samples(&system, &moving, None, 2, sigma, seed);
     let times = (0..knots).map(|i| 10.0 * i as f64 / (knots - 1) as f64);
     let basis = Basis::PiecewiseLinear {
         knots: times.collect(),

@@ -1,16 +1,16 @@
 use crate::problems::knots;
 use crate::problems::{
-    Record, bound, constants, device, linear, problem, readings, regular, scalar, system,
+    Record, bound, constants, linear, nodal, problem, regular, samples, scalar, system,
 };
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Penalty, Value,
+    Basis, CoefficientFunction, CoefficientKind, Penalty, ScalarValue,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Sensor, Weighting};
 use kmcfit_core::internals::solvers::{fit, fit_from};
+use kmcfit_core::internals::study::extremes::{MisfitLimit, extreme_pairs};
 use kmcfit_core::internals::study::profile::{End, Interval, QUANTILE_95};
-use kmcfit_core::internals::study::pull_apart::{Level, tube};
 use kmcfit_core::internals::study::{Linear, Profile, ProfileSettings, Target, profile, profiles};
 use kmcfit_core::internals::system::{Excitation, Method};
 
@@ -87,11 +87,11 @@ fn the_gain_of_a_driven_sensor_has_its_closed_form() {
         .collect();
     let excitation = Excitation::force_at_nodes(&force);
     let truth = [1.0, 0.1, 2.0];
-    let values = readings(&system, &device(201, truth), Some(&excitation), 4, 0.05, 2);
+    let values = samples(&system, &nodal(201, truth), Some(&excitation), 4, 0.05, 2);
     let record = Record {
         sensor: Sensor {
-            gain: Value::Sought(0),
-            offset: Value::Sought(1),
+            gain: ScalarValue::Estimated(0),
+            offset: ScalarValue::Estimated(1),
             ..Sensor::default()
         },
         excitation: Some(excitation),
@@ -119,11 +119,11 @@ fn damping_and_stiffness_of_a_known_mass_are_identified() {
     }
 }
 
-/// Free motion shows k/m and c/m: of m, c and k together no number is seen.
+/// Free response shows k/m and c/m: of m, c and k together no number is seen.
 #[test]
-fn the_mass_of_a_free_motion_is_flat() {
+fn the_mass_of_a_free_response_has_a_flat_profile() {
     let system = system(10.0, 101);
-    let values = readings(&system, &device(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
+    let values = samples(&system, &nodal(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
     let list = constants(101, [Some(1.0), Some(0.2), Some(2.0)], [0.0; 3]);
     let mut problem = problem(system, list, Vec::new(), Record::of(values, 2));
     bound(&mut problem, "mass from 0.5 to 3", 0, [0.5, 3.0]);
@@ -139,14 +139,14 @@ fn the_mass_of_a_free_motion_is_flat() {
         .iter()
         .fold(0.0f64, |m, c| m.max(c - found.optimum_cost));
     assert!(most < 1e-6, "{most}");
-    assert!(found.sentence().contains("not seen"));
+    assert!(found.sentence().contains("not identifiable"));
 }
 
-/// The noise of the readings leaves room for no damping at all: below it ends at its own bound.
+/// The noise of the samples leaves room for no damping at all: below it ends at its own bound.
 #[test]
 fn a_damping_near_its_bound_is_one_sided() {
     let system = system(10.0, 101);
-    let values = readings(&system, &device(101, [1.0, 0.0, 2.0]), None, 2, 0.05, 5);
+    let values = samples(&system, &nodal(101, [1.0, 0.0, 2.0]), None, 2, 0.05, 5);
     let list = constants(101, [None, Some(0.02), Some(2.0)], [1.0, 0.0, 0.0]);
     let mut problem = problem(system, list, Vec::new(), Record::of(values, 2));
     bound(&mut problem, "damping >= 0", 0, [0.0, f64::INFINITY]);
@@ -158,12 +158,12 @@ fn a_damping_near_its_bound_is_one_sided() {
     assert!(found.sentence().contains("at most"));
 }
 
-/// The same free motion, but the stiffness must not exceed 3: a mass above 1.5 times its ratio fits
-/// worse, though the readings do not see the mass.
+/// The same free response, but the stiffness must not exceed 3: a mass above 1.5 times its ratio fits
+/// worse, though the samples do not see the mass.
 #[test]
 fn a_rise_that_another_bound_makes_is_called_so() {
     let system = system(10.0, 101);
-    let values = readings(&system, &device(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
+    let values = samples(&system, &nodal(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
     let list = constants(101, [Some(1.0), Some(0.2), Some(2.0)], [0.0; 3]);
     let mut problem = problem(system, list, Vec::new(), Record::of(values, 2));
     bound(&mut problem, "mass from 0.5 to 5", 0, [0.5, 5.0]);
@@ -209,8 +209,8 @@ fn a_better_optimum_on_the_way_is_reported() {
 fn a_nodal_function_has_a_profile() {
     let sigma = 0.02;
     let system = crate::common::system(101, Method::Rk4);
-    let device = crate::common::paper_device(101);
-    let values = crate::common::noisy(&system, &device, sigma, 5);
+    let nodal = crate::common::paper_system(101);
+    let values = crate::common::noisy(&system, &nodal, sigma, 5);
     let mut list = constants(101, [None; 3], [1.0, 0.0, 1.0]);
     list[0] = CoefficientFunction::nodal(CoefficientKind::Mass, vec![1.0; 101]);
     let mut problem = crate::common::problem_of(system, list, values, Some(sigma));
@@ -223,7 +223,7 @@ fn a_nodal_function_has_a_profile() {
     let found = profile(&problem, &best.best.parameters, &q, &how).unwrap();
     println!("{} ({} fits)", found.sentence(), found.values.len());
     let [low, high] = found.interval.map(Option::unwrap);
-    let truth = device.mass[50];
+    let truth = nodal.mass[50];
     assert!(low < truth && truth < high, "{low} {truth} {high}");
     for end in [low, high] {
         let i = found.values.iter().position(|v| *v == end).unwrap();
@@ -252,7 +252,7 @@ fn without_sigma_the_interval_is_that_of_the_likelihood_ratio() {
     let covariance = problem
         .covariance(&problem.evaluate(&best).unwrap())
         .unwrap();
-    let (n, p) = (problem.reading_count() as f64, 3.0);
+    let (n, p) = (problem.sample_count() as f64, 3.0);
     let q = Linear::scalar(&problem, 1);
     let half = ((QUANTILE_95 / n).exp_m1() * (n - p)).sqrt() * q.deviation(&covariance);
     let found = profile(&problem, &best, &q, &ProfileSettings::default()).unwrap();
@@ -286,9 +286,9 @@ fn the_mean_of_a_monotone_function_has_the_same_ends_both_ways() {
     let misfit = problem.evaluate(&best).unwrap().misfit;
     let q = Linear::mean(&problem, 2);
     let at = Linear::value(&problem, 2, 4.0).unwrap();
-    let (device, theta) = (problem.functions.device(&best), &best);
+    let (nodal, theta) = (problem.functions.nodal(&best), &best);
     let node = (4.0 / problem.system.grid.step()).round() as usize;
-    assert!((at.of(theta) - device.coefficients[1][node]).abs() < 1e-12);
+    assert!((at.of(theta) - nodal.coefficients[1][node]).abs() < 1e-12);
     assert!(Linear::value(&problem, 2, 10.1).is_none());
     let list = [q, at];
     let how = ProfileSettings::default();
@@ -296,8 +296,8 @@ fn the_mean_of_a_monotone_function_has_the_same_ends_both_ways() {
     let again = profiles(&problem, &best, &list, &how, 1).unwrap();
     assert_eq!(found, again, "the threads change no bit");
     let targets = list.map(Target::Linear);
-    let level = Level::of(misfit + QUANTILE_95);
-    let bands = tube(&problem, std::slice::from_ref(&best), &targets, &level, 1).unwrap();
+    let level = MisfitLimit::of(misfit + QUANTILE_95);
+    let bands = extreme_pairs(&problem, std::slice::from_ref(&best), &targets, &level, 1).unwrap();
     for (profile, band) in found.iter().zip(&bands) {
         let [low, high] = profile.interval.map(Option::unwrap);
         println!(

@@ -5,7 +5,7 @@ use crate::config::build::functions::history;
 use crate::config::scalar::{Number, NumberOrColumn};
 use crate::config::spec::{ConstraintSpec, RangeSpec};
 use crate::error::InputError;
-use kmcfit_core::internals::constraints::{Shape, Statement, TimeHistory};
+use kmcfit_core::internals::constraints::{Constraint, Shape, TimeHistory};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::system::Grid;
 
@@ -84,7 +84,7 @@ pub(super) fn read(
     grid: &Grid,
     key: &str,
     spec: &ConstraintSpec,
-) -> Result<Vec<(String, Statement)>, InputError> {
+) -> Result<Vec<(String, Constraint)>, InputError> {
     let reader = Reader {
         file,
         grid,
@@ -124,7 +124,7 @@ impl Reader<'_> {
             [] => {
                 let all: Vec<&str> = Kind::ALL.iter().map(|(_, name)| *name).collect();
                 Err(self
-                    .error("", "this constraint demands nothing")
+                    .error("", "empty constraint")
                     .expected(format!("one of: {}", all.join(", "))))
             }
             [first, second, ..] => Err(self
@@ -168,25 +168,25 @@ impl Reader<'_> {
         self.spec.function.unwrap_or(CoefficientKind::Mass)
     }
 
-    fn statement(&self, kind: Kind) -> Result<Statement, InputError> {
+    fn statement(&self, kind: Kind) -> Result<Constraint, InputError> {
         let spec = self.spec;
         let of = self.of();
         let number = |given: Option<Number>| given.map_or(0.0, |n| n.0);
         Ok(match kind {
-            Kind::Bounds => Statement::Bounds {
+            Kind::Bounds => Constraint::Bounds {
                 of,
                 min: self.bound("min", spec.min.as_ref())?,
                 max: self.bound("max", spec.max.as_ref())?,
             },
             Kind::Slope => {
                 let (min, max) = self.range("slope", spec.slope.as_ref())?;
-                Statement::Slope { of, min, max }
+                Constraint::Slope { of, min, max }
             }
-            Kind::Mean => Statement::Mean {
+            Kind::Mean => Constraint::Mean {
                 of,
                 value: number(spec.mean),
             },
-            Kind::Integral => Statement::Integral {
+            Kind::Integral => Constraint::Integral {
                 of,
                 value: number(spec.integral),
             },
@@ -195,7 +195,7 @@ impl Reader<'_> {
                 let (min, max) = self.range("frequency", spec.frequency.as_ref())?;
                 self.positive("frequency.min", min)?;
                 self.positive("frequency.max", max)?;
-                Statement::Frequency { min, max }
+                Constraint::Frequency { min, max }
             }
             Kind::DampingRatio => self.damping_ratio()?,
             Kind::Passive | Kind::Shape | Kind::Values => {
@@ -203,9 +203,9 @@ impl Reader<'_> {
                     return Err(self
                         .error("passive", "this demands nothing")
                         .found("false")
-                        .expected("`passive: true`, or no such constraint"));
+                        .expected("`passive: true`, or leave the constraint out"));
                 }
-                Statement::Passive
+                Constraint::Passive
             }
         })
     }
@@ -219,7 +219,7 @@ impl Reader<'_> {
         given.map(read).transpose()
     }
 
-    fn shapes(&self) -> Result<Vec<(String, Statement)>, InputError> {
+    fn shapes(&self) -> Result<Vec<(String, Constraint)>, InputError> {
         let Some(shapes) = &self.spec.shape else {
             return Ok(Vec::new());
         };
@@ -227,12 +227,12 @@ impl Reader<'_> {
         let statement = |(i, &shape): (usize, &Shape)| {
             let key = format!("{}.shape{}", self.key, shapes.place(i));
             let of = self.of();
-            (key, Statement::Shape { of, shape })
+            (key, Constraint::Shape { of, shape })
         };
         Ok(shapes.values().iter().enumerate().map(statement).collect())
     }
 
-    fn fixed_values(&self) -> Result<Vec<(String, Statement)>, InputError> {
+    fn fixed_values(&self) -> Result<Vec<(String, Constraint)>, InputError> {
         let (at, value) = match (&self.spec.at, &self.spec.value) {
             (Some(at), Some(value)) => (at, value),
             (at, _) => {
@@ -241,7 +241,7 @@ impl Reader<'_> {
                     None => ("value", "at"),
                 };
                 return Err(self
-                    .error(has, format!("`{has}` needs `{lacks}` beside it"))
+                    .error(has, format!("`{has}` requires `{lacks}`"))
                     .found(format!("`{has}` alone"))
                     .expected("both, as in {function: stiffness, at: 0.0, value: 1.0}"));
             }
@@ -251,7 +251,7 @@ impl Reader<'_> {
         self.not_empty("value", values.len(), "at least one value")?;
         if values.len() != 1 && values.len() != times.len() {
             return Err(self
-                .error("value", "there is not one value for every time")
+                .error("value", "the numbers of values and times differ")
                 .found(format!("{} values, {} times", values.len(), times.len()))
                 .expected("as many values as times, or one for all"));
         }
@@ -268,7 +268,7 @@ impl Reader<'_> {
                         self.grid.round_time(end)
                     )));
             }
-            let held = Statement::Value {
+            let held = Constraint::Value {
                 of: self.of(),
                 at: time.0.clamp(start, end),
                 value: values[i.min(values.len() - 1)].0,
@@ -278,10 +278,10 @@ impl Reader<'_> {
         times.iter().enumerate().map(statement).collect()
     }
 
-    fn equal(&self) -> Result<Statement, InputError> {
+    fn equal(&self) -> Result<Constraint, InputError> {
         let names = self.spec.equal.as_deref().unwrap_or_default();
         match names {
-            [first, second] if first != second => Ok(Statement::Equal {
+            [first, second] if first != second => Ok(Constraint::Equal {
                 first: *first,
                 second: *second,
                 ratio: self.spec.ratio.map_or(1.0, |r| r.0),
@@ -301,7 +301,7 @@ impl Reader<'_> {
         }
     }
 
-    fn damping_ratio(&self) -> Result<Statement, InputError> {
+    fn damping_ratio(&self) -> Result<Constraint, InputError> {
         let range = self.spec.damping_ratio.as_ref();
         if let Some(min) = range.and_then(|r| r.min) {
             return Err(self
@@ -315,7 +315,7 @@ impl Reader<'_> {
                 .error("damping_ratio", "the cap is missing")
                 .expected("`max`, as in {max: 0.2}"));
         };
-        Ok(Statement::DampingRatio { max })
+        Ok(Constraint::DampingRatio { max })
     }
 
     /// Both ends of a range, at least one of which is given.

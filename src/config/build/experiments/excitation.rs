@@ -5,9 +5,10 @@ use crate::config::ModelFile;
 use crate::config::scalar::Number;
 use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec};
 use crate::error::InputError;
+use crate::finding::Finding;
 use crate::units::Kind;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
-use kmcfit_core::internals::signal::{Interpolation, Shape, Signal, SweepLaw};
+use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
 
 /// What drives an experiment, as the model gives it.
 #[derive(Default)]
@@ -52,7 +53,7 @@ pub fn read(
     file: &ModelFile,
     i: usize,
     spec: &ExperimentSpec,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<RawExcitation, InputError> {
     let key = format!("experiments[{i}]");
     let columns = spec.columns.as_ref();
@@ -64,7 +65,7 @@ pub fn read(
         (Some(column), force) => {
             if let Some(named) = force.as_ref().and_then(|f| f.shape) {
                 return Err(file
-                    .error_at(&format!("{key}.force.shape"), "there are two forces")
+                    .error_at(&format!("{key}.force.shape"), "the force is given twice")
                     .found(format!("a column and the shape `{named}`"))
                     .expected("one of the two"));
             }
@@ -92,7 +93,7 @@ fn base(
     file: &ModelFile,
     i: usize,
     spec: &ExperimentSpec,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<Option<BaseMotion>, InputError> {
     let key = format!("experiments[{i}]");
     let columns = spec.columns.as_ref();
@@ -104,14 +105,14 @@ fn base(
         (None, None) if spec.base.is_none() => return Ok(None),
         (None, None) => {
             return Err(file
-                .error_at(&format!("{key}.base"), "the motion of the base is missing")
+                .error_at(&format!("{key}.base"), "the base motion is missing")
                 .expected("`columns: {base_acceleration: …}` or `{base_displacement: …}`"));
         }
         (Some(_), Some(_)) => {
             return Err(file
                 .error_at(
                     &format!("{key}.columns.base_displacement"),
-                    "the motion of the base is given twice",
+                    "the base motion is given twice",
                 )
                 .found("`base_acceleration` and `base_displacement`")
                 .expected("one of the two"));
@@ -159,7 +160,7 @@ fn signal(
     spec: &ExperimentSpec,
     wanted: &Wanted,
     interpolation: Interpolation,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<Signal, InputError> {
     // What drives the motion is needed a little beyond the window of the readings.
     let unbounded = ExperimentSpec {
@@ -172,7 +173,7 @@ fn signal(
     if missing > 0 {
         let first = source.values.iter().position(|v| v.is_nan()).unwrap_or(0);
         return Err(file
-            .error_at(&key, "what drives the motion has gaps")
+            .error_at(&key, "the input has gaps")
             .found(format!(
                 "{missing} of {} values missing, the first at {} s",
                 source.values.len(),
@@ -182,14 +183,14 @@ fn signal(
     }
     let samples = source.times.len();
     Signal::new(source.times, source.values, interpolation).ok_or_else(|| {
-        file.error_at(&key, "these samples make no signal")
+        file.error_at(&key, "invalid samples of the input")
             .found(format!("{samples} samples"))
             .expected("finite values at increasing times")
     })
 }
 
 /// A force without samples.
-pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Shape, InputError> {
+pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<ExcitationShape, InputError> {
     let key = format!("{key}.force");
     let Some(shape) = spec.shape else {
         return Err(file
@@ -201,13 +202,13 @@ pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Shape, Inp
     let (amplitude, at) = (number(spec.amplitude), number(spec.at));
     let duration = number(spec.duration);
     Ok(match shape {
-        ForceShape::Constant => Shape::Constant { amplitude },
-        ForceShape::Sine => Shape::Sine {
+        ForceShape::Constant => ExcitationShape::Constant { amplitude },
+        ForceShape::Sine => ExcitationShape::Sine {
             amplitude,
             frequency: number(spec.frequency),
             phase: number(spec.phase),
         },
-        ForceShape::Sweep => Shape::Sweep {
+        ForceShape::Sweep => ExcitationShape::Sweep {
             amplitude,
             from: number(spec.from),
             to: number(spec.to),
@@ -215,8 +216,8 @@ pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Shape, Inp
             duration,
             law: SweepLaw::Linear,
         },
-        ForceShape::Step => Shape::Step { amplitude, at },
-        ForceShape::HalfSine => Shape::HalfSine {
+        ForceShape::Step => ExcitationShape::Step { amplitude, at },
+        ForceShape::HalfSine => ExcitationShape::HalfSine {
             amplitude,
             at,
             duration,

@@ -1,16 +1,18 @@
 //! Experiments: readings, forces and initial states from files, put on the grid.
 
 mod channel;
-mod doubts;
+mod data_checks;
 mod excitation;
 mod source;
 mod unit;
+mod warning;
 
-use super::{Purpose, functions};
+use super::{BuildMode, functions};
 use crate::config::ModelFile;
 use crate::config::scalar::{Estimate, NumberOrEstimate, ScalarOr};
 use crate::config::spec::{EstimateValue, ExperimentSpec, FitMethod, InitialSpec, SensorSpec};
 use crate::error::InputError;
+use crate::finding::Finding;
 use crate::observations::resample;
 use crate::units::Unit;
 pub(super) use channel::RawChannel;
@@ -91,17 +93,17 @@ pub(super) fn is_held_out(spec: &ExperimentSpec) -> bool {
 /// Reads the files of all experiments; `None` where there is none to be read.
 pub(super) fn read(
     file: &ModelFile,
-    purpose: Purpose,
-    warnings: &mut Vec<String>,
+    purpose: BuildMode,
+    warnings: &mut Vec<Finding>,
 ) -> Result<Vec<Option<Record>>, InputError> {
     let specs = &file.spec.experiments;
     if specs.iter().all(is_held_out) {
         return Err(file
-            .error_at("experiments", "every experiment is held out of the fit")
+            .error_at("experiments", "every experiment is a validation record")
             .found("`validation: true` in all of them")
             .expected("at least one experiment without"));
     }
-    if matches!(purpose, Purpose::Simulate { .. }) {
+    if matches!(purpose, BuildMode::Simulate { .. }) {
         // The duration may still have to come from the readings.
         let has_duration = (file.spec.grid.as_ref()).is_some_and(|g| g.duration.is_some());
         let all_have_data = specs.iter().all(|e| e.data.is_some());
@@ -127,21 +129,21 @@ fn read_one(
     file: &ModelFile,
     i: usize,
     spec: &ExperimentSpec,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<Record, InputError> {
     let channels = channel::read(file, i, spec, warnings)?;
     let record = Record {
         channels,
         excitation: excitation::read(file, i, spec, warnings)?,
     };
-    warnings.extend(doubts::of(file, i, spec, &record));
+    warnings.extend(data_checks::of(file, i, spec, &record));
     Ok(record)
 }
 
 /// The specification of experiment `i` with what its files have, and what a report says of its channels.
 pub(super) fn specification(
     file: &ModelFile,
-    purpose: Purpose,
+    purpose: BuildMode,
     grid: &Grid,
     i: usize,
     record: Option<Record>,
@@ -164,7 +166,7 @@ pub(super) fn specification(
     let mut notes = Vec::new();
     if let Some(mut record) = record {
         found = found.input(record.excitation.into_input());
-        if let (Purpose::Check { .. }, [only]) = (purpose, record.channels.as_mut_slice()) {
+        if let (BuildMode::Check { .. }, [only]) = (purpose, record.channels.as_mut_slice()) {
             reading_per_node(only, grid);
         }
         for raw in record.channels {

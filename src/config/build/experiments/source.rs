@@ -1,11 +1,12 @@
 //! Columns of files as times and values.
 
-use super::unit::Column;
+use super::unit::QuantityColumn;
 use crate::config::ModelFile;
 use crate::config::build::asked_for;
 use crate::config::scalar::{ColumnId, ScalarOr, Text};
 use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, SourceSpec};
 use crate::error::InputError;
+use crate::finding::Finding;
 use crate::observations::{ColumnName, SAMPLE_RATES, Table, TableFormat, increasing_at};
 use crate::units::{Kind, Unit};
 
@@ -58,7 +59,7 @@ pub fn read(
     file: &ModelFile,
     spec: &ExperimentSpec,
     wanted: &Wanted,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<Source, InputError> {
     let experiment = format!("experiments[{}]", wanted.experiment);
     let column_key = format!("{experiment}.columns.{}", wanted.name);
@@ -72,7 +73,7 @@ pub fn read(
         None => column_key,
     };
     let index = (table.find(&column_name(id))).map_err(asked_for(file, &column_key))?;
-    let column = |index| Column {
+    let column = |index| QuantityColumn {
         file,
         experiment: &experiment,
         name: wanted.name,
@@ -135,7 +136,7 @@ fn table(
     let key = format!("{}.data", own.map_or(experiment, |_| column_key));
     let data = own.or(spec.data.as_ref()).ok_or_else(|| {
         file.error_at(experiment, "this experiment has no data")
-            .expected("`data`, a CSV file with the readings")
+            .expected("`data`, a CSV file with the samples")
     })?;
     Table::read_with(file.resolve(&data.0), &format(spec))
         .map_err(|error| about_format(file, experiment, error))
@@ -157,7 +158,7 @@ fn inside(
         true => Err(file
             .error_at(
                 &format!("{experiment}.window"),
-                "no reading lies in the window",
+                "no sample lies in the window",
             )
             .found(format!("{from} s to {to} s"))
             .expected(format!(
@@ -212,7 +213,7 @@ fn times(
     experiment: &str,
     own: Option<&SourceSpec>,
     table: &Table,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<Times, InputError> {
     let own_rate = own.and_then(|s| s.sample_rate);
     let own_column = own.and_then(|s| s.time.as_ref());
@@ -231,7 +232,7 @@ fn times(
             return Err(file
                 .error_at(
                     &format!("{experiment}.sample_rate"),
-                    "this sampling rate cannot be used",
+                    "invalid sampling rate",
                 )
                 .found(format!("{:?}", rate.0))
                 .expected(rates()));
@@ -246,11 +247,11 @@ fn times(
     let index = table.find(&column_name(id)).map_err(|error| {
         let error = asked_for(file, &key)(error);
         match own_column.or(shared_column) {
-            None => error.hint("`columns: {time: …}` names it; `sample_rate: …` does without"),
+            None => error.hint("name it with `columns: {time: …}`, or give `sample_rate: …`"),
             Some(_) => error,
         }
     })?;
-    let column = Column {
+    let column = QuantityColumn {
         file,
         experiment,
         name: "time",
@@ -276,7 +277,7 @@ fn rates() -> String {
 fn two_times(file: &ModelFile, experiment: &str) -> InputError {
     file.error_at(
         &format!("{experiment}.sample_rate"),
-        "there are times from a rate and from a column",
+        "both a sampling rate and a column of times are given",
     )
     .found("`sample_rate` beside a column of times")
     .expected("one of the two")

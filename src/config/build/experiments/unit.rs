@@ -1,13 +1,15 @@
 //! The unit of a column: from the model, else from the file, else SI.
 
+use super::warning::DataWarning;
 use crate::config::ModelFile;
 use crate::config::scalar::Text;
 use crate::error::InputError;
+use crate::finding::Finding;
 use crate::observations::Table;
 use crate::units::{Kind, Unit};
 
-/// A column whose unit is wanted, and where the model speaks of it.
-pub(super) struct Column<'a> {
+/// A column of a table, its keys in the model file and its kind of quantity.
+pub(super) struct QuantityColumn<'a> {
     pub file: &'a ModelFile,
     /// The experiment's key.
     pub experiment: &'a str,
@@ -20,13 +22,13 @@ pub(super) struct Column<'a> {
     pub index: usize,
 }
 
-impl Column<'_> {
-    /// The unit: that of the model, else the one that the file states in its row of units or behind
-    /// the name, else SI. Every other unit that the file states is a warning.
+impl QuantityColumn<'_> {
+    /// Unit of the column: from the model file, else from the row of units or the name in the table, else SI. A
+    /// differing unit in the table gives a warning.
     ///
     /// # Errors
-    /// When the model's unit is none of this kind; when the model gives none and the file states two.
-    pub fn unit(&self, warnings: &mut Vec<String>) -> Result<Unit, InputError> {
+    /// If the model's unit is not of this kind of quantity, or the table alone states two units.
+    pub fn unit(&self, warnings: &mut Vec<Finding>) -> Result<Unit, InputError> {
         let Self { name, kind, .. } = *self;
         let stated = self.table.stated_unit(self.index);
         let units_key = format!("{}.units.{name}", self.experiment);
@@ -39,63 +41,65 @@ impl Column<'_> {
                 .map_err(|error| self.file.error_about(&units_key, error))?;
             let other = stated.explicit(kind).or(suffix);
             if let Some(other) = other.filter(|other| differs(other, unit)) {
-                warnings.push(format!(
-                    "{units_key}: the column `{label}` is taken in {}, though the file says {}",
-                    unit.symbol(),
-                    other.symbol()
-                ));
+                let warning = DataWarning::UnitDiffersFromFile {
+                    column: label,
+                    used: unit.symbol().into(),
+                    stated: other.symbol().into(),
+                };
+                warnings.push(warning.at(&units_key));
             }
             return Ok(unit);
         }
         self.table.check_stated_unit(self.index).map_err(|error| {
-            let way_out = format!("`units: {{{name}: …}}` in the model decides");
+            let way_out = format!("state the unit in the model: `units: {{{name}: …}}`");
             error.key(&*columns_key).hint(way_out)
         })?;
         if let Some(unit) = stated.explicit(kind) {
             if let Some(other) = suffix.filter(|other| differs(other, unit)) {
-                warnings.push(format!(
-                    "{columns_key}: the column `{label}` is taken in {}, as the file says, though \
-                     its name ends like {}",
-                    unit.symbol(),
-                    other.symbol()
-                ));
+                let warning = DataWarning::UnitDiffersFromName {
+                    column: label,
+                    used: unit.symbol().into(),
+                    stated: other.symbol().into(),
+                };
+                warnings.push(warning.at(&columns_key));
             }
             return Ok(unit);
         }
         if let Some(text) = stated.text() {
-            warnings.push(format!(
-                "{columns_key}: `{text}`, which the file gives as the unit of `{label}`, is not \
-                 known as one of {}; the values are taken as they are, in {}",
-                kind.name(),
-                si.symbol(),
-            ));
+            let warning = DataWarning::UnknownUnit {
+                column: label,
+                stated: text.to_string(),
+                quantity: kind.name(),
+                used: si.symbol().into(),
+            };
+            warnings.push(warning.at(&columns_key));
             return Ok(si);
         }
         if let Some(looks) = suffix.filter(|unit| differs(unit, si)) {
-            warnings.push(format!(
-                "{columns_key}: the column `{label}` is taken in {}, though its name ends like \
-                 {}; if that is its unit, say `units: {{{name}: {}}}`",
-                si.symbol(),
-                looks.symbol(),
-                looks.symbol(),
-            ));
+            let warning = DataWarning::UnitOfNameUnused {
+                column: label,
+                name: name.to_owned(),
+                used: si.symbol().into(),
+                stated: looks.symbol().into(),
+            };
+            warnings.push(warning.at(&columns_key));
         }
-        // A name like `phi_rad` or `acc_V` says what reports should call the unit.
+        // A name like `phi_rad` or `acc_V` has the symbol of the unit for reports.
         Ok(suffix.filter(|unit| !differs(unit, si)).unwrap_or(si))
     }
 
-    /// Warns where the file states another unit of this column than the one that it is taken in,
-    /// since it belongs to another column: a standard deviation to the readings.
-    pub fn same_as(&self, used: Unit, key: &str, warnings: &mut Vec<String>) {
+    /// Warns if the table states another unit for this column of standard deviations than `used`, the unit of the
+    /// samples that they belong to.
+    pub fn same_as(&self, used: Unit, key: &str, warnings: &mut Vec<Finding>) {
         let stated = self.table.stated_unit(self.index);
         let own = stated.explicit(self.kind).or(stated.suffix(self.kind));
         if let Some(own) = own.filter(|own| own.factor() != used.factor()) {
-            warnings.push(format!(
-                "{key}: the column `{}` is taken in {}, as the readings, though the file says {}",
-                self.table.label(self.index),
-                used.symbol(),
-                own.symbol()
-            ));
+            let warning = DataWarning::SigmaUnitDiffers {
+                column: self.table.label(self.index),
+                used: used.symbol().into(),
+                stated: own.symbol().into(),
+            };
+            warnings.push(warning.at(key));
         }
     }
 }

@@ -1,41 +1,40 @@
-//! How many nodes the data ask for.
+//! Automatic number of nodes.
 //!
-//! The readings' spectrum says how fast the motion is, the stepper's order what a step of a given
-//! length costs: over a time `T` the motion of angular frequency `w` arrives with a phase error of
-//! about `w T (w h)^p / C`, `C` = 6 for the midpoint rule (p = 2) and 120 for the classical
-//! Runge-Kutta method (p = 4). The step is chosen for the frequency below which nearly all energy
-//! lies, then shortened so that samples of the force fall on nodes. Readings without a spectrum (too few, or
-//! all the same) say nothing of a frequency: no step is then longer than from one to the next.
+//! A response of angular frequency `w`, integrated over the time `T` with the step `h`, has a phase error of about
+//! `w T (w h)^p / C` at the end, with `p = 2`, `C = 6` for the midpoint rule and `p = 4`, `C = 120` for the classical
+//! Runge-Kutta method. The step is chosen for the frequency below which 90 % of the energy of the records lies, then
+//! shortened so that samples of force and base fall on nodes. For records without a spectrum (too few or equal samples)
+//! the step is the sampling interval.
 
 use crate::config::build::experiments::Record;
 use crate::digits::significant;
+use crate::finding::Finding;
 use kmcfit_core::internals::signal::Spectrum;
 use kmcfit_core::internals::system::Method;
 use std::f64::consts::TAU;
 
-/// Phase error at the end of the record that is aimed at, rad: as a share of the amplitude the
-/// largest error of the motion.
+/// Target phase error at the end of the record, rad: the largest error of the response relative to its amplitude.
 const ACCURACY: f64 = 1e-4;
-/// Share of the energy below the frequency that the accuracy is meant for, and below that which
-/// must at least be resolved.
+/// Share of the energy below the frequency for which the accuracy holds, and below the frequency that must be resolved
+/// with [`STEPS_PER_PERIOD`].
 const ENERGY: f64 = 0.9;
 const ALL_ENERGY: f64 = 0.999;
-/// Fewest steps in a period of the latter.
+/// Fewest steps per period of the frequency of [`ALL_ENERGY`].
 const STEPS_PER_PERIOD: f64 = 10.0;
-/// Readings have come to rest where the later half has this share of the energy of the earlier one.
+/// A response has decayed if the later half of its samples has less than this share of the energy of the earlier half.
 const AT_REST: f64 = 0.01;
-/// Fewest readings that are halved.
+/// Fewest samples that are halved.
 const FEWEST_LIVELY: usize = 128;
-/// More nodes than so many per reading only make a coarse record slow.
+/// Most nodes per sample: more only slow down the fit of a coarse record.
 const MOST_PER_READING: usize = 64;
 
-/// The number of nodes over `duration` s; what was chosen and why goes into `remarks`.
+/// Number of nodes over `duration` s; a finding in `notes` states the choice.
 pub fn nodes(
     method: Method,
     records: &[Option<Record>],
     duration: f64,
     most: usize,
-    remarks: &mut Vec<String>,
+    notes: &mut Vec<Finding>,
 ) -> usize {
     let mut longest = f64::INFINITY;
     let mut fastest = 0.0f64;
@@ -70,26 +69,30 @@ pub fn nodes(
     let (order, constant) = error_constant(method);
     let omega = TAU * fastest;
     if fastest == 0.0 {
-        remarks.push(format!(
-            "grid: {nodes} nodes were chosen: the readings show no frequency, so no step is longer than from one \
-             to the next"
-        ));
+        let text = format!(
+            "grid: {nodes} nodes; the record has no dominant frequency, so the step is the sampling interval"
+        );
+        notes.push(Finding::new("nodes_from_sampling", text).with("nodes", nodes));
         return nodes;
     }
-    remarks.push(format!(
-        "grid: {nodes} nodes were chosen: {:.0} steps in a period at {} Hz, below which \
-         {:.0} % of the readings' energy lies, for a phase error of about {:.0e} rad at the end of \
-         the record",
-        1.0 / (fastest * step),
+    let steps_per_period = 1.0 / (fastest * step);
+    let phase_error = omega * duration * (omega * step).powf(order) / constant;
+    let text = format!(
+        "grid: {nodes} nodes, {steps_per_period:.0} steps per period at {} Hz ({:.0} % of the record's energy lies \
+         below); phase error about {phase_error:.0e} rad at the end of the record",
         significant(fastest, 4),
         100.0 * ENERGY,
-        omega * duration * (omega * step).powf(order) / constant,
-    ));
+    );
+    let note = Finding::new("nodes_from_spectrum", text).with("nodes", nodes);
+    let note = note
+        .with("steps_per_period", steps_per_period)
+        .with("frequency", fastest);
+    notes.push(note.with("phase_error", phase_error));
     nodes
 }
 
-/// The beginning of readings that come to rest: halved as long as the later half has next to none of the energy.
-/// What is left of the motion there is noise, and a window would leave little else.
+/// First part of a decaying response: halved as long as the later half has next to no energy, where noise dominates the
+/// spectrum.
 fn lively(values: &[f64]) -> &[f64] {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     let energy = |part: &[f64]| part.iter().map(|y| (y - mean) * (y - mean)).sum::<f64>();

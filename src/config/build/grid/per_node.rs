@@ -4,7 +4,7 @@
 //! every method, with one to three records and functions, and rounded up: most runs need half as much.
 
 use crate::config::ModelFile;
-use crate::config::build::Purpose;
+use crate::config::build::BuildMode;
 use crate::config::build::fit::DEFAULT_MEMORY;
 use crate::config::build::functions::{self, Given};
 use crate::config::scalar::Knots;
@@ -22,7 +22,7 @@ const SIMULATION: usize = 100;
 /// For each pair that L-BFGS remembers and each function that is free at every node: two numbers and their
 /// duals, and the same once more while a checkpoint is written.
 const PAIR: usize = 72;
-/// Gauss-Newton with few free values, and for each record: start from the readings, Jacobian.
+/// Gauss-Newton with few parameters, and for each record: start from the readings, Jacobian.
 const FEW: usize = 1000;
 const FEW_RECORD: usize = 300;
 /// Gauss-Newton with many, for each record and each function that is free at every node: the states
@@ -33,10 +33,10 @@ const MANY_FUNCTION: usize = 1500;
 const PROGRAMS: usize = 2;
 
 /// Bytes per node that a run of the model may need.
-pub fn per_node(file: &ModelFile, purpose: Purpose) -> usize {
+pub fn per_node(file: &ModelFile, purpose: BuildMode) -> usize {
     let spec = &file.spec;
     let (records, functions) = (spec.experiments.len(), functions::all(file));
-    if let Purpose::Simulate { .. } = purpose {
+    if let BuildMode::Simulate { .. } = purpose {
         return SIMULATION * (1 + records + functions.len());
     }
     let common = RUN + RECORD * records + FUNCTION * functions.len();
@@ -139,13 +139,13 @@ mod tests {
         ];
         for (function, method, bytes) in measured {
             let file = model(function, method, "");
-            let asked = per_node(&file, Purpose::Fit);
+            let asked = per_node(&file, BuildMode::Fit);
             assert!(
                 (bytes..=2 * bytes + 500).contains(&asked),
                 "{method}: {asked} {bytes}"
             );
         }
-        let simulation = Purpose::Simulate { nodes: None };
+        let simulation = BuildMode::Simulate { nodes: None };
         let asked = per_node(&model(nodal, "lbfgs", ""), simulation);
         assert!((186..=500).contains(&asked), "{asked}");
     }
@@ -162,7 +162,7 @@ mod tests {
         for (name, bytes) in measured {
             let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
             let file = ModelFile::read(models.join(format!("{name}.yaml"))).expect("a model");
-            let asked = per_node(&file, Purpose::Fit);
+            let asked = per_node(&file, BuildMode::Fit);
             assert!(asked >= bytes, "{name}: {asked} {bytes}");
         }
     }
@@ -171,7 +171,7 @@ mod tests {
     fn more_knots_than_a_dense_jacobian_takes_are_many() {
         let splines = |knots: usize| {
             let function = format!("{{basis: b-spline, knots: {knots}, start: 1.0}}");
-            per_node(&model(&function, "gauss-newton", ""), Purpose::Fit)
+            per_node(&model(&function, "gauss-newton", ""), BuildMode::Fit)
         };
         assert_eq!(splines(10), splines(60));
         assert!(splines(100) > 2 * splines(60));

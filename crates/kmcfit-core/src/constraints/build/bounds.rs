@@ -1,8 +1,8 @@
-//! Smallest and largest values.
+//! Bounds of function values.
 
-use super::form::group;
+use super::linear_form::group;
 use super::sampling::{nodal, value};
-use super::{All, Impossible, TimeHistory};
+use super::{All, ConstraintError, TimeHistory};
 use crate::constraints::RowGroup;
 
 pub(super) fn build(
@@ -10,7 +10,7 @@ pub(super) fn build(
     j: usize,
     min: Option<&TimeHistory>,
     max: Option<&TimeHistory>,
-) -> Result<Vec<RowGroup>, Impossible> {
+) -> Result<Vec<RowGroup>, ConstraintError> {
     let name = all.name(j);
     if let (Some(TimeHistory::Constant(min)), Some(TimeHistory::Constant(max))) = (min, max)
         && min == max

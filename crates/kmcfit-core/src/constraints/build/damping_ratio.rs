@@ -1,7 +1,7 @@
-//! A cap on the damping ratio, as second-order cones.
+//! Upper bound of the damping ratio, as second-order cones.
 
 use super::All;
-use super::form::Form;
+use super::linear_form::LinearForm;
 use super::sampling::value;
 use crate::constraints::{Cone, ConeGroup, Rows};
 
@@ -14,7 +14,7 @@ pub(super) fn build(all: &All<'_>, [m, c, k]: [usize; 3], zeta: f64) -> ConeGrou
     let mut times = Vec::new();
     for ((m, c), k) in samples {
         let cone = cone(m, c, k);
-        // Both sides of a time at which nothing jumps say the same.
+        // At a time without a jump both sides give the same cone.
         if cones.last() != Some(&cone) {
             cones.push(cone);
             times.push(m.time);
@@ -27,7 +27,7 @@ pub(super) fn build(all: &All<'_>, [m, c, k]: [usize; 3], zeta: f64) -> ConeGrou
     }
 }
 
-fn cone(m: &Form, c: &Form, k: &Form) -> Cone {
+fn cone(m: &LinearForm, c: &LinearForm, k: &LinearForm) -> Cone {
     let mut sum = m.clone();
     sum.add(1.0, k);
     let mut difference = m.clone();
@@ -39,9 +39,9 @@ fn cone(m: &Form, c: &Form, k: &Form) -> Cone {
     Cone { rows }
 }
 
-/// The power of two nearest to `sqrt(k/m)`, by the largest values at the start.
+/// Power of two nearest to `sqrt(k/m)`, from the largest values at the start.
 fn balance(all: &All<'_>, m: usize, k: usize) -> f64 {
-    let start = all.functions.device(&all.functions.start());
+    let start = all.functions.nodal(&all.functions.start());
     let sizes: Vec<f64> = (start.functions())
         .map(|f| f.iter().fold(0.0f64, |most, p| most.max(p.abs())))
         .collect();

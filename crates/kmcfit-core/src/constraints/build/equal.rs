@@ -1,19 +1,23 @@
-//! One function equal to a multiple of another.
+//! Equality of one function and a multiple of another.
 
-use super::form::{Form, group};
+use super::linear_form::{LinearForm, group};
 use super::sampling::value;
-use super::{All, Impossible};
+use super::{All, ConstraintError};
 use crate::constraints::RowGroup;
 use crate::functions::Basis;
 
-/// What is left of a row beside those before it, relative to its size, is rounding below this.
+/// Residual of a row after elimination, relative to its size, below which it depends on the previous rows.
 const DEPENDENT: f64 = 1e-10;
-/// A row that follows from others must have the right-hand side that follows, relative to its size.
+/// Largest residual of the right-hand side of a dependent row, relative to its size.
 const CONSISTENT: f64 = 1e-8;
-/// Up to so many parameters dependent rows are sought out; one value per node has none.
+/// Number of parameters up to which dependent rows are eliminated; nodal functions have none.
 const MOST_PARAMETERS: usize = 400;
 
-pub(super) fn build(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Result<RowGroup, Impossible> {
+pub(super) fn build(
+    all: &All<'_>,
+    [a, b]: [usize; 2],
+    ratio: f64,
+) -> Result<RowGroup, ConstraintError> {
     let (first, second) = (all.list[a], all.list[b]);
     let name = match ratio {
         1.0 => format!("{} = {}", all.name(a), all.name(b)),
@@ -27,7 +31,7 @@ pub(super) fn build(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Result<Row
         .iter()
         .any(|f| f.basis == Some(Basis::Nodal));
     let forms = match nodal {
-        // The nodes alone: a function with kinks at knots between them would have to lose those.
+        // At the nodes only: equality everywhere would remove kinks at knots between nodes.
         true => at_nodes(all, [a, b], ratio),
         false => all.sum(&parts, &[]),
     };
@@ -38,7 +42,7 @@ pub(super) fn build(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Result<Row
     }
 }
 
-fn by_parameter(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Vec<Form> {
+fn by_parameter(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Vec<LinearForm> {
     let ranges = all.functions.ranges();
     let knots = (all.list[a].basis.as_ref()).map_or(Vec::new(), |b| b.knot_times(all.grid));
     let ends = all.ends();
@@ -47,7 +51,7 @@ fn by_parameter(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Vec<Form> {
             true => [knots[i - ranges[a].start]; 2],
             false => ends,
         };
-        Form {
+        LinearForm {
             entries: vec![(i, 1.0), (j, -ratio)],
             constant: 0.0,
             time: span[0],
@@ -58,7 +62,7 @@ fn by_parameter(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Vec<Form> {
     pairs.map(form).collect()
 }
 
-fn at_nodes(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Vec<Form> {
+fn at_nodes(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Vec<LinearForm> {
     let times = all.grid.times();
     let mut forms = all.forms(a, 0, &times);
     for (form, other) in forms.iter_mut().zip(all.forms(b, 0, &times)) {
@@ -67,13 +71,12 @@ fn at_nodes(all: &All<'_>, [a, b]: [usize; 2], ratio: f64) -> Vec<Form> {
     forms
 }
 
-/// The equalities without those that follow from others: the most independent row first, each
-/// against what the rows before it leave of all others.
-fn independent(group: RowGroup, parameters: usize) -> Result<RowGroup, Impossible> {
+/// Independent equalities, by elimination with the most independent row first.
+fn independent(group: RowGroup, parameters: usize) -> Result<RowGroup, ConstraintError> {
     let count = group.rows.len();
     let mut rest: Vec<Vec<f64>> = (0..count)
         .map(|i| {
-            // With the right-hand side behind the parameters.
+            // The right-hand side follows the parameters.
             let mut row = vec![0.0; parameters + 1];
             group.rows.row(i).for_each(|(j, a)| row[j] = a);
             row[parameters] = group.upper[i];
@@ -113,7 +116,7 @@ fn independent(group: RowGroup, parameters: usize) -> Result<RowGroup, Impossibl
         .iter()
         .position(|row| row[parameters].abs() > CONSISTENT * right)
     {
-        return Err(Impossible::Broken {
+        return Err(ConstraintError::Broken {
             name: group.name.clone(),
             time: group.times[i][0],
         });

@@ -1,9 +1,9 @@
-//! Natural frequencies in a band.
+//! Bounds of the natural frequency.
 
-use super::form::group;
+use super::linear_form::group;
 use super::sampling::value;
 use super::shape::{DOWN, UP};
-use super::{All, Impossible};
+use super::{All, ConstraintError};
 use crate::constraints::RowGroup;
 use std::f64::consts::TAU;
 
@@ -12,7 +12,7 @@ pub(super) fn build(
     [m, k]: [usize; 2],
     min: Option<f64>,
     max: Option<f64>,
-) -> Result<Vec<RowGroup>, Impossible> {
+) -> Result<Vec<RowGroup>, ConstraintError> {
     let one = |frequency: f64, sign: &str, bounds: [f64; 2]| {
         let omega = TAU * frequency;
         let forms = all.sum(&[value(k, 1.0), value(m, -omega * omega)], &[]);

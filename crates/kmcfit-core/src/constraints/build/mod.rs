@@ -1,18 +1,17 @@
-//! From statements about the functions to rows and cones in their parameters.
+//! Rows and cones of constraints on the coefficient functions.
 //!
-//! Where every function in a statement is linear between its knots, the statement is enforced at the
-//! ends of all pieces and so holds **at all times**: `nodal`, `constant`, `piecewise-constant` and
-//! `piecewise-linear` functions, lines, parabolas' slopes, and the curvature of cubic splines. Values
-//! and slopes of other polynomials and of splines are held at every node, where the equation of
-//! motion looks at them; **between nodes nothing is promised** about those.
+//! Where every function in a constraint is linear between its knots, the constraint is imposed at the ends of all pieces and
+//! holds **at all times**: `nodal`, `constant`, `piecewise-constant` and `piecewise-linear` functions, lines, slopes of
+//! parabolas, and curvatures of cubic splines. Values and slopes of other polynomials and of splines are constrained at every
+//! node, where the equation of motion uses them, but **not between nodes**.
 //!
-//! A row that is about a single parameter (a value at a knot) stays one, so that clipping is exact.
+//! A row on a single parameter (a value at a knot) remains a bound, so that clipping is exact.
 
 mod bounds;
 mod damping_ratio;
 mod equal;
-mod form;
 mod frequency;
+mod linear_form;
 mod passive;
 mod sampling;
 mod shape;
@@ -27,14 +26,14 @@ use crate::functions::{CoefficientFunction, CoefficientKind, Parameterization};
 use crate::system::Grid;
 use std::fmt;
 
-/// Values of a coefficient function, in its unit: a known function, a bound or a reference.
+/// Values of a fixed function, a bound or a reference over time, in the unit of the function.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TimeHistory {
-    /// The same at all times.
+    /// Equal at all times.
     Constant(f64),
     /// Values at the nodes, linear in between.
     Nodal {
-        /// Name for rows and messages.
+        /// Name in rows and messages.
         name: String,
         /// One value per node.
         values: Vec<f64>,
@@ -42,7 +41,7 @@ pub enum TimeHistory {
 }
 
 impl TimeHistory {
-    /// Its value at node `i`.
+    /// Value at node `i`.
     pub fn at(&self, i: usize) -> f64 {
         match self {
             TimeHistory::Constant(value) => *value,
@@ -50,7 +49,7 @@ impl TimeHistory {
         }
     }
 
-    /// Its smallest value.
+    /// Smallest value.
     pub fn least(&self) -> f64 {
         match self {
             TimeHistory::Constant(value) => *value,
@@ -70,9 +69,9 @@ impl fmt::Display for TimeHistory {
     }
 }
 
-/// What is demanded of the functions.
+/// A constraint on the coefficient functions.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Statement {
+pub enum Constraint {
     /// `min <= p(t) <= max`, in the unit of the function.
     Bounds {
         /// The function `p`.
@@ -92,11 +91,11 @@ pub enum Statement {
         /// Largest slope.
         max: Option<f64>,
     },
-    /// Monotone or curved in one direction.
+    /// Monotone, convex or concave.
     Shape {
-        /// The function.
+        /// Function.
         of: CoefficientKind,
-        /// Which shape.
+        /// Shape.
         shape: Shape,
     },
     /// `p(at) = value`; a time within 1e-6 steps of a knot is that knot.
@@ -122,8 +121,8 @@ pub enum Statement {
         /// Value, in (unit of the function) s.
         value: f64,
     },
-    /// `first(t) = ratio * second(t)` as numbers in their units: at all times where both are linear
-    /// between knots or of the same basis, else at the nodes.
+    /// `first(t) = ratio * second(t)` as numbers in their units: at all times where both are linear between knots or have the
+    /// same basis, otherwise at the nodes.
     Equal {
         /// First function.
         first: CoefficientKind,
@@ -132,11 +131,10 @@ pub enum Statement {
         /// Factor of the second.
         ratio: f64,
     },
-    /// The stored energy never grows: `c - m'/2 >= 0` and `k' <= 0`. In every cell `c` at both ends
-    /// is at least half the slope of `m` there; a `piecewise-constant` mass must not jump up.
+    /// The stored energy of a free system never grows: `c - m'/2 >= 0` and `k' <= 0`. In every cell, `c` at both ends is at least
+    /// half the slope of `m`; a `piecewise-constant` mass must not jump up.
     Passive,
-    /// `w_min^2 m <= k <= w_max^2 m` with `w = 2 pi f`: the natural frequency of the device at rest
-    /// stays in a band, in Hz.
+    /// `w_min^2 m <= k <= w_max^2 m` with `w = 2 pi f`: bounds of the natural frequency about the rest position, in Hz.
     Frequency {
         /// Lowest frequency, Hz.
         min: Option<f64>,
@@ -146,44 +144,43 @@ pub enum Statement {
     /// `c^2 <= 4 zeta^2 m k` with `m + k >= 0`: the damping ratio is at most `zeta`, as the
     /// second-order cone `|(c/zeta, s m - k/s)| <= s m + k/s`.
     ///
-    /// This is `|(c/zeta, m - k)| <= m + k` for masses and stiffnesses of one magnitude (kg and N/m)
-    /// and says the same for any `m, k >= 0` and `s > 0`. `s` is the power of two nearest to
-    /// `sqrt(k/m)` at the start, so that neither side drowns in the rounding of the other.
+    /// This is equivalent to `|(c/zeta, m - k)| <= m + k` for any `m, k >= 0` and `s > 0`. `s` is the power of two nearest to
+    /// `sqrt(k/m)` at the start, which balances the magnitudes of kg and N/m.
     DampingRatio {
         /// Largest damping ratio.
         max: f64,
     },
 }
 
-/// Why a statement cannot become rows.
+/// Reason for which a constraint has no rows.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Impossible {
-    /// The device has no such function.
+pub enum ConstraintError {
+    /// The system has no such function.
     Absent(CoefficientKind),
-    /// All functions that it is about are fixed.
+    /// All functions of the constraint are fixed.
     Fixed(Vec<CoefficientKind>),
-    /// No parameters can change that this row is broken.
+    /// Fixed functions violate a row, which no parameters can change.
     Broken {
-        /// Name of the row's group.
+        /// Name of the group.
         name: String,
-        /// Time that it is broken at, s.
+        /// Time of the violation, s.
         time: f64,
     },
 }
 
-impl Statement {
-    /// The functions that it is about.
+impl Constraint {
+    /// Kinds of the constrained functions.
     pub fn functions(&self) -> Vec<CoefficientKind> {
         match self {
-            Statement::Bounds { of, .. }
-            | Statement::Slope { of, .. }
-            | Statement::Shape { of, .. }
-            | Statement::Value { of, .. }
-            | Statement::Mean { of, .. }
-            | Statement::Integral { of, .. } => vec![*of],
-            Statement::Equal { first, second, .. } => vec![*first, *second],
-            Statement::Frequency { .. } => vec![CoefficientKind::Mass, CoefficientKind::Stiffness],
-            Statement::Passive | Statement::DampingRatio { .. } => {
+            Constraint::Bounds { of, .. }
+            | Constraint::Slope { of, .. }
+            | Constraint::Shape { of, .. }
+            | Constraint::Value { of, .. }
+            | Constraint::Mean { of, .. }
+            | Constraint::Integral { of, .. } => vec![*of],
+            Constraint::Equal { first, second, .. } => vec![*first, *second],
+            Constraint::Frequency { .. } => vec![CoefficientKind::Mass, CoefficientKind::Stiffness],
+            Constraint::Passive | Constraint::DampingRatio { .. } => {
                 vec![
                     CoefficientKind::Mass,
                     CoefficientKind::Damping,
@@ -193,66 +190,65 @@ impl Statement {
         }
     }
 
-    /// Rows and cones in the parameters of all `functions`; fixed functions are moved to the bounds.
-    /// A statement that always holds has no rows.
+    /// Rows and cones in the parameters of all `functions`; contributions of fixed functions are moved to the bounds. A constraint
+    /// that holds for all parameters has no rows.
     ///
     /// # Errors
-    /// If it is about fixed functions only, or no parameters can fulfil a row of it.
+    /// If all its functions are fixed, or no parameters satisfy one of its rows.
     pub fn build(
         &self,
         grid: &Grid,
         functions: &Parameterization,
-    ) -> Result<Constraints, Impossible> {
+    ) -> Result<Constraints, ConstraintError> {
         self.build_for(grid, functions, 0)
     }
 
-    /// [`Statement::build`] about the functions of device `device` of
-    /// [`Parameterization::assemblies`].
+    /// [`Constraint::build`] for the functions of one coefficient set of [`Parameterization::coefficient_sets`].
     ///
     /// # Errors
-    /// As [`Statement::build`].
+    /// As [`Constraint::build`].
     pub fn build_for(
         &self,
         grid: &Grid,
         functions: &Parameterization,
-        device: usize,
-    ) -> Result<Constraints, Impossible> {
-        let all = All::new(grid, functions, device);
+        set: usize,
+    ) -> Result<Constraints, ConstraintError> {
+        let all = All::new(grid, functions, set);
         let about = self.functions();
         let indices: Vec<usize> = (about.iter())
             .map(|q| all.index(*q))
             .collect::<Result<_, _>>()?;
         if indices.iter().all(|&j| all.list[j].parameters() == 0) {
-            return Err(Impossible::Fixed(about));
+            return Err(ConstraintError::Fixed(about));
         }
         let mut found = Constraints::default();
         match (self, indices.as_slice()) {
-            (Statement::Bounds { min, max, .. }, &[j]) => {
+            (Constraint::Bounds { min, max, .. }, &[j]) => {
                 found.groups = bounds::build(&all, j, min.as_ref(), max.as_ref())?;
             }
-            (Statement::Slope { min, max, .. }, &[j]) => {
+            (Constraint::Slope { min, max, .. }, &[j]) => {
                 found.groups = slope::build(&all, j, *min, *max)?;
             }
-            (Statement::Shape { shape, .. }, &[j]) => {
+            (Constraint::Shape { shape, .. }, &[j]) => {
                 found.groups = vec![shape::build(&all, j, *shape)?];
             }
-            (Statement::Value { at, value, .. }, &[j]) => {
+            (Constraint::Value { at, value, .. }, &[j]) => {
                 found.groups = vec![values::build(&all, j, *at, *value)?];
             }
-            (Statement::Mean { value, .. }, &[j]) => {
+            (Constraint::Mean { value, .. }, &[j]) => {
                 found.groups = vec![totals::mean(&all, j, *value)?];
             }
-            (Statement::Integral { value, .. }, &[j]) => {
+            (Constraint::Integral { value, .. }, &[j]) => {
                 found.groups = vec![totals::integral(&all, j, *value)?];
             }
-            (Statement::Equal { ratio, .. }, &[a, b]) => {
+            (Constraint::Equal { ratio, .. }, &[a, b]) => {
                 found.groups = vec![equal::build(&all, [a, b], *ratio)?];
             }
-            (Statement::Passive, &[m, c, k]) => found.groups = passive::build(&all, [m, c, k])?,
-            (Statement::Frequency { min, max }, &[m, k]) => {
+            (Constraint::Passive, &[m, c, k]) => found.groups = passive::build(&all, [m, c, k])?,
+            (Constraint::Frequency { min, max }, &[m, k]) => {
                 found.groups = frequency::build(&all, [m, k], *min, *max)?;
             }
-            (Statement::DampingRatio { max }, &[m, c, k]) => {
+            (Constraint::DampingRatio { max }, &[m, c, k]) => {
                 found.cones = vec![damping_ratio::build(&all, [m, c, k], *max)];
             }
             _ => unreachable!("one index for each function of a statement"),
@@ -263,7 +259,7 @@ impl Statement {
     }
 }
 
-/// All functions on their grid.
+/// Functions of a coefficient set on their grid.
 struct All<'a> {
     grid: &'a Grid,
     functions: &'a Parameterization,
@@ -272,26 +268,26 @@ struct All<'a> {
 }
 
 impl<'a> All<'a> {
-    fn new(grid: &'a Grid, functions: &'a Parameterization, device: usize) -> Self {
+    fn new(grid: &'a Grid, functions: &'a Parameterization, set: usize) -> Self {
         Self {
             grid,
             functions,
             list: functions.iter().collect(),
-            assembly: functions.assembly(device),
+            assembly: functions.coefficient_set(set),
         }
     }
 
-    fn index(&self, quantity: CoefficientKind) -> Result<usize, Impossible> {
+    fn index(&self, quantity: CoefficientKind) -> Result<usize, ConstraintError> {
         let is_meant = |f: &&usize| self.list[**f].quantity == quantity;
         let found = self.assembly.iter().find(is_meant);
-        found.copied().ok_or(Impossible::Absent(quantity))
+        found.copied().ok_or(ConstraintError::Absent(quantity))
     }
 
     fn name(&self, j: usize) -> String {
         self.list[j].name()
     }
 
-    /// Both ends of the record, s.
+    /// Start and end of the record, s.
     fn ends(&self) -> [f64; 2] {
         [self.grid.start(), self.grid.time(self.grid.nodes() - 1)]
     }

@@ -1,18 +1,21 @@
-//! Passivity: the stored energy `m v^2/2 + k y^2/2` never grows.
+//! Passivity: the stored energy `m v^2/2 + k y^2/2` of a free system never grows.
 
-use super::form::group;
+use super::linear_form::group;
 use super::sampling::{slope, value};
 use super::shape::DOWN;
 use super::slope::slopes;
-use super::{All, Impossible};
+use super::{All, ConstraintError};
 use crate::constraints::RowGroup;
 use crate::functions::Basis;
 
-pub(super) fn build(all: &All<'_>, [m, c, k]: [usize; 3]) -> Result<Vec<RowGroup>, Impossible> {
+pub(super) fn build(
+    all: &All<'_>,
+    [m, c, k]: [usize; 3],
+) -> Result<Vec<RowGroup>, ConstraintError> {
     let mut groups = Vec::new();
     let mut parts = vec![value(c, 1.0)];
     if let Some(Basis::PiecewiseConstant { .. }) = all.list[m].basis {
-        // Inside the cells m' is zero; a jump of m is a slope without bound.
+        // Within cells m' is zero; an upward jump of m is an unbounded slope.
         let jumps = slopes(all, m);
         groups.push(group("passive: m does not jump up", &jumps, |_| DOWN)?);
     } else {

@@ -1,60 +1,60 @@
-//! At which times a statement has to hold so that it holds everywhere, and the forms there.
+//! Times at which a constraint is imposed so that it holds at all times, and the affine forms at these times.
 
 use super::All;
-use super::form::Form;
+use super::linear_form::LinearForm;
 use crate::functions::Basis;
 use crate::rows::Rows;
 use crate::system::Grid;
 
-/// Times nearer than this, relative to the record, are one: the same that the bases take for one.
+/// Largest distance of equal times, relative to the record; the same as in the bases.
 const SAME_TIME: f64 = 1e-12;
-/// Values this near to a line, relative to their size, are a line.
+/// Largest deviation of collinear values, relative to their size.
 const STRAIGHT: f64 = 1e-13;
 
 /// `factor * d^derivative p / dt^derivative` of one function.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Part {
+pub(super) struct DerivativeTerm {
     pub function: usize,
     pub derivative: usize,
     pub factor: f64,
 }
 
-/// The value of a function.
-pub(super) fn value(function: usize, factor: f64) -> Part {
-    Part {
+/// Value of a function.
+pub(super) fn value(function: usize, factor: f64) -> DerivativeTerm {
+    DerivativeTerm {
         function,
         derivative: 0,
         factor,
     }
 }
 
-/// The slope of a function.
-pub(super) fn slope(function: usize, factor: f64) -> Part {
-    Part {
+/// Slope of a function.
+pub(super) fn slope(function: usize, factor: f64) -> DerivativeTerm {
+    DerivativeTerm {
         function,
         derivative: 1,
         factor,
     }
 }
 
-/// Where a derivative of a function is linear.
+/// Intervals on which a derivative of a function is linear.
 enum Pieces {
-    /// Between these times; it may jump at them.
+    /// Between these times, at which it may jump.
     Linear { times: Vec<f64>, jumps: bool },
-    /// Nowhere: it is looked at at every node.
+    /// None: the derivative is constrained at every node.
     Smooth,
 }
 
-/// One end of a piece: where continuous parts are read, and where those that jump are.
+/// One end of an interval: times for the evaluation of continuous parts and of parts that jump.
 #[derive(Debug, Clone, Copy)]
-struct Sample {
+struct FormSample {
     time: f64,
     inside: f64,
     span: [f64; 2],
 }
 
 impl All<'_> {
-    fn pieces(&self, part: Part) -> Pieces {
+    fn pieces(&self, part: DerivativeTerm) -> Pieces {
         let function = self.list[part.function];
         let grid = self.grid;
         let linear = |times, jumps| Pieces::Linear { times, jumps };
@@ -79,7 +79,7 @@ impl All<'_> {
         }
     }
 
-    /// The times between which nodal values are on a line: the ends, or all nodes.
+    /// Times between which nodal values are collinear: the ends, or all nodes.
     pub fn breaks(&self, nodal: &[f64]) -> Vec<f64> {
         let last = nodal.len() - 1;
         let size = nodal.iter().fold(0.0f64, |most, p| most.max(p.abs()));
@@ -94,12 +94,11 @@ impl All<'_> {
         }
     }
 
-    /// The sum of `parts` at the ends of all pieces, where it must be tested to be known everywhere;
-    /// `also` are further times at which what it is compared with bends.
-    pub fn sum(&self, parts: &[Part], also: &[f64]) -> Vec<Form> {
+    /// Sum of `parts` at the ends of all intervals, which determine it everywhere; `also` are kinks of the bound.
+    pub fn sum(&self, parts: &[DerivativeTerm], also: &[f64]) -> Vec<LinearForm> {
         let pieces: Vec<Pieces> = parts.iter().map(|part| self.pieces(*part)).collect();
         let samples = self.samples(&pieces, also);
-        let mut sums: Vec<Form> = samples.iter().map(Form::at).collect();
+        let mut sums: Vec<LinearForm> = samples.iter().map(LinearForm::at).collect();
         for (part, pieces) in parts.iter().zip(&pieces) {
             let jumps = matches!(pieces, Pieces::Linear { jumps: true, .. });
             let times: Vec<f64> = (samples.iter())
@@ -113,16 +112,16 @@ impl All<'_> {
         sums
     }
 
-    /// All `parts` on their own at the same times.
-    pub fn each(&self, parts: &[Part]) -> Vec<Vec<Form>> {
+    /// Each of `parts` at the same times.
+    pub fn each(&self, parts: &[DerivativeTerm]) -> Vec<Vec<LinearForm>> {
         let pieces: Vec<Pieces> = parts.iter().map(|part| self.pieces(*part)).collect();
         let samples = self.samples(&pieces, &[]);
-        let one = |(part, pieces): (&Part, &Pieces)| {
+        let one = |(part, pieces): (&DerivativeTerm, &Pieces)| {
             let jumps = matches!(pieces, Pieces::Linear { jumps: true, .. });
             let times: Vec<f64> = (samples.iter())
                 .map(|s| if jumps { s.inside } else { s.time })
                 .collect();
-            let mut forms: Vec<Form> = samples.iter().map(Form::at).collect();
+            let mut forms: Vec<LinearForm> = samples.iter().map(LinearForm::at).collect();
             let read = self.forms(part.function, part.derivative, &times);
             for (form, read) in forms.iter_mut().zip(&read) {
                 form.add(part.factor, read);
@@ -132,7 +131,7 @@ impl All<'_> {
         parts.iter().zip(&pieces).map(one).collect()
     }
 
-    fn samples(&self, pieces: &[Pieces], also: &[f64]) -> Vec<Sample> {
+    fn samples(&self, pieces: &[Pieces], also: &[f64]) -> Vec<FormSample> {
         let mut times = also.to_vec();
         let mut any_jumps = false;
         for pieces in pieces {
@@ -148,7 +147,7 @@ impl All<'_> {
         let slack = SAME_TIME * self.grid.duration();
         times.dedup_by(|later, earlier| *later - *earlier <= slack);
         if !any_jumps {
-            let at = |t: &f64| Sample {
+            let at = |t: &f64| FormSample {
                 time: *t,
                 inside: *t,
                 span: [*t, *t],
@@ -158,18 +157,18 @@ impl All<'_> {
         let ends = |cell: &[f64]| {
             let span = [cell[0], cell[1]];
             let inside = 0.5 * (cell[0] + cell[1]);
-            span.map(|time| Sample { time, inside, span })
+            span.map(|time| FormSample { time, inside, span })
         };
         times.windows(2).flat_map(ends).collect()
     }
 
-    /// A derivative of a function at `times` (s).
-    pub fn forms(&self, j: usize, derivative: usize, times: &[f64]) -> Vec<Form> {
+    /// Derivative of a function at `times` (s).
+    pub fn forms(&self, j: usize, derivative: usize, times: &[f64]) -> Vec<LinearForm> {
         let function = self.list[j];
         let first = self.functions.ranges()[j].start;
         let rows = function.basis.as_ref();
         let rows = rows.map(|basis| basis.rows(self.grid, times, derivative));
-        let form = |(i, t): (usize, &f64)| Form {
+        let form = |(i, t): (usize, &f64)| LinearForm {
             entries: rows.as_ref().map_or(Vec::new(), |m| entries(m, i, first)),
             constant: nodal(self.grid, &function.offset, derivative, *t),
             time: *t,
@@ -178,10 +177,10 @@ impl All<'_> {
         times.iter().enumerate().map(form).collect()
     }
 
-    /// Rows of a matrix in the parameters of function `j`, one form each at `times` (s).
-    pub fn matrix_forms(&self, j: usize, rows: &Rows, times: &[f64]) -> Vec<Form> {
+    /// Rows of a matrix in the parameters of function `j`, one form for each of `times` (s).
+    pub fn matrix_forms(&self, j: usize, rows: &Rows, times: &[f64]) -> Vec<LinearForm> {
         let first = self.functions.ranges()[j].start;
-        let form = |(i, t): (usize, &f64)| Form {
+        let form = |(i, t): (usize, &f64)| LinearForm {
             entries: entries(rows, i, first),
             constant: 0.0,
             time: *t,
@@ -191,9 +190,9 @@ impl All<'_> {
     }
 }
 
-impl Form {
-    /// Zero at a sample.
-    fn at(sample: &Sample) -> Self {
+impl LinearForm {
+    /// Zero form at a sample.
+    fn at(sample: &FormSample) -> Self {
         Self {
             entries: Vec::new(),
             constant: 0.0,
@@ -207,10 +206,10 @@ fn entries(rows: &Rows, i: usize, first: usize) -> Vec<(usize, f64)> {
     rows.row(i).map(|(j, a)| (first + j, a)).collect()
 }
 
-/// A derivative of the piecewise linear function with these values at the nodes.
+/// Derivative of the piecewise linear function with these nodal values.
 pub(super) fn nodal(grid: &Grid, values: &[f64], derivative: usize, t: f64) -> f64 {
     let x = (t - grid.start()) / grid.step();
-    // A time that misses a node by rounding is that node.
+    // A time that differs from a node by rounding is that node.
     let near = x.round();
     let x = match (x - near).abs() <= SAME_TIME * values.len() as f64 {
         true => near,

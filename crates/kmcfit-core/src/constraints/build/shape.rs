@@ -1,22 +1,22 @@
 //! Monotone, convex and concave functions.
 
-use super::form::{Form, group};
-use super::sampling::Part;
+use super::linear_form::{LinearForm, group};
+use super::sampling::DerivativeTerm;
 use super::slope::slopes;
-use super::{All, Impossible};
+use super::{All, ConstraintError};
 use crate::constraints::RowGroup;
 use crate::functions::Basis;
 
-/// The shape of a function.
+/// Shape of a function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shape {
-    /// It never rises.
+    /// Never rising.
     NonIncreasing,
-    /// It never falls.
+    /// Never falling.
     NonDecreasing,
-    /// Its slope never falls.
+    /// Slope never falling.
     Convex,
-    /// Its slope never rises.
+    /// Slope never rising.
     Concave,
 }
 
@@ -32,11 +32,11 @@ impl Shape {
     }
 }
 
-/// Not negative, and not positive.
+/// Nonnegative and nonpositive values.
 pub(super) const UP: [f64; 2] = [0.0, f64::INFINITY];
 pub(super) const DOWN: [f64; 2] = [f64::NEG_INFINITY, 0.0];
 
-pub(super) fn build(all: &All<'_>, j: usize, shape: Shape) -> Result<RowGroup, Impossible> {
+pub(super) fn build(all: &All<'_>, j: usize, shape: Shape) -> Result<RowGroup, ConstraintError> {
     let (forms, bounds) = match shape {
         Shape::NonIncreasing => (slopes(all, j), DOWN),
         Shape::NonDecreasing => (slopes(all, j), UP),
@@ -47,9 +47,8 @@ pub(super) fn build(all: &All<'_>, j: usize, shape: Shape) -> Result<RowGroup, I
     group(name, &forms, |_| bounds)
 }
 
-/// The curvature of a function, or where it is not square-integrable its divided differences, scaled
-/// by the root of their spacing.
-fn curvatures(all: &All<'_>, j: usize) -> Vec<Form> {
+/// Curvature of a function or, where it is not square-integrable, divided differences times the root of their spacing.
+fn curvatures(all: &All<'_>, j: usize) -> Vec<LinearForm> {
     match &all.list[j].basis {
         Some(
             basis
@@ -57,7 +56,7 @@ fn curvatures(all: &All<'_>, j: usize) -> Vec<Form> {
         ) => {
             let rows = basis.roughness(all.grid, 2);
             let knots = basis.knot_times(all.grid);
-            // The rows are about the inner knots, or about the inner cells.
+            // Rows belong to the inner knots, or to the inner cells.
             let middle = |i: usize| match basis {
                 Basis::PiecewiseConstant { .. } => 0.5 * (knots[i + 1] + knots[i + 2]),
                 _ => knots[i + 1],
@@ -66,7 +65,7 @@ fn curvatures(all: &All<'_>, j: usize) -> Vec<Form> {
             all.matrix_forms(j, &rows, &times)
         }
         _ => {
-            let curvature = Part {
+            let curvature = DerivativeTerm {
                 function: j,
                 derivative: 2,
                 factor: 1.0,

@@ -1,8 +1,8 @@
-//! Smallest and largest slopes.
+//! Bounds of slopes.
 
-use super::form::{Form, group};
+use super::linear_form::{LinearForm, group};
 use super::sampling::slope;
-use super::{All, Impossible};
+use super::{All, ConstraintError};
 use crate::constraints::RowGroup;
 use crate::functions::Basis;
 
@@ -11,7 +11,7 @@ pub(super) fn build(
     j: usize,
     min: Option<f64>,
     max: Option<f64>,
-) -> Result<Vec<RowGroup>, Impossible> {
+) -> Result<Vec<RowGroup>, ConstraintError> {
     let name = all.name(j);
     let forms = slopes(all, j);
     let (low, high) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -31,16 +31,16 @@ pub(super) fn build(
         .collect()
 }
 
-/// The slope of a function: of every cell, of every node for smooth bases, of the line between the
-/// centres of neighbouring cells for functions with jumps.
-pub(super) fn slopes(all: &All<'_>, j: usize) -> Vec<Form> {
+/// Slopes of a function: of every cell, at every node for smooth bases, and between the centres of neighbouring cells for
+/// functions with jumps.
+pub(super) fn slopes(all: &All<'_>, j: usize) -> Vec<LinearForm> {
     let Some(Basis::PiecewiseConstant { knots }) = &all.list[j].basis else {
         return all.sum(&[slope(j, 1.0)], &[]);
     };
     let first = all.functions.ranges()[j].start;
     let difference = |(i, knots): (usize, &[f64])| {
         let distance = 0.5 * (knots[2] - knots[0]);
-        Form {
+        LinearForm {
             entries: vec![
                 (first + i, -1.0 / distance),
                 (first + i + 1, 1.0 / distance),

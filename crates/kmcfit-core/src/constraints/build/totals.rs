@@ -1,12 +1,12 @@
 //! Means and integrals over the record.
 
-use super::form::{Form, group};
-use super::{All, Impossible};
+use super::linear_form::{LinearForm, group};
+use super::{All, ConstraintError};
 use crate::constraints::RowGroup;
 use crate::functions::Basis;
 use crate::system::quadrature::trapezoid_weights;
 
-pub(super) fn mean(all: &All<'_>, j: usize, value: f64) -> Result<RowGroup, Impossible> {
+pub(super) fn mean(all: &All<'_>, j: usize, value: f64) -> Result<RowGroup, ConstraintError> {
     let mut form = total(all, j);
     let share = 1.0 / all.grid.duration();
     form.entries.iter_mut().for_each(|(_, a)| *a *= share);
@@ -15,19 +15,19 @@ pub(super) fn mean(all: &All<'_>, j: usize, value: f64) -> Result<RowGroup, Impo
     group(name, &[form], |_| [value, value])
 }
 
-pub(super) fn integral(all: &All<'_>, j: usize, value: f64) -> Result<RowGroup, Impossible> {
+pub(super) fn integral(all: &All<'_>, j: usize, value: f64) -> Result<RowGroup, ConstraintError> {
     let name = format!("integral of {} = {value}", all.name(j));
     group(name, &[total(all, j)], |_| [value, value])
 }
 
 /// `integral p dt` over the record, exactly.
-fn total(all: &All<'_>, j: usize) -> Form {
+fn total(all: &All<'_>, j: usize) -> LinearForm {
     let function = all.list[j];
     let first = all.functions.ranges()[j].start;
     let weights = trapezoid_weights(all.grid.nodes(), all.grid.step());
     let of_offset = weights.iter().zip(&function.offset).map(|(w, p)| w * p);
     let ends = all.ends();
-    let mut form = Form {
+    let mut form = LinearForm {
         entries: Vec::new(),
         constant: of_offset.sum(),
         time: ends[0],

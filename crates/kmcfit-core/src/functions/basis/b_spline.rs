@@ -1,26 +1,26 @@
 //! Cubic B-splines: smooth functions with local parameters.
 
-use super::knots::Knots;
+use super::knots::KnotSpans;
 use super::space::BasisFunctions;
 
 /// Degree of the pieces.
 const DEGREE: usize = 3;
 
-/// Clamped cubic B-splines: the break points with each end repeated, so that the first and the last
-/// parameter are the values at the ends of the record.
+/// Clamped cubic B-splines: end knots are repeated, so that the first and the last parameter are the values at the ends of the
+/// record.
 pub(super) struct CubicSpline {
-    knots: Knots,
+    knots: KnotSpans,
 }
 
 impl CubicSpline {
-    /// Between `knots` (s).
+    /// Splines with the knots `knots` (s).
     pub fn new(knots: &[f64]) -> Self {
         Self {
-            knots: Knots::new(knots),
+            knots: KnotSpans::new(knots),
         }
     }
 
-    /// Knot `i` of the clamped sequence, in which cell `s` begins at `i = s + DEGREE`.
+    /// Knot `i` of the clamped sequence, in which cell `s` starts at `i = s + DEGREE`.
     fn clamped(&self, i: usize) -> f64 {
         let index = i.saturating_sub(DEGREE).min(self.knots.cells());
         self.knots.times()[index]
@@ -40,7 +40,7 @@ impl BasisFunctions for CubicSpline {
         self.knots.times().to_vec()
     }
 
-    /// The recursion of Cox and de Boor, from degree to degree; its last steps take derivatives:
+    /// Recursion of Cox and de Boor, by degree; its last steps compute derivatives:
     ///
     /// ```text
     /// N_{i,p}  = (t - u_i) / (u_{i+p} - u_i) N_{i,p-1}
@@ -56,7 +56,7 @@ impl BasisFunctions for CubicSpline {
         for degree in 1..=DEGREE {
             let mut raised = [0.0; DEGREE + 1];
             for r in 0..degree {
-                // The function of the degree below whose support is [begin, end].
+                // Function of lower degree with support [begin, end].
                 let i = cell + DEGREE + 1 + r - degree;
                 let (begin, end) = (self.clamped(i), self.clamped(i + degree));
                 let (falling, rising) = match degree <= degree_of_values {

@@ -1,4 +1,4 @@
-//! One value for all times.
+//! Constant basis: one value for all times.
 
 use super::knots::uniform_knots;
 use super::space::BasisFunctions;
@@ -10,7 +10,7 @@ pub(super) struct Constant {
 }
 
 impl Constant {
-    /// On the record.
+    /// The basis on the record.
     pub fn on(grid: &Grid) -> Self {
         Self {
             ends: uniform_knots(grid, 2),

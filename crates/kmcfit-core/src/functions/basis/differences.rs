@@ -1,5 +1,4 @@
-//! Divided differences of values at unequal spacings, as roughness of functions that have no
-//! square-integrable derivative.
+//! Divided differences of values at unequal spacings: roughness of functions without square-integrable derivative.
 
 use crate::rows::Rows;
 

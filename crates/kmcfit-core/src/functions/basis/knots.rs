@@ -2,8 +2,8 @@
 
 use crate::system::Grid;
 
-/// How near a time must be to a knot, relative to the record, to count as being on it: far above
-/// the rounding of node times, far below a step.
+/// Largest distance of a time from a knot, relative to the record, to be taken as the knot: far above rounding errors of node
+/// times, far below a step.
 const SAME_TIME: f64 = 1e-12;
 
 /// `count` equally spaced knots over the record, both ends included, in s.
@@ -23,20 +23,20 @@ pub fn uniform_knots(grid: &Grid, count: usize) -> Vec<f64> {
 
 /// Increasing times and the cells between them.
 #[derive(Debug, Clone)]
-pub(super) struct Knots {
+pub(super) struct KnotSpans {
     times: Vec<f64>,
     widths: Vec<f64>,
     slack: f64,
 }
 
-impl Knots {
+impl KnotSpans {
     /// Cells between `times` (s).
     pub fn new(times: &[f64]) -> Self {
         let widths = times.windows(2).map(|w| w[1] - w[0]).collect();
         Self::with_widths(times.to_vec(), widths)
     }
 
-    /// The steps of the grid as cells, all of exactly the same width.
+    /// Steps of the grid as cells of exactly equal width.
     pub fn nodes(grid: &Grid) -> Self {
         Self::with_widths(grid.times(), vec![grid.step(); grid.nodes() - 1])
     }
@@ -51,12 +51,12 @@ impl Knots {
         }
     }
 
-    /// The times, in s.
+    /// Times of the knots, s.
     pub fn times(&self) -> &[f64] {
         &self.times
     }
 
-    /// The widths of the cells, in s.
+    /// Widths of the cells, s.
     pub fn widths(&self) -> &[f64] {
         &self.widths
     }
@@ -66,7 +66,7 @@ impl Knots {
         self.widths.len()
     }
 
-    /// The cell of a time, the one after it at a knot; and the time moved into the cell.
+    /// Cell of a time, at a knot the one after it; and the time clipped to the cell.
     pub fn locate(&self, t: f64) -> (usize, f64) {
         let passed = self.times.partition_point(|knot| *knot <= t + self.slack);
         let cell = passed.clamp(1, self.cells()) - 1;

@@ -1,6 +1,6 @@
-//! Legendre polynomials and the quadrature on their roots.
+//! Legendre polynomials and Gauss–Legendre quadrature.
 
-/// Newton steps for one point: convergence is quadratic from a start good to a few per cent.
+/// Newton steps per root: convergence is quadratic from a start accurate to a few per cent.
 const NEWTON_STEPS: usize = 8;
 
 /// Points and weights of Gauss-Legendre quadrature on `[-1, 1]`, exact for polynomials of degree `2 points - 1`.
@@ -17,7 +17,7 @@ pub(super) fn gauss_rule(points: usize) -> Vec<(f64, f64)> {
     (0..points).rev().map(point).collect()
 }
 
-/// `d^derivative P_n / dx^derivative` at `x` for `n = 0..=degree`.
+/// Derivatives `d^derivative P_n / dx^derivative` at `x` for `n = 0..=degree`.
 ///
 /// Values by `(n+1) P_{n+1} = (2n+1) x P_n - n P_{n-1}`, derivatives by
 /// `P'_{n+1} = P'_{n-1} + (2n+1) P_n`.

@@ -1,8 +1,7 @@
-//! Bases: each turns parameters `theta` into a function `p(t) = sum_j theta_j b_j(t)` of time.
+//! Bases: representation of a function of time by parameters, `p(t) = sum_j theta_j b_j(t)`.
 //!
-//! What was chosen is a [`Basis`]; how its functions `b_j` behave is in one file per basis. All but
-//! the polynomials are non-negative and sum to one, so that their parameters have the unit and the
-//! size of the function itself.
+//! A [`Basis`] is the choice of a user; its functions `b_j` are in one file per basis. The functions of all bases except
+//! polynomials are nonnegative and sum to one, so that parameters have the unit and magnitude of the function.
 
 mod b_spline;
 mod constant;
@@ -23,12 +22,12 @@ use crate::system::Grid;
 use crate::system::quadrature::trapezoid_weights;
 use space::{BasisFunctions, matrix};
 
-/// How often [`Basis::project`] corrects its solution of the normal equations; the second pass
-/// removes what the first one lost to rounding.
+/// Passes of the iterative refinement of the normal equations in [`Basis::project`]; the second removes the rounding error of
+/// the first.
 const PROJECTION_PASSES: usize = 3;
 
-/// Highest degree on N nodes, over sqrt(N): above it equally spaced nodes cannot tell polynomials
-/// apart in double precision (measured for N from 50 to 1000), and the trial would be expensive.
+/// Highest degree divided by sqrt(N) on N nodes: above it, polynomials on equally spaced nodes are linearly dependent in double
+/// precision (measured for N from 50 to 1000).
 const DEGREE_PER_ROOT_OF_NODES: f64 = 7.0;
 
 /// A finite-dimensional space of functions of time on the record.
@@ -76,7 +75,7 @@ impl Basis {
         }
     }
 
-    /// The functions of this basis on a record: the one place where the kinds are told apart.
+    /// Functions of this basis on a record.
     fn on(&self, grid: &Grid) -> Box<dyn BasisFunctions> {
         match self {
             Basis::Nodal => Box::new(piecewise_linear::PiecewiseLinear::on_nodes(grid)),
@@ -92,7 +91,7 @@ impl Basis {
         }
     }
 
-    /// The highest degree of a polynomial that the nodes of a grid can tell from lower ones.
+    /// Highest degree of a polynomial that is independent of lower ones on the nodes of a grid.
     pub fn highest_degree(grid: &Grid) -> usize {
         let nodes = grid.nodes();
         let stable = DEGREE_PER_ROOT_OF_NODES * (nodes as f64).sqrt();
@@ -112,7 +111,7 @@ impl Basis {
         }
     }
 
-    /// The design matrix `B_ij = b_j(t_i)` at the nodes, `nodes x parameters`; without unit.
+    /// Design matrix `B_ij = b_j(t_i)` at the nodes, `nodes x parameters`; dimensionless.
     pub fn design(&self, grid: &Grid) -> Design {
         match self {
             Basis::Nodal => Design::Identity,
@@ -120,12 +119,10 @@ impl Basis {
         }
     }
 
-    /// `d^q b_j / dt^q` at arbitrary `times` (s) inside the record, `q = derivative`:
-    /// `times.len() x parameters`, in 1/s^q.
+    /// Derivatives `d^q b_j / dt^q` at `times` (s) within the record, `q = derivative`: `times.len() x parameters`, in 1/s^q.
     ///
-    /// Where the derivative jumps it is the one after the time; at the end of the record the one
-    /// before. A node that misses a knot by rounding only counts as being on it. Times outside the
-    /// record are moved to its ends.
+    /// At a jump the value after the time is used, at the end of the record the one before. A time that differs from a knot by
+    /// rounding counts as the knot. Times outside the record are moved to its ends.
     pub fn rows(&self, grid: &Grid, times: &[f64], derivative: usize) -> Rows {
         let space = self.on(grid);
         let row = |t: &f64| (*t, 1.0);
@@ -135,18 +132,16 @@ impl Basis {
     /// The roughness `L` of order `q` in residual form, rows `x parameters`:
     /// `|L theta|^2 = integral (d^q p / dt^q)^2 dt` over the record, in (unit of p)^2 s^(1-2q).
     ///
-    /// Exact for every function of the basis, by Gauss-Legendre quadrature of each cell. Where the
-    /// derivative is not square-integrable — `nodal` and `piecewise-linear` with `q = 2`,
-    /// `piecewise-constant` with `q >= 1` — it is the sum of `h (divided difference)^2` over the
-    /// inner knots (for `piecewise-constant`: of differences between cell centres), `h` the mean of
-    /// the two neighbouring spacings; with equal spacing `h ((p_{j-1} - 2 p_j + p_{j+1}) / h^2)^2`.
-    /// It leaves out the half cell at either end. A derivative that is zero has no rows.
+    /// Exact for every function of the basis, by Gauss–Legendre quadrature of each cell. Where the derivative is not
+    /// square-integrable — `nodal` and `piecewise-linear` with `q = 2`, `piecewise-constant` with `q >= 1` — it is the sum of
+    /// `h (divided difference)^2` over the inner knots (for `piecewise-constant`: of differences between cell centres), `h` the
+    /// mean of the two neighbouring spacings; with equal spacing `h ((p_{j-1} - 2 p_j + p_{j+1}) / h^2)^2`. The half cells at the
+    /// ends are omitted. A derivative that is zero has no rows.
     pub fn roughness(&self, grid: &Grid, order: usize) -> Rows {
         self.on(grid).roughness(order)
     }
 
-    /// Times (s) at which the function may change its formula: the nodes, the knots, or the two
-    /// ends of the record.
+    /// Times (s) at which the formula of the function may change: the nodes, the knots, or the ends of the record.
     pub fn knot_times(&self, grid: &Grid) -> Vec<f64> {
         match self {
             Basis::Nodal => grid.times(),
@@ -157,13 +152,12 @@ impl Basis {
         }
     }
 
-    /// Whether positive parameters make a function positive at all times: all but polynomials of
-    /// degree 1 and more.
+    /// True if positive parameters make the function positive at all times: for all bases except polynomials of degree 1 and more.
     pub fn positive_parameters(&self) -> bool {
         !matches!(self, Basis::Polynomial { degree: 1.. })
     }
 
-    /// The parameters of the constant function `value`.
+    /// Parameters of the constant function `value`.
     pub fn constant(&self, grid: &Grid, value: f64) -> Vec<f64> {
         let mut theta = vec![0.0; self.parameters(grid)];
         match self {
@@ -173,8 +167,8 @@ impl Basis {
         theta
     }
 
-    /// Changes of the function from one knot, cell or node to the next, rows x parameters: the sum
-    /// of their sizes is its total variation.
+    /// Changes of the function between neighbouring knots, cells or nodes, rows x parameters; the sum of their absolute values is
+    /// the total variation.
     pub fn changes(&self, grid: &Grid) -> Rows {
         let knots = self.knot_times(grid);
         let times: Vec<f64> = match self {
@@ -196,9 +190,8 @@ impl Basis {
         changes
     }
 
-    /// The parameters of the function closest to the values `nodal` at the nodes:
-    /// `min sum_i w_i (p(t_i) - nodal_i)^2` with the trapezoid weights `w_i` (s). `None` if the
-    /// nodes cannot tell the functions of the basis apart.
+    /// Parameters of the function closest to the values `nodal` at the nodes, `min sum_i w_i (p(t_i) - nodal_i)^2` with trapezoid
+    /// weights `w_i` (s). `None` if the basis functions are linearly dependent at the nodes.
     ///
     /// # Panics
     /// If there is not one value per node.
@@ -210,7 +203,7 @@ impl Basis {
         let design = self.design(grid);
         let weights = trapezoid_weights(grid.nodes(), grid.step());
         let gram = Gram::new(&design, &weights)?;
-        // From a constant, so that constants come back as they are.
+        // Starting from a constant, which makes constants exact.
         let mut theta = self.constant(grid, nodal[0]);
         let mut correction = theta.clone();
         for _ in 0..PROJECTION_PASSES {

@@ -1,20 +1,20 @@
-//! One value per cell: functions with jumps.
+//! Piecewise constant basis: one value per cell.
 
 use super::differences;
-use super::knots::Knots;
+use super::knots::KnotSpans;
 use super::space::{BasisFunctions, square_integral};
 use crate::rows::Rows;
 
 /// The indicator functions of the cells.
 pub(super) struct PiecewiseConstant {
-    knots: Knots,
+    knots: KnotSpans,
 }
 
 impl PiecewiseConstant {
-    /// Cells between `knots` (s).
+    /// The basis with cells between `knots` (s).
     pub fn new(knots: &[f64]) -> Self {
         Self {
-            knots: Knots::new(knots),
+            knots: KnotSpans::new(knots),
         }
     }
 

@@ -1,28 +1,28 @@
-//! One value per knot, linear in between.
+//! Piecewise linear basis: one value per knot, linear in between.
 
 use super::differences;
-use super::knots::Knots;
+use super::knots::KnotSpans;
 use super::space::{BasisFunctions, square_integral};
 use crate::rows::Rows;
 use crate::system::Grid;
 
 /// Hat functions: 1 at their own knot, 0 at all others.
 pub(super) struct PiecewiseLinear {
-    knots: Knots,
+    knots: KnotSpans,
 }
 
 impl PiecewiseLinear {
-    /// Between `knots` (s).
+    /// The basis with the knots `knots` (s).
     pub fn new(knots: &[f64]) -> Self {
         Self {
-            knots: Knots::new(knots),
+            knots: KnotSpans::new(knots),
         }
     }
 
-    /// Between the nodes of `grid`.
+    /// The basis with the nodes of `grid` as knots.
     pub fn on_nodes(grid: &Grid) -> Self {
         Self {
-            knots: Knots::nodes(grid),
+            knots: KnotSpans::nodes(grid),
         }
     }
 }
@@ -46,7 +46,7 @@ impl BasisFunctions for PiecewiseLinear {
         let (before, after) = (self.knots.times()[cell], self.knots.times()[cell + 1]);
         match derivative {
             0 => {
-                // Exactly 1 at the knot after, whatever the rounding of the width.
+                // Exactly 1 at the next knot, for every rounding of the width.
                 let share = match t < after {
                     true => ((t - before) / width).min(1.0),
                     false => 1.0,

@@ -1,7 +1,7 @@
 //! Polynomials over the whole record, as sums of Legendre polynomials.
 //!
-//! Powers of `t` are nearly dependent from degree 8 or so; Legendre polynomials are orthogonal, and
-//! their Gram matrix has condition `2 degree + 1`.
+//! Powers of `t` are nearly dependent from about degree 8; Legendre polynomials are orthogonal, and their Gram matrix has the
+//! condition number `2 degree + 1`.
 
 use super::knots::uniform_knots;
 use super::legendre::legendre;
@@ -15,7 +15,7 @@ pub(super) struct Legendre {
 }
 
 impl Legendre {
-    /// On the record.
+    /// The basis on the record.
     pub fn on(grid: &Grid, degree: usize) -> Self {
         Self {
             ends: uniform_knots(grid, 2),
@@ -46,10 +46,10 @@ impl BasisFunctions for Legendre {
     }
 }
 
-/// The coefficients `a_0..=a_d` of `p(t) = sum_i a_i t^i` for the Legendre parameters `theta`; `t` in
-/// s as in the file, `a_i` in (unit of p)/s^i.
+/// Coefficients `a_0..=a_d` of `p(t) = sum_i a_i t^i` for the Legendre parameters `theta`; `t` in s as in the file, `a_i` in
+/// (unit of p)/s^i.
 ///
-/// High powers cancel each other: use these numbers for reading, not for computing.
+/// High powers cancel: the coefficients are for reports, not for computation.
 pub fn physical_powers(grid: &Grid, theta: &[f64]) -> Vec<f64> {
     // x = scale t + shift
     let scale = 2.0 / grid.duration();
@@ -76,8 +76,7 @@ pub fn physical_powers(grid: &Grid, theta: &[f64]) -> Vec<f64> {
     sum
 }
 
-/// The Legendre parameters of `p(t) = sum_i powers_i t^i`, `t` in s as in the file: the inverse of
-/// [`physical_powers`].
+/// Legendre parameters of `p(t) = sum_i powers_i t^i`, `t` in s as in the file: the inverse of [`physical_powers`].
 pub fn from_physical_powers(grid: &Grid, powers: &[f64]) -> Vec<f64> {
     // Horner's scheme; t = middle + half x, and x P_n = ((n+1) P_{n+1} + n P_{n-1}) / (2n+1).
     let half = 0.5 * grid.duration();

@@ -1,9 +1,9 @@
-//! The interface of a basis on a record.
+//! Interface of a basis on a record.
 
 use super::legendre;
 use crate::rows::Rows;
 
-/// The functions `b_j` of a basis on a record: polynomials between break points.
+/// Functions `b_j` of a basis on a record: polynomials between break points.
 pub(super) trait BasisFunctions {
     /// Number of functions.
     fn parameters(&self) -> usize;
@@ -14,18 +14,17 @@ pub(super) trait BasisFunctions {
     /// Times (s) between which the functions are polynomials, both ends included.
     fn breaks(&self) -> Vec<f64>;
 
-    /// Appends the index and the `derivative`-th derivative (1/s^derivative) of every function that
-    /// is not zero around the time `t` (s).
+    /// Appends index and `derivative`-th derivative (1/s^derivative) of every function that is nonzero near the time `t` (s).
     fn row(&self, t: f64, derivative: usize, entries: &mut Vec<(usize, f64)>);
 
-    /// The roughness, see [`Basis::roughness`](super::Basis::roughness); as it stands for functions
-    /// whose derivative is square-integrable.
+    /// Roughness rows, see [`Basis::roughness`](super::Basis::roughness); the default is for functions with square-integrable
+    /// derivative.
     fn roughness(&self, order: usize) -> Rows {
         square_integral(self, order)
     }
 }
 
-/// The matrix with one row per time and factor: `factor * d^derivative b_j / dt^derivative`.
+/// Matrix with one row per time and factor: `factor * d^derivative b_j / dt^derivative`.
 pub(super) fn matrix<S: BasisFunctions + ?Sized>(
     space: &S,
     rows: impl Iterator<Item = (f64, f64)>,
@@ -42,8 +41,8 @@ pub(super) fn matrix<S: BasisFunctions + ?Sized>(
     matrix
 }
 
-/// `L` with `|L theta|^2 = integral (d^order p / dt^order)^2 dt`, by the shortest exact Gauss rule:
-/// `degree - order + 1` rows per cell.
+/// Rows `L` with `|L theta|^2 = integral (d^order p / dt^order)^2 dt`, by the shortest exact Gauss rule: `degree - order + 1`
+/// rows per cell.
 pub(super) fn square_integral<S: BasisFunctions + ?Sized>(space: &S, order: usize) -> Rows {
     let Some(rest) = space.degree().checked_sub(order) else {
         return Rows::of_width(space.parameters());

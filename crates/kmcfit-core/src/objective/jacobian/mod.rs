@@ -1,27 +1,27 @@
-//! The derivatives of all predictions with respect to all parameters, from tangents in lanes.
+//! Jacobian of all predictions with respect to all parameters, from forward sensitivities eight directions at a time.
 
-mod moving;
-mod reader;
+mod observation_rows;
+mod sensitivity_layout;
 
 use super::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, LONG_RECORD_STEPS};
 use crate::simd::LANES;
 use crate::simd::sum::are_finite;
-use crate::simd::tall_qr::Piece;
+use crate::simd::tall_qr::RowBlock;
 use crate::simulate::fast::sensitivities::{BaseTrajectory, TILE};
-use moving::Moving;
 use nalgebra::DMatrix;
-use reader::Reader;
+use observation_rows::JacobianRows;
+use sensitivity_layout::SensitivityLayout;
 use std::ops::Range;
 
 impl Problem {
-    /// The change of every prediction (rows: readings of all channels of all experiments, in order)
-    /// along every parameter: [`Problem::predictions_tangent`] of all unit vectors, to rounding.
+    /// Jacobian of the predictions (rows: samples of all channels of all experiments, in order) with respect to the
+    /// parameters: [`Problem::predictions_tangent`] of all unit vectors, to machine precision.
     pub fn predictions_jacobian(&self, evaluation: &Evaluation) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(self.reading_count(), self.parameters());
+        let mut jacobian = DMatrix::zeros(self.sample_count(), self.parameters());
         let order = self.places();
-        self.each_piece(evaluation, &order, |piece| {
+        self.each_row_block(evaluation, &order, |piece| {
             for (place, j) in order.iter().enumerate().take(piece.begun()) {
                 let mut column = jacobian.column_mut(*j);
                 let rows = piece.first..piece.first + piece.count;
@@ -36,10 +36,10 @@ impl Problem {
         }
     }
 
-    /// One direction after the other: for numbers at the ends of their range, where the order of the
-    /// operations decides what is still finite.
+    /// Jacobian by one tangent solve per column, for values near the limits of the floating-point range, where the order of
+    /// operations determines what is finite.
     fn jacobian_by_columns(&self, evaluation: &Evaluation) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(self.reading_count(), self.parameters());
+        let mut jacobian = DMatrix::zeros(self.sample_count(), self.parameters());
         let mut unit = vec![0.0; self.parameters()];
         for (j, mut column) in jacobian.column_iter_mut().enumerate() {
             unit[j] = 1.0;
@@ -54,8 +54,8 @@ impl Problem {
         jacobian
     }
 
-    /// The parameter at each place of the tangents: in the order in which they begin to matter, so that
-    /// those that have not begun cost nothing.
+    /// Parameter of each column of the sensitivities, ordered by the first node that it affects; columns cost nothing before
+    /// that node.
     pub(crate) fn places(&self) -> Vec<usize> {
         let first = self.functions.first_nodes();
         let mut order: Vec<usize> = (0..self.parameters()).collect();
@@ -63,37 +63,36 @@ impl Problem {
         order
     }
 
-    /// Whether the pieces of [`Problem::each_piece`] are all there is to the Jacobian: nothing of a sensor is
-    /// sought, and no channel is filtered.
-    pub(crate) fn comes_in_pieces(&self) -> bool {
+    /// True if the row blocks of [`Problem::each_row_block`] form the complete Jacobian: no sensor parameter is estimated, and no
+    /// channel is filtered.
+    pub(crate) fn is_computed_by_blocks(&self) -> bool {
         let is_plain = |channel: &Channel| {
             channel.filter().is_empty() && channel.sensor().indices().iter().all(Option::is_none)
         };
         self.channels().all(is_plain)
     }
 
-    /// Gives `take` the rows of the Jacobian, some at a time, with the parameters in `order` at their places
-    /// ([`Problem::places`]), and without what the sensors and filters do; it returns the piece, or another one, to
-    /// go on with. The rows of a channel come in their order, those of several channels in turn.
-    pub(crate) fn each_piece(
+    /// Passes the rows of the Jacobian to `take` in blocks, with columns in `order` ([`Problem::places`]) and without the
+    /// contributions of sensors and filters; `take` returns a block to fill next. Rows of one channel come in order, those of
+    /// several channels alternate.
+    pub(crate) fn each_row_block(
         &self,
         evaluation: &Evaluation,
         order: &[usize],
-        mut take: impl FnMut(Piece) -> Piece,
+        mut take: impl FnMut(RowBlock) -> RowBlock,
     ) {
         let mut row = 0;
         for (e, experiment) in self.experiments.iter().enumerate() {
-            if experiment.reading_count() > 0 && !order.is_empty() {
+            if experiment.sample_count() > 0 && !order.is_empty() {
                 let view = self.view(evaluation, e);
                 let all = 0..experiment.nodes - 1;
                 sweep(self, experiment, view, order, row, all, &mut take);
             }
-            row += experiment.reading_count();
+            row += experiment.sample_count();
         }
     }
 
-    /// The step in the middle of the only record of a problem, at the end of a tile; `None` if there are several, or the one
-    /// is short.
+    /// Step in the middle of the only record of a problem, at the end of a tile; `None` for several records or a short one.
     pub(crate) fn middle(&self) -> Option<usize> {
         let [experiment] = self.experiments.as_slice() else {
             return None;
@@ -102,21 +101,21 @@ impl Problem {
         (steps >= LONG_RECORD_STEPS).then(|| steps / 2 / TILE * TILE)
     }
 
-    /// [`Problem::each_piece`] for the readings in some steps of the only record, which begin with a tile, and how
-    /// displacement and velocity at their end answer to each place. Later steps than the first do not know how the
-    /// state that they set out from answers: that state has two places of its own, behind the others.
-    pub(crate) fn each_piece_of_part(
+    /// [`Problem::each_row_block`] for the samples within some steps of the only record, starting with a tile; returns the
+    /// derivatives of displacement and velocity at their end. Steps after the first treat their initial state as two further
+    /// columns, behind the others.
+    pub(crate) fn each_row_block_of_part(
         &self,
         evaluation: &Evaluation,
         order: &[usize],
         steps: Range<usize>,
-        mut take: impl FnMut(Piece) -> Piece,
+        mut take: impl FnMut(RowBlock) -> RowBlock,
     ) -> Vec<[f64; 2]> {
         let (experiment, view) = (&self.experiments[0], self.view(evaluation, 0));
         sweep(self, experiment, view, order, 0, steps, &mut take)
     }
 
-    /// What the sensors that are sought add to a Jacobian, and what the filters make of it.
+    /// Adds the derivatives with respect to sensor parameters to a Jacobian and applies the filters.
     fn add_sensors(&self, evaluation: &Evaluation, jacobian: &mut DMatrix<f64>) {
         let mut row = 0;
         for (e, experiment) in self.experiments.iter().enumerate() {
@@ -129,8 +128,8 @@ impl Problem {
     }
 }
 
-/// Goes through some steps of the motion of one experiment, whose first reading has the row `row`: how displacement and
-/// velocity at the end answer to each place.
+/// Integrates the sensitivities of one experiment over `steps`, with the first sample in row `row`; returns the derivatives
+/// of displacement and velocity at the end.
 fn sweep(
     problem: &Problem,
     experiment: &Experiment,
@@ -138,9 +137,9 @@ fn sweep(
     order: &[usize],
     mut row: usize,
     steps: Range<usize>,
-    take: &mut impl FnMut(Piece) -> Piece,
+    take: &mut impl FnMut(RowBlock) -> RowBlock,
 ) -> Vec<[f64; 2]> {
-    let moving = Moving::new(&problem.functions, order, experiment);
+    let moving = SensitivityLayout::new(&problem.functions, order, experiment);
     let is_later = steps.start > 0;
     let places = order.len() + 2 * usize::from(is_later);
     let mut tangents = match is_later {
@@ -150,29 +149,29 @@ fn sweep(
     let mut readers = Vec::with_capacity(experiment.channels.len());
     for channel in &experiment.channels {
         let first = channel.places().partition_point(|p| p.step < steps.start);
-        let mut piece = Piece::new(places);
+        let mut piece = RowBlock::new(places);
         piece.restart(row + first);
-        readers.push((Reader::new(channel, view, first), piece));
+        readers.push((JacobianRows::new(channel, view, first), piece));
         row += channel.len();
     }
-    let mut give = |piece: &mut Piece| {
+    let mut give = |piece: &mut RowBlock| {
         let next = piece.first + piece.count;
         let full = std::mem::take(piece);
         *piece = take(full);
         piece.restart(next);
     };
-    let course = BaseTrajectory {
+    let base = BaseTrajectory {
         system: view.system,
-        device: view.device,
+        nodal: view.nodal,
         excitation: view.excitation,
-        motion: view.motion,
+        response: view.response,
     };
     let mut from = steps.start;
     let mut last = 0;
     while from < steps.end {
         let to = (from + TILE).min(steps.end);
         moving.fill(&mut tangents, from, from == steps.start);
-        tangents.advance(course, from..to);
+        tangents.advance(base, from..to);
         for (reader, piece) in &mut readers {
             while reader.read(&tangents, from..to, piece) {
                 give(piece);
@@ -193,7 +192,7 @@ fn sweep(
     (0..places).map(end).collect()
 }
 
-/// What the sensor of one channel adds to its rows, from `row` on, and what its filter makes of them.
+/// Adds the derivatives with respect to the sensor parameters of one channel to its rows from `row`, and filters them.
 fn add_sensor(channel: &Channel, view: SimulatedRecord, row: usize, jacobian: &mut DMatrix<f64>) {
     let parameters = jacobian.ncols();
     let scalars = parameters - view.scalars.len();
@@ -230,8 +229,8 @@ mod tests {
 
     const NODES: usize = 70;
 
-    /// Two records of two devices that differ in their stiffness, the second over the first `nodes` nodes of the grid,
-    /// each with a displacement at every third node and `count` accelerations from the first node on.
+    /// Two records with coefficient sets that differ in their stiffness, the second over the first `nodes` nodes of the grid,
+    /// each with a displacement at every third node and `count` accelerations from the first node.
     fn problem(with_knots: bool, nodes: usize, count: usize) -> Problem {
         let grid = Grid::new(0.0, 7.0, NODES).expect("a grid");
         let function = |quantity, knots: u32, start: f64| match with_knots {
@@ -250,20 +249,21 @@ mod tests {
             function(CoefficientKind::Stiffness, 20, 2.0),
             function(CoefficientKind::Stiffness, 20, 3.0),
         ];
-        let devices = vec![vec![0, 1, 2], vec![0, 1, 3]];
-        let functions = Parameterization::with_devices(list, devices, NODES, grid.step());
+        let coefficient_sets = vec![vec![0, 1, 2], vec![0, 1, 3]];
+        let functions =
+            Parameterization::with_coefficient_sets(list, coefficient_sets, NODES, grid.step());
         let force: Vec<f64> = grid.times().iter().map(|t| (3.0 * t).sin()).collect();
-        let record = |device: usize, nodes: usize| {
+        let record = |coefficient_set: usize, nodes: usize| {
             let channel = |kind, at: Vec<usize>| {
                 let times: Vec<f64> = at.iter().map(|i| grid.time(*i)).collect();
                 let values = times.iter().map(|t| (2.0 * t).cos()).collect();
                 let weighting = Weighting::Sigma(0.1);
-                Channel::new(kind, times, values, weighting, &grid, nodes).expect("readings")
+                Channel::new(kind, times, values, weighting, &grid, nodes).expect("samples")
             };
             let accelerations = (0..count.min(nodes)).collect();
             let thirds = (0..nodes).step_by(3).collect();
             Experiment {
-                device,
+                coefficient_set,
                 ..Experiment::free("driven", State::default(), nodes)
                     .with_excitation(Excitation::force_at_nodes(&force))
                     .with_channel(channel(ChannelKind::Acceleration, accelerations))
@@ -279,9 +279,9 @@ mod tests {
         Problem::new(system, functions.expect("functions"), records).unwrap()
     }
 
-    /// Ends of tiles, of lanes and of records; pieces that come back with nothing but rubbish in them.
+    /// Covers the ends of tiles, of lanes and of records, and returned blocks with arbitrary contents.
     #[test]
-    fn pieces_are_the_jacobian_and_it_is_the_gradient_s() {
+    fn row_blocks_form_the_jacobian_that_agrees_with_the_gradient() {
         let lengths = [1, 7, 8, 9, 64, 65, 66, NODES];
         for (with_knots, nodes) in [(true, 5), (true, 65), (false, 9), (false, NODES)] {
             for count in lengths {
@@ -291,7 +291,7 @@ mod tests {
                 let expected = problem.jacobian_by_columns(&evaluation);
                 let order = problem.places();
                 let mut found = DMatrix::zeros(expected.nrows(), expected.ncols());
-                problem.each_piece(&evaluation, &order, |mut piece| {
+                problem.each_row_block(&evaluation, &order, |mut piece| {
                     for (place, j) in order.iter().enumerate() {
                         if place < piece.begun() {
                             let rows = piece.first..piece.first + piece.count;

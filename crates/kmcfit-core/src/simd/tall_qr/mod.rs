@@ -1,14 +1,14 @@
-//! Tall matrices, reduced to triangles some rows at a time.
+//! QR factorisation of tall matrices, block of rows by block of rows.
 
 mod piece;
 mod triangle;
 
 use super::{Aligned, LANES, Row};
-pub(crate) use piece::{PIECE, Piece};
+pub(crate) use piece::{PIECE, RowBlock};
 pub(crate) use triangle::Triangle;
 
-/// Rows of a piece, in lanes: with 34 columns they fill the processor's nearest memory.
+/// Rows of a block in units of SIMD rows; with 34 columns a block fills the first-level cache.
 const HIGH: usize = 12;
 
-/// A column of a piece.
-type Column = Aligned<[Row; HIGH]>;
+/// A column of a block of rows.
+type BlockColumn = Aligned<[Row; HIGH]>;

@@ -1,25 +1,25 @@
-//! Some rows of a tall matrix.
+//! A block of rows of a tall matrix.
 
-use super::{Aligned, Column, HIGH, LANES};
+use super::{Aligned, BlockColumn, HIGH, LANES};
 
-/// Most rows of a piece.
+/// Largest number of rows of a block.
 pub(crate) const PIECE: usize = HIGH * LANES;
 
-/// Up to [`PIECE`] rows, column by column; what is below them means nothing.
+/// Up to [`PIECE`] rows, column by column; entries below the last row are undefined.
 #[derive(Default)]
-pub(crate) struct Piece {
-    /// Which row of the matrix the first one is.
+pub(crate) struct RowBlock {
+    /// Index of the first row in the matrix.
     pub first: usize,
     /// Number of rows.
     pub count: usize,
-    /// Columns that have begun: what stands behind them means nothing, and stands for zeros.
+    /// Number of columns with nonzero entries so far; later columns are undefined and count as zero.
     begun: usize,
-    /// A column at each place, and one to spare.
-    pub(super) columns: Vec<Column>,
+    /// The columns, and a spare one.
+    pub(super) columns: Vec<BlockColumn>,
 }
 
-impl Piece {
-    /// One without rows, for so many places, that have all begun with zeros.
+impl RowBlock {
+    /// An empty block with `places` columns of zeros.
     pub fn new(places: usize) -> Self {
         Self {
             first: 0,
@@ -29,18 +29,18 @@ impl Piece {
         }
     }
 
-    /// No rows, and zeros everywhere.
+    /// Removes all rows and sets all entries to zero.
     pub fn clear(&mut self) {
         (self.count, self.begun) = (0, self.places());
         self.columns.fill(Aligned([[0.0; LANES]; HIGH]));
     }
 
-    /// No rows, and no column has begun; the first row will be row `first` of the matrix.
+    /// Removes all rows and columns; the next row is row `first` of the matrix.
     pub fn restart(&mut self, first: usize) {
         (self.first, self.count, self.begun) = (first, 0, 0);
     }
 
-    /// So many columns have begun: those that had not are zero so far.
+    /// Extends the block to `begun` columns; new ones are zero so far.
     pub fn widen(&mut self, begun: usize) {
         for column in self
             .columns
@@ -53,32 +53,32 @@ impl Piece {
         self.begun = self.begun.max(begun);
     }
 
-    /// How many columns have begun.
+    /// Number of columns in use.
     pub fn begun(&self) -> usize {
         self.begun
     }
 
-    /// How many rows there is room for.
+    /// Number of free rows.
     pub fn room(&self) -> usize {
         PIECE - self.count.min(PIECE)
     }
 
-    /// Whether there is none.
+    /// True without free rows.
     pub fn is_full(&self) -> bool {
         self.room() == 0
     }
 
-    /// Number of places.
+    /// Number of columns.
     pub fn places(&self) -> usize {
         self.columns.len().saturating_sub(1)
     }
 
-    /// The rows of a column.
+    /// Rows of a column.
     pub fn column(&self, place: usize) -> &[f64] {
         &self.columns[place].as_flattened()[..self.count]
     }
 
-    /// The column at a place, with room for [`PIECE`] rows.
+    /// A column, with space for [`PIECE`] rows.
     #[inline(always)]
     pub fn column_mut(&mut self, place: usize) -> &mut [f64; PIECE] {
         let flat = self.columns[place].as_flattened_mut();

@@ -1,30 +1,28 @@
-//! The triangular factor of a tall matrix, by Householder reflections of some rows at a time.
+//! Triangular factor of a tall matrix, by Householder reflections of blocks of rows.
 //!
-//! The rows are taken in pieces that stay in the processor's nearest memory; each is reflected into the
-//! triangle of all rows before it. A parameter that the first readings do not see stays out of the way
-//! until it is seen: the columns are taken in the order in which they begin.
+//! Blocks fit into the first-level cache; each is reflected into the triangle of all previous rows. Columns are ordered by their first
+//! nonzero row, so that columns without entries so far cost nothing.
 
-use super::{Column, HIGH, LANES, PIECE, Piece, Row};
+use super::{BlockColumn, HIGH, LANES, PIECE, Row, RowBlock};
 use crate::simd::{self, Arithmetic, Eight, Kernel};
 use nalgebra::DMatrix;
 
-/// Columns that are reflected at once.
+/// Number of columns reflected together.
 const WIDE: usize = LANES;
 
-/// `|D A x - d|^2 = |R x - b|^2 + rest^2` with diagonal `D`.
+/// Reduced least-squares problem `|D A x - d|^2 = |R x - b|^2 + rest^2` with diagonal `D`.
 #[derive(Clone)]
 pub(crate) struct Triangle {
-    /// Rows of `R`, each with its `b` behind the columns that have begun.
+    /// Rows of `R`, each followed by its entry of `b`.
     rows: Vec<Vec<f64>>,
-    /// Columns that have begun, or stand before one that has.
+    /// Number of columns up to the last one with nonzero entries.
     begun: usize,
-    /// The square of the rest.
+    /// Squared norm of the rest.
     rest: f64,
 }
 
 impl Triangle {
-    /// Of no rows yet, with so many columns. Best in the order in which they begin: those behind the last one that
-    /// has cost nothing.
+    /// Empty triangle with `columns` columns, best ordered by their first nonzero row.
     pub fn new(columns: usize) -> Self {
         Self {
             rows: vec![vec![0.0; columns + 1]; columns],
@@ -33,7 +31,7 @@ impl Triangle {
         }
     }
 
-    /// From `A`, the diagonal `roots` of `D`, and `d`; with the column of `A` that each column of `R` is.
+    /// Triangle of `A`, the diagonal `roots` of `D`, and `d`; also returns the column of `A` for each column of `R`.
     pub fn of(matrix: &DMatrix<f64>, roots: &[f64], right: &[f64]) -> (Self, Vec<usize>) {
         let height = matrix.nrows();
         let columns: Vec<&[f64]> = matrix.as_slice().chunks_exact(height.max(1)).collect();
@@ -41,7 +39,7 @@ impl Triangle {
         let mut order: Vec<usize> = (0..columns.len()).collect();
         order.sort_by_key(|j| begins[*j]);
         let mut triangle = Self::new(order.len());
-        let mut piece = Piece::new(order.len());
+        let mut piece = RowBlock::new(order.len());
         while piece.first < height {
             let rows = piece.first..(piece.first + PIECE).min(height);
             piece.count = rows.len();
@@ -55,8 +53,8 @@ impl Triangle {
         (triangle, order)
     }
 
-    /// Adds the rows of a piece, with `D` and `d` for each; what the piece holds then means nothing.
-    pub fn add_weighted(&mut self, piece: &mut Piece, roots: &[f64], right: &[f64]) {
+    /// Adds the rows of a block, with `D` and `d` for each; the contents of the block are then undefined.
+    pub fn add_weighted(&mut self, piece: &mut RowBlock, roots: &[f64], right: &[f64]) {
         let places = self.begin(piece);
         simd::run(Weigh {
             columns: &mut piece.columns[..places],
@@ -65,14 +63,14 @@ impl Triangle {
         self.reflect(piece, right);
     }
 
-    /// As [`Triangle::add_weighted`] with ones for `D`.
-    pub fn add(&mut self, piece: &mut Piece, right: &[f64]) {
+    /// [`Triangle::add_weighted`] with `D = 1`.
+    pub fn add(&mut self, piece: &mut RowBlock, right: &[f64]) {
         self.begin(piece);
         self.reflect(piece, right);
     }
 
-    /// Takes in the columns that begin in a piece: how many have.
-    fn begin(&mut self, piece: &mut Piece) -> usize {
+    /// Adds the columns that start in a block; returns the number of columns in use.
+    fn begin(&mut self, piece: &mut RowBlock) -> usize {
         let any = |part: &[f64]| part.iter().fold(false, |any, a| any | (*a != 0.0));
         let has_begun = |place: &usize| piece.column(*place).chunks(4 * LANES).any(any);
         let last = (self.begun..piece.begun()).rev().find(has_begun);
@@ -81,9 +79,9 @@ impl Triangle {
         self.begun
     }
 
-    fn reflect(&mut self, piece: &mut Piece, right: &[f64]) {
+    fn reflect(&mut self, piece: &mut RowBlock, right: &[f64]) {
         let columns = &mut piece.columns[..=self.begun];
-        // The right-hand side behind the columns that have begun: the others are zero.
+        // The right-hand side follows the columns in use; the others are zero.
         let to = columns[self.begun].as_flattened_mut();
         match (to.first_chunk_mut::<PIECE>(), right.first_chunk::<PIECE>()) {
             (Some(to), Some(right)) => *to = *right,
@@ -92,13 +90,13 @@ impl Triangle {
         for column in columns.iter_mut() {
             column.as_flattened_mut()[right.len()..].fill(0.0);
         }
-        simd::run(Reflect {
+        simd::run(BlockReflection {
             triangle: self,
             piece: columns,
         });
     }
 
-    /// More columns begin: until now there is nothing in them.
+    /// Adds columns, which are zero so far.
     fn widen(&mut self, begun: usize) {
         for row in &mut self.rows[..self.begun] {
             let b = std::mem::take(&mut row[self.begun]);
@@ -107,7 +105,7 @@ impl Triangle {
         self.begun = begun;
     }
 
-    /// Rows of `R` with entries, and `b`.
+    /// Nonempty rows of `R`, with `b`.
     pub fn rows(&self) -> impl Iterator<Item = (impl Iterator<Item = (usize, f64)>, f64)> {
         let rows = self.rows[..self.begun].iter().enumerate();
         rows.map(|(i, row)| {
@@ -117,11 +115,11 @@ impl Triangle {
         })
     }
 
-    /// Adds the rows of another triangle, whose columns, places `0..n` and two more, answer to those of this one by `1`, and
-    /// by `states` those two.
+    /// Adds the rows of another triangle, whose columns are those of this one and two more, which are the combinations `states` of the
+    /// columns of this one.
     pub fn join(&mut self, other: &Triangle, states: &[[f64; 2]]) {
         let n = self.rows.len();
-        let mut piece = Piece::new(n);
+        let mut piece = RowBlock::new(n);
         piece.restart(0);
         piece.count = other.begun;
         piece.widen(n);
@@ -142,7 +140,7 @@ impl Triangle {
         self.rest += other.rest;
     }
 
-    /// `R' b`, which is `(D A)' d`.
+    /// Products `R' b = (D A)' d`.
     pub fn products(&self) -> Vec<f64> {
         let mut products = vec![0.0; self.rows.len()];
         for (entries, b) in self.rows() {
@@ -153,9 +151,8 @@ impl Triangle {
         products
     }
 
-    /// The triangle of the same matrix beside another right-hand side, of which the products `(D A)' d` and the square
-    /// `|d|^2` are known; `None` if these belong to another matrix, of which they explain more than there is, or a column is
-    /// zero beside those before it.
+    /// Triangle of the same matrix with another right-hand side, given by its products `(D A)' d` and its square `|d|^2`; `None` if these
+    /// are inconsistent with the matrix (a negative rest), or a column is linearly dependent.
     pub fn beside(mut self, products: &[f64], square: f64) -> Option<Self> {
         let n = self.rows.len();
         let mut explained = 0.0;
@@ -169,7 +166,7 @@ impl Triangle {
         (self.begun == n && self.is_finite() && self.rest >= 0.0).then_some(self)
     }
 
-    /// The `x` with `R x = b`; `None` if a column has less than the share `independent` of its length to itself.
+    /// Solution of `R x = b`; `None` if the independent part of a column is below the share `independent` of its length.
     pub fn solve(&self, independent: f64) -> Option<Vec<f64>> {
         let n = self.rows.len();
         (self.begun == n).then_some(())?;
@@ -186,18 +183,18 @@ impl Triangle {
         x.iter().all(|x| x.is_finite()).then_some(x)
     }
 
-    /// What no `x` can change, as a length.
+    /// Norm of the rest.
     pub fn rest(&self) -> f64 {
         self.rest.sqrt()
     }
 
-    /// Whether all numbers are.
+    /// True if all numbers are finite.
     pub fn is_finite(&self) -> bool {
         self.rest.is_finite() && self.rows.iter().flatten().all(|r| r.is_finite())
     }
 }
 
-/// The first row of a column that is not zero; its length if there is none.
+/// First nonzero row of a column; its length if there is none.
 fn begin(column: &[f64]) -> usize {
     let (eights, rest) = column.as_chunks::<LANES>();
     let is_zero = |eight: &Row| eight.iter().fold(true, |all, a| all & (*a == 0.0));
@@ -209,7 +206,7 @@ fn begin(column: &[f64]) -> usize {
 
 /// Multiplies the rows of columns by their `roots`.
 struct Weigh<'a> {
-    columns: &'a mut [Column],
+    columns: &'a mut [BlockColumn],
     roots: &'a [f64],
 }
 
@@ -229,13 +226,13 @@ impl Kernel for Weigh<'_> {
     }
 }
 
-/// Reflects a piece, its right-hand side last, into the triangle.
-struct Reflect<'a> {
+/// Reflects a block, its right-hand side last, into the triangle.
+struct BlockReflection<'a> {
     triangle: &'a mut Triangle,
-    piece: &'a mut [Column],
+    piece: &'a mut [BlockColumn],
 }
 
-impl Kernel for Reflect<'_> {
+impl Kernel for BlockReflection<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -250,7 +247,7 @@ impl Kernel for Reflect<'_> {
             }
             let row = &mut self.triangle.rows[k];
             let norm = (row[k] * row[k] + square).sqrt();
-            // Away from zero, so that nothing cancels.
+            // The sign avoids cancellation.
             let corner = if row[k] > 0.0 { -norm } else { norm };
             let reflector = Reflector {
                 column,
@@ -281,9 +278,9 @@ impl Kernel for Reflect<'_> {
     }
 }
 
-/// `1 - factor (top, column) (top, column)'`.
+/// Reflection `1 - factor (top, column) (top, column)'`.
 struct Reflector<'a> {
-    column: &'a Column,
+    column: &'a BlockColumn,
     top: f64,
     factor: f64,
 }
@@ -293,7 +290,7 @@ impl Reflector<'_> {
     fn reflect<A: Arithmetic, const J: usize>(
         &self,
         arithmetic: A,
-        columns: &mut [Column],
+        columns: &mut [BlockColumn],
         tops: &mut [f64],
     ) {
         let Some(columns) = columns.first_chunk_mut::<J>() else {
@@ -332,7 +329,7 @@ impl Reflector<'_> {
 }
 
 #[inline(always)]
-fn dot<A: Arithmetic>(arithmetic: A, a: &Column, b: &Column) -> f64 {
+fn dot<A: Arithmetic>(arithmetic: A, a: &BlockColumn, b: &BlockColumn) -> f64 {
     let mut sums = [Eight::splat(arithmetic, 0.0); 4];
     for h in 0..HIGH {
         sums[h % 4] += Eight::load(arithmetic, &a[h]) * Eight::load(arithmetic, &b[h]);
@@ -352,7 +349,7 @@ mod tests {
 
     const ROWS: usize = 2 * PIECE + 37;
 
-    /// A matrix of which the columns begin one after the other, not in their order; weights; right-hand side.
+    /// A matrix whose columns start at different rows, in another order; weights; right-hand side.
     fn problem() -> (DMatrix<f64>, Vec<f64>, Vec<f64>) {
         let begins = [PIECE + 5, 0, 90, 3, PIECE];
         let entry = |i: usize, j: usize| match i < begins[j] {
@@ -366,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn it_has_the_minimum_of_the_tall_matrix() {
+    fn the_triangle_has_the_minimum_of_the_tall_matrix() {
         let (matrix, roots, right) = problem();
         let (triangle, order) = Triangle::of(&matrix, &roots, &right);
         assert_eq!(order, [1, 3, 2, 4, 0]);
@@ -386,9 +383,9 @@ mod tests {
         assert!(triangle.is_finite());
     }
 
-    /// The right-hand side by its products and its square; no side explains more than its square.
+    /// A right-hand side given by its products and its square; inconsistent values are rejected.
     #[test]
-    fn another_side_of_the_same_matrix() {
+    fn another_right_hand_side_of_the_same_matrix_is_reduced() {
         let (matrix, roots, right) = problem();
         let other: Vec<f64> = right.iter().map(|x| x * x - 0.3).collect();
         let (expected, order) = Triangle::of(&matrix, &roots, &other);
@@ -405,13 +402,13 @@ mod tests {
         assert!(wider.beside(&expected.products(), square).is_none());
     }
 
-    /// However the rows are cut into pieces, to rounding.
+    /// Every division of the rows into blocks gives the same result, to rounding.
     #[test]
-    fn short_pieces_are_as_good() {
+    fn the_result_does_not_depend_on_the_blocks() {
         let (matrix, roots, right) = problem();
         let (whole, order) = Triangle::of(&matrix, &roots, &right);
         let mut parts = Triangle::new(order.len());
-        let mut piece = Piece::new(order.len());
+        let mut piece = RowBlock::new(order.len());
         let mut first = 0;
         for count in (1..).take_while(|count| *count < 100) {
             let rows = first..(first + count).min(ROWS);
@@ -437,7 +434,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_determined_is_not_solved() {
+    fn undetermined_columns_have_no_solution() {
         let (mut matrix, roots, right) = problem();
         let sum = matrix.column(1) + matrix.column(3);
         matrix.set_column(2, &sum);

@@ -1,10 +1,10 @@
-//! Eq. 13 with its coefficients formed eight steps at a time.
+//! Continuous adjoint (Eq. 13) with its coefficients computed eight steps at a time.
 
 use super::padded_loads::places;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::reference::{Adjoint, AdjointEquation};
 
-/// [`AdjointEquation::solve`], to the bit.
+/// [`AdjointEquation::solve`], bit-identical.
 pub(crate) fn solve(equation: &AdjointEquation) -> Adjoint {
     let lists = equation.functions.each_ref().map(|f| &**f);
     let mut z = vec![0.0; lists[0].len()];
@@ -19,30 +19,30 @@ pub(crate) fn solve(equation: &AdjointEquation) -> Adjoint {
     }
 }
 
-/// Functions of time that a step back needs.
+/// Number of functions of time in a step.
 const LISTS: usize = 8;
 
-/// The way back. What a step needs and does not wait for is made for eight steps at a time, in lanes, between the steps
-/// of the eight before, each of which waits for the one before it: so it takes no time of its own.
+/// Backward integration. The coefficients of eight steps are computed in SIMD lanes while the previous eight steps, which
+/// depend on each other, are integrated.
 struct Sweep<'a> {
     dt: f64,
-    /// `m`, `m'`, `m''`, `C`, `C'`, `K`, `y` and `y_obs` at the nodes.
+    /// Nodal values of `m`, `m'`, `m''`, `C`, `C'`, `K`, `y` and `y_obs`.
     lists: [&'a [f64]; LISTS],
-    /// The adjoint displacement at the nodes.
+    /// Adjoint displacement at the nodes.
     z: &'a mut [f64],
 }
 
-/// What eight steps need, each at its right node and at mid-step: `m`, `C - 2 m'`, `m'' - C' + K` and `2 (y - y_obs) / m`.
+/// Coefficients of eight steps, at the right node and at mid-step: `m`, `C - 2 m'`, `m'' - C' + K` and `2 (y - y_obs) / m`.
 #[repr(align(64))]
-struct Coefficients {
+struct StageCoefficients {
     mass: Row,
     damping: Row,
     stiffness: Row,
     source: Row,
 }
 
-impl Coefficients {
-    /// `z''` of step `j` at `(z, w) = (z, z')`.
+impl StageCoefficients {
+    /// Second derivative `z''` in step `j` at `(z, w) = (z, z')`.
     #[inline(always)]
     fn slope(&self, j: usize, w: f64, z: f64) -> f64 {
         let m = self.mass[j];
@@ -51,7 +51,7 @@ impl Coefficients {
 }
 
 impl Kernel for Sweep<'_> {
-    /// `z'` at the first node.
+    /// Slope `z'` at the first node.
     type Output = f64;
 
     #[inline(always)]
@@ -82,18 +82,18 @@ impl Kernel for Sweep<'_> {
     }
 }
 
-/// Values at the right nodes of the eight steps from `first` on, and their means with those at the left nodes.
+/// Values at the right nodes of the eight steps from `first` on, and means with those at the left nodes.
 #[inline(always)]
 fn right_and_middle<A: Arithmetic>(arithmetic: A, f: &[f64], first: usize) -> [Eight<A>; 2] {
     let [_, middle, right] = places(arithmetic, f, first);
     [right, middle]
 }
 
-/// What eight steps need at one place, from the values there, in the order of [`Sweep::lists`].
+/// Coefficients of eight steps at one stage, from the values there, in the order of [`Sweep::lists`].
 #[inline(always)]
-fn coefficients<A: Arithmetic>(values: [Eight<A>; LISTS]) -> Coefficients {
+fn coefficients<A: Arithmetic>(values: [Eight<A>; LISTS]) -> StageCoefficients {
     let [m, m1, m2, c, c1, k, y, observed] = values;
-    Coefficients {
+    StageCoefficients {
         mass: m.row(),
         damping: (c - (m1 + m1)).row(),
         stiffness: (m2 - c1 + k).row(),

@@ -1,16 +1,16 @@
-//! The responses of the elements in eight lanes.
+//! Element responses `phi(y, v)` and their derivatives in eight SIMD lanes.
 
 use crate::simd::{Arithmetic, Eight, LANES};
 use crate::system::Term;
 
-/// A response and its derivatives with respect to displacement and velocity.
+/// Element response with its derivatives with respect to displacement and velocity.
 pub(super) struct Response<A: Arithmetic> {
     pub phi: Eight<A>,
     pub by_y: Derivative<A>,
     pub by_v: Derivative<A>,
 }
 
-/// A derivative, of which the plainest need no product.
+/// A derivative; zero and one need no product.
 pub(super) enum Derivative<A: Arithmetic> {
     Zero,
     One,
@@ -18,7 +18,7 @@ pub(super) enum Derivative<A: Arithmetic> {
 }
 
 impl<A: Arithmetic> Derivative<A> {
-    /// `sum - p` times this.
+    /// Difference `sum - p` times the derivative.
     #[inline(always)]
     pub fn taken_from(self, sum: Eight<A>, p: Eight<A>) -> Eight<A> {
         match self {
@@ -63,7 +63,7 @@ impl Term {
         }
     }
 
-    /// Absolute values and square roots, lane by lane.
+    /// Terms with absolute values and square roots, lane by lane.
     #[inline(always)]
     fn one_by_one<A: Arithmetic>(self, arithmetic: A, y: Eight<A>, v: Eight<A>) -> Response<A> {
         let (y, v) = (y.row(), v.row());
@@ -80,7 +80,7 @@ impl Term {
     }
 }
 
-/// Evaluates an expression with the list of terms as a constant where it is one of the usual lists, so that the compiler
+/// Evaluates an expression with the list of terms as a compile-time constant for common lists, so that the compiler
 /// unrolls the loop over it; the second name is the largest number of terms.
 macro_rules! with_known {
     ($terms:expr, $known:ident, $most:ident => $call:expr) => {

@@ -1,7 +1,7 @@
-//! Specialisations of [`reference`](super::reference): vector arithmetic, parallel in time, batches of steps.
+//! Specialisations of [`reference`](super::reference): SIMD arithmetic, parallel-in-time blocks, batches of steps.
 //!
-//! Each states which reference function it equals and to what tolerance; `tests.rs` holds it to that over random
-//! systems, records, steppers and excitations. [`Engine`](super::Engine) chooses among them.
+//! Each module states its reference function and the tolerance of agreement; `tests.rs` checks it over random systems,
+//! records, steppers and excitations. [`Engine`](super::Engine) chooses among them.
 
 pub(crate) mod blocks;
 pub(crate) mod continuous_adjoint;

@@ -1,4 +1,4 @@
-//! Accelerations at eight neighbouring nodes, as an accelerometer sampled with the grid measures them:
+//! Accelerations at eight neighbouring nodes, the samples of an accelerometer on the grid. Agrees with
 //! [`observe`](crate::simulate::reference::observe()) to some machine precisions.
 
 use super::elements::with_known;
@@ -7,11 +7,11 @@ use crate::simd::{Arithmetic, Eight, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::system::{FUNCTIONS, MOST_TERMS, NodalCoefficients, System, Term};
 
-/// Accelerations at eight nodes and their derivatives, one node a lane.
+/// Accelerations at eight nodes and their derivatives, one node per lane.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
 pub(crate) struct Accelerations {
-    /// The accelerations of `y`, relative to the base.
+    /// Accelerations `y''`, relative to the base.
     pub value: Row,
     /// Derivatives with respect to displacement and velocity at the node.
     pub states: [Row; 2],
@@ -31,13 +31,13 @@ impl Accelerations {
 #[derive(Clone, Copy)]
 pub(crate) struct NodalObservations<'a> {
     pub system: &'a System,
-    pub device: &'a NodalCoefficients,
+    pub nodal: &'a NodalCoefficients,
     pub states: &'a Trajectory,
 }
 
 impl NodalObservations<'_> {
-    /// The accelerations at eight nodes from node `i` on, with force and acceleration of the base at each; lanes
-    /// beyond the last node mean nothing.
+    /// Accelerations at eight nodes from node `i`, with force and acceleration of the base at each; lanes beyond the last node
+    /// are undefined.
     #[inline(always)]
     pub fn accelerations<A: Arithmetic>(
         &self,
@@ -64,12 +64,12 @@ impl NodalObservations<'_> {
         let (zero, one) = (Eight::splat(arithmetic, 0.0), Eight::splat(arithmetic, 1.0));
         let y = padded_loads::eight(arithmetic, &self.states.displacement, i);
         let v = padded_loads::eight(arithmetic, &self.states.velocity, i);
-        let per_mass = one / padded_loads::eight(arithmetic, &self.device.mass, i);
+        let per_mass = one / padded_loads::eight(arithmetic, &self.nodal.mass, i);
         let minus_per_mass = -per_mass;
         let mut push = force;
         let [mut by_y, mut by_v] = [zero; 2];
         for (j, term) in terms.iter().enumerate().take(TERMS) {
-            let p = &self.device.coefficients[j];
+            let p = &self.nodal.coefficients[j];
             let p = padded_loads::eight(arithmetic, p, i);
             let response = term.respond(arithmetic, y, v);
             push = push - p * response.phi;

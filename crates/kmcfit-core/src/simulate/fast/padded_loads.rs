@@ -1,9 +1,9 @@
-//! Eight neighbouring values of what is known at the nodes or over the steps.
+//! Loads of eight neighbouring nodal or stage values into SIMD lanes, padded at the end of the data.
 
 use crate::simd::{Arithmetic, Eight, LANES, Row, window};
 use crate::system::StageSamples;
 
-/// Values `i`, `i + 1`, ...; beyond the end the last one, for lanes that nobody asks.
+/// Values `i` to `i + 7`; lanes beyond the end repeat the last value.
 #[inline(always)]
 pub(crate) fn eight<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> Eight<A> {
     let inside = values.get(i..).and_then(<[f64]>::first_chunk::<LANES>);
@@ -13,7 +13,7 @@ pub(crate) fn eight<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> E
     }
 }
 
-/// A function at the left ends, middles and right ends of the steps `i`, `i + 1`, ...
+/// Values of a function at the left ends, middles and right ends of the steps `i` to `i + 7`.
 #[inline(always)]
 pub(crate) fn places<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> [Eight<A>; 3] {
     let left = eight(arithmetic, values, i);
@@ -21,7 +21,7 @@ pub(crate) fn places<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> 
     [left, (right + left) * Eight::splat(arithmetic, 0.5), right]
 }
 
-/// One by the mass at the places of [`places`]; by a single division where the mass is constant.
+/// Inverse mass at the stages of [`places`]; by a single division where the mass is constant.
 #[inline(always)]
 pub(crate) fn per_mass<A: Arithmetic>(arithmetic: A, mass: &[f64], i: usize) -> [Eight<A>; 3] {
     let steps = &mass[i..mass.len().min(i + LANES + 1)];
@@ -35,14 +35,14 @@ pub(crate) fn per_mass<A: Arithmetic>(arithmetic: A, mass: &[f64], i: usize) -> 
     places
 }
 
-/// Whether all values are the same.
+/// True if all values are equal.
 #[inline(always)]
 pub(crate) fn is_constant(values: &[f64]) -> bool {
     values.iter().fold(true, |same, x| same & (*x == values[0]))
 }
 
-/// The steps `i`, `i + 1`, ... at their left ends, middles and right ends; zero for `None`, and beyond the end the last
-/// step, for lanes that nobody asks.
+/// Stage values of the steps `i` to `i + 7` at left ends, middles and right ends; zero for `None`. Lanes beyond the end
+/// repeat the last step.
 #[inline(always)]
 pub(crate) fn stepwise<A: Arithmetic>(
     arithmetic: A,

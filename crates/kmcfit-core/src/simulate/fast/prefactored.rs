@@ -1,7 +1,8 @@
-//! The response with prefactored stages: each function divided by the mass, and the input, times the step and the
-//! tableau's factors, are formed eight steps at a time. The rest of a step are products and sums of its states, in
-//! an order with few dependencies: a stage's velocity waits for four operations on the displacement of the stage
-//! before.
+//! Forward solve with prefactored stages.
+//!
+//! The quotients of each function and the mass, and the input, times the step and the factors of the tableau, are computed
+//! eight steps at a time. A step then consists of products and sums, ordered for short chains of dependent operations: the
+//! velocity of a stage follows by four operations from the displacement of the previous one.
 
 use super::padded_loads;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
@@ -9,8 +10,8 @@ use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::system::{MIDPOINT, MOST_TERMS, Method, RK4, State, Tableau, Term};
 
-/// [`forward_into`](crate::simulate::reference::forward_into()), to 40 machine precisions of the largest value for each
-/// step. `false` if a kind of term is there twice: then nothing is done.
+/// Forward solve; agrees with [`forward_into`](crate::simulate::reference::forward_into()) to 40 machine precisions of the
+/// largest value per step. Returns `false`, without a response, if a kind of term occurs twice.
 pub(crate) fn forward(
     equation: EquationOfMotion,
     method: Method,
@@ -27,7 +28,7 @@ pub(crate) fn forward(
         Term::CoulombFriction { width } => Some(*width),
         _ => None,
     });
-    simd::run(Forward {
+    simd::run(PrefactoredForward {
         equation,
         method,
         kinds,
@@ -45,7 +46,7 @@ const OFFSET: usize = 3;
 const QUADRATIC_DAMPING: usize = 4;
 const COULOMB_FRICTION: usize = 5;
 
-/// The kinds of terms of a linear system, and of one with a cubic spring besides.
+/// Kinds of terms of a linear system, and of one with a cubic spring.
 const LINEAR: [bool; MOST_TERMS] = kinds(&[STIFFNESS, DAMPING]);
 const CUBIC: [bool; MOST_TERMS] = kinds(&[STIFFNESS, DAMPING, CUBIC_STIFFNESS]);
 
@@ -70,11 +71,11 @@ fn place(term: Term) -> usize {
     }
 }
 
-/// Most stages of a tableau.
+/// Largest number of stages of a tableau.
 const STAGES: usize = 4;
 
-/// `h p/m` of each kind of term, and `h (f/m - b'')`, over eight steps; `h` is the step times a factor of
-/// the tableau.
+/// Rates `h p/m` of each kind of term, and `h (f/m - b'')`, over eight steps; `h` is the step times a factor of the
+/// tableau.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Rates {
@@ -102,24 +103,24 @@ const NOTHING: StageRates = {
     }
 };
 
-struct Forward<'a> {
+struct PrefactoredForward<'a> {
     equation: EquationOfMotion<'a>,
     method: Method,
-    /// The term of each kind.
+    /// Index of the term of each kind.
     kinds: [Option<usize>; MOST_TERMS],
     width: f64,
     initial: State,
     trajectory: &'a mut Trajectory,
 }
 
-impl Kernel for Forward<'_> {
+impl Kernel for PrefactoredForward<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) {
         let there = self.kinds.map(|kind| kind.is_some());
         match (self.method, there) {
-            // Such lists are known when this is compiled.
+            // Compile-time constants for common lists.
             (Method::Midpoint, LINEAR) => self.sweep(arithmetic, &MIDPOINT, LINEAR),
             (Method::Rk4, LINEAR) => self.sweep(arithmetic, &RK4, LINEAR),
             (Method::Rk4, CUBIC) => self.sweep(arithmetic, &RK4, CUBIC),
@@ -129,7 +130,7 @@ impl Kernel for Forward<'_> {
     }
 }
 
-impl Forward<'_> {
+impl PrefactoredForward<'_> {
     #[inline(always)]
     fn sweep<A: Arithmetic, const S: usize>(
         self,
@@ -137,21 +138,21 @@ impl Forward<'_> {
         tableau: &Tableau<S>,
         there: [bool; MOST_TERMS],
     ) {
-        let device = self.equation.device;
-        let is_constant = |j: usize| padded_loads::is_constant(&device.coefficients[j]);
-        let has_constant_mass = padded_loads::is_constant(&device.mass);
+        let nodal = self.equation.nodal;
+        let is_constant = |j: usize| padded_loads::is_constant(&nodal.coefficients[j]);
+        let has_constant_mass = padded_loads::is_constant(&nodal.mass);
         let mut steady = [false; MOST_TERMS];
         for (steady, kind) in steady.iter_mut().zip(&self.kinds) {
             *steady = has_constant_mass && kind.is_some_and(is_constant);
         }
         let mut stages = [NOTHING; STAGES];
         let (mut y, mut v) = (self.initial.displacement, self.initial.velocity);
-        let motion = &mut *self.trajectory;
-        let steps = motion.nodes() - 1;
-        (motion.displacement[0], motion.velocity[0]) = (y, v);
+        let response = &mut *self.trajectory;
+        let steps = response.nodes() - 1;
+        (response.displacement[0], response.velocity[0]) = (y, v);
         let mut from = 0;
         while from < steps {
-            let per_mass = padded_loads::per_mass(arithmetic, &device.mass, from);
+            let per_mass = padded_loads::per_mass(arithmetic, &nodal.mass, from);
             prepare_drive(
                 arithmetic,
                 tableau,
@@ -162,11 +163,11 @@ impl Forward<'_> {
             );
             for (k, (kind, steady)) in self.kinds.iter().zip(steady).enumerate() {
                 if let Some(j) = *kind {
-                    // Rates of constants are those of the first eight steps.
+                    // Constant functions keep the rates of the first eight steps.
                     if from > 0 && steady {
                         continue;
                     }
-                    let values = &self.equation.device.coefficients[j];
+                    let values = &self.equation.nodal.coefficients[j];
                     prepare(
                         arithmetic,
                         tableau,
@@ -180,9 +181,9 @@ impl Forward<'_> {
                 }
             }
             let to = (from + LANES).min(steps);
-            let ends = motion.displacement[from + 1..=to]
+            let ends = response.displacement[from + 1..=to]
                 .iter_mut()
-                .zip(&mut motion.velocity[from + 1..=to]);
+                .zip(&mut response.velocity[from + 1..=to]);
             for (l, (end_y, end_v)) in ends.enumerate() {
                 let l = l & (LANES - 1);
                 step(
@@ -202,11 +203,11 @@ impl Forward<'_> {
     }
 }
 
-/// The rates of a kind of term from its function, over the steps from `i` on.
+/// Rates of a kind of term from its function, over the steps from `i`.
 #[inline(always)]
 #[allow(
     clippy::too_many_arguments,
-    reason = "rows go where they stay, and nowhere between"
+    reason = "rows are written in place, without copies"
 )]
 fn prepare<A: Arithmetic, const S: usize>(
     arithmetic: A,
@@ -230,7 +231,7 @@ fn prepare<A: Arithmetic, const S: usize>(
     }
 }
 
-/// What drives the steps from `i` on.
+/// Input of the steps from `i`.
 #[inline(always)]
 fn prepare_drive<A: Arithmetic, const S: usize>(
     arithmetic: A,
@@ -260,8 +261,8 @@ fn prepare_drive<A: Arithmetic, const S: usize>(
     }
 }
 
-/// The step times what the acceleration of stage `s` counts for the next stage, the only one that sees
-/// it, and for the end of the step.
+/// Factors of the acceleration of stage `s` in the next stage, the only one that depends on it, and at the end of the step,
+/// times the step.
 #[inline(always)]
 fn factors<const S: usize>(tableau: &Tableau<S>, dt: f64, s: usize) -> [f64; 2] {
     let next = if s + 1 < S { tableau.a[s + 1][s] } else { 0.0 };
@@ -270,8 +271,8 @@ fn factors<const S: usize>(tableau: &Tableau<S>, dt: f64, s: usize) -> [f64; 2] 
 
 /// One step, in lane `l` of the rates.
 ///
-/// Sums are in the order in which their parts become known: the displacement of a stage before its velocity, and
-/// at the first stage before the velocity that the step starts from.
+/// Sums follow the order in which their terms become available: the displacement of a stage before its velocity, and at the
+/// first stage before the initial velocity.
 #[inline(always)]
 #[allow(
     clippy::too_many_arguments,
@@ -312,7 +313,7 @@ fn step<const S: usize>(
     (*y, *v) = (y_end, v_end);
 }
 
-/// What each term multiplies its function by, at one stage; for the cubic stiffness the square alone.
+/// Factor `phi` of each function at one stage; for the cubic stiffness the square alone.
 #[derive(Clone, Copy)]
 struct Phi([f64; MOST_TERMS]);
 
@@ -335,7 +336,7 @@ impl Phi {
         Self(phi)
     }
 
-    /// `sum` and what the displacement brings.
+    /// Adds the forces that depend on the displacement to `sum`.
     #[inline(always)]
     fn pushed(self, rates: &Rates, there: [bool; MOST_TERMS], l: usize, sum: f64) -> f64 {
         let Self(phi) = self;
@@ -346,14 +347,14 @@ impl Phi {
             }
         }
         if there[CUBIC_STIFFNESS] {
-            // In pairs, of which neither waits for the other.
+            // In independent pairs.
             let slope = rates.kinds[CUBIC_STIFFNESS][l] * phi[STIFFNESS];
             sum -= slope * phi[CUBIC_STIFFNESS];
         }
         sum
     }
 
-    /// `sum` and what the velocity brings.
+    /// Adds the forces that depend on the velocity to `sum`.
     #[inline(always)]
     fn damped(self, rates: &Rates, there: [bool; MOST_TERMS], l: usize, sum: f64) -> f64 {
         let mut sum = sum;
@@ -372,9 +373,10 @@ mod tests {
     use crate::simulate::{Engine, reference};
     use crate::system::{Excitation, Grid, NodalCoefficients, System};
 
-    /// What is constant is made once, and only that: each function in turn changes after the first eight steps.
+    /// Rates of constants are computed once, those of varying functions anew: each function in turn varies after the first
+    /// eight steps.
     #[test]
-    fn functions_that_are_constant_at_first() {
+    fn functions_that_vary_after_the_first_eight_steps_are_recomputed() {
         let system = System {
             grid: Grid::new(0.0, 2.0, 41).expect("a grid"),
             method: Method::Rk4,
@@ -397,17 +399,16 @@ mod tests {
                 };
                 (0..41).map(|i| value + grows(i)).collect()
             };
-            let device = NodalCoefficients {
+            let nodal = NodalCoefficients {
                 mass: values(0, 1.2),
                 coefficients: vec![values(1, 0.3), values(2, 5.0), values(3, 2.0)],
             };
             let zeros = || Trajectory::zeros(41);
             let (mut fast, mut plain, drive) = (zeros(), zeros(), Some(&excitation));
             Engine::Prefactored
-                .forward_into(&system, &device, initial, drive, &mut fast)
+                .forward_into(&system, &nodal, initial, drive, &mut fast)
                 .expect("a motion");
-            reference::forward_into(&system, &device, initial, drive, &mut plain)
-                .expect("a motion");
+            reference::forward_into(&system, &nodal, initial, drive, &mut plain).expect("a motion");
             let pairs = (fast.displacement.iter().zip(&plain.displacement))
                 .chain(fast.velocity.iter().zip(&plain.velocity));
             for (fast, plain) in pairs {

@@ -1,24 +1,22 @@
-//! Forward sensitivities: tangents along many directions at once, eight in the lanes of a group.
+//! Forward sensitivities: tangents along many directions, eight per group in SIMD lanes.
 //!
-//! Each equals [`tangent`](crate::simulate::reference::tangent()) to 40 machine precisions of the largest value for each
-//! step.
-//! The linearised steps, which the directions share, are computed once, in eight steps at a time. The
-//! motion is gone through in tiles of [`TILE`] steps, so that neither the directions nor the tangents
-//! are ever in memory as a whole.
+//! Each agrees with [`tangent`](crate::simulate::reference::tangent()) to 40 machine precisions of the largest value per
+//! step. The directions share the linearised steps, which are computed eight at a time. Integration proceeds in tiles of
+//! [`TILE`] steps, so that neither directions nor tangents are stored for the whole record.
 
-use super::step_linearisation::{self, StepLinearisation, Wanted};
+use super::step_linearisation::{self, RequestedDerivatives, StepLinearisation};
 use crate::simd::{self, Aligned, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::system::{Excitation, FUNCTIONS, Method, NodalCoefficients, System};
 use std::ops::Range;
 
-/// Steps of a tile.
+/// Steps per tile.
 pub(crate) const TILE: usize = 64;
-/// Nodes of a tile: its last node is the first of the next.
+/// Nodes per tile; the last node is the first of the next tile.
 pub(crate) const TILE_NODES: usize = TILE + 1;
 
-/// A function of the device that changes along directions of a group.
+/// A function that varies along directions of a group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Slot {
     /// Group of directions.
@@ -27,62 +25,63 @@ pub(crate) struct Slot {
     pub function: usize,
 }
 
-/// A constant that changes along one direction of a group: by how much.
+/// Perturbation of a constant function along one direction of a group.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Steady {
-    /// The direction's lane.
+pub(crate) struct ConstantPerturbation {
+    /// Lane of the direction.
     pub lane: usize,
-    /// The change, at every node.
+    /// Perturbation, equal at all nodes.
     pub value: f64,
 }
 
-/// What a slot's function does in a tile.
+/// Perturbation of a function in a tile.
 #[derive(Clone, Copy)]
-pub(crate) struct Change<'a> {
-    /// The function, mass first.
+pub(crate) struct FunctionPerturbation<'a> {
+    /// Function, mass first.
     pub function: usize,
-    /// Its changes at the nodes of the tile.
+    /// Perturbations at the nodes of the tile.
     pub rows: &'a [Row; TILE_NODES],
-    /// What they are, if they are the same everywhere.
-    pub steady: Option<Steady>,
+    /// Constant perturbation, if equal at all nodes.
+    pub steady: Option<ConstantPerturbation>,
 }
 
-impl Change<'_> {
-    /// Whether it is not that of a constant.
+impl FunctionPerturbation<'_> {
+    /// True unless the perturbation is constant.
     pub fn varies(&self) -> bool {
         self.steady.is_none()
     }
 }
 
-/// The tangents at the nodes of one tile.
+/// Tangents at the nodes of one tile.
 pub(crate) struct Tangents {
     slots: Vec<Slot>,
     of_group: Vec<Range<usize>>,
     changes: Vec<Aligned<[Row; TILE_NODES]>>,
-    /// Whether a slot's function changes in this tile.
+    /// True for slots whose function is perturbed in this tile.
     moves: Vec<bool>,
-    /// The slots whose functions change by the same in all tiles.
-    steady: Vec<Option<Steady>>,
+    /// Constant perturbations of slots.
+    steady: Vec<Option<ConstantPerturbation>>,
     states: Vec<Aligned<[[Row; 2]; TILE_NODES]>>,
-    /// Whether a group has been anything but zero.
+    /// True for groups with nonzero tangents.
     begun: Vec<bool>,
-    /// What constants push displacement and velocity of each group by in eight steps: one direction a row.
+    /// Contributions of constant perturbations to displacement and velocity of each group over eight steps, one direction per
+    /// row.
     held: Vec<Aligned<[[Row; LANES]; 2]>>,
     maps: StepLinearisation,
 }
 
-/// The response about which tangents are taken.
+/// Response about which tangents are computed.
 #[derive(Clone, Copy)]
 pub(crate) struct BaseTrajectory<'a> {
     pub system: &'a System,
-    pub device: &'a NodalCoefficients,
+    pub nodal: &'a NodalCoefficients,
     pub excitation: Option<&'a Excitation>,
-    pub motion: &'a Trajectory,
+    pub response: &'a Trajectory,
 }
 
 impl Tangents {
-    /// Tangents that start from `initial` (displacement and velocity of each group), with the functions
-    /// of `slots`, which must be in the order of their groups.
+    /// Tangents from the initial perturbations `initial` (displacement and velocity of each group), with the functions of
+    /// `slots`, ordered by group.
     pub fn new(slots: Vec<Slot>, initial: &[[Row; 2]]) -> Self {
         let groups = 0..initial.len();
         let range = |g: usize| {
@@ -107,7 +106,7 @@ impl Tangents {
         }
     }
 
-    /// A slot's function does not change in the tile to come.
+    /// Marks a slot's function as unperturbed in the next tile.
     pub fn rest(&mut self, slot: usize) {
         if self.moves[slot] {
             self.changes[slot].fill([0.0; LANES]);
@@ -115,59 +114,59 @@ impl Tangents {
         }
     }
 
-    /// The change of a slot's function at the nodes of the tile to come, along each direction of its group.
+    /// Perturbation of a slot's function at the nodes of the next tile, for each direction of its group.
     pub fn changes_mut(&mut self, slot: usize) -> &mut [Row; TILE_NODES] {
         self.moves[slot] = true;
         &mut self.changes[slot]
     }
 
-    /// A slot's function changes by the same at all nodes, along one direction only.
-    pub fn hold(&mut self, slot: usize, steady: Steady) {
+    /// Sets an equal perturbation of a slot's function at all nodes, along one direction.
+    pub fn hold(&mut self, slot: usize, steady: ConstantPerturbation) {
         let mut row = [0.0; LANES];
         row[steady.lane] = steady.value;
         self.changes_mut(slot).fill(row);
         self.steady[slot] = Some(steady);
     }
 
-    /// The functions that change along a direction of a group.
-    pub fn changes(&self, group: usize) -> impl Iterator<Item = Change<'_>> {
+    /// Perturbed functions of a group.
+    pub fn changes(&self, group: usize) -> impl Iterator<Item = FunctionPerturbation<'_>> {
         let slots = self.of_group[group].clone();
         let moving = slots.filter(|slot| self.moves[*slot]);
-        moving.map(|slot| Change {
+        moving.map(|slot| FunctionPerturbation {
             function: self.slots[slot].function,
             rows: &self.changes[slot],
             steady: self.steady[slot],
         })
     }
 
-    /// Whether the tangents of a group have been anything but zero.
+    /// True if the tangents of a group are nonzero at some node so far.
     pub fn has_begun(&self, group: usize) -> bool {
         self.begun[group]
     }
 
-    /// The groups up to the last one that has been anything but zero.
+    /// Number of groups up to the last one with nonzero tangents.
     pub fn begun_groups(&self) -> usize {
         let last = self.begun.iter().rposition(|begun| *begun);
         last.map_or(0, |last| last + 1)
     }
 
-    /// Displacement and velocity at the nodes of the tile, along each direction of a group.
+    /// Displacement and velocity at the nodes of the tile, for each direction of a group.
     pub fn states(&self, group: usize) -> &[[Row; 2]; TILE_NODES] {
         &self.states[group]
     }
 
-    /// Goes on by a tile: over the steps `steps`, at most [`TILE`] and not the same as before.
-    pub fn advance(&mut self, course: BaseTrajectory, steps: Range<usize>) {
+    /// Integrates over the next tile, the steps `steps` (at most [`TILE`], each once).
+    pub fn advance(&mut self, base: BaseTrajectory, steps: Range<usize>) {
         let BaseTrajectory {
             system,
-            device,
+            nodal,
             excitation,
-            motion,
-        } = course;
+            response,
+        } = base;
         simd::run(Advance {
-            equation: EquationOfMotion::new(system, device, excitation, motion.nodes()),
+            equation: EquationOfMotion::new(system, nodal, excitation, response.nodes()),
             method: system.method,
-            motion,
+            response,
             steps,
             tangents: self,
         });
@@ -177,7 +176,7 @@ impl Tangents {
 struct Advance<'a> {
     equation: EquationOfMotion<'a>,
     method: Method,
-    motion: &'a Trajectory,
+    response: &'a Trajectory,
     steps: Range<usize>,
     tangents: &'a mut Tangents,
 }
@@ -195,7 +194,7 @@ impl Kernel for Advance<'_> {
                 .any(|slot| tangents.moves[slot]);
         }
         let (first, count) = (self.steps.start, self.steps.len().min(TILE));
-        let mut wanted = Wanted::default();
+        let mut wanted = RequestedDerivatives::default();
         for (slot, steady) in tangents.slots.iter().zip(&tangents.steady) {
             match steady {
                 Some(_) => wanted.sum[slot.function] = true,
@@ -208,7 +207,7 @@ impl Kernel for Advance<'_> {
                 arithmetic,
                 self.method,
                 &self.equation,
-                self.motion,
+                self.response,
                 first + from,
                 &wanted,
                 &mut tangents.maps,
@@ -262,13 +261,13 @@ impl Kernel for Advance<'_> {
     }
 }
 
-/// The pushes of eight steps, one a lane, to the direction along which a constant changes.
+/// Contributions of eight steps, one per lane, along the direction in which a constant varies.
 #[inline(always)]
 fn hold<A: Arithmetic>(
     arithmetic: A,
     maps: &StepLinearisation,
     function: usize,
-    steady: Steady,
+    steady: ConstantPerturbation,
     held: &mut [[Row; LANES]; 2],
 ) {
     let change = Eight::splat(arithmetic, steady.value);
@@ -278,18 +277,18 @@ fn hold<A: Arithmetic>(
     }
 }
 
-/// The functions that change along the directions of a group.
+/// Perturbed functions of a group.
 #[derive(Clone, Copy)]
 struct Pushes<'a> {
-    /// What constants push displacement and velocity by in each step.
+    /// Contributions of constants to displacement and velocity in each step.
     held: &'a [[Row; LANES]; 2],
-    /// The slots of all other functions.
+    /// Slots of all other functions.
     moving: &'a [usize],
     slots: &'a [Slot],
     changes: &'a [Aligned<[Row; TILE_NODES]>],
 }
 
-/// Carries a group over up to eight steps.
+/// Integrates a group over up to eight steps.
 #[inline(always)]
 fn carry<A: Arithmetic>(
     arithmetic: A,

@@ -1,29 +1,28 @@
-//! The discrete adjoint with its steps linearised eight at a time: the motion is known, so only two
-//! products of a step wait for the step after it.
+//! The discrete adjoint with steps linearised eight at a time. The response is known, so only two products of a step depend
+//! on the following step.
 
-use super::step_linearisation::{self, StepLinearisation, Wanted};
+use super::step_linearisation::{self, RequestedDerivatives, StepLinearisation};
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::simulate::{CoefficientGradient, Trajectory};
 use crate::system::{FUNCTIONS, Method, NodalCoefficients, State, SystemTangent};
 
-/// As [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()), to 40 machine precisions of the largest
-/// value for each step; not finite where a product of this order
-/// of operations leaves the range of numbers.
+/// Adjoint; agrees with [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) to 40 machine precisions of
+/// the largest value per step. Not finite where a product in this order of operations exceeds the floating-point range.
 pub(crate) fn gradient(
     equation: EquationOfMotion,
     method: Method,
     trajectory: &Trajectory,
     source: &Trajectory,
 ) -> SystemTangent {
-    let mut device = NodalCoefficients::zeros(equation.device.mass.len(), equation.terms.len());
-    let gradient = CoefficientGradient::AtNodes(&mut device);
+    let mut nodal = NodalCoefficients::zeros(equation.nodal.mass.len(), equation.terms.len());
+    let gradient = CoefficientGradient::AtNodes(&mut nodal);
     let initial = back(equation, method, trajectory, source, gradient);
-    SystemTangent { device, initial }
+    SystemTangent { nodal, initial }
 }
 
-/// Goes back through a motion: the gradient with respect to the initial state. That with respect to the functions is
-/// added to the sums in `gradient`, or is written to the nodes there, which must be zero.
+/// Integrates the adjoint backwards; returns the gradient with respect to the initial state. The gradient with respect to
+/// the functions is added to the sums in `gradient`, or written to its nodal values, which must be zero.
 pub(crate) fn back(
     equation: EquationOfMotion,
     method: Method,
@@ -57,7 +56,7 @@ impl Kernel for Back<'_> {
         let mut gradient = self.gradient;
         let mut sums = [[0.0; LANES]; FUNCTIONS];
         let last = self.trajectory.nodes() - 1;
-        let mut wanted = Wanted::default();
+        let mut wanted = RequestedDerivatives::default();
         let asked = match &gradient {
             CoefficientGradient::AtNodes(_) => &mut wanted.ends,
             CoefficientGradient::Summed(_) => &mut wanted.sum,
@@ -77,13 +76,13 @@ impl Kernel for Back<'_> {
                 &wanted,
                 &mut maps,
             );
-            // The adjoint at the right node of each step; zero where there is no step.
+            // Adjoint at the right node of each step; zero for lanes without a step.
             let mut ends = [[0.0; LANES]; 2];
             let [[yy, yv], [vy, vv]] = &maps.growth;
             for i in (from..to).rev() {
                 let l = i - from;
                 (ends[0][l], ends[1][l]) = (x[0], x[1]);
-                // In pairs, of which neither waits for the other.
+                // In independent pairs.
                 x = [
                     (x[0] + vy[l] * x[1]) + (source.displacement[i] + yy[l] * x[0]),
                     (x[1] + yv[l] * x[0]) + (source.velocity[i] + vv[l] * x[1]),
@@ -95,10 +94,10 @@ impl Kernel for Back<'_> {
             ];
             for (f, sum) in sums.iter_mut().enumerate().take(1 + equation.terms.len()) {
                 match &mut gradient {
-                    CoefficientGradient::AtNodes(device) => {
+                    CoefficientGradient::AtNodes(nodal) => {
                         let left = share(arithmetic, &maps.left[f], ends);
                         let right = share(arithmetic, &maps.right[f], ends);
-                        let values = &mut device.function_mut(f)[from..];
+                        let values = &mut nodal.function_mut(f)[from..];
                         set(arithmetic, left, right, to - from, values);
                     }
                     CoefficientGradient::Summed(_) => {
@@ -121,14 +120,14 @@ impl Kernel for Back<'_> {
     }
 }
 
-/// The shares of eight steps in the gradient of a function, from the answers to it.
+/// Contributions of eight steps to the gradient of a function.
 #[inline(always)]
 fn share<A: Arithmetic>(arithmetic: A, answers: &[Row; 2], ends: [Eight<A>; 2]) -> Eight<A> {
     Eight::load(arithmetic, &answers[0]) * ends[0] + Eight::load(arithmetic, &answers[1]) * ends[1]
 }
 
-/// Writes the shares of up to eight steps to the gradient of a function, from their first node on. It is called from
-/// the last steps to the first: the node after these has the share of the step that follows, the others have none yet.
+/// Writes the contributions of up to eight steps to the gradient of a function, from their first node. Calls proceed from
+/// the last steps to the first: the node after these holds the contribution of the following step, the others are zero.
 #[inline(always)]
 fn set<A: Arithmetic>(
     arithmetic: A,
@@ -138,7 +137,7 @@ fn set<A: Arithmetic>(
     gradient: &mut [f64],
 ) {
     let right = right.row();
-    // The share of the step before a node.
+    // Contribution of the step before a node.
     let mut before = [0.0; LANES];
     before[1..].copy_from_slice(&right[..LANES - 1]);
     let nodes = (left + Eight::load(arithmetic, &before)).row();

@@ -1,4 +1,4 @@
-//! Eight steps linearised at once: the response is known, so no step waits for the one before.
+//! Linearisation of eight steps at a time about a known response.
 
 use super::elements::with_known;
 use super::padded_loads;
@@ -6,20 +6,20 @@ use crate::simd::{Arithmetic, Eight, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
 use crate::system::{
-    FUNCTIONS, MIDPOINT, MOST_TERMS, Method, Position, RK4, StageSamples, Tableau, Term,
+    FUNCTIONS, MIDPOINT, MOST_TERMS, Method, RK4, StagePosition, StageSamples, Tableau, Term,
 };
 
-/// Derivatives of the states at the right nodes of eight steps, one step a lane. The index after the function is the
-/// one of the right node's state (displacement, velocity).
+/// Derivatives of the states at the right nodes of eight steps, one step per lane. The last index is the component of the
+/// state at the right node (displacement, velocity).
 #[repr(align(64))]
 pub(super) struct StepLinearisation {
-    /// With respect to displacement and velocity at the left node, less the identity.
+    /// With respect to displacement and velocity at the left node, minus the identity.
     pub growth: [[Row; 2]; 2],
     /// With respect to each function's value at the left node, mass first.
     pub left: [[Row; 2]; FUNCTIONS],
     /// With respect to each function's value at the right node.
     pub right: [[Row; 2]; FUNCTIONS],
-    /// With respect to each function that has the same value everywhere.
+    /// With respect to a value equal at both nodes.
     pub sum: [[Row; 2]; FUNCTIONS],
 }
 
@@ -34,14 +34,14 @@ impl StepLinearisation {
 
 /// Requested derivatives, mass first.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Wanted {
+pub(super) struct RequestedDerivatives {
     /// With respect to the values at both nodes.
     pub ends: [bool; FUNCTIONS],
-    /// With respect to one value for both.
+    /// With respect to a value equal at both nodes.
     pub sum: [bool; FUNCTIONS],
 }
 
-/// A function at the three [`Position`]s of eight steps.
+/// Values of a function at the three [`StagePosition`]s of eight steps.
 #[derive(Clone, Copy)]
 struct Places<A: Arithmetic>([Eight<A>; 3]);
 
@@ -57,12 +57,13 @@ impl<A: Arithmetic> Places<A> {
     }
 
     #[inline(always)]
-    fn at(&self, position: Position) -> Eight<A> {
+    fn at(&self, position: StagePosition) -> Eight<A> {
         self.0[position as usize]
     }
 }
 
-/// Linearises the steps `i` to `i + 7` of a response for the functions that are `wanted`: [`step_jacobians`](crate::simulate::reference::step_jacobians()) to machine precision.
+/// Linearises the steps `i` to `i + 7` of a response for the functions `wanted`; agrees with
+/// [`step_jacobians`](crate::simulate::reference::step_jacobians()) to machine precision.
 #[inline(always)]
 #[allow(
     clippy::too_many_arguments,
@@ -72,22 +73,22 @@ pub(super) fn linearise<A: Arithmetic>(
     arithmetic: A,
     method: Method,
     equation: &EquationOfMotion,
-    motion: &Trajectory,
+    response: &Trajectory,
     i: usize,
-    wanted: &Wanted,
+    wanted: &RequestedDerivatives,
     maps: &mut StepLinearisation,
 ) {
     let terms = equation.terms;
     with_known!(terms, terms, TERMS => match method {
         Method::Midpoint => {
             let stages = StageDerivatives::<A, 2, TERMS>::new(
-                arithmetic, &MIDPOINT, terms, equation, motion, i,
+                arithmetic, &MIDPOINT, terms, equation, response, i,
             );
             stages.transpose(arithmetic, &MIDPOINT, terms.len(), equation.dt, wanted, maps);
         }
         Method::Rk4 => {
             let stages = StageDerivatives::<A, 4, TERMS>::new(
-                arithmetic, &RK4, terms, equation, motion, i,
+                arithmetic, &RK4, terms, equation, response, i,
             );
             stages.transpose(arithmetic, &RK4, terms.len(), equation.dt, wanted, maps);
         }
@@ -113,21 +114,21 @@ impl<A: Arithmetic, const S: usize, const TERMS: usize> StageDerivatives<A, S, T
         tableau: &Tableau<S>,
         terms: &[Term],
         equation: &EquationOfMotion,
-        motion: &Trajectory,
+        response: &Trajectory,
         i: usize,
     ) -> Self {
         let zero = Eight::splat(arithmetic, 0.0);
-        let per_mass = Places(padded_loads::per_mass(arithmetic, &equation.device.mass, i));
+        let per_mass = Places(padded_loads::per_mass(arithmetic, &equation.nodal.mass, i));
         let input = equation.excitation;
         let force = Places::stepwise(arithmetic, input.and_then(|e| e.force.as_ref()), i);
         let base = Places::stepwise(arithmetic, input.and_then(|e| e.base.as_ref()), i);
         let mut functions = [Places([zero; 3]); TERMS];
-        let coefficients = equation.device.coefficients.iter().take(terms.len());
+        let coefficients = equation.nodal.coefficients.iter().take(terms.len());
         for (places, values) in functions.iter_mut().zip(coefficients) {
             *places = Places::of(arithmetic, values, i);
         }
-        let y0 = padded_loads::eight(arithmetic, &motion.displacement, i);
-        let v0 = padded_loads::eight(arithmetic, &motion.velocity, i);
+        let y0 = padded_loads::eight(arithmetic, &response.displacement, i);
+        let v0 = padded_loads::eight(arithmetic, &response.velocity, i);
         let [mut v, mut a] = [[zero; S]; 2];
         let mut stages = Self {
             by_y: [zero; S],
@@ -166,7 +167,7 @@ impl<A: Arithmetic, const S: usize, const TERMS: usize> StageDerivatives<A, S, T
         stages
     }
 
-    /// The derivatives of the state at the right node, from each of its components back through the stages.
+    /// Derivatives of each component of the state at the right node, backwards through the stages.
     #[inline(always)]
     fn transpose(
         &self,
@@ -174,7 +175,7 @@ impl<A: Arithmetic, const S: usize, const TERMS: usize> StageDerivatives<A, S, T
         tableau: &Tableau<S>,
         terms: usize,
         dt: f64,
-        wanted: &Wanted,
+        wanted: &RequestedDerivatives,
         maps: &mut StepLinearisation,
     ) {
         let zero = Eight::splat(arithmetic, 0.0);
@@ -240,9 +241,9 @@ fn at_ends<A: Arithmetic, const S: usize>(
     let [mut left, mut middle, mut right] = [Eight::splat(arithmetic, 0.0); 3];
     for (s, stage) in stages.into_iter().enumerate() {
         match tableau.position[s] {
-            Position::Left => left += stage,
-            Position::Middle => middle += stage,
-            Position::Right => right += stage,
+            StagePosition::Left => left += stage,
+            StagePosition::Middle => middle += stage,
+            StagePosition::Right => right += stage,
         }
     }
     middle = middle * Eight::splat(arithmetic, 0.5);

@@ -1,8 +1,8 @@
-//! Every specialisation against its reference function, over random systems, records, steppers and excitations.
+//! Agreement of every specialisation with its reference function, over random systems, records, steppers and excitations.
 
 use super::continuous_adjoint;
 use super::nodal_observations::{Accelerations, NodalObservations};
-use super::sensitivities::{BaseTrajectory, Slot, Steady, TILE, Tangents};
+use super::sensitivities::{BaseTrajectory, ConstantPerturbation, Slot, TILE, Tangents};
 use super::step_batch::{LaneLayout, SearchRay, StepBatch, reconstruct};
 use crate::record::ChannelKind;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
@@ -19,18 +19,18 @@ use proptest::prelude::*;
 #[path = "../../../tests/common/properties.rs"]
 mod properties;
 
-/// Largest difference of two responses or gradients, in machine precisions of the largest value, for each step: each
-/// step rounds some ten operations, and what they lose is carried along.
+/// Largest difference of two responses or gradients per step, in machine precisions of the largest value: each step rounds
+/// about ten operations, and the errors accumulate.
 const PER_STEP: f64 = 40.0;
 
 /// A random system with a random record.
 #[derive(Debug, Clone)]
 struct Case {
     system: System,
-    device: NodalCoefficients,
+    nodal: NodalCoefficients,
     excitation: Option<Excitation>,
     initial: State,
-    /// Numbers in (-1, 1), three a node.
+    /// Random numbers in (-1, 1), three per node.
     numbers: Vec<f64>,
 }
 
@@ -44,11 +44,11 @@ impl Case {
     }
 
     fn response(&self) -> Trajectory {
-        reference::forward(&self.system, &self.device, self.initial, self.excitation())
+        reference::forward(&self.system, &self.nodal, self.initial, self.excitation())
             .expect("a response")
     }
 
-    /// The `which`-th series of random numbers, one a node.
+    /// Series `which` of random numbers, one per node.
     fn series(&self, which: usize) -> Vec<f64> {
         let nodes = self.nodes();
         (0..nodes)
@@ -68,7 +68,7 @@ impl Case {
         Engine::choose(system, excitation, self.nodes(), Purpose::Estimation)
     }
 
-    /// Whether two series agree.
+    /// Checks that two series agree.
     fn agree(&self, a: &[f64], b: &[f64]) -> Result<(), TestCaseError> {
         let largest = |f: &mut dyn Iterator<Item = f64>| f.fold(0.0f64, |m, x| m.max(x.abs()));
         let scale = largest(&mut b.iter().copied());
@@ -87,7 +87,7 @@ impl Case {
     }
 
     fn agree_gradients(&self, a: &SystemTangent, b: &SystemTangent) -> Result<(), TestCaseError> {
-        let pairs = a.device.functions().zip(b.device.functions());
+        let pairs = a.nodal.functions().zip(b.nodal.functions());
         pairs.into_iter().try_for_each(|(a, b)| self.agree(a, b))?;
         let list = |s: State| [s.displacement, s.velocity];
         self.agree(&list(a.initial), &list(b.initial))
@@ -123,7 +123,7 @@ fn range(term: Option<&Term>) -> std::ops::Range<f64> {
     }
 }
 
-/// A function: one value a node, or a constant.
+/// A function: nodal values, or a constant.
 fn function(range: std::ops::Range<f64>, nodes: usize) -> impl Strategy<Value = Vec<f64>> {
     prop_oneof![
         prop::collection::vec(range.clone(), nodes),
@@ -160,7 +160,7 @@ fn case_of(
                 let mut functions = functions.into_iter();
                 Case {
                     system: system.clone(),
-                    device: NodalCoefficients {
+                    nodal: NodalCoefficients {
                         mass: functions.next().expect("a mass"),
                         coefficients: functions.collect(),
                     },
@@ -185,7 +185,7 @@ fn any_case() -> impl Strategy<Value = Case> {
     case_of(terms(), methods(), 3..200, true)
 }
 
-/// Damping and stiffness alone, free, by the midpoint rule; records of several tiles among them.
+/// Linear systems in free response by the midpoint rule; some records have several tiles.
 fn linear_free_case() -> impl Strategy<Value = Case> {
     let case = |nodes| {
         let terms = Just(vec![Term::Damping, Term::Stiffness]);
@@ -210,12 +210,12 @@ impl Kernel for Observe<'_> {
     }
 }
 
-/// A direction for each lane of a group: one series of numbers a function, or one number for a constant function.
+/// A direction for each lane of a group: random nodal values, or one number for a constant function.
 fn directions(case: &Case, holds: bool) -> [SystemTangent; LANES] {
     let functions = 1 + case.system.terms.len();
     std::array::from_fn(|lane| {
-        let mut device = NodalCoefficients::zeros(case.nodes(), functions - 1);
-        for (f, values) in device.functions_mut().enumerate() {
+        let mut nodal = NodalCoefficients::zeros(case.nodes(), functions - 1);
+        for (f, values) in nodal.functions_mut().enumerate() {
             match holds {
                 true if f == lane => values.fill(case.numbers[lane]),
                 true => {}
@@ -223,7 +223,7 @@ fn directions(case: &Case, holds: bool) -> [SystemTangent; LANES] {
             }
         }
         SystemTangent {
-            device,
+            nodal,
             initial: State {
                 displacement: case.numbers[lane],
                 velocity: -0.5,
@@ -233,7 +233,7 @@ fn directions(case: &Case, holds: bool) -> [SystemTangent; LANES] {
 }
 
 /// All tangents of a group.
-fn sensitivities(case: &Case, motion: &Trajectory, holds: bool) -> [Trajectory; LANES] {
+fn sensitivities(case: &Case, response: &Trajectory, holds: bool) -> [Trajectory; LANES] {
     let directions = directions(case, holds);
     let functions = 1 + case.system.terms.len();
     let slots = (0..functions).map(|function| Slot { group: 0, function });
@@ -244,11 +244,11 @@ fn sensitivities(case: &Case, motion: &Trajectory, holds: bool) -> [Trajectory; 
     ];
     let mut tangents = Tangents::new(slots.collect(), &[initial]);
     let mut out = [(); LANES].map(|()| Trajectory::zeros(case.nodes()));
-    let course = BaseTrajectory {
+    let base = BaseTrajectory {
         system: &case.system,
-        device: &case.device,
+        nodal: &case.nodal,
         excitation: case.excitation(),
-        motion,
+        response,
     };
     let last = case.nodes() - 1;
     for first in (0..last).step_by(TILE) {
@@ -258,7 +258,7 @@ fn sensitivities(case: &Case, motion: &Trajectory, holds: bool) -> [Trajectory; 
                 if let (0, Some(value)) = (first, case.numbers.get(slot)) {
                     tangents.hold(
                         slot,
-                        Steady {
+                        ConstantPerturbation {
                             lane: slot,
                             value: *value,
                         },
@@ -269,12 +269,12 @@ fn sensitivities(case: &Case, motion: &Trajectory, holds: bool) -> [Trajectory; 
             let rows = tangents.changes_mut(slot);
             for (i, row) in rows.iter_mut().enumerate().take(count + 1) {
                 let at = |d: &SystemTangent| {
-                    d.device.functions().nth(slot).expect("a function")[first + i]
+                    d.nodal.functions().nth(slot).expect("a function")[first + i]
                 };
                 *row = directions.each_ref().map(at);
             }
         }
-        tangents.advance(course, first..first + count);
+        tangents.advance(base, first..first + count);
         for (i, [y, v]) in tangents.states(0).iter().enumerate().take(count + 1) {
             for (lane, out) in out.iter_mut().enumerate() {
                 (out.displacement[first + i], out.velocity[first + i]) = (y[lane], v[lane]);
@@ -288,27 +288,27 @@ proptest! {
     #![proptest_config(properties(150, 1))]
 
     #[test]
-    fn prefactored_responses(case in any_case()) {
+    fn prefactored_responses_agree_with_the_reference(case in any_case()) {
         let mut fast = Trajectory::zeros(case.nodes());
-        let (system, device) = (&case.system, &case.device);
+        let (system, nodal) = (&case.system, &case.nodal);
         Engine::Prefactored
-            .forward_into(system, device, case.initial, case.excitation(), &mut fast)
+            .forward_into(system, nodal, case.initial, case.excitation(), &mut fast)
             .expect("a response");
         case.agree_responses(&fast, &case.response())?;
     }
 
     #[test]
-    fn prefactored_adjoints_and_their_sums(case in any_case()) {
-        let (system, device, excitation) = (&case.system, &case.device, case.excitation());
-        let (motion, source) = (case.response(), case.source());
-        let exact = reference::discrete_adjoint(system, device, excitation, &motion, &source);
+    fn prefactored_adjoints_and_their_sums_agree_with_the_reference(case in any_case()) {
+        let (system, nodal, excitation) = (&case.system, &case.nodal, case.excitation());
+        let (response, source) = (case.response(), case.source());
+        let exact = reference::discrete_adjoint(system, nodal, excitation, &response, &source);
         let engine = Engine::Prefactored;
-        let fast = engine.discrete_adjoint(system, device, excitation, &motion, &source);
+        let fast = engine.discrete_adjoint(system, nodal, excitation, &response, &source);
         case.agree_gradients(&fast, &exact)?;
-        let sums = engine.discrete_adjoint_sums(system, device, excitation, &motion, &source);
+        let sums = engine.discrete_adjoint_sums(system, nodal, excitation, &response, &source);
         let (sums, initial) = sums.expect("finite sums");
         prop_assert_eq!(initial, fast.initial);
-        for (sum, values) in sums.iter().zip(exact.device.functions()) {
+        for (sum, values) in sums.iter().zip(exact.nodal.functions()) {
             let size: f64 = values.iter().map(|x| x.abs()).sum();
             let error = (sum - values.iter().sum::<f64>()).abs();
             prop_assert!(error <= PER_STEP * case.nodes() as f64 * f64::EPSILON * size);
@@ -316,37 +316,37 @@ proptest! {
     }
 
     #[test]
-    fn responses_and_adjoints_in_blocks(case in linear_free_case()) {
-        let (system, device) = (&case.system, &case.device);
+    fn responses_and_adjoints_in_blocks_agree_with_the_reference(case in linear_free_case()) {
+        let (system, nodal) = (&case.system, &case.nodal);
         prop_assert_eq!(case.engine(), Engine::ParallelInTime);
-        let motion = case.response();
+        let response = case.response();
         let mut fast = Trajectory::zeros(case.nodes());
         case.engine()
-            .forward_into(system, device, case.initial, None, &mut fast)
+            .forward_into(system, nodal, case.initial, None, &mut fast)
             .expect("a response");
-        case.agree_responses(&fast, &motion)?;
+        case.agree_responses(&fast, &response)?;
         let source = case.source();
-        let exact = reference::discrete_adjoint(system, device, None, &motion, &source);
-        let fast = case.engine().discrete_adjoint(system, device, None, &motion, &source);
+        let exact = reference::discrete_adjoint(system, nodal, None, &response, &source);
+        let fast = case.engine().discrete_adjoint(system, nodal, None, &response, &source);
         case.agree_gradients(&fast, &exact)?;
     }
 
     #[test]
-    fn fused_least_squares(case in linear_free_case()) {
-        let (system, device) = (&case.system, &case.device);
-        let (motion, observed, weights) = (case.response(), case.series(2), [0.7, 0.2]);
+    fn fused_least_squares_agree_with_the_reference(case in linear_free_case()) {
+        let (system, nodal) = (&case.system, &case.nodal);
+        let (response, observed, weights) = (case.response(), case.series(2), [0.7, 0.2]);
         let last = case.nodes() - 1;
         let mut source = Trajectory::zeros(case.nodes());
         let mut cost = 0.0;
-        for (i, (y, o)) in motion.displacement.iter().zip(&observed).enumerate() {
+        for (i, (y, o)) in response.displacement.iter().zip(&observed).enumerate() {
             let w = weights[usize::from(i == 0 || i == last)];
             cost += w * (y - o) * (y - o);
             source.displacement[i] = 2.0 * w * (y - o);
         }
-        let exact = reference::discrete_adjoint(system, device, None, &motion, &source);
-        let mut gradient = device.clone();
+        let exact = reference::discrete_adjoint(system, nodal, None, &response, &source);
+        let mut gradient = nodal.clone();
         let [c, k] = gradient.coefficients.as_mut_slice() else { unreachable!("two terms") };
-        let functions = [&device.mass, &device.coefficients[0], &device.coefficients[1]];
+        let functions = [&nodal.mass, &nodal.coefficients[0], &nodal.coefficients[1]];
         let found = least_squares(
             system,
             functions.map(Vec::as_slice),
@@ -357,44 +357,44 @@ proptest! {
         );
         let (found, initial) = found.expect("a record in blocks");
         case.agree(&[found], &[cost])?;
-        case.agree_gradients(&SystemTangent { device: gradient, initial }, &exact)?;
+        case.agree_gradients(&SystemTangent { nodal: gradient, initial }, &exact)?;
     }
 
     #[test]
     fn continuous_adjoints_have_the_bits_of_the_reference(case in any_case()) {
-        let (motion, observed) = (case.response(), case.series(0));
-        let equation = AdjointEquation::new(&case.system, &case.device, &motion, &observed);
+        let (response, observed) = (case.response(), case.series(0));
+        let equation = AdjointEquation::new(&case.system, &case.nodal, &response, &observed);
         let (exact, fast) = (equation.solve(), continuous_adjoint::solve(&equation));
         prop_assert_eq!(fast.displacement, exact.displacement);
         prop_assert_eq!(fast.first_slope, exact.first_slope);
     }
 
     #[test]
-    fn sensitivities_in_lanes(case in any_case(), holds in any::<bool>()) {
-        let motion = case.response();
-        let fast = sensitivities(&case, &motion, holds);
+    fn sensitivities_agree_with_the_tangent(case in any_case(), holds in any::<bool>()) {
+        let response = case.response();
+        let fast = sensitivities(&case, &response, holds);
         for (fast, direction) in fast.iter().zip(&directions(&case, holds)) {
-            let (system, device) = (&case.system, &case.device);
+            let (system, nodal) = (&case.system, &case.nodal);
             let exact =
-                reference::tangent(system, device, case.excitation(), &motion, direction);
+                reference::tangent(system, nodal, case.excitation(), &response, direction);
             case.agree_responses(fast, &exact)?;
         }
     }
 
     #[test]
-    fn accelerations_at_nodes(case in any_case()) {
-        let (system, device) = (&case.system, &case.device);
+    fn accelerations_at_nodes_agree_with_observations(case in any_case()) {
+        let (system, nodal) = (&case.system, &case.nodal);
         let states = case.response();
         let around = [case.numbers[0], case.numbers[1]];
         let surroundings = crate::system::InputSample { force: around[0], base: around[1] };
         for first in (0..case.nodes()).step_by(LANES) {
-            let nodes = NodalObservations { system, device, states: &states };
+            let nodes = NodalObservations { system, nodal, states: &states };
             let seen = simd::run(Observe(nodes, first, around));
             for node in first..case.nodes().min(first + LANES) {
                 let place = TimePoint::node(node, case.nodes());
                 let kind = ChannelKind::Acceleration;
                 let exact = reference::observe(
-                    system, kind, device, case.excitation(), &states, place, surroundings,
+                    system, kind, nodal, case.excitation(), &states, place, surroundings,
                 );
                 let (lane, side) = (node - first, usize::from(place.fraction == 1.0));
                 let functions = 1 + system.terms.len();
@@ -417,16 +417,16 @@ proptest! {
     }
 
     #[test]
-    fn batches_of_steps(case in linear_free_case(), count in 1usize..50) {
-        let Case { system, device, initial, .. } = &case;
+    fn batches_of_steps_agree_with_single_trials(case in linear_free_case(), count in 1usize..50) {
+        let Case { system, nodal, initial, .. } = &case;
         let (step, observed) = (system.grid.step(), case.series(0));
         let direction = [case.series(1), case.series(2), case.series(3)];
         let ray = SearchRay {
-            functions: [&device.mass, &device.coefficients[0], &device.coefficients[1]]
+            functions: [&nodal.mass, &nodal.coefficients[0], &nodal.coefficients[1]]
                 .map(Vec::as_slice),
             direction: direction.each_ref().map(Vec::as_slice),
             initial: *initial,
-            readings: &observed,
+            samples: &observed,
             step,
         };
         let lengths: Vec<f64> = (1..=count).map(|i| 1.0 / (i * i) as f64).collect();
@@ -438,23 +438,23 @@ proptest! {
         let costs = batch.each_ref().map(StepBatch::costs).concat();
         let mut alone = Vec::new();
         for (which, a) in lengths.iter().enumerate() {
-            let mut device = device.clone();
-            for (values, direction) in device.functions_mut().zip(&direction) {
+            let mut nodal = nodal.clone();
+            for (values, direction) in nodal.functions_mut().zip(&direction) {
                 values.iter_mut().zip(direction).for_each(|(p, g)| *p -= a * g);
             }
-            let Ok(motion) = reference::forward(system, &device, *initial, None) else {
+            let Ok(response) = reference::forward(system, &nodal, *initial, None) else {
                 alone.push(f64::INFINITY);
                 continue;
             };
-            let pairs = motion.displacement.iter().zip(&observed);
+            let pairs = response.displacement.iter().zip(&observed);
             let squares: Vec<f64> = pairs.map(|(y, o)| (y - o) * (y - o)).collect();
             alone.push(trapezoid(&squares, step));
             let (row, lane) = layout.place(which);
             case.agree(&[step * costs[row][lane]], &[alone[which]])?;
             let states = batch.iter().find_map(|batch| batch.states((row, lane)));
             let mut again = Trajectory::zeros(case.nodes());
-            if reconstruct(&device, *initial, states.expect("its states"), step, &mut again) {
-                prop_assert_eq!(again, motion);
+            if reconstruct(&nodal, *initial, states.expect("its states"), step, &mut again) {
+                prop_assert_eq!(again, response);
             }
         }
         let best = (0..count).min_by(|a, b| alone[*a].total_cmp(&alone[*b])).expect("a trial");

@@ -1,9 +1,8 @@
 //! The paper's continuous adjoint: Eq. 13, with the gradients of Eqs. 15-17.
 //!
-//! It is derived for functions of time and only then discretised, so it is consistent with the
-//! discrete cost but not its exact derivative: the relative error levels off at a floor that
-//! falls with the step (about 2e-5 at 1000 nodes, 4e-6 at 2000). It reproduces the paper;
-//! [`discrete_adjoint`](super::discrete_adjoint()) has no floor.
+//! It is derived for functions of time and then discretised, so it is consistent with the discrete cost but not its exact
+//! derivative: the relative error has a floor that decreases with the step (about 2e-5 at 1000 nodes, 4e-6 at 2000). It
+//! reproduces the paper; [`discrete_adjoint`](super::discrete_adjoint()) is exact.
 
 use crate::simulate::Trajectory;
 use crate::system::quadrature::{curvature, midpoint, slope};
@@ -16,36 +15,35 @@ use std::borrow::Cow;
 /// The adjoint displacement `z` satisfies Eq. 13 and `z = z' = 0` at the end:
 /// `m z'' + (2 m' - C) z' + (m'' - C' + K) z = 2 (y - y_obs)` with `C = sum_j p_j dphi_j/dv` and
 /// `K = sum_j p_j dphi_j/dy` along the response (for the paper's terms `C = c`, `K = k`). The gradients are
-/// `-z (y'' + b'')` for the mass (Eq. 16) and `-z phi_j` for term `j` (Eqs. 15 and 17). Derivatives are
-/// differences, that of `y` too. The stepper is the explicit midpoint rule whatever the forward solve uses, in
-/// the paper's order of operations.
+/// `-z (y'' + b'')` for the mass (Eq. 16) and `-z phi_j` for term `j` (Eqs. 15 and 17). Time derivatives, that of `y`
+/// included, are finite differences. Eq. 13 is integrated by the explicit midpoint rule for every stepper of the forward
+/// solve, in the paper's order of operations.
 ///
-/// The gradients with respect to the initial state are numbers: `dJ/dv(0) = m z` and
-/// `dJ/dy(0) = C z - (m z)'` at the beginning.
+/// The gradients with respect to the initial state are `dJ/dv(0) = m z` and `dJ/dy(0) = C z - (m z)'` at the first node.
 ///
 /// # Panics
-/// If the response, the measurements or a function of the device end before the grid does.
+/// If the response, the measurements or a function of the system is shorter than the grid.
 pub fn continuous_adjoint(
     system: &System,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     observed: &[f64],
 ) -> SystemTangent {
-    let equation = AdjointEquation::new(system, device, trajectory, observed);
+    let equation = AdjointEquation::new(system, nodal, trajectory, observed);
     let adjoint = equation.solve();
     equation.gradients(system, excitation, trajectory, &adjoint)
 }
 
-/// The functions of time in Eq. 13, at the nodes.
+/// Functions of time in Eq. 13, at the nodes.
 pub(crate) struct AdjointEquation<'a> {
     /// Step, s.
     pub dt: f64,
-    /// `m`, `m'`, `m''`, `C`, `C'`, `K`, `y` and `y_obs`.
+    /// Nodal values of `m`, `m'`, `m''`, `C`, `C'`, `K`, `y` and `y_obs`.
     pub functions: [Cow<'a, [f64]>; 8],
 }
 
-/// The adjoint displacement `z` at the nodes, and its slope `z'` at the first one.
+/// Adjoint displacement `z` at the nodes, and its slope `z'` at the first one.
 pub(crate) struct Adjoint {
     pub displacement: Vec<f64>,
     pub first_slope: f64,
@@ -54,13 +52,13 @@ pub(crate) struct Adjoint {
 impl<'a> AdjointEquation<'a> {
     pub fn new(
         system: &System,
-        device: &'a NodalCoefficients,
+        nodal: &'a NodalCoefficients,
         trajectory: &'a Trajectory,
         observed: &'a [f64],
     ) -> Self {
         let dt = system.grid.step();
-        let [c, k] = linearised_coefficients(system, device, trajectory);
-        let m = device.mass.as_slice();
+        let [c, k] = linearised_coefficients(system, nodal, trajectory);
+        let m = nodal.mass.as_slice();
         let (m1, m2, c1) = (slope(m, dt), curvature(m, dt), slope(&c, dt));
         let y = trajectory.displacement.as_slice();
         let functions = [
@@ -103,7 +101,7 @@ impl<'a> AdjointEquation<'a> {
         }
     }
 
-    /// Eqs. 15-17, and the gradient with respect to the initial state.
+    /// Gradients of Eqs. 15-17, and the gradient with respect to the initial state.
     pub fn gradients(
         &self,
         system: &System,
@@ -118,7 +116,7 @@ impl<'a> AdjointEquation<'a> {
             let base = base.at_nodes();
             acceleration.iter_mut().zip(base).for_each(|(a, b)| *a += b);
         }
-        // Subtracted from zero, so that no zero has a sign.
+        // The subtraction from zero avoids negative zeros.
         let gradient = |response: &[f64]| -> Vec<f64> {
             let pairs = z.iter().zip(response);
             pairs.map(|(z, x)| 0.0 - z * x).collect()
@@ -134,7 +132,7 @@ impl<'a> AdjointEquation<'a> {
         let [m, m1, _, c, ..] = self.functions.each_ref().map(|f| f[0]);
         let momentum_slope = m1 * z[0] + m * adjoint.first_slope;
         SystemTangent {
-            device: NodalCoefficients {
+            nodal: NodalCoefficients {
                 mass: gradient(&acceleration),
                 coefficients: system.terms.iter().map(by_term).collect(),
             },
@@ -146,24 +144,24 @@ impl<'a> AdjointEquation<'a> {
     }
 }
 
-/// `z''` by Eq. 13, from the functions of [`AdjointEquation`] at one time and `(z, w) = (z, z')`.
+/// Second derivative `z''` by Eq. 13, from the functions of [`AdjointEquation`] at one time and `(z, w) = (z, z')`.
 fn acceleration(functions: [f64; 8], z: f64, w: f64) -> f64 {
     let [m, m1, m2, c, c1, k, y, observed] = functions;
     -w / m * (2.0 * m1 - c) - z / m * (m2 - c1 + k) + 2.0 * (y - observed) / m
 }
 
-/// `(C, K)` at the nodes: damping and stiffness of small disturbances of the response.
+/// `(C, K)` at the nodes: tangent damping and stiffness along the response.
 fn linearised_coefficients<'a>(
     system: &System,
-    device: &'a NodalCoefficients,
+    nodal: &'a NodalCoefficients,
     trajectory: &Trajectory,
 ) -> [Cow<'a, [f64]>; 2] {
     if system.terms == [Term::Damping, Term::Stiffness] {
-        return [0, 1].map(|j| Cow::Borrowed(device.coefficients[j].as_slice()));
+        return [0, 1].map(|j| Cow::Borrowed(nodal.coefficients[j].as_slice()));
     }
     let nodes = trajectory.nodes();
     let (mut c, mut k) = (vec![0.0; nodes], vec![0.0; nodes]);
-    for (term, p) in system.terms.iter().zip(&device.coefficients) {
+    for (term, p) in system.terms.iter().zip(&nodal.coefficients) {
         for i in 0..nodes {
             let (phi_y, phi_v) = term.partials(trajectory.displacement[i], trajectory.velocity[i]);
             c[i] += p[i] * phi_v;

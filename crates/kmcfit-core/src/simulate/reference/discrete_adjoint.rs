@@ -10,20 +10,20 @@ use crate::system::{
 /// to the initial state, in the Euclidean inner product of the nodal values.
 ///
 /// `source` holds the derivative of the cost with respect to displacement and velocity at every
-/// node; `trajectory` must be the response of `device` under `excitation`. The result is the transpose of
+/// node; `trajectory` must be the response of `system` under `excitation`. The result is the transpose of
 /// [`tangent`](super::tangent()) applied to `source`, to machine precision.
 ///
 /// Per stage, backwards, with `k̄` the multiplier of the stage's increment:
-/// `ā = dt k̄_v`, `v̄ = dt k̄_y + ā da/dv`, `ȳ = ā da/dy`, and `-ā phi_j/m`, `-ā (a + b'')/m` go to the
-/// functions. The stages are computed again from the nodes, so memory is two numbers a node.
+/// `ā = dt k̄_v`, `v̄ = dt k̄_y + ā da/dv`, `ȳ = ā da/dy`; the contributions to the functions are `-ā phi_j/m` and, for the
+/// mass, `-ā (a + b'')/m`. Stages are recomputed from the nodes, so memory is two numbers per node.
 pub fn discrete_adjoint(
     system: &System,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     source: &Trajectory,
 ) -> SystemTangent {
-    let equation = EquationOfMotion::new(system, device, excitation, trajectory.nodes());
+    let equation = EquationOfMotion::new(system, nodal, excitation, trajectory.nodes());
     match system.method {
         Method::Midpoint => sweep(&MIDPOINT, equation, trajectory, source),
         Method::Rk4 => sweep(&RK4, equation, trajectory, source),
@@ -37,7 +37,7 @@ fn sweep<const S: usize>(
     source: &Trajectory,
 ) -> SystemTangent {
     let nodes = trajectory.displacement.len();
-    let mut gradient = NodalCoefficients::zeros(equation.device.mass.len(), equation.terms.len());
+    let mut gradient = NodalCoefficients::zeros(equation.nodal.mass.len(), equation.terms.len());
     let mut adjoint = State {
         displacement: source.displacement[nodes - 1],
         velocity: source.velocity[nodes - 1],
@@ -50,12 +50,12 @@ fn sweep<const S: usize>(
         adjoint.velocity += source.velocity[i];
     }
     SystemTangent {
-        device: gradient,
+        nodal: gradient,
         initial: adjoint,
     }
 }
 
-/// Carries the adjoint from node `i + 1` to node `i` and adds the step's share to the gradient.
+/// Advances the adjoint from node `i + 1` to node `i` and adds the step's contribution to the gradient.
 #[inline(always)]
 fn step_back<const S: usize>(
     tableau: &Tableau<S>,

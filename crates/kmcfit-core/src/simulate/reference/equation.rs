@@ -1,12 +1,12 @@
 //! The equation of motion at the stages of one step.
 
-use crate::system::{Excitation, NodalCoefficients, Position, System, Tableau, Term};
+use crate::system::{Excitation, NodalCoefficients, StagePosition, System, Tableau, Term};
 
-/// The equation of motion of one device in one experiment.
+/// The equation of motion of one system in one experiment.
 #[derive(Clone, Copy)]
 pub(crate) struct EquationOfMotion<'a> {
     pub terms: &'a [Term],
-    pub device: &'a NodalCoefficients,
+    pub nodal: &'a NodalCoefficients,
     pub excitation: Option<&'a Excitation>,
     pub dt: f64,
 }
@@ -27,21 +27,21 @@ pub(crate) struct Partials {
 
 impl<'a> EquationOfMotion<'a> {
     /// # Panics
-    /// If `device` does not fit the grid and the terms, or grid or excitation end before `nodes` nodes do.
+    /// If `system` does not fit the grid and the terms, or grid or excitation is shorter than `nodes` nodes.
     pub fn new(
         system: &'a System,
-        device: &'a NodalCoefficients,
+        nodal: &'a NodalCoefficients,
         excitation: Option<&'a Excitation>,
         nodes: usize,
     ) -> Self {
         let System { grid, terms, .. } = system;
         assert_eq!(
-            device.coefficients.len(),
+            nodal.coefficients.len(),
             terms.len(),
             "one function per term"
         );
         assert!(
-            device.functions().all(|f| f.len() == grid.nodes()),
+            nodal.functions().all(|f| f.len() == grid.nodes()),
             "functions on the nodes"
         );
         assert!(
@@ -54,22 +54,22 @@ impl<'a> EquationOfMotion<'a> {
         );
         Self {
             terms,
-            device,
+            nodal,
             excitation,
             dt: grid.step(),
         }
     }
 
-    /// `y'' = f/m - sum_j p_j phi_j / m - b''`.
+    /// Acceleration `y'' = f/m - sum_j p_j phi_j / m - b''`.
     ///
-    /// Each quotient is taken by itself and the terms run backwards (stiffness before damping):
-    /// these are the paper's operations in the paper's order, and its run depends on every bit.
+    /// Each quotient is computed separately, and the terms are summed backwards (stiffness before damping): the paper's order
+    /// of operations, on whose every bit its run depends.
     #[inline(always)]
-    pub fn acceleration(&self, i: usize, position: Position, y: f64, v: f64) -> f64 {
-        let mass = position.of(&self.device.mass, i);
+    pub fn acceleration(&self, i: usize, position: StagePosition, y: f64, v: f64) -> f64 {
+        let mass = position.of(&self.nodal.mass, i);
         let force = self.excitation.and_then(|e| e.force.as_ref());
         let mut a = force.map_or(0.0, |f| f.at(i, position) / mass);
-        for (term, p) in self.terms.iter().zip(&self.device.coefficients).rev() {
+        for (term, p) in self.terms.iter().zip(&self.nodal.coefficients).rev() {
             a -= position.of(p, i) * term.phi(y, v) / mass;
         }
         match self.excitation.and_then(|e| e.base.as_ref()) {
@@ -78,9 +78,9 @@ impl<'a> EquationOfMotion<'a> {
         }
     }
 
-    /// The absolute acceleration `y'' + b''` for the acceleration `y'' = a`.
+    /// Absolute acceleration `y'' + b''` for the relative acceleration `y'' = a`.
     #[inline(always)]
-    pub fn absolute(&self, i: usize, position: Position, a: f64) -> f64 {
+    pub fn absolute(&self, i: usize, position: StagePosition, a: f64) -> f64 {
         match self.excitation.and_then(|e| e.base.as_ref()) {
             Some(base) => a + base.at(i, position),
             None => a,
@@ -89,10 +89,10 @@ impl<'a> EquationOfMotion<'a> {
 
     /// Mass and partial derivatives of [`EquationOfMotion::acceleration`].
     #[inline(always)]
-    pub fn partials(&self, i: usize, position: Position, y: f64, v: f64) -> Partials {
-        let mass = position.of(&self.device.mass, i);
+    pub fn partials(&self, i: usize, position: StagePosition, y: f64, v: f64) -> Partials {
+        let mass = position.of(&self.nodal.mass, i);
         let (mut da_dy, mut da_dv) = (0.0, 0.0);
-        for (term, p) in self.terms.iter().zip(&self.device.coefficients) {
+        for (term, p) in self.terms.iter().zip(&self.nodal.coefficients) {
             let (phi_y, phi_v) = term.partials(y, v);
             let p = position.of(p, i);
             da_dy -= p * phi_y / mass;
@@ -101,7 +101,7 @@ impl<'a> EquationOfMotion<'a> {
         Partials { mass, da_dy, da_dv }
     }
 
-    /// The stages of step `i` from the state `(y, v)` at its left node.
+    /// Stages of step `i` from the state `(y, v)` at its left node.
     #[inline(always)]
     pub fn stages<const S: usize>(
         &self,
@@ -129,7 +129,7 @@ impl<'a> EquationOfMotion<'a> {
     }
 }
 
-/// The state at the right node: `x + sum_s b_s dt x'_s`.
+/// State at the right node: `x + sum_s b_s dt x'_s`.
 #[inline(always)]
 pub(crate) fn advance<const S: usize>(
     tableau: &Tableau<S>,

@@ -1,44 +1,43 @@
-//! Eq. 2: the response.
+//! Forward solve: the response by Eq. 2.
 
 use super::equation::{EquationOfMotion, advance};
 use crate::simulate::Trajectory;
 use crate::simulate::error::{SimulationError, require_finite, require_positive_mass};
 use crate::system::{Excitation, MIDPOINT, Method, NodalCoefficients, RK4, State, System, Tableau};
 
-/// The response of `device` from `initial` under `excitation` (`None` is free motion), over the whole grid:
-/// `m (y'' + b'') + sum_j p_j phi_j(y, y') = f`, step by step in the paper's order of operations.
+/// Response of `system` from `initial` under `excitation` (`None` for a free response) over the whole grid:
+/// `m (y'' + b'') + sum_j p_j phi_j(y, y') = f`, in sequential steps with the paper's order of operations.
 ///
 /// # Errors
 /// A [`SimulationError`] if the mass is not positive at some node or the response overflows.
 ///
 /// # Panics
-/// If `device` or `excitation` does not fit the grid and the terms.
+/// If `system` or `excitation` does not fit the grid and the terms.
 pub fn forward(
     system: &System,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     initial: State,
     excitation: Option<&Excitation>,
 ) -> Result<Trajectory, SimulationError> {
     let mut trajectory = Trajectory::zeros(system.grid.nodes());
-    forward_into(system, device, initial, excitation, &mut trajectory)?;
+    forward_into(system, nodal, initial, excitation, &mut trajectory)?;
     Ok(trajectory)
 }
 
-/// [`forward`] into existing storage, over as many nodes as `trajectory` has: a record may end before the grid
-/// does.
+/// [`forward`] into existing storage, over the nodes of `trajectory`; a record may be shorter than the grid.
 ///
 /// # Errors
 /// As [`forward`].
 pub fn forward_into(
     system: &System,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     initial: State,
     excitation: Option<&Excitation>,
     trajectory: &mut Trajectory,
 ) -> Result<(), SimulationError> {
     let grid = &system.grid;
-    require_positive_mass(grid, device)?;
-    let equation = EquationOfMotion::new(system, device, excitation, trajectory.nodes());
+    require_positive_mass(grid, nodal)?;
+    let equation = EquationOfMotion::new(system, nodal, excitation, trajectory.nodes());
     match system.method {
         Method::Midpoint => sweep(&MIDPOINT, equation, initial, trajectory),
         Method::Rk4 => sweep(&RK4, equation, initial, trajectory),

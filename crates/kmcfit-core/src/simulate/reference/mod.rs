@@ -1,15 +1,15 @@
-//! The equations, plainly: scalar arithmetic, one step after the other, any stepper.
+//! Reference implementation of the equations: scalar arithmetic, sequential steps, any stepper.
 //!
 //! | function | equation |
 //! |---|---|
 //! | `forward` | Eq. 2, the response |
-//! | `tangent` | its linearisation |
-//! | `discrete_adjoint` | the exact transpose of the linearisation |
+//! | `tangent` | its directional derivative |
+//! | `discrete_adjoint` | the exact transpose of the tangent |
 //! | `continuous_adjoint` | Eq. 13, with the gradients of Eqs. 15-17 |
-//! | `step_jacobians` | the linearisation of each step by itself |
+//! | `step_jacobians` | the linearisation of single steps |
 //! | `observe` | displacement, velocity or acceleration at any time |
 //!
-//! The order of operations is the paper's. Everything in [`fast`](super::fast) equals one of these functions to a
+//! The order of operations is the paper's. Each function in [`fast`](super::fast) agrees with one of these functions to a
 //! stated tolerance.
 
 mod continuous_adjoint;

@@ -1,22 +1,22 @@
 //! Observations of a response at any time, and their derivatives with respect to states and functions.
 //!
-//! Between nodes displacement and velocity are cubic Hermite polynomials, of order 4 in the step: the
-//! displacement from its values and the velocities at both nodes, the velocity from its values and
-//! the accelerations there. The acceleration is the equation of motion's own, at the interpolated
-//! state, with the functions linear between nodes as in the stepper.
+//! Between nodes, displacement and velocity are cubic Hermite polynomials, fourth-order accurate in the step: the
+//! displacement from its values and the velocities at both nodes, the velocity from its values and the accelerations
+//! there. The acceleration follows from the equation of motion at the interpolated state, with functions linear between
+//! nodes as in the stepper.
 
 use super::equation::EquationOfMotion;
 use crate::record::ChannelKind;
 use crate::simulate::Trajectory;
 use crate::system::{
-    Excitation, FUNCTIONS, InputSample, NodalCoefficients, Position, StageSamples, System,
+    Excitation, FUNCTIONS, InputSample, NodalCoefficients, StagePosition, StageSamples, System,
     TimePoint,
 };
 
-/// A value observed by a sensor, and its derivatives.
+/// An observed value and its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
-    /// The value itself, in the SI unit of its kind.
+    /// Value, in the SI unit of its kind.
     pub value: f64,
     /// Derivatives with respect to displacement and velocity at the left node, then at the right.
     pub states: [f64; 4],
@@ -53,17 +53,17 @@ impl Observation {
     }
 }
 
-/// The observation of `kind` at `place` of the response `states` of `device`.
+/// Observes `kind` at `place` of the response `states`.
 ///
-/// `around` is the force and the base's acceleration at that very time; `excitation` is that of
-/// the whole response. An acceleration is that of `y`, relative to the base.
+/// `around` is the force and the acceleration of the base at that time; `excitation` is that of the whole response.
+/// Accelerations are those of `y`, relative to the base.
 ///
 /// # Panics
 /// If `place` is not within `states`.
 pub fn observe(
     system: &System,
     kind: ChannelKind,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
     states: &Trajectory,
     place: TimePoint,
@@ -71,7 +71,7 @@ pub fn observe(
 ) -> Observation {
     let equation = EquationOfMotion {
         terms: &system.terms,
-        device,
+        nodal,
         excitation,
         dt: system.grid.step(),
     };
@@ -121,7 +121,7 @@ fn velocity(equation: EquationOfMotion, states: &Trajectory, place: TimePoint) -
         1.0 => Observation::state(3, v[i + 1]),
         x => {
             let at_end = |right: usize| {
-                let position = [Position::Left, Position::Right][right];
+                let position = [StagePosition::Left, StagePosition::Right][right];
                 let part = |p: &Option<StageSamples>| p.as_ref().map_or(0.0, |p| p.at(i, position));
                 let around = equation
                     .excitation
@@ -146,7 +146,7 @@ fn velocity(equation: EquationOfMotion, states: &Trajectory, place: TimePoint) -
     }
 }
 
-/// `y'' = (f - sum_j p_j phi_j) / m - b''` at fraction `x` of step `i`, at the state `(y, v)`.
+/// Acceleration `y'' = (f - sum_j p_j phi_j) / m - b''` at fraction `x` of step `i`, at the state `(y, v)`.
 fn acceleration(
     equation: EquationOfMotion,
     i: usize,
@@ -160,14 +160,14 @@ fn acceleration(
         1.0 => f[i + 1],
         x => f[i] * (1.0 - x) + f[i + 1] * x,
     };
-    let mass = blend(&equation.device.mass);
+    let mass = blend(&equation.nodal.mass);
     let mut inertia = around.force / mass;
     let (mut by_y, mut by_v) = (0.0, 0.0);
     let mut by_function = [0.0; FUNCTIONS];
     for (j, (term, p)) in equation
         .terms
         .iter()
-        .zip(&equation.device.coefficients)
+        .zip(&equation.nodal.coefficients)
         .enumerate()
         .rev()
     {

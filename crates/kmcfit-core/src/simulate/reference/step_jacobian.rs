@@ -1,9 +1,9 @@
-//! The linearisation of single steps, for methods that keep the states as unknowns.
+//! Linearisation of single steps, for methods with the states as unknowns.
 
 use super::equation::{EquationOfMotion, Stages, advance};
 use crate::simulate::Trajectory;
 use crate::system::{
-    Excitation, MIDPOINT, Method, NodalCoefficients, Position, RK4, State, System, Tableau,
+    Excitation, MIDPOINT, Method, NodalCoefficients, RK4, StagePosition, State, System, Tableau,
 };
 
 /// Change of the state `(y, v)` at the right node of a step.
@@ -13,7 +13,7 @@ pub type StateChange = [f64; 2];
 /// [`NodalCoefficients::functions`], mass first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepJacobian {
-    /// `Phi_i` itself: displacement and velocity at the right node.
+    /// `Phi_i`: displacement and velocity at the right node.
     pub end: State,
     /// Derivatives with respect to the displacement and to the velocity at the left node.
     pub state: [StateChange; 2],
@@ -23,22 +23,22 @@ pub struct StepJacobian {
     pub right: Vec<StateChange>,
 }
 
-/// What one column of a step's Jacobian differentiates with respect to.
+/// Variable of one column of a step's Jacobian.
 #[derive(Clone, Copy)]
 enum Seed {
     Displacement,
     Velocity,
-    Function(usize, Position),
+    Function(usize, StagePosition),
 }
 
-/// All steps linearised about the node states `states`, which need not be a response.
+/// Linearises all steps about the node states `states`, which need not satisfy the equation of motion.
 pub fn step_jacobians(
     system: &System,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
     states: &Trajectory,
 ) -> Vec<StepJacobian> {
-    let equation = EquationOfMotion::new(system, device, excitation, states.nodes());
+    let equation = EquationOfMotion::new(system, nodal, excitation, states.nodes());
     let steps = 0..states.nodes() - 1;
     match system.method {
         Method::Midpoint => steps
@@ -59,7 +59,7 @@ fn step<const S: usize>(
     let (displacement, velocity) = advance(tableau, equation.dt, &base, y, v);
     let column = |seed: Seed| column(tableau, equation, i, &base, seed);
     let functions = 0..=equation.terms.len();
-    let side = |position: Position| {
+    let side = |position: StagePosition| {
         let each = functions.clone();
         each.map(|f| column(Seed::Function(f, position))).collect()
     };
@@ -69,8 +69,8 @@ fn step<const S: usize>(
             velocity,
         },
         state: [column(Seed::Displacement), column(Seed::Velocity)],
-        left: side(Position::Left),
-        right: side(Position::Right),
+        left: side(StagePosition::Left),
+        right: side(StagePosition::Right),
     }
 }
 

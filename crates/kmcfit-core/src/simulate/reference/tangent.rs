@@ -1,4 +1,4 @@
-//! The tangent: the linearisation of Eq. 2.
+//! Tangent: directional derivative of the forward solve.
 
 use super::equation::{EquationOfMotion, Stages, advance};
 use crate::simulate::Trajectory;
@@ -6,17 +6,16 @@ use crate::system::{
     Excitation, MIDPOINT, Method, NodalCoefficients, RK4, System, SystemTangent, Tableau,
 };
 
-/// Directional derivative of [`forward`](super::forward()) at `trajectory` (which must be the response of
-/// `device` under `excitation`) along `direction`: the change of displacement and velocity per unit
-/// step, exact for the discrete response.
+/// Directional derivative of [`forward`](super::forward()) at `trajectory` (the response of `system` under `excitation`)
+/// along `direction`: change of displacement and velocity, exact for the discrete response.
 pub fn tangent(
     system: &System,
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     excitation: Option<&Excitation>,
     trajectory: &Trajectory,
     direction: &SystemTangent,
 ) -> Trajectory {
-    let equation = EquationOfMotion::new(system, device, excitation, trajectory.nodes());
+    let equation = EquationOfMotion::new(system, nodal, excitation, trajectory.nodes());
     match system.method {
         Method::Midpoint => sweep(&MIDPOINT, equation, trajectory, direction),
         Method::Rk4 => sweep(&RK4, equation, trajectory, direction),
@@ -36,7 +35,7 @@ fn sweep<const S: usize>(
     for i in 0..nodes - 1 {
         let (y, v) = (trajectory.displacement[i], trajectory.velocity[i]);
         let base = equation.stages(tableau, i, y, v);
-        let change = stage_changes(tableau, equation, &direction.device, i, &base, dy, dv);
+        let change = stage_changes(tableau, equation, &direction.nodal, i, &base, dy, dv);
         (dy, dv) = advance(tableau, equation.dt, &change, dy, dv);
         (out.displacement[i + 1], out.velocity[i + 1]) = (dy, dv);
     }

@@ -1,7 +1,6 @@
-//! The linearised readings of a long record in two halves, each reduced by itself and at the same time where a processor is
-//! to spare.
+//! Linearised samples of a long record in two halves, each reduced separately, on two threads where a processor is free.
 //!
-//! The gradient of the misfit is the product of Jacobian and residuals, so that it needs no adjoint solve.
+//! The gradient of the misfit is the product of Jacobian and residuals and needs no adjoint solve.
 
 use super::reduced::{NARROW, Reduced};
 use super::residuals::Residuals;
@@ -11,14 +10,13 @@ use crate::simd::tall_qr::{PIECE, Triangle};
 use crate::threads;
 use std::ops::Range;
 
-/// The step at which a record is cut in two: the middle of a long record with few parameters; `None` elsewhere.
+/// Step at which a record is divided: the middle of a long record with few parameters; `None` otherwise.
 pub(in crate::solvers) fn halfway(problem: &Problem) -> Option<usize> {
-    let is_narrow = problem.parameters() <= NARROW && Reduced::comes_in_pieces(problem);
+    let is_narrow = problem.parameters() <= NARROW && Reduced::is_computed_by_blocks(problem);
     problem.middle().filter(|_| is_narrow)
 }
 
-/// The readings from both halves of a record cut at the step `halfway`, and the result of `beside`, which is computed after
-/// the first half.
+/// Samples of both halves of a record divided at step `halfway`, and the result of `beside`, computed after the first half.
 pub(in crate::solvers) fn in_halves<T>(
     problem: &Problem,
     evaluation: &Evaluation,
@@ -32,22 +30,22 @@ pub(in crate::solvers) fn in_halves<T>(
     (first.join(&second), more)
 }
 
-/// The readings of one half of a record, linearised and reduced.
+/// Samples of one half of a record, linearised and reduced.
 pub(super) struct Half {
     triangle: Triangle,
-    /// The parameter of each column.
+    /// Parameter of each column.
     order: Vec<usize>,
-    /// How the state at its end answers to each parameter, in the order of the columns.
+    /// Derivatives of the state at its end with respect to the parameters, in the order of the columns.
     states: Vec<[f64; 2]>,
 }
 
 impl Half {
-    /// The one before the step `halfway`.
+    /// Half before the step `halfway`.
     pub fn first(problem: &Problem, evaluation: &Evaluation, halfway: usize) -> Self {
         Self::of(problem, evaluation, 0..halfway, problem.parameters())
     }
 
-    /// The one from the step `halfway` on. The state that it sets out from has columns of its own.
+    /// Half from the step `halfway` on; its initial state has columns of its own.
     pub fn second(problem: &Problem, evaluation: &Evaluation, halfway: usize) -> Self {
         let steps = halfway..problem.experiments[0].nodes - 1;
         Self::of(problem, evaluation, steps, problem.parameters() + 2)
@@ -58,8 +56,8 @@ impl Half {
         let experiment = &problem.experiments[0];
         let mut triangle = Triangle::new(columns);
         let mut residuals = Residuals::with_capacity(PIECE);
-        let states = problem.each_piece_of_part(evaluation, &order, steps, |mut piece| {
-            // All rows of a piece are of one channel.
+        let states = problem.each_row_block_of_part(evaluation, &order, steps, |mut piece| {
+            // All rows of a block belong to one channel.
             let mut first = piece.first;
             let mut of = experiment.channels.iter().zip(&evaluation.predictions[0]);
             let channel = of.find(|(channel, _)| match first.checked_sub(channel.len()) {
@@ -83,7 +81,7 @@ impl Half {
         }
     }
 
-    /// Both halves as one: the second sets out from the state at the end of the first.
+    /// Joins the halves: the initial state of the second is the final state of the first.
     pub fn join(self, second: &Half) -> Reduced {
         let mut triangle = self.triangle;
         triangle.join(&second.triangle, &self.states);

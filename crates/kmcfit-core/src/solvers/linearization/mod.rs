@@ -1,4 +1,4 @@
-//! Predictions and cost, linearised at an iterate: the subproblem of a Gauss–Newton step.
+//! Linearisation of predictions and cost at an iterate: the subproblem of a Gauss–Newton step.
 
 mod halves;
 mod penalties;
@@ -22,31 +22,30 @@ use crate::record::Loss;
 use penalties::add_soft;
 use reduced::of_whole_jacobian;
 
-/// State of the linearised predictions at an iterate.
+/// Linearised predictions of an iterate.
 #[derive(Clone, Default)]
 pub(crate) enum Linearization {
-    /// Computed at the iterate, when a step from there is made.
+    /// Computed when a step is made.
     #[default]
     Fresh,
-    /// Computed at the iterate together with its gradient, in two halves of a long record.
+    /// Computed with the gradient, in two halves of a long record.
     Halves(Reduced),
-    /// Computed at the parameters `at` nearby; the gradient is that of the iterate.
+    /// Computed at the nearby parameters `at`; residuals and gradient are those of the iterate.
     Reused {
-        /// Where the Jacobian was computed.
+        /// Parameters of the Jacobian.
         at: Vec<f64>,
-        /// The readings with that Jacobian, and residuals and gradient of the iterate.
+        /// Samples with that Jacobian, and residuals and gradient of the iterate.
         reduced: Reduced,
     },
 }
 
 impl Linearization {
-    /// That at the evaluated point itself.
+    /// Linearisation at the evaluated point.
     pub fn at(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> Self {
         Self::Halves(reduce(problem, evaluation, timings))
     }
 
-    /// The Jacobian computed at the parameters `at`, for an evaluated point nearby. `None` where it cannot be that of the
-    /// point.
+    /// Jacobian computed at the parameters `at`, for an evaluated point nearby; `None` where it is inconsistent with the point.
     pub fn reused(
         problem: &Problem,
         at: Vec<f64>,
@@ -59,7 +58,7 @@ impl Linearization {
         Some(Self::Reused { at, reduced })
     }
 
-    /// This one for a point near `from`, its own; `None` where it cannot be that of the point.
+    /// This linearisation for a point near `from`, its own; `None` where it is inconsistent with the point.
     pub fn nearby(
         &self,
         from: &[f64],
@@ -72,7 +71,7 @@ impl Linearization {
         Some(Self::Reused { at, reduced })
     }
 
-    /// The linearised readings, if they are computed.
+    /// Linearised samples, if computed.
     pub fn reduced(&self) -> Option<&Reduced> {
         match self {
             Self::Fresh => None,
@@ -80,7 +79,7 @@ impl Linearization {
         }
     }
 
-    /// Where the Jacobian was computed, if not at the iterate.
+    /// Parameters of the Jacobian, if they differ from the iterate's.
     pub fn computed_at(&self) -> Option<&[f64]> {
         match self {
             Self::Reused { at, .. } => Some(at),
@@ -89,7 +88,7 @@ impl Linearization {
     }
 }
 
-/// The tangent solves of one linearisation; with many parameters the step Jacobians count as one.
+/// Number of tangent solves of one linearisation; with many parameters the step Jacobians count as one.
 pub(super) fn linearisation_tangents(problem: &Problem) -> u64 {
     match problem.parameters() {
         few @ ..=FEW_PARAMETERS => few as u64,
@@ -97,36 +96,34 @@ pub(super) fn linearisation_tangents(problem: &Problem) -> u64 {
     }
 }
 
-/// The readings linearised and reduced at an evaluated point, a long record in halves.
+/// Samples linearised and reduced at an evaluated point, a long record in halves.
 fn reduce(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> Reduced {
     match halfway(problem) {
         Some(halfway) => timed(&mut timings.tangent, || {
             in_halves(problem, evaluation, halfway, || ()).0
         }),
-        None => Reduced::piece_by_piece(problem, evaluation, timings),
+        None => Reduced::block_by_block(problem, evaluation, timings),
     }
 }
 
-/// The linearised readings alone: `|F z - f|^2` is the misfit of the linearised predictions. The first
-/// variables are the change of the parameters; with many of them the changes of the states follow,
-/// tied to them by equalities.
-pub(crate) fn linear_readings(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
-    readings(problem, evaluation, None, &mut Timings::default())
+/// Linearised samples alone: `|F z - f|^2` is the misfit of the linearised predictions. The first variables are the changes
+/// of the parameters; with many of them the changes of the states follow, linked by equalities.
+pub(crate) fn linear_predictions(problem: &Problem, evaluation: &Evaluation) -> Subproblem {
+    samples(problem, evaluation, None, &mut Timings::default())
 }
 
-/// [`linear_readings`], from the `known` ones if they are computed already, and the time that tangents and linear algebra
-/// took.
-fn readings(
+/// [`linear_predictions`] from the `known` reduction, if computed; adds the time of tangents and linear algebra.
+fn samples(
     problem: &Problem,
     evaluation: &Evaluation,
     known: Option<&Reduced>,
     timings: &mut Timings,
 ) -> Subproblem {
     if problem.parameters() <= FEW_PARAMETERS {
-        if Reduced::comes_in_pieces(problem) {
+        if Reduced::is_computed_by_blocks(problem) {
             let mut own = None;
             let reduced = known.unwrap_or_else(|| own.insert(reduce(problem, evaluation, timings)));
-            // Else in another order of operations.
+            // Otherwise the order of operations differs.
             if reduced.is_finite() {
                 return timed(&mut timings.linear_algebra, || reduced.subproblem());
             }
@@ -141,8 +138,8 @@ fn readings(
     })
 }
 
-/// The subproblem at an evaluated point without the proximal term: readings, penalties and constraints; and the number of
-/// residual rows that belong to the readings, which come first.
+/// Subproblem at an evaluated point without the proximal term: samples, penalties and constraints. Also returns the number
+/// of residual rows of the samples, which come first.
 pub(super) fn linearise(
     problem: &Problem,
     parameters: &[f64],
@@ -150,15 +147,15 @@ pub(super) fn linearise(
     linearization: &Linearization,
     timings: &mut Timings,
 ) -> (Subproblem, usize) {
-    let mut sub = readings(problem, evaluation, linearization.reduced(), timings);
-    let readings = sub.residuals.len();
+    let mut sub = samples(problem, evaluation, linearization.reduced(), timings);
+    let samples = sub.residuals.len();
     timed(&mut timings.linear_algebra, || {
         add_the_rest(problem, parameters, evaluation, &mut sub);
     });
-    (sub, readings)
+    (sub, samples)
 }
 
-/// The subproblem in parameters and states about any states, also of no response.
+/// Subproblem in parameters and states about arbitrary states.
 pub(super) fn linearise_about(
     problem: &Problem,
     parameters: &[f64],
@@ -170,7 +167,7 @@ pub(super) fn linearise_about(
     sub
 }
 
-/// All that the cost and the constraints have beside the readings.
+/// Adds the terms of the cost besides the samples, and the constraints.
 fn add_the_rest(
     problem: &Problem,
     parameters: &[f64],
@@ -185,7 +182,7 @@ fn add_the_rest(
     sub.constrain(&problem.constraints, parameters);
 }
 
-/// The cost of the readings less the weighted squares that stand for it: none for least squares.
+/// Cost of the samples minus its quadratic majorant: zero for least squares.
 pub(super) fn robust_surplus(problem: &Problem, evaluation: &Evaluation) -> f64 {
     let mut surplus = 0.0;
     for (channel, predicted) in problem.predicted(evaluation) {

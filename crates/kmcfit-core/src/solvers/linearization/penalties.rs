@@ -1,9 +1,9 @@
-//! Terms of the cost beside the readings, as rows of a subproblem.
+//! Terms of the cost besides the samples, as rows of a subproblem.
 
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 
-/// `(x + delta - mean) / sigma` of the scalars' priors as residual rows.
+/// Adds priors of scalars, `(x + delta - mean) / sigma`, as residual rows.
 pub(crate) fn add_priors(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
     let functions = &problem.functions;
     for (index, scalar) in functions.scalar_range().zip(functions.scalars()) {
@@ -15,7 +15,7 @@ pub(crate) fn add_priors(problem: &Problem, parameters: &[f64], sub: &mut Subpro
     }
 }
 
-/// `sqrt(weight) (L (theta + delta) - target)` as residual rows.
+/// Adds penalties, `sqrt(weight) (L (theta + delta) - target)`, as residual rows.
 pub(crate) fn add_penalties(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
     for penalty in &problem.penalties {
         let range = problem.functions.ranges()[penalty.function].clone();
@@ -31,7 +31,7 @@ pub(crate) fn add_penalties(problem: &Problem, parameters: &[f64], sub: &mut Sub
     }
 }
 
-/// `weight |D (theta + delta)|` as absolute values.
+/// Adds total-variation penalties, `weight |D (theta + delta)|`, as absolute values.
 pub(in crate::solvers) fn add_variations(
     problem: &Problem,
     parameters: &[f64],
@@ -48,7 +48,7 @@ pub(in crate::solvers) fn add_variations(
     }
 }
 
-/// The rows of soft constraints that are violated at `parameters`, as residuals.
+/// Adds the rows of soft constraints violated at `parameters` as residuals.
 pub(super) fn add_soft(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
     for group in &problem.soft {
         let root = group.row_weight().sqrt();

@@ -1,4 +1,4 @@
-//! The readings linearised by tangent solves and reduced to a triangle, for functions with few parameters.
+//! Samples linearised by tangent solves and reduced to a triangular factor, for functions with few parameters.
 
 use super::residuals::Residuals;
 use crate::host::Instant;
@@ -11,27 +11,26 @@ use crate::solvers::timings::{Timings, timed};
 use nalgebra::DMatrix;
 use std::time::Duration;
 
-/// Up to so many columns the reduction of a piece of rows takes as long as a look at the clock.
+/// Number of columns up to which the reduction of a block of rows is as fast as reading the clock.
 pub(super) const NARROW: usize = LANES;
 
-/// The readings, linearised and reduced to as many rows as there are parameters:
-/// `|R delta + b|^2 + rest^2`, with the triangular factor `R` of the weighted Jacobian.
+/// Linearised samples, reduced to as many rows as there are parameters: `|R delta + b|^2 + rest^2` with the triangular
+/// factor `R` of the weighted Jacobian.
 #[derive(Clone)]
 pub(crate) struct Reduced {
     pub(super) triangle: Triangle,
-    /// The parameter of each column.
+    /// Parameter of each column.
     pub(super) order: Vec<usize>,
 }
 
 impl Reduced {
-    /// Whether a problem's Jacobian can be reduced piece by piece as it comes ([`Problem::each_piece`]), and
-    /// is worth it.
-    pub fn comes_in_pieces(problem: &Problem) -> bool {
-        problem.comes_in_pieces() && problem.reading_count() > problem.parameters()
+    /// True if the Jacobian of a problem can be reduced block by block ([`Problem::each_row_block`]) with a benefit.
+    pub fn is_computed_by_blocks(problem: &Problem) -> bool {
+        problem.is_computed_by_blocks() && problem.sample_count() > problem.parameters()
     }
 
-    /// At an evaluated point, in one pass.
-    pub(super) fn piece_by_piece(
+    /// Reduction at an evaluated point, in one pass.
+    pub(super) fn block_by_block(
         problem: &Problem,
         evaluation: &Evaluation,
         timings: &mut Timings,
@@ -41,7 +40,7 @@ impl Reduced {
         let Residuals { roots, weighted } = Residuals::at(problem, evaluation);
         let mut triangle = Triangle::new(order.len());
         let mut reducing = Duration::ZERO;
-        problem.each_piece(evaluation, &order, |mut piece| {
+        problem.each_row_block(evaluation, &order, |mut piece| {
             let rows = piece.first..piece.first + piece.count;
             let (roots, right) = (&roots[rows.clone()], &weighted[rows]);
             let mut add = || triangle.add_weighted(&mut piece, roots, right);
@@ -56,8 +55,8 @@ impl Reduced {
         Self { triangle, order }
     }
 
-    /// The same Jacobian at a point nearby, where the misfit, a sum of squares, and its gradient are known; `None` if it
-    /// cannot be the Jacobian there.
+    /// The same Jacobian at a nearby point with known misfit (a sum of squares) and gradient; `None` if it is inconsistent with
+    /// them.
     pub fn nearby(&self, misfit: f64, gradient: &[f64]) -> Option<Self> {
         let products: Vec<f64> = self.order.iter().map(|j| 0.5 * gradient[*j]).collect();
         let triangle = self.triangle.clone().beside(&products, misfit)?;
@@ -65,18 +64,18 @@ impl Reduced {
         Some(Self { triangle, order })
     }
 
-    /// The step to the minimum, less the sign, in the order of the columns.
+    /// Negative step to the minimum, in the order of the columns.
     #[cfg(test)]
     pub fn solution(&self) -> Option<Vec<f64>> {
         self.triangle.solve(1e-14)
     }
 
-    /// Whether all numbers are finite.
+    /// True if all numbers are finite.
     pub(super) fn is_finite(&self) -> bool {
         self.triangle.is_finite()
     }
 
-    /// The subproblem in `delta theta`, with what no step can change as a row of its own.
+    /// Subproblem in `delta theta`; the constant part of the misfit is a row of its own.
     pub(super) fn subproblem(&self) -> Subproblem {
         let mut sub = empty(self.order.len());
         for (entries, b) in self.triangle.rows() {
@@ -87,7 +86,7 @@ impl Reduced {
         sub
     }
 
-    /// The gradient of the misfit; `None` where a number has left its range.
+    /// Gradient of the misfit; `None` where it is not finite.
     pub fn misfit_gradient(&self) -> Option<Vec<f64>> {
         let mut gradient = vec![0.0; self.order.len()];
         for (product, j) in self.triangle.products().into_iter().zip(&self.order) {
@@ -98,14 +97,14 @@ impl Reduced {
     }
 }
 
-/// A subproblem whose variables are eliminated all at once.
+/// Subproblem whose variables are eliminated together.
 fn empty(variables: usize) -> Subproblem {
     let mut sub = Subproblem::new(variables);
     sub.stations = vec![0; variables];
     sub
 }
 
-/// The subproblem in `delta theta` at an evaluated point, from the whole Jacobian: one tangent solve for each parameter.
+/// Subproblem in `delta theta` at an evaluated point, from the full Jacobian: one tangent solve per parameter.
 pub(super) fn of_whole_jacobian(
     problem: &Problem,
     evaluation: &Evaluation,
@@ -126,13 +125,13 @@ pub(super) fn of_whole_jacobian(
             let entries = row.iter().map(|a| root * a).enumerate();
             sub.residuals.push(entries.filter(|(_, a)| *a != 0.0), -r);
         }
-        // So that the readings' rows end alike.
+        // All rows of the samples then end alike.
         sub.residuals.push([], 0.0);
         sub
     })
 }
 
-/// `sqrt(w) dz/dtheta` (readings x parameters) for the predictions `z` of all channels.
+/// Weighted Jacobian `sqrt(w) dz/dtheta` (samples x parameters) for the predictions `z` of all channels.
 pub fn weighted_jacobian(problem: &Problem, evaluation: &Evaluation) -> DMatrix<f64> {
     let Residuals { roots, .. } = Residuals::at(problem, evaluation);
     let mut jacobian = problem.predictions_jacobian(evaluation);

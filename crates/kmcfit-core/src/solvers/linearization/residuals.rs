@@ -1,32 +1,32 @@
-//! Weighted residuals of the readings.
+//! Weighted residuals of the samples.
 
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::Channel;
 use std::ops::Range;
 
-/// How the residuals of the readings of all channels are weighed.
+/// Weighted residuals of the samples of all channels.
 pub(super) struct Residuals {
-    /// `sqrt(w)`.
+    /// Roots of the weights, `sqrt(w)`.
     pub roots: Vec<f64>,
-    /// `sqrt(w) r`.
+    /// Weighted residuals, `sqrt(w) r`.
     pub weighted: Vec<f64>,
 }
 
 impl Residuals {
-    /// At an evaluated point.
+    /// Residuals at an evaluated point.
     pub fn at(problem: &Problem, evaluation: &Evaluation) -> Self {
-        let mut all = Self::with_capacity(problem.reading_count());
+        let mut all = Self::with_capacity(problem.sample_count());
         for (channel, predicted) in problem.predicted(evaluation) {
             all.push(channel, predicted, 0..channel.len());
         }
         all
     }
 
-    pub fn with_capacity(readings: usize) -> Self {
+    pub fn with_capacity(samples: usize) -> Self {
         Self {
-            roots: Vec::with_capacity(readings),
-            weighted: Vec::with_capacity(readings),
+            roots: Vec::with_capacity(samples),
+            weighted: Vec::with_capacity(samples),
         }
     }
 
@@ -35,22 +35,22 @@ impl Residuals {
         self.weighted.clear();
     }
 
-    /// Adds some readings of a channel.
-    pub fn push(&mut self, channel: &Channel, predicted: &[f64], readings: Range<usize>) {
+    /// Appends some samples of a channel.
+    pub fn push(&mut self, channel: &Channel, predicted: &[f64], samples: Range<usize>) {
         let Self { roots, weighted } = self;
         let first = roots.len();
-        let residuals = || channel.residuals_of(predicted, readings.clone());
+        let residuals = || channel.residuals_of(predicted, samples.clone());
         match channel.uniform_weights() {
             Some([inner, ends]) => {
-                roots.resize(first + readings.len(), inner.sqrt());
+                roots.resize(first + samples.len(), inner.sqrt());
                 for end in [0, channel.len() - 1] {
-                    if readings.contains(&end) {
-                        roots[first + end - readings.start] = ends.sqrt();
+                    if samples.contains(&end) {
+                        roots[first + end - samples.start] = ends.sqrt();
                     }
                 }
             }
             None => {
-                let each = readings.clone().zip(residuals());
+                let each = samples.clone().zip(residuals());
                 roots.extend(each.map(|(i, r)| channel.weight(i, r).sqrt()));
             }
         }
@@ -65,15 +65,15 @@ mod tests {
     use crate::record::Weighting;
     use crate::system::Grid;
 
-    /// The squares of the weighted residuals are the cost, in which the readings at both ends count half; some readings
-    /// at a time are the same.
+    /// The squares of the weighted residuals sum to the cost, in which samples at both ends have half weight; so do those of
+    /// parts of the samples.
     #[test]
-    fn weighted_residuals() {
+    fn squares_of_weighted_residuals_sum_to_the_cost() {
         let grid = Grid::new(0.0, 1.0, 11).expect("a grid");
         let spacing = grid.step();
-        let readings = (0..11).map(|i| f64::from(i).sin()).collect();
+        let samples = (0..11).map(|i| f64::from(i).sin()).collect();
         let weighting = Weighting::Integral { spacing };
-        let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
+        let channel = Channel::displacement_at_nodes(samples, 1, weighting, &grid);
         let predicted: Vec<f64> = (0..11).map(|i| 2.0 - f64::from(i)).collect();
         let mut whole = Residuals::with_capacity(11);
         whole.push(&channel, &predicted, 0..11);
@@ -81,8 +81,8 @@ mod tests {
         let cost = channel.cost(&predicted);
         assert!((squares - cost).abs() <= 1e-14 * cost, "{squares} {cost}");
         let mut parts = Residuals::with_capacity(11);
-        for readings in [0..1, 1..6, 6..10, 10..11] {
-            parts.push(&channel, &predicted, readings);
+        for samples in [0..1, 1..6, 6..10, 10..11] {
+            parts.push(&channel, &predicted, samples);
         }
         assert_eq!(parts.weighted, whole.weighted);
         assert_eq!(parts.roots, whole.roots);

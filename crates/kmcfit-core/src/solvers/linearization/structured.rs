@@ -1,5 +1,5 @@
-//! The Gauss–Newton subproblem with the states as unknowns: sparse, and of a size linear in the number
-//! of nodes, for functions with many parameters.
+//! Gauss–Newton subproblem with the states as unknowns: sparse, with a size linear in the number of nodes, for functions
+//! with many parameters.
 
 use crate::constraints::Rows;
 use crate::functions::Design;
@@ -11,24 +11,24 @@ use crate::signal::SecondOrder;
 use crate::simulate::reference::step_jacobians;
 use crate::simulate::{StepJacobian, Trajectory};
 
-/// Entries of a linearised step to make room for: three states, three functions at both ends.
+/// Capacity for a linearised step: three states, three functions at both ends.
 const ENTRIES: usize = 9;
 
-/// Every step of every experiment, linearised.
+/// Linearised steps of all experiments.
 pub fn steps(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<StepJacobian>> {
     let each = (0..problem.experiments.len()).map(|e| {
         let view = problem.view(evaluation, e);
-        step_jacobians(view.system, view.device, view.excitation, view.motion)
+        step_jacobians(view.system, view.nodal, view.excitation, view.response)
     });
     each.collect()
 }
 
-/// The subproblem in `(delta theta, delta x)` about `theta` and the node states `states`, one
-/// trajectory per experiment; the first state of each is given, or two of the scalars in `theta`.
+/// Subproblem in `(delta theta, delta x)` about `theta` and the node states `states`, one trajectory per experiment; initial
+/// states are fixed or scalars in `theta`.
 ///
-/// Residuals: `sqrt(w) (r + delta z)` for the readings. Equalities: every step, linearised,
-/// `delta x_{i+1} - dPhi_i (delta x_i, delta theta) = Phi_i(x_i) - x_{i+1}`; the right-hand sides
-/// vanish where the states are a motion. `steps` are those of [`steps`].
+/// Residuals: `sqrt(w) (r + delta z)` for the samples. Equalities: the linearised steps
+/// `delta x_{i+1} - dPhi_i (delta x_i, delta theta) = Phi_i(x_i) - x_{i+1}`, whose right-hand sides vanish where the states
+/// are a response. `steps` are those of [`steps`].
 pub fn subproblem(
     problem: &Problem,
     evaluation: &Evaluation,
@@ -47,21 +47,21 @@ pub fn subproblem(
     for (e, steps) in steps.iter().enumerate() {
         let experiment = &problem.experiments[e];
         let view = problem.view(evaluation, e);
-        let columns = Columns {
+        let columns = UnknownColumns {
             problem,
             experiment,
             base,
         };
-        columns.add_steps(steps, view.motion, &mut sub.equalities);
+        columns.add_steps(steps, view.response, &mut sub.equalities);
         for (channel, predicted) in experiment.channels.iter().zip(&evaluation.predictions[e]) {
-            columns.add_readings(channel, predicted, view, &mut sub);
+            columns.add_samples(channel, predicted, view, &mut sub);
         }
         base += 2 * (experiment.nodes - 1);
     }
     sub
 }
 
-/// The nodes at which the unknowns act; `None` if a function has neither one value per node nor a single one.
+/// Assignment of the unknowns to nodes; `None` if a function is neither nodal nor constant.
 fn layout(problem: &Problem) -> Option<StageLayout> {
     let functions = &problem.functions;
     let mut layout = StageLayout {
@@ -79,7 +79,7 @@ fn layout(problem: &Problem) -> Option<StageLayout> {
     let mut is_initial = vec![false; functions.scalars().len()];
     let mut first = problem.parameters();
     for experiment in &problem.experiments {
-        let initial = experiment.sought;
+        let initial = experiment.initial_parameters;
         for index in initial.into_iter().flatten() {
             if std::mem::replace(&mut is_initial[index], true) {
                 return None;
@@ -100,19 +100,18 @@ fn layout(problem: &Problem) -> Option<StageLayout> {
     Some(layout)
 }
 
-/// Where the unknowns of one experiment stand.
-struct Columns<'a> {
+/// Columns of the unknowns of one experiment.
+struct UnknownColumns<'a> {
     problem: &'a Problem,
     experiment: &'a Experiment,
     base: usize,
 }
 
-impl Columns<'_> {
-    /// Index of component `q` (0 displacement, 1 velocity) of the state at node `i`; `None` for a
-    /// first state that is known.
+impl UnknownColumns<'_> {
+    /// Column of component `q` (0 displacement, 1 velocity) of the state at node `i`; `None` for a fixed initial state.
     fn state(&self, i: usize, q: usize) -> Option<usize> {
         match i {
-            0 => Some(self.scalar(self.experiment.sought[q]?)),
+            0 => Some(self.scalar(self.experiment.initial_parameters[q]?)),
             _ => Some(self.base + 2 * (i - 1) + q),
         }
     }
@@ -143,7 +142,7 @@ impl Columns<'_> {
         }
     }
 
-    /// What the functions' values at both ends of step `i` do, by `slope(function, side)`.
+    /// Adds the dependence on the functions' values at both ends of step `i`, with `slope(function, side)`.
     fn add_function_slopes(
         &self,
         i: usize,
@@ -152,7 +151,7 @@ impl Columns<'_> {
     ) {
         let functions = &self.problem.functions;
         for (place, &f) in functions
-            .assembly(self.experiment.device)
+            .coefficient_set(self.experiment.coefficient_set)
             .iter()
             .enumerate()
         {
@@ -167,7 +166,7 @@ impl Columns<'_> {
         }
     }
 
-    fn add_readings(
+    fn add_samples(
         &self,
         channel: &Channel,
         predicted: &[f64],
@@ -223,10 +222,9 @@ impl Columns<'_> {
     }
 }
 
-/// Adds the filtered changes of the predictions as unknowns: every section is a recurrence, run
-/// forward over the record for all sections and then backward, from rest. Returns the index of each
-/// filtered prediction. Recurrences that run both ways leave the variables no order in which each
-/// follows from those before.
+/// Adds filtered changes of the predictions as unknowns and returns their columns. Each section is a recurrence, run forward
+/// over the record for all sections and then backward, from rest. With recurrences in both directions the variables have no
+/// elimination order along time.
 fn add_filter(
     filter: &[SecondOrder],
     rows: Vec<Vec<(usize, f64)>>,

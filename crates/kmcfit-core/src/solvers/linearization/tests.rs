@@ -6,10 +6,10 @@ use crate::functions::{
 use crate::objective::GradientKind;
 use crate::record::{Channel, ChannelKind, Experiment, Weighting};
 use crate::solvers::checkpoint::{ExactF64s, MethodState};
-use crate::solvers::counts::Counts;
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::methods::{GaussNewton, Step, StepRule};
 use crate::solvers::settings::FitSettings;
+use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::{Fit, fit, fit_from};
 use crate::system::{Excitation, Grid, Method, State, System, Term};
 use crate::threads;
@@ -19,9 +19,8 @@ fn fitted(problem: &Problem) -> Fit {
     fit(problem, &problem.start(), &settings, &mut |_| {}).expect("a motion")
 }
 
-/// A driven oscillator over a long record, of which displacements are read at every seventh node, accelerations at
-/// every one and velocities between them; its velocity at the start is sought as well. The stiffness has so many knots,
-/// or is a constant.
+/// A driven oscillator over a long record with displacements at every seventh node, accelerations at every node and
+/// velocities between nodes; the initial velocity is estimated. The stiffness has `knots` knots, or is a constant.
 fn long_problem(knots: Option<u32>) -> Problem {
     let grid = Grid::new(0.0, 330.0, 33_001).expect("a grid");
     let nodes = grid.nodes();
@@ -57,13 +56,13 @@ fn long_problem(knots: Option<u32>) -> Problem {
     let channel = |kind, times: Vec<f64>| {
         let values = times.iter().map(read).collect();
         let weighting = Weighting::Sigma(0.1);
-        Channel::new(kind, times, values, weighting, &grid, nodes).expect("readings")
+        Channel::new(kind, times, values, weighting, &grid, nodes).expect("samples")
     };
     let sevenths = times.iter().step_by(7).copied().collect();
     let between = times.iter().step_by(50).map(|t| t + 0.3 * grid.step());
     let between = between.filter(|t| *t < grid.duration()).collect();
     let record = Experiment {
-        sought: [None, Some(0)],
+        initial_parameters: [None, Some(0)],
         ..Experiment::free("driven", State::default(), nodes)
             .with_excitation(Excitation::force_at_nodes(&force))
             .with_channel(channel(ChannelKind::Displacement, sevenths))
@@ -79,10 +78,10 @@ fn long_problem(knots: Option<u32>) -> Problem {
     Problem::new(system, functions, vec![record]).unwrap()
 }
 
-/// Both halves together say what the whole record says, and what the adjoint does: for few parameters, and for as many as
-/// leave one lane or none for the state in the middle.
+/// The joined halves agree with the reduction of the whole record and with the adjoint: for few parameters, and for numbers
+/// of parameters that leave one SIMD lane or none for the state in the middle.
 #[test]
-fn halves_of_a_long_record() {
+fn halves_of_a_long_record_agree_with_the_whole() {
     for (knots, parameters) in [(None, 4), (Some(4), 7), (Some(5), 8)] {
         let problem = long_problem(knots);
         assert_eq!(problem.parameters(), parameters);
@@ -91,7 +90,7 @@ fn halves_of_a_long_record() {
         let evaluation = problem.evaluate(&theta).expect("a motion");
         let second = Half::second(&problem, &evaluation, halfway);
         let joined = Half::first(&problem, &evaluation, halfway).join(&second);
-        let whole = Reduced::piece_by_piece(&problem, &evaluation, &mut Timings::default());
+        let whole = Reduced::block_by_block(&problem, &evaluation, &mut Timings::default());
         let solution = |reduced: &Reduced| reduced.solution().expect("independent columns");
         for (joined, whole) in solution(&joined).iter().zip(solution(&whole)) {
             let off = (joined - whole).abs();
@@ -106,15 +105,15 @@ fn halves_of_a_long_record() {
     }
 }
 
-/// After short steps there are adjoint solves in place of tangents, with the same end: the gradient there is that of an
-/// adjoint, and the linearised readings ask for no further step.
+/// After short steps adjoint solves replace tangents, with the same result: the gradient is that of an adjoint, and the
+/// linearised samples predict no further step.
 #[test]
-fn after_short_steps_the_jacobian_stays() {
+fn the_jacobian_is_reused_after_short_steps() {
     let mut problem = long_problem(None);
     let truth: Vec<f64> = problem.start().iter().map(|p| 1.02 * p).collect();
-    let motion = problem.evaluate(&truth).expect("a motion");
+    let response = problem.evaluate(&truth).expect("a motion");
     let channels = problem.parts_mut().experiments[0].channels.iter_mut();
-    for (channel, predicted) in channels.zip(&motion.predictions[0]) {
+    for (channel, predicted) in channels.zip(&response.predictions[0]) {
         let noise: Vec<f64> = (0..channel.len()).map(|i| (7.0 * i as f64).sin()).collect();
         *channel = channel.clone().with_simulated(predicted, &noise);
     }
@@ -122,13 +121,13 @@ fn after_short_steps_the_jacobian_stays() {
     let fit = fit_from(&problem, &problem.start(), &settings).expect("a motion");
     let points = fit.history.len() as u64 + 1;
     let parameters = problem.parameters() as u64;
-    let Counts {
+    let SolveCounts {
         adjoint, tangent, ..
     } = fit.counts;
     assert!(0 < adjoint && adjoint < points);
     assert_eq!(tangent, (points - adjoint) * parameters);
     let theta = &fit.best.parameters;
-    // Of two ways to the gradient one may have been gone at the end: both have the rounding of the one at the start.
+    // The gradient at the end may come from either method: both have the rounding error of the one at the start.
     let at_start = problem.evaluate(&problem.start()).expect("a motion");
     let at_start = problem.gradient(&problem.start(), &at_start, GradientKind::Discrete);
     let expected = problem.gradient(theta, &fit.best.evaluation, GradientKind::Discrete);
@@ -152,9 +151,9 @@ fn after_short_steps_the_jacobian_stays() {
     }
 }
 
-/// A step that the Jacobian of another point leads astray is made again with the one of its own.
+/// A step that fails with the Jacobian of another point is repeated with its own.
 #[test]
-fn a_jacobian_that_leads_astray_is_made_anew() {
+fn a_reused_jacobian_that_fails_is_recomputed() {
     let problem = long_problem(None);
     let settings = FitSettings::default();
     let start = problem.start();
@@ -172,7 +171,7 @@ fn a_jacobian_that_leads_astray_is_made_anew() {
         let Step::Moved { point, .. } = method.step(&mut work, &point) else {
             panic!("no step");
         };
-        (point.parameters, Counts::of(&counted))
+        (point.parameters, SolveCounts::of(&counted))
     };
     let (expected, before) = stepped(None);
     let elsewhere = [2.0, 1.0, 3.0, 1.0].iter().zip(&start);
@@ -182,9 +181,9 @@ fn a_jacobian_that_leads_astray_is_made_anew() {
     assert_eq!(after.tangent, before.tangent + problem.parameters() as u64);
 }
 
-/// On one thread and on two the same, to the last bit.
+/// Results on one thread and on two are bit-identical.
 #[test]
-fn a_long_record_on_two_threads() {
+fn a_long_record_has_the_same_result_on_two_threads() {
     let problem = long_problem(None);
     let alone = threads::sharing(|| fitted(&problem));
     let together = fitted(&problem);
@@ -193,15 +192,15 @@ fn a_long_record_on_two_threads() {
     assert_eq!(together.best.parameters, alone.best.parameters);
 }
 
-/// By the continuous gradient, too, which needs an adjoint.
+/// The continuous gradient, which needs an adjoint, is available for long records.
 #[test]
-fn a_long_record_by_the_continuous_gradient() {
+fn a_long_record_is_fitted_by_the_continuous_gradient() {
     let mut problem = long_problem(None);
     let grid = problem.system.grid;
-    let readings = grid.times().iter().map(|t| (0.9 * t).cos()).collect();
+    let samples = grid.times().iter().map(|t| (0.9 * t).cos()).collect();
     let spacing = grid.step();
     let weighting = Weighting::Integral { spacing };
-    let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
+    let channel = Channel::displacement_at_nodes(samples, 1, weighting, &grid);
     problem.parts_mut().experiments[0].channels = vec![channel];
     assert!(problem.supports_continuous() && halfway(&problem).is_some());
     let mut settings = FitSettings {

@@ -1,16 +1,15 @@
 //! Limited-memory BFGS in the L2 inner product.
 //!
-//! The search runs in coordinates `x`: the logarithm of the mass where its parameters can carry
-//! one, the parameters themselves elsewhere, or what they are of a [`unit`] where their numbers are
-//! very large or small. A step in `ln m` cannot take the mass through zero,
-//! where plain L-BFGS ends. All inner products are those of functions of time, `x^T G x'`, so the
-//! path hardly depends on the number of nodes. Pairs that have lost curvature are left out; after
-//! a failed line search the memory is dropped once and the search goes on along the gradient.
+//! The search variables `x` are the logarithm of the mass where its basis permits, otherwise the parameters, divided by a
+//! [`unit`] where they are very large or small. A step in `ln m` cannot make the mass negative, which ends plain L-BFGS.
+//! Inner products are those of functions of time, `x^T G x'`, so the iterates hardly depend on the number of nodes. Pairs
+//! without positive curvature are rejected; after a failed line search the memory is cleared once and the search continues
+//! along the gradient.
 //!
-//! argmin runs the loop and counts the solves; its own L-BFGS is not used, as it has no guard
-//! against lost curvature, no step limit, and asks for cost and gradient separately.
+//! argmin runs the loop and counts the solves. Its own L-BFGS is not used: it has no curvature safeguard and no step limit,
+//! and evaluates cost and gradient separately.
 
-use super::line_search::{Line, weak_wolfe};
+use super::line_search::{LineFunction, weak_wolfe};
 use super::{Step, StepRule, difference};
 use crate::functions::{CoefficientKind, Parameterization};
 use crate::objective::Evaluation;
@@ -23,23 +22,23 @@ use crate::solvers::iterate::Iterate;
 use crate::solvers::reason::Reason;
 use std::collections::VecDeque;
 
-/// Pairs with `<s, z>` below this fraction of `|s| |z|` carry rounding, not curvature.
+/// Share of `|s| |z|` below which `<s, z>` is a rounding error.
 const LOST_CURVATURE: f64 = 1e-10;
 /// Largest change of `ln m` at the first trial of a step: a factor of e.
 const LONGEST_LOG_STEP: f64 = 1.0;
 
-/// Functions whose start is within these need no other unit.
+/// Starts of functions within this range need no other unit.
 const ORDINARY: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 
-/// The method and its memory.
+/// The method with its memory.
 pub struct Lbfgs {
     memory: usize,
     pairs: VecDeque<Pair>,
-    /// The point that the last step led to.
+    /// Point reached by the last step.
     here: Option<Here>,
 }
 
-/// A vector of coordinates `x` and its dual `G x`: inner products are sums of products of the two.
+/// A vector `x` with its dual `G x`; an inner product is a sum of products of the two.
 struct Vector {
     primal: Vec<f64>,
     dual: Vec<f64>,
@@ -52,7 +51,7 @@ struct Pair {
     curvature: f64,
 }
 
-/// What is known of a point in coordinates.
+/// A point in search variables.
 struct Here {
     parameters: Vec<f64>,
     logarithmic: Vec<bool>,
@@ -61,7 +60,7 @@ struct Here {
 }
 
 impl Vector {
-    /// `x^T G x'`.
+    /// Inner product `x^T G x'`.
     fn inner(&self, primal: &[f64]) -> f64 {
         dot(&self.dual, primal)
     }
@@ -96,7 +95,7 @@ impl Lbfgs {
             return None;
         }
         let first = if self.pairs.is_empty() {
-            // The step at which the linear model of J reaches zero.
+            // Step at which the linear model of J reaches zero.
             -point.evaluation.cost / slope
         } else {
             1.0
@@ -142,7 +141,7 @@ impl Lbfgs {
         })
     }
 
-    /// The point in coordinates, as the last step left it if it is still the same.
+    /// The point in search variables, reused from the last step if unchanged.
     fn here(&mut self, at: &Coordinates, point: &Iterate) -> Here {
         let same =
             |here: &Here| here.parameters == point.parameters && here.logarithmic == at.logarithmic;
@@ -168,7 +167,7 @@ impl Lbfgs {
         }
     }
 
-    /// The two-loop recursion, `-H g`.
+    /// Search direction `-H g` by the two-loop recursion.
     fn direction(&self, gradient: &[f64]) -> Vec<f64> {
         let mut q: Vec<f64> = gradient.iter().map(|g| -g).collect();
         let mut weights = Vec::with_capacity(self.pairs.len());
@@ -253,7 +252,7 @@ impl StepRule for Lbfgs {
         let Some(pairs) = pairs.filter(|pairs| pairs.len() <= self.memory) else {
             return false;
         };
-        // After a step there is always the point that it led to.
+        // After a step, the point reached is always present.
         if [x.0.len(), logarithmic.len()] != [len; 2] {
             return false;
         }
@@ -273,14 +272,14 @@ impl StepRule for Lbfgs {
     }
 }
 
-/// Which coordinates are logarithms, the units of the others, and the inner product of all.
+/// Search variables: logarithmic flags, units and inner product.
 struct Coordinates<'p> {
     functions: &'p Parameterization,
     units: Vec<f64>,
     logarithmic: Vec<bool>,
 }
 
-/// The unit of every parameter.
+/// Unit of every parameter.
 fn units(functions: &Parameterization) -> Vec<f64> {
     let mut units = vec![1.0; functions.parameters()];
     for (function, range) in functions.iter().zip(functions.ranges()) {
@@ -289,8 +288,8 @@ fn units(functions: &Parameterization) -> Vec<f64> {
     units
 }
 
-/// The power of two nearest to a function's start, where a number of that size beside ordinary ones
-/// would leave the first steps without any change of it, or with nothing else; otherwise one.
+/// Unit of a parameter: the power of two nearest to its start if that is very large or small, otherwise one. Without it the
+/// first steps would change such a parameter not at all, or it alone.
 fn unit(size: f64) -> f64 {
     let ordinary = size == 0.0 || ORDINARY.contains(&size) || !size.is_finite();
     if ordinary {
@@ -320,7 +319,7 @@ impl<'p> Coordinates<'p> {
         }
     }
 
-    /// For each parameter whether it is a logarithm, and its unit.
+    /// Logarithmic flag and unit of each parameter.
     fn kinds(&self) -> impl Iterator<Item = (bool, f64)> {
         self.logarithmic
             .iter()
@@ -342,7 +341,7 @@ impl<'p> Coordinates<'p> {
             .collect()
     }
 
-    /// The gradient in these coordinates: L2, and Euclidean as its dual.
+    /// Gradient in the search variables: L2, with the Euclidean one as its dual.
     fn gradient(&self, point: &Iterate) -> Vector {
         let dual: Vec<f64> = (point.gradient.euclidean.iter().zip(&point.parameters))
             .zip(self.kinds())
@@ -371,11 +370,11 @@ struct Trials<'a, 'w, 'q, 'p> {
     direction: &'a [f64],
     spare: Option<Evaluation>,
     trial: Option<Trial>,
-    /// The lowest trial that lowered the cost enough.
+    /// Lowest trial with sufficient decrease.
     accepted: Option<Accepted>,
 }
 
-/// A trial with its cost alone.
+/// A trial with its cost.
 struct Trial {
     length: f64,
     x: Vec<f64>,
@@ -383,7 +382,7 @@ struct Trial {
     evaluation: Evaluation,
 }
 
-/// A trial with its gradient.
+/// A trial with cost and gradient.
 struct Accepted {
     length: f64,
     x: Vec<f64>,
@@ -391,7 +390,7 @@ struct Accepted {
     gradient: Vector,
 }
 
-impl Line for Trials<'_, '_, '_, '_> {
+impl LineFunction for Trials<'_, '_, '_, '_> {
     fn cost(&mut self, length: f64) -> Option<f64> {
         let mut x = self.x.clone();
         add_scaled(&mut x, length, self.direction);

@@ -1,30 +1,33 @@
-//! A line search for the weak Wolfe conditions by bracketing and interpolation.
+//! Line search for the weak Wolfe conditions, by bracketing and interpolation.
 
 /// Sufficient decrease: `phi(a) <= phi(0) + 1e-4 a phi'(0)`.
 const DECREASE: f64 = 1e-4;
 /// Curvature: `phi'(a) >= 0.9 phi'(0)`.
 const CURVATURE: f64 = 0.9;
-/// Trials before the search gives up: enough to halve a step to 1e-9 of its first length.
+/// Largest number of trials, enough to halve a step to 1e-9 of its first length.
 const TRIALS: u32 = 30;
-/// How far a step may grow from one trial to the next.
+/// Largest growth factor of the step between trials.
 const GROWTH: f64 = 4.0;
 
-/// What a line search sees of a trial point.
-pub(super) trait Line {
-    /// Cost at step `a`; `None` if there is no motion at this point.
+/// Cost along a line, `phi(a)`.
+pub(super) trait LineFunction {
+    /// Cost at step `a`; `None` if the simulation fails.
     fn cost(&mut self, a: f64) -> Option<f64>;
-    /// Slope at the step last asked for by [`Line::cost`].
+    /// Slope at the step of the last call of [`LineFunction::cost`].
     fn slope(&mut self) -> f64;
 }
 
-/// Finds a step that satisfies the weak Wolfe conditions, from the first trial `a`; `cost` and
-/// `slope < 0` belong to step 0. Where no motion exists the step is too long. Returns the last step
-/// that lowered the cost enough, which is the last one whose slope was asked for; `None` if there
-/// was none.
+/// Finds a step that satisfies the weak Wolfe conditions, from the first trial `first`; `cost` and `slope < 0` belong to
+/// step 0. A step whose simulation fails is too long. Returns the last step with sufficient decrease, which is the last one
+/// whose slope was evaluated; `None` if there was none.
 ///
-/// The slope is only asked for where the cost is low enough, so a rejected trial costs one
-/// forward solve and no adjoint.
-pub(super) fn weak_wolfe(line: &mut dyn Line, cost: f64, slope: f64, first: f64) -> Option<f64> {
+/// Slopes are evaluated only at steps with sufficient decrease, so a rejected trial costs one forward solve and no adjoint.
+pub(super) fn weak_wolfe(
+    line: &mut dyn LineFunction,
+    cost: f64,
+    slope: f64,
+    first: f64,
+) -> Option<f64> {
     let (mut low, mut high) = (0.0, f64::INFINITY);
     let mut low_slope = slope;
     let mut a = first;
@@ -57,7 +60,7 @@ pub(super) fn weak_wolfe(line: &mut dyn Line, cost: f64, slope: f64, first: f64)
     accepted
 }
 
-/// Minimiser of the parabola through `phi(0)`, `phi'(0)`, `phi(a)`, kept inside `[0.1 a, 0.5 a]`.
+/// Minimiser of the parabola through `phi(0)`, `phi'(0)`, `phi(a)`, limited to `[0.1 a, 0.5 a]`.
 fn parabola(cost: f64, slope: f64, a: f64, trial: f64) -> f64 {
     let minimiser = -slope * a * a / (2.0 * (trial - cost - slope * a));
     if minimiser.is_finite() {
@@ -67,7 +70,7 @@ fn parabola(cost: f64, slope: f64, a: f64, trial: f64) -> f64 {
     }
 }
 
-/// Zero of the slope by the secant through two steps.
+/// Zero of the slope by the secant method.
 fn secant(a: f64, slope_a: f64, b: f64, slope_b: f64) -> f64 {
     let zero = b - slope_b * (b - a) / (slope_b - slope_a);
     if zero.is_finite() { zero } else { GROWTH * b }
@@ -78,8 +81,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_parabola_is_minimised_within_its_limits() {
-        // 3 - 4 x + 1.5 x^2 at x = 4, and steeper ones whose minimum is nearer or farther.
+    fn the_minimiser_of_the_parabola_is_limited() {
+        // 3 - 4 x + 1.5 x^2 at x = 4, and parabolas whose minimum is nearer or farther.
         let at = |bend: f64| parabola(3.0, -4.0, 4.0, 3.0 - 16.0 + 16.0 * bend);
         assert!((at(1.5) - 4.0 / 3.0).abs() < 1e-15);
         assert_eq!(at(100.0), 0.4);

@@ -1,4 +1,4 @@
-//! Methods: each is a direction and a step rule; the equation error is minimised at once.
+//! Methods, each a search direction and a step rule; the equation error is minimised directly.
 
 pub(super) mod equation_error;
 mod gauss_newton;
@@ -24,55 +24,54 @@ fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
-/// Where one iteration led.
+/// Result of one iteration.
 #[allow(
     clippy::large_enum_variant,
     reason = "there is one at a time, and nearly all have a point"
 )]
 pub(crate) enum Step {
-    /// To a point with lower cost; `length` is the step along the direction. A `limited` step is
-    /// short because longer ones could not be computed: that it is short says nothing of a minimum.
+    /// A point of lower cost; `length` is the step along the direction. A `limited` step is short because longer ones could not
+    /// be computed, which is no sign of convergence.
     Moved {
         point: Box<Iterate>,
         length: f64,
         limited: bool,
     },
-    /// Nowhere: no step lowers the cost, for this reason.
+    /// No step lowers the cost; the reason.
     Stuck(Reason),
-    /// Nowhere: the point breaks the constraints, and no step leads into them, for this reason.
+    /// The point violates the constraints, and no step leads into them; the reason.
     Infeasible(Reason),
-    /// Nowhere: the model predicts no decrease worth the name; the point is a minimum.
+    /// The predicted decrease is not significant: the point is a minimum; the reason.
     Minimum(Reason),
 }
 
-/// A direction and a step rule.
+/// A search direction and a step rule.
 pub(crate) trait StepRule {
     /// One iteration from `point`.
     fn step(&mut self, work: &mut CountedEvaluator, point: &Iterate) -> Step;
 
-    /// Storage for the next step, from a point that has been left.
+    /// Takes storage for the next step from a point that is no longer needed.
     fn recycle(&mut self, evaluation: Evaluation) {
         let _ = evaluation;
     }
 
-    /// What decides its next steps from `point` beside that.
+    /// State of the method at `point`.
     fn state(&self, point: &Iterate) -> MethodState {
         let _ = point;
         MethodState::Nothing
     }
 
-    /// Restores a state at `point`; `false` where it belongs to another method or problem, and the method is then not used any
-    /// more.
+    /// Restores a state at `point`; `false` if it belongs to another method or problem, after which the method must not be used.
     fn restore(&mut self, memory: MethodState, problem: &Problem, point: &mut Iterate) -> bool {
         let _ = (problem, point);
         memory == MethodState::Nothing
     }
 }
 
-/// The step rule of a solver.
+/// Step rule of a solver.
 ///
 /// # Panics
-/// For the equation error, which has no steps.
+/// For the equation error, which has no iterations.
 pub(super) fn step_rule(solver: Solver) -> Box<dyn StepRule> {
     match solver {
         Solver::SteepestDescent => Box::<steepest_descent::SteepestDescent>::default(),
@@ -83,10 +82,10 @@ pub(super) fn step_rule(solver: Solver) -> Box<dyn StepRule> {
     }
 }
 
-/// The step from `point` when the quadratic programs that would make one ended with `status`.
+/// Result of an iteration whose quadratic programs ended with `status`.
 pub(super) fn no_step(problem: &Problem, point: &Iterate, status: ConicStatus) -> Step {
     let reason = Reason::Program(status);
-    // From a point that satisfies them there is always the step of length zero.
+    // From a feasible point the step of length zero is always feasible.
     let inside = problem.constraints.hold(&point.parameters, TOLERANCE);
     match status == ConicStatus::Infeasible && !inside {
         true => Step::Infeasible(reason),
@@ -101,11 +100,11 @@ mod tests {
     use crate::objective::GradientKind;
     use crate::solvers::checkpoint::ExactF64s;
 
-    /// A state with vectors of another length, as a damaged checkpoint has it, is refused by every method.
+    /// Every method rejects a state with vectors of the wrong length, as in a damaged checkpoint.
     #[test]
-    fn states_of_another_length_are_refused() {
+    fn states_of_wrong_length_are_rejected() {
         let times: Vec<f64> = (0..21).map(|i| 0.1 * f64::from(i)).collect();
-        let motion: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let response: Vec<f64> = times.iter().map(|t| t.cos()).collect();
         let system = [
             CoefficientSpec::constant(2.0),
             CoefficientSpec::constant(0.1),
@@ -113,7 +112,7 @@ mod tests {
         ];
         let record = Record::new("r")
             .from_state(1.0, 0.0)
-            .displacement(&times, &motion);
+            .displacement(&times, &response);
         let problem = Builder::new(system)
             .record(record)
             .build()

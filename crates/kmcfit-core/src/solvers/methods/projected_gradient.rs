@@ -1,10 +1,8 @@
-//! Spectral projected gradient: a gradient step, projected onto the constraints, then a line search
-//! towards the projection.
+//! Spectral projected gradient: a gradient step projected onto the constraints, then a line search towards the projection.
 //!
 //! After E. G. Birgin, J. M. Martinez, M. Raydan, *Nonmonotone spectral projected gradient methods on
-//! convex sets*, SIAM J. Optim. 10 (2000), with a monotone line search, so that the best point is
-//! always the last. Metric and projection are those of functions, `sum_f 1/T integral (delta p_f /
-//! size_f)^2 dt`, with the sizes at the start of the search.
+//! convex sets*, SIAM J. Optim. 10 (2000), with a monotone line search, so that the last point is the best one. Metric and
+//! projection are those of functions, `sum_f 1/T integral (delta p_f / size_f)^2 dt`, with the sizes at the start.
 
 use super::{Step, StepRule, difference, no_step};
 use crate::constraints::TOLERANCE;
@@ -17,12 +15,12 @@ use crate::solvers::reason::Reason;
 
 /// Sufficient decrease along the feasible direction.
 const DECREASE: f64 = 1e-4;
-/// Halvings of the step before the search gives up.
+/// Largest number of halvings of a step.
 const HALVINGS: u32 = 40;
-/// Bounds on the spectral step relative to the first one.
+/// Range of the spectral step, relative to the first one.
 const STEP_RANGE: [f64; 2] = [1e-10, 1e10];
 
-/// The method: the metric of the search, and the last step and change of gradient.
+/// The method: metric of the search, first and last step length.
 #[derive(Default)]
 pub struct ProjectedGradient {
     metric: Vec<f64>,
@@ -44,7 +42,7 @@ impl StepRule for ProjectedGradient {
         if slope.abs() <= f64::EPSILON * point.evaluation.cost {
             return Step::Minimum(Reason::ZeroProjectedGradient);
         }
-        // Also of no number: towards a projection the cost falls, and where it does not the projection is wrong.
+        // Also for NaN: the cost falls towards a correct projection.
         if slope.is_nan() || slope > 0.0 {
             return Step::Stuck(Reason::NoDescentToProjection);
         }
@@ -101,7 +99,7 @@ impl ProjectedGradient {
     fn prepare(&mut self, work: &CountedEvaluator, point: &Iterate) {
         let problem = work.problem();
         self.metric = point.relative_metric(problem);
-        // The step at which the linear model of J reaches zero.
+        // Step at which the linear model of J reaches zero.
         let gradient = &point.gradient.euclidean;
         let squared: f64 = gradient
             .iter()
@@ -112,7 +110,7 @@ impl ProjectedGradient {
         self.length = self.first_length;
     }
 
-    /// The projection of the gradient step.
+    /// Projection of the gradient step.
     fn target(
         &self,
         work: &mut CountedEvaluator,
@@ -124,7 +122,7 @@ impl ProjectedGradient {
             .map(|(p, (g, m))| p - self.length * g / m)
             .collect();
         if constraints.are_simple() {
-            // In a diagonal metric clipping is the projection.
+            // In a diagonal metric the projection is clipping.
             constraints.clip(&mut target);
             return Ok(target);
         }
@@ -145,7 +143,7 @@ impl ProjectedGradient {
         }
     }
 
-    /// The spectral step `|s|^2 / <s, z>` in the metric.
+    /// Spectral step `|s|^2 / <s, z>` in the metric.
     fn learn(&mut self, before: &Iterate, after: &Iterate) {
         let s = difference(&after.parameters, &before.parameters);
         let z = difference(&after.gradient.euclidean, &before.gradient.euclidean);

@@ -1,10 +1,8 @@
-//! A start from states and parameters together: the motion near the readings and the functions are
-//! corrected at once, and the equation of motion holds only in the end.
+//! Collocation start: states near the samples and parameters are corrected together, so that the equation of motion holds
+//! only at the end.
 //!
-//! A motion that runs through the record cannot slip by a period, because it begins at the readings
-//! and not at a device. So this start knows no local minima of a wrong period however long the
-//! record is. The steps are linear in the functions: if the motion is right, one of them finds the
-//! functions from anywhere.
+//! States near the samples cannot be off by a period, so this starting point has no local minima of a wrong period, however
+//! long the record. The steps are linear in the functions: with correct states one step finds the functions from anywhere.
 
 use crate::constraints::TOLERANCE;
 use crate::objective::{Evaluation, SimulatedRecord};
@@ -13,37 +11,34 @@ use crate::qp::Subproblem;
 use crate::record::Channel;
 use crate::simulate::Trajectory;
 use crate::solvers::linearization::linearise_about;
-use crate::solvers::methods::equation_error::{from_motions, with_initial_states};
+use crate::solvers::methods::equation_error::{from_kinematics, with_initial_states};
 use crate::solvers::state_estimation::{Kinematics, by_spline};
 use crate::system::State;
 
-/// Most corrections of the parameters.
+/// Largest number of corrections.
 const ROUNDS: usize = 16;
-/// In so many of these at most, and until no function changes by more than [`NEAR`] of its size, the
-/// motion is that of the readings again, as the sensors are known by then: the functions may still be
-/// far off, and a motion that follows them would be led away.
+/// Number of corrections, at most, that reset the states to those of the samples with the current sensor parameters, until no
+/// function changes by more than [`NEAR`] of its size: states that follow wrong functions would drift away.
 const ANCHORED: usize = 8;
 const NEAR: f64 = 1e-3;
-/// Corrections end when no function changes by more than this share of its size: the fit that follows
-/// needs a start, not an optimum.
+/// Largest change of a function, relative to its size, at which corrections end; a starting point need not be optimal.
 const SETTLED: f64 = 1e-6;
-/// A pull towards the last parameters, relative to the misfit of no motion at all: it decides what the
-/// readings leave open.
+/// Weight of the proximal term towards the last parameters, relative to the zero-response misfit; it determines the
+/// directions that the samples leave undetermined.
 const PULL: f64 = 1e-9;
 
-/// The parameters with the lowest cost among the corrected ones; `None` if none of them has a motion.
-/// Ends early where `interrupted` says so.
+/// Corrected parameters of lowest cost; `None` if none can be simulated. Ends early if `interrupted` returns true.
 pub(in crate::solvers) fn collocation_start(
     problem: &Problem,
     start: &[f64],
     interrupted: &dyn Fn() -> bool,
 ) -> Option<Vec<f64>> {
     let scalars = problem.scalars(start);
-    let motions: Vec<Option<Kinematics>> = (problem.experiments.iter())
+    let kinematics: Vec<Option<Kinematics>> = (problem.experiments.iter())
         .map(|e| by_spline(problem, e, scalars).map(|(near, _)| near))
         .collect();
-    let mut theta = from_motions(problem, start, &motions)
-        .unwrap_or_else(|_| with_initial_states(problem, start, &motions));
+    let mut theta = from_kinematics(problem, start, &kinematics)
+        .unwrap_or_else(|_| with_initial_states(problem, start, &kinematics));
     let first = first_states(problem, &theta)?;
     let mut states = first.clone();
     let mut evaluation = problem.workspace();
@@ -65,7 +60,7 @@ pub(in crate::solvers) fn collocation_start(
         theta = moved;
         anchored = anchored && round < ANCHORED && change > NEAR;
         match anchored {
-            true => states = motion_of_readings(problem, &theta, &first)?,
+            true => states = response_of_samples(problem, &theta, &first)?,
             false => correct(problem, &theta, &z, &mut states),
         }
         if let Ok(free) = problem.evaluate(&theta)
@@ -80,7 +75,7 @@ pub(in crate::solvers) fn collocation_start(
     best.map(|(_, theta)| theta)
 }
 
-/// The motion of each experiment near its readings; that of the parameters where there are too few.
+/// States of each experiment near its samples; those of a simulation where there are too few samples.
 fn first_states(problem: &Problem, theta: &[f64]) -> Option<Vec<Trajectory>> {
     let scalars = problem.scalars(theta);
     let mut own = None;
@@ -89,8 +84,8 @@ fn first_states(problem: &Problem, theta: &[f64]) -> Option<Vec<Trajectory>> {
         .iter()
         .enumerate()
         .map(|(e, experiment)| {
-            let mut motion = match by_spline(problem, experiment, scalars) {
-                Some((_, motion)) => motion,
+            let mut response = match by_spline(problem, experiment, scalars) {
+                Some((_, response)) => response,
                 None => {
                     if own.is_none() {
                         own = problem.evaluate(theta).ok();
@@ -98,14 +93,14 @@ fn first_states(problem: &Problem, theta: &[f64]) -> Option<Vec<Trajectory>> {
                     own.as_ref()?.trajectories[e].clone()
                 }
             };
-            begin(experiment.initial_state(scalars), &mut motion);
-            Some(motion)
+            begin(experiment.initial_state(scalars), &mut response);
+            Some(response)
         });
     each.collect()
 }
 
-/// [`first_states`] as sensors and initial states are now seen; `first` as they were seen at first.
-fn motion_of_readings(
+/// [`first_states`] for the current sensor parameters and initial states; `first` are those of the first round.
+fn response_of_samples(
     problem: &Problem,
     theta: &[f64],
     first: &[Trajectory],
@@ -115,18 +110,18 @@ fn motion_of_readings(
         return first_states(problem, theta);
     }
     let mut states = first.to_vec();
-    for (experiment, motion) in problem.experiments.iter().zip(&mut states) {
-        begin(experiment.initial_state(problem.scalars(theta)), motion);
+    for (experiment, response) in problem.experiments.iter().zip(&mut states) {
+        begin(experiment.initial_state(problem.scalars(theta)), response);
     }
     Some(states)
 }
 
-fn begin(initial: State, motion: &mut Trajectory) {
-    motion.displacement[0] = initial.displacement;
-    motion.velocity[0] = initial.velocity;
+fn begin(initial: State, response: &mut Trajectory) {
+    response.displacement[0] = initial.displacement;
+    response.velocity[0] = initial.velocity;
 }
 
-/// Fills `evaluation` with the device at `theta`, the motion `states` and what the channels see of it.
+/// Sets `evaluation` to the coefficients at `theta`, the states `states` and the resulting predictions.
 fn look(problem: &Problem, theta: &[f64], states: &[Trajectory], evaluation: &mut Evaluation) {
     problem.set_parameters(theta, evaluation);
     evaluation.trajectories.clone_from_slice(states);
@@ -145,10 +140,10 @@ fn look(problem: &Problem, theta: &[f64], states: &[Trajectory], evaluation: &mu
     evaluation.predictions = each.collect();
 }
 
-/// Whether every device has a mass that an equation of motion can be solved for.
+/// True if the mass of every coefficient set is positive.
 fn has_mass(evaluation: &Evaluation) -> bool {
-    let mut devices = std::iter::once(&evaluation.device).chain(&evaluation.own_devices);
-    devices.all(|device| device.mass.iter().all(|m| *m > 0.0))
+    let mut nodal_sets = std::iter::once(&evaluation.nodal).chain(&evaluation.own_nodal);
+    nodal_sets.all(|nodal| nodal.mass.iter().all(|m| *m > 0.0))
 }
 
 fn add_pull(problem: &Problem, evaluation: &Evaluation, sub: &mut Subproblem) {
@@ -172,12 +167,12 @@ fn solve(sub: &Subproblem) -> Option<Vec<f64>> {
 /// Adds the changes of the states, which follow the parameters in `z`.
 fn correct(problem: &Problem, theta: &[f64], z: &[f64], states: &mut [Trajectory]) {
     let mut changes = z[theta.len()..].chunks_exact(2);
-    for (experiment, motion) in problem.experiments.iter().zip(states) {
+    for (experiment, response) in problem.experiments.iter().zip(states) {
         for i in 1..experiment.nodes {
             let Some(change) = changes.next() else { return };
-            motion.displacement[i] += change[0];
-            motion.velocity[i] += change[1];
+            response.displacement[i] += change[0];
+            response.velocity[i] += change[1];
         }
-        begin(experiment.initial_state(problem.scalars(theta)), motion);
+        begin(experiment.initial_state(problem.scalars(theta)), response);
     }
 }

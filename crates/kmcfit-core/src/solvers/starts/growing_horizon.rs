@@ -1,25 +1,25 @@
-//! A start fitted to growing parts of the record.
+//! Starting point fitted to growing parts of the record.
 
 use crate::problem::Problem;
 use crate::solvers::checkpoint::Observer;
-use crate::solvers::counts::Counts;
 use crate::solvers::executor::search;
 use crate::solvers::settings::FitSettings;
+use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::timings::Timings;
 
-/// Parts of the record that are fitted in turn, before all of it.
+/// Parts of the record fitted before the whole record.
 const HORIZONS: [f64; 3] = [0.125, 0.25, 0.5];
-/// Most iterations on each part.
+/// Iteration limit on each part.
 const HORIZON_ITERATIONS: u64 = 20;
 
-/// The parameters `from`, fitted to growing parts of the record; and the work that took.
+/// Parameters `from` fitted to growing parts of the record, and the work.
 pub(in crate::solvers) fn growing_horizon_start(
     problem: &Problem,
     from: Vec<f64>,
     settings: &FitSettings,
     watch: &mut Observer,
-) -> (Vec<f64>, Counts, Timings) {
-    let (mut counts, mut timings) = (Counts::default(), Timings::default());
+) -> (Vec<f64>, SolveCounts, Timings) {
+    let (mut counts, mut timings) = (SolveCounts::default(), Timings::default());
     let mut parameters = from;
     let mut short = settings.clone();
     short.stopping.iterations = HORIZON_ITERATIONS;

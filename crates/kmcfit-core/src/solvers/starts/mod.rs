@@ -1,4 +1,4 @@
-//! Starting points, one strategy each.
+//! Starting points, one module for each strategy.
 
 mod collocation;
 mod data;
@@ -18,11 +18,11 @@ use crate::problem::Problem;
 
 /// Cost and gradient at the start values.
 pub(super) struct Referred {
-    /// `None` if there is no response.
+    /// `None` if the simulation fails.
     pub reference: Option<Reference>,
-    /// What the work took.
+    /// Time by kind of work.
     pub timings: Timings,
-    /// The storage that it used.
+    /// Storage of the evaluation.
     pub spare: Option<Evaluation>,
 }
 

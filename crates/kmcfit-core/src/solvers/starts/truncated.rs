@@ -1,8 +1,7 @@
-//! A start from the beginning of a long record.
+//! Truncated start: constants fitted to the first steps of a long record.
 //!
-//! Where every function is a constant, a small part of a long record tells its value nearly as well as is needed to
-//! begin with: the many iterations from a rough start are then made on little, and the few that are left on
-//! all of it.
+//! If all functions are constants, a small part of a long record determines them accurately enough for a starting point. The
+//! many iterations from a rough start then use few samples, and the few remaining ones use the whole record.
 
 use super::{Referred, reference};
 use crate::functions::{Basis, CoefficientFunction, Parameterization};
@@ -10,27 +9,27 @@ use crate::host::Instant;
 use crate::problem::Problem;
 use crate::record::{Experiment, Input, LONG_RECORD_STEPS};
 use crate::solvers::checkpoint::Observer;
-use crate::solvers::counts::Counts;
 use crate::solvers::executor::{Prepared, search};
 use crate::solvers::fit::Fit;
 use crate::solvers::settings::FitSettings;
+use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::timings::Timings;
 use crate::system::{Excitation, Grid, StageSamples, System};
 use crate::threads;
 use std::time::Duration;
 
-/// Steps of the beginning, the more if there are too few readings in the fewer: powers of two, so that its grid has
-/// the same step to the last bit.
+/// Numbers of steps: the larger one if the smaller part has too few samples. Powers of two give the truncated grid exactly the
+/// same step.
 const STEPS: [usize; 2] = [1 << 11, 1 << 12];
-/// How many readings there must be for each parameter.
+/// Smallest number of samples per parameter.
 const READINGS: usize = 20;
-/// Most iterations on the beginning.
+/// Iteration limit on the truncated record.
 const ITERATIONS: u64 = 20;
-/// The tolerance there: what is left is less than the rest of the record adds.
+/// Tolerance on the truncated record, smaller than the change by the rest of the record.
 const TOLERANCE: f64 = 1e-6;
 
-/// The number of steps of a truncated start; `None` unless they are long, all functions constants, and
-/// there are readings enough in it.
+/// Number of steps of a truncated start; `None` unless the records are long, all functions are constants, and the part has
+/// enough samples.
 pub(in crate::solvers) fn truncated_steps(problem: &Problem) -> Option<usize> {
     let is_constant = |f: &CoefficientFunction| {
         matches!(f.basis, Some(Basis::Constant)) || f.basis.is_none() && f.start.is_empty()
@@ -39,14 +38,14 @@ pub(in crate::solvers) fn truncated_steps(problem: &Problem) -> Option<usize> {
     let suits = problem.system.grid.nodes() > LONG_RECORD_STEPS
         && problem.penalties.is_empty()
         && problem.variations.is_empty()
-        && problem.comes_in_pieces()
+        && problem.is_computed_by_blocks()
         && problem.functions.iter().all(is_constant)
         && parameters > 0;
-    let has_readings = |steps: &usize| {
+    let has_samples = |steps: &usize| {
         let count: usize = problem.channels().map(|c| c.count_within(*steps)).sum();
         count >= READINGS * parameters
     };
-    (STEPS.into_iter().find(has_readings)).filter(|_| suits)
+    (STEPS.into_iter().find(has_samples)).filter(|_| suits)
 }
 
 /// The first steps of a problem's records, with the same parameters.
@@ -55,15 +54,20 @@ fn first_steps(problem: &Problem, steps: usize) -> Option<Problem> {
     let grid = Grid::new(grid.start(), grid.step() * steps as f64, steps + 1)?;
     let functions = &problem.functions;
     let list: Option<Vec<_>> = functions.iter().map(|f| shorter(f, grid.nodes())).collect();
-    let devices = functions.assemblies().to_vec();
+    let coefficient_sets = functions.coefficient_sets().to_vec();
     let system = System {
         grid,
         ..problem.system.clone()
     };
     let mut part = Problem::new(
         system,
-        Parameterization::with_devices(list?, devices, grid.nodes(), grid.step())?
-            .with_scalars(functions.scalars().to_vec()),
+        Parameterization::with_coefficient_sets(
+            list?,
+            coefficient_sets,
+            grid.nodes(),
+            grid.step(),
+        )?
+        .with_scalars(functions.scalars().to_vec()),
         problem
             .experiments
             .iter()
@@ -76,7 +80,7 @@ fn first_steps(problem: &Problem, steps: usize) -> Option<Problem> {
     Some(part)
 }
 
-/// A constant or known function over the first nodes.
+/// A constant or fixed function over the first nodes.
 fn shorter(function: &CoefficientFunction, nodes: usize) -> Option<CoefficientFunction> {
     let offset = function.offset[..nodes].to_vec();
     let short = match (&function.basis, function.start.as_slice()) {
@@ -107,39 +111,39 @@ fn first_steps_of(experiment: &Experiment, steps: usize) -> Experiment {
     Experiment {
         name: experiment.name.clone(),
         initial: experiment.initial,
-        sought: experiment.sought,
+        initial_parameters: experiment.initial_parameters,
         excitation,
         drive: Input::default(),
         nodes: experiment.nodes.min(steps + 1),
-        device: experiment.device,
+        coefficient_set: experiment.coefficient_set,
         channels: channels.filter_map(|c| c.within(steps)).collect(),
     }
 }
 
-/// A start from the first steps of a long record, with the whole problem evaluated there, if it has a response; and cost
+/// A starting point from the first steps of a long record, evaluated on the whole problem if the simulation succeeds; and cost
 /// and gradient of the whole problem at the start values.
 pub(in crate::solvers) struct TruncatedStart {
-    /// The start.
+    /// Starting point.
     pub start: Option<Prepared>,
     /// Cost and gradient at the start values.
     pub referred: Referred,
-    /// Work of the fit of the first steps.
-    pub counts: Counts,
-    /// What that work took.
+    /// Solves of the fit of the first steps.
+    pub counts: SolveCounts,
+    /// Time by kind of work.
     pub timings: Timings,
-    /// Wall-clock time, also of what was done before an interrupt.
+    /// Wall-clock time, including that before an interrupt.
     pub elapsed: Duration,
 }
 
-/// A fit of the first steps and the evaluation of the whole problem where it ended.
-struct Part {
+/// Fit of the first steps, and the evaluation of the whole problem at its end.
+struct PartialFit {
     fit: Fit,
     better: Option<Prepared>,
     evaluating: Duration,
 }
 
-/// Fits the first `steps` from `start`; at the same time, where a processor is to spare, finds cost and gradient of the
-/// whole problem at `start`.
+/// Fits the first `steps` from `start`; computes cost and gradient of the whole problem at `start` concurrently where a
+/// processor is free.
 pub(in crate::solvers) fn truncated_start(
     problem: &Problem,
     steps: usize,
@@ -156,13 +160,13 @@ pub(in crate::solvers) fn truncated_start(
         return TruncatedStart {
             start: None,
             referred,
-            counts: Counts::default(),
+            counts: SolveCounts::default(),
             timings: Timings::default(),
             elapsed: Duration::ZERO,
         };
     };
     let elapsed = part.fit.elapsed + part.evaluating;
-    // What was done at once is counted once.
+    // Concurrent work is counted once.
     let rest = clock.elapsed().saturating_sub(elapsed);
     let at_start = &mut referred.timings;
     at_start.forward = at_start.forward.min(rest);
@@ -185,7 +189,7 @@ fn fit_part(
     start: &[f64],
     settings: &FitSettings,
     watch: &mut Observer,
-) -> Option<Part> {
+) -> Option<PartialFit> {
     let mut short = settings.clone();
     short.stopping.iterations = settings.stopping.iterations.min(ITERATIONS);
     short.stopping.tolerance = Some(TOLERANCE);
@@ -200,7 +204,7 @@ fn fit_part(
         parameters,
         spare: None,
     });
-    Some(Part {
+    Some(PartialFit {
         fit,
         better,
         evaluating: clock.elapsed(),

@@ -1,4 +1,4 @@
-//! From an equally spaced acceleration alone: displacement, velocity and acceleration of one band.
+//! State estimation from an equally spaced acceleration: displacement, velocity and acceleration in a frequency band.
 //!
 //! An acceleration is integrated twice by the curve that minimises
 //!
@@ -6,48 +6,47 @@
 //! sum_i [(y_{i-1} - 2 y_i + y_{i+1})/h^2 - (a_{i-1} + 10 a_i + a_{i+1})/12]^2 + w_c^4 sum_i y_i^2
 //! ```
 //!
-//! so `y` is the second integral of `a` seen through `H(w) = w^4/(w^4 + w_c^4)`, which has no phase.
-//! Numerov's relation in the brackets is of order 4; plain second differences would bias a stiffness
-//! by `(w h)^2/12`. Velocity and acceleration are taken from `y` by relations of the same order,
-//! so that all three have passed the same filter: then `m a + c v + k y = f` still holds wherever the
-//! coefficients hardly change in the time `1/w_c`, with the force `f` seen through the filter too.
+//! so `y` is the second integral of `a` filtered by `H(w) = w^4/(w^4 + w_c^4)`, which has zero phase. Numerov's relation in
+//! the brackets is fourth-order accurate; second differences would bias a stiffness by `(w h)^2/12`. Velocity and
+//! acceleration follow from `y` by relations of the same order, so that all three have passed the same filter:
+//! `m a + c v + k y = f` then holds for the filtered force `f` wherever the coefficients vary slowly over the time `1/w_c`.
 
 use crate::qp::Subproblem;
 use crate::simd::sum::rms;
 use std::f64::consts::PI;
 
-/// Corner of the filter as a share of the dominant frequency.
+/// Corner frequency of the filter as a share of the dominant frequency.
 const CORNER: f64 = 0.5;
-/// Rounds in which the dominant frequency is found.
+/// Rounds of the search for the dominant frequency.
 const ROUNDS: usize = 3;
-/// Fewest readings.
+/// Smallest number of samples.
 const FEWEST: usize = 8;
 
-/// The band of a motion.
+/// Frequency band of a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Band {
+pub struct PassBand {
     /// Dominant frequency: root-mean-square velocity over root-mean-square displacement, rad/s.
     pub frequency: f64,
-    /// Spacing of the readings, s.
+    /// Spacing of the samples, s.
     spacing: f64,
 }
 
-/// A series and its integrals through the band's filter, at all readings but the first and the last.
+/// A filtered series and its integrals, at all samples but the first and the last.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InBand {
-    /// Integrated twice.
+    /// Second integral.
     pub y: Vec<f64>,
-    /// Integrated once.
+    /// First integral.
     pub v: Vec<f64>,
-    /// The series itself.
+    /// Filtered series.
     pub a: Vec<f64>,
 }
 
-impl Band {
-    /// The band of a motion with these accelerations, `spacing` seconds apart; `None` if they are too
-    /// few or show no oscillation.
+impl PassBand {
+    /// Band of a response with these accelerations, `spacing` seconds apart; `None` if there are too few, or they do not
+    /// oscillate.
     ///
-    /// The search begins with the zero crossings of the acceleration itself.
+    /// The search starts from the zero crossings of the acceleration.
     pub fn of(accelerations: &[f64], spacing: f64) -> Option<Self> {
         let n = accelerations.len();
         if n < FEWEST {
@@ -60,8 +59,8 @@ impl Band {
         let mut frequency = PI * crossings as f64 / (n as f64 * spacing);
         for _ in 0..ROUNDS {
             let band = Self { frequency, spacing }.oscillating()?;
-            let motion = band.motions(&[accelerations])?.pop()?;
-            frequency = rms(&motion.v) / rms(&motion.y);
+            let response = band.responses(&[accelerations])?.pop()?;
+            frequency = rms(&response.v) / rms(&response.y);
         }
         Self { frequency, spacing }.oscillating()
     }
@@ -75,9 +74,8 @@ impl Band {
         CORNER * self.frequency
     }
 
-    /// Each series, without its mean, through the filter, and its integrals; `None` if they cannot
-    /// be computed.
-    pub fn motions(&self, series: &[&[f64]]) -> Option<Vec<InBand>> {
+    /// Filters each series, without its mean, and integrates it; `None` if the computation fails.
+    pub fn responses(&self, series: &[&[f64]]) -> Option<Vec<InBand>> {
         let n = series.first()?.len();
         let h = self.spacing;
         let mut sub = Subproblem::new(n);
@@ -117,11 +115,11 @@ fn centred(series: &[f64]) -> Vec<f64> {
     series.iter().map(|x| x - mean).collect()
 }
 
-/// The second derivative `a` of `y` with `(a_{i-1} + 10 a_i + a_{i+1})/12 = (y_{i-1} - 2 y_i +
-/// y_{i+1})/h^2`, zero at both ends.
+/// Second derivative `a` of `y` with `(a_{i-1} + 10 a_i + a_{i+1})/12 = (y_{i-1} - 2 y_i + y_{i+1})/h^2`, zero at both
+/// ends.
 fn numerov(y: &[f64], h: f64) -> Vec<f64> {
     let mut a = vec![0.0; y.len()];
-    // Elimination from the left; the matrix is diagonally dominant.
+    // Forward elimination; the matrix is diagonally dominant.
     let mut pivots = vec![10.0; y.len()];
     for i in 1..y.len() - 1 {
         let right = 12.0 * (y[i - 1] - 2.0 * y[i] + y[i + 1]) / (h * h);
@@ -142,29 +140,29 @@ fn numerov(y: &[f64], h: f64) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// A long sine comes out as itself times the filter's response, in the middle of the record.
+    /// In the middle of the record, a long sine is multiplied by the frequency response of the filter.
     #[test]
-    fn a_sine_passes_by_the_response_of_the_filter() {
+    fn a_sine_is_multiplied_by_the_frequency_response_of_the_filter() {
         let (w, h) = (2.0 * PI * 3.0, 0.01);
         let acceleration: Vec<f64> = (0..4000).map(|i| (w * h * f64::from(i)).sin()).collect();
-        let band = Band::of(&acceleration, h).expect("it oscillates");
-        // The ends, of which the filter knows one side alone, leave 2e-3.
+        let band = PassBand::of(&acceleration, h).expect("it oscillates");
+        // End effects are 2e-3.
         assert!(
             (band.frequency / w - 1.0).abs() < 5e-3,
             "{}",
             band.frequency
         );
-        let motion = band.motions(&[&acceleration]).unwrap().pop().unwrap();
-        // Of the filter with differences for derivatives, which all three have passed.
+        let response = band.responses(&[&acceleration]).unwrap().pop().unwrap();
+        // Frequency response of the filter with differences for derivatives, for all three series.
         let square = (2.0 / h * (0.5 * w * h).sin()).powi(2);
-        let response = 1.0 / (1.0 + band.corner().powi(4) / square.powi(2));
+        let filter_response = 1.0 / (1.0 + band.corner().powi(4) / square.powi(2));
         for i in 1900..2100 {
             let t = h * (i + 1) as f64;
             let (sine, cosine) = (w * t).sin_cos();
             for (found, expected) in [
-                (motion.a[i], response * sine),
-                (motion.v[i] * w, -response * cosine),
-                (motion.y[i] * w * w, -response * sine),
+                (response.a[i], filter_response * sine),
+                (response.v[i] * w, -filter_response * cosine),
+                (response.y[i] * w * w, -filter_response * sine),
             ] {
                 // (w h)^4/240 = 5e-6.
                 assert!((found - expected).abs() < 2e-5, "{i}: {found} {expected}");
@@ -173,8 +171,8 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_oscillate_has_no_band() {
-        assert_eq!(Band::of(&[1.0; 50], 0.1), None);
-        assert_eq!(Band::of(&[1.0, -1.0, 1.0], 0.1), None);
+    fn a_series_without_oscillation_has_no_band() {
+        assert_eq!(PassBand::of(&[1.0; 50], 0.1), None);
+        assert_eq!(PassBand::of(&[1.0, -1.0, 1.0], 0.1), None);
     }
 }

@@ -1,39 +1,38 @@
-//! Displacement, velocity and acceleration from the readings of one experiment, for a start that
-//! needs no model of the device.
+//! State estimation: displacement, velocity and acceleration from the samples of one experiment, without a model of the
+//! system.
 
 mod band_limited;
 mod spline;
 mod stencil;
 mod uniform;
 
-pub(super) use band_limited::Band;
+pub(super) use band_limited::PassBand;
 pub(super) use spline::kinematics as by_spline;
 
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment};
 use crate::system::State;
 
-/// A smooth motion near the readings, at some nodes of the grid.
+/// Smooth states near the samples, at some nodes of the grid.
 pub(super) struct Kinematics {
-    /// The nodes.
+    /// Nodes.
     pub nodes: Vec<usize>,
-    /// Displacement there, m.
+    /// Displacement, m.
     pub y: Vec<f64>,
     /// Velocity, m/s.
     pub v: Vec<f64>,
     /// Acceleration, m/s^2.
     pub a: Vec<f64>,
-    /// State at the first node, where the readings reach there.
+    /// State at the first node, if the samples reach it.
     pub initial: Option<State>,
-    /// Size of the readings that are weighed, in their unit.
+    /// Size of the weighted samples, in their unit.
     pub size: f64,
-    /// Weight of a squared residual of theirs.
+    /// Weight of a squared residual.
     pub weight: f64,
 }
 
-/// The states at the beginning of each experiment as its readings suggest them; `None` where they are
-/// too few or begin later.
-pub fn states_from_readings(problem: &Problem) -> Vec<Option<State>> {
+/// Initial state of each experiment, estimated from its samples; `None` if they are too few or start later.
+pub fn estimate_states(problem: &Problem) -> Vec<Option<State>> {
     let start = problem.start();
     let scalars = problem.scalars(&start);
     (problem.experiments.iter())
@@ -42,8 +41,7 @@ pub fn states_from_readings(problem: &Problem) -> Vec<Option<State>> {
 }
 
 impl Kinematics {
-    /// From all channels of an experiment, with the sensors at the values `scalars`; `None` for too
-    /// few readings.
+    /// Estimates the states from all channels of an experiment, for the sensor parameters `scalars`; `None` for too few samples.
     pub fn of(problem: &Problem, experiment: &Experiment, scalars: &[f64]) -> Option<Self> {
         match experiment.channels.as_slice() {
             [] => None,
@@ -56,8 +54,8 @@ impl Kinematics {
     }
 }
 
-/// Standard deviation of the noise from fourth differences, which a smooth motion hardly has: their
-/// variance is 70 times that of white noise.
+/// Standard deviation of the noise from fourth differences, in which a smooth response is negligible; their variance is 70
+/// times that of white noise.
 fn noise_level(observed: &[f64]) -> f64 {
     let fourth = observed
         .windows(5)
@@ -66,16 +64,15 @@ fn noise_level(observed: &[f64]) -> f64 {
     (squares / (70.0 * observed.len().saturating_sub(4).max(1) as f64)).sqrt()
 }
 
-/// Readings as a perfect sensor that moves with the base would give them, and the sensor's gain, with
-/// the sensors at the values `scalars`.
+/// Samples corrected for the sensor parameters `scalars`, as from an ideal sensor on the base, and the gain.
 pub(super) fn unsensed(channel: &Channel, scalars: &[f64]) -> (Vec<f64>, f64) {
     let [gain, offset, drift] = channel.sensor().values(scalars);
     let gain = if gain == 0.0 { 1.0 } else { gain };
     let filtered = !channel.filter().is_empty();
-    let plain = |(i, reading): (usize, &f64)| match filtered {
-        // The filter has taken the offset.
-        true => reading / gain,
-        false => (reading - offset - drift * channel.age(i)) / gain - channel.base_at(i),
+    let plain = |(i, sample): (usize, &f64)| match filtered {
+        // The filter has removed the offset.
+        true => sample / gain,
+        false => (sample - offset - drift * channel.age(i)) / gain - channel.base_at(i),
     };
     let values = channel.observed().iter().enumerate().map(plain);
     (values.collect(), gain)

@@ -1,10 +1,9 @@
-//! From channels of any kind at any times: one curve through all of them.
+//! State estimation from channels of any kind at any times: one smooth curve through all samples.
 //!
-//! The displacement at the nodes minimises the distance of its values and differences to the
-//! readings, plus third differences as far as the noise allows. Where no displacement was measured,
-//! the curve is held near zero below the band of the motion, `omega_0^4 |y|^2` beside `|y'' - a|^2`: so an
-//! acceleration is integrated twice with the response `omega^4 / (omega^4 + omega_0^4)` and without
-//! a phase.
+//! The displacement at the nodes minimises the distance of its values and differences to the samples, plus third differences
+//! weighted according to the noise. Without measured displacements, `omega_0^4 |y|^2` is added to `|y'' - a|^2` to keep the
+//! curve near zero below the band of the response: an acceleration is integrated twice with the zero-phase frequency response
+//! `omega^4 / (omega^4 + omega_0^4)`.
 
 use super::stencil::weights;
 use super::{Kinematics, noise_level, unsensed};
@@ -17,34 +16,31 @@ use crate::simulate::Trajectory;
 use crate::system::{State, TimePoint};
 use std::f64::consts::TAU;
 
-/// Points of a difference stencil: derivatives are of order 4 or better.
+/// Points of a difference stencil; derivatives are at least fourth-order accurate.
 const POINTS: usize = 6;
 /// Rounds of the search for the smoothing weight, and its decimal exponents.
 const ROUNDS: u32 = 12;
 const EXPONENTS: [f64; 2] = [-12.0, 12.0];
-/// How much more than without smoothing a smooth curve may miss the readings, where that is more than
-/// their noise.
+/// Largest residual of a smooth curve relative to that without smoothing, where it exceeds the noise.
 const ALLOWED: f64 = 1.05;
-/// How far below the dominant frequency the band ends in which readings are integrated: from readings
-/// full of noise to exact ones. What holds the curve near zero below the band takes a share of
-/// `band^(-2 p)` off the readings, with p the order of their derivative.
+/// Ratio of the dominant frequency to the lower end of the integrated band, for noisy and for exact samples. The ridge term
+/// below the band removes a share of `band^(-2 p)` of the samples, with `p` the order of their derivative.
 const BAND: [f64; 2] = [6.0, 30.0];
-/// What lies lower than the dominant frequency loses a larger share: so many times as much is allowed.
+/// Allowance for components below the dominant frequency, which lose a larger share.
 const SHARE: f64 = 2.0;
-/// Nodes further than so many median spacings from a reading lie in a gap.
+/// Distance from a sample, in median spacings, beyond which nodes lie in a gap.
 const GAP: f64 = 1.5;
-/// Dominant periods at the ends of an integrated record that are left out: there the integral still
-/// feels its beginning.
+/// Dominant periods omitted at the ends of an integrated record, because of the transients of the integration.
 const SETTLING: f64 = 0.5;
 
-/// A channel as it would be read by a perfect sensor that moves with the base.
+/// A channel corrected to an ideal sensor on the base.
 struct Plain<'a> {
     channel: &'a Channel,
     values: Vec<f64>,
     noise: f64,
 }
 
-/// At all nodes that are near readings.
+/// States at all nodes near samples.
 pub fn kinematics(
     problem: &Problem,
     experiment: &Experiment,
@@ -52,7 +48,7 @@ pub fn kinematics(
 ) -> Option<(Kinematics, Trajectory)> {
     let grid = &problem.system.grid;
     let nodes = experiment.nodes;
-    if nodes < 2 * POINTS || experiment.reading_count() < 2 * POINTS {
+    if nodes < 2 * POINTS || experiment.sample_count() < 2 * POINTS {
         return None;
     }
     let channels: Vec<Plain> = (experiment.channels.iter())
@@ -75,7 +71,7 @@ pub fn kinematics(
         })
     };
     let settling = ridge.map_or(2.0 * step, |r| SETTLING / r.frequency);
-    let near = near_readings(&channels, nodes, grid.start(), step, settling);
+    let near = near_samples(&channels, nodes, grid.start(), step, settling);
     let chosen: Vec<usize> = (0..nodes).filter(|i| near[*i]).collect();
     let all = (0..nodes).map(derivatives).map(|[_, v, a]| (v, a));
     let (v, a): (Vec<f64>, Vec<f64>) = all.unzip();
@@ -97,14 +93,14 @@ pub fn kinematics(
         weight: weight_of(main.channel),
         nodes: chosen.clone(),
     })?;
-    let motion = Trajectory {
+    let response = Trajectory {
         displacement: y.clone(),
         velocity: v.clone(),
     };
-    Some((near, motion))
+    Some((near, response))
 }
 
-/// A typical weight of a channel's readings.
+/// Typical weight of a channel's samples.
 fn weight_of(channel: &Channel) -> f64 {
     channel.weighting().weight(channel.len() / 2, channel.len())
 }
@@ -128,7 +124,7 @@ impl<'a> Plain<'a> {
         }
     }
 
-    /// Median spacing of the readings, s.
+    /// Median spacing of the samples, s.
     fn spacing(&self) -> f64 {
         let mut spacings: Vec<f64> = (self.channel.times().windows(2))
             .map(|w| w[1] - w[0])
@@ -137,13 +133,13 @@ impl<'a> Plain<'a> {
         spacings.get(spacings.len() / 2).copied().unwrap_or(0.0)
     }
 
-    /// Of as many values at equal distances, linear between the readings.
+    /// Spectrum of equally spaced values, interpolated linearly between the samples.
     fn spectrum(&self) -> Option<Spectrum> {
         let times = self.channel.times();
         let (first, last) = (times.first()?, times.last()?);
         let spacing = (last - first) / times.len().checked_sub(1)? as f64;
-        let readings = Signal::new(times.to_vec(), self.values.clone(), Interpolation::Linear)?;
-        let even = (0..times.len()).map(|i| readings.value(first + i as f64 * spacing));
+        let samples = Signal::new(times.to_vec(), self.values.clone(), Interpolation::Linear)?;
+        let even = (0..times.len()).map(|i| samples.value(first + i as f64 * spacing));
         Spectrum::of(&even.collect::<Vec<f64>>(), spacing)
     }
 
@@ -156,14 +152,14 @@ impl<'a> Plain<'a> {
     }
 }
 
-/// What holds an integrated curve near zero below the band.
+/// Ridge term that keeps an integrated curve near zero below the band.
 #[derive(Clone, Copy)]
 struct Ridge {
-    /// Weight of `y^2` beside the squared residuals of the highest derivative.
+    /// Root of the weight of `y^2` relative to the squared residuals of the highest derivative.
     root: f64,
     /// Dominant frequency, Hz.
     frequency: f64,
-    /// What it takes off the readings, in units of their noise.
+    /// Bias of the samples, in units of their noise.
     bias: f64,
 }
 
@@ -172,7 +168,7 @@ fn ridge(channels: &[Plain]) -> Option<Ridge> {
     let frequency = highest.spectrum()?.dominant();
     let size = rms(&highest.values) / highest.noise;
     let order = highest.order() as i32;
-    // As wide as the noise is small: so the share that is lost is no more than the noise.
+    // The band widens as the noise falls, so that the bias does not exceed the noise.
     let band = size.powf(0.5 / f64::from(order)).clamp(BAND[0], BAND[1]);
     let root = (TAU * frequency / band).powi(order) / highest.noise;
     (frequency > 0.0 && root.is_finite()).then(|| Ridge {
@@ -191,7 +187,7 @@ fn differences(x: f64, first: usize, step: f64) -> [Vec<f64>; 3] {
     [value, slope, curvature]
 }
 
-/// The displacement at the nodes.
+/// Displacement at the nodes.
 fn curve(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> Option<Vec<f64>> {
     let mut sub = Subproblem::new(nodes);
     sub.stations = (0..nodes as u32).collect();
@@ -208,9 +204,9 @@ fn curve(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> O
             count += 1.0;
         }
     }
-    let readings = sub.residuals.len();
+    let samples = sub.residuals.len();
     if let Some(ridge) = ridge {
-        // As many readings as there are nodes would weigh as the readings do.
+        // Weighted like the samples, as if there were as many as nodes.
         let share = (count / nodes as f64).sqrt();
         for i in 0..nodes {
             sub.residuals.push([(i, ridge.root * share)], 0.0);
@@ -218,11 +214,11 @@ fn curve(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> O
     }
     let misfit = |candidate: &[f64]| -> f64 {
         let fitted = sub.residuals.multiply(candidate);
-        let pairs = fitted.iter().zip(sub.residuals.right()).take(readings);
+        let pairs = fitted.iter().zip(sub.residuals.right()).take(samples);
         pairs.map(|(a, b)| (a - b) * (a - b)).sum()
     };
     let [mut low, mut high] = EXPONENTS;
-    // What holds an integrated curve near zero may cost more than the noise.
+    // The ridge term may exceed the noise.
     let mut best = smooth(&sub, nodes, 10f64.powf(low))?;
     let bias = ridge.map_or(1.0, |r| r.bias.max(1.0));
     let enough = (ALLOWED * misfit(&best)).max(count * bias * bias);
@@ -254,7 +250,7 @@ fn first_point(place: TimePoint, nodes: usize) -> usize {
     nearest.saturating_sub(POINTS / 2).min(nodes - POINTS)
 }
 
-/// With third differences in units of the curve's own size, so that the weight has none.
+/// Adds third differences in units of the curve's size, so that the weight is dimensionless.
 fn smooth(sub: &Subproblem, nodes: usize, weight: f64) -> Option<Vec<f64>> {
     let mut sub = sub.clone();
     let scale = (0..sub.residuals.len()).map(|i| sub.residuals.scale(i));
@@ -271,8 +267,8 @@ fn smooth(sub: &Subproblem, nodes: usize, weight: f64) -> Option<Vec<f64>> {
     sub.solve_plain()
 }
 
-/// Which nodes have readings near by, of the channel with the most readings.
-fn near_readings(
+/// Nodes near the samples of the channel with the most samples.
+fn near_samples(
     channels: &[Plain],
     nodes: usize,
     start: f64,

@@ -1,7 +1,6 @@
-//! Weights of finite differences on any nodes (Fornberg, Math. Comp. 51, 1988).
+//! Weights of finite differences on arbitrary nodes (Fornberg, Math. Comp. 51, 1988).
 
-/// Weights of the derivatives of order 0, 1 and 2 at `x` of the polynomial through values at
-/// `nodes`: one row per order.
+/// Weights of the derivatives of order 0, 1 and 2 at `x` of the interpolation polynomial on `nodes`, one row per order.
 pub fn weights(x: f64, nodes: &[f64]) -> [Vec<f64>; 3] {
     let n = nodes.len();
     let mut out = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];

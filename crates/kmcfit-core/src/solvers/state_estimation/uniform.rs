@@ -1,4 +1,4 @@
-//! From displacements at equally spaced nodes: smoothed, then differences of order 4.
+//! State estimation from displacements at equally spaced nodes: smoothing, then fourth-order differences.
 
 use super::{Kinematics, noise_level};
 use crate::qp::Subproblem;
@@ -6,14 +6,14 @@ use crate::record::{Channel, Weighting};
 use crate::simd::sum::rms;
 use crate::system::State;
 
-/// Rounds of the search for the smoothing weight: each halves its decimal exponent's interval.
+/// Rounds of the bisection for the exponent of the smoothing weight.
 const ROUNDS: u32 = 14;
 /// Decimal exponents of the smoothing weight between no smoothing and a parabola.
 const EXPONENTS: [f64; 2] = [-12.0, 16.0];
-/// Readings whose noise is below this share of their size are taken as they are.
+/// Noise level, relative to the size of the samples, below which they are not smoothed.
 const NOISELESS: f64 = 1e-6;
 
-/// At the readings but the two at each end.
+/// States at all samples but two at each end.
 pub fn kinematics(channel: &Channel, stride: usize, step: f64) -> Option<Kinematics> {
     let y = smoothed(channel)?;
     let h = step * stride as f64;
@@ -34,7 +34,7 @@ pub fn kinematics(channel: &Channel, stride: usize, step: f64) -> Option<Kinemat
     })
 }
 
-/// The smoothest curve (third differences) whose distance from the readings is their noise.
+/// Smoothest curve (in third differences) whose distance from the samples equals their noise.
 fn smoothed(channel: &Channel) -> Option<Vec<f64>> {
     let observed = channel.observed();
     if observed.len() < 8 {

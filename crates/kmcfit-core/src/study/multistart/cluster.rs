@@ -1,20 +1,20 @@
-//! Clusters of optima.
+//! Clusters of local minima: minima with the same ratios to the mass and the same responses.
 
 use super::Waterfall;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::solvers::Status;
 
-/// How far two optima are from each other, without unit.
+/// Distance between two minima, dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distance {
     /// Largest root mean square difference of a ratio `p/m`, relative to its natural size.
     pub ratios: f64,
     /// Root mean square difference of the displacements, relative to their own.
-    pub motions: f64,
+    pub responses: f64,
 }
 
-/// Optima that are one.
+/// Minima within the tolerance of each other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cluster {
     /// Indices of the runs, by rising cost.
@@ -24,9 +24,8 @@ pub struct Cluster {
 }
 
 impl Waterfall {
-    /// Clusters by rising cost: a run belongs to the first cluster whose best member is no further
-    /// than `tolerance`, in ratios and motions both. Only converged runs are told apart; the others
-    /// have not reached an optimum.
+    /// Clusters by rising cost. A run joins the first cluster whose best member is within `tolerance` in both ratios and
+    /// responses. Runs that have not converged are left out, because they have not reached a minimum.
     pub fn clusters(&self, problem: &Problem, tolerance: Distance) -> Vec<Cluster> {
         let mut clusters: Vec<Cluster> = Vec::new();
         for &i in &self.order {
@@ -38,7 +37,7 @@ impl Waterfall {
                 let best = self.runs[cluster.members[0]].found.as_ref();
                 best.is_some_and(|best| {
                     let apart = distance(problem, &best.evaluation, &found.evaluation);
-                    apart.ratios <= tolerance.ratios && apart.motions <= tolerance.motions
+                    apart.ratios <= tolerance.ratios && apart.responses <= tolerance.responses
                 })
             };
             match clusters.iter_mut().find(near) {
@@ -53,12 +52,12 @@ impl Waterfall {
     }
 }
 
-/// How far two points are from each other.
+/// Distance between two points.
 pub fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> Distance {
     let natural = problem.natural_scales(a);
     let mut ratios = 0.0f64;
-    for (which, assembly) in problem.functions.assemblies().iter().enumerate() {
-        let (one, two) = (a.device_of(which), b.device_of(which));
+    for (which, assembly) in problem.functions.coefficient_sets().iter().enumerate() {
+        let (one, two) = (a.nodal_of(which), b.nodal_of(which));
         for (j, (p, q)) in one.coefficients.iter().zip(&two.coefficients).enumerate() {
             let size = natural[assembly[j + 1]] / natural[assembly[0]];
             let changes = (0..p.len()).map(|i| p[i] / one.mass[i] - q[i] / two.mass[i]);
@@ -80,7 +79,7 @@ pub fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> Distance {
     let (change, own) = (rms(changes), rms(own));
     Distance {
         ratios,
-        motions: if change > 0.0 { change / own } else { 0.0 },
+        responses: if change > 0.0 { change / own } else { 0.0 },
     }
 }
 

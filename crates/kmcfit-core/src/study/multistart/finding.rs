@@ -1,43 +1,43 @@
-//! Findings of fits from many starting points.
+//! Findings of a multistart analysis: number of minima, lower minima, connected minima.
 
 use super::{Cluster, Ranges, Waterfall, between};
 use crate::functions::Parameterization;
 use crate::problem::Problem;
 
-/// Steps of the paths between two optima.
+/// Number of steps of a path between two minima.
 const PATH: usize = 40;
-/// A path that rises by less than this share of the higher end's cost joins two ends of one valley.
+/// Largest rise along a path between two connected minima, as a share of the higher end's cost.
 const RISE: f64 = 0.05;
 
-/// A finding.
+/// A finding of a multistart analysis.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Finding {
-    /// No starting point led to an optimum.
+pub enum MultistartFinding {
+    /// No starting point converged to a minimum.
     Nowhere,
-    /// How many starting points led to an optimum, and to how many different ones.
+    /// Number of converged starting points and of distinct minima.
     Points {
-        /// Fits that ended.
+        /// Converged fits.
         ended: usize,
-        /// Different optima.
+        /// Distinct minima.
         different: usize,
-        /// The lowest cost.
+        /// Lowest cost.
         lowest: f64,
     },
-    /// Whether a path between the two lowest optima hardly rises.
+    /// Connection of the two lowest minima by a path of nearly constant cost.
     OneValley(bool),
-    /// An optimum below the fit.
+    /// A minimum below the fit.
     Lower {
-        /// Its cost.
+        /// Cost of the minimum.
         cost: f64,
-        /// The fit's.
+        /// Cost of the fit.
         fit: f64,
     },
-    /// No starting point led to an optimum as low as the fit, of this cost.
+    /// No starting point converged to a cost as low as that of the fit, the value.
     NotReached(f64),
 }
 
 impl Ranges {
-    /// Between the start of each function divided and multiplied by `spread`; about zero where the start is zero.
+    /// Ranges from each start divided by `spread` to the start multiplied by it; about zero where the start is zero.
     pub fn around_starts(functions: &Parameterization, spread: f64) -> Self {
         let around = |start: f64, size: f64| match start == 0.0 {
             true => [-size, size],
@@ -57,13 +57,18 @@ impl Ranges {
 }
 
 impl Waterfall {
-    /// The findings beside a fit with the parameters `theta`.
-    pub fn findings(&self, problem: &Problem, theta: &[f64], clusters: &[Cluster]) -> Vec<Finding> {
+    /// Findings in comparison with a fit at the parameters `theta`.
+    pub fn findings(
+        &self,
+        problem: &Problem,
+        theta: &[f64],
+        clusters: &[Cluster],
+    ) -> Vec<MultistartFinding> {
         let costs = self.costs();
         let Some(lowest) = costs.first().copied() else {
-            return vec![Finding::Nowhere];
+            return vec![MultistartFinding::Nowhere];
         };
-        let mut findings = vec![Finding::Points {
+        let mut findings = vec![MultistartFinding::Points {
             ended: self.order.len(),
             different: clusters.len().max(1),
             lowest,
@@ -73,17 +78,17 @@ impl Waterfall {
             if let (Some(a), Some(b)) = (of(first), of(second)) {
                 let paths = between(problem, &a.parameters, &b.parameters, PATH);
                 let rise = RISE * second.cost.max(first.cost);
-                findings.push(Finding::OneValley(paths.one_valley(rise)));
+                findings.push(MultistartFinding::OneValley(paths.one_valley(rise)));
             }
         }
-        // Below this share of what there is to explain a difference of costs is rounding.
+        // Differences of costs below this share of the zero-response misfit are rounding errors.
         let rounding = 1e-12 * problem.zero_response_misfit();
         let fit = problem.evaluate(theta).map(|here| here.cost);
         findings.extend(fit.ok().and_then(|fit| {
             if lowest < fit * (1.0 - 1e-6) - rounding {
-                Some(Finding::Lower { cost: lowest, fit })
+                Some(MultistartFinding::Lower { cost: lowest, fit })
             } else {
-                (lowest > fit * 1.01 + rounding).then_some(Finding::NotReached(fit))
+                (lowest > fit * 1.01 + rounding).then_some(MultistartFinding::NotReached(fit))
             }
         }));
         findings

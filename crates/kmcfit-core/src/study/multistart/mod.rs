@@ -1,17 +1,17 @@
-//! Fits from many starts: their costs, their clusters, and whether two optima share a valley.
+//! Multistart: fits from many starting points, their clusters, and paths between minima.
 //!
-//! Starts are a Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, *Technometrics* 21 (1979)
-//! 239-245): each range is cut into as many parts as there are starts, and every part is used once.
-//! Optima are told apart by what free motion can show, the ratios of the functions to the mass, and by
-//! their motions, not by their costs: two different devices may fit alike, and one device may be
-//! reached to different accuracy.
+//! Starting points are a Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, *Technometrics* 21 (1979)
+//! 239-245): each range is divided into as many parts as there are starting points, and each part is used once.
+//! Minima are distinguished by the ratios of the functions to the mass, which a free response determines, and by their
+//! responses. Costs do not distinguish them: two different systems may fit equally well, and one minimum may be reached
+//! with different accuracy.
 
 mod cluster;
 mod finding;
 mod path;
 
 pub use cluster::{Cluster, Distance, distance};
-pub use finding::Finding;
+pub use finding::MultistartFinding;
 pub use path::{Paths, between};
 
 use super::parallel::map;
@@ -22,19 +22,18 @@ use crate::problem::Problem;
 use crate::solvers::{FitSettings, Status, fit, fit_from};
 use rand::RngExt;
 
-/// Where starts lie.
+/// Ranges of the starting points.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ranges {
     /// A range for each parameter, scalars included.
     Parameters(Vec<[f64; 2]>),
-    /// A range for each function, which starts constant, and then one for each scalar. Fixed
-    /// functions have a range that is not used.
+    /// A range for each function, whose starting point is constant, then one for each scalar. Ranges of fixed functions are
+    /// unused.
     Constants(Vec<[f64; 2]>),
 }
 
 impl Ranges {
-    /// The parameters' own bounds, by the constraints about one parameter alone; `None` unless every
-    /// parameter has two.
+    /// Bounds of the parameters, from the constraints on single parameters; `None` unless every parameter has two bounds.
     pub fn of_bounds(problem: &Problem) -> Option<Self> {
         let mut ranges = vec![[f64::NEG_INFINITY, f64::INFINITY]; problem.parameters()];
         for group in &problem.constraints.groups {
@@ -56,59 +55,59 @@ impl Ranges {
     }
 }
 
-/// How the fits are run.
+/// Settings of a multistart analysis.
 #[derive(Debug, Clone)]
 pub struct Multistart {
-    /// Where they start.
+    /// Ranges of the starting points.
     pub ranges: Ranges,
-    /// How many.
+    /// Number of starting points.
     pub starts: usize,
-    /// Seed of the starts.
+    /// Seed of the starting points.
     pub seed: u64,
-    /// Most threads; the results do not depend on it.
+    /// Largest number of threads; results do not depend on it.
     pub threads: usize,
-    /// Whether each fit may try further starting points after its own.
+    /// Permission for each fit to try further starting points after its own.
     pub attempts: bool,
-    /// The fits.
+    /// Settings of the fits.
     pub settings: FitSettings,
 }
 
 /// One fit.
 #[derive(Debug, Clone)]
-pub struct Run {
-    /// Its start, within the constraints.
+pub struct StartRun {
+    /// Starting point, feasible.
     pub start: Vec<f64>,
-    /// Where it led; `None` if the start has no motion, or the constraints no point.
-    pub found: Option<Found>,
-    /// How it ended, or why there is nothing.
+    /// Minimum found; `None` if the simulation at the starting point fails or no feasible point exists.
+    pub found: Option<LocalOptimum>,
+    /// Status of the fit.
     pub status: Status,
-    /// The same in words.
+    /// Reason for the status, as a sentence.
     pub reason: String,
 }
 
-/// The end of one fit.
+/// Final point of one fit.
 #[derive(Debug, Clone)]
-pub struct Found {
+pub struct LocalOptimum {
     /// Parameters.
     pub parameters: Vec<f64>,
-    /// Cost, devices and motions.
+    /// Cost, coefficients and responses.
     pub evaluation: Evaluation,
     /// Iterations.
     pub iterations: usize,
 }
 
-/// All fits.
+/// Results of all fits.
 #[derive(Debug, Clone)]
 pub struct Waterfall {
-    /// In the order of the starts.
-    pub runs: Vec<Run>,
-    /// Indices of the runs that found something, by rising cost.
+    /// Fits in the order of the starting points.
+    pub runs: Vec<StartRun>,
+    /// Indices of the fits with a result, by rising cost.
     pub order: Vec<usize>,
-    /// The seed of the starts.
+    /// Seed of the starting points.
     pub seed: u64,
 }
 
-/// The starts of `how`, one list per start, before the constraints.
+/// Starting points of `how`, before projection onto the constraints.
 ///
 /// # Panics
 /// If there is not one range for each parameter, or function and scalar.
@@ -158,7 +157,7 @@ fn constants(problem: &Problem, levels: &[f64]) -> Vec<f64> {
     theta
 }
 
-/// Runs all fits. A fit that fails is a record with its reason.
+/// Runs all fits; a failed fit is listed with its reason.
 pub fn multistart(problem: &Problem, how: &Multistart) -> Waterfall {
     let starts = starts(problem, how);
     let runs = map(starts.len(), how.threads, |i| run(problem, how, &starts[i]));
@@ -169,7 +168,7 @@ pub fn multistart(problem: &Problem, how: &Multistart) -> Waterfall {
         let found = runs[*i].found.as_ref();
         found.map_or(f64::INFINITY, |f| f.evaluation.cost)
     };
-    // Stable: equal costs stay in the order of the starts.
+    // A stable sort keeps equal costs in the order of the starting points.
     order.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
     Waterfall {
         runs,
@@ -178,8 +177,8 @@ pub fn multistart(problem: &Problem, how: &Multistart) -> Waterfall {
     }
 }
 
-fn run(problem: &Problem, how: &Multistart, start: &[f64]) -> Run {
-    let failed = |start: &[f64], reason: String| Run {
+fn run(problem: &Problem, how: &Multistart, start: &[f64]) -> StartRun {
+    let failed = |start: &[f64], reason: String| StartRun {
         start: start.to_vec(),
         found: None,
         status: Status::Failed,
@@ -197,9 +196,9 @@ fn run(problem: &Problem, how: &Multistart, start: &[f64]) -> Run {
     };
     match result {
         Err(breakdown) => failed(&start, breakdown.to_string()),
-        Ok(fit) => Run {
+        Ok(fit) => StartRun {
             start,
-            found: Some(Found {
+            found: Some(LocalOptimum {
                 parameters: fit.best.parameters,
                 evaluation: fit.best.evaluation,
                 iterations: fit.history.len(),
@@ -220,7 +219,7 @@ impl Waterfall {
         found.map(|f| f.evaluation.cost).collect()
     }
 
-    /// How many fits found nothing.
+    /// Number of fits without a result.
     pub fn failures(&self) -> usize {
         self.runs.len() - self.order.len()
     }

@@ -1,32 +1,32 @@
-//! Paths between two optima.
+//! Costs along paths between two minima.
 
 use crate::problem::Problem;
 use crate::system::NodalCoefficients;
 
-/// The cost along two paths between two points; infinite where there is no motion.
+/// Costs along two paths between two points; infinite where the simulation fails.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Paths {
-    /// Along `(1 - s) a + s b`, both ends included.
+    /// Costs along the straight path `(1 - s) a + s b`, both ends included.
     pub straight: Vec<f64>,
-    /// Along the gauge: the mass goes from one to the other geometrically, `m_a^(1-s) m_b^s`, and the
-    /// ratios to it go straight, so that between devices with the same ratios nothing but the common
-    /// factor changes. `None` where the functions cannot follow, as when one is fixed.
-    pub gauge: Option<Vec<f64>>,
+    /// Costs along the path of the scaling ambiguity: the mass is `m_a^(1-s) m_b^s` and the ratios to the mass vary linearly,
+    /// so that only the common factor varies between systems with equal ratios. `None` where the bases do not contain the
+    /// path, for example where a function is fixed.
+    pub scaling: Option<Vec<f64>>,
 }
 
 impl Paths {
-    /// Whether one of the paths never rises by more than `rise` above the higher end: then the two
-    /// are ends of one valley. No path below it proves nothing.
+    /// True if the cost along one of the paths never exceeds the higher end's by more than the share `rise`: the minima are
+    /// connected. False is no proof of the opposite.
     pub fn one_valley(&self, rise: f64) -> bool {
         let low = |path: &Vec<f64>| {
             let ends = path[0].max(path[path.len() - 1]);
             path.iter().all(|cost| *cost <= ends + rise)
         };
-        low(&self.straight) || self.gauge.as_ref().is_some_and(low)
+        low(&self.straight) || self.scaling.as_ref().is_some_and(low)
     }
 }
 
-/// The cost at `points` steps between the parameters `a` and `b`.
+/// Costs at `points` steps between the parameters `a` and `b`.
 pub fn between(problem: &Problem, a: &[f64], b: &[f64], points: usize) -> Paths {
     let points = points.max(1);
     let shares: Vec<f64> = (0..=points).map(|i| i as f64 / points as f64).collect();
@@ -36,18 +36,18 @@ pub fn between(problem: &Problem, a: &[f64], b: &[f64], points: usize) -> Paths 
         pairs.map(|(a, b)| (1.0 - s) * a + s * b).collect()
     };
     let straight = shares.iter().map(|s| cost(&mix(*s))).collect();
-    let gauge: Option<Vec<Vec<f64>>> = shares
+    let scaling: Option<Vec<Vec<f64>>> = shares
         .iter()
-        .map(|s| along_gauge(problem, a, b, *s, mix(*s)))
+        .map(|s| along_scaling(problem, a, b, *s, mix(*s)))
         .collect();
     Paths {
         straight,
-        gauge: gauge.map(|path| path.iter().map(|theta| cost(theta)).collect()),
+        scaling: scaling.map(|path| path.iter().map(|theta| cost(theta)).collect()),
     }
 }
 
-/// The point at `s` of the gauge path, functions of single experiments and scalars straight.
-fn along_gauge(
+/// Point `s` of the scaling path; functions of single experiments and scalars vary linearly.
+fn along_scaling(
     problem: &Problem,
     a: &[f64],
     b: &[f64],
@@ -55,13 +55,13 @@ fn along_gauge(
     straight: Vec<f64>,
 ) -> Option<Vec<f64>> {
     let mut theta = straight;
-    let (one, two) = (problem.functions.device(a), problem.functions.device(b));
+    let (one, two) = (problem.functions.nodal(a), problem.functions.nodal(b));
     if one.mass.iter().chain(&two.mass).any(|m| *m <= 0.0) {
         return None;
     }
     let between = mixed(&one, &two, s);
     let grid = &problem.system.grid;
-    let assembly = problem.functions.assembly(0);
+    let assembly = problem.functions.coefficient_set(0);
     for (&f, values) in assembly.iter().zip(between.functions()) {
         let basis = problem.functions.get(f).basis.as_ref()?;
         let range = problem.functions.ranges()[f].clone();

@@ -1,43 +1,43 @@
-//! Profile likelihood of one number.
+//! Likelihood profile of one quantity.
 //!
 //! The profile of `q(theta)` is `P(v) = min J(theta)` subject to `q(theta) = v` and the model's
 //! constraints. With `J` a chi-square, the values with
 //!
 //! ```text
-//! P(v) - J(optimum) <= quantile            (n ln(P(v)/J(optimum)) without sigma, n readings)
+//! P(v) - J(optimum) <= quantile            (n ln(P(v)/J(optimum)) without sigma, n samples)
 //! ```
 //!
 //! are a confidence interval, 95 % for the quantile 3.841 of chi-square with one degree of freedom.
 //! `J` is the whole cost, penalties and priors included: with penalties the interval is that of the
-//! penalised problem. A profile that never rises is a number that the readings do not see.
+//! penalised problem. A flat profile is that of a quantity that the data do not determine.
 //!
 //! Sources: S. S. Wilks, *Annals of Mathematical Statistics* 9 (1938) 60-62; A. Raue et al.,
 //! "Structural and practical identifiability analysis of partially observed dynamical models by
 //! exploiting the profile likelihood", *Bioinformatics* 25 (2009) 1923-1929.
 
-mod walk;
+mod continuation;
 
 use super::functional::Linear;
 use super::parallel::map;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
-use walk::Walk;
+use continuation::ProfileSearch;
 
 /// The 95 % quantile of chi-square with one degree of freedom.
 pub const QUANTILE_95: f64 = 3.841_458_820_694_124;
-/// Without a limit, so many sizes away is far.
+/// Search limit without stated limits, as a multiple of the size of the quantity.
 const FAR: f64 = 1e3;
-/// How far a profile is walked.
+/// Settings of a profile.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProfileSettings {
-    /// The rise at which it ends.
+    /// Rise of the cost at which the profile ends.
     pub quantile: f64,
-    /// Values beyond which nobody asks, in the unit of the number.
+    /// Range of values to search, in the unit of the quantity.
     pub limits: [f64; 2],
-    /// First step, in the unit of the number; by default half a standard deviation by the
-    /// covariance, or where there is none a share of the number's size.
+    /// First step, in the unit of the quantity; by default half a standard deviation by the covariance, or a share of the
+    /// quantity's size where no covariance exists.
     pub step: Option<f64>,
-    /// Most steps on each side; they double where the profile is flat.
+    /// Largest number of steps on each side; steps double where the profile is flat.
     pub steps: usize,
 }
 
@@ -52,74 +52,74 @@ impl Default for ProfileSettings {
     }
 }
 
-/// The kind of an interval.
+/// Classification of a profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Interval {
-    /// Both ends of its interval are found.
+    /// Both ends of the interval are found.
     Identified,
     /// One end is found.
     OneSided,
-    /// None is: the readings do not see it.
+    /// No end is found: the data do not determine the quantity.
     Flat,
 }
 
-/// Why a profile ends on one side.
+/// End of a profile on one side.
 #[derive(Debug, Clone, PartialEq)]
 pub enum End {
     /// The cost rises by the quantile.
     Rise,
-    /// It does, but another constraint makes it: without the constraints of these names it would not.
+    /// The cost rises by the quantile because of the named constraints; without them the rise is smaller.
     RiseBy(Vec<String>),
-    /// The number's own bound, or the stated limit, comes first.
+    /// The bound of the quantity, or the stated limit, is reached first.
     Bound,
-    /// There is none within a thousand times the number's size.
+    /// No end within a thousand times the size of the quantity.
     Far,
-    /// The steps ran out.
+    /// The limit of steps is reached.
     Steps,
-    /// No motion, or no fit, further out.
+    /// No fit succeeds further out; the reason.
     Failed(String),
 }
 
 /// A constraint that becomes active along the profile.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Mark {
-    /// The value from which on it is, outwards from the optimum.
+pub struct ActivationPoint {
+    /// Value at which it becomes active, outwards from the optimum.
     pub value: f64,
-    /// Its name.
+    /// Name of the constraint.
     pub constraint: String,
 }
 
-/// The profile of one number.
+/// The profile of one quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
-    /// What was profiled.
+    /// Name of the quantity.
     pub name: String,
-    /// Its unit.
+    /// Unit of the quantity.
     pub unit: String,
-    /// Its value at the optimum.
+    /// Value at the optimum.
     pub optimum: f64,
-    /// Cost there.
+    /// Cost at the optimum.
     pub optimum_cost: f64,
-    /// The values at which it was held, rising.
+    /// Fixed values of the quantity, rising.
     pub values: Vec<f64>,
-    /// `P(v)` at each.
+    /// Cost `P(v)` at each value.
     pub costs: Vec<f64>,
-    /// The parameters at each.
+    /// Parameters at each value.
     pub parameters: Vec<Vec<f64>>,
-    /// The ends of the interval; `None` where there is none.
+    /// Ends of the interval; `None` where not found.
     pub interval: [Option<f64>; 2],
-    /// Why it ends, below and above.
+    /// Reasons for the lower and upper end.
     pub ends: [End; 2],
-    /// In one word.
+    /// Classification.
     pub verdict: Interval,
-    /// Where other constraints become active.
-    pub marks: Vec<Mark>,
-    /// Parameters of a better optimum, if one was met.
+    /// Constraints that become active along the profile.
+    pub marks: Vec<ActivationPoint>,
+    /// Parameters of a better minimum, if one was found.
     pub better_optimum: Option<Vec<f64>>,
 }
 
 impl Profile {
-    /// The verdict in words.
+    /// The result as a sentence.
     pub fn sentence(&self) -> String {
         let Self { name, unit, .. } = self;
         let number = |x: f64| format!("{x:.6} {unit}").trim_end().to_owned();
@@ -129,51 +129,50 @@ impl Profile {
                 number(low),
                 number(high)
             ),
-            [Some(low), None] => format!("{name} is only known to be at least {}", number(low)),
-            [None, Some(high)] => format!("{name} is only known to be at most {}", number(high)),
-            [None, None] => format!("{name} is not seen by the readings"),
+            [Some(low), None] => format!("{name} is bounded below only: at least {}", number(low)),
+            [None, Some(high)] => format!("{name} is bounded above only: at most {}", number(high)),
+            [None, None] => format!("{name} is not identifiable from these samples"),
         };
         for (side, end) in ["below", "above"].iter().zip(&self.ends) {
             let why = match end {
                 End::Rise => continue,
                 End::RiseBy(names) => format!(
-                    "the rise {side} is the work of {}, not of the readings alone",
+                    "the rise {side} is due to {}, not to the samples alone",
                     names.join(" and ")
                 ),
-                End::Bound => format!("{side} it runs into its bound or limit"),
-                End::Far => format!("{side} there is no end within {FAR} times its size"),
-                End::Steps => format!("{side} the steps ran out"),
+                End::Bound => format!("{side} the profile reaches its bound or limit"),
+                End::Far => format!("{side} there is no end within {FAR} times the optimum's size"),
+                End::Steps => format!("{side} the limit of steps was reached"),
                 End::Failed(reason) => format!("{side} no fit was found ({reason})"),
             };
             words.push_str("; ");
             words.push_str(&why);
         }
         if self.better_optimum.is_some() {
-            words.push_str("; a better optimum was met on the way: fit again from there");
+            words.push_str("; the profile found a better minimum: repeat the fit from there");
         }
         words
     }
 }
 
-/// The profile of `of` about `optimum`, parameters at which the problem was fitted.
+/// Computes the profile of `of` about the fitted parameters `optimum`.
 ///
-/// It walks outwards from the optimum, each fit (Gauss–Newton under the constraints) from its
-/// neighbours, until the cost has risen by the quantile or a bound, a limit or the number of steps is
-/// met; the ends are then found by a secant method on the root of the rise, which is a straight line
-/// where the motion is linear in the parameters.
+/// The value moves outwards from the optimum. Each fit (Gauss–Newton under the constraints) starts from its neighbours,
+/// until the cost has risen by the quantile or a bound, a limit or the number of steps is reached. A secant method on the
+/// square root of the rise, which is linear in `v` where the response is linear in the parameters, then locates the ends.
 ///
 /// # Errors
-/// A [`SimulationError`] if the optimum has no motion.
+/// A [`SimulationError`] if the simulation at the optimum fails.
 pub fn profile(
     problem: &Problem,
     optimum: &[f64],
     of: &Linear,
     how: &ProfileSettings,
 ) -> Result<Profile, SimulationError> {
-    Walk::new(problem, optimum, of, how).map(Walk::run)
+    ProfileSearch::new(problem, optimum, of, how).map(ProfileSearch::run)
 }
 
-/// The profiles of several numbers, on up to `threads` threads; the same bits for any number of them.
+/// Profiles of several quantities, on up to `threads` threads; results do not depend on their number.
 ///
 /// # Errors
 /// As [`profile()`].

@@ -4,11 +4,13 @@ mod noise;
 mod sampling;
 
 use super::source::{self, Wanted};
+use super::warning::DataWarning;
 use super::{ChannelNote, names};
 use crate::config::ModelFile;
 use crate::config::scalar::{ColumnId, ScalarOr, Sigma, Text};
 use crate::config::spec::{ColumnRef, ExperimentSpec, LossName, LossSpec, SensorSpec};
 use crate::error::InputError;
+use crate::finding::Finding;
 use crate::units::{Kind, Unit};
 use kmcfit_core::internals::record::{ChannelKind, Loss, Weighting};
 use kmcfit_core::internals::signal::SecondOrder;
@@ -103,7 +105,7 @@ pub fn read(
     file: &ModelFile,
     i: usize,
     spec: &ExperimentSpec,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<Vec<RawChannel>, InputError> {
     let named: Vec<ChannelKind> = (ChannelKind::ALL.into_iter())
         .filter(|kind| spec_of(spec, *kind).column.is_some())
@@ -137,9 +139,9 @@ fn no_channel(file: &ModelFile, i: usize, spec: &ExperimentSpec) -> InputError {
     match (&spec.data, &spec.columns) {
         (None, None) => file
             .error_at(&key, "this experiment has no data")
-            .expected("`data`, a CSV file with the readings"),
+            .expected("`data`, a CSV file with the samples"),
         _ => file
-            .error_at(&format!("{key}.columns"), "this experiment has no readings")
+            .error_at(&format!("{key}.columns"), "this experiment has no data")
             .found("columns of other things only")
             .expected("one or more of `displacement`, `velocity`, `acceleration`"),
     }
@@ -169,7 +171,7 @@ fn without_column(
                 [] => "no `columns`: the displacement is read".to_owned(),
                 some => format!("columns of {}", names(some)),
             })
-            .expected(format!("`columns: {{{name}: …}}`, or no such key here"))),
+            .expected(format!("`columns: {{{name}: …}}`, or leave the key out"))),
         None => Ok(()),
     }
 }
@@ -180,7 +182,7 @@ fn read_one(
     spec: &ExperimentSpec,
     of_kind: &Spec,
     column: &ColumnRef,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Finding>,
 ) -> Result<RawChannel, InputError> {
     let kind = of_kind.kind;
     let key = format!("experiments[{i}]");
@@ -220,11 +222,7 @@ fn read_one(
     let sigmas = source.beside.as_deref().map(pick);
     let spacing = even_spacing(&times);
     if spacing.is_none() && missing == 0 && nearly_equal(&times) {
-        warnings.push(format!(
-            "{key}: the times are nearly equally spaced but not quite, as if they had been printed \
-             with too few digits; they are taken as they are. `sample_rate` in place of the column \
-             of times gives them exactly"
-        ));
+        warnings.push(DataWarning::NearlyEqualTimes.at(&key));
     }
     let filter = band(file, &key, spec, spacing, missing)?;
     let weighting = weighting(file, &sigma_key, of_kind.sigma, sigmas, &values)?;
@@ -258,16 +256,16 @@ fn present(
         0 => {
             let (missing, label) = (source.values.len(), &source.label);
             return Err(file
-                .error_at(column, "all readings are missing")
+                .error_at(column, "all samples are missing")
                 .found(format!("{missing} rows without a number in `{label}`"))
-                .expected("at least some readings"));
+                .expected("at least one sample"));
         }
         1 => "1 reading".to_owned(),
         count if count < Grid::FEWEST_NODES => format!("{count} readings"),
         _ => return Ok(present),
     };
     Err(file
-        .error_at(column, "there are too few readings")
+        .error_at(column, "too few samples")
         .found(found)
         .expected(format!("at least {}", Grid::FEWEST_NODES)))
 }

@@ -34,10 +34,10 @@ pub(super) fn weighting(
                 Some(row) => Err(file
                     .error_at(key, "a standard deviation must be positive")
                     .found(match sigmas[row].is_nan() {
-                        true => format!("nothing in `{name}` beside reading {}", row + 1),
+                        true => format!("an empty field in `{name}` for sample {}", row + 1),
                         false => format!("{} in `{name}` beside reading {}", sigmas[row], row + 1),
                     })
-                    .expected("a number greater than 0 beside every reading")),
+                    .expected("a number greater than 0 for every sample")),
                 None => Ok(Some(Weighting::Sigmas(sigmas))),
             }
         }

@@ -30,17 +30,14 @@ pub(super) fn decimate(
     let at = format!("{key}.decimate");
     if factor == 0 {
         return Err(file
-            .error_at(&at, "every how manyth reading is kept cannot be 0")
+            .error_at(&at, "the decimation factor must not be 0")
             .found(factor)
             .expected("an integer, 1 or more"));
     }
     let whole = source.values.iter().all(|v| !v.is_nan());
     if !whole || source.times.len() < 2 || even_spacing(&source.times).is_none() {
         return Err(file
-            .error_at(
-                &at,
-                "only equally spaced readings without gaps can be decimated",
-            )
+            .error_at(&at, "decimation needs equally spaced samples without gaps")
             .found(match whole {
                 true => "times that are not equally spaced",
                 false => "missing readings",
@@ -55,10 +52,7 @@ pub(super) fn decimate(
     }
     let dropped = before - source.values.len();
     if dropped > 0 {
-        ignored.push((
-            dropped,
-            format!("left out by decimation to every {factor}th"),
-        ));
+        ignored.push((dropped, format!("removed by decimation by {factor}")));
     }
     Ok(())
 }
@@ -77,10 +71,7 @@ pub(super) fn band(
     let at = format!("{key}.band");
     let Some(spacing) = spacing else {
         return Err(file
-            .error_at(
-                &at,
-                "only equally spaced readings without gaps can be filtered",
-            )
+            .error_at(&at, "filtering needs equally spaced samples without gaps")
             .found(match missing {
                 0 => "times that are not equally spaced".to_owned(),
                 count => format!("{count} missing readings"),
@@ -97,7 +88,7 @@ pub(super) fn band(
     };
     sections.ok_or_else(|| {
         let end = |f: Option<f64>| f.map_or("open".to_owned(), |f| format!("{f} Hz"));
-        file.error_at(&at, "these frequencies make no band")
+        file.error_at(&at, "invalid frequency band")
             .found(format!("{} to {}", end(low), end(high)))
             .expected(format!(
                 "`min`, `max` or both, with 0 < min < max < {} Hz, half the sampling rate",

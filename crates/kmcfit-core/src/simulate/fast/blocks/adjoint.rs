@@ -1,37 +1,37 @@
 //! The discrete adjoint in blocks.
 
-use super::LinearDevice;
+use super::LinearSystem;
 use super::tile::Tile;
 use super::workspace::{Ends, Maps, Workspace};
 use crate::simd::{Arithmetic, Kernel, LANES, Row};
 use crate::system::State;
 
-/// Everything that one solve needs.
-pub(super) struct Adjoint<'a> {
-    pub device: LinearDevice<'a>,
+/// Arguments of one adjoint solve.
+pub(super) struct BlockAdjoint<'a> {
+    pub nodal: LinearSystem<'a>,
     pub displacement: &'a [f64],
     pub velocity: &'a [f64],
-    /// Derivative of the cost with respect to displacement and, if there is any, velocity.
+    /// Derivative of the cost with respect to displacement and, if present, velocity.
     pub source: [Option<&'a [f64]>; 2],
-    /// Gradient with respect to mass, damping, stiffness: overwritten.
+    /// Gradient with respect to mass, damping, stiffness; overwritten.
     pub gradient: [&'a mut [f64]; 3],
     pub workspace: &'a mut Workspace,
 }
 
-impl Kernel for Adjoint<'_> {
+impl Kernel for BlockAdjoint<'_> {
     type Output = State;
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) -> State {
         let Self {
-            device,
+            nodal,
             displacement,
             velocity,
             source,
             mut gradient,
             workspace,
         } = self;
-        let h = device.h;
+        let h = nodal.h;
         let steps = displacement.len() - 1;
         let scale = [1.0, 1.0 / h];
         let at = |i: usize| [0, 1].map(|q: usize| source[q].map_or(0.0, |s| s[i] * scale[q]));
@@ -39,13 +39,13 @@ impl Kernel for Adjoint<'_> {
         gradient.iter_mut().for_each(|g| g[steps] = 0.0);
         let (tiles, rest) = Tile::cut(steps);
         for i in (rest..steps).rev() {
-            let motion = [displacement[i], h * velocity[i]];
-            device.step_back(i, motion, at(i), &mut x, &mut gradient);
+            let response = [displacement[i], h * velocity[i]];
+            nodal.step_back(i, response, at(i), &mut x, &mut gradient);
         }
         for tile in tiles.rev() {
-            device.gather(arithmetic, tile, workspace);
-            tile.gather(arithmetic, displacement, &mut workspace.motion[0]);
-            tile.gather(arithmetic, velocity, &mut workspace.motion[1]);
+            nodal.gather(arithmetic, tile, workspace);
+            tile.gather(arithmetic, displacement, &mut workspace.response[0]);
+            tile.gather(arithmetic, velocity, &mut workspace.response[1]);
             let last = match source {
                 [Some(y), None] => {
                     tile.gather(arithmetic, y, &mut workspace.source[0]);
@@ -73,7 +73,7 @@ impl Kernel for Adjoint<'_> {
     }
 }
 
-/// The gradient of one tile, in lanes; carries the adjoint state `x` over it.
+/// Gradient of one tile in SIMD layout; integrates the adjoint state `x` over the tile.
 #[inline(always)]
 fn back<A: Arithmetic, const VELOCITY: bool>(
     arithmetic: A,
@@ -85,10 +85,10 @@ fn back<A: Arithmetic, const VELOCITY: bool>(
     let maps = workspace.prepare(arithmetic, h, tile.length);
     let driven = workspace.drive::<A, VELOCITY>(arithmetic, h, tile.length);
     let ends = ends(&maps, &driven, x);
-    workspace.replay_back::<A, VELOCITY>(arithmetic, h, tile.length, &ends)
+    workspace.adjoint_pass::<A, VELOCITY>(arithmetic, h, tile.length, &ends)
 }
 
-/// Brings the gradient of a tile back from its lanes; returns what belongs to the node behind it.
+/// Copies the gradient of a tile from its SIMD layout; returns the contribution to the node after the tile.
 #[inline(always)]
 pub(super) fn collect<A: Arithmetic>(
     arithmetic: A,
@@ -106,8 +106,8 @@ pub(super) fn collect<A: Arithmetic>(
     [last[0][LANES - 1], last[1][LANES - 1], last[2][LANES - 1]]
 }
 
-/// The adjoint states at the ends of all blocks, from `x` behind the last back to the first, before
-/// which `x` is carried.
+/// Adjoint states at the ends of all blocks, by recursion from `x` after the last block to the first; `x` becomes the state
+/// before the first.
 #[inline(always)]
 pub(super) fn ends(maps: &Maps, driven: &Ends, x: &mut [f64; 2]) -> Ends {
     let mut ends = [[[0.0; LANES]; 2]; 2];
@@ -115,7 +115,7 @@ pub(super) fn ends(maps: &Maps, driven: &Ends, x: &mut [f64; 2]) -> Ends {
         for half in [1, 0] {
             ends[half][0][b] = x[0];
             ends[half][1][b] = x[1];
-            // Transposed: rows are what becomes of (1, 0) and of (0, 1).
+            // Rows of the transposed map: images of (1, 0) and (0, 1).
             *x = [0, 1].map(|q: usize| {
                 let [y, w] = &maps[half][q];
                 y[b] * x[0] + w[b] * x[1] + driven[half][q][b]

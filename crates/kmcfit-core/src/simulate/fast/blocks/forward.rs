@@ -1,54 +1,54 @@
 //! The forward solve in blocks.
 
-use super::LinearDevice;
+use super::LinearSystem;
 use super::tile::Tile;
 use super::workspace::{Ends, Maps, Workspace};
 use crate::simd::{Arithmetic, Kernel, LANES};
 use crate::system::State;
 
-/// Everything that one solve needs.
-pub(super) struct Forward<'a> {
-    pub device: LinearDevice<'a>,
+/// Arguments of one forward solve.
+pub(super) struct BlockForward<'a> {
+    pub nodal: LinearSystem<'a>,
     pub initial: State,
     pub displacement: &'a mut [f64],
     pub velocity: &'a mut [f64],
     pub workspace: &'a mut Workspace,
 }
 
-impl Kernel for Forward<'_> {
+impl Kernel for BlockForward<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) {
         let Self {
-            device,
+            nodal,
             displacement,
             velocity,
             workspace,
             ..
         } = self;
-        let h = device.h;
+        let h = nodal.h;
         let steps = displacement.len() - 1;
         let mut x = [self.initial.displacement, h * self.initial.velocity];
         let (tiles, rest) = Tile::cut(steps);
         for tile in tiles {
-            device.gather(arithmetic, tile, workspace);
+            nodal.gather(arithmetic, tile, workspace);
             let maps = workspace.prepare(arithmetic, h, tile.length);
             let starts = starts(&maps, &mut x);
-            workspace.replay(arithmetic, h, tile.length, &starts);
-            tile.scatter(arithmetic, &workspace.motion[0], displacement);
-            tile.scatter(arithmetic, &workspace.motion[1], velocity);
+            workspace.response_pass(arithmetic, h, tile.length, &starts);
+            tile.scatter(arithmetic, &workspace.response[0], displacement);
+            tile.scatter(arithmetic, &workspace.response[1], velocity);
         }
         for i in rest..=steps {
-            (displacement[i], velocity[i]) = (x[0], x[1] * device.constants().per_h);
+            (displacement[i], velocity[i]) = (x[0], x[1] * nodal.constants().per_h);
             if i < steps {
-                x = device.rates(i).forward(x, device.constants());
+                x = nodal.rates(i).forward(x, nodal.constants());
             }
         }
     }
 }
 
-/// The states at the starts of all blocks, one after the other from `x`, which is carried to the end.
+/// States at the starts of all blocks, by recursion from `x`, which becomes the state at the end.
 #[inline(always)]
 pub(super) fn starts(maps: &Maps, x: &mut [f64; 2]) -> Ends {
     let mut starts = [[[0.0; LANES]; 2]; 2];

@@ -1,137 +1,135 @@
-//! Cost and gradient in one go, for readings of the displacement at every node.
+//! Cost and gradient in two passes over the record, for displacement samples at every node.
 //!
-//! A block's share of the cost is a quadratic function of the state at its start. A first pass, in which no
-//! tile waits for another, finds for every block its map and the derivative of that function; from these
-//! follow the states between the blocks and, from the end back, the adjoint states there. A second pass, in
-//! which again no tile waits for another, computes motion, adjoint and gradient tile by tile and writes
-//! nothing down but the gradient. Long records are shared by two threads; what a tile gives
-//! does not depend on who computes it.
+//! The cost of a block is a quadratic function of the state at its start. The first pass computes for each block its map
+//! and the derivative of that function, with all tiles independent. The states between blocks follow by a forward
+//! recursion, the adjoint states by a backward one. The second pass, again with independent tiles, computes response,
+//! adjoint and gradient tile by tile and stores the gradient alone. Long records are divided between two threads; the
+//! results of a tile do not depend on the thread.
 
-use super::LinearDevice;
+use super::LinearSystem;
 use super::adjoint::{collect, ends};
 use super::forward::starts;
 use super::tile::Tile;
-use super::workspace::{Chart, Ends, Workspace, with_workspace};
+use super::workspace::{BlockMap, Ends, Workspace, with_workspace};
 use crate::simd::{self, Arithmetic, Kernel, LANES};
 use crate::system::State;
 use crate::threads;
 
-/// From so many tiles on, a second thread pays: to start it takes as long as some three tiles do, twice.
+/// Number of tiles from which a second thread reduces the time: starting it takes as long as about three tiles, twice.
 const WORTH_A_THREAD: usize = 24;
 
-/// `J = sum_i w_i (y_i - reading_i)^2` over all nodes.
+/// The cost `J = sum_i w_i (y_i - sample_i)^2` over all nodes.
 #[derive(Clone, Copy)]
 pub(super) struct LeastSquares<'a> {
-    pub device: LinearDevice<'a>,
+    pub nodal: LinearSystem<'a>,
     pub initial: State,
-    /// One a node.
-    pub readings: &'a [f64],
-    /// `w_i` at the inner nodes, and at both ends.
+    /// One sample per node, m.
+    pub samples: &'a [f64],
+    /// Weights `w_i` of inner nodes, and of both ends.
     pub weights: [f64; 2],
 }
 
 /// A tile with the states at the starts of its blocks, and the adjoint states at their ends.
-pub(super) struct Leg {
+pub(super) struct TileStates {
     tile: Tile,
     starts: Ends,
     ends: Ends,
 }
 
-/// The first pass, over some tiles.
-pub(super) struct Survey<'a> {
+/// First pass over some tiles.
+pub(super) struct FirstPass<'a> {
     pub of: LeastSquares<'a>,
     pub tiles: &'a [Tile],
     pub workspace: &'a mut Workspace,
 }
 
-impl Kernel for Survey<'_> {
-    type Output = Vec<Chart>;
+impl Kernel for FirstPass<'_> {
+    type Output = Vec<BlockMap>;
 
     #[inline(always)]
-    fn run<A: Arithmetic>(self, arithmetic: A) -> Vec<Chart> {
+    fn run<A: Arithmetic>(self, arithmetic: A) -> Vec<BlockMap> {
         let Self {
             of,
             tiles,
             workspace,
         } = self;
-        let mut charts = Vec::with_capacity(tiles.len());
+        let mut block_maps = Vec::with_capacity(tiles.len());
         for tile in tiles {
-            of.device.gather(arithmetic, *tile, workspace);
-            tile.gather(arithmetic, of.readings, &mut workspace.source[0]);
-            charts.push(match tiles.len() {
-                1 => workspace.survey::<A, true>(arithmetic, of.device.h, tile.length),
-                _ => workspace.survey::<A, false>(arithmetic, of.device.h, tile.length),
+            of.nodal.gather(arithmetic, *tile, workspace);
+            tile.gather(arithmetic, of.samples, &mut workspace.source[0]);
+            block_maps.push(match tiles.len() {
+                1 => workspace.first_pass::<A, true>(arithmetic, of.nodal.h, tile.length),
+                _ => workspace.first_pass::<A, false>(arithmetic, of.nodal.h, tile.length),
             });
         }
-        charts
+        block_maps
     }
 }
 
-/// The second pass, over some legs.
-pub(super) struct Descent<'a> {
+/// Second pass over some tiles.
+pub(super) struct SecondPass<'a> {
     pub of: LeastSquares<'a>,
-    pub legs: &'a [Leg],
-    /// With respect to mass, damping, stiffness from the first node of the legs to the one before the node
-    /// that follows them: overwritten.
+    pub tile_states: &'a [TileStates],
+    /// Gradient with respect to mass, damping, stiffness, from the first node of the tiles to the last one; overwritten.
     pub gradient: [&'a mut [f64]; 3],
-    /// Whether `workspace` has surveyed the only leg before.
-    pub at_hand: bool,
+    /// True if `workspace` still holds the step rates of the only tile.
+    pub rates_kept: bool,
     pub workspace: &'a mut Workspace,
 }
 
-/// What a leg gives besides its gradient.
-pub(super) struct Harvest {
-    /// Sum of the squares of its residuals.
+/// Results of the second pass over a tile, besides the gradient.
+pub(super) struct TileResult {
+    /// Sum of squared residuals.
     squares: f64,
-    /// What belongs to the gradient at the node behind it.
+    /// Contribution to the gradient at the node after the tile.
     behind: [f64; 3],
 }
 
-impl Kernel for Descent<'_> {
-    type Output = Vec<Harvest>;
+impl Kernel for SecondPass<'_> {
+    type Output = Vec<TileResult>;
 
     #[inline(always)]
-    fn run<A: Arithmetic>(self, arithmetic: A) -> Vec<Harvest> {
+    fn run<A: Arithmetic>(self, arithmetic: A) -> Vec<TileResult> {
         let Self {
             of,
-            legs,
+            tile_states,
             mut gradient,
-            at_hand,
+            rates_kept,
             workspace,
         } = self;
-        let mut harvest = Vec::with_capacity(legs.len());
-        let Some(start) = legs.first().map(|leg| leg.tile.first) else {
-            return harvest;
+        let mut result = Vec::with_capacity(tile_states.len());
+        let Some(start) = tile_states.first().map(|tile_state| tile_state.tile.first) else {
+            return result;
         };
-        let (h, factor) = (of.device.h, of.factor());
-        // From the end: what the first pass has seen last is still near.
-        for Leg { tile, starts, ends } in legs.iter().rev() {
-            if !at_hand {
-                of.device.gather(arithmetic, *tile, workspace);
+        let (h, factor) = (of.nodal.h, of.factor());
+        // Backwards: the last tile of the first pass is still in the cache.
+        for TileStates { tile, starts, ends } in tile_states.iter().rev() {
+            if !rates_kept {
+                of.nodal.gather(arithmetic, *tile, workspace);
                 workspace.prepare_rates(arithmetic, h, tile.length);
-                tile.gather(arithmetic, of.readings, &mut workspace.source[0]);
+                tile.gather(arithmetic, of.samples, &mut workspace.source[0]);
             }
-            workspace.replay(arithmetic, h, tile.length, starts);
+            workspace.response_pass(arithmetic, h, tile.length, starts);
             let squares = workspace.compare(arithmetic, tile.length, factor);
-            let last = workspace.replay_back::<A, false>(arithmetic, h, tile.length, ends);
+            let last = workspace.adjoint_pass::<A, false>(arithmetic, h, tile.length, ends);
             let within = Tile {
                 first: tile.first - start,
                 ..*tile
             };
-            harvest.push(Harvest {
+            result.push(TileResult {
                 squares: squares.iter().sum(),
                 behind: collect(arithmetic, within, workspace, &last, &mut gradient),
             });
         }
-        harvest.reverse();
-        harvest
+        result.reverse();
+        result
     }
 }
 
-/// What the few steps behind the last tile give, and what both passes are joined by.
-pub(super) struct Joint {
-    pub legs: Vec<Leg>,
-    /// Sum of the squares of the residuals behind the last tile, the one at the last node included.
+/// States at the junctions of the tiles, and the results of the steps after the last tile.
+pub(super) struct Junctions {
+    pub tile_states: Vec<TileStates>,
+    /// Sum of squared residuals after the last tile, including the last node.
     squares: f64,
     /// Residual at the last node.
     last: f64,
@@ -140,15 +138,15 @@ pub(super) struct Joint {
 }
 
 impl LeastSquares<'_> {
-    /// The cost, and its gradient: with respect to the functions it overwrites `gradient`, with respect to the
-    /// initial state it is returned.
+    /// Cost and gradient: overwrites `gradient` with that with respect to the functions and returns that with respect to the
+    /// initial state.
     pub fn solve(self, gradient: [&mut [f64]; 3]) -> (f64, State) {
         let tiles: Vec<Tile> = Tile::cut(self.steps()).0.collect();
         let middle = middle(tiles.len());
         self.solve_in_two(&tiles, middle, gradient)
     }
 
-    /// The same, with the tiles from number `middle` on, if there are any, in a second thread.
+    /// As [`LeastSquares::solve`], with the tiles from number `middle` on, if any, on a second thread.
     pub fn solve_in_two(
         self,
         tiles: &[Tile],
@@ -157,125 +155,131 @@ impl LeastSquares<'_> {
     ) -> (f64, State) {
         let (of, at_once) = (self, middle < tiles.len());
         let rest = behind(tiles);
-        let charts = both(tiles.split_at(middle), at_once, |tiles| {
+        let block_maps = both(tiles.split_at(middle), at_once, |tiles| {
             with_workspace(|workspace| {
-                simd::run(Survey {
+                simd::run(FirstPass {
                     of,
                     tiles,
                     workspace,
                 })
             })
         });
-        let joint = self.join(tiles, &charts, &mut gradient);
+        let joint = self.join(tiles, &block_maps, &mut gradient);
 
-        let (former, latter) = joint.legs.split_at(middle);
-        let cut = latter.first().map_or(rest, |leg| leg.tile.first);
+        let (former, latter) = joint.tile_states.split_at(middle);
+        let cut = latter
+            .first()
+            .map_or(rest, |tile_state| tile_state.tile.first);
         let [m, c, k] = gradient.each_mut().map(|g| g[..rest].split_at_mut(cut));
         let parts = ((former, [m.0, c.0, k.0]), (latter, [m.1, c.1, k.1]));
-        let harvest = both(parts, at_once, |(legs, gradient)| {
+        let result = both(parts, at_once, |(tile_states, gradient)| {
             with_workspace(|workspace| {
-                simd::run(Descent {
+                simd::run(SecondPass {
                     of,
-                    legs,
+                    tile_states,
                     gradient,
-                    at_hand: tiles.len() == 1 && !at_once,
+                    rates_kept: tiles.len() == 1 && !at_once,
                     workspace,
                 })
             })
         });
-        self.finish(&joint, &harvest, &mut gradient)
+        self.finish(&joint, &result, &mut gradient)
     }
 
     fn steps(&self) -> usize {
-        self.readings.len() - 1
+        self.samples.len() - 1
     }
 
-    /// `2 w`: times the residual it is the derivative of `w r^2`, between the ends.
+    /// Factor `2 w` of the residual in the derivative of `w r^2`, at inner nodes.
     fn factor(&self) -> f64 {
         2.0 * self.weights[0]
     }
 
-    /// States and adjoint states between all blocks, from their charts; the steps behind the last
-    /// tile are done one by one, with their gradient.
-    pub fn join(&self, tiles: &[Tile], charts: &[Chart], gradient: &mut [&mut [f64]; 3]) -> Joint {
+    /// States and adjoint states at all block boundaries, from the block maps; the steps after the last tile are done
+    /// sequentially, with their gradient.
+    pub fn join(
+        &self,
+        tiles: &[Tile],
+        block_maps: &[BlockMap],
+        gradient: &mut [&mut [f64]; 3],
+    ) -> Junctions {
         let Self {
-            device,
+            nodal,
             initial,
-            readings,
+            samples,
             weights: [_, outer],
         } = *self;
-        let (h, steps, factor) = (device.h, self.steps(), self.factor());
+        let (h, steps, factor) = (nodal.h, self.steps(), self.factor());
         let mut x = [initial.displacement, h * initial.velocity];
-        let starts: Vec<Ends> = charts.iter().map(|c| starts(&c.maps, &mut x)).collect();
+        let starts: Vec<Ends> = block_maps.iter().map(|c| starts(&c.maps, &mut x)).collect();
 
         let rest = behind(tiles);
-        let mut motion = [[0.0; 2]; 2 * LANES];
+        let mut response = [[0.0; 2]; 2 * LANES];
         let mut squares = 0.0;
         for i in rest..=steps {
-            motion[i - rest] = x;
-            let r = x[0] - readings[i];
+            response[i - rest] = x;
+            let r = x[0] - samples[i];
             squares += r * r;
             if i < steps {
-                x = device.rates(i).forward(x, device.constants());
+                x = nodal.rates(i).forward(x, nodal.constants());
             }
         }
-        let last = x[0] - readings[steps];
+        let last = x[0] - samples[steps];
         let mut x = [2.0 * outer * last, 0.0];
         gradient.iter_mut().for_each(|g| g[steps] = 0.0);
         for i in (rest..steps).rev() {
-            let state = motion[i - rest];
-            let source = [factor * (state[0] - readings[i]), 0.0];
-            device.step_back(i, state, source, &mut x, gradient);
+            let state = response[i - rest];
+            let source = [factor * (state[0] - samples[i]), 0.0];
+            nodal.step_back(i, state, source, &mut x, gradient);
         }
 
-        let mut legs = Vec::with_capacity(tiles.len());
-        for ((tile, chart), starts) in tiles.iter().zip(charts).zip(starts).rev() {
-            let driven = chart.driven(&starts, factor);
-            legs.push(Leg {
+        let mut tile_states = Vec::with_capacity(tiles.len());
+        for ((tile, block_map), starts) in tiles.iter().zip(block_maps).zip(starts).rev() {
+            let driven = block_map.driven(&starts, factor);
+            tile_states.push(TileStates {
                 tile: *tile,
                 starts,
-                ends: ends(&chart.maps, &driven, &mut x),
+                ends: ends(&block_map.maps, &driven, &mut x),
             });
         }
-        legs.reverse();
-        Joint {
-            legs,
+        tile_states.reverse();
+        Junctions {
+            tile_states,
             squares,
             last,
             adjoint: x,
         }
     }
 
-    /// Cost and gradient with respect to the initial state; the gradient is completed at the nodes
-    /// between legs.
+    /// Cost and gradient with respect to the initial state; completes the gradient at the nodes between tiles.
     pub fn finish(
         &self,
-        joint: &Joint,
-        harvest: &[Harvest],
+        joint: &Junctions,
+        result: &[TileResult],
         gradient: &mut [&mut [f64]; 3],
     ) -> (f64, State) {
         let mut sum = 0.0;
-        for (leg, got) in joint.legs.iter().zip(harvest) {
+        for (tile_state, got) in joint.tile_states.iter().zip(result) {
             sum += got.squares;
             for (g, share) in gradient.iter_mut().zip(got.behind) {
-                g[leg.tile.node(LANES, 0)] += share;
+                g[tile_state.tile.node(LANES, 0)] += share;
             }
         }
         sum += joint.squares;
         let [inner, outer] = self.weights;
-        let first = self.initial.displacement - self.readings[0];
-        // Both ends have been counted like the others.
+        let first = self.initial.displacement - self.samples[0];
+        // Both ends were counted with the weight of inner nodes.
         let cost = inner * sum + (outer - inner) * (first * first + joint.last * joint.last);
         let [y, w] = joint.adjoint;
         let initial = State {
             displacement: y + 2.0 * (outer - inner) * first,
-            velocity: self.device.h * w,
+            velocity: self.nodal.h * w,
         };
         (cost, initial)
     }
 }
 
-/// Where to cut so many tiles in two.
+/// Number of tiles in the first of two parts.
 fn middle(tiles: usize) -> usize {
     match tiles >= WORTH_A_THREAD && threads::spare() {
         true => tiles / 2,
@@ -283,12 +287,12 @@ fn middle(tiles: usize) -> usize {
     }
 }
 
-/// The node behind the last tile.
+/// Node after the last tile.
 fn behind(tiles: &[Tile]) -> usize {
     tiles.last().map_or(0, |tile| tile.node(LANES, 0))
 }
 
-/// Does the same to both parts, `at_once` in two threads; otherwise the second is empty.
+/// Applies `act` to both parts, `at_once` on two threads; otherwise the second part is empty.
 fn both<P: Send, T: Send>(
     (former, latter): (P, P),
     at_once: bool,

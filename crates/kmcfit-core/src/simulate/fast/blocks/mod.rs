@@ -1,16 +1,14 @@
-//! Linear free motion in eight blocks at once.
+//! Parallel-in-time integration of linear free responses, in eight SIMD lanes.
 //!
-//! A step of the midpoint rule is a linear map of the state as long as the terms are linear. So the
-//! record can be cut into blocks that do not wait for each other: a first pass finds the map of
-//! each block, from these the states between blocks follow one after the other, and a second
-//! pass computes the motion in all blocks at once. The adjoint is done the same way from the end. One
-//! step after the other, each waits for the one before; in eight lanes the processor has always
-//! something to do.
+//! A step of the midpoint rule is a linear map of the state if the terms are linear. The record is divided into blocks. A
+//! first pass computes the map of each block; the states between blocks follow by a recursion over the maps; a second pass
+//! computes the response in all blocks in parallel. The adjoint is computed likewise, backwards. Sequential integration has
+//! one chain of dependent operations, eight lanes have eight independent ones.
 //!
-//! Responses, adjoints and least squares equal [`forward`](crate::simulate::reference::forward()) and
-//! [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) to 40 machine precisions of the largest value for
-//! each step: each step adds an increment of the state, as there, and the relative error of a block's map
-//! is that of its few steps.
+//! Responses, adjoints and least squares agree with [`forward`](crate::simulate::reference::forward()) and
+//! [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) to 40 machine precisions of the largest value per
+//! step: steps are increments of the state, as in the reference, and the relative error of a block's map is that of its
+//! few steps.
 
 mod adjoint;
 mod forward;
@@ -24,65 +22,63 @@ mod workspace;
 use crate::simd::{self, Arithmetic};
 use crate::simulate::Trajectory;
 use crate::system::{NodalCoefficients, State, System, SystemTangent};
-use step::{Coefficients, Constants, Rates};
+use step::{Constants, NodeCoefficients, StepRates};
 use tile::Tile;
 use workspace::{Workspace, with_workspace};
 
-/// A mass outside this range meets its own square near the ends of the range of numbers.
+/// Range of masses whose square is safely within the floating-point range.
 const MASSES: std::ops::Range<f64> = 1e-150..1e150;
 
-/// A device with damping and stiffness alone, and the step `h` (s).
+/// A system with damping and stiffness alone, and the step `h` (s).
 #[derive(Clone, Copy)]
-pub(crate) struct LinearDevice<'a> {
+pub(crate) struct LinearSystem<'a> {
     mass: &'a [f64],
     damping: &'a [f64],
     stiffness: &'a [f64],
     h: f64,
 }
 
-impl<'a> LinearDevice<'a> {
-    /// `None` if a mass is so large or small that the arithmetic of the blocks would not be safe. The system must have
-    /// the terms damping and stiffness.
-    pub fn of(system: &System, device: &'a NodalCoefficients, nodes: usize) -> Option<Self> {
-        let [damping, stiffness] = device.coefficients.as_slice() else {
+impl<'a> LinearSystem<'a> {
+    /// Constructs the system; `None` if a mass is outside the safe range. The terms must be damping and stiffness.
+    pub fn of(system: &System, nodal: &'a NodalCoefficients, nodes: usize) -> Option<Self> {
+        let [damping, stiffness] = nodal.coefficients.as_slice() else {
             return None;
         };
-        let functions = [device.mass.as_slice(), damping, stiffness];
+        let functions = [nodal.mass.as_slice(), damping, stiffness];
         Self::new(functions, system.grid.step(), nodes)
     }
 
-    /// The same from mass, damping and stiffness, and the step `h` (s).
+    /// Constructs the system from mass, damping and stiffness, and the step `h` (s).
     pub fn new([mass, damping, stiffness]: [&'a [f64]; 3], h: f64, nodes: usize) -> Option<Self> {
-        let device = Self {
+        let nodal = Self {
             mass: &mass[..nodes],
             damping,
             stiffness,
             h,
         };
-        // Also behind the end of a record that is shorter than the grid.
-        simd::run(Within(mass)).then_some(device)
+        // Nodes beyond the end of a short record are included.
+        simd::run(MassRange(mass)).then_some(nodal)
     }
 
-    /// The cost `sum_i w_i (y_i - reading_i)^2` of one reading a node with the weights of the inner
-    /// nodes and of both ends, and its gradient: with respect to the functions into `gradient`,
-    /// with respect to the initial state returned.
+    /// Cost `sum_i w_i (y_i - sample_i)^2` of one sample per node with the weights of inner nodes and of both ends. Overwrites
+    /// `gradient` with the gradient with respect to the functions and returns that with respect to the initial state.
     pub fn least_squares(
         self,
         initial: State,
-        readings: &[f64],
+        samples: &[f64],
         weights: [f64; 2],
         gradient: [&mut [f64]; 3],
     ) -> (f64, State) {
         least_squares::LeastSquares {
-            device: self,
+            nodal: self,
             initial,
-            readings,
+            samples,
             weights,
         }
         .solve(gradient)
     }
 
-    /// Brings the functions into lanes.
+    /// Copies the functions to SIMD layout.
     #[inline(always)]
     fn gather<A: Arithmetic>(&self, arithmetic: A, tile: Tile, workspace: &mut Workspace) {
         let functions = [self.mass, self.damping, self.stiffness];
@@ -96,28 +92,28 @@ impl<'a> LinearDevice<'a> {
     }
 
     #[inline(always)]
-    fn rates(&self, i: usize) -> Rates<f64> {
-        let at = |i: usize| Coefficients {
+    fn rates(&self, i: usize) -> StepRates<f64> {
+        let at = |i: usize| NodeCoefficients {
             m: self.mass[i],
             c: self.damping[i],
             hk: self.h * self.stiffness[i],
         };
-        Rates::new(at(i), at(i + 1), self.constants())
+        StepRates::new(at(i), at(i + 1), self.constants())
     }
 
-    /// One step of the adjoint by itself: carries `x` from node `i + 1` to node `i` and adds the
-    /// step's share to the gradient, which is overwritten at node `i`.
+    /// One sequential step of the adjoint: advances `x` from node `i + 1` to node `i` and adds the step's contribution to the
+    /// gradient, which is overwritten at node `i`.
     #[inline(always)]
     fn step_back(
         &self,
         i: usize,
-        motion: [f64; 2],
+        response: [f64; 2],
         source: [f64; 2],
         x: &mut [f64; 2],
         gradient: &mut [&mut [f64]; 3],
     ) {
         let (rates, of) = (self.rates(i), self.constants());
-        let (node, middle) = rates.shares(motion, *x, of);
+        let (node, middle) = rates.shares(response, *x, of);
         let scale = [of.per_h, 1.0, of.h];
         for (f, g) in gradient.iter_mut().enumerate() {
             g[i] = (node[f] + middle[f]) * scale[f];
@@ -127,12 +123,12 @@ impl<'a> LinearDevice<'a> {
         *x = [y + source[0], w + source[1]];
     }
 
-    /// The motion from `initial`, over as many nodes as `trajectory` has. Where it, or a block's map,
-    /// leaves the finite numbers, the last state is not finite.
+    /// Response from `initial` over the nodes of `trajectory`. If it, or a block's map, is not finite, the last state is not
+    /// finite.
     pub fn forward(self, initial: State, trajectory: &mut Trajectory) {
         with_workspace(|workspace| {
-            simd::run(forward::Forward {
-                device: self,
+            simd::run(forward::BlockForward {
+                nodal: self,
                 initial,
                 displacement: &mut trajectory.displacement,
                 velocity: &mut trajectory.velocity,
@@ -141,7 +137,7 @@ impl<'a> LinearDevice<'a> {
         });
     }
 
-    /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()).
+    /// Adjoint, as [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()).
     pub fn gradient(self, trajectory: &Trajectory, source: &Trajectory) -> SystemTangent {
         let by_velocity = source.velocity.iter().any(|s| *s != 0.0);
         let source = [
@@ -155,8 +151,8 @@ impl<'a> LinearDevice<'a> {
         };
         let parts = [&mut gradient.mass, damping, stiffness].map(|g| &mut g[..nodes]);
         let initial = with_workspace(|workspace| {
-            simd::run(adjoint::Adjoint {
-                device: self,
+            simd::run(adjoint::BlockAdjoint {
+                nodal: self,
                 displacement: &trajectory.displacement,
                 velocity: &trajectory.velocity,
                 source,
@@ -165,17 +161,16 @@ impl<'a> LinearDevice<'a> {
             })
         });
         SystemTangent {
-            device: gradient,
+            nodal: gradient,
             initial,
         }
     }
 }
 
-/// Whether all masses are positive, and neither so large nor so small that a product of two leaves
-/// the range of numbers.
-struct Within<'a>(&'a [f64]);
+/// Check that all masses are within the safe range.
+struct MassRange<'a>(&'a [f64]);
 
-impl simd::Kernel for Within<'_> {
+impl simd::Kernel for MassRange<'_> {
     type Output = bool;
 
     #[inline(always)]

@@ -1,6 +1,6 @@
-//! One step of the midpoint rule for a linear device in free motion.
+//! One step of the midpoint rule for a linear system in free response.
 //!
-//! Time is counted in steps `h` here, so that the velocity is `w = h v`, in m, and a step is
+//! Time is in units of the step `h`, so the velocity is `w = h v`, in m, and a step is
 //!
 //! ```text
 //! w_h = w - (beta y + alpha w)            alpha = h/2 c/m            beta  = h^2/2 k/m
@@ -13,18 +13,18 @@
 use crate::simd::{Arithmetic, Eight};
 use std::ops::{Add, Div, Mul, Sub};
 
-/// A number, or eight of them.
-pub(super) trait Number:
+/// A number, or eight numbers in SIMD lanes.
+pub(super) trait StepNumber:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
 }
 
-impl<T> Number for T where
+impl<T> StepNumber for T where
     T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T> + Div<Output = T>
 {
 }
 
-/// The numbers that every step needs.
+/// Constants of all steps.
 #[derive(Clone, Copy)]
 pub(super) struct Constants<T> {
     pub zero: T,
@@ -32,7 +32,7 @@ pub(super) struct Constants<T> {
     pub one: T,
     /// Step, s.
     pub h: T,
-    /// Half of it.
+    /// Half of the step, s.
     pub half_h: T,
     /// `1/h`.
     pub per_h: T,
@@ -50,9 +50,9 @@ impl Constants<f64> {
         }
     }
 
-    /// The same in every lane.
+    /// The constants in all SIMD lanes.
     #[inline(always)]
-    pub fn in_lanes<A: Arithmetic>(self, arithmetic: A) -> Constants<Eight<A>> {
+    pub fn splat<A: Arithmetic>(self, arithmetic: A) -> Constants<Eight<A>> {
         Constants {
             zero: Eight::splat(arithmetic, self.zero),
             half: Eight::splat(arithmetic, self.half),
@@ -66,27 +66,27 @@ impl Constants<f64> {
 
 /// Mass, damping and `h` times the stiffness at a node.
 #[derive(Clone, Copy)]
-pub(super) struct Coefficients<T> {
+pub(super) struct NodeCoefficients<T> {
     pub m: T,
     pub c: T,
     pub hk: T,
 }
 
-/// What a step does, without units but for the last two.
+/// Dimensionless rates of a step, and the mobilities.
 #[derive(Clone, Copy)]
-pub(super) struct Rates<T> {
+pub(super) struct StepRates<T> {
     pub alpha: T,
     pub beta: T,
     pub gamma: T,
     pub delta: T,
-    /// `h/(2m)` left and in the middle, s/kg.
+    /// Mobility `h/(2m)` at the left node and in the middle, s/kg.
     pub mobility: [T; 2],
 }
 
-impl<T: Number> Rates<T> {
-    /// Both inverse masses come from one division.
+impl<T: StepNumber> StepRates<T> {
+    /// Computes the rates; both inverse masses come from one division.
     #[inline(always)]
-    pub fn new(left: Coefficients<T>, right: Coefficients<T>, of: Constants<T>) -> Self {
+    pub fn new(left: NodeCoefficients<T>, right: NodeCoefficients<T>, of: Constants<T>) -> Self {
         let twice = left.m + right.m;
         let both = of.half_h / (left.m * twice);
         let mobility = [twice * both, (left.m + left.m) * both];
@@ -99,7 +99,7 @@ impl<T: Number> Rates<T> {
         }
     }
 
-    /// The state `(y, w)` after the step.
+    /// State `(y, w)` after the step.
     #[inline(always)]
     pub fn forward(&self, [y, w]: [T; 2], of: Constants<T>) -> [T; 2] {
         let w_half = w - (self.beta * y + self.alpha * w);
@@ -107,7 +107,7 @@ impl<T: Number> Rates<T> {
         [y + w_half, w - (self.delta * y_half + self.gamma * w_half)]
     }
 
-    /// The transpose of [`Rates::forward`].
+    /// Transpose of [`StepRates::forward`].
     #[inline(always)]
     pub fn backward(&self, [y, w]: [T; 2], of: Constants<T>) -> [T; 2] {
         let w_half = y - self.gamma * w;
@@ -118,7 +118,7 @@ impl<T: Number> Rates<T> {
         ]
     }
 
-    /// The same step as an increment of the state.
+    /// The step as an increment of the state.
     #[inline(always)]
     pub fn increment(&self, of: Constants<T>) -> Increment<T> {
         let q = of.one - self.alpha;
@@ -131,9 +131,8 @@ impl<T: Number> Rates<T> {
         }
     }
 
-    /// What a step gives to the gradient with respect to `m/h`, `c` and `h k`: at its left node, and
-    /// half of what it gives at mid-step. `adjoint` belongs to the right node, `motion` to the
-    /// left.
+    /// Contributions of a step to the gradient with respect to `m/h`, `c` and `h k`: at its left node, and half of that at
+    /// mid-step. `adjoint` is the state at the right node, `response` that at the left node.
     #[inline(always)]
     pub fn shares(&self, [y, w]: [T; 2], adjoint: [T; 2], of: Constants<T>) -> ([T; 3], [T; 3]) {
         let slowing = self.beta * y + self.alpha * w;
@@ -154,8 +153,7 @@ impl<T: Number> Rates<T> {
     }
 }
 
-/// `x_{i+1} - x_i = E x_i` of one step. Without the identity, which would round what `E` changes by the
-/// same amount at every step.
+/// Increment `x_{i+1} - x_i = E x_i` of one step. Adding the identity would round the change by `E` at every step.
 #[derive(Clone, Copy)]
 pub(super) struct Increment<T> {
     yy: T,
@@ -164,8 +162,8 @@ pub(super) struct Increment<T> {
     ww: T,
 }
 
-impl<T: Number> Increment<T> {
-    /// `x + E x`.
+impl<T: StepNumber> Increment<T> {
+    /// State `x + E x`.
     #[inline(always)]
     pub fn forward(&self, [y, w]: [T; 2]) -> [T; 2] {
         [

@@ -3,7 +3,7 @@ use crate::simd::LANES;
 use crate::simulate::{Engine, reference};
 use crate::system::{Grid, Method, Term};
 
-/// Records of a few steps more and less than whole tiles, and of several.
+/// Records slightly shorter and longer than whole tiles, and of several tiles.
 const NODES: [usize; 8] = [65, 66, 81, 200, 4096, 4097, 4113, 9000];
 
 const INITIAL: State = State {
@@ -19,8 +19,8 @@ fn system(nodes: usize) -> System {
     }
 }
 
-/// Mass falls, damping changes its sign, stiffness wobbles.
-fn device(nodes: usize) -> NodalCoefficients {
+/// Falling mass, damping of both signs, oscillating stiffness.
+fn nodal(nodes: usize) -> NodalCoefficients {
     let at = |f: &dyn Fn(f64) -> f64| -> Vec<f64> {
         (0..nodes).map(|i| f(i as f64 / nodes as f64)).collect()
     };
@@ -33,28 +33,25 @@ fn device(nodes: usize) -> NodalCoefficients {
     }
 }
 
-fn readings(motion: &Trajectory) -> Vec<f64> {
-    let pairs = motion.displacement.iter().enumerate();
+fn samples(response: &Trajectory) -> Vec<f64> {
+    let pairs = response.displacement.iter().enumerate();
     pairs
         .map(|(i, y)| 0.9 * y + 0.1 * (0.03 * i as f64).sin())
         .collect()
 }
 
-fn source(motion: &Trajectory, velocity: f64) -> Trajectory {
+fn source(response: &Trajectory, velocity: f64) -> Trajectory {
     Trajectory {
-        displacement: readings(motion),
-        velocity: motion.velocity.iter().map(|v| velocity * v).collect(),
+        displacement: samples(response),
+        velocity: response.velocity.iter().map(|v| velocity * v).collect(),
     }
 }
 
-fn squares_of<'a>(
-    device: LinearDevice<'a>,
-    readings: &'a [f64],
-) -> least_squares::LeastSquares<'a> {
+fn squares_of<'a>(nodal: LinearSystem<'a>, samples: &'a [f64]) -> least_squares::LeastSquares<'a> {
     least_squares::LeastSquares {
-        device,
+        nodal,
         initial: INITIAL,
-        readings,
+        samples,
         weights: [0.7, 0.2],
     }
 }
@@ -68,20 +65,20 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     largest(&difference)
 }
 
-/// Rounding of the states at every step, carried along: some epsilons a period and 25 s of them.
+/// Bound of the accumulated rounding errors of 25 s: some machine precisions per period.
 const ROUNDING: f64 = 1e-12;
 
 #[test]
-fn motions_are_those_of_single_steps() {
+fn responses_agree_with_sequential_steps() {
     for nodes in NODES {
-        let (system, device) = (system(nodes), device(nodes));
-        let one_by_one = system.forward(&device, INITIAL, None).unwrap();
-        let mut motion = Trajectory::zeros(nodes);
-        let linear = LinearDevice::of(&system, &device, nodes).unwrap();
-        linear.forward(INITIAL, &mut motion);
+        let (system, nodal) = (system(nodes), nodal(nodes));
+        let one_by_one = system.forward(&nodal, INITIAL, None).unwrap();
+        let mut response = Trajectory::zeros(nodes);
+        let linear = LinearSystem::of(&system, &nodal, nodes).unwrap();
+        linear.forward(INITIAL, &mut response);
         for (a, b) in [
-            (&motion.displacement, &one_by_one.displacement),
-            (&motion.velocity, &one_by_one.velocity),
+            (&response.displacement, &one_by_one.displacement),
+            (&response.velocity, &one_by_one.velocity),
         ] {
             let error = distance(a, b) / largest(b);
             assert!(error < ROUNDING, "{nodes}: {error:e}");
@@ -90,15 +87,15 @@ fn motions_are_those_of_single_steps() {
 }
 
 #[test]
-fn gradients_are_those_of_single_steps() {
+fn gradients_agree_with_sequential_steps() {
     for (nodes, by_velocity) in NODES.into_iter().flat_map(|n| [(n, 0.0), (n, 0.3)]) {
-        let (system, device) = (system(nodes), device(nodes));
-        let motion = system.forward(&device, INITIAL, None).unwrap();
-        let source = source(&motion, by_velocity);
-        let expected = reference::discrete_adjoint(&system, &device, None, &motion, &source);
-        let linear = LinearDevice::of(&system, &device, nodes).unwrap();
-        let found = linear.gradient(&motion, &source);
-        for (a, b) in found.device.functions().zip(expected.device.functions()) {
+        let (system, nodal) = (system(nodes), nodal(nodes));
+        let response = system.forward(&nodal, INITIAL, None).unwrap();
+        let source = source(&response, by_velocity);
+        let expected = reference::discrete_adjoint(&system, &nodal, None, &response, &source);
+        let linear = LinearSystem::of(&system, &nodal, nodes).unwrap();
+        let found = linear.gradient(&response, &source);
+        for (a, b) in found.nodal.functions().zip(expected.nodal.functions()) {
             let error = distance(a, b) / largest(b);
             assert!(error < ROUNDING, "{nodes}: {error:e}");
         }
@@ -109,34 +106,30 @@ fn gradients_are_those_of_single_steps() {
 }
 
 #[test]
-fn squares_are_motion_and_gradient_in_one() {
+fn least_squares_agree_with_response_and_gradient() {
     let weights = [0.7, 0.2];
     for nodes in NODES {
-        let (system, device) = (system(nodes), device(nodes));
-        let motion = system.forward(&device, INITIAL, None).unwrap();
-        let readings = readings(&motion);
+        let (system, nodal) = (system(nodes), nodal(nodes));
+        let response = system.forward(&nodal, INITIAL, None).unwrap();
+        let samples = samples(&response);
         let mut source = Trajectory::zeros(nodes);
         let mut cost = 0.0;
         for i in 0..nodes {
             let w = weights[usize::from(i == 0 || i + 1 == nodes)];
-            let r = motion.displacement[i] - readings[i];
+            let r = response.displacement[i] - samples[i];
             cost += w * r * r;
             source.displacement[i] = 2.0 * w * r;
         }
-        let expected = reference::discrete_adjoint(&system, &device, None, &motion, &source);
-        let mut gradient = device.clone();
+        let expected = reference::discrete_adjoint(&system, &nodal, None, &response, &source);
+        let mut gradient = nodal.clone();
         let [c, k] = gradient.coefficients.as_mut_slice() else {
             unreachable!("two terms")
         };
         let (found, initial) = crate::simulate::least_squares(
             &system,
-            [
-                &device.mass,
-                &device.coefficients[0],
-                &device.coefficients[1],
-            ],
+            [&nodal.mass, &nodal.coefficients[0], &nodal.coefficients[1]],
             INITIAL,
-            &readings,
+            &samples,
             weights,
             [&mut gradient.mass, c, k],
         )
@@ -145,7 +138,7 @@ fn squares_are_motion_and_gradient_in_one() {
             (found - cost).abs() < ROUNDING * cost,
             "{nodes}: {found} {cost}"
         );
-        for (a, b) in gradient.functions().zip(expected.device.functions()) {
+        for (a, b) in gradient.functions().zip(expected.nodal.functions()) {
             let error = distance(a, b) / largest(b);
             assert!(error < ROUNDING, "{nodes}: {error:e}");
         }
@@ -155,7 +148,7 @@ fn squares_are_motion_and_gradient_in_one() {
     }
 }
 
-/// A motion and what follows from it, with one arithmetic.
+/// A response and its derivatives, with one SIMD arithmetic.
 struct Whole<'a>(&'a System, &'a NodalCoefficients);
 
 impl simd::Kernel for Whole<'_> {
@@ -163,49 +156,49 @@ impl simd::Kernel for Whole<'_> {
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) -> Vec<u64> {
-        let Self(system, device) = self;
-        let nodes = device.mass.len();
-        let linear = LinearDevice::of(system, device, nodes).unwrap();
-        let mut motion = Trajectory::zeros(nodes);
+        let Self(system, nodal) = self;
+        let nodes = nodal.mass.len();
+        let linear = LinearSystem::of(system, nodal, nodes).unwrap();
+        let mut response = Trajectory::zeros(nodes);
         let mut gradient = NodalCoefficients::zeros(nodes, 2);
         with_workspace(|workspace| {
-            forward::Forward {
-                device: linear,
+            forward::BlockForward {
+                nodal: linear,
                 initial: INITIAL,
-                displacement: &mut motion.displacement,
-                velocity: &mut motion.velocity,
+                displacement: &mut response.displacement,
+                velocity: &mut response.velocity,
                 workspace,
             }
             .run(arithmetic);
         });
-        let readings = readings(&motion);
+        let samples = samples(&response);
         let [c, k] = gradient.coefficients.as_mut_slice() else {
             unreachable!("two terms")
         };
-        let of = squares_of(linear, &readings);
+        let of = squares_of(linear, &samples);
         let tiles: Vec<Tile> = Tile::cut(nodes - 1).0.collect();
         let mut slopes = [&mut gradient.mass, c, k].map(Vec::as_mut_slice);
         let (cost, _) = with_workspace(|workspace| {
-            let survey = least_squares::Survey {
+            let first_pass = least_squares::FirstPass {
                 of,
                 tiles: &tiles,
                 workspace,
             };
-            let charts = survey.run(arithmetic);
-            let joint = of.join(&tiles, &charts, &mut slopes);
-            let descent = least_squares::Descent {
+            let block_maps = first_pass.run(arithmetic);
+            let joint = of.join(&tiles, &block_maps, &mut slopes);
+            let descent = least_squares::SecondPass {
                 of,
-                legs: &joint.legs,
+                tile_states: &joint.tile_states,
                 gradient: slopes
                     .each_mut()
                     .map(|g| &mut g[..tiles.last().map_or(0, |tile| tile.node(LANES, 0))]),
-                at_hand: false,
+                rates_kept: false,
                 workspace,
             };
-            let harvest = descent.run(arithmetic);
-            of.finish(&joint, &harvest, &mut slopes)
+            let result = descent.run(arithmetic);
+            of.finish(&joint, &result, &mut slopes)
         });
-        let numbers = motion.displacement.iter().chain(&motion.velocity);
+        let numbers = response.displacement.iter().chain(&response.velocity);
         let numbers = numbers.chain(gradient.functions().flatten()).chain([&cost]);
         numbers.map(|x| x.to_bits()).collect()
     }
@@ -214,8 +207,8 @@ impl simd::Kernel for Whole<'_> {
 #[test]
 fn all_arithmetics_give_the_same_bits() {
     for nodes in NODES {
-        let (system, device) = (system(nodes), device(nodes));
-        let outputs = simd::on_each(|| Whole(&system, &device));
+        let (system, nodal) = (system(nodes), nodal(nodes));
+        let outputs = simd::on_each(|| Whole(&system, &nodal));
         assert!(
             outputs.iter().all(|output| output == &outputs[0]),
             "{nodes}"
@@ -223,96 +216,96 @@ fn all_arithmetics_give_the_same_bits() {
     }
 }
 
-/// Masses at the ends of the range of numbers, and motions that leave it, go one step after the other
-/// and end as they do there.
+/// Masses near the limits of the floating-point range, and responses that exceed it, are integrated sequentially with the
+/// results of the reference.
 #[test]
-fn what_blocks_cannot_do_is_done_step_by_step() {
+fn systems_outside_the_safe_range_are_integrated_sequentially() {
     let nodes = 500;
     let system = system(nodes);
-    let mut tiny = device(nodes);
+    let mut tiny = nodal(nodes);
     for f in tiny.functions_mut() {
         f.iter_mut().for_each(|x| *x *= 1e-200);
     }
-    assert!(LinearDevice::of(&system, &tiny, nodes).is_none());
-    let mut motion = Trajectory::zeros(nodes);
+    assert!(LinearSystem::of(&system, &tiny, nodes).is_none());
+    let mut response = Trajectory::zeros(nodes);
     Engine::ParallelInTime
-        .forward_into(&system, &tiny, INITIAL, None, &mut motion)
+        .forward_into(&system, &tiny, INITIAL, None, &mut response)
         .unwrap();
     let expected = system.forward(&tiny, INITIAL, None).unwrap();
-    let error = distance(&motion.displacement, &expected.displacement);
+    let error = distance(&response.displacement, &expected.displacement);
     assert!(
         error < ROUNDING * largest(&expected.displacement),
         "{error:e}"
     );
 
-    let mut stiff = device(nodes);
+    let mut stiff = nodal(nodes);
     stiff.coefficients[1].fill(1e30);
     let expected = system.forward(&stiff, INITIAL, None).unwrap_err();
-    let found = Engine::ParallelInTime.forward_into(&system, &stiff, INITIAL, None, &mut motion);
+    let found = Engine::ParallelInTime.forward_into(&system, &stiff, INITIAL, None, &mut response);
     assert_eq!(found.unwrap_err(), expected);
 }
 
-/// A record that ends before the grid does: the device must have mass on all of it.
+/// The mass must be positive on the whole grid, also for a shorter record.
 #[test]
-fn mass_is_required_behind_the_end_of_a_record() {
+fn mass_is_required_beyond_the_end_of_a_record() {
     let nodes = 500;
-    let (system, mut device) = (system(nodes), device(nodes));
-    device.mass[nodes - 1] = -1.0;
+    let (system, mut nodal) = (system(nodes), nodal(nodes));
+    nodal.mass[nodes - 1] = -1.0;
     let mut short = Trajectory::zeros(300);
-    let expected = reference::forward_into(&system, &device, INITIAL, None, &mut short);
-    let found = Engine::ParallelInTime.forward_into(&system, &device, INITIAL, None, &mut short);
+    let expected = reference::forward_into(&system, &nodal, INITIAL, None, &mut short);
+    let found = Engine::ParallelInTime.forward_into(&system, &nodal, INITIAL, None, &mut short);
     assert!(expected.is_err());
     assert_eq!(found, expected);
 }
 
-/// Where the motion meets the readings, the derivative of a block's cost is the difference of two numbers
-/// that are nearly the same. What it loses is less than the motion's own rounding takes from the residuals:
-/// the gradients of two motions that differ by rounding differ more.
+/// Where the response equals the samples, the derivative of a block's cost is a difference of nearly equal numbers. The
+/// cancellation error is below the effect of rounding errors of the response on the residuals: the gradients of two
+/// responses that differ by rounding differ more.
 #[test]
-fn squares_lose_nothing_near_the_readings() {
+fn least_squares_are_accurate_for_a_response_equal_to_the_samples() {
     let nodes = 2000;
-    let (system, device) = (system(nodes), device(nodes));
-    let one_by_one = system.forward(&device, INITIAL, None).unwrap();
+    let (system, nodal) = (system(nodes), nodal(nodes));
+    let one_by_one = system.forward(&nodal, INITIAL, None).unwrap();
     let wave = |(i, y): (usize, &f64)| y + 1e-8 * (0.11 * i as f64).sin();
-    let readings: Vec<f64> = one_by_one
+    let samples: Vec<f64> = one_by_one
         .displacement
         .iter()
         .enumerate()
         .map(wave)
         .collect();
-    let linear = LinearDevice::of(&system, &device, nodes).unwrap();
+    let linear = LinearSystem::of(&system, &nodal, nodes).unwrap();
     let mut in_blocks = Trajectory::zeros(nodes);
     linear.forward(INITIAL, &mut in_blocks);
-    let [expected, other] = [&in_blocks, &one_by_one].map(|motion| {
+    let [expected, other] = [&in_blocks, &one_by_one].map(|response| {
         let mut source = Trajectory::zeros(nodes);
         for (i, s) in source.displacement.iter_mut().enumerate() {
-            *s = 2.0 * (motion.displacement[i] - readings[i]);
+            *s = 2.0 * (response.displacement[i] - samples[i]);
         }
-        reference::discrete_adjoint(&system, &device, None, motion, &source)
+        reference::discrete_adjoint(&system, &nodal, None, response, &source)
     });
-    let mut gradient = device.clone();
+    let mut gradient = nodal.clone();
     let [c, k] = gradient.coefficients.as_mut_slice() else {
         unreachable!("two terms")
     };
-    linear.least_squares(INITIAL, &readings, [1.0, 1.0], [&mut gradient.mass, c, k]);
-    let functions = expected.device.functions().zip(other.device.functions());
+    linear.least_squares(INITIAL, &samples, [1.0, 1.0], [&mut gradient.mass, c, k]);
+    let functions = expected.nodal.functions().zip(other.nodal.functions());
     for (found, (expected, other)) in gradient.functions().zip(functions) {
         assert!(distance(found, expected) < distance(other, expected));
     }
 }
 
-/// Whoever computes a tile, and whether its rates are still at hand: the same bits.
+/// Results of a tile do not depend on the thread, nor on reuse of its rates.
 #[test]
-fn every_cut_gives_the_same_bits() {
+fn results_do_not_depend_on_the_division_into_threads() {
     for nodes in [2000, 4097, 20_000] {
-        let (system, device) = (system(nodes), device(nodes));
-        let linear = LinearDevice::of(&system, &device, nodes).unwrap();
-        let motion = system.forward(&device, INITIAL, None).unwrap();
-        let readings = readings(&motion);
-        let of = squares_of(linear, &readings);
+        let (system, nodal) = (system(nodes), nodal(nodes));
+        let linear = LinearSystem::of(&system, &nodal, nodes).unwrap();
+        let response = system.forward(&nodal, INITIAL, None).unwrap();
+        let samples = samples(&response);
+        let of = squares_of(linear, &samples);
         let tiles: Vec<Tile> = Tile::cut(nodes - 1).0.collect();
         let bits = |middle: usize| {
-            let mut slopes = device.clone();
+            let mut slopes = nodal.clone();
             let [c, k] = slopes.coefficients.as_mut_slice() else {
                 unreachable!("two terms")
             };

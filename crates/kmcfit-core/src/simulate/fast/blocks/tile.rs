@@ -1,22 +1,21 @@
-//! A part of the record cut into blocks, one a lane and half.
+//! Tiles: parts of a record divided into sixteen blocks, two in each SIMD lane.
 
 use crate::simd::{self, Arithmetic, LANES, Row};
 
-/// Most steps of one lane: what a tile needs then stays in the second cache.
+/// Largest number of steps per lane; the data of a tile then fit in the second-level cache.
 pub(super) const LONGEST: usize = 512;
 
-/// Eight lanes of `length` steps each, one after the other from node `first`: lane `b` holds the
-/// nodes `first + b length ...`. Both halves of a lane are blocks: two chains that do not wait for each
-/// other.
+/// Eight lanes of `length` steps each, consecutive from node `first`: lane `b` holds the nodes from `first + b length` on.
+/// Both halves of a lane are blocks, independent chains of operations.
 #[derive(Clone, Copy)]
 pub(super) struct Tile {
     pub first: usize,
-    /// Even.
+    /// Steps per lane, even.
     pub length: usize,
 }
 
 impl Tile {
-    /// The tiles of a record, in order, and the first node of the few steps that are left over.
+    /// Tiles of a record, in order, and the first node of the remaining steps.
     pub fn cut(
         steps: usize,
     ) -> (
@@ -39,7 +38,7 @@ impl Tile {
         self.first + b * self.length + j
     }
 
-    /// Brings `values` of the nodes `0..length` of every lane into rows.
+    /// Copies `values` of the nodes `0..length` of every lane to rows.
     #[inline(always)]
     pub fn gather<A: Arithmetic>(self, arithmetic: A, values: &[f64], rows: &mut [Row]) {
         let values = &values[self.first..self.first + LANES * self.length];
@@ -58,14 +57,14 @@ impl Tile {
         }
     }
 
-    /// [`Tile::gather`] of the nodes `0..=length`: the last of each lane is the first of the next.
+    /// [`Tile::gather`] for the nodes `0..=length`; the last of each lane is the first of the next.
     #[inline(always)]
     pub fn gather_with_end<A: Arithmetic>(self, arithmetic: A, values: &[f64], rows: &mut [Row]) {
         self.gather(arithmetic, values, rows);
         rows[self.length] = std::array::from_fn(|b| values[self.node(b, self.length)]);
     }
 
-    /// Brings rows of the nodes `0..length` of every lane back to `values`.
+    /// Copies rows of the nodes `0..length` of every lane back to `values`.
     #[inline(always)]
     pub fn scatter<A: Arithmetic>(self, arithmetic: A, rows: &[Row], values: &mut [f64]) {
         let values = &mut values[self.first..self.first + LANES * self.length];

@@ -1,32 +1,32 @@
-//! One tile in lanes: storage that is used again and again, and the passes over it.
+//! Storage of one tile in SIMD layout, and the passes over it.
 
-use super::step::{Coefficients, Constants, Rates};
+use super::step::{Constants, NodeCoefficients, StepRates};
 use super::tile::LONGEST;
 use crate::simd::{Arithmetic, Eight, LANES, Row};
 use std::cell::RefCell;
 
-/// One row a node.
-type Rows = [Row; LONGEST + 1];
+/// One row per node.
+type NodeRows = [Row; LONGEST + 1];
 
-/// A state in every lane, at the ends of both halves.
+/// One state per lane, at the ends of both halves.
 pub(super) type Ends = [[Row; 2]; 2];
 
-/// The maps of both halves of every lane, from the state at the start of a half to that at its end, by
-/// columns: what becomes of `(1, 0)` and of `(0, 1)`.
+/// Maps of both halves of every lane, from the state at the start of a half to that at its end, by columns: the images of
+/// `(1, 0)` and `(0, 1)`.
 pub(super) type Maps = [[[Row; 2]; 2]; 2];
 
-/// What becomes of any state at the start of a block: the block's map, and half the derivative of the sum of the
-/// squares of its residuals, `H x - g`, with respect to that state.
-pub(super) struct Chart {
+/// Map of a block, and half the derivative `H x - g` of its sum of squared residuals with respect to the state `x` at its
+/// start.
+pub(super) struct BlockMap {
     pub maps: Maps,
-    /// `H` of both halves: its diagonal, then what stands beside it.
+    /// `H` of both halves: diagonal, then off-diagonal entry.
     curvature: [[Row; 3]; 2],
     /// `g` of both halves.
     slope: [[Row; 2]; 2],
 }
 
-impl Chart {
-    /// `factor (H x - g)`: the adjoint state at the start of every block that is zero at its end.
+impl BlockMap {
+    /// Adjoint states `factor (H x - g)` at the starts of all blocks, for adjoint states of zero at their ends.
     pub fn driven(&self, starts: &Ends, factor: f64) -> Ends {
         let mut driven = [[[0.0; LANES]; 2]; 2];
         for (half, [dy, dw]) in driven.iter_mut().enumerate() {
@@ -41,18 +41,18 @@ impl Chart {
     }
 }
 
-/// A tile in lanes.
+/// A tile in SIMD layout.
 pub(super) struct Workspace {
     /// Mass, damping, stiffness.
-    pub functions: [Rows; 3],
-    /// The six numbers of every step's [`Rates`].
-    rates: [Rows; 6],
+    pub functions: [NodeRows; 3],
+    /// The six numbers of each step's [`StepRates`].
+    rates: [NodeRows; 6],
     /// Displacement and velocity.
-    pub motion: [Rows; 2],
+    pub response: [NodeRows; 2],
     /// Derivative of the cost with respect to displacement and velocity.
-    pub source: [Rows; 2],
+    pub source: [NodeRows; 2],
     /// Gradient with respect to the functions.
-    pub gradient: [Rows; 3],
+    pub gradient: [NodeRows; 3],
 }
 
 thread_local! {
@@ -65,14 +65,14 @@ impl Default for Workspace {
         Self {
             functions: [empty; 3],
             rates: [empty; 6],
-            motion: [empty; 2],
+            response: [empty; 2],
             source: [empty; 2],
             gradient: [empty; 3],
         }
     }
 }
 
-/// Does something with this thread's workspace.
+/// Calls `act` with the workspace of the thread.
 pub(super) fn with_workspace<R>(act: impl FnOnce(&mut Workspace) -> R) -> R {
     WORKSPACE.with_borrow_mut(|workspace| act(workspace))
 }
@@ -84,9 +84,9 @@ impl Workspace {
         arithmetic: A,
         j: usize,
         of: Constants<Eight<A>>,
-    ) -> Coefficients<Eight<A>> {
+    ) -> NodeCoefficients<Eight<A>> {
         let [m, c, k] = &self.functions;
-        Coefficients {
+        NodeCoefficients {
             m: Eight::load(arithmetic, &m[j]),
             c: Eight::load(arithmetic, &c[j]),
             hk: of.h * Eight::load(arithmetic, &k[j]),
@@ -94,9 +94,9 @@ impl Workspace {
     }
 
     #[inline(always)]
-    fn rates<A: Arithmetic>(&self, arithmetic: A, j: usize) -> Rates<Eight<A>> {
+    fn rates<A: Arithmetic>(&self, arithmetic: A, j: usize) -> StepRates<Eight<A>> {
         let [alpha, beta, gamma, delta, left, middle] = &self.rates;
-        Rates {
+        StepRates {
             alpha: Eight::load(arithmetic, &alpha[j]),
             beta: Eight::load(arithmetic, &beta[j]),
             gamma: Eight::load(arithmetic, &gamma[j]),
@@ -109,7 +109,7 @@ impl Workspace {
     }
 
     #[inline(always)]
-    fn keep_rates<A: Arithmetic>(&mut self, j: usize, rates: &Rates<Eight<A>>) {
+    fn keep_rates<A: Arithmetic>(&mut self, j: usize, rates: &StepRates<Eight<A>>) {
         let [alpha, beta, gamma, delta, left, middle] = &mut self.rates;
         alpha[j] = rates.alpha.row();
         beta[j] = rates.beta.row();
@@ -119,11 +119,11 @@ impl Workspace {
         middle[j] = rates.mobility[1].row();
     }
 
-    /// The adjoint state before step `j`, from that after it.
+    /// Adjoint state before step `j`, from that after it.
     #[inline(always)]
     fn backward<A: Arithmetic, const VELOCITY: bool>(
         &self,
-        rates: &Rates<Eight<A>>,
+        rates: &StepRates<Eight<A>>,
         j: usize,
         x: [Eight<A>; 2],
         arithmetic: A,
@@ -140,10 +140,10 @@ impl Workspace {
         }
     }
 
-    /// Rates of all steps from the functions, and the maps of all blocks.
+    /// Computes the rates of all steps and the maps of all blocks.
     #[inline(always)]
     pub fn prepare<A: Arithmetic>(&mut self, arithmetic: A, h: f64, length: usize) -> Maps {
-        let of = Constants::new(h).in_lanes(arithmetic);
+        let of = Constants::new(h).splat(arithmetic);
         let mut left = self.coefficients(arithmetic, 0, of);
         let mut maps = [[[[0.0; LANES]; 2]; 2]; 2];
         for (half, map) in maps.iter_mut().enumerate() {
@@ -152,7 +152,7 @@ impl Workspace {
             let mut from_w = [of.zero, of.one];
             for j in first..first + length / 2 {
                 let right = self.coefficients(arithmetic, j + 1, of);
-                let rates = Rates::new(left, right, of);
+                let rates = StepRates::new(left, right, of);
                 self.keep_rates(j, &rates);
                 let increment = rates.increment(of);
                 from_y = increment.forward(from_y);
@@ -167,16 +167,16 @@ impl Workspace {
         maps
     }
 
-    /// The charts of all blocks, from the functions and from readings in place of the source. With `KEEP`
-    /// the rates of all steps are kept as well.
+    /// Block maps of all blocks, from the functions and from samples in place of the source. `KEEP` stores the rates of all
+    /// steps.
     #[inline(always)]
-    pub fn survey<A: Arithmetic, const KEEP: bool>(
+    pub fn first_pass<A: Arithmetic, const KEEP: bool>(
         &mut self,
         arithmetic: A,
         h: f64,
         length: usize,
-    ) -> Chart {
-        let of = Constants::new(h).in_lanes(arithmetic);
+    ) -> BlockMap {
+        let of = Constants::new(h).splat(arithmetic);
         let half = length / 2;
         let mut left = [
             self.coefficients(arithmetic, 0, of),
@@ -188,16 +188,16 @@ impl Workspace {
         for i in 0..half {
             for block in 0..2 {
                 let j = block * half + i;
-                let reading = Eight::load(arithmetic, &self.source[0][j]);
+                let sample = Eight::load(arithmetic, &self.source[0][j]);
                 let [from_y, from_w] = &mut map[block];
                 let [yy, ww, yw] = &mut curvature[block];
                 *yy += from_y[0] * from_y[0];
                 *ww += from_w[0] * from_w[0];
                 *yw += from_y[0] * from_w[0];
-                slope[block][0] += from_y[0] * reading;
-                slope[block][1] += from_w[0] * reading;
+                slope[block][0] += from_y[0] * sample;
+                slope[block][1] += from_w[0] * sample;
                 let right = self.coefficients(arithmetic, j + 1, of);
-                let rates = Rates::new(left[block], right, of);
+                let rates = StepRates::new(left[block], right, of);
                 if KEEP {
                     self.keep_rates(j, &rates);
                 }
@@ -208,54 +208,60 @@ impl Workspace {
             }
         }
         let empty = [0.0; LANES];
-        let mut chart = Chart {
+        let mut block_map = BlockMap {
             maps: [[[empty; 2]; 2]; 2],
             curvature: [[empty; 3]; 2],
             slope: [[empty; 2]; 2],
         };
         for block in 0..2 {
             let [from_y, from_w] = map[block];
-            chart.maps[block] = [
+            block_map.maps[block] = [
                 [from_y[0].row(), from_y[1].row()],
                 [from_w[0].row(), from_w[1].row()],
             ];
             let [yy, ww, yw] = curvature[block];
-            chart.curvature[block] = [yy.row(), ww.row(), yw.row()];
+            block_map.curvature[block] = [yy.row(), ww.row(), yw.row()];
             let [gy, gw] = slope[block];
-            chart.slope[block] = [gy.row(), gw.row()];
+            block_map.slope[block] = [gy.row(), gw.row()];
         }
-        chart
+        block_map
     }
 
-    /// Rates of all steps from the functions.
+    /// Computes the rates of all steps from the functions.
     #[inline(always)]
     pub fn prepare_rates<A: Arithmetic>(&mut self, arithmetic: A, h: f64, length: usize) {
-        let of = Constants::new(h).in_lanes(arithmetic);
+        let of = Constants::new(h).splat(arithmetic);
         let mut left = self.coefficients(arithmetic, 0, of);
         for j in 0..length {
             let right = self.coefficients(arithmetic, j + 1, of);
-            self.keep_rates(j, &Rates::new(left, right, of));
+            self.keep_rates(j, &StepRates::new(left, right, of));
             left = right;
         }
     }
 
-    /// The motion in all blocks from their starts.
+    /// Response in all blocks from their initial states.
     #[inline(always)]
-    pub fn replay<A: Arithmetic>(&mut self, arithmetic: A, h: f64, length: usize, starts: &Ends) {
-        let of = Constants::new(h).in_lanes(arithmetic);
+    pub fn response_pass<A: Arithmetic>(
+        &mut self,
+        arithmetic: A,
+        h: f64,
+        length: usize,
+        starts: &Ends,
+    ) {
+        let of = Constants::new(h).splat(arithmetic);
         let mut x = load(arithmetic, starts);
         for i in 0..length / 2 {
             for (half, x) in x.iter_mut().enumerate() {
                 let j = half * (length / 2) + i;
-                self.motion[0][j] = x[0].row();
-                self.motion[1][j] = (x[1] * of.per_h).row();
+                self.response[0][j] = x[0].row();
+                self.response[1][j] = (x[1] * of.per_h).row();
                 *x = self.rates(arithmetic, j).forward(*x, of);
             }
         }
     }
 
-    /// From readings in place of the source: their residuals `r = y - reading`, the source
-    /// `factor r`, and the sum of the squares `r^2` in every lane.
+    /// Residuals `r = y - sample`, from samples in place of the source; replaces the source by `factor r` and returns the sum
+    /// of `r^2` in each lane.
     #[inline(always)]
     pub fn compare<A: Arithmetic>(&mut self, arithmetic: A, length: usize, factor: f64) -> Row {
         let factor = Eight::splat(arithmetic, factor);
@@ -263,7 +269,7 @@ impl Workspace {
         for i in 0..length / 2 {
             for (odd, sum) in sums.iter_mut().enumerate() {
                 let j = 2 * i + odd;
-                let y = Eight::load(arithmetic, &self.motion[0][j]);
+                let y = Eight::load(arithmetic, &self.response[0][j]);
                 let r = y - Eight::load(arithmetic, &self.source[0][j]);
                 *sum += r * r;
                 self.source[0][j] = (factor * r).row();
@@ -272,8 +278,8 @@ impl Workspace {
         (sums[0] + sums[1]).row()
     }
 
-    /// The adjoint state at the start of every block that is zero at its end. `VELOCITY`: whether the
-    /// source has a part at the velocity.
+    /// Adjoint states at the starts of all blocks for states of zero at their ends. `VELOCITY` is true if the source has a
+    /// velocity part.
     #[inline(always)]
     pub fn drive<A: Arithmetic, const VELOCITY: bool>(
         &self,
@@ -281,7 +287,7 @@ impl Workspace {
         h: f64,
         length: usize,
     ) -> Ends {
-        let of = Constants::new(h).in_lanes(arithmetic);
+        let of = Constants::new(h).splat(arithmetic);
         let mut x = [[of.zero; 2]; 2];
         for i in (0..length / 2).rev() {
             for (half, x) in x.iter_mut().enumerate() {
@@ -296,31 +302,31 @@ impl Workspace {
         ]
     }
 
-    /// The adjoint in all blocks from their ends, and the gradient of all steps at the nodes `0..length`;
-    /// returns what belongs to the node after each lane.
+    /// Adjoint in all blocks from their ends, and the gradient of all steps at the nodes `0..length`; returns the contribution
+    /// to the node after each lane.
     #[inline(always)]
-    pub fn replay_back<A: Arithmetic, const VELOCITY: bool>(
+    pub fn adjoint_pass<A: Arithmetic, const VELOCITY: bool>(
         &mut self,
         arithmetic: A,
         h: f64,
         length: usize,
         ends: &Ends,
     ) -> [Row; 3] {
-        let of = Constants::new(h).in_lanes(arithmetic);
+        let of = Constants::new(h).splat(arithmetic);
         let scale = [of.per_h, of.one, of.h];
         let mut x = load(arithmetic, ends);
-        // Share of the node to the right so far, and of the node after each half.
+        // Contributions to the right node so far, and to the node after each half.
         let mut after = [[of.zero; 3]; 2];
         let mut last = [[of.zero; 3]; 2];
         for i in (0..length / 2).rev() {
             for half in 0..2 {
                 let j = half * (length / 2) + i;
                 let rates = self.rates(arithmetic, j);
-                let motion = [
-                    Eight::load(arithmetic, &self.motion[0][j]),
-                    of.h * Eight::load(arithmetic, &self.motion[1][j]),
+                let response = [
+                    Eight::load(arithmetic, &self.response[0][j]),
+                    of.h * Eight::load(arithmetic, &self.response[1][j]),
                 ];
-                let (node, middle) = rates.shares(motion, x[half], of);
+                let (node, middle) = rates.shares(response, x[half], of);
                 for f in 0..3 {
                     let right = after[half][f] + middle[f];
                     if i + 1 == length / 2 {

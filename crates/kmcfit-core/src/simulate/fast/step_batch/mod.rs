@@ -1,9 +1,9 @@
-//! The costs of many devices along a ray, one a lane: the paper's trial steps.
+//! Costs of many systems along a search ray, one per SIMD lane: the paper's trial steps.
 //!
-//! What is wanted of them is which is lowest, and its motion, with the bits that it would have by itself
-//! ([`forward`](crate::simulate::reference::forward())). So no motion is kept: of each eight states along the record are, from
-//! which the lowest one's is made again, eight parts at once ([`reconstruct()`]). The costs are sums in another order than that of
-//! the integral; those who may have the lowest cost are told from all others by a margin far above its rounding.
+//! The search needs the trial of least cost and its response, bit-identical with
+//! [`forward`](crate::simulate::reference::forward()). Responses are not stored: eight states along the record are, from
+//! which [`reconstruct()`] computes the response of the best trial, eight parts in parallel. The order of summation differs
+//! from that of the integral; trials whose cost is within a margin far above the rounding error of the sums are candidates.
 
 mod reconstruct;
 mod rows;
@@ -16,42 +16,41 @@ use std::ops::Range;
 
 pub(crate) use reconstruct::reconstruct;
 
-/// Devices `p - a g` in linear free motion by the midpoint rule, seen at every node.
+/// Systems `p - a g` in linear free response by the midpoint rule, with a sample at every node.
 #[derive(Clone, Copy)]
 pub(crate) struct SearchRay<'a> {
     /// Mass, damping, stiffness at the nodes.
     pub functions: [&'a [f64]; 3],
-    /// What is taken away from them, per unit of `a`.
+    /// Search direction `g`, subtracted per unit of `a`.
     pub direction: [&'a [f64]; 3],
     /// State at the first node.
     pub initial: State,
-    /// Displacements read at the nodes, m.
-    pub readings: &'a [f64],
+    /// Displacement samples at the nodes, m.
+    pub samples: &'a [f64],
     /// Step, s.
     pub step: f64,
 }
 
-/// Most rows at once: enough that the divisions of one row hide behind those of the others, and few
-/// enough for the registers.
+/// Largest number of rows computed together: enough to hide the latency of divisions, few enough for the registers.
 pub(crate) const ROWS: usize = 4;
 
-/// How far a cost that is summed in lanes, relative to itself, may be from the one that is summed in order. Of `n` terms
-/// that are not negative two sums are within `n EPSILON`, which is less up to 10^5 nodes (and is taken beyond).
+/// Relative margin between a cost summed in SIMD lanes and in sequential order. Two sums of `n` nonnegative terms differ by
+/// at most `n EPSILON`, which is smaller up to 10^5 nodes (and is taken beyond).
 const MARGIN: f64 = 1e-10;
 
-/// In which rows and lanes the trials at some lengths are.
+/// Assignment of trials to rows and lanes.
 #[derive(Debug, Default)]
 pub(crate) struct LaneLayout {
-    /// Trials before the first that has mass everywhere.
+    /// Number of leading trials without a positive mass at all nodes.
     without_mass: usize,
-    /// Trials in the first row, which may be less than full: it is filled up with its first.
+    /// Trials in the first row, which is padded with its first trial.
     in_first: usize,
     rows: Vec<Row>,
     nodes: usize,
 }
 
 impl LaneLayout {
-    /// That of the devices at `lengths`, which fall.
+    /// Layout of the systems at `lengths`, in decreasing order.
     pub fn new(ray: SearchRay, lengths: &[f64]) -> Self {
         let without_mass = ray.first_with_mass(lengths);
         let lengths = &lengths[without_mass..];
@@ -63,7 +62,7 @@ impl LaneLayout {
         let row = |part: &[f64]| std::array::from_fn(|lane| *part.get(lane).unwrap_or(&part[0]));
         let first = (!first.is_empty()).then(|| row(first));
         Self {
-            nodes: ray.readings.len(),
+            nodes: ray.samples.len(),
             without_mass,
             in_first,
             rows: first
@@ -87,8 +86,8 @@ impl LaneLayout {
         }
     }
 
-    /// The trials that may have the lowest cost `integral (y - y_obs)^2 dt`, by the sums of squares of all rows: those of
-    /// all others are higher, or there is no mass, or the motion leaves the finite numbers.
+    /// Trials that may have the least cost `integral (y - y_obs)^2 dt`, by the sums of squares of all rows. All others have a
+    /// higher cost, no positive mass, or a response that is not finite.
     pub fn lowest(&self, costs: &[Row]) -> Vec<usize> {
         let of = |which: &usize| {
             let (row, lane) = self.place(*which);
@@ -106,10 +105,10 @@ impl LaneLayout {
     }
 }
 
-/// Displacements and velocities of a row where the eight parts of the record begin.
+/// Displacements and velocities of a row at the starts of the eight parts of the record.
 type States = [[Row; 2]; LANES];
 
-/// The trials of some rows, at most [`ROWS`]: storage that is used again and again.
+/// Storage for the trials of up to [`ROWS`] rows.
 #[derive(Default)]
 pub(crate) struct StepBatch {
     rows: Range<usize>,
@@ -118,10 +117,10 @@ pub(crate) struct StepBatch {
 }
 
 impl StepBatch {
-    /// Does the trials of some rows.
+    /// Computes the trials of some rows.
     ///
     /// # Panics
-    /// If they are too many.
+    /// If there are more than [`ROWS`] rows.
     pub fn run(&mut self, ray: SearchRay, layout: &LaneLayout, rows: Range<usize>) {
         assert!(rows.len() <= ROWS, "{} rows at once", rows.len());
         let lengths = &layout.rows[rows.clone()];
@@ -138,12 +137,12 @@ impl StepBatch {
         self.rows = rows;
     }
 
-    /// The sums of squares of the rows.
+    /// Sums of squares of the rows.
     pub fn costs(&self) -> &[Row] {
         &self.costs
     }
 
-    /// Displacements and velocities of a lane where its parts begin, if the row is one of these.
+    /// Displacements and velocities of a lane at the starts of its parts; `None` for rows not computed here.
     pub fn states(&self, (row, lane): (usize, usize)) -> Option<[Row; 2]> {
         let states = self.states.get(row.checked_sub(self.rows.start)?)?;
         let of = |which: usize| std::array::from_fn(|part| states[part][which][lane]);
@@ -153,7 +152,7 @@ impl StepBatch {
     fn of_rows<const R: usize>(&mut self, ray: SearchRay, lengths: &[Row]) {
         let (states, costs) = (self.states.first_chunk_mut(), self.costs.first_chunk_mut());
         if let (Some(lengths), Some(states), Some(costs)) = (lengths.first_chunk(), states, costs) {
-            simd::run(rows::Rows::<R> {
+            simd::run(rows::BatchRows::<R> {
                 ray,
                 lengths,
                 states,
@@ -163,16 +162,16 @@ impl StepBatch {
     }
 }
 
-/// Nodes in each of the eight parts of a motion, the last of which may be shorter, or empty.
+/// Nodes per part of a response; the last part may be shorter or empty.
 fn part(nodes: usize) -> usize {
     nodes.div_ceil(LANES)
 }
 
 impl SearchRay<'_> {
-    /// The first of `lengths` whose device has mass at all nodes: then so has every shorter one, also
-    /// after rounding.
+    /// Index of the first of `lengths` whose mass is positive at all nodes; then that of every shorter length is too, also after
+    /// rounding.
     fn first_with_mass(self, lengths: &[f64]) -> usize {
-        // All are looked at: a loop without a way out is the faster one.
+        // All nodes are checked: a loop without early exit is faster.
         let has_mass = |a: &f64| {
             let pairs = self.functions[0].iter().zip(self.direction[0]);
             pairs.fold(true, |so_far, (p, g)| so_far & (p - a * g > 0.0))

@@ -1,4 +1,4 @@
-//! The motion of one device, made again from eight of its states.
+//! Reconstruction of the response of one system from eight of its states.
 
 use super::part;
 use super::rows::{Steps, Values};
@@ -6,13 +6,12 @@ use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row, window};
 use crate::simulate::Trajectory;
 use crate::system::{NodalCoefficients, State};
 
-/// The motion of `device` from the displacements and velocities where its eight parts begin, by divisions alone.
+/// Computes the response of the system from displacements and velocities at the starts of its eight parts.
 ///
-/// Whether it is the motion that one step after the other gives from `initial`, to the last bit: the first part begins there, and
-/// each ends where the next begins.
-/// Otherwise what is in `trajectory` is of no use.
+/// Returns true if it is bit-identical with sequential integration from `initial`: the first part starts there, and each
+/// part ends in the initial state of the next. Otherwise the contents of `trajectory` are undefined.
 pub(crate) fn reconstruct(
-    device: &NodalCoefficients,
+    nodal: &NodalCoefficients,
     initial: State,
     states: [Row; 2],
     step: f64,
@@ -22,41 +21,37 @@ pub(crate) fn reconstruct(
         return false;
     }
     let nodes = trajectory.nodes();
-    let ends = simd::run(Replay {
-        functions: [
-            &device.mass,
-            &device.coefficients[0],
-            &device.coefficients[1],
-        ],
+    let ends = simd::run(PartsReplay {
+        functions: [&nodal.mass, &nodal.coefficients[0], &nodal.coefficients[1]],
         states,
         step,
-        motion: [&mut trajectory.displacement, &mut trajectory.velocity],
+        response: [&mut trajectory.displacement, &mut trajectory.velocity],
     });
     let parts = nodes.div_ceil(part(nodes));
     let joins = |ends: &Row, begins: &Row| ends[..parts - 1] == begins[1..parts];
     joins(&ends[0], &states[0]) && joins(&ends[1], &states[1])
 }
 
-/// A motion from its states at the beginning of its eight parts, a lane each; gives those at their ends.
-struct Replay<'a> {
+/// Integration of the eight parts from their initial states, one per lane; returns their final states.
+struct PartsReplay<'a> {
     /// Mass, damping, stiffness at the nodes.
     functions: [&'a [f64]; 3],
-    /// Displacements and velocities where the parts begin.
+    /// Displacements and velocities at the starts of the parts.
     states: [Row; 2],
     step: f64,
-    motion: [&'a mut [f64]; 2],
+    response: [&'a mut [f64]; 2],
 }
 
-impl Kernel for Replay<'_> {
+impl Kernel for PartsReplay<'_> {
     type Output = [Row; 2];
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) -> [Row; 2] {
-        let Replay {
+        let PartsReplay {
             functions,
             states,
             step,
-            motion,
+            response,
         } = self;
         let nodes = functions[0].len();
         let part = part(nodes);
@@ -103,9 +98,9 @@ impl Kernel for Replay<'_> {
                     let from = lane * part + first;
                     let count = LANES.min(part - first).min(nodes.saturating_sub(from));
                     if count == LANES {
-                        motion[which][from..from + LANES].copy_from_slice(column);
+                        response[which][from..from + LANES].copy_from_slice(column);
                     } else if count > 0 {
-                        motion[which][from..from + count].copy_from_slice(&column[..count]);
+                        response[which][from..from + count].copy_from_slice(&column[..count]);
                     }
                 }
             }

@@ -1,18 +1,18 @@
-//! Rows of devices, one a lane, and the steps that they take.
+//! Rows of systems in SIMD lanes, and their steps by the midpoint rule.
 
 use super::{SearchRay, States, part};
 use crate::simd::{Arithmetic, Eight, Kernel, Row};
 
 /// `R` rows of systems.
-pub(super) struct Rows<'a, const R: usize> {
+pub(super) struct BatchRows<'a, const R: usize> {
     pub ray: SearchRay<'a>,
     pub lengths: &'a [Row; R],
     pub states: &'a mut [States; R],
-    /// Sums of squares, not finite where the response is not.
+    /// Sums of squares; not finite where the response is not.
     pub costs: &'a mut [Row; R],
 }
 
-/// Mass, damping and stiffness of a row of devices.
+/// Mass, damping and stiffness of a row of systems.
 #[derive(Clone, Copy)]
 pub(super) struct Values<A: Arithmetic>(pub [Eight<A>; 3]);
 
@@ -31,7 +31,7 @@ impl<A: Arithmetic> Values<A> {
         Self(values)
     }
 
-    /// Twice the values in the middle: halves of all three would change no bit of an acceleration.
+    /// Twice the values at mid-step; halving all three would not change a bit of an acceleration.
     #[inline(always)]
     fn twice_middle(self, right: Self) -> Self {
         let mut values = self.0;
@@ -41,7 +41,8 @@ impl<A: Arithmetic> Values<A> {
         Self(values)
     }
 
-    /// `-y'' = k y/m + c v/m`. Of both signs all that follows has the same bits, but for the sign of a velocity of zero.
+    /// Deceleration `-y'' = k y/m + c v/m`. Using it in place of the acceleration changes no bit except the sign of a zero
+    /// velocity.
     #[inline(always)]
     fn deceleration(self, y: Eight<A>, v: Eight<A>) -> Eight<A> {
         let [m, c, k] = self.0;
@@ -49,7 +50,7 @@ impl<A: Arithmetic> Values<A> {
     }
 }
 
-/// What is the same in every step.
+/// Constants of all steps.
 #[derive(Clone, Copy)]
 pub(super) struct Steps<A: Arithmetic> {
     dt: Eight<A>,
@@ -78,36 +79,36 @@ impl<A: Arithmetic> Steps<A> {
     }
 }
 
-/// A row of devices on their way.
+/// A row of systems during integration.
 #[derive(Clone, Copy)]
-struct Devices<A: Arithmetic> {
+struct BatchCoefficients<A: Arithmetic> {
     arithmetic: A,
     length: Row,
     left: Values<A>,
     state: [Eight<A>; 2],
-    /// The squares of the residuals.
+    /// Sum of squared residuals.
     sum: Eight<A>,
 }
 
-impl<A: Arithmetic> Devices<A> {
+impl<A: Arithmetic> BatchCoefficients<A> {
     #[inline(always)]
     fn begin(ray: &SearchRay, arithmetic: A, length: &Row) -> Self {
         let splat = |x| Eight::splat(arithmetic, x);
         let state = [splat(ray.initial.displacement), splat(ray.initial.velocity)];
-        let residual = state[0] - splat(ray.readings[0]);
+        let residual = state[0] - splat(ray.samples[0]);
         Self {
             arithmetic,
             length: *length,
             left: Values::at(ray, arithmetic, Eight::load(arithmetic, length), 0),
             state,
-            // Both ends count half.
+            // Both ends have half weight.
             sum: splat(-0.5) * (residual * residual),
         }
     }
 
     #[inline(always)]
     fn step(&mut self, ray: &SearchRay, steps: Steps<A>, i: usize) {
-        let residual = self.state[0] - Eight::splat(self.arithmetic, ray.readings[i]);
+        let residual = self.state[0] - Eight::splat(self.arithmetic, ray.samples[i]);
         self.sum += residual * residual;
         let length = Eight::load(self.arithmetic, &self.length);
         let right = Values::at(ray, self.arithmetic, length, i + 1);
@@ -121,35 +122,35 @@ impl<A: Arithmetic> Devices<A> {
     }
 
     #[inline(always)]
-    fn cost(&self, last_reading: f64) -> Row {
+    fn cost(&self, last_sample: f64) -> Row {
         let splat = |x| Eight::splat(self.arithmetic, x);
         let [y, v] = self.state;
-        let residual = y - splat(last_reading);
-        // Zero, and not a number where the motion is not finite.
+        let residual = y - splat(last_sample);
+        // Zero for a finite response, otherwise not a number.
         let nothing = splat(0.0) * y + splat(0.0) * v;
         (self.sum + splat(0.5) * (residual * residual) + nothing).row()
     }
 }
 
-impl<const R: usize> Kernel for Rows<'_, R> {
+impl<const R: usize> Kernel for BatchRows<'_, R> {
     type Output = ();
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) {
-        let Rows {
+        let BatchRows {
             ray,
             lengths,
             states,
             costs,
         } = self;
         let steps = Steps::of(arithmetic, ray.step);
-        let nodes = ray.readings.len();
+        let nodes = ray.samples.len();
         let last = nodes - 1;
         let part = part(nodes);
 
-        let mut rows = [Devices::begin(&ray, arithmetic, &lengths[0]); R];
+        let mut rows = [BatchCoefficients::begin(&ray, arithmetic, &lengths[0]); R];
         for r in 1..R {
-            rows[r] = Devices::begin(&ray, arithmetic, &lengths[r]);
+            rows[r] = BatchCoefficients::begin(&ray, arithmetic, &lengths[r]);
         }
         let (mut next, mut which) = (0, 0);
         for i in 0..=last {
@@ -166,7 +167,7 @@ impl<const R: usize> Kernel for Rows<'_, R> {
             }
         }
         for r in 0..R {
-            costs[r] = rows[r].cost(ray.readings[last]);
+            costs[r] = rows[r].cost(ray.samples[last]);
         }
     }
 }

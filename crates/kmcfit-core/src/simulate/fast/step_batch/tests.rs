@@ -3,10 +3,10 @@ use crate::simulate::{Trajectory, reference};
 use crate::system::quadrature::trapezoid;
 use crate::system::{Grid, Method, NodalCoefficients, System, Term};
 
-/// Parts of one node and of many, whole rounds of eight and others, and last parts that are short or empty.
+/// Parts of one and of many nodes, with short and empty last parts.
 const NODES: [usize; 9] = [3, 4, 8, 9, 17, 41, 64, 65, 241];
 
-/// Mass, damping and stiffness, and what is taken away from them.
+/// Mass, damping and stiffness, and the search direction.
 fn functions(nodes: usize) -> [[Vec<f64>; 3]; 2] {
     let of = |f: fn(f64) -> f64| -> Vec<f64> {
         (0..nodes)
@@ -27,7 +27,7 @@ fn functions(nodes: usize) -> [[Vec<f64>; 3]; 2] {
     ]
 }
 
-fn device_at(ray: &SearchRay, length: f64) -> NodalCoefficients {
+fn nodal_at(ray: &SearchRay, length: f64) -> NodalCoefficients {
     let [mass, damping, stiffness] = [0, 1, 2].map(|f| {
         let pairs = ray.functions[f].iter().zip(ray.direction[f]);
         pairs.map(|(p, g)| p - length * g).collect()
@@ -38,25 +38,25 @@ fn device_at(ray: &SearchRay, length: f64) -> NodalCoefficients {
     }
 }
 
-/// One by one, by the forward solve and the trapezoid rule: the motion and its cost.
+/// One trial by the forward solve and the trapezoid rule: response and cost.
 fn by_itself(ray: &SearchRay, length: f64) -> Option<(Trajectory, f64)> {
-    let nodes = ray.readings.len();
+    let nodes = ray.samples.len();
     let system = System {
         grid: Grid::new(0.0, ray.step * (nodes - 1) as f64, nodes).unwrap(),
         method: Method::Midpoint,
         terms: vec![Term::Damping, Term::Stiffness],
     };
-    let motion = reference::forward(&system, &device_at(ray, length), ray.initial, None).ok()?;
-    let pairs = motion.displacement.iter().zip(ray.readings);
+    let response = reference::forward(&system, &nodal_at(ray, length), ray.initial, None).ok()?;
+    let pairs = response.displacement.iter().zip(ray.samples);
     let squares: Vec<f64> = pairs.map(|(y, o)| (y - o) * (y - o)).collect();
     let cost = trapezoid(&squares, ray.step);
-    Some((motion, cost))
+    Some((response, cost))
 }
 
 fn ray<'a>(
     functions: &'a [Vec<f64>; 3],
     direction: &'a [Vec<f64>; 3],
-    readings: &'a [f64],
+    samples: &'a [f64],
 ) -> SearchRay<'a> {
     SearchRay {
         functions: functions.each_ref().map(Vec::as_slice),
@@ -65,25 +65,25 @@ fn ray<'a>(
             displacement: 1.2,
             velocity: -0.7,
         },
-        readings,
+        samples,
         step: 0.125,
     }
 }
 
 #[test]
-fn every_trial_is_the_forward_solve_by_itself() {
+fn every_trial_agrees_with_its_forward_solve() {
     NODES.into_iter().for_each(every_trial);
 }
 
 fn every_trial(nodes: usize) {
     let [functions, direction] = functions(nodes);
-    let readings: Vec<f64> = (0..nodes).map(|i| (0.3 * i as f64).cos()).collect();
-    let ray = ray(&functions, &direction, &readings);
-    // One lane, part of a row, whole rows, and half a row beside one, two and three; the two longest leave no mass.
+    let samples: Vec<f64> = (0..nodes).map(|i| (0.3 * i as f64).cos()).collect();
+    let ray = ray(&functions, &direction, &samples);
+    // One lane, part of a row, whole rows, and half a row with one, two and three rows; the two longest steps leave no mass.
     for count in [1, 7, 8, 19, 28, 32, 44, 50, 52] {
         let lengths: Vec<f64> = (1..=count).map(|i| 3.0 / i as f64).collect();
         let layout = LaneLayout::new(ray, &lengths);
-        // One thread's rows and another one's.
+        // Rows of one thread and of another.
         let (rows, mut trials) = (layout.rows(), [StepBatch::default(), StepBatch::default()]);
         trials[0].run(ray, &layout, 0..rows.div_ceil(2));
         trials[1].run(ray, &layout, rows.div_ceil(2)..rows);
@@ -111,34 +111,34 @@ fn every_trial(nodes: usize) {
             assert!(error.abs() < 1e-12, "trial {which} of {count}: {error:e}");
         }
         for (which, found) in alone.into_iter().enumerate() {
-            let Some((motion, _)) = found else { continue };
+            let Some((response, _)) = found else { continue };
             let mut again = Trajectory::zeros(nodes);
-            let device = device_at(&ray, lengths[which]);
+            let nodal = nodal_at(&ray, lengths[which]);
             let place = layout.place(which);
             let states = trials.iter().find_map(|trials| trials.states(place));
             let mut states = states.expect("states of every trial");
-            let is_whole = reconstruct(&device, ray.initial, states, ray.step, &mut again);
-            assert!(is_whole && again == motion, "trial {which} of {count}");
-            // A last bit is seen, in whatever part.
+            let is_whole = reconstruct(&nodal, ray.initial, states, ray.step, &mut again);
+            assert!(is_whole && again == response, "trial {which} of {count}");
+            // A change of the last bit in any part is detected.
             let parts = nodes.div_ceil(part(nodes));
             let state = &mut states[which % 2][which % parts];
             *state = state.next_up();
             assert!(
-                !reconstruct(&device, ray.initial, states, ray.step, &mut again),
+                !reconstruct(&nodal, ray.initial, states, ray.step, &mut again),
                 "trial {which} of {count}"
             );
         }
     }
 }
 
-/// Trials whose costs are as good as equal are all told, whichever is lower in its last digits.
+/// All trials with nearly equal costs are candidates, whichever is lower in the last digits.
 #[test]
-fn costs_that_are_as_good_as_equal_are_all_candidates() {
+fn trials_of_nearly_equal_cost_are_all_candidates() {
     let [functions, direction] = functions(41);
-    let readings = [0.3; 41];
-    let ray = ray(&functions, &direction, &readings);
+    let samples = [0.3; 41];
+    let ray = ray(&functions, &direction, &samples);
     let layout = LaneLayout::new(ray, &[0.5, 0.4, 0.3, 0.2, 0.1]);
-    // Within the margin, and beyond it.
+    // Costs within the margin, and beyond it.
     let mut costs = [1.0; LANES];
     (costs[1], costs[2], costs[3]) = (0.5, 0.5 * (1.0 + 1e-12), 0.5 * (1.0 + 1e-9));
     assert_eq!(layout.lowest(&[costs]), [1, 2]);

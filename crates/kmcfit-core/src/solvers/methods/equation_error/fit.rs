@@ -1,39 +1,38 @@
-//! The equation error as a method of its own: one convex problem, solved once.
+//! Equation-error method: minimises the residual of the equation of motion, one convex problem.
 
 use super::measured::{Measured, Measurements};
-use super::{Accuracy, Minimum, add_rows, device, minimise};
+use super::{Accuracy, ConvexMinimum, add_rows, minimise, nodal};
 use crate::host::Instant;
 use crate::objective::{Evaluation, Gradient};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
 use crate::record::Experiment;
-use crate::solvers::counts::Counts;
 use crate::solvers::fit::Fit;
 use crate::solvers::history::{IterationRecord, ratio};
 use crate::solvers::iterate::Iterate;
 use crate::solvers::linearization::{add_penalties, add_variations};
 use crate::solvers::optimality::{Optimality, judged};
 use crate::solvers::reason::{Reason, UnsupportedRecord};
+use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::termination::{Outcome, Status};
 use crate::solvers::timings::{Timings, timed};
 use crate::system::NodalCoefficients;
 
-/// A function that is smaller than its start by this factor is solved for again, up to so many times.
+/// Factor between a function and its start beyond which the problem is solved again, and the number of repetitions.
 const FAR: f64 = 1e4;
 const AGAIN: usize = 3;
-/// Relative rounding of a term of the equation of motion: of derivatives of smoothed readings, and of parameters that are known to
-/// the accuracy of a factorisation.
+/// Relative rounding error of a term of the equation of motion, with derivatives of smoothed samples and parameters of the
+/// accuracy of a factorisation.
 const TERM_ROUNDING: f64 = 1000.0 * f64::EPSILON;
 
-/// Minimises over the readings of all experiments
+/// Minimises over the samples of all experiments
 ///
 /// ```text
 /// J = integral (m (y'' + b'') + sum_j p_j phi_j(y, y') - f)^2 dt + penalties      (N^2 s)
 /// ```
 ///
-/// with `y`, `y'`, `y''` from the readings ([`Measurements`]) and every reading of the same weight.
-/// Nothing is simulated: the trajectories of the fit are the measured motions, the predictions what
-/// the equation of motion says of the readings there. Scalars keep their values at the start.
+/// with `y`, `y'`, `y''` from the samples ([`Measurements`]) and equal weights. Nothing is simulated: the trajectories of
+/// the fit are the measured responses, the predictions those of the equation of motion. Scalars keep their start values.
 pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationRecord)) -> Fit {
     let clock = Instant::now();
     let mut timings = Timings::default();
@@ -49,14 +48,14 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationR
         measurements: &measurements,
     };
     let first = cost.point(start.to_vec());
-    let mut counts = Counts::default();
+    let mut counts = SolveCounts::default();
     let mut optimality = None;
     let (outcome, found) = match cost.minimise(start, &mut timings) {
         Ok((minimum, programs)) => {
             counts.qp = programs;
             let point = cost.point(minimum.parameters.clone());
-            let device = &point.evaluation.device;
-            let has_mass = device.mass.iter().all(|m| *m > 0.0);
+            let nodal = &point.evaluation.nodal;
+            let has_mass = nodal.mass.iter().all(|m| *m > 0.0);
             let reason = reason(problem, &minimum, has_mass);
             let status = match minimum.program {
                 Some(ConicStatus::Almost) => Status::Stalled,
@@ -101,7 +100,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationR
     }
 }
 
-fn reason(problem: &Problem, minimum: &Minimum, has_mass: bool) -> Reason {
+fn reason(problem: &Problem, minimum: &ConvexMinimum, has_mass: bool) -> Reason {
     if problem.functions.iter().all(|f| f.parameters() == 0) {
         return Reason::NoParameters;
     }
@@ -111,7 +110,7 @@ fn reason(problem: &Problem, minimum: &Minimum, has_mass: bool) -> Reason {
     }
 }
 
-/// The only row of the history.
+/// Single row of the history.
 fn row(problem: &Problem, first: &Iterate, best: &Iterate) -> IterationRecord {
     IterationRecord {
         iteration: 1,
@@ -126,12 +125,12 @@ fn row(problem: &Problem, first: &Iterate, best: &Iterate) -> IterationRecord {
     }
 }
 
-/// The end of a fit whose readings tell no motion: the start, without a cost.
+/// Result of a fit whose samples do not provide a response: the start, without a cost.
 fn failed(problem: &Problem, start: &[f64], reason: UnsupportedRecord) -> Fit {
     let mut evaluation = problem.workspace();
-    evaluation.device = problem.functions.device(start);
-    for (readings, experiment) in evaluation.predictions.iter_mut().zip(&problem.experiments) {
-        for (predicted, channel) in readings.iter_mut().zip(&experiment.channels) {
+    evaluation.nodal = problem.functions.nodal(start);
+    for (samples, experiment) in evaluation.predictions.iter_mut().zip(&problem.experiments) {
+        for (predicted, channel) in samples.iter_mut().zip(&experiment.channels) {
             *predicted = vec![f64::NAN; channel.len()];
         }
     }
@@ -151,7 +150,7 @@ fn failed(problem: &Problem, start: &[f64], reason: UnsupportedRecord) -> Fit {
         history: Vec::new(),
         snapshots: Vec::new(),
         outcome: Outcome::new(Status::Failed, Reason::UnsupportedRecord(reason)),
-        counts: Counts::default(),
+        counts: SolveCounts::default(),
         timings: Timings::default(),
         elapsed: std::time::Duration::ZERO,
         attempts: Vec::new(),
@@ -159,7 +158,7 @@ fn failed(problem: &Problem, start: &[f64], reason: UnsupportedRecord) -> Fit {
     }
 }
 
-/// J of the equation error.
+/// Cost of the equation error.
 struct Cost<'a> {
     problem: &'a Problem,
     measurements: &'a Measurements,
@@ -172,14 +171,13 @@ impl<'a> Cost<'a> {
         pairs.filter_map(|(experiment, measured)| Some((experiment, measured.as_ref()?)))
     }
 
-    /// The minimum; where it is far below the start in the size of a function, once more from there: what is solved for
-    /// is the step, and beside a step of 1e12 the digits of a 1 are rounding.
-    /// Also how many quadratic programs that took.
+    /// Minimum of the cost and the number of quadratic programs. Where a function is far smaller than its start, the problem
+    /// is solved again from the minimum: the unknown is the step, whose rounding error otherwise exceeds the function.
     fn minimise(
         &self,
         start: &[f64],
         timings: &mut Timings,
-    ) -> Result<(Minimum, u64), ConicStatus> {
+    ) -> Result<(ConvexMinimum, u64), ConicStatus> {
         let mut minimum = self.minimise_from(start, timings)?;
         let mut programs = u64::from(minimum.program.is_some());
         let mut from = self.measurements.sizes(self.problem, start);
@@ -199,17 +197,17 @@ impl<'a> Cost<'a> {
         Ok((minimum, programs))
     }
 
-    /// The first-order condition at `point`, the `minimum`: the problem is convex, so solving it again from there tells by how
-    /// much its cost is above the minimum; of J and of the pull towards where the step began, which decides what
-    /// the equation leaves open. `None` if it cannot be solved again.
+    /// First-order condition at `point`, the `minimum`. The problem is convex, so solving it again from there gives the excess
+    /// of its cost over the minimum, of J and of the proximal term that determines the remaining directions. `None` if it cannot
+    /// be solved again.
     fn optimality(
         &self,
         point: &Iterate,
-        minimum: &Minimum,
+        minimum: &ConvexMinimum,
         timings: &mut Timings,
     ) -> Option<Optimality> {
         let problem = self.problem;
-        // Not counted, so not timed as a program either: it is no part of the fit.
+        // Not counted, so not timed as a program.
         let mut own = Timings::default();
         let again = self.minimise_from(&point.parameters, &mut own);
         timings.linear_algebra += own.sum();
@@ -228,8 +226,8 @@ impl<'a> Cost<'a> {
         })
     }
 
-    /// The rounding of J at `point`: that of the terms of the equation of motion, which cancel where it holds. With twice the
-    /// parameters its error is the sum of those that they stand in.
+    /// Rounding error of J at `point`: that of the terms of the equation of motion, which cancel where it holds. With doubled
+    /// parameters the error is the sum of their terms.
     fn rounding(&self, point: &Iterate) -> f64 {
         let twice: Vec<f64> = point.parameters.iter().map(|p| 2.0 * p).collect();
         let terms = self.point(twice).evaluation.misfit;
@@ -237,7 +235,11 @@ impl<'a> Cost<'a> {
         2.0 * rounding * point.evaluation.cost.sqrt() + rounding * rounding
     }
 
-    fn minimise_from(&self, start: &[f64], timings: &mut Timings) -> Result<Minimum, ConicStatus> {
+    fn minimise_from(
+        &self,
+        start: &[f64],
+        timings: &mut Timings,
+    ) -> Result<ConvexMinimum, ConicStatus> {
         let problem = self.problem;
         let sub = timed(&mut timings.linear_algebra, || self.assembled(start));
         let sizes = self.measurements.sizes(problem, start);
@@ -246,7 +248,7 @@ impl<'a> Cost<'a> {
         minimise(problem, sub, start, &sizes, optimum, &excess, timings)
     }
 
-    /// The squares of J in steps from `start`, without the constraints.
+    /// Squares of J in steps from `start`, without constraints.
     fn assembled(&self, start: &[f64]) -> Subproblem {
         let problem = self.problem;
         let mut sub = Subproblem::new(problem.parameters());
@@ -261,8 +263,8 @@ impl<'a> Cost<'a> {
         sub
     }
 
-    /// Soft constraints with their excess as further variables: `lower <= a theta - excess <= upper`
-    /// at the price `weight excess^2`.
+    /// Adds soft constraints with their excess as further variables: `lower <= a theta - excess <= upper`, penalty
+    /// `weight excess^2`.
     fn add_soft(&self, start: &[f64], sub: &mut Subproblem) {
         for group in &self.problem.soft {
             let excess = sub.add_variables(group.rows.len());
@@ -284,7 +286,7 @@ impl<'a> Cost<'a> {
             .collect()
     }
 
-    /// Everything about the parameters `theta`.
+    /// Iterate at the parameters `theta`.
     fn point(&self, theta: Vec<f64>) -> Iterate {
         let problem = self.problem;
         let mut evaluation = problem.workspace();
@@ -292,19 +294,19 @@ impl<'a> Cost<'a> {
         evaluation.misfit = self
             .experiments()
             .map(|(experiment, measured)| {
-                let device = device(problem, experiment, &theta);
-                measured.misfit(&measured.errors(problem, &device))
+                let nodal = nodal(problem, experiment, &theta);
+                measured.misfit(&measured.errors(problem, &nodal))
             })
             .sum();
         evaluation.regularisation = problem.regularisation(&theta);
         evaluation.cost = evaluation.misfit + evaluation.regularisation;
-        self.say_motions(&mut evaluation);
+        self.report_responses(&mut evaluation);
         let gradient = self.gradient(&theta);
         Iterate::new(theta, evaluation, gradient)
     }
 
-    /// The measured motions, and what the model says of the readings there.
-    fn say_motions(&self, evaluation: &mut Evaluation) {
+    /// Sets the measured responses and the predictions of the equation of motion.
+    fn report_responses(&self, evaluation: &mut Evaluation) {
         let problem = self.problem;
         for (e, measured) in self.measurements.experiments.iter().enumerate() {
             let Some(measured) = measured else { continue };
@@ -322,9 +324,9 @@ impl<'a> Cost<'a> {
         let problem = self.problem;
         let mut euclidean = problem.penalty_gradient(theta);
         for (experiment, measured) in self.experiments() {
-            let device = device(problem, experiment, theta);
-            let errors = measured.errors(problem, &device);
-            let mut nodal: NodalCoefficients = problem.functions.empty_device();
+            let nodal = nodal(problem, experiment, theta);
+            let errors = measured.errors(problem, &nodal);
+            let mut nodal: NodalCoefficients = problem.functions.empty_nodal();
             for (f, values) in nodal.functions_mut().enumerate() {
                 for (i, (place, error)) in measured.places.iter().zip(&errors).enumerate() {
                     let push = 2.0 * measured.weight * error * measured.response(problem, f, i);
@@ -333,7 +335,7 @@ impl<'a> Cost<'a> {
                 }
             }
             let functions = &problem.functions;
-            functions.add_transpose(&nodal, experiment.device, &mut euclidean);
+            functions.add_transpose(&nodal, experiment.coefficient_set, &mut euclidean);
         }
         let l2 = problem.functions.gram_solve(&euclidean);
         Gradient {

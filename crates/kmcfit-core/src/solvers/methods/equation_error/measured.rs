@@ -1,4 +1,4 @@
-//! States and inputs of records as measured, without a simulation.
+//! States and inputs of records, estimated from the samples without a simulation.
 
 use crate::functions::Parameterization;
 use crate::objective::SimulatedRecord;
@@ -8,20 +8,19 @@ use crate::signal::zero_phase;
 use crate::simd::sum::rms;
 use crate::simulate::Trajectory;
 use crate::solvers::reason::{MissingMeasurement, UnsupportedRecord};
-use crate::solvers::state_estimation::{Band, Kinematics, unsensed};
+use crate::solvers::state_estimation::{Kinematics, PassBand, unsensed};
 use crate::system::{Grid, NodalCoefficients, StageSamples, TimePoint};
 
-/// Dominant periods at either end that are left out where a force or the base is known to drive the
-/// motion: there the filter's transients, which begin as large as the motion and fall to a tenth in
-/// a period, are the largest errors there are. Without a known drive the unknown one is larger.
+/// Dominant periods omitted at either end of a record with known force or base motion: transients of the filter there are as
+/// large as the response and decay to a tenth in one period. Without a known input, the unknown input is the larger error.
 const SETTLING: f64 = 2.0;
-/// Most of a record that may be left out at either end.
+/// Smallest fraction of a record (1 / n) that may be omitted at either end.
 const MOST_LEFT_OUT: usize = 4;
 
-/// The state of an experiment at some times, and what drives it there.
+/// State of an experiment at some times, with force and base acceleration.
 pub(super) struct Measured {
     pub places: Vec<TimePoint>,
-    /// Index of the first time among the readings of the channel, where it is one channel's.
+    /// Index of the first time among the samples, if the times are those of one channel.
     first: usize,
     /// Displacement, m.
     pub y: Vec<f64>,
@@ -37,15 +36,15 @@ pub(super) struct Measured {
     pub weight: f64,
     /// Dominant frequency, rad/s.
     pub frequency: f64,
-    /// Where all of this has passed the filter of a band: its corner, rad/s.
+    /// Corner of the filter that all series have passed, rad/s, if any.
     pub corner: Option<f64>,
 }
 
 impl Measured {
-    /// From the channels of an experiment, with the sensors at the values `scalars`.
+    /// Estimates the state from the channels of an experiment, for the sensor parameters `scalars`.
     ///
     /// # Errors
-    /// What is missing.
+    /// The missing measurement.
     fn of(
         problem: &Problem,
         experiment: &Experiment,
@@ -58,8 +57,8 @@ impl Measured {
         {
             return Err(MissingMeasurement::QuadraticLoss);
         }
-        let sought = |c: &Channel| c.sensor().indices().iter().any(Option::is_some);
-        if experiment.channels.iter().any(sought) {
+        let estimated = |c: &Channel| c.sensor().indices().iter().any(Option::is_some);
+        if experiment.channels.iter().any(estimated) {
             return Err(MissingMeasurement::KnownSensors);
         }
         if let [channel] = experiment.channels.as_slice()
@@ -73,14 +72,14 @@ impl Measured {
         if !experiment.is_free() && !experiment.channels.iter().any(anchored) {
             return Err(MissingMeasurement::FilteredDrive);
         }
-        let motion = Kinematics::of(problem, experiment, scalars);
-        let motion = motion.ok_or(MissingMeasurement::Readings)?;
-        let measured = Self::at_nodes(problem, experiment, &motion);
+        let kinematics = Kinematics::of(problem, experiment, scalars);
+        let kinematics = kinematics.ok_or(MissingMeasurement::Readings)?;
+        let measured = Self::at_nodes(problem, experiment, &kinematics);
         let moves = measured.frequency > 0.0 && measured.frequency.is_finite();
         moves.then_some(measured).ok_or(MissingMeasurement::Motion)
     }
 
-    /// From accelerations alone: motion, force and base through the same filter.
+    /// From accelerations alone: response, force and base pass the same filter.
     fn in_band(
         experiment: &Experiment,
         channel: &Channel,
@@ -88,34 +87,34 @@ impl Measured {
         scalars: &[f64],
     ) -> Option<Self> {
         let (values, _) = unsensed(channel, scalars);
-        let band = Band::of(&values, spacing)?;
+        let band = PassBand::of(&values, spacing)?;
         let excitation = experiment.excitation.as_ref();
-        let around = (0..channel.len()).map(|i| channel.around_reading(excitation, i));
+        let around = (0..channel.len()).map(|i| channel.around_sample(excitation, i));
         let (force, base): (Vec<f64>, Vec<f64>) = around.map(|s| (s.force, s.base)).unzip();
         let sensed = |part: Vec<f64>| match channel.filter() {
             [] => part,
             filter => zero_phase(filter, &part),
         };
         let (force, base) = (sensed(force), sensed(base));
-        let [motion, force, base] = band
-            .motions(&[&values, &force, &base])?
+        let [response, force, base] = band
+            .responses(&[&values, &force, &base])?
             .try_into()
             .expect("one for each");
         let skipped = match experiment.is_free() {
             true => 1,
             false => {
                 let periods = SETTLING * std::f64::consts::TAU / band.frequency;
-                let readings = (periods / spacing).ceil() as usize;
-                readings.clamp(1, channel.len() / MOST_LEFT_OUT)
+                let samples = (periods / spacing).ceil() as usize;
+                samples.clamp(1, channel.len() / MOST_LEFT_OUT)
             }
         };
         let kept = |series: Vec<f64>| series[skipped - 1..=series.len() - skipped].to_vec();
         Some(Self {
             places: channel.places()[skipped..channel.len() - skipped].to_vec(),
             first: skipped,
-            y: kept(motion.y),
-            v: kept(motion.v),
-            a: kept(motion.a),
+            y: kept(response.y),
+            v: kept(response.v),
+            a: kept(response.a),
             force: kept(force.a),
             base: kept(base.a),
             weight: spacing,
@@ -124,8 +123,8 @@ impl Measured {
         })
     }
 
-    /// At the nodes at which a motion is known.
-    pub fn at_nodes(problem: &Problem, experiment: &Experiment, motion: &Kinematics) -> Self {
+    /// From the nodes with a known response.
+    pub fn at_nodes(problem: &Problem, experiment: &Experiment, kinematics: &Kinematics) -> Self {
         let excitation = experiment.excitation.as_ref();
         let parts = [
             excitation.and_then(|e| e.force.as_ref()),
@@ -134,25 +133,25 @@ impl Measured {
         let [force, base] = parts.map(|part| {
             let nodes = part.map(StageSamples::at_nodes);
             let at = |node: &usize| nodes.as_ref().map_or(0.0, |f| f[*node]);
-            motion.nodes.iter().map(at).collect::<Vec<f64>>()
+            kinematics.nodes.iter().map(at).collect::<Vec<f64>>()
         });
-        let stride = motion.nodes.windows(2).map(|w| w[1] - w[0]).min();
+        let stride = kinematics.nodes.windows(2).map(|w| w[1] - w[0]).min();
         let place = |node: &usize| TimePoint::node(*node, experiment.nodes);
         Self {
-            places: motion.nodes.iter().map(place).collect(),
+            places: kinematics.nodes.iter().map(place).collect(),
             first: 0,
-            y: motion.y.clone(),
-            v: motion.v.clone(),
-            a: motion.a.clone(),
+            y: kinematics.y.clone(),
+            v: kinematics.v.clone(),
+            a: kinematics.a.clone(),
             force,
             base,
             weight: stride.unwrap_or(1) as f64 * problem.system.grid.step(),
-            frequency: rms(&motion.v) / rms(&motion.y),
+            frequency: rms(&kinematics.v) / rms(&kinematics.y),
             corner: None,
         }
     }
 
-    /// What function `f` of a device multiplies at time `i`: `y'' + b''` for the mass, `phi` of a term.
+    /// Factor of function `f` at time `i`: `y'' + b''` for the mass, `phi` for a term.
     pub fn response(&self, problem: &Problem, f: usize, i: usize) -> f64 {
         match f {
             0 => self.a[i] + self.base[i],
@@ -160,10 +159,10 @@ impl Measured {
         }
     }
 
-    /// `m (y'' + b'') + sum_j p_j phi_j(y, y') - f` of a device at all times, N.
-    pub fn errors(&self, problem: &Problem, device: &NodalCoefficients) -> Vec<f64> {
+    /// Residual `m (y'' + b'') + sum_j p_j phi_j(y, y') - f` of the equation of motion at all times, N.
+    pub fn errors(&self, problem: &Problem, nodal: &NodalCoefficients) -> Vec<f64> {
         let error = |(i, place): (usize, &TimePoint)| {
-            let forces = device.functions().enumerate();
+            let forces = nodal.functions().enumerate();
             let force =
                 |(f, values): (usize, &[f64])| blend(values, *place) * self.response(problem, f, i);
             forces
@@ -173,15 +172,14 @@ impl Measured {
         self.places.iter().enumerate().map(error).collect()
     }
 
-    /// `integral error^2 dt`.
+    /// Integral `integral error^2 dt`.
     pub fn misfit(&self, errors: &[f64]) -> f64 {
         self.weight * errors.iter().map(|e| e * e).sum::<f64>()
     }
 
-    /// The motion on `nodes` nodes: cubic in between, and swinging on with the dominant frequency
-    /// where nothing was measured.
+    /// Response on `nodes` nodes: cubic between times, extended harmonically with the dominant frequency beyond them.
     pub fn trajectory(&self, grid: &Grid, nodes: usize) -> Trajectory {
-        let mut motion = Trajectory::zeros(nodes);
+        let mut response = Trajectory::zeros(nodes);
         let at = |i: usize| self.places[i].step as f64 + self.places[i].fraction;
         let last = self.places.len() - 1;
         let mut i = 0;
@@ -195,10 +193,10 @@ impl Measured {
                 true => self.between(i, since, (at(i + 1) - at(i)) * grid.step()),
                 false => self.swung_on(i, since),
             };
-            motion.displacement[node] = y;
-            motion.velocity[node] = v;
+            response.displacement[node] = y;
+            response.velocity[node] = v;
         }
-        motion
+        response
     }
 
     fn swung_on(&self, i: usize, since: f64) -> (f64, f64) {
@@ -220,25 +218,25 @@ impl Measured {
         (cubic(&self.y, &self.v), cubic(&self.v, &self.a))
     }
 
-    /// What the model says of the readings at this state.
+    /// Predictions at this state.
     ///
-    /// For an acceleration in a band that is `y'' = (f - sum_j p_j phi_j)/m - b''` of the band plus what
-    /// the filter took from the reading, so that model less reading is minus the equation's error
-    /// over the mass; the readings at the ends, which are left out, stand for themselves.
+    /// For an acceleration in a band, `y'' = (f - sum_j p_j phi_j)/m - b''` of the band plus the part of the sample that the
+    /// filter removed; the residual is then minus the equation error over the mass. Omitted samples at the ends are their own
+    /// predictions.
     pub fn predict(&self, problem: &Problem, channel: &Channel, view: SimulatedRecord) -> Vec<f64> {
         if self.corner.is_none() {
             return channel.predict(view);
         }
         let [gain, ..] = channel.sensor().values(view.scalars);
         let mut predicted = channel.observed().to_vec();
-        for (i, error) in self.errors(problem, view.device).iter().enumerate() {
-            predicted[self.first + i] -= gain * error / blend(&view.device.mass, self.places[i]);
+        for (i, error) in self.errors(problem, view.nodal).iter().enumerate() {
+            predicted[self.first + i] -= gain * error / blend(&view.nodal.mass, self.places[i]);
         }
         predicted
     }
 }
 
-/// The value at a place of a function that is linear between nodes.
+/// Value of a function that is linear between nodes.
 fn blend(values: &[f64], place: TimePoint) -> f64 {
     let [left, right] = [values[place.step], values[place.step + 1]];
     match place.fraction {
@@ -248,7 +246,7 @@ fn blend(values: &[f64], place: TimePoint) -> f64 {
     }
 }
 
-/// The spacing of times that are equally spaced.
+/// Spacing of equally spaced times; `None` for other times.
 fn equal_spacing(times: &[f64]) -> Option<f64> {
     let steps = times.len().checked_sub(1).filter(|steps| *steps > 0)?;
     let spacing = (times[steps] - times[0]) / steps as f64;
@@ -259,21 +257,20 @@ fn equal_spacing(times: &[f64]) -> Option<f64> {
     times.iter().enumerate().all(in_place).then_some(spacing)
 }
 
-/// The motions of all experiments as their readings tell them.
+/// Responses of all experiments, estimated from their samples.
 ///
-/// From one channel of equally spaced accelerations the motion is integrated in a band around its
-/// dominant frequency, and force and base pass the same filter. From any other channels a smooth
-/// curve through all of them is differentiated, as for the start from the data.
+/// For a single channel of equally spaced accelerations the response is integrated in a band around its dominant frequency,
+/// and force and base pass the same filter. For other channels a smooth curve through all samples is differentiated.
 pub struct Measurements {
-    /// `None` for an experiment without readings.
+    /// One entry per experiment; `None` for an experiment without samples.
     pub(super) experiments: Vec<Option<Measured>>,
 }
 
 impl Measurements {
-    /// From the readings of a problem, with the scalars at their start.
+    /// Estimates from the samples of a problem, with scalars at their start.
     ///
     /// # Errors
-    /// The first experiment whose readings do not tell a motion.
+    /// The first experiment whose samples do not provide a response.
     pub fn of(problem: &Problem) -> Result<Self, UnsupportedRecord> {
         Self::with_scalars(problem, problem.scalars(&problem.start()))
     }
@@ -299,8 +296,8 @@ impl Measurements {
         })
     }
 
-    /// What is lost, in words: the filter that integrates an acceleration takes slow parts, which
-    /// only forces proportional to the motion do without.
+    /// Notes on lost information: the filter that integrates an acceleration removes slow components, which biases forces not
+    /// proportional to the response.
     pub fn remarks(&self, problem: &Problem) -> Vec<String> {
         let terms = problem.system.terms.iter();
         if terms.clone().all(|term| term.is_linear()) {
@@ -310,22 +307,20 @@ impl Measurements {
         let one = |(experiment, measured): (&Experiment, &Option<Measured>)| {
             let corner = measured.as_ref()?.corner? / std::f64::consts::TAU;
             Some(format!(
-                "{}: the acceleration is integrated above {corner:.3} Hz alone, so forces that are \
-                 not proportional to the motion are seen with an error, and a constant offset is not \
-                 seen",
+                "{}: the acceleration is integrated above {corner:.3} Hz alone, so forces that \
+                 are not proportional to the response are biased, and a static force is not \
+                 identifiable",
                 experiment.name
             ))
         };
         in_bands.filter_map(one).collect()
     }
 
-    /// The weight of a penalty on derivative `order` of function `index` of the list with which the
-    /// smoother's time constant is one dominant period T where the motion has its mean amplitude:
-    /// `mean(phi^2) T^(2 order)`, summed over the experiments that have the function. T is the mean
-    /// of theirs.
+    /// Weight of a penalty on derivative `order` of function `index` for which the time constant of the smoother is one dominant
+    /// period T at the mean amplitude of the response: `mean(phi^2) T^(2 order)`, summed over the experiments with the function.
+    /// T is the mean of their periods.
     ///
-    /// Where nothing else changes, `integral (phi p - g)^2 + weight p'^2 dt` smooths `p` by
-    /// `exp(-|t|/T)/(2T)`.
+    /// For fixed other functions, minimising `integral (phi p - g)^2 + weight p'^2 dt` smooths `p` by `exp(-|t|/T)/(2T)`.
     pub fn period_weight(&self, problem: &Problem, index: usize, order: usize) -> f64 {
         let mut squares = 0.0;
         let mut periods = Vec::new();
@@ -337,15 +332,15 @@ impl Measurements {
         squares * period.powi(2 * order as i32)
     }
 
-    /// The largest value at `start` of each function of the list.
+    /// Largest value at `start` of each function of the list.
     pub(super) fn own_sizes(problem: &Problem, start: &[f64]) -> Vec<f64> {
         let values = problem.functions.values(start);
         let largest = |f: &Vec<f64>| f.iter().fold(0.0f64, |m, p| m.max(p.abs()));
         values.iter().map(largest).collect()
     }
 
-    /// The larger of a function's own largest value at `start` and of the value at which its force
-    /// would be as large as the mass's, for each function of the list.
+    /// For each function of the list, the larger of its largest value at `start` and of the value whose force equals the inertia
+    /// force.
     pub(super) fn sizes(&self, problem: &Problem, start: &[f64]) -> Vec<f64> {
         let sizes = Self::own_sizes(problem, start);
         let own = |index: usize| sizes[index];
@@ -366,7 +361,7 @@ impl Measurements {
             .collect()
     }
 
-    /// The experiments that have function `index` of the list, and which of their device it is.
+    /// Experiments with function `index` of the list, and its position in their coefficient set.
     fn with_function<'a>(
         &'a self,
         problem: &'a Problem,
@@ -374,22 +369,24 @@ impl Measurements {
     ) -> impl Iterator<Item = (usize, &'a Measured)> {
         let all = problem.experiments.iter().zip(&self.experiments);
         all.filter_map(move |(experiment, measured)| {
-            let assembly = problem.functions.assembly(experiment.device);
+            let assembly = problem
+                .functions
+                .coefficient_set(experiment.coefficient_set);
             let f = assembly.iter().position(|f| *f == index)?;
             Some((f, measured.as_ref()?))
         })
     }
 }
 
-/// The mass of the first device that has function `index` of the list.
+/// Mass of the first coefficient set with function `index`.
 fn mass_of(functions: &Parameterization, index: usize) -> Option<usize> {
-    let mut devices = functions.assemblies().iter();
-    let device = devices.find(|assembly| assembly.contains(&index))?;
-    device.first().copied()
+    let mut nodal_sets = functions.coefficient_sets().iter();
+    let nodal = nodal_sets.find(|assembly| assembly.contains(&index))?;
+    nodal.first().copied()
 }
 
 impl Measured {
-    /// Mean of the squared response of function `f` of the device.
+    /// Mean square of the factor of function `f`.
     fn mean_square(&self, problem: &Problem, f: usize) -> f64 {
         let n = self.places.len();
         let squares = (0..n).map(|i| self.response(problem, f, i).powi(2));
@@ -408,7 +405,7 @@ mod tests {
         Grid::new(0.0, STEP * (NODES - 1) as f64, NODES).unwrap()
     }
 
-    /// Readings at some nodes and between some, of the motion that `state` tells: `y`, `y'`, `y''`.
+    /// Measured states at some nodes and between some, of the response `state`: `y`, `y'`, `y''`.
     fn measured(frequency: f64, state: impl Fn(f64) -> [f64; 3]) -> Measured {
         let between = |step| TimePoint {
             step,
@@ -433,24 +430,24 @@ mod tests {
         }
     }
 
-    /// The largest distance of a motion from what `state` tells of displacement and velocity.
+    /// Largest difference of a response from the displacement and velocity of `state`.
     fn distance(
-        motion: &Trajectory,
+        response: &Trajectory,
         nodes: impl Iterator<Item = usize>,
         state: impl Fn(f64) -> [f64; 3],
     ) -> f64 {
         let one = |i: usize| {
             let [y, v, _] = state(i as f64 * STEP);
-            let [of_y, of_v] = [motion.displacement[i] - y, motion.velocity[i] - v];
+            let [of_y, of_v] = [response.displacement[i] - y, response.velocity[i] - v];
             of_y.abs() + of_v.abs()
         };
-        // What is no number is the largest.
+        // NaN counts as the largest.
         nodes.map(one).max_by(f64::total_cmp).unwrap()
     }
 
-    /// Polynomials of degree 3 through values and slopes give back one, at the places and between.
+    /// Cubic polynomials through values and slopes are exact for cubics, at the times and between.
     #[test]
-    fn a_cubic_motion_is_exact_between_its_readings() {
+    fn a_cubic_response_is_interpolated_exactly() {
         let cubic = |t: f64| {
             [
                 0.3 + t - 2.0 * t * t + 0.7 * t * t * t,
@@ -458,26 +455,26 @@ mod tests {
                 4.2 * t - 4.0,
             ]
         };
-        let motion = measured(1.0, cubic).trajectory(&grid(), NODES);
-        let off = distance(&motion, 3..=18, cubic);
+        let response = measured(1.0, cubic).trajectory(&grid(), NODES);
+        let off = distance(&response, 3..=18, cubic);
         assert!(off < 1e-12, "{off}");
     }
 
     #[test]
-    fn a_harmonic_motion_swings_on_beyond_its_readings() {
+    fn a_harmonic_response_is_extended_exactly() {
         let w = 1.7;
         let harmonic = |t: f64| {
             let (sine, cosine) = (w * t + 0.4).sin_cos();
             [2.0 * cosine, -2.0 * w * sine, -2.0 * w * w * cosine]
         };
-        let motion = measured(w, harmonic).trajectory(&grid(), NODES);
-        let off = distance(&motion, (0..=3).chain(18..NODES), harmonic);
+        let response = measured(w, harmonic).trajectory(&grid(), NODES);
+        let off = distance(&response, (0..=3).chain(18..NODES), harmonic);
         assert!(off < 1e-12, "{off}");
     }
 
-    /// Whether times are equally spaced is no matter of how long a second is.
+    /// Equal spacing is recognised in every unit of time.
     #[test]
-    fn equal_spacing_knows_no_unit() {
+    fn equal_spacing_does_not_depend_on_the_unit() {
         for spacing in [1e-6, 1.0, 1e6] {
             let times = |off: f64| -> Vec<f64> {
                 let late = |i: usize| if i == 3 { off } else { 0.0 };

@@ -1,10 +1,9 @@
-//! The equation error: smoothed readings put into the equation of motion.
+//! Equation error: residual of the equation of motion with states estimated from the samples.
 //!
-//! With `y`, `y'`, `y''` from the readings, `m y'' + c y' + k y - f` is linear in the parameters, so
-//! penalties and constraints make it one convex problem. It needs no start and knows no local minima
-//! of a wrong period; noise biases it. It is a start ([`equation_error`]) for a fit that removes the
-//! bias, and a method of its own ([`fit`]) for records that no motion from known states and forces
-//! explains.
+//! With `y`, `y'`, `y''` from the samples, `m y'' + c y' + k y - f` is linear in the parameters, so with penalties and
+//! constraints its least-squares minimum is a convex problem. It needs no starting point and has no local minima of a wrong
+//! period, but noise biases it. It serves as a starting point ([`equation_error`]) for a fit that removes the bias, and as a
+//! method of its own ([`fit`]) for records that no response from known states and forces reproduces.
 
 mod fit;
 mod measured;
@@ -23,22 +22,22 @@ use crate::system::quadrature::trapezoid_weights;
 use crate::system::{NodalCoefficients, Term, TimePoint};
 use measured::Measured;
 
-/// A pull towards the start, relative to the equation's own weight: it decides what the equation
-/// leaves open and nothing else.
+/// Weight of the proximal term towards the start, relative to the equation error; it determines the directions that the
+/// equation leaves undetermined.
 const PULL: f64 = 1e-9;
 
-/// What a minimum is for.
+/// Use of a minimum.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Accuracy {
-    /// To start a fit.
+    /// Starting point of a fit.
     Start,
-    /// For its own sake.
+    /// Result.
     Optimum,
 }
 
 impl Accuracy {
-    /// A plain minimum moved into the constraints is used if it keeps this share of its decrease: a
-    /// fit that follows needs no optimum, and an optimum has the accuracy to which programs are solved.
+    /// Share of its decrease that a plain minimum must keep when moved into the constraints. A starting point need not be
+    /// optimal; a result has the accuracy of a quadratic program.
     fn kept(self) -> f64 {
         match self {
             Accuracy::Start => 0.999,
@@ -47,38 +46,38 @@ impl Accuracy {
     }
 }
 
-/// Parameters from the equation error, under the problem's penalties and constraints.
+/// Parameters that minimise the equation error, under the penalties and constraints of the problem.
 ///
 /// # Errors
-/// How the convex problem ended, if not with a solution.
+/// Status of the convex program, if it failed.
 pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, ConicStatus> {
-    let motions: Vec<Option<Kinematics>> = (problem.experiments.iter())
+    let kinematics: Vec<Option<Kinematics>> = (problem.experiments.iter())
         .map(|experiment| Kinematics::of(problem, experiment, problem.scalars(start)))
         .collect();
-    from_motions(problem, start, &motions)
+    from_kinematics(problem, start, &kinematics)
 }
 
-/// [`equation_error`] with the motion of each experiment.
-pub(in crate::solvers) fn from_motions(
+/// [`equation_error`] with given kinematics of each experiment.
+pub(in crate::solvers) fn from_kinematics(
     problem: &Problem,
     start: &[f64],
-    motions: &[Option<Kinematics>],
+    kinematics: &[Option<Kinematics>],
 ) -> Result<Vec<f64>, ConicStatus> {
-    let start = &with_initial_states(problem, start, motions);
+    let start = &with_initial_states(problem, start, kinematics);
     let mut sub = Subproblem::new(problem.parameters());
     sub.stations = problem.functions.first_nodes();
     let mut experiments = Vec::new();
-    for (experiment, motion) in problem.experiments.iter().zip(motions) {
-        experiments.push(motion.as_ref().map(|motion| {
-            let measured = Measured::at_nodes(problem, experiment, motion);
-            let root = root_weight(problem, experiment, motion, start);
+    for (experiment, states) in problem.experiments.iter().zip(kinematics) {
+        experiments.push(states.as_ref().map(|states| {
+            let measured = Measured::at_nodes(problem, experiment, states);
+            let root = root_weight(problem, experiment, states, start);
             add_rows(problem, experiment, &measured, root, start, &mut sub);
             measured
         }));
     }
     add_penalties(problem, start, &mut sub);
     add_variations(problem, start, &mut sub);
-    // The size of a function is that of its start, or where that is zero the one that it would need.
+    // The size of a function is that of its start or, where that is zero, the value that balances the equation.
     let own = Measurements::own_sizes(problem, start);
     let natural = Measurements { experiments }.sizes(problem, start);
     let either = |(own, natural): (f64, f64)| if own > 0.0 { own } else { natural };
@@ -95,20 +94,20 @@ pub(in crate::solvers) fn from_motions(
     Ok(minimum.parameters)
 }
 
-/// The minimum of a convex problem.
-struct Minimum {
+/// Minimum of a convex problem.
+struct ConvexMinimum {
     parameters: Vec<f64>,
-    /// How the quadratic program ended, if one was needed.
+    /// Status of the quadratic program, if one was needed.
     program: Option<ConicStatus>,
-    /// The residuals of its optimality conditions.
+    /// Residuals of the optimality conditions.
     kkt: Option<Kkt>,
-    /// Where the step began, and the weights of the pull towards there.
+    /// Start of the step, and the weights of the proximal term.
     from: Vec<f64>,
     pull: Vec<f64>,
 }
 
-impl Minimum {
-    /// What the pull adds to the cost at `theta`.
+impl ConvexMinimum {
+    /// Proximal term at `theta`.
     fn pull(&self, theta: &[f64]) -> f64 {
         let steps = theta.iter().zip(&self.from).zip(&self.pull);
         steps
@@ -117,13 +116,12 @@ impl Minimum {
     }
 }
 
-/// Minimises `sub`, which has no constraints yet, in steps from `start`, under those of the problem.
-/// `sub` may have variables after the parameters: `rest` tells them for given parameters. For an
-/// optimum a quadratic program is solved in units of the `sizes` of the functions, which it needs where
-/// these differ by many orders. What was solved adds to `timings`.
+/// Minimises `sub`, without constraints of its own, in steps from `start`, under the constraints of the problem. `sub` may
+/// have variables after the parameters, computed by `rest`. For a result the quadratic program is scaled by the `sizes` of
+/// the functions, which may differ by many orders of magnitude. Work is added to `timings`.
 ///
 /// # Errors
-/// How the convex problem ended, if not with a solution.
+/// Status of the convex program, if it failed.
 fn minimise(
     problem: &Problem,
     mut sub: Subproblem,
@@ -132,7 +130,7 @@ fn minimise(
     accuracy: Accuracy,
     rest: &dyn Fn(&[f64]) -> Vec<f64>,
     timings: &mut Timings,
-) -> Result<Minimum, ConicStatus> {
+) -> Result<ConvexMinimum, ConicStatus> {
     let constraints = with_scale_held(problem, start);
     sub.constrain(&constraints, start);
     let duration = problem.system.grid.duration();
@@ -149,12 +147,12 @@ fn minimise(
         let steps = parameters.iter().zip(start).map(|(t, s)| t - s);
         let step: Vec<f64> = steps.chain(rest(&parameters)).collect();
         let (at_start, least) = (sub.value(&vec![0.0; z.len()]), sub.value(&z));
-        // Moved into the constraints it is used if they hold there and it is nearly as good as the
-        // plain one, which no point in them can beat.
+        // A plain minimum moved into the constraints is used if feasible and nearly as good as the plain one, which is a lower
+        // bound of all feasible points.
         let enough =
             sub.value(&step) - least <= (1.0 - accuracy.kept()) * (at_start - least).max(0.0);
         if constraints.hold(&parameters, TOLERANCE) && enough {
-            return Ok(Minimum {
+            return Ok(ConvexMinimum {
                 parameters,
                 program: None,
                 kkt: None,
@@ -173,7 +171,7 @@ fn minimise(
     let z = solution.z.iter_mut().zip(&units);
     z.for_each(|(z, unit)| *z *= unit);
     match solution.status {
-        status if status.is_point() => Ok(Minimum {
+        status if status.is_point() => Ok(ConvexMinimum {
             parameters: moved(&solution.z),
             program: Some(status),
             kkt: solution.kkt,
@@ -184,33 +182,33 @@ fn minimise(
     }
 }
 
-/// Root of the weight of a squared error of the equation, so that it counts as the readings would.
+/// Root of the weight of a squared equation error, chosen so that it is comparable with the samples' misfit.
 fn root_weight(
     problem: &Problem,
     experiment: &Experiment,
-    motion: &Kinematics,
+    kinematics: &Kinematics,
     start: &[f64],
 ) -> f64 {
-    let device = device(problem, experiment, start);
+    let nodal = nodal(problem, experiment, start);
     let size = |f: &[f64]| f.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-    let terms = problem.system.terms.iter().zip(&device.coefficients);
+    let terms = problem.system.terms.iter().zip(&nodal.coefficients);
     let springs = terms.filter(|(term, _)| **term == Term::Stiffness);
-    let springs = springs.map(|(_, k)| size(k) * size(&motion.y));
-    let force_scale = springs.fold(size(&device.mass) * size(&motion.a), f64::max)
-        / motion.size.max(f64::MIN_POSITIVE);
-    motion.weight.sqrt() / force_scale
+    let springs = springs.map(|(_, k)| size(k) * size(&kinematics.y));
+    let force_scale = springs.fold(size(&nodal.mass) * size(&kinematics.a), f64::max)
+        / kinematics.size.max(f64::MIN_POSITIVE);
+    kinematics.weight.sqrt() / force_scale
 }
 
-/// The device of an experiment for the parameters `theta`.
-fn device(problem: &Problem, experiment: &Experiment, theta: &[f64]) -> NodalCoefficients {
-    let mut device = problem.functions.empty_device();
+/// Nodal values of an experiment's coefficients at the parameters `theta`.
+fn nodal(problem: &Problem, experiment: &Experiment, theta: &[f64]) -> NodalCoefficients {
+    let mut nodal = problem.functions.empty_nodal();
     problem
         .functions
-        .device_into(theta, experiment.device, &mut device);
-    device
+        .nodal_into(theta, experiment.coefficient_set, &mut nodal);
+    nodal
 }
 
-/// The equation's errors, each times `root`, as residuals in the steps from `start`.
+/// Adds the equation errors, each times `root`, as residuals in the steps from `start`.
 fn add_rows(
     problem: &Problem,
     experiment: &Experiment,
@@ -220,8 +218,8 @@ fn add_rows(
     sub: &mut Subproblem,
 ) {
     let functions = &problem.functions;
-    let assembly = functions.assembly(experiment.device);
-    let errors = measured.errors(problem, &device(problem, experiment, start));
+    let assembly = functions.coefficient_set(experiment.coefficient_set);
+    let errors = measured.errors(problem, &nodal(problem, experiment, start));
     for (i, (&TimePoint { step, fraction }, error)) in
         measured.places.iter().zip(errors).enumerate()
     {
@@ -240,13 +238,13 @@ fn add_rows(
     }
 }
 
-/// The constraints, and where nothing fixes the common scale of all functions, the mean of the mass
-/// at its start: without it the equation is solved by no device at all.
+/// Constraints of the problem, plus a fixed mean of the mass where the common scale of all functions is undetermined:
+/// otherwise zero coefficients satisfy the equation.
 fn with_scale_held(problem: &Problem, start: &[f64]) -> Constraints {
     let mut constraints = problem.constraints.clone();
     if !(equation_fixes_scale(problem) || equalities_fix_scale(&constraints, start)) {
         let grid = &problem.system.grid;
-        let mut ones = problem.functions.empty_device();
+        let mut ones = problem.functions.empty_nodal();
         ones.mass
             .copy_from_slice(&trapezoid_weights(grid.nodes(), grid.step()));
         let row = problem.functions.transpose(&ones);
@@ -263,9 +261,8 @@ fn with_scale_held(problem: &Problem, start: &[f64]) -> Constraints {
     constraints
 }
 
-/// Whether the equation of motion tells `theta` from `s theta`. Its error is linear in `theta`, and
-/// homogeneous unless a force that acts on a record or a fixed function gives it a right-hand side;
-/// a force or a function that is zero does not.
+/// True if the equation of motion determines the scale of `theta`. Its error is linear in `theta`, and homogeneous unless a
+/// nonzero force or a nonzero fixed function contributes a right-hand side.
 fn equation_fixes_scale(problem: &Problem) -> bool {
     let nonzero = |values: &[f64]| values.iter().any(|v| *v != 0.0);
     let fixed = problem.functions.iter().any(|f| nonzero(&f.offset));
@@ -273,14 +270,13 @@ fn equation_fixes_scale(problem: &Problem) -> bool {
         .experiments
         .iter()
         .filter(|e| !e.channels.is_empty());
-    // The base pushes with `-m b''`, which grows with the mass.
+    // The inertia force `-m b''` of the base scales with the mass.
     let force = |e: &Experiment| e.excitation.as_ref().and_then(|e| e.force.clone());
     fixed || measured.any(|e| force(e).is_some_and(|f| !f.is_zero()))
 }
 
-/// Whether some equality tells `theta` from `s theta`: `a theta = b` does unless `b` is zero. An
-/// inequality does not fix the scale, it only bounds it. A `b` that is rounding beside the terms of
-/// the row at `start` counts as zero.
+/// True if some equality determines the scale of `theta`: `a theta = b` with nonzero `b`. Inequalities only bound the scale.
+/// A `b` below the rounding error of the row's terms at `start` counts as zero.
 fn equalities_fix_scale(constraints: &Constraints, start: &[f64]) -> bool {
     constraints.groups.iter().any(|group| {
         (0..group.rows.len()).any(|i| {
@@ -291,20 +287,20 @@ fn equalities_fix_scale(constraints: &Constraints, start: &[f64]) -> bool {
     })
 }
 
-/// `start` with the initial states that are sought taken from the motions, where these begin.
+/// `start` with estimated initial states set from the kinematics, where these include the first node.
 pub(in crate::solvers) fn with_initial_states(
     problem: &Problem,
     start: &[f64],
-    motions: &[Option<Kinematics>],
+    kinematics: &[Option<Kinematics>],
 ) -> Vec<f64> {
     let mut theta = start.to_vec();
     let first = problem.functions.scalar_range().start;
-    for (experiment, motion) in problem.experiments.iter().zip(motions) {
-        let Some(state) = motion.as_ref().and_then(|m| m.initial) else {
+    for (experiment, measured_states) in problem.experiments.iter().zip(kinematics) {
+        let Some(state) = measured_states.as_ref().and_then(|m| m.initial) else {
             continue;
         };
         let values = [state.displacement, state.velocity];
-        for (index, value) in experiment.sought.into_iter().zip(values) {
+        for (index, value) in experiment.initial_parameters.into_iter().zip(values) {
             if let Some(index) = index {
                 theta[first + index] = value;
             }

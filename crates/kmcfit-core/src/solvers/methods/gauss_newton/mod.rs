@@ -1,10 +1,9 @@
 //! Gauss–Newton steps with a proximal term, under constraints.
 //!
-//! Each iteration minimises the linearised cost plus `damping * J * sum_f 1/T integral (delta p_f /
-//! size of p_f)^2 dt` under the linearised constraints. The plain step, one sparse factorisation, is
-//! taken where it stays in the set; where it leaves a set of simple bounds, the clipped step is
-//! taken if it is nearly as good as the plain one, which no step in the set can beat, or else the plain
-//! step with those bounds held that it meets; only otherwise a quadratic program is solved.
+//! Each iteration minimises the linearised cost plus `damping * J * sum_f 1/T integral (delta p_f / size of p_f)^2 dt` under
+//! the linearised constraints. The plain step, one sparse factorisation, is taken where it is feasible. Where it violates
+//! simple bounds, the clipped step is taken if it is nearly as good as the plain one, a lower bound of all feasible steps,
+//! or else the plain step with the violated bounds active. Otherwise a quadratic program is solved.
 
 mod proposal;
 
@@ -18,30 +17,30 @@ use crate::solvers::iterate::Iterate;
 use crate::solvers::linearization::{Linearization, linearisation_tangents, linearise};
 use crate::solvers::optimality::Optimality;
 use crate::solvers::reason::Reason;
-use proposal::{Answer, Proposal, SMALLEST_CHANGE, at_minimum, change, propose};
+use proposal::{Proposal, ProposalOutcome, SMALLEST_CHANGE, at_minimum, change, propose};
 
-/// First weight of the proximal term, relative to J.
+/// Initial weight of the proximal term, relative to J.
 const FIRST_DAMPING: f64 = 1e-2;
-/// Smallest weight: less is lost in the factorisation's own shift.
+/// Smallest weight; smaller values are below the regularisation of the factorisation.
 const LEAST_DAMPING: f64 = 1e-10;
-/// Largest weight: a step so short changes no digit of the cost.
+/// Largest weight, at which a step changes no digit of the cost.
 const MOST_DAMPING: f64 = 1e14;
-/// A step is taken if it brings this share of the predicted decrease.
+/// Share of the predicted decrease from which a step is accepted.
 const ACCEPTED: f64 = 0.05;
-/// Above this share the damping falls, below the next it rises.
+/// Shares of the predicted decrease above which the damping is reduced and below which it is raised.
 const GOOD: f64 = 0.7;
 const POOR: f64 = 0.3;
-/// A predicted decrease below this share of J0 is rounding: J0 is a sum of squares, so this is the
-/// square of the precision of its terms.
+/// Predicted decrease, relative to J0, below which it is a rounding error: the square of the precision of the residuals.
 const NO_DECREASE: f64 = 1e-30;
 
-/// The Jacobian is kept while no function is further from where it was made than this, relative to its size, ...
+/// Largest change of a function, relative to its size, for which a Jacobian is reused.
 const NEARBY: f64 = 1e-2;
-/// ... and the decrease is as predicted to this share: where a motion remembers long, its phase makes the Jacobian another
-/// one sooner. A step with the old one leaves about that share of the error, which one with its own would square.
+/// Largest relative deviation of the decrease from its prediction for which a Jacobian is reused. The phase of lightly damped
+/// responses makes the Jacobian invalid after shorter changes. A step with a reused Jacobian leaves about that share of the
+/// error, a step with a new one its square.
 const AS_PREDICTED: f64 = 0.1;
 
-/// The method and its damping.
+/// The method with its damping.
 pub struct GaussNewton {
     damping: f64,
     first_cost: Option<f64>,
@@ -72,11 +71,13 @@ impl StepRule for GaussNewton {
         while self.damping <= MOST_DAMPING {
             linear.damp(self.damping * point.evaluation.cost);
             let proposal = match propose(work, &linear.sub, point) {
-                Answer::Step(proposal) => proposal,
-                Answer::Unsolved(_) if Optimality::is_exact(problem, point.evaluation.cost) => {
+                ProposalOutcome::Step(proposal) => proposal,
+                ProposalOutcome::Unsolved(_)
+                    if Optimality::is_exact(problem, point.evaluation.cost) =>
+                {
                     return Step::Minimum(Reason::NegligibleResiduals);
                 }
-                Answer::Unsolved(status) => {
+                ProposalOutcome::Unsolved(status) => {
                     linear.trouble = Some(status);
                     self.damping *= 10.0;
                     continue;
@@ -86,20 +87,20 @@ impl StepRule for GaussNewton {
             let decrease = result.map(|()| point.evaluation.cost - evaluation.cost);
             let gain = decrease.map_or(f64::NAN, |decrease| decrease / proposal.predicted);
             if linear.trouble.is_some() && change(problem, point, &proposal) <= SMALLEST_CHANGE {
-                // What is left of the step by damping away the programs that stalled.
+                // Without the effect of damping caused by failed programs.
                 break;
             }
             if gain >= ACCEPTED && evaluation.cost < point.evaluation.cost {
                 self.learn(gain);
                 if linear.trouble.is_some() || !proposal.is_solved {
                     linear.trouble.get_or_insert(ConicStatus::Almost);
-                    // The next programs are others: they get the chance to be solved with less.
+                    // The following programs differ and may be solved with less damping.
                     self.damping = before;
                 }
                 return linear.step_to(work, point, proposal, evaluation, gain);
             }
             if linear.linearization.computed_at().is_some() {
-                // The Jacobian of another point may be to blame.
+                // The reused Jacobian may be the cause.
                 linear.linearise_again(work, point);
                 continue;
             }
@@ -109,7 +110,7 @@ impl StepRule for GaussNewton {
                 return Step::Minimum(reason);
             }
             if !proposal.is_solved {
-                // A shorter step promises less for being short.
+                // A shorter step predicts less because it is short.
                 linear.trouble.get_or_insert(ConicStatus::Almost);
             }
             self.damping *= 8.0;
@@ -164,13 +165,13 @@ impl GaussNewton {
     }
 }
 
-/// The linearised problem of one step.
+/// Linearised problem of one iteration.
 struct LinearisedProblem {
     linearization: Linearization,
     sub: Subproblem,
     /// Diagonal of the proximal term.
     scales: Vec<f64>,
-    /// How the last program ended that was not solved to full accuracy.
+    /// Status of the last program that was not solved to full accuracy.
     trouble: Option<ConicStatus>,
 }
 
@@ -186,21 +187,21 @@ impl LinearisedProblem {
         }
     }
 
-    /// Computes the Jacobian at `point` itself.
+    /// Computes the Jacobian at `point`.
     fn linearise_again(&mut self, work: &mut CountedEvaluator, point: &Iterate) {
         work.count_tangents(linearisation_tangents(work.problem()));
         self.linearization = work.linearise_again(point);
         self.sub = subproblem(work, point, &self.linearization);
     }
 
-    /// Gives the proximal term its weight.
+    /// Sets the weight of the proximal term.
     fn damp(&mut self, weight: f64) {
         for (d, s) in self.sub.proximal.iter_mut().zip(&self.scales) {
             *d = weight * s;
         }
     }
 
-    /// The step from `point` to a proposal; its linearisation is reused if that is nearby and brought the predicted decrease.
+    /// Step from `point` to a proposal; the linearisation is reused if the step is short and the decrease as predicted.
     fn step_to(
         &self,
         work: &mut CountedEvaluator,
@@ -225,7 +226,7 @@ impl LinearisedProblem {
     }
 }
 
-/// The subproblem at a point, without the proximal term.
+/// Subproblem at a point, without the proximal term.
 fn subproblem(
     work: &mut CountedEvaluator,
     point: &Iterate,

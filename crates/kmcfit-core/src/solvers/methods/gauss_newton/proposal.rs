@@ -1,4 +1,4 @@
-//! The step that a linearised problem proposes, and what is predicted of it.
+//! Proposed step of a linearised problem, and its predicted decrease.
 
 use crate::constraints;
 use crate::objective::Evaluation;
@@ -12,50 +12,49 @@ use crate::solvers::optimality::response_rounding;
 use crate::solvers::reason::Reason;
 use crate::solvers::timings::timed;
 
-/// A clipped step is used if it keeps this share of the plain step's predicted decrease.
+/// Share of the plain step's predicted decrease from which a clipped step is used.
 const CLIPPED: f64 = 0.9;
 /// Distance of an active bound, relative to the largest distance of a bound.
 const ACTIVE: f64 = 1e-4;
 /// J above this share of the misfit of zero response is that of noise or of another model: residuals of a thousandth of the
 /// measurements.
 const NOISE: f64 = 1e-6;
-/// A predicted decrease below this share of J that does not come true is within the accuracy to
-/// which a quadratic program is solved.
+/// Share of J below which a predicted decrease is within the accuracy of a quadratic program.
 const PROGRAM_ACCURACY: f64 = 1e-9;
-/// A relative change of the functions below this is not a step but rounding.
+/// Relative change of the functions below which a step is a rounding error.
 pub(super) const SMALLEST_CHANGE: f64 = 1e-9;
 
-/// A step of the parameters and the decrease of J that the model predicts for it.
+/// A step of the parameters and the predicted decrease of J.
 pub(super) struct Proposal {
     pub parameters: Vec<f64>,
     pub predicted: f64,
-    /// By how much more the subproblem can be lowered, as far as its solution is known; 0 where it is known to full accuracy.
+    /// Bound of the further decrease of the subproblem; 0 where it is solved to full accuracy.
     pub uncertainty: f64,
     /// Whether the subproblem was solved as accurately as was wanted.
     pub is_solved: bool,
 }
 
-/// What a subproblem gives.
-pub(super) enum Answer {
+/// Result of a subproblem.
+pub(super) enum ProposalOutcome {
     Step(Proposal),
-    /// No step: the subproblem could not be solved, for this reason.
+    /// The subproblem could not be solved; its status.
     Unsolved(ConicStatus),
 }
 
-/// A decrease of the cost that cannot be told from none: by the accuracy to which a quadratic program is solved, and the
-/// rounding of the response.
+/// Smallest significant decrease of the cost, given the accuracy of a quadratic program and the rounding error of the
+/// response.
 fn least_decrease(problem: &Problem, cost: f64) -> f64 {
     PROGRAM_ACCURACY * cost + response_rounding(problem, cost)
 }
 
-/// Why a proposal that did not lower the cost is no reason to go on, if it is none: it promises
-/// less than the rounding of the cost, or moves less than rounding moves the motion.
+/// Reason to end at a minimum after a proposal that did not lower the cost: its predicted decrease, or its change, is below
+/// the rounding error. `None` otherwise.
 pub(super) fn at_minimum(
     problem: &Problem,
     point: &Iterate,
     proposal: &Proposal,
 ) -> Option<Reason> {
-    // A prediction below zero by more, or of no number, is that of a wrong solution.
+    // A negative or NaN prediction belongs to a wrong solution.
     if proposal.predicted.abs() + proposal.uncertainty
         <= least_decrease(problem, point.evaluation.cost)
     {
@@ -66,27 +65,30 @@ pub(super) fn at_minimum(
     (is_known && change <= SMALLEST_CHANGE).then_some(Reason::NoPredictedChange(change))
 }
 
-/// The largest change of a function that a proposal asks for, relative to the function's size.
+/// Largest change of a function in a proposal, relative to its size.
 pub(super) fn change(problem: &Problem, point: &Iterate, proposal: &Proposal) -> f64 {
     point.relative_change(problem, &proposal.parameters)
 }
 
-/// The best step that the subproblem offers in the constraint set. Staying is a step as well: whatever predicts
-/// a higher cost is no solution, and the next way is tried.
-pub(super) fn propose(work: &mut CountedEvaluator, sub: &Subproblem, point: &Iterate) -> Answer {
+/// Best feasible step of the subproblem. Candidates with a predicted increase of the cost are rejected.
+pub(super) fn propose(
+    work: &mut CountedEvaluator,
+    sub: &Subproblem,
+    point: &Iterate,
+) -> ProposalOutcome {
     let constraints = &work.problem().constraints;
     let cost = point.evaluation.cost;
     let least = least_decrease(work.problem(), cost);
     // False for NaN.
     let is_sound = |predicted: &f64| *predicted >= -least;
-    // Rounding of the step, or a clipped parameter, may break a row that the step itself satisfies.
+    // Rounding, or a clipped parameter, may violate a row that the step itself satisfies.
     let moved = |z: &[f64]| {
         let parameters = constraints.moved(&point.parameters, z);
         let is_inside = constraints.hold(&parameters, constraints::TOLERANCE);
         is_inside.then_some(parameters)
     };
     let exact = |parameters: Vec<f64>, predicted: f64| {
-        Answer::Step(Proposal {
+        ProposalOutcome::Step(Proposal {
             parameters,
             predicted,
             uncertainty: 0.0,
@@ -101,7 +103,7 @@ pub(super) fn propose(work: &mut CountedEvaluator, sub: &Subproblem, point: &Ite
         && let Some((solution, excess)) = work.program(|| sub.step_on_stages(iterations))
         && let Some(proposal) = of_program(work, sub, point, &solution, excess)
     {
-        return Answer::Step(proposal);
+        return ProposalOutcome::Step(proposal);
     }
     let plain = work.algebra(|| sub.solve_plain());
     let plain = plain.map(|z| (cost - sub.value(&z), z));
@@ -135,11 +137,11 @@ pub(super) fn propose(work: &mut CountedEvaluator, sub: &Subproblem, point: &Ite
         None => (sub.solve_within(iterations), 0.0),
     });
     if !solution.status.is_point() {
-        return Answer::Unsolved(solution.status);
+        return ProposalOutcome::Unsolved(solution.status);
     }
     match of_program(work, sub, point, &solution, excess) {
-        Some(proposal) => Answer::Step(proposal),
-        None => Answer::Unsolved(ConicStatus::Stalled),
+        Some(proposal) => ProposalOutcome::Step(proposal),
+        None => ProposalOutcome::Unsolved(ConicStatus::Stalled),
     }
 }
 
@@ -171,7 +173,7 @@ fn of_program(
     })
 }
 
-/// The subproblem's cost for the step to `parameters`, by tangent solves.
+/// Cost of the subproblem for the step to `parameters`, by tangent solves.
 fn model_cost(
     work: &mut CountedEvaluator,
     sub: &Subproblem,
@@ -197,8 +199,7 @@ fn model_cost(
     near + problem.regularisation(parameters) + misfit
 }
 
-/// The cost of the readings with every prediction replaced by its linearisation, and every loss by
-/// the squares that stand for it.
+/// Cost of the samples with linearised predictions and quadratic majorants of the losses.
 fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f64 {
     let changes = problem.predictions_tangent(evaluation, delta);
     let mut misfit = robust_surplus(problem, evaluation);

@@ -1,5 +1,4 @@
-//! All trial steps of a point at once: the costs of batches of trials, eight in the lanes of a row, and the response of
-//! the lowest one only.
+//! Trial steps of a point in batches: costs of eight trials per SIMD row, and the response of the best trial only.
 
 use super::{Best, take, trial};
 use crate::objective::Evaluation;
@@ -16,7 +15,7 @@ use crate::solvers::iterate::Iterate;
 pub(super) struct BatchedTrials([StepBatch; 2]);
 
 impl BatchedTrials {
-    /// The lowest trial, if it lowers the cost.
+    /// Best trial, if it lowers the cost.
     pub fn lowest(
         &mut self,
         work: &mut CountedEvaluator,
@@ -36,8 +35,8 @@ impl BatchedTrials {
                 let parameters = trial(point, length);
                 let mut evaluation = take(spare, problem);
                 let states = self.states(layout.place(which));
-                let has_motion = move_to(problem, &parameters, states, &mut evaluation);
-                evaluation.misfit = match has_motion {
+                let has_response = move_to(problem, &parameters, states, &mut evaluation);
+                evaluation.misfit = match has_response {
                     true => channel.cost(&evaluation.predictions[0][0]),
                     false => f64::INFINITY,
                 };
@@ -54,7 +53,7 @@ impl BatchedTrials {
         })
     }
 
-    /// The sums of squares of all rows.
+    /// Sums of squares of all rows.
     fn costs(&mut self, ray: SearchRay, layout: &LaneLayout) -> Vec<Row> {
         let rows = layout.rows();
         let middle = rows.div_ceil(2);
@@ -64,35 +63,35 @@ impl BatchedTrials {
         [first.costs(), second.costs()].concat()
     }
 
-    /// States of a trial along its response; not a number where there are none, which no response is made of.
+    /// States of a trial along its response; NaN where not stored, from which no response is reconstructed.
     fn states(&self, place: (usize, usize)) -> [Row; 2] {
         let states = self.0.iter().find_map(|batch| batch.states(place));
         states.unwrap_or([[f64::NAN; LANES]; 2])
     }
 }
 
-/// Device, motion and predictions at `parameters`, from states of the motion; whether it has one.
+/// Computes coefficients, response and predictions at `parameters`, from states of the response; returns false if the
+/// simulation fails.
 fn move_to(
     problem: &Problem,
     parameters: &[f64],
     states: [Row; 2],
     evaluation: &mut Evaluation,
 ) -> bool {
-    (problem.functions).device_into(parameters, 0, &mut evaluation.device);
-    let (system, device) = (&problem.system, &evaluation.device);
-    let motion = &mut evaluation.trajectories[0];
+    (problem.functions).nodal_into(parameters, 0, &mut evaluation.nodal);
+    let (system, nodal) = (&problem.system, &evaluation.nodal);
+    let response = &mut evaluation.trajectories[0];
     let initial = problem.experiments[0].initial;
-    let is_whole = reconstruct(device, initial, states, system.grid.step(), motion);
-    if !is_whole && reference::forward_into(system, device, initial, None, motion).is_err() {
+    let is_whole = reconstruct(nodal, initial, states, system.grid.step(), response);
+    if !is_whole && reference::forward_into(system, nodal, initial, None, response).is_err() {
         return false;
     }
-    evaluation.predictions[0][0].clone_from(&motion.displacement);
+    evaluation.predictions[0][0].clone_from(&response.displacement);
     true
 }
 
-/// The trials' devices as a ray, on the paper's own problem: one free record seen at every node, one
-/// value a node, linear terms, the midpoint rule, and nothing beside the integral cost; `None` for
-/// any other.
+/// Trial systems as a search ray, for the paper's problem: one free record with a sample at every node, nodal functions,
+/// linear terms, the midpoint rule and the integral cost alone; `None` for any other problem.
 pub(super) fn ray<'a>(problem: &'a Problem, point: &'a Iterate) -> Option<SearchRay<'a>> {
     let (experiment, channel, _) = problem.one_full_record()?;
     let system = &problem.system;
@@ -112,7 +111,7 @@ pub(super) fn ray<'a>(problem: &'a Problem, point: &'a Iterate) -> Option<Search
         functions: parts(&point.parameters),
         direction: parts(&point.gradient.l2),
         initial: experiment.initial,
-        readings: channel.observed(),
+        samples: channel.observed(),
         step: system.grid.step(),
     })
 }

@@ -1,4 +1,4 @@
-//! Steepest descent exactly as in the paper.
+//! Steepest descent with the paper's trial steps.
 
 mod batched_trials;
 
@@ -15,10 +15,10 @@ const TRIALS: u32 = 50;
 /// Factor of the longest trial step: `5 sqrt(G^2)`.
 const LONGEST: f64 = 5.0;
 
-/// Tries the steps `5 sqrt(G^2) / i^4`, `i = 1..50`, along the L2 gradient and takes the trial with
-/// the lowest cost, if it is strictly lower.
+/// Tries the steps `5 sqrt(G^2) / i^4`, `i = 1..50`, along the negative L2 gradient and takes the trial of lowest cost, if it
+/// is strictly lower than the current one.
 ///
-/// On the paper's own problem all trials are computed in batches; the bits are the same.
+/// For the paper's problem all trials are computed in batches, with bit-identical results.
 #[derive(Default)]
 pub struct SteepestDescent {
     spare: Vec<Evaluation>,
@@ -81,8 +81,7 @@ impl SteepestDescent {
 }
 
 impl Best {
-    /// Takes the place of `best` if its cost is strictly lower than that, and than that of the point; whose storage is not
-    /// needed any more goes to `spare`.
+    /// Replaces `best` if its cost is strictly lower than that of `best` and of the point; unused storage is added to `spare`.
     fn or_lower(self, best: &mut Option<Best>, point: &Iterate, spare: &mut Vec<Evaluation>) {
         let lowest = best
             .as_ref()
@@ -95,7 +94,7 @@ impl Best {
     }
 }
 
-/// The lengths of the trial steps, longest first.
+/// Lengths of the trial steps, longest first.
 fn lengths(point: &Iterate) -> Vec<f64> {
     let root = point.gradient.norm_squared.sqrt();
     (1..=TRIALS)
@@ -108,7 +107,7 @@ fn take(spare: &mut Vec<Evaluation>, problem: &Problem) -> Evaluation {
     spare.pop().unwrap_or_else(|| problem.workspace())
 }
 
-/// `p - length g`.
+/// Parameters `p - length g`.
 fn trial(point: &Iterate, length: f64) -> Vec<f64> {
     let moves = point.parameters.iter().zip(&point.gradient.l2);
     moves.map(|(p, g)| p - length * g).collect()

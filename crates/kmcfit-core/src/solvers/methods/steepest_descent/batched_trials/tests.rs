@@ -9,7 +9,7 @@ use crate::system::{Grid, Method, State, System, Term};
 
 const NODES: usize = 401;
 
-/// The paper's problem, smaller.
+/// The paper's problem on a coarse grid.
 fn problem() -> Problem {
     let grid = Grid::new(0.0, 10.0, NODES).expect("a grid");
     let system = System {
@@ -27,10 +27,10 @@ fn problem() -> Problem {
     ];
     let functions = Parameterization::new(list, NODES, grid.step()).expect("functions");
     let times = grid.times().into_iter();
-    let readings = times.map(|t| (-0.05 * t).exp() * (1.1 * t).cos()).collect();
+    let samples = times.map(|t| (-0.05 * t).exp() * (1.1 * t).cos()).collect();
     let spacing = grid.step();
     let weighting = Weighting::Integral { spacing };
-    let channel = Channel::displacement_at_nodes(readings, 1, weighting, &grid);
+    let channel = Channel::displacement_at_nodes(samples, 1, weighting, &grid);
     let initial = State {
         displacement: 1.0,
         velocity: 0.0,
@@ -39,7 +39,7 @@ fn problem() -> Problem {
     Problem::new(system, functions, vec![experiment]).unwrap()
 }
 
-/// A search of some steps.
+/// Iterates of a search with some steps.
 fn search(problem: &Problem, steps: usize) -> Vec<Iterate> {
     let settings = FitSettings {
         solver: Solver::SteepestDescent,
@@ -64,7 +64,7 @@ fn search(problem: &Problem, steps: usize) -> Vec<Iterate> {
     points
 }
 
-/// Each step is the best of the trials that are evaluated one by one.
+/// Each step is the best of the trials evaluated one by one.
 #[test]
 fn steps_are_the_best_of_all_trials() {
     let problem = problem();
@@ -86,9 +86,9 @@ fn steps_are_the_best_of_all_trials() {
     }
 }
 
-/// States that are not those of the motion lead to the motion all the same.
+/// A response reconstructed from wrong states is recomputed.
 #[test]
-fn a_motion_does_not_depend_on_its_states() {
+fn the_response_does_not_depend_on_the_stored_states() {
     let problem = problem();
     let mut expected = problem.workspace();
     let evaluated = problem.evaluate_for(Purpose::Reproduction, &problem.start(), &mut expected);
@@ -96,7 +96,7 @@ fn a_motion_does_not_depend_on_its_states() {
     let mut found = problem.workspace();
     for states in [[[0.0; LANES]; 2], [[f64::NAN; LANES]; 2]] {
         assert!(move_to(&problem, &problem.start(), states, &mut found));
-        assert!(found.device == expected.device && found.trajectories == expected.trajectories);
+        assert!(found.nodal == expected.nodal && found.trajectories == expected.trajectories);
         assert!(found.predictions == expected.predictions);
     }
     let mut without_mass = problem.start();

@@ -1,0 +1,64 @@
+//! Standard error of a constant function, and Wald test of a constant against a varying function.
+
+use crate::functions::{Basis, CoefficientFunction};
+use crate::problem::Problem;
+use crate::record::{Channel, Loss, Weighting};
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+
+/// Standard error of a constant function.
+pub fn standard_error(
+    function: &CoefficientFunction,
+    index: usize,
+    covariance: Option<&DMatrix<f64>>,
+) -> Option<f64> {
+    let constant = matches!(function.basis, Some(Basis::Constant));
+    let covariance = covariance.filter(|_| constant)?;
+    Some(covariance[(index, index)].sqrt())
+}
+
+/// p-value of the Wald test of function `f` against a constant: the probability that noise alone causes at least the variation
+/// found. With the parameters `p`, their `covariance` `C` and the parameters `e` of the constant 1, `min_a (p - a e)' C^-1 (p - a e)` has
+/// a chi-square distribution with one degree of freedom less than there are parameters; divided by that number, an F
+/// distribution where the noise is estimated from the residuals. `None` for a function whose basis contains no constant, or
+/// nothing else, and under a robust loss, which has another covariance.
+pub fn constant_probability(
+    problem: &Problem,
+    f: usize,
+    theta: &[f64],
+    covariance: &DMatrix<f64>,
+) -> Option<f64> {
+    let function = problem.functions.get(f);
+    let range = problem.functions.ranges()[f].clone();
+    let n = range.len();
+    let one = match function.basis.as_ref()? {
+        Basis::Constant => return None,
+        Basis::Polynomial { .. } => DVector::from_fn(n, |i, _| f64::from(i == 0)),
+        Basis::Nodal
+        | Basis::PiecewiseConstant { .. }
+        | Basis::PiecewiseLinear { .. }
+        | Basis::BSpline { .. } => DVector::from_element(n, 1.0),
+    };
+    let is_robust = problem.channels().any(|c| c.loss() != Loss::Squares);
+    if is_robust || function.offset.iter().any(|x| *x != 0.0) {
+        return None;
+    }
+    let block = covariance.view((range.start, range.start), (n, n));
+    let root = block.into_owned().cholesky()?.l();
+    let values = root.solve_lower_triangular(&DVector::from_column_slice(&theta[range]))?;
+    let one = root.solve_lower_triangular(&one)?;
+    let along = values.dot(&one) / one.norm_squared();
+    let distance = (values - one * along).norm_squared();
+    let degrees = n.checked_sub(1)? as f64;
+    let is_given =
+        |c: &Channel| matches!(c.weighting(), Weighting::Sigma(_) | Weighting::Sigmas(_));
+    let p = match problem.channels().all(is_given) {
+        true => ChiSquared::new(degrees).ok()?.sf(distance),
+        false => {
+            let left = problem.sample_count().checked_sub(problem.parameters())?;
+            let law = FisherSnedecor::new(degrees, left as f64).ok()?;
+            law.sf(distance / degrees)
+        }
+    };
+    p.is_finite().then_some(p)
+}

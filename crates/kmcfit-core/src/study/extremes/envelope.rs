@@ -1,0 +1,103 @@
+//! Envelopes of all coefficient functions and of `k/m` and `c/m`: smallest and largest values compatible with the data.
+
+use super::{
+    Extreme, ExtremePair, ExtremeStatus, MisfitLimit, extreme_pairs, ratios_at, values_at,
+};
+use crate::diagnostics::chi_square_one;
+use crate::functions::CoefficientKind;
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+
+/// Largest roughness of a system in an envelope, as a multiple of the optimum's.
+const BUDGET: f64 = 2.0;
+/// A misfit above this share of the limit counts as equal to the limit.
+const AT_LEVEL: f64 = 0.999;
+
+/// The extremes of one function or ratio at several times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Envelope {
+    /// Name of the function or ratio.
+    pub name: String,
+    /// Its unit.
+    pub unit: &'static str,
+    /// The extremes at each time.
+    pub bands: Vec<ExtremePair>,
+}
+
+impl MisfitLimit {
+    /// The requested misfit limit, or that of a confidence level, with limits of roughness for each penalty of the fit.
+    pub fn at(
+        problem: &Problem,
+        theta: &[f64],
+        evaluation: &Evaluation,
+        asked: Option<f64>,
+        confidence: f64,
+    ) -> Self {
+        let quantile = chi_square_one(confidence);
+        let has_sigma = problem.channels().all(|c| c.weighting().is_sigma());
+        let mut level = Self::of(asked.unwrap_or_else(|| match has_sigma {
+            true => evaluation.misfit + quantile,
+            // The profile statistic `n ln J` rises by the quantile.
+            false => evaluation.misfit * (quantile / problem.sample_count() as f64).exp(),
+        }));
+        level.budgets = (problem.penalties.iter())
+            .map(|penalty| {
+                let range = problem.functions.ranges()[penalty.function].clone();
+                let now = penalty.roughness(&theta[range]);
+                (penalty.clone(), BUDGET * now.max(f64::MIN_POSITIVE))
+            })
+            .collect();
+        level
+    }
+}
+
+impl Extreme {
+    /// Status of the search; a search without a feasible step whose misfit equals the limit has converged.
+    pub fn ended_at(&self, level: &MisfitLimit) -> ExtremeStatus {
+        match self.ended {
+            ExtremeStatus::NoFeasibleStep if self.misfit >= AT_LEVEL * level.misfit => {
+                ExtremeStatus::Converged
+            }
+            ended => ended,
+        }
+    }
+}
+
+/// Envelopes of all estimated functions and of k/m and c/m at `times` (s); empty where the optimum violates the misfit limit
+/// or the constraints.
+pub fn envelopes(
+    problem: &Problem,
+    theta: &[f64],
+    level: &MisfitLimit,
+    times: &[f64],
+    threads: usize,
+) -> Vec<Envelope> {
+    let main = problem.functions.coefficient_set(0);
+    let mut jobs = Vec::new();
+    for &f in main {
+        let function = problem.functions.get(f);
+        if function.parameters() > 0 {
+            let targets = values_at(problem, f, times);
+            jobs.push((function.name(), function.quantity.unit(), targets));
+        }
+    }
+    let of = |q: CoefficientKind| {
+        main.iter()
+            .find(|f| problem.functions.get(**f).quantity == q)
+    };
+    let ratios = [
+        ("k/m", CoefficientKind::Stiffness, "1/s^2"),
+        ("c/m", CoefficientKind::Damping, "1/s"),
+    ];
+    for (name, over, unit) in ratios {
+        if let (Some(&over), Some(&mass)) = (of(over), of(CoefficientKind::Mass)) {
+            jobs.push((name.to_owned(), unit, ratios_at(problem, over, mass, times)));
+        }
+    }
+    let starts = [theta.to_vec()];
+    let envelopes = jobs.into_iter().filter_map(|(name, unit, targets)| {
+        let bands = extreme_pairs(problem, &starts, &targets, level, threads)?;
+        Some(Envelope { name, unit, bands })
+    });
+    envelopes.collect()
+}

@@ -1,0 +1,212 @@
+//! Data checks of a record.
+
+use super::warning::DataWarning;
+use super::{RawChannel, Record, is_equation_error};
+use crate::config::ModelFile;
+use crate::config::scalar::{NumberOrEstimate, ScalarOr};
+use crate::config::spec::{ExperimentSpec, InitialSpec};
+use crate::finding::Finding;
+use kmcfit_core::internals::diagnostics::{far_off, spread, without_line};
+use kmcfit_core::internals::record::ChannelKind;
+use kmcfit_core::internals::signal::{Interpolation, Signal, Spectrum, clipped, onset};
+use kmcfit_core::internals::system::round_time;
+use std::f64::consts::TAU;
+
+/// Ratios between channels, or between a sample and the given state, that suggest a wrong unit.
+const SUSPICIOUS: [(f64, &str); 8] = [
+    (1e3, "the factor 1000 between m and mm"),
+    (1e-3, "the factor 1/1000 between mm and m"),
+    (1e6, "the factor 10^6 between m and um"),
+    (1e-6, "the factor 10^-6 between um and m"),
+    (1e2, "the factor 100 between m and cm"),
+    (1e-2, "the factor 1/100 between cm and m"),
+    (9.80665, "the factor 9.81 between g and m/s^2"),
+    (1.0 / 9.80665, "the factor 1/9.81 between m/s^2 and g"),
+];
+/// Largest quotient of a ratio and such a factor: channels of one response agree within some ten per cent only, because
+/// the response has more than one frequency.
+const NEAR: f64 = 1.5;
+/// Two channels have opposite signs if their correlation is below minus this.
+const AGAINST: f64 = 0.7;
+/// Fewest periods of the response, and fewest samples per period, for a comparison of signs: a monotone decay has an
+/// acceleration of the sign of its displacement, and differences of coarse samples have any sign.
+const FEWEST_PERIODS: f64 = 3.0;
+const FEWEST_IN_A_PERIOD: f64 = 4.0;
+
+/// Warnings about the record of experiment `i`.
+pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &Record) -> Vec<Finding> {
+    let mut warnings = sizes(spec, record);
+    warnings.extend(signs(spec, record));
+    warnings.extend(record.channels.iter().filter_map(range));
+    warnings.extend(record.channels.iter().filter_map(|c| outliers(spec, c)));
+    // The equation error simulates no response from an initial state.
+    if !is_equation_error(file) {
+        warnings.extend(stillness(spec, record));
+    }
+    let name = file.experiment_name(i);
+    let place = format!("experiments[{i}] ({name})");
+    warnings.iter().map(|warning| warning.at(&place)).collect()
+}
+
+/// Channels of one response, or a sample and the given state, that disagree by a [`SUSPICIOUS`] factor.
+fn sizes(spec: &ExperimentSpec, record: &Record) -> Vec<DataWarning> {
+    let mut found = Vec::new();
+    let mut add = |ratio: f64, quantity: String| {
+        let near = |f: f64| ratio / f < NEAR && f / ratio < NEAR;
+        if let Some((_, factor)) = SUSPICIOUS.iter().find(|(f, _)| near(*f)) {
+            found.push(DataWarning::SuspiciousFactor {
+                quantity,
+                ratio,
+                factor,
+            });
+        }
+    };
+    let first = |kind: ChannelKind| record.channels.iter().find(|c| c.kind == kind);
+    let displacement = first(ChannelKind::Displacement);
+    if let (Some(channel), InitialSpec::Map(state)) = (displacement, &spec.initial)
+        && let ScalarOr::Scalar(NumberOrEstimate::Number(start)) = &state.displacement
+        && start.0 != 0.0
+    {
+        let ratio = (channel.values[0] / start.0).abs();
+        add(ratio, "the first displacement".to_owned());
+    }
+    for pair in [
+        [ChannelKind::Displacement, ChannelKind::Velocity],
+        [ChannelKind::Velocity, ChannelKind::Acceleration],
+        [ChannelKind::Displacement, ChannelKind::Acceleration],
+    ] {
+        let [Some(low), Some(high)] = pair.map(first) else {
+            continue;
+        };
+        let Some(spectrum) = Spectrum::of(&low.values, low.median_spacing) else {
+            continue;
+        };
+        let omega = TAU * spectrum.dominant();
+        let orders = pair[1] as i32 - pair[0] as i32;
+        let ratio = spread(&high.values) / (omega.powi(orders) * spread(&low.values));
+        if ratio.is_finite() && ratio > 0.0 {
+            let [low, high] = pair.map(ChannelKind::name);
+            add(ratio, format!("the {high} relative to the {low}"));
+        }
+    }
+    found
+}
+
+/// Pairs of channels of one response with opposite signs.
+fn signs(spec: &ExperimentSpec, record: &Record) -> Vec<DataWarning> {
+    let channels = &record.channels;
+    let pairs = (channels.iter().enumerate())
+        .flat_map(|(place, high)| channels[..place].iter().map(move |low| (low, high)));
+    let against = pairs.filter(|(low, high)| {
+        let turned = turn(spec, low.kind).zip(turn(spec, high.kind));
+        turned.is_some_and(|(one, other)| {
+            one * other * together(low, high).unwrap_or_default() < -AGAINST
+        })
+    });
+    let warnings = against.map(|(low, high)| DataWarning::OppositeSign {
+        high: high.kind.name(),
+        low: low.kind.name(),
+    });
+    warnings.collect()
+}
+
+/// Sign of a sensor's gain; `None` if the gain is estimated.
+fn turn(spec: &ExperimentSpec, kind: ChannelKind) -> Option<f64> {
+    let sensors = spec.sensors.as_ref();
+    let sensor = sensors.and_then(|sensors| match kind {
+        ChannelKind::Displacement => sensors.displacement.as_ref(),
+        ChannelKind::Velocity => sensors.velocity.as_ref(),
+        ChannelKind::Acceleration => sensors.acceleration.as_ref(),
+    });
+    match sensor.and_then(|sensor| sensor.gain.as_ref()) {
+        None => Some(1.0),
+        Some(ScalarOr::Scalar(NumberOrEstimate::Number(gain))) => Some(gain.0.signum()),
+        Some(_) => None,
+    }
+}
+
+/// Correlation of the samples of `high` with their estimate from `low`: its slope, or for an acceleration and a
+/// displacement the negative displacement, as for a harmonic response. `None` for too few periods or samples.
+fn together(low: &RawChannel, high: &RawChannel) -> Option<f64> {
+    let frequency = Spectrum::of(&high.values, high.median_spacing)?.dominant();
+    let duration = high.times[high.times.len() - 1] - high.times[0];
+    if frequency * duration < FEWEST_PERIODS
+        || frequency * low.median_spacing * FEWEST_IN_A_PERIOD > 1.0
+    {
+        return None;
+    }
+    let values = Signal::new(
+        high.times.clone(),
+        high.values.clone(),
+        Interpolation::Linear,
+    )?;
+    let around = low.times.windows(3).zip(low.values.windows(3));
+    let inside = around.filter(|(t, _)| values.covers(t[1], t[1]));
+    let (mut times, mut said, mut read) = (Vec::new(), Vec::new(), Vec::new());
+    for (t, y) in inside {
+        times.push(t[1]);
+        read.push(values.value(t[1]));
+        said.push(match high.kind as i32 - low.kind as i32 {
+            1 => (y[2] - y[0]) / (t[2] - t[0]),
+            _ => -y[1],
+        });
+    }
+    // Sensors drift.
+    let [said, read] = [said, read].map(|values| without_line(&times, &values));
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let correlation =
+        product(&said, &read) / (product(&said, &said) * product(&read, &read)).sqrt();
+    correlation.is_finite().then_some(correlation)
+}
+
+/// A free record that begins at rest, before the release or the impact.
+fn stillness(spec: &ExperimentSpec, record: &Record) -> Option<DataWarning> {
+    if !record.excitation.is_empty() || spec.force.is_some() || spec.base.is_some() {
+        return None;
+    }
+    let mut channels = record.channels.iter();
+    let (channel, first) = channels.find_map(|c| Some((c, onset(&c.values, c.median_spacing)?)))?;
+    let from = in_file(spec, channel, first);
+    Some(DataWarning::AtRest {
+        channel: channel.kind.name(),
+        start: from,
+    })
+}
+
+/// Time of a sample on the time axis of its file, s.
+fn in_file(spec: &ExperimentSpec, channel: &RawChannel, reading: usize) -> f64 {
+    let zero = spec.time_zero.as_ref().map_or(0.0, |zero| zero.0);
+    round_time(channel.times[reading] + zero, channel.median_spacing)
+}
+
+/// Outliers of a channel with a quadratic loss.
+fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<DataWarning> {
+    if !channel.is_squared() {
+        return None;
+    }
+    let mut sorted = channel.values.clone();
+    sorted.sort_by(f64::total_cmp);
+    let level = sorted[sorted.len() / 2];
+    let away: Vec<f64> = channel.values.iter().map(|value| value - level).collect();
+    let far = far_off(&away);
+    let first = *far.first()?;
+    Some(DataWarning::Outliers {
+        channel: channel.kind.name(),
+        samples: far.len(),
+        first_value: channel.values[first] / channel.unit.factor(),
+        first_time: in_file(spec, channel, first),
+        unit: channel.unit.symbol().into(),
+        has_sigma: channel.weighting.is_some(),
+    })
+}
+
+/// Many samples at one extreme value: saturation of the sensor.
+fn range(channel: &RawChannel) -> Option<DataWarning> {
+    let (samples, level) = clipped(&channel.values)?;
+    Some(DataWarning::Saturation {
+        channel: channel.kind.name(),
+        samples,
+        level: level / channel.unit.factor(),
+        unit: channel.unit.symbol().into(),
+    })
+}

@@ -1,0 +1,121 @@
+//! Warnings about the data of an experiment.
+
+use crate::digits::significant;
+use crate::finding::Finding;
+use serde::Serialize;
+use thiserror::Error;
+
+/// A warning about the data of an experiment. Values are in the unit of the column.
+#[derive(Debug, Clone, PartialEq, Serialize, Error)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub(super) enum DataWarning {
+    /// The model and the file state different units of a column.
+    #[error("column `{column}` is read in {used}, as the model states; the file states {stated}")]
+    UnitDiffersFromFile {
+        column: String,
+        used: String,
+        stated: String,
+    },
+    /// The row of units and the name of a column state different units.
+    #[error(
+        "column `{column}` is read in {used}, as the file's row of units states; its name ends like {stated}"
+    )]
+    UnitDiffersFromName {
+        column: String,
+        used: String,
+        stated: String,
+    },
+    /// The file states a unit that the program cannot convert.
+    #[error(
+        "unknown unit `{stated}` of {quantity} in column `{column}`; the values are read in {used} without conversion"
+    )]
+    UnknownUnit {
+        column: String,
+        stated: String,
+        quantity: &'static str,
+        used: String,
+    },
+    /// The name of a column ends like a unit that is not used.
+    #[error(
+        "column `{column}` is read in {used}, although its name ends like {stated}; if {stated} is its unit, add `units: \
+         {{{name}: {stated}}}`"
+    )]
+    UnitOfNameUnused {
+        column: String,
+        name: String,
+        used: String,
+        stated: String,
+    },
+    /// A column of standard deviations states another unit than its samples.
+    #[error(
+        "column `{column}` is read in {used}, the unit of its samples; the file states {stated}"
+    )]
+    SigmaUnitDiffers {
+        column: String,
+        used: String,
+        stated: String,
+    },
+    /// The times look equally spaced but rounded.
+    #[error(
+        "the times are nearly but not exactly equally spaced, as if printed with too few digits; they are used as given. \
+         `sample_rate` in place of the column of times states them exactly"
+    )]
+    NearlyEqualTimes,
+    /// Two channels, or a channel and the initial state, disagree by the factor between two units.
+    #[error("{quantity} is {} times its expected value, {factor}; check `units`", significant(*ratio, 4))]
+    SuspiciousFactor {
+        quantity: String,
+        ratio: f64,
+        factor: &'static str,
+    },
+    /// Two channels of one response have opposite signs.
+    #[error(
+        "{high} and {low} have opposite signs; if the {high} is reversed, add `sensors: {{{high}: {{gain: -1}}}}`"
+    )]
+    OppositeSign {
+        high: &'static str,
+        low: &'static str,
+    },
+    /// A free record at rest before its motion begins.
+    #[error(
+        "the {channel} is at rest before {start} s; a free decay must begin after the release or impact: `window: {{min: \
+         {start}}}`"
+    )]
+    AtRest { channel: &'static str, start: f64 },
+    /// Outliers under a quadratic loss.
+    #[error(
+        "{samples} outlier{} in the {channel}, the first {} {unit} at {first_time} s; delete {} (empty fields) or use a \
+         robust loss (`loss: {{{channel}: huber}}`{})",
+        if *samples == 1 { "" } else { "s" },
+        significant(*first_value, 4),
+        if *samples == 1 { "it" } else { "them" },
+        if *has_sigma { "" } else { ", with `sigma`" },
+    )]
+    Outliers {
+        channel: &'static str,
+        samples: usize,
+        first_value: f64,
+        first_time: f64,
+        unit: String,
+        #[serde(skip)]
+        has_sigma: bool,
+    },
+    /// Many samples at the end of the range.
+    #[error(
+        "{samples} samples of the {channel} equal its extreme value {level} {unit}; if the sensor saturates there, delete \
+         them (empty fields)"
+    )]
+    Saturation {
+        channel: &'static str,
+        samples: usize,
+        level: f64,
+        unit: String,
+    },
+}
+
+impl DataWarning {
+    /// The warning as a finding about a key or an experiment of the model file.
+    pub fn at(&self, place: &str) -> Finding {
+        Finding::of(self, format!("{place}: {self}")).with("place", place)
+    }
+}

@@ -1,0 +1,89 @@
+//! Findings, warnings and suggestions of a document: a kind, its quantities and a sentence.
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::fmt;
+
+/// One finding, warning or suggestion. In JSON an object with the field `kind`, the quantities of that kind, and the
+/// field `text`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Finding {
+    /// Kind, in snake case.
+    pub kind: String,
+    /// Quantities by name.
+    #[serde(flatten)]
+    pub quantities: Map<String, Value>,
+    /// The sentence.
+    pub text: String,
+}
+
+impl Finding {
+    /// A finding without quantities.
+    pub fn new(kind: impl Into<String>, text: impl Into<String>) -> Self {
+        Self {
+            kind: kind.into(),
+            quantities: Map::new(),
+            text: text.into(),
+        }
+    }
+
+    /// The finding with another quantity; one that JSON cannot hold is `null`.
+    #[must_use]
+    pub fn with(mut self, name: &str, value: impl Serialize) -> Self {
+        let value = serde_json::to_value(value).unwrap_or_default();
+        self.quantities.insert(name.to_owned(), value);
+        self
+    }
+
+    /// The finding of an enumeration's variant that serialises with its kind as the tag `kind`.
+    pub fn of(variant: &impl Serialize, text: impl Into<String>) -> Self {
+        let mut quantities = match serde_json::to_value(variant) {
+            Ok(Value::Object(fields)) => fields,
+            _ => Map::new(),
+        };
+        let kind = quantities.remove("kind");
+        let kind = kind.and_then(|kind| kind.as_str().map(str::to_owned));
+        Self {
+            kind: kind.unwrap_or_default(),
+            quantities,
+            text: text.into(),
+        }
+    }
+
+    /// The finding of a variant whose sentence is its `Display`.
+    pub fn stated(variant: &(impl Serialize + fmt::Display)) -> Self {
+        Self::of(variant, variant.to_string())
+    }
+
+    /// The sentences of findings.
+    pub fn texts(findings: &[Self]) -> Vec<String> {
+        findings.iter().map(|f| f.text.clone()).collect()
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_finding_is_one_object_with_kind_quantities_and_text() {
+        #[derive(Serialize)]
+        #[serde(tag = "kind", rename_all = "snake_case")]
+        enum Example {
+            CoarseSteps { ratio: f64 },
+        }
+        let finding = Finding::of(&Example::CoarseSteps { ratio: 2.0 }, "the steps are coarse");
+        let json = serde_json::to_string(&finding).unwrap_or_default();
+        assert_eq!(
+            json,
+            r#"{"kind":"coarse_steps","ratio":2.0,"text":"the steps are coarse"}"#
+        );
+        assert_eq!(serde_json::from_str::<Finding>(&json).ok(), Some(finding));
+    }
+}

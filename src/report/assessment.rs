@@ -1,0 +1,81 @@
+//! Functions and identifiability of a fit, for its result document.
+
+use super::assumptions::assumptions;
+use super::document::IdentifiabilitySummary;
+use super::findings;
+use super::known::ValidationRecord;
+use super::run::FittedModel;
+use crate::finding::Finding;
+use kmcfit_core::internals::assessment::{FunctionSummary, function_summaries};
+use kmcfit_core::internals::identifiability::{
+    Classification, FunctionClassification, structural_rank,
+};
+use std::collections::BTreeMap;
+
+impl FittedModel<'_> {
+    /// Findings and warnings on identifiability: the structural rank, the classification of the functions and the
+    /// plausibility of the fit. A fit of the equation error simulates no response and has none of them.
+    pub(super) fn identifiability(&self) -> IdentifiabilitySummary {
+        let problem = &self.model.problem;
+        let mut summary = IdentifiabilitySummary {
+            parameters: problem.parameters(),
+            assumptions: assumptions(problem),
+            ..IdentifiabilitySummary::default()
+        };
+        let Some(assessment) = &self.known.assessment else {
+            let text = "a fit of the equation error gives no confidence intervals, and noise biases its estimates; refine \
+                        it with `method: gauss-newton` and `initial: data`";
+            summary.warnings.push(Finding::new("equation_error", text));
+            return summary;
+        };
+        let count = structural_rank(problem);
+        summary.rank_bound = count.rank_bound;
+        let plausibility = &assessment.plausibility;
+        if let Some(reason) = &plausibility.unidentified {
+            summary.warnings.push(findings::unidentified(reason));
+            return summary;
+        }
+        let judgements = &assessment.judgements;
+        // Constraints and penalties may determine what the records do not.
+        let all_identified =
+            !judgements.is_empty() && !judgements.iter().any(FunctionClassification::is_open);
+        if count.rank_bound < count.parameters && !all_identified {
+            let finding = Finding::new("rank_bound", count.headline());
+            let finding = finding.with("rank_bound", count.rank_bound);
+            summary
+                .warnings
+                .push(finding.with("parameters", count.parameters));
+        }
+        let mut add = |is_warning: bool, finding: Finding| match is_warning {
+            true => summary.warnings.push(finding),
+            false => summary.findings.push(finding),
+        };
+        for finding in &count.findings {
+            add(finding.is_warning(), findings::rank(finding));
+        }
+        for judgement in judgements {
+            if judgement.verdict != Classification::Fixed {
+                add(judgement.is_open(), findings::classification(judgement));
+            }
+        }
+        let warnings = plausibility.warnings.iter();
+        summary.warnings.extend(warnings.map(findings::warning));
+        let poor = self.known.validation.iter();
+        let poor = poor.filter_map(ValidationRecord::poor);
+        summary.warnings.extend(poor.map(findings::not_predicted));
+        summary
+    }
+
+    pub(super) fn function_summaries(&self) -> BTreeMap<String, FunctionSummary> {
+        let (problem, truth) = (&self.model.problem, self.model.truth.as_ref());
+        let assessment = self.known.assessment.as_ref();
+        let summaries = function_summaries(problem, self.fit, assessment, truth);
+        let named = problem.functions.iter().zip(summaries);
+        named
+            .map(|(function, summary)| {
+                let unit = self.unit(function).into();
+                (function.name(), FunctionSummary { unit, ..summary })
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,63 @@
+//! What a model says about the device besides its readings, in words.
+
+use kmcfit_core::internals::functions::Basis;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{ChannelKind, Experiment};
+
+/// What is known: records, fixed functions, bases with few numbers, constraints, smoothness.
+pub fn assumptions(problem: &Problem) -> Vec<String> {
+    let mut known = vec![records(problem)];
+    for function in problem.functions.iter() {
+        let name = function.name();
+        match &function.basis {
+            None => known.push(format!("{name} known at all times")),
+            Some(Basis::Nodal) => {}
+            Some(basis) => known.push(match function.parameters() {
+                1 => format!("{name} one number"),
+                count => format!("{name} {count} numbers ({})", basis.name()),
+            }),
+        }
+    }
+    known.extend(problem.constraints.groups.iter().map(|g| g.name.clone()));
+    known.extend(problem.constraints.cones.iter().map(|c| c.name.clone()));
+    for penalty in &problem.penalties {
+        let name = problem.functions.get(penalty.function).name();
+        known.push(match penalty.order {
+            0 => format!("{name} near its reference"),
+            1 => format!("{name} of little slope"),
+            _ => format!("{name} of little curvature"),
+        });
+    }
+    for variation in &problem.variations {
+        let name = problem.functions.get(variation.function).name();
+        known.push(format!("{name} with few jumps"));
+    }
+    known.extend(
+        problem
+            .soft
+            .iter()
+            .map(|g| format!("{} if possible", g.name)),
+    );
+    known
+}
+
+/// Number and kind of the records.
+fn records(problem: &Problem) -> String {
+    let free = problem.experiments.iter().filter(|e| e.is_free()).count();
+    let forced = problem.experiments.len() - free;
+    let count = |n: usize, kind: &str| match n {
+        1 => format!("one {kind} record"),
+        n => format!("{n} {kind} records"),
+    };
+    let which = match (free, forced) {
+        (0, forced) => count(forced, "driven"),
+        (free, 0) => count(free, "free"),
+        (free, forced) => format!("{} and {}", count(free, "free"), count(forced, "driven")),
+    };
+    let sees = |e: &Experiment, kind: ChannelKind| e.channels.iter().any(|c| c.kind() == kind);
+    let kinds = ChannelKind::ALL
+        .into_iter()
+        .filter(|kind| problem.experiments.iter().any(|e| sees(e, *kind)));
+    let kinds: Vec<&str> = kinds.map(ChannelKind::name).collect();
+    format!("{which} of {}", kinds.join(", "))
+}

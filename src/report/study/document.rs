@@ -1,0 +1,353 @@
+//! The document of a study, `study.json`, and the records of its analyses, which the journal keeps as well.
+
+use crate::finding::Finding;
+use kmcfit_core::internals::solvers::Status;
+use serde::{Deserialize, Serialize};
+
+/// Numbers; an infinite or missing one is `null` in JSON.
+pub type Numbers = Vec<Option<f64>>;
+
+/// The document of a study.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct StudyDocument {
+    /// Version of this format.
+    pub format: u32,
+    /// Title of the model.
+    pub title: String,
+    /// Version of kmcfit.
+    pub version: String,
+    /// `complete`, or `interrupted` before all analyses were finished.
+    pub status: String,
+    /// Confidence of bands and intervals.
+    pub confidence: f64,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Structural rank: the part of identifiability that is known before the fit.
+    pub structural_rank: Vec<Finding>,
+    /// The fit.
+    pub fit: Option<StudiedFit>,
+    /// Singular values of the sensitivity at the optimum.
+    pub sensitivity: Option<SensitivityRecord>,
+    /// Confidence bands of functions and ratios.
+    pub bands: Option<BandsRecord>,
+    /// Likelihood profiles.
+    pub profiles: Vec<ProfileRecord>,
+    /// Data-consistent extremes of functions and ratios.
+    pub extremes: Vec<ExtremesRecord>,
+    /// Whether penalties limit the roughness of the extremes.
+    pub roughness_limited: bool,
+    /// Equivalent systems: other coefficients with the same response.
+    pub equivalent_systems: Vec<EquivalentSystemRecord>,
+    /// Fits from random starting points.
+    pub multistart: Option<MultistartRecord>,
+    /// Likelihood-ratio test of a constant for each function.
+    pub constancy_test: Vec<ConstancyRecord>,
+    /// Bootstrap intervals.
+    pub bootstrap: Vec<BootstrapRecord>,
+    /// Candidate experiments, the most informative first.
+    pub candidates: Vec<CandidateRecord>,
+    /// Predicted responses.
+    pub predictions: Vec<PredictionRecord>,
+    /// Analyses that failed.
+    pub failures: Vec<AnalysisFailure>,
+}
+
+/// An analysis that failed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct AnalysisFailure {
+    /// The analysis.
+    pub analysis: String,
+    /// The reason.
+    pub reason: String,
+}
+
+/// The fit that is studied.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StudiedFit {
+    /// Status.
+    pub status: Status,
+    /// The reason, as a sentence.
+    pub reason: String,
+    /// Cost J.
+    pub cost: f64,
+    /// Part of J from the samples.
+    pub misfit: f64,
+    /// Parameters of the functions, then the nuisance parameters.
+    pub parameters: Vec<f64>,
+    /// Weights of the penalties.
+    pub weights: Vec<f64>,
+    /// Estimated sigma of each channel; `null` where it is given.
+    pub sigmas: Numbers,
+}
+
+/// Singular value decomposition of the scaled sensitivity of the samples to the parameters.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SensitivityRecord {
+    /// The rank, as a sentence.
+    pub text: String,
+    /// Singular values, largest first.
+    pub singular_values: Vec<f64>,
+    /// Number of identifiable parameter combinations.
+    pub rank: usize,
+    /// Number of parameter combinations.
+    pub combinations: usize,
+    /// Combinations that are not identifiable.
+    pub unidentifiable: Vec<UnidentifiableRecord>,
+    /// Times of the nodes, s.
+    pub times: Vec<f64>,
+    /// The combinations with the largest singular values.
+    pub best: Vec<DirectionRecord>,
+    /// The combinations with the smallest singular values above the rank tolerance.
+    pub worst: Vec<DirectionRecord>,
+}
+
+/// A parameter combination that is not identifiable.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct UnidentifiableRecord {
+    /// The ambiguity that it belongs to.
+    pub name: String,
+    /// Share of its squared norm within that ambiguity.
+    pub share: f64,
+}
+
+/// A parameter combination as changes of the functions over time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DirectionRecord {
+    /// Its singular value.
+    pub singular_value: f64,
+    /// Name of each function and its change at the nodes.
+    pub functions: Vec<(String, Vec<f64>)>,
+}
+
+/// Confidence bands and the classification by them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BandsRecord {
+    /// Times, s.
+    pub times: Vec<f64>,
+    /// Functions, then ratios.
+    pub bands: Vec<BandRecord>,
+    /// Notes on all bands.
+    pub notes: Vec<String>,
+    /// Classification of functions and ratios.
+    pub classification: Vec<ClassificationRecord>,
+    /// Turning points, s: at them the free response determines k/m for any c.
+    pub turning_points: Vec<f64>,
+    /// Zero crossings, s: at them it determines c/m.
+    pub zero_crossings: Vec<f64>,
+}
+
+/// The band of a function or ratio.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BandRecord {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Values.
+    pub values: Numbers,
+    /// Lower ends of the pointwise band; `null` where there is none.
+    pub low: Numbers,
+    /// Upper ends of the pointwise band.
+    pub high: Numbers,
+    /// Lower ends of the simultaneous band.
+    pub simultaneous_low: Numbers,
+    /// Upper ends of the simultaneous band.
+    pub simultaneous_high: Numbers,
+    /// True values, where they are known.
+    pub truth: Numbers,
+    /// Notes.
+    pub notes: Vec<String>,
+}
+
+/// Classification of a function or ratio.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ClassificationRecord {
+    /// Function or ratio.
+    pub name: String,
+    /// `identified`, `only-ratio`, `partly-identified`, `not-identified` or `fixed`.
+    pub verdict: String,
+    /// The sentence.
+    pub text: String,
+}
+
+/// Likelihood profile of one quantity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProfileRecord {
+    /// The quantity.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Its value at the optimum.
+    pub optimum: f64,
+    /// Values of the quantity, each held fixed while the other parameters are fitted.
+    pub values: Vec<f64>,
+    /// Minimal cost at each value.
+    pub costs: Vec<f64>,
+    /// Ends of the confidence interval; `null` where the profile has none.
+    pub interval: [Option<f64>; 2],
+    /// `identified`, `one-sided` or `flat`.
+    pub verdict: String,
+    /// The sentence.
+    pub text: String,
+    /// Values at which further constraints become active.
+    pub active_from: Vec<ActiveFrom>,
+}
+
+/// A value of a profiled quantity at which a constraint becomes active.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ActiveFrom {
+    /// The value.
+    pub value: f64,
+    /// The constraint.
+    pub constraint: String,
+}
+
+/// Data-consistent extremes of a function or ratio: its smallest and largest value among all systems whose misfit is at
+/// most `misfit_limit`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExtremesRecord {
+    /// Function or ratio.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Times, s.
+    pub times: Vec<f64>,
+    /// Smallest values.
+    pub low: Vec<f64>,
+    /// Largest values.
+    pub high: Vec<f64>,
+    /// Largest misfit that is consistent with the data.
+    pub misfit_limit: f64,
+    /// The systems that attain the extremes.
+    pub systems: Vec<ExtremeSystemRecord>,
+}
+
+/// A system that attains an extreme.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ExtremeSystemRecord {
+    /// The extreme, as in `largest mass at 3 s`.
+    pub name: String,
+    /// Misfit, recomputed.
+    pub misfit: f64,
+    /// End of the search.
+    pub status: ExtremeSearch,
+}
+
+/// End of the search for an extreme.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ExtremeSearch {
+    /// A local extreme was reached.
+    Converged,
+    /// The search range was reached before an extreme.
+    RangeLimit,
+    /// No step satisfied the misfit limit.
+    Stalled,
+    /// The limit on convex subproblems was reached.
+    IterationLimit,
+}
+
+/// An equivalent system: other coefficients with the response of the fit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EquivalentSystemRecord {
+    /// Name.
+    pub name: String,
+    /// Times, s.
+    pub times: Vec<f64>,
+    /// Mass, kg.
+    pub mass: Vec<f64>,
+    /// Damping, N s/m.
+    pub damping: Vec<f64>,
+    /// Stiffness, N/m.
+    pub stiffness: Vec<f64>,
+    /// Largest difference of its response from the fit's, relative to the largest displacement.
+    pub response_error: f64,
+}
+
+/// Fits from random starting points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MultistartRecord {
+    /// Costs in rising order.
+    pub costs: Vec<f64>,
+    /// Reasons for which fits failed.
+    pub failures: Vec<String>,
+    /// Distinct end points.
+    pub clusters: Vec<ClusterRecord>,
+    /// Findings.
+    pub findings: Vec<Finding>,
+}
+
+/// An end point that one or several starting points led to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ClusterRecord {
+    /// Number of starting points.
+    pub starts: usize,
+    /// Its cost.
+    pub cost: f64,
+}
+
+/// Likelihood-ratio test of a constant function.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ConstancyRecord {
+    /// Function.
+    pub name: String,
+    /// p-value of the hypothesis that the function is constant.
+    pub p_value: f64,
+    /// The sentence.
+    pub text: String,
+}
+
+/// A bootstrap interval.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BootstrapRecord {
+    /// The quantity.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Interval; `null` where too few refits converged.
+    pub interval: Option<[f64; 2]>,
+}
+
+/// A candidate experiment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CandidateRecord {
+    /// Name.
+    pub name: String,
+    /// Number of parameter combinations that it makes identifiable; `null` if it cannot be simulated.
+    pub added_rank: Option<usize>,
+    /// D criterion: ratio of the geometric means of the standard errors, with the experiment to without.
+    pub d_ratio: Option<f64>,
+    /// A criterion: ratio of their root mean squares.
+    pub a_ratio: Option<f64>,
+    /// E criterion: ratio of the largest standard errors.
+    pub e_ratio: Option<f64>,
+    /// The sentence.
+    pub text: String,
+}
+
+/// A predicted response with its uncertainty.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PredictionRecord {
+    /// Name.
+    pub name: String,
+    /// Times, s.
+    pub times: Vec<f64>,
+    /// Displacement, m.
+    pub displacement: Vec<f64>,
+    /// 95 % confidence band, m.
+    pub band: Option<Vec<[f64; 2]>>,
+    /// Envelope over the extreme systems, m.
+    pub envelope: Option<Vec<[f64; 2]>>,
+    /// The extreme system with the largest difference of displacement.
+    pub furthest: Option<FurthestSystem>,
+}
+
+/// The extreme system whose response differs most from the prediction.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FurthestSystem {
+    /// The extreme.
+    pub name: String,
+    /// Largest difference of displacement, m.
+    pub difference: f64,
+}

@@ -1,0 +1,308 @@
+//! Suggestions: up to three actions that the result document recommends to the user, the most urgent first.
+
+mod text;
+
+use super::document::{ChannelSummary, ExperimentSummary, ResultDocument};
+use crate::finding::Finding;
+use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR, ResidualPattern};
+use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
+use kmcfit_core::internals::solvers::{Solver, StartStrategy, Status};
+use kmcfit_core::internals::system::Method;
+use serde::Serialize;
+
+/// Residuals with a lower probability under white noise have a pattern.
+const PATTERN: f64 = 1e-3;
+/// Largest change of the response by halving the step, relative to its peak.
+const COARSE: f64 = 1e-3;
+/// Fit of a free record, per cent, below which an unknown force may act.
+const HARDLY: f64 = 50.0;
+/// Most suggestions.
+const MOST: usize = 3;
+
+/// A suggestion; in documents its kind and quantities.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Suggestion {
+    /// A larger iteration limit.
+    MoreIterations {
+        /// The limit.
+        iterations: u64,
+    },
+    /// A larger time limit.
+    MoreTime,
+    /// Resuming the fit.
+    Resume,
+    /// The Gauss-Newton method.
+    AnotherMethod,
+    /// Another starting point, softer constraints.
+    AnotherStart,
+    /// A finer grid.
+    FinerSteps {
+        /// Number of nodes.
+        nodes: f64,
+    },
+    /// A loss or a sensor model for a pattern in the residuals of a channel.
+    Pattern {
+        /// Kind of the channel.
+        channel: String,
+        /// Whether its sigma is given.
+        #[serde(skip)]
+        has_sigma: bool,
+        /// The pattern.
+        pattern: ResidualPattern,
+    },
+    /// A larger sigma.
+    LargerSigma {
+        /// Root-mean-square residual over sigma.
+        times: f64,
+        /// Fit of the worst channel, per cent.
+        fit: f64,
+    },
+    /// No change of the model: the residuals of a channel are noise.
+    NoiseLimited {
+        /// Kind of the channel.
+        channel: String,
+        /// Its fit, per cent.
+        fit: f64,
+        /// Whether the residuals pass the test of whiteness.
+        is_white: bool,
+    },
+    /// A change of the input, the start or the functions for a record that is not fitted.
+    Mismatch {
+        /// Kind of the channel and name of the record, where there are several channels.
+        channel: Option<(String, String)>,
+        /// Fit, per cent.
+        fit: f64,
+        /// Whether the start from the record was not tried.
+        start_from_data: bool,
+        /// The likeliest cause.
+        #[serde(skip)]
+        suspect: Suspect,
+        /// Force terms that the model lacks.
+        absent: Vec<&'static str>,
+    },
+    /// More parameters or terms for autocorrelated residuals.
+    MoreParameters {
+        /// Force terms that the model lacks.
+        absent: Vec<&'static str>,
+    },
+    /// A constant in place of a function.
+    Constant {
+        /// Name of the function.
+        function: String,
+        /// p-value of Wald's test of a constant.
+        p_value: f64,
+    },
+    /// Fewer parameters or a penalty, and a study of a model whose parameters are not all identifiable.
+    StudyUnidentifiable {
+        /// Number of parameters.
+        parameters: usize,
+        /// Upper bound of the number of identifiable parameter combinations.
+        rank_bound: usize,
+        /// Whether fewer parameters or a penalty are an option.
+        can_be_simpler: bool,
+    },
+    /// A study.
+    Study,
+}
+
+/// Likeliest cause of a poor fit of a record.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Suspect {
+    /// The input (force or base motion), and the initial state unless it is estimated.
+    Input {
+        /// Whether the input is a base motion.
+        is_base: bool,
+        /// Whether the initial state is given.
+        start_is_given: bool,
+    },
+    /// An unknown force.
+    UnknownForce,
+    /// The coefficient functions.
+    Functions,
+}
+
+/// Suggestions as they stand in the document, the most urgent first; at most three.
+pub fn suggestions(document: &ResultDocument) -> Vec<Finding> {
+    let list = typed(document);
+    list.iter().map(Finding::stated).collect()
+}
+
+fn typed(document: &ResultDocument) -> Vec<Suggestion> {
+    let mut steps = Vec::new();
+    steps.extend(about_ending(document));
+    steps.extend(about_steps(document));
+    steps.extend(about_residuals(document));
+    if wanders(document) {
+        steps.rotate_left(1);
+    }
+    steps.extend(about_constants(document));
+    let known = &document.identifiability;
+    if document.is_simulated() && document.model.parameters > 0 {
+        // Constraints may determine what the records do not.
+        let is_open = known.rank_bound < known.parameters && !known.warnings.is_empty();
+        let is_smooth = document.cost.regularisation > 0.0;
+        steps.push(match is_open {
+            true => Suggestion::StudyUnidentifiable {
+                parameters: known.parameters,
+                rank_bound: known.rank_bound,
+                can_be_simpler: !is_smooth && !changes_nothing(document),
+            },
+            false => Suggestion::Study,
+        });
+    }
+    steps.truncate(MOST);
+    steps
+}
+
+/// The function whose constancy is not rejected at the level [`SIGNIFICANCE`], with the largest p-value.
+fn about_constants(document: &ResultDocument) -> Option<Suggestion> {
+    let functions = document.functions.iter();
+    let probable = functions.filter_map(|(name, f)| Some((name, f.constant_p_value?)));
+    let (name, p_value) = probable.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    (p_value >= SIGNIFICANCE).then(|| Suggestion::Constant {
+        function: name.clone(),
+        p_value,
+    })
+}
+
+/// Whether the Gauss-Newton method reached the iteration limit with a poor fit, which suggests a wrong model rather than
+/// too few iterations.
+fn wanders(document: &ResultDocument) -> bool {
+    document.outcome.status == Status::MaxIterations
+        && document.model.method == Solver::GaussNewton.name()
+        && document.worst_fit().is_some_and(|worst| worst < POOR)
+}
+
+/// A number of nodes for which, by the order of the stepper, the step-size check passes; `None` if it passes already.
+fn about_steps(document: &ResultDocument) -> Option<Suggestion> {
+    let half = document.step_check.as_ref()?;
+    let is_exact = document.worst_fit().is_some_and(|worst| worst > EXACT);
+    let beside_residuals = match is_exact {
+        true => 0.0,
+        false => half.change_per_residual,
+    };
+    // A step-size error of a tenth of the residuals is acceptable.
+    let times = (half.change_per_sample / COARSE).max(10.0 * beside_residuals);
+    if half.change_per_sample <= COARSE && beside_residuals <= 1.0 {
+        return None;
+    }
+    let stepper = match document.model.stepper == Method::Midpoint.name() {
+        true => Method::Midpoint,
+        false => Method::Rk4,
+    };
+    // Beyond a factor of 16 the order of the stepper predicts nothing.
+    let finer = times
+        .powf(1.0 / f64::from(stepper.order()))
+        .clamp(2.0, 16.0)
+        .ceil();
+    let nodes = (document.model.nodes - 1) as f64 * finer + 1.0;
+    Some(Suggestion::FinerSteps { nodes })
+}
+
+/// Likeliest cause of a poor fit of a record: its input, if it has one.
+fn suspect(document: &ResultDocument, record: &ExperimentSummary) -> Suspect {
+    let Some(drive) = record.driven_by.first() else {
+        let worst = (record.channels.iter()).fold(100.0f64, |least, c| least.min(c.fit_percent));
+        return match worst < HARDLY {
+            true => Suspect::UnknownForce,
+            false => Suspect::Functions,
+        };
+    };
+    let start = format!("initial displacement of {}", record.name);
+    Suspect::Input {
+        is_base: drive == "base",
+        start_is_given: !document.nuisance_parameters.iter().any(|s| s.name == start),
+    }
+}
+
+/// Force terms that the model lacks.
+fn absent(document: &ResultDocument) -> Vec<&'static str> {
+    let terms = ["cubic_stiffness", "quadratic_damping", "coulomb_friction"];
+    let has = |term: &&str| document.model.terms.iter().any(|t| t == term);
+    terms.into_iter().filter(|term| !has(term)).collect()
+}
+
+/// Whether every function is constant.
+fn changes_nothing(document: &ResultDocument) -> bool {
+    document.functions.values().all(|f| f.min == f.max)
+}
+
+/// The suggestion from patterns, size and whiteness of the residuals.
+fn about_residuals(document: &ResultDocument) -> Option<Suggestion> {
+    let channels = || document.channels();
+    let mut patterns = channels().filter_map(|c| Some((c, c.pattern.clone()?)));
+    if let Some((channel, pattern)) = patterns.next() {
+        return Some(Suggestion::Pattern {
+            channel: channel.kind.clone(),
+            has_sigma: channel.sigma.is_some(),
+            pattern,
+        });
+    }
+    let fit = document.worst_fit().unwrap_or(100.0);
+    let times = document.statistics.reduced_chi_square.map(f64::sqrt);
+    if let Some(times) = times.filter(|times| *times > BEYOND_SIGMA && fit > POOR) {
+        return Some(Suggestion::LargerSigma { times, fit });
+    }
+    let is_coloured = |c: &ChannelSummary| {
+        c.sigma.is_some()
+            && c.fit_percent < EXACT
+            && c.whiteness_p_value.is_some_and(|p| p < PATTERN)
+    };
+    let named = document.experiments.iter();
+    let mut named = named.flat_map(|e| e.channels.iter().map(move |c| (e, c)));
+    let poor = |c: &ChannelSummary| c.fit_percent.is_finite() && c.fit_percent < POOR;
+    let Some((record, channel)) = named.find(|(_, channel)| poor(channel)) else {
+        let absent = absent(document);
+        return channels()
+            .any(is_coloured)
+            .then_some(Suggestion::MoreParameters { absent });
+    };
+    let fit = channel.fit_percent;
+    let kind = channel.kind.clone();
+    if let (Some(_), Some(p), false) = (
+        channel.sigma,
+        channel.whiteness_p_value,
+        is_coloured(channel),
+    ) {
+        let is_white = p >= SIGNIFICANCE;
+        return Some(Suggestion::NoiseLimited {
+            channel: kind,
+            fit,
+            is_white,
+        });
+    }
+    let start = StartStrategy::StartValues.name();
+    let tried = document.attempts.iter().any(|r| r.start != start);
+    Some(Suggestion::Mismatch {
+        channel: (channels().count() > 1).then(|| (kind, record.name.clone())),
+        fit,
+        start_from_data: !tried && document.is_simulated(),
+        suspect: suspect(document, record),
+        absent: absent(document),
+    })
+}
+
+fn about_ending(document: &ResultDocument) -> Option<Suggestion> {
+    let is_newton = document.model.method == Solver::GaussNewton.name();
+    match document.outcome.status {
+        Status::MaxIterations => Some(Suggestion::MoreIterations {
+            iterations: 10 * document.counts.iterations.max(1),
+        }),
+        Status::TimeLimit => Some(Suggestion::MoreTime),
+        Status::Interrupted => Some(Suggestion::Resume),
+        Status::Stalled if !is_newton => Some(Suggestion::AnotherMethod),
+        Status::Stalled | Status::Infeasible | Status::Failed => Some(Suggestion::AnotherStart),
+        Status::Converged | Status::Completed => None,
+    }
+}
+
+/// A percentage; one far below zero in powers of ten.
+pub(super) fn percent(share: f64, digits: usize) -> String {
+    match share > -1000.0 {
+        // Rounding to zero keeps no sign.
+        true if share.abs() < 0.5 * 0.1f64.powi(digits as i32) => format!("{:.digits$} %", 0.0),
+        true => format!("{share:.digits$} %"),
+        false => format!("{share:.0e} %"),
+    }
+}

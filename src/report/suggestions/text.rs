@@ -1,0 +1,191 @@
+//! Texts of the suggestions.
+
+use super::{Suggestion, Suspect, percent};
+use crate::digits::significant;
+use kmcfit_core::internals::assessment::ResidualPattern;
+use kmcfit_core::internals::solvers::Solver;
+use std::fmt;
+
+impl fmt::Display for Suggestion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Suggestion::MoreIterations { iterations } => {
+                write!(f, "iteration limit reached: raise it with fit.stop.iterations={iterations}")
+            }
+            Suggestion::MoreTime => {
+                f.write_str("time limit reached: raise it with fit.stop.seconds")
+            }
+            Suggestion::Resume => f.write_str("continue this fit with `kmcfit resume`"),
+            Suggestion::AnotherMethod => {
+                let newton = Solver::GaussNewton.name();
+                write!(f, "the search stalled: use fit.method={newton}")
+            }
+            Suggestion::AnotherStart => f.write_str(
+                "use another starting point (fit.initial=data, or other `start` values) or soft constraints (`soft`)",
+            ),
+            Suggestion::FinerSteps { nodes } => {
+                write!(f, "the time step is too coarse: use grid.nodes={nodes}")
+            }
+            Suggestion::Pattern {
+                channel,
+                has_sigma,
+                pattern,
+            } => write_pattern(f, channel, *has_sigma, pattern),
+            Suggestion::LargerSigma { times, fit } => write!(
+                f,
+                "sigma is too small: the residuals are {times:.1} times sigma although the fit is {}; use `sigma: estimate`",
+                percent(*fit, 2)
+            ),
+            Suggestion::NoiseLimited {
+                channel,
+                fit,
+                is_white,
+            } => {
+                let noise = match is_white {
+                    true => "white",
+                    false => "nearly white",
+                };
+                let fit = percent(*fit, 0);
+                write!(
+                    f,
+                    "{channel}: fit {fit}, but the residuals are {noise}: measurement noise limits the fit, not the model"
+                )
+            }
+            Suggestion::Mismatch {
+                channel,
+                fit,
+                start_from_data,
+                suspect,
+                absent,
+            } => {
+                write_fit(f, channel.as_ref(), *fit)?;
+                if *start_from_data {
+                    f.write_str("start from the record (fit.initial=data), or ")?;
+                }
+                write_suspect(f, suspect, &more_parameters(absent))
+            }
+            Suggestion::MoreParameters { absent } => {
+                write!(f, "the residuals are autocorrelated: {}", more_parameters(absent))
+            }
+            Suggestion::Constant { function, p_value } => write!(
+                f,
+                "a constant {function} is not rejected (Wald test, p = {}): use `basis: constant`",
+                significant(*p_value, 1)
+            ),
+            Suggestion::StudyUnidentifiable {
+                parameters,
+                rank_bound,
+                can_be_simpler,
+            } => {
+                write!(
+                    f,
+                    "at most {rank_bound} of {parameters} parameter combinations are identifiable: "
+                )?;
+                if *can_be_simpler {
+                    f.write_str("use fewer parameters (`knots`) or add a `penalty`; ")?;
+                }
+                f.write_str("`kmcfit study` lists the identifiable ones")
+            }
+            Suggestion::Study => f.write_str(
+                "`kmcfit study` computes profiles, extremes and, with `study.candidates`, the most informative next experiment",
+            ),
+        }
+    }
+}
+
+/// The channel and its poor fit.
+fn write_fit(
+    f: &mut fmt::Formatter<'_>,
+    channel: Option<&(String, String)>,
+    fit: f64,
+) -> fmt::Result {
+    if let Some((channel, record)) = channel {
+        write!(f, "{channel} of {record}: ")?;
+    }
+    write!(f, "poor fit ({}): ", percent(fit, 0))
+}
+
+/// The likeliest cause, or else more parameters.
+fn write_suspect(f: &mut fmt::Formatter<'_>, suspect: &Suspect, more: &str) -> fmt::Result {
+    let (input, start_is_given) = match suspect {
+        Suspect::Functions => return f.write_str(more),
+        Suspect::UnknownForce => {
+            return write!(
+                f,
+                "{more}; if an unmeasured force acts, fit the equation of motion instead (fit.method=equation-error)"
+            );
+        }
+        Suspect::Input {
+            is_base: true,
+            start_is_given,
+        } => ("the base motion", start_is_given),
+        Suspect::Input { start_is_given, .. } => ("the force", start_is_given),
+    };
+    let start = match start_is_given {
+        true => ", and the initial state (`initial: estimate`)",
+        false => "",
+    };
+    write!(
+        f,
+        "check sign (`gain: -1` of a sensor reverses it), unit and times of {input}{start}; or {more}"
+    )
+}
+
+/// More parameters of the functions, and the terms that the model lacks.
+fn more_parameters(absent: &[&str]) -> String {
+    let functions = "use more parameters (`basis: piecewise-linear`, more `knots`)";
+    let terms = absent
+        .join(", ")
+        .replace("friction", "friction with its width");
+    match absent.is_empty() {
+        true => functions.into(),
+        false => format!("{functions} or add a force term ({terms})"),
+    }
+}
+
+fn write_pattern(
+    f: &mut fmt::Formatter<'_>,
+    channel: &str,
+    has_sigma: bool,
+    pattern: &ResidualPattern,
+) -> fmt::Result {
+    match pattern {
+        ResidualPattern::Outliers {
+            samples: readings,
+            first,
+        } => {
+            match readings {
+                1 => write!(f, "{channel}: one outlier, at {first} s")?,
+                _ => write!(f, "{channel}: {readings} outliers, the first at {first} s")?,
+            }
+            let sigma = match has_sigma {
+                true => "",
+                false => ", with `sigma`",
+            };
+            write!(
+                f,
+                ": use a robust loss (`loss: {{{channel}: huber}}`{sigma})"
+            )
+        }
+        ResidualPattern::Offset => write!(
+            f,
+            "{channel}: the residuals have an offset: estimate it (`sensors: {{{channel}: {{offset: estimate}}}}`)"
+        ),
+        ResidualPattern::Tone { frequency, beside } => {
+            let end = if frequency > beside { "max" } else { "min" };
+            write!(
+                f,
+                "{channel}: the residuals oscillate at {} Hz, the response at {} Hz (mains hum or another mode): restrict \
+                 the frequency band (`band: {{{end}: {}}}`)",
+                significant(*frequency, 3),
+                significant(*beside, 3),
+                significant((frequency * beside).sqrt(), 2)
+            )
+        }
+        ResidualPattern::Drift => write!(
+            f,
+            "{channel}: the residuals drift: estimate offset and drift (`sensors: {{{channel}: {{offset: estimate, drift: \
+             estimate}}}}`)"
+        ),
+    }
+}
