@@ -55,7 +55,7 @@ pub mod problem {
     pub use crate::problem::{Problem, ProblemError, ProblemParts};
 }
 pub mod qp {
-    pub use crate::qp::{ConicStatus, Kkt, Subproblem, project};
+    pub use crate::qp::{ConicStatus, Kkt, ResponseVariables, StageLayout, Subproblem, project};
 }
 pub mod record {
     pub use crate::record::{
