@@ -133,25 +133,21 @@ impl Subproblem {
         self.solve_until(iterations, Kkt::is_solution)
     }
 
-    /// Step of a fit: a feasible point whose cost exceeds the minimum by at most [`Subproblem::STEP_GAP`] of the decrease, or the minimum;
-    /// and a bound of the excess.
-    pub fn solve_step(&self, iterations: u32) -> (Solution, f64) {
-        if iterations > 0
-            && self.is_finite()
-            && let Some(found) = self.minimise_on_stages(iterations, Self::STEP_GAP)
-        {
-            let kkt = self.kkt_with_decrease(&found.point, found.decrease);
-            let excess = match kkt.is_solution() {
-                true => 0.0,
-                false => 2.0 * (found.gap + found.decrease),
-            };
-            let decrease = self.value(&vec![0.0; self.variables]) - self.value(&found.point.z);
-            if excess <= 2.0 * Self::STEP_GAP * decrease {
-                let found = Some((found.point, kkt));
-                return (self.solution(ConicStatus::Solved, found, 1), excess);
-            }
+    /// A step of a fit on the stages of [`Subproblem::layout`]: a point that satisfies the constraints and brings the cost down
+    /// to the minimum but for [`Subproblem::STEP_GAP`] of the decrease, or the minimum itself; and by how much the cost may exceed
+    /// the minimum, zero for the minimum itself. `None` where there is none.
+    pub fn step_on_stages(&self, iterations: u32) -> Option<(Solution, f64)> {
+        let is_usable = iterations > 0 && self.layout.is_some() && self.is_finite();
+        is_usable.then_some(())?;
+        let found = self.minimise_on_stages(iterations, Self::STEP_GAP)?;
+        let decrease = self.value(&vec![0.0; self.variables]) - self.value(&found.point.z);
+        let excess = 2.0 * (found.gap + found.decrease);
+        if excess <= 2.0 * Self::STEP_GAP * decrease {
+            return Some((self.unjudged(found.point), excess));
         }
-        (self.solve_within(iterations), 0.0)
+        let kkt = self.kkt_with_decrease(&found.point, found.decrease);
+        let found = kkt.is_solution().then_some(Some((found.point, kkt)))?;
+        Some((self.solution(ConicStatus::Solved, found, 1), 0.0))
     }
 
     /// Largest excess of the cost of a step over the minimum, as a share of the decrease; the next linearisation removes it.
@@ -262,6 +258,19 @@ impl Subproblem {
             z: candidate.z,
             kkt,
             attempts,
+        }
+    }
+
+    /// A point whose cost is known to be near enough to the minimum.
+    fn unjudged(&self, point: PrimalDual) -> Solution {
+        Solution {
+            status: ConicStatus::Solved,
+            multipliers: point.inequalities,
+            equality_multipliers: point.equalities,
+            cone_multipliers: Vec::new(),
+            z: point.z,
+            kkt: None,
+            attempts: 1,
         }
     }
 

@@ -213,13 +213,19 @@ impl Subproblem {
         rows && self.cones.iter().all(|cone| cone.violation(z) <= tolerance)
     }
 
-    /// True if an inequality is active at zero, to `tolerance` relative to the row's size.
-    pub fn is_active_at_zero(&self, tolerance: f64) -> bool {
+    /// Whether an inequality is active at zero: its bound is nearer than `share` of the largest distance of a bound, each
+    /// in units of the row's largest coefficient.
+    pub fn is_active_at_zero(&self, share: f64) -> bool {
         let bounds = self.inequalities.right().iter().zip(&self.upper);
-        let mut rows = bounds.enumerate();
-        rows.any(|(i, (lower, upper))| {
-            lower.abs().min(upper.abs()) <= tolerance * self.inequalities.scale(i)
-        })
+        let distances = bounds
+            .enumerate()
+            .map(|(i, (lower, upper))| lower.abs().min(upper.abs()) / self.inequalities.scale(i));
+        let (least, most) = distances
+            .filter(|distance| distance.is_finite())
+            .fold((f64::INFINITY, 0.0f64), |(least, most), d| {
+                (least.min(d), most.max(d))
+            });
+        least <= share * most
     }
 
     /// Largest residual of the optimality conditions, relative to their right-hand side, of a usable plain solution: the iterations converge like
