@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// Where in the input something is wrong.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Place {
+pub enum Location {
     /// A command-line option or argument, or a library argument, by name.
     Argument(String),
     /// A file as a whole.
@@ -36,15 +36,15 @@ pub enum Place {
     },
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Place::Argument(name) => write!(f, "{name}"),
-            Place::File(file) => write!(f, "{}", file.display()),
-            Place::Line { file, line, column } => {
+            Location::Argument(name) => write!(f, "{name}"),
+            Location::File(file) => write!(f, "{}", file.display()),
+            Location::Line { file, line, column } => {
                 write!(f, "{}:{line}:{column}", file.display())
             }
-            Place::Row {
+            Location::Row {
                 file,
                 row,
                 line,
@@ -64,7 +64,7 @@ impl fmt::Display for Place {
 ///
 /// ```
 /// use kmcfit::error::{InputError, Place};
-/// let error = InputError::new(Place::Argument("--nodes".into()), "a grid needs at least 3 nodes")
+/// let error = InputError::new(Location::Argument("--nodes".into()), "a grid needs at least 3 nodes")
 ///     .found("2")
 ///     .expected("3 or more");
 /// assert_eq!(
@@ -75,7 +75,7 @@ impl fmt::Display for Place {
 #[derive(Debug, Clone, PartialEq)]
 pub struct InputError {
     /// Where.
-    pub place: Place,
+    pub place: Location,
     /// Dotted path of the key, as in `functions.mass.start`.
     pub key: Option<String>,
     /// What is wrong, in one sentence without a full stop.
@@ -90,7 +90,7 @@ pub struct InputError {
 
 impl InputError {
     /// An error at `place` that says what is wrong.
-    pub fn new(place: Place, problem: impl Into<String>) -> Self {
+    pub fn new(place: Location, problem: impl Into<String>) -> Self {
         Self {
             place,
             key: None,
@@ -103,7 +103,7 @@ impl InputError {
 
     /// An error about an argument.
     pub fn argument(name: impl Into<String>, problem: impl Into<String>) -> Self {
-        Self::new(Place::Argument(name.into()), problem)
+        Self::new(Location::Argument(name.into()), problem)
     }
 
     /// An error at a line of a file and a column in it, both from 1.
@@ -114,7 +114,7 @@ impl InputError {
         problem: impl Into<String>,
     ) -> Self {
         let file = file.as_ref().to_path_buf();
-        Self::new(Place::Line { file, line, column }, problem)
+        Self::new(Location::Line { file, line, column }, problem)
     }
 
     /// An error in a text file behind some text.
@@ -126,7 +126,7 @@ impl InputError {
 
     /// An error about a file as a whole.
     pub fn file(file: impl AsRef<Path>, problem: impl Into<String>) -> Self {
-        Self::new(Place::File(file.as_ref().to_path_buf()), problem)
+        Self::new(Location::File(file.as_ref().to_path_buf()), problem)
     }
 
     /// Adds the dotted path of the key.

@@ -1,6 +1,6 @@
 //! The line of a file that an error is about, with a mark below the part that is wrong.
 
-use crate::error::{InputError, Place};
+use crate::error::{InputError, Location};
 use console::measure_text_width;
 use std::fmt;
 use std::fs::File;
@@ -38,18 +38,18 @@ impl Excerpt {
     /// line, or the file is no text.
     pub fn of(error: &InputError) -> Option<Self> {
         match &error.place {
-            Place::Line { file, line, column } => {
+            Location::Line { file, line, column } => {
                 let text = line_of(file, *line)?;
                 let start = (*column - 1).min(text.len());
                 let end = token_end(&text, start).max(start + 1);
                 Some(Self::new(*line, &text, start, end))
             }
-            Place::Row { file, line, .. } => {
+            Location::Row { file, line, .. } => {
                 let text = line_of(file, *line)?;
                 let [start, end] = field(&text, error.found.as_deref().unwrap_or_default());
                 Some(Self::new(*line, &text, start, end))
             }
-            Place::Argument(_) | Place::File(_) => None,
+            Location::Argument(_) | Location::File(_) => None,
         }
     }
 
@@ -195,7 +195,7 @@ mod tests {
     use super::*;
     use insta::assert_snapshot;
 
-    fn shown(text: &str, place: impl Fn(std::path::PathBuf) -> Place, found: &str) -> String {
+    fn shown(text: &str, place: impl Fn(std::path::PathBuf) -> Location, found: &str) -> String {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("file");
         std::fs::write(&path, text).expect("a file");
@@ -204,12 +204,12 @@ mod tests {
     }
 
     fn at(text: &str, line: usize, column: usize) -> String {
-        let place = |file| Place::Line { file, line, column };
+        let place = |file| Location::Line { file, line, column };
         shown(text, place, "")
     }
 
     fn row(text: &str, line: usize, found: &str) -> String {
-        let place = |file| Place::Row {
+        let place = |file| Location::Row {
             file,
             row: 1,
             line,

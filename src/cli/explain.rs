@@ -1,6 +1,6 @@
 //! `kmcfit explain`
 
-use super::{Failure, OK, print};
+use super::{CommandError, OK, print};
 use crate::config::keys;
 
 /// Explain a key of the model file: meaning, type, unit, default, example.
@@ -11,7 +11,7 @@ pub struct Arguments {
     key: Option<String>,
 }
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     print(&keys::explain(arguments.key.as_deref())?);
     Ok(OK)
 }

@@ -2,7 +2,7 @@
 
 use super::progress::Progress;
 use super::{
-    Failure, Overrides, announce, exit_code, inputs, interrupt, print, say, stem, unwritable,
+    CommandError, Overrides, announce, exit_code, inputs, interrupt, print, say, stem, unwritable,
 };
 use crate::config::{BuildMode, Model, ModelFile, Override, WeightSearch, build};
 use crate::error::InputError;
@@ -61,7 +61,7 @@ pub(super) struct Printed {
     pub plot: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     if let Some(seconds) = arguments.checkpoint.filter(|s| !(0.0..=1e9).contains(s)) {
         return Err(InputError::argument("--checkpoint", "invalid time")
             .found(seconds)
@@ -81,7 +81,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 }
 
 /// Resumes an unfinished fit.
-pub(super) fn resume(place: &Path, heading: &Heading, printed: &Printed) -> Result<u8, Failure> {
+pub(super) fn resume(
+    place: &Path,
+    heading: &Heading,
+    printed: &Printed,
+) -> Result<u8, CommandError> {
     let path = heading.inputs.first().cloned().unwrap_or_default();
     let file = ModelFile::read_with(path, &Override::parse_all(&heading.overrides)?)?;
     let now = Heading::of_model("fit", &file, heading.figures, heading.checkpoint);
@@ -94,7 +98,7 @@ fn fit(
     out: &Path,
     printed: &Printed,
     is_resumed: bool,
-) -> Result<u8, Failure> {
+) -> Result<u8, CommandError> {
     let mut model = build(file, BuildMode::Fit)?;
     model.settings.interrupt = Some(interrupt::flag());
     let folder = OutputFolder::prepare(out, fit_claim(&model).inputs(inputs(file)))?;
@@ -173,7 +177,7 @@ pub(super) fn fit_into(
     progress: &Progress,
     with_figures: bool,
     mut journal: FitJournal,
-) -> Result<(ResultDocument, Status), Failure> {
+) -> Result<(ResultDocument, Status), CommandError> {
     let clock = Instant::now();
     let full = |error| unwritable(folder.path(), &error);
     let result = search(model, progress, Some(&mut journal));
@@ -191,7 +195,7 @@ pub(super) fn fit_into(
             stage.write(RESULT, &json(&document)).map_err(full)?;
             stage.commit().map_err(full)?;
             FitJournal::clear(folder.path()).map_err(full)?;
-            return Err(Failure::Numerical(reason));
+            return Err(CommandError::Numerical(reason));
         }
     };
     let model = weighted.as_ref().unwrap_or(model);

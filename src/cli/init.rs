@@ -1,6 +1,6 @@
 //! `kmcfit init`
 
-use super::{Failure, OK, print, schema, unwritable};
+use super::{CommandError, OK, print, schema, unwritable};
 use crate::config::{ModelFile, starter};
 use crate::error::InputError;
 use crate::observations::SAMPLE_RATES;
@@ -25,7 +25,7 @@ pub struct Arguments {
     sample_rate: Option<f64>,
 }
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let rate = arguments.sample_rate;
     if let Some(rate) = rate.filter(|rate| !SAMPLE_RATES.contains(rate)) {
         return Err(

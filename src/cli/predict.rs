@@ -1,6 +1,6 @@
 //! `kmcfit predict`
 
-use super::{Failure, OK, print, unwritable};
+use super::{CommandError, OK, print, unwritable};
 use crate::error::InputError;
 use crate::report::{
     CsvTable, PredictedResponse, Run, figures, json, predict, prediction_table, render,
@@ -29,7 +29,7 @@ pub struct Arguments {
 /// The files in the output folder.
 const FILES: [&str; 2] = ["predictions.csv", "figures/predictions.svg"];
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let states: Vec<State> = arguments
         .initial
         .iter()
@@ -43,7 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         })
         .transpose()?;
     let motions = predict(&run.system, &run.device, run.truth.as_ref(), &states)
-        .map_err(|breakdown| Failure::Numerical(format!("no response: {breakdown}")))?;
+        .map_err(|breakdown| CommandError::Numerical(format!("no response: {breakdown}")))?;
     if let Some(folder) = folder {
         let unit = if run.document.is_rotation() {
             "rad"

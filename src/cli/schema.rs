@@ -1,6 +1,6 @@
 //! `kmcfit schema`
 
-use super::{Failure, OK, print};
+use super::{CommandError, OK, print};
 use crate::config::keys;
 use crate::report::json;
 
@@ -9,7 +9,7 @@ use crate::report::json;
 #[command(after_help = "Example:\n  kmcfit schema > kmcfit.schema.json")]
 pub struct Arguments {}
 
-pub fn run(_: &Arguments) -> Result<u8, Failure> {
+pub fn run(_: &Arguments) -> Result<u8, CommandError> {
     print(&text());
     Ok(OK)
 }

@@ -1,6 +1,6 @@
 //! `kmcfit simulate`
 
-use super::{Failure, OK, Overrides, inputs, print, say, unwritable};
+use super::{CommandError, OK, Overrides, inputs, print, say, unwritable};
 use crate::config::{BuildMode, ModelFile, build};
 use crate::digest::{digest, digest_of_file};
 use crate::error::InputError;
@@ -47,7 +47,7 @@ pub struct Arguments {
     experiment: Option<String>,
 }
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let file = arguments.set.read(&arguments.model)?;
     let purpose = BuildMode::Simulate {
         nodes: arguments.nodes,
@@ -76,7 +76,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     let motion = problem
         .system
         .forward(&device, experiment.initial, experiment.excitation.as_ref())
-        .map_err(|breakdown| Failure::Numerical(format!("no motion: {breakdown}")))?;
+        .map_err(|breakdown| CommandError::Numerical(format!("no motion: {breakdown}")))?;
     let mut readings = motion.displacement;
     if let Some(noise) = &noise {
         noise.add_to(&mut readings);
@@ -85,7 +85,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
         .column("t_s", problem.system.grid.times())
         .column("y_m", readings)
         .to_csv();
-    let record = Record {
+    let record = Provenance {
         made_by: MADE_BY,
         version: env!("CARGO_PKG_VERSION"),
         sha256: digest(table.as_bytes()),
@@ -183,7 +183,7 @@ fn record_path(out: &Path) -> PathBuf {
 
 /// How a file of readings was made: `OUT.json` beside `OUT`.
 #[derive(Debug, Serialize)]
-struct Record<'a> {
+struct Provenance<'a> {
     made_by: &'static str,
     version: &'static str,
     /// Digest of the table: the proof that this command wrote it.
@@ -222,7 +222,7 @@ impl Noise {
 }
 
 /// The readings and, before them, their record: readings with noise are never without a seed.
-fn write(path: &Path, table: &str, record: &Record) -> io::Result<()> {
+fn write(path: &Path, table: &str, record: &Provenance) -> io::Result<()> {
     write_together(&[(&record_path(path), &json(record)), (path, table)])
 }
 

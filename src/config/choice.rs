@@ -35,7 +35,7 @@ macro_rules! choice {
         }
 
         impl $crate::config::value::Value for $name {
-            const KIND: $crate::config::key::Kind = $crate::config::key::Kind::Choice(Self::NAMES);
+            const KIND: $crate::config::key::ValueType = $crate::config::key::ValueType::Choice(Self::NAMES);
             fn scalar(
                 scalar: $crate::config::value::Scalar<'_>,
             ) -> Result<Self, $crate::config::value::Mistake> {
@@ -52,7 +52,7 @@ macro_rules! choice {
         pub type $name = $kind;
 
         impl $crate::config::value::Value for $kind {
-            const KIND: $crate::config::key::Kind = $crate::config::key::Kind::Choice(&[
+            const KIND: $crate::config::key::ValueType = $crate::config::key::ValueType::Choice(&[
                 $(($word, concat!($($variant_doc),+).trim_ascii_start()),)+
             ]);
             fn scalar(

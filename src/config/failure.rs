@@ -6,7 +6,7 @@ use super::guard::Checked;
 use super::locate::place;
 use super::locate::{self, Position, key_path, locate};
 use super::syntax;
-use super::value::{Mistake, Reader, Report, Value};
+use super::value::{Mistake, Report, Value, ValueVisitor};
 use crate::error::InputError;
 use crate::input::{one_of, quote};
 use crate::near::did_you_mean;
@@ -18,7 +18,7 @@ use serde::de::DeserializeSeed;
 pub(super) fn read<T: Value>(file: &Path, checked: &Checked) -> Result<T, InputError> {
     let text = checked.text();
     let report = Report::default();
-    Reader::new(&report)
+    ValueVisitor::new(&report)
         .deserialize(serde_yaml::Deserializer::from_str(text))
         .map_err(|error| input_error(file, text, &error, report))
 }
@@ -29,7 +29,7 @@ fn input_error(file: &Path, text: &str, error: &serde_yaml::Error, report: Repor
     }
     let at = locate::position(error);
     let (key, mistake) = report.into_parts();
-    let failure = Failure {
+    let failure = YamlError {
         file,
         text,
         at,
@@ -49,14 +49,14 @@ fn input_error(file: &Path, text: &str, error: &serde_yaml::Error, report: Repor
 }
 
 /// An error in the making.
-struct Failure<'a> {
+struct YamlError<'a> {
     file: &'a Path,
     text: &'a str,
     at: Option<Position>,
     key: &'a str,
 }
 
-impl Failure<'_> {
+impl YamlError<'_> {
     /// An error at the position that the YAML crate gave.
     fn here(&self, problem: impl Into<String>) -> InputError {
         self.at_position(self.at.unwrap_or(Position::START), problem)

@@ -22,11 +22,11 @@ macro_rules! keys {
 
         impl $name {
             /// The keys of the map.
-            pub const GROUP: &'static $crate::config::key::Group = {
-                static GROUP: $crate::config::key::Group = $crate::config::key::Group {
+            pub const GROUP: &'static $crate::config::key::KeyGroup = {
+                static GROUP: $crate::config::key::KeyGroup = $crate::config::key::KeyGroup {
                     name: $group,
                     text: concat!($($text),+).trim_ascii_start(),
-                    keys: &[$($crate::config::key::Key {
+                    keys: &[$($crate::config::key::KeyDoc {
                         name: stringify!($key),
                         kind: <$value as $crate::config::value::Value>::KIND,
                         text: concat!($($about),+).trim_ascii_start(),
@@ -41,7 +41,7 @@ macro_rules! keys {
         }
 
         impl $crate::config::value::Value for $name {
-            const KIND: $crate::config::key::Kind = $crate::config::key::Kind::Map($name::GROUP);
+            const KIND: $crate::config::key::ValueType = $crate::config::key::ValueType::Map($name::GROUP);
 
             fn scalar(
                 scalar: $crate::config::value::Scalar<'_>,

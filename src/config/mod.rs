@@ -32,5 +32,5 @@ pub use model_file::ModelFile;
 pub use overrides::Override;
 pub use scalar::{Number, NumberOrColumn, Text};
 pub use sequence::Sequence;
-pub use source::{DataFile, Source};
+pub use source::{DataFile, ModelSource};
 pub use starter::{Starter, starter};

@@ -2,7 +2,7 @@
 
 use super::guard::Checked;
 use super::locate::{Segment, key_path};
-use crate::error::{InputError, Place};
+use crate::error::{InputError, Location};
 use crate::input::quote;
 use serde_yaml::{Mapping, Value};
 use std::fmt;
@@ -34,7 +34,7 @@ impl Override {
     /// When missing `=`, no key, or the value is not YAML.
     pub fn parse(text: &str) -> Result<Self, InputError> {
         let wrong = |problem: &str| {
-            InputError::new(Place::Argument("--set".into()), problem).found(quote(text))
+            InputError::new(Location::Argument("--set".into()), problem).found(quote(text))
         };
         let Some((key, written)) = text.split_once('=') else {
             return Err(
@@ -72,8 +72,8 @@ impl Override {
     }
 
     /// The override as the place of an error.
-    pub(super) fn place(&self) -> Place {
-        Place::Argument(format!("--set {self}"))
+    pub(super) fn place(&self) -> Location {
+        Location::Argument(format!("--set {self}"))
     }
 
     /// Puts the value into a model; maps on the way that are not there are made.

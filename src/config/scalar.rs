@@ -3,9 +3,9 @@
 //! Each type reads itself, so that a mistake is reported at its line with words of its own.
 
 use super::choice::{choice, choose};
-use super::key::Kind;
+use super::key::ValueType;
 use super::map::keys;
-use super::value::{Mistake, Reader, Report, Scalar, Value};
+use super::value::{Mistake, Report, Scalar, Value, ValueVisitor};
 use crate::input::one_of;
 use crate::near::{did_you_mean, number_in};
 use serde::de::{Deserializer, MapAccess, SeqAccess};
@@ -21,7 +21,7 @@ const ESTIMATE: &str = "estimate";
 pub struct Format;
 
 impl Value for Format {
-    const KIND: Kind = Kind::Format;
+    const KIND: ValueType = ValueType::Format;
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         match scalar {
             Scalar::Integer(1) => Ok(Self),
@@ -38,7 +38,7 @@ impl Value for Format {
 pub struct Number(pub f64);
 
 impl Value for Number {
-    const KIND: Kind = Kind::Number;
+    const KIND: ValueType = ValueType::Number;
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         match scalar {
             Scalar::Integer(value) => Ok(Self(value as f64)),
@@ -57,7 +57,7 @@ impl Value for Number {
 pub struct Count(pub usize);
 
 impl Value for Count {
-    const KIND: Kind = Kind::Count;
+    const KIND: ValueType = ValueType::Count;
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         let refused = |problem| scalar.refused(problem, "an integer");
         match scalar {
@@ -100,7 +100,7 @@ impl fmt::Display for Text {
 }
 
 impl Value for Text {
-    const KIND: Kind = Kind::Text;
+    const KIND: ValueType = ValueType::Text;
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         match scalar {
             Scalar::Text("") | Scalar::Nothing => {
@@ -111,7 +111,7 @@ impl Value for Text {
         }
     }
     fn read<'de, D: Deserializer<'de>>(
-        reader: Reader<'_, Self>,
+        reader: ValueVisitor<'_, Self>,
         from: D,
     ) -> Result<Self, D::Error> {
         // Read as text, a name such as 12 or 1.50 keeps its spelling.
@@ -138,7 +138,7 @@ impl fmt::Display for ColumnId {
 }
 
 impl Value for ColumnId {
-    const KIND: Kind = Kind::Column;
+    const KIND: ValueType = ValueType::Column;
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         let refused = |scalar: Scalar<'_>, problem| {
             let expected = "the name of a column, its number from 1, or a map such as \
@@ -162,7 +162,7 @@ impl Value for ColumnId {
 pub struct Estimate;
 
 impl Value for Estimate {
-    const KIND: Kind = Kind::Word(ESTIMATE);
+    const KIND: ValueType = ValueType::Word(ESTIMATE);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         let hint = match scalar {
             Scalar::Text(ESTIMATE) => return Ok(Self),
@@ -185,7 +185,7 @@ pub enum NumberOrEstimate {
 }
 
 impl Value for NumberOrEstimate {
-    const KIND: Kind = Kind::AnyOf(&[Kind::Number, Estimate::KIND]);
+    const KIND: ValueType = ValueType::AnyOf(&[ValueType::Number, Estimate::KIND]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         let expected = "a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}";
         match scalar {
@@ -210,7 +210,7 @@ pub enum Sigma {
 }
 
 impl Value for Sigma {
-    const KIND: Kind = Kind::AnyOf(&[Kind::Number, Estimate::KIND, Kind::Text]);
+    const KIND: ValueType = ValueType::AnyOf(&[ValueType::Number, Estimate::KIND, ValueType::Text]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         match scalar {
             Scalar::Text(ESTIMATE) => Ok(Self::Estimate),
@@ -236,7 +236,7 @@ pub enum Nodes {
 }
 
 impl Value for Nodes {
-    const KIND: Kind = Kind::AnyOf(&[Kind::Count, Kind::Word("auto")]);
+    const KIND: ValueType = ValueType::AnyOf(&[ValueType::Count, ValueType::Word("auto")]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         match scalar {
             Scalar::Text("auto") => Ok(Self::Auto),
@@ -248,15 +248,16 @@ impl Value for Nodes {
 
 /// Break points: how many, equally spaced over the record, or their times in s.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Knots {
+pub enum KnotSpec {
     /// So many over the record, both ends included.
     Count(Count),
     /// At these times, in s.
     Times(Vec<Number>),
 }
 
-impl Value for Knots {
-    const KIND: Kind = Kind::AnyOf(&[Kind::Count, Kind::List(&Kind::Number)]);
+impl Value for KnotSpec {
+    const KIND: ValueType =
+        ValueType::AnyOf(&[ValueType::Count, ValueType::List(&ValueType::Number)]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         let expected = "an integer (so many, equally spaced), or a list of times in s";
         (Count::scalar(scalar).map(Self::Count))
@@ -291,7 +292,7 @@ pub enum Weight {
 }
 
 impl Value for Weight {
-    const KIND: Kind = Kind::AnyOf(&[Kind::Number, WeightRule::KIND]);
+    const KIND: ValueType = ValueType::AnyOf(&[ValueType::Number, WeightRule::KIND]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         let weight = match scalar {
             Scalar::Text(word) if number_in(word).is_none() => {
@@ -324,7 +325,7 @@ pub enum NumberOrColumn {
 }
 
 impl Value for NumberOrColumn {
-    const KIND: Kind = Kind::AnyOf(&[Kind::Number, ColumnSpec::KIND]);
+    const KIND: ValueType = ValueType::AnyOf(&[ValueType::Number, ColumnSpec::KIND]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         let expected = "a finite number, or a column: {data: file.csv, column: name}";
         number_or(scalar, expected).map(Self::Number)
@@ -336,7 +337,7 @@ impl Value for NumberOrColumn {
 
 /// Where a fit starts: a number, a list of values, or a column of a file.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Start {
+pub enum StartSpec {
     /// The same number at all times.
     Number(Number),
     /// One value per parameter; their meaning depends on the basis.
@@ -345,8 +346,12 @@ pub enum Start {
     Column(ColumnSpec),
 }
 
-impl Value for Start {
-    const KIND: Kind = Kind::AnyOf(&[Kind::Number, Kind::List(&Kind::Number), ColumnSpec::KIND]);
+impl Value for StartSpec {
+    const KIND: ValueType = ValueType::AnyOf(&[
+        ValueType::Number,
+        ValueType::List(&ValueType::Number),
+        ColumnSpec::KIND,
+    ]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         let expected =
             "a finite number, a list of numbers, or a column: {data: file.csv, column: name}";
@@ -370,7 +375,7 @@ pub enum ScalarOr<S, M> {
 }
 
 impl<S: Value, M: Value> Value for ScalarOr<S, M> {
-    const KIND: Kind = Kind::AnyOf(&[S::KIND, M::KIND]);
+    const KIND: ValueType = ValueType::AnyOf(&[S::KIND, M::KIND]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         S::scalar(scalar).map(Self::Scalar)
     }
@@ -412,9 +417,9 @@ impl<T> OneOrList<T> {
 }
 
 impl<T: Value> Value for OneOrList<T> {
-    const KIND: Kind = Kind::AnyOf(&[T::KIND, Kind::List(&T::KIND)]);
+    const KIND: ValueType = ValueType::AnyOf(&[T::KIND, ValueType::List(&T::KIND)]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
-        if let Kind::Map(_) = T::KIND {
+        if let ValueType::Map(_) = T::KIND {
             let problem = "wrong type of value";
             return Err(scalar.refused(problem, "a map, or a list of maps"));
         }
@@ -426,7 +431,7 @@ impl<T: Value> Value for OneOrList<T> {
     }
     fn map<'de, A: MapAccess<'de>>(map: A, report: &Report) -> Result<Self, A::Error> {
         match T::KIND {
-            Kind::Map(_) => T::map(map, report).map(Self::One),
+            ValueType::Map(_) => T::map(map, report).map(Self::One),
             _ => Self::scalar(Scalar::Map).map_err(|mistake| report.raise(mistake)),
         }
     }

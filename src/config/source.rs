@@ -6,7 +6,7 @@ use std::path::Path;
 
 /// The text of a model and the data files that it names.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Source {
+pub struct ModelSource {
     /// The text of the model file.
     pub text: String,
     /// What was given beside it, in the place of its own values.
@@ -24,7 +24,7 @@ pub struct DataFile {
     pub content: Option<(u64, String)>,
 }
 
-impl Source {
+impl ModelSource {
     /// The text of a model file, and the files behind its keys `data`.
     pub fn of(file: &ModelFile) -> Self {
         let data = file.data_names().into_iter().map(|name| DataFile {
@@ -60,7 +60,7 @@ functions: {mass: {fixed: 1}, damping: {fixed: {data: b.csv, column: c}}, stiffn
 fit: {initial: data}
 ";
         let file = ModelFile::parse(folder.path().join("model.yaml"), text).expect("a model");
-        let source = Source::of(&file);
+        let source = ModelSource::of(&file);
         assert_eq!(source.text, text);
         let digest = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         let expected = [("a.csv", Some((3, digest.to_string()))), ("b.csv", None)];

@@ -3,7 +3,7 @@
 //! The YAML crate gives errors as text with a position. So a reader leaves its [`Mistake`] in a [`Report`], which also has
 //! the path of the key, and raises any error of the crate: that one has the position.
 
-use super::key::{Key, Kind};
+use super::key::{KeyDoc, ValueType};
 use crate::input::quote;
 use serde::de::{DeserializeSeed, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Visitor};
 use std::cell::RefCell;
@@ -138,7 +138,7 @@ impl Report {
     pub fn key<'de, A: MapAccess<'de>>(
         &self,
         map: &mut A,
-        keys: &'static [Key],
+        keys: &'static [KeyDoc],
     ) -> Result<Option<&'static str>, A::Error> {
         map.next_key_seed(NextKey { keys, report: self })
     }
@@ -153,7 +153,7 @@ impl Report {
         if field.is_some() {
             return Err(self.raise(Mistake::RepeatedKey(key)));
         }
-        let value = || map.next_value_seed(Reader::new(self));
+        let value = || map.next_value_seed(ValueVisitor::new(self));
         *field = Some(self.below(&format!(".{key}"), value)?);
         Ok(())
     }
@@ -176,7 +176,7 @@ impl Report {
         let mut elements = Vec::new();
         let mut next = |i| {
             self.below(&format!("[{i}]"), || {
-                list.next_element_seed(Reader::new(self))
+                list.next_element_seed(ValueVisitor::new(self))
             })
         };
         while let Some(element) = next(elements.len())? {
@@ -189,7 +189,7 @@ impl Report {
 /// A type that is read from the value of a key.
 pub(super) trait Value: Sized {
     /// What may stand behind the key.
-    const KIND: Kind;
+    const KIND: ValueType;
     /// Whether the key must be there.
     const REQUIRED: bool = true;
 
@@ -213,7 +213,7 @@ pub(super) trait Value: Sized {
 
     /// The value from whatever stands there.
     fn read<'de, D: Deserializer<'de>>(
-        reader: Reader<'_, Self>,
+        reader: ValueVisitor<'_, Self>,
         from: D,
     ) -> Result<Self, D::Error> {
         from.deserialize_any(reader)
@@ -221,7 +221,7 @@ pub(super) trait Value: Sized {
 }
 
 impl<T: Value> Value for Option<T> {
-    const KIND: Kind = T::KIND;
+    const KIND: ValueType = T::KIND;
     const REQUIRED: bool = false;
     fn absent(_: &'static str) -> Result<Self, Mistake> {
         Ok(None)
@@ -230,7 +230,7 @@ impl<T: Value> Value for Option<T> {
         Ok(None)
     }
     fn read<'de, D: Deserializer<'de>>(
-        reader: Reader<'_, Self>,
+        reader: ValueVisitor<'_, Self>,
         from: D,
     ) -> Result<Self, D::Error> {
         from.deserialize_option(Optional(reader.report, PhantomData))
@@ -238,7 +238,7 @@ impl<T: Value> Value for Option<T> {
 }
 
 impl<T: Value> Value for Vec<T> {
-    const KIND: Kind = Kind::List(&T::KIND);
+    const KIND: ValueType = ValueType::List(&T::KIND);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         match scalar {
             Scalar::Nothing => Ok(Self::new()),
@@ -251,7 +251,7 @@ impl<T: Value> Value for Vec<T> {
 }
 
 impl Value for bool {
-    const KIND: Kind = Kind::Bool;
+    const KIND: ValueType = ValueType::Bool;
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         match scalar {
             Scalar::Bool(value) => Ok(value),
@@ -261,12 +261,12 @@ impl Value for bool {
 }
 
 /// The reader of a value for serde.
-pub(super) struct Reader<'a, T> {
+pub(super) struct ValueVisitor<'a, T> {
     report: &'a Report,
     value: PhantomData<T>,
 }
 
-impl<'a, T: Value> Reader<'a, T> {
+impl<'a, T: Value> ValueVisitor<'a, T> {
     /// A reader that leaves its mistakes in `report`.
     pub fn new(report: &'a Report) -> Self {
         let value = PhantomData;
@@ -278,7 +278,7 @@ impl<'a, T: Value> Reader<'a, T> {
     }
 }
 
-impl<'de, T: Value> DeserializeSeed<'de> for Reader<'_, T> {
+impl<'de, T: Value> DeserializeSeed<'de> for ValueVisitor<'_, T> {
     type Value = T;
     fn deserialize<D: Deserializer<'de>>(self, from: D) -> Result<T, D::Error> {
         T::read(self, from)
@@ -320,7 +320,7 @@ macro_rules! scalar_visits {
 }
 pub(super) use scalar_visits;
 
-impl<'de, T: Value> Visitor<'de> for Reader<'_, T> {
+impl<'de, T: Value> Visitor<'de> for ValueVisitor<'_, T> {
     type Value = T;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -342,7 +342,7 @@ impl<'de, T: Value> Visitor<'de> for Reader<'_, T> {
 
 /// The reader of a key of a map.
 struct NextKey<'a> {
-    keys: &'static [Key],
+    keys: &'static [KeyDoc],
     report: &'a Report,
 }
 
@@ -387,6 +387,6 @@ impl<'de, T: Value> Visitor<'de> for Optional<'_, T> {
     }
 
     fn visit_some<D: Deserializer<'de>>(self, from: D) -> Result<Option<T>, D::Error> {
-        T::read(Reader::new(self.0), from).map(Some)
+        T::read(ValueVisitor::new(self.0), from).map(Some)
     }
 }

@@ -103,7 +103,7 @@ fn soft_limit(text: &str, name: &str) -> Option<u64> {
 
 /// A folder of the memory controller, its mount point, and the version of the interface.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Group {
+struct ControlGroup {
     folder: PathBuf,
     mount: PathBuf,
     version: u8,
@@ -111,7 +111,7 @@ struct Group {
 
 /// The folders of the process's control groups that may limit memory, by `/proc/self/cgroup` and
 /// `/proc/self/mountinfo`.
-fn directories(cgroup: &str, mountinfo: &str) -> Vec<Group> {
+fn directories(cgroup: &str, mountinfo: &str) -> Vec<ControlGroup> {
     let mut groups = Vec::new();
     for line in cgroup.lines() {
         let mut parts = line.splitn(3, ':');
@@ -127,7 +127,7 @@ fn directories(cgroup: &str, mountinfo: &str) -> Vec<Group> {
         for (root, mount) in mounts(mountinfo, version) {
             // A path outside of the mount's root is one of another namespace: its own is the root.
             let inside = Path::new(path).strip_prefix(&root).unwrap_or(Path::new(""));
-            groups.push(Group {
+            groups.push(ControlGroup {
                 folder: mount.join(inside),
                 mount,
                 version,
@@ -155,7 +155,7 @@ fn mounts(mountinfo: &str, version: u8) -> Vec<(PathBuf, PathBuf)> {
 }
 
 /// The least that a control group and those that contain it leave, bytes.
-fn left(root: &Path, group: &Group) -> Option<u64> {
+fn left(root: &Path, group: &ControlGroup) -> Option<u64> {
     let levels = group.folder.ancestors();
     let levels = levels.take_while(|folder| folder.starts_with(&group.mount));
     let (limit, usage, reclaimable) = match group.version {

@@ -10,7 +10,7 @@ use csv::StringRecord;
 
 use super::field::{self, Field};
 use super::format::TableFormat;
-use super::rows::Source;
+use super::rows::CsvText;
 use crate::units::Unit;
 
 /// As much of a file as is looked at, in bytes: some thousand rows, more than any preamble.
@@ -36,9 +36,9 @@ pub struct Layout {
 pub fn detect(path: &Path, text: &str, format: &TableFormat) -> Layout {
     let sample = beginning(text);
     let records = |delimiter| records(path, sample, format, delimiter);
-    let (mut best, mut single): (Option<Candidate>, Option<Candidate>) = (None, None);
+    let (mut best, mut single): (Option<DialectCandidate>, Option<DialectCandidate>) = (None, None);
     for (delimiter, decimal) in signs(format) {
-        let Some(candidate) = Candidate::new(records(delimiter), delimiter, decimal) else {
+        let Some(candidate) = DialectCandidate::new(records(delimiter), delimiter, decimal) else {
             continue;
         };
         let guessed_comma =
@@ -54,7 +54,7 @@ pub fn detect(path: &Path, text: &str, format: &TableFormat) -> Layout {
         }
     }
     // A single column is what remains, unless the others make hardly any numbers of the file.
-    let explains = |b: &Candidate| single.as_ref().is_none_or(|s| 2.0 * b.score >= s.score);
+    let explains = |b: &DialectCandidate| single.as_ref().is_none_or(|s| 2.0 * b.score >= s.score);
     let found = match best.filter(explains) {
         Some(best) => Some(best),
         None => single,
@@ -94,7 +94,7 @@ fn beginning(text: &str) -> &str {
 }
 
 fn records(path: &Path, sample: &str, format: &TableFormat, delimiter: char) -> Vec<StringRecord> {
-    let source = Source::new(sample, format.skip.unwrap_or(0), delimiter);
+    let source = CsvText::new(sample, format.skip.unwrap_or(0), delimiter);
     let mut rows = source.rows(path);
     let mut records = Vec::new();
     let mut record = StringRecord::new();
@@ -136,7 +136,7 @@ fn without_numbers(
 }
 
 /// The rows that one delimiter and decimal sign make.
-struct Candidate {
+struct DialectCandidate {
     delimiter: char,
     decimal: char,
     records: Vec<StringRecord>,
@@ -144,12 +144,12 @@ struct Candidate {
     score: f64,
 }
 
-impl Candidate {
+impl DialectCandidate {
     /// `None` where there is no number.
     fn new(records: Vec<StringRecord>, delimiter: char, decimal: char) -> Option<Self> {
-        let counts: Vec<(usize, Count)> = records
+        let counts: Vec<(usize, FieldCounts)> = records
             .iter()
-            .map(|record| (record.len(), Count::of(record, decimal)))
+            .map(|record| (record.len(), FieldCounts::of(record, decimal)))
             .collect();
         let widest = counts.iter().map(|(width, _)| *width).max()?;
         let mut numbers = vec![0; widest + 1];
@@ -181,7 +181,7 @@ impl Candidate {
     /// the first ones may be of the preamble.
     fn numeric(&self) -> Vec<usize> {
         let bears_numbers = |record: &&StringRecord| {
-            record.len() == self.width && Count::of(record, self.decimal).numbers > 0
+            record.len() == self.width && FieldCounts::of(record, self.decimal).numbers > 0
         };
         let rows: Vec<&StringRecord> = self.records.iter().filter(bears_numbers).collect();
         let is_numeric = |&column: &usize| {
@@ -314,12 +314,12 @@ fn are_units(record: &StringRecord) -> bool {
 }
 
 /// The fields of one row.
-struct Count {
+struct FieldCounts {
     numbers: usize,
     others: usize,
 }
 
-impl Count {
+impl FieldCounts {
     fn of(record: &StringRecord, decimal: char) -> Self {
         let mut count = Self {
             numbers: 0,

@@ -1,6 +1,6 @@
 //! One field of a table: a number, a missing reading, or neither.
 
-use crate::error::{InputError, Place};
+use crate::error::{InputError, Location};
 use crate::input::quote;
 
 /// What stands for a missing reading, in small letters; also an empty field.
@@ -60,7 +60,7 @@ fn is_missing(field: &str) -> bool {
 }
 
 /// The error for a field that is not a finite number, where one must be.
-pub fn not_a_number(place: Place, field: &str, decimal: char) -> InputError {
+pub fn not_a_number(place: Location, field: &str, decimal: char) -> InputError {
     let problem = match parse(field, decimal) {
         Some(_) => "not a finite number",
         None if field.is_empty() => "a number is missing",
@@ -70,7 +70,7 @@ pub fn not_a_number(place: Place, field: &str, decimal: char) -> InputError {
 }
 
 /// The error for a field that is neither a finite number nor missing.
-pub fn not_a_reading(place: Place, field: &str, decimal: char) -> InputError {
+pub fn not_a_reading(place: Location, field: &str, decimal: char) -> InputError {
     let expected = "a finite number, or an empty field for a missing sample";
     match parse(field, decimal) {
         Some(_) => wrong(place, "not a finite number", field, decimal)
@@ -80,7 +80,7 @@ pub fn not_a_reading(place: Place, field: &str, decimal: char) -> InputError {
     }
 }
 
-fn wrong(place: Place, problem: &str, field: &str, decimal: char) -> InputError {
+fn wrong(place: Location, problem: &str, field: &str, decimal: char) -> InputError {
     let error = InputError::new(place, problem).found(match field {
         "" => "nothing".to_owned(),
         field => quote(field),

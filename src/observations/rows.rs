@@ -8,13 +8,13 @@ use csv::{ReaderBuilder, StringRecord, Trim};
 use crate::error::InputError;
 
 /// A text as the csv crate reads it: what the delimiters and line ends of instruments become.
-pub struct Source<'a> {
+pub struct CsvText<'a> {
     text: Cow<'a, str>,
     delimiter: u8,
     first_line: usize,
 }
 
-impl<'a> Source<'a> {
+impl<'a> CsvText<'a> {
     /// The text after `skip` lines; a blank as the delimiter stands for runs of blanks and tabs.
     pub fn new(text: &'a str, skip: usize, delimiter: char) -> Self {
         let rest = after_lines(text, skip);
@@ -30,7 +30,7 @@ impl<'a> Source<'a> {
     }
 
     /// Its rows; `path` is what messages call it.
-    pub fn rows(&'a self, path: &'a Path) -> Rows<'a> {
+    pub fn rows(&'a self, path: &'a Path) -> TableRows<'a> {
         let records = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -38,7 +38,7 @@ impl<'a> Source<'a> {
             .comment(Some(b'#'))
             .trim(Trim::All)
             .from_reader(self.text.as_bytes());
-        Rows {
+        TableRows {
             path,
             text: &self.text,
             records,
@@ -93,7 +93,7 @@ fn runs_to_tabs(text: &str) -> String {
 }
 
 /// Reads row after row.
-pub struct Rows<'a> {
+pub struct TableRows<'a> {
     path: &'a Path,
     text: &'a str,
     records: csv::Reader<&'a [u8]>,
@@ -101,7 +101,7 @@ pub struct Rows<'a> {
     line: usize,
 }
 
-impl Rows<'_> {
+impl TableRows<'_> {
     /// Reads the next row into `record` and gives its line; `None` at the end.
     pub fn read(&mut self, record: &mut StringRecord) -> Result<Option<usize>, InputError> {
         loop {

@@ -5,7 +5,7 @@ use super::Table;
 use super::columns::split_unit;
 use crate::error::InputError;
 use crate::input::quote;
-use crate::units::{Kind, Unit, unbracketed};
+use crate::units::{Quantity, Unit, unbracketed};
 
 /// What a table states as the unit of one column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,13 +25,13 @@ impl<'a> StatedUnit<'a> {
     }
 
     /// The unit of this kind that the row of units or the text behind the name states.
-    pub fn explicit(&self, kind: Kind) -> Option<Unit> {
+    pub fn explicit(&self, kind: Quantity) -> Option<Unit> {
         let unit = |text: Option<&str>| Unit::recognise(kind, text?);
         unit(self.row).or_else(|| unit(self.header))
     }
 
     /// The unit of this kind at the end of the name, as in `y_mm` and `a_m_per_s2`.
-    pub fn suffix(&self, kind: Kind) -> Option<Unit> {
+    pub fn suffix(&self, kind: Quantity) -> Option<Unit> {
         self.name.match_indices('_').find_map(|(at, _)| {
             let end = &self.name[at + 1..];
             Unit::recognise(kind, &end.replace("_per_", "/").replace('_', " "))
@@ -43,7 +43,7 @@ impl<'a> StatedUnit<'a> {
         let (Some(row), Some(header)) = (self.row, self.header) else {
             return false;
         };
-        let units = |text| Kind::ALL.map(|kind| Unit::recognise(kind, text));
+        let units = |text| Quantity::ALL.map(|kind| Unit::recognise(kind, text));
         let (row, header) = (units(row), units(header));
         let is_unit = |units: &[Option<Unit>]| units.iter().any(Option::is_some);
         let agree = row.iter().zip(&header).any(|(a, b)| a.is_some() && a == b);
@@ -99,16 +99,16 @@ mod tests {
     #[test]
     fn units_are_read_at_the_ends_of_names() {
         for (name, kind, symbol) in [
-            ("y_mm", Kind::Displacement, Some("mm")),
-            ("left_y_mm", Kind::Displacement, Some("mm")),
-            ("t_ms", Kind::Time, Some("ms")),
-            ("a_m_per_s2", Kind::Acceleration, Some("m/s²")),
-            ("v_mm_per_s", Kind::Velocity, Some("mm/s")),
-            ("M_N_m", Kind::Force, Some("N m")),
-            ("y", Kind::Displacement, None),
-            ("mm", Kind::Displacement, None),
-            ("y_raw", Kind::Displacement, None),
-            ("y_mm", Kind::Time, None),
+            ("y_mm", Quantity::Displacement, Some("mm")),
+            ("left_y_mm", Quantity::Displacement, Some("mm")),
+            ("t_ms", Quantity::Time, Some("ms")),
+            ("a_m_per_s2", Quantity::Acceleration, Some("m/s²")),
+            ("v_mm_per_s", Quantity::Velocity, Some("mm/s")),
+            ("M_N_m", Quantity::Force, Some("N m")),
+            ("y", Quantity::Displacement, None),
+            ("mm", Quantity::Displacement, None),
+            ("y_raw", Quantity::Displacement, None),
+            ("y_mm", Quantity::Time, None),
         ] {
             let table = table(&format!("{name},z\n1,2\n2,3\n"));
             let unit = table.stated_unit(0).suffix(kind);

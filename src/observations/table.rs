@@ -10,8 +10,8 @@ use super::encoding::decode;
 use super::field::{self, Field};
 use super::format::{Detected, TableFormat};
 use super::room::Room;
-use super::rows::{Source, with_newlines};
-use crate::error::{InputError, Place};
+use super::rows::{CsvText, with_newlines};
+use crate::error::{InputError, Location};
 use crate::input::{LONGEST_TABLE, check_lines, listed, quote, read_bytes, read_bytes_from};
 
 /// Most columns: each takes some hundred bytes, whatever its fields take.
@@ -34,13 +34,13 @@ pub struct Table {
     format: Detected,
     headers: Vec<String>,
     units: Vec<String>,
-    columns: Vec<Column>,
+    columns: Vec<ColumnValues>,
     lines: Vec<usize>,
 }
 
 /// The readings of a column, NaN where one is missing, up to the first field that is none.
 #[derive(Debug, Clone, PartialEq, Default)]
-struct Column {
+struct ColumnValues {
     readings: Vec<f64>,
     /// The first field that is not a finite number.
     unnumbered: Option<InputError>,
@@ -182,8 +182,8 @@ impl Table {
     }
 
     /// The place of a data row, counted from 0, for errors about it.
-    pub fn place(&self, row: usize, column: Option<&str>) -> Place {
-        Place::Row {
+    pub fn place(&self, row: usize, column: Option<&str>) -> Location {
+        Location::Row {
             file: self.path.clone(),
             row: row + 1,
             line: self.lines.get(row).copied().unwrap_or_default(),
@@ -191,7 +191,7 @@ impl Table {
         }
     }
 
-    fn at(&self, index: usize) -> Result<&Column, InputError> {
+    fn at(&self, index: usize) -> Result<&ColumnValues, InputError> {
         let index = self.find(&super::ColumnName::Number(index.saturating_add(1)))?;
         Ok(&self.columns[index])
     }
@@ -222,12 +222,12 @@ impl Table {
         let width = layout.width.unwrap_or(1);
         room.check(width)?;
         table.lines = room.list(width)?;
-        let source = Source::new(&text, skipped, layout.delimiter);
+        let source = CsvText::new(&text, skipped, layout.delimiter);
         table.fill(&source, &layout, room)?;
         Ok(table)
     }
 
-    fn fill(&mut self, source: &Source, layout: &Layout, room: Room) -> Result<(), InputError> {
+    fn fill(&mut self, source: &CsvText, layout: &Layout, room: Room) -> Result<(), InputError> {
         let path = self.path.clone();
         let mut rows = source.rows(&path);
         let mut fields = StringRecord::new();
@@ -310,11 +310,11 @@ impl Table {
 }
 
 /// So many columns with room for the values of all rows.
-fn columns(width: usize, room: Room) -> Result<Vec<Column>, InputError> {
+fn columns(width: usize, room: Room) -> Result<Vec<ColumnValues>, InputError> {
     let column = |_| {
-        Ok(Column {
+        Ok(ColumnValues {
             readings: room.list(width)?,
-            ..Column::default()
+            ..ColumnValues::default()
         })
     };
     (0..width).map(column).collect()
@@ -368,7 +368,7 @@ fn check_headers(
 }
 
 /// A row with more or fewer fields than there are columns.
-fn ragged(place: Place, fields: &StringRecord, expected: usize, named: bool) -> InputError {
+fn ragged(place: Location, fields: &StringRecord, expected: usize, named: bool) -> InputError {
     let plural = |n: usize| match n {
         1 => "1 field".to_owned(),
         n => format!("{n} fields"),

@@ -1,6 +1,6 @@
 //! Tables that a run wrote, read back.
 
-use crate::error::{InputError, Place};
+use crate::error::{InputError, Location};
 use crate::input::{Lines, one_of, open, quote};
 use crate::memory;
 use crate::near::did_you_mean;
@@ -11,13 +11,13 @@ const TABLE: &str = "a CSV file with one row of column names and rows of numbers
 /// A table that a run wrote: unlike a user's, it may have no rows and empty fields, and every field
 /// that is not empty is a number.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Columns {
+pub struct ResultTable {
     path: PathBuf,
     headers: Vec<String>,
     columns: Vec<Vec<f64>>,
 }
 
-impl Columns {
+impl ResultTable {
     /// Reads a table of any number of rows, as [`read_rows`](Self::read_rows) does.
     ///
     /// # Errors
@@ -109,7 +109,7 @@ impl Columns {
         match values.iter().position(|v| !v.is_finite()) {
             None => Ok(values),
             Some(i) => {
-                let place = Place::Row {
+                let place = Location::Row {
                     file: self.path.clone(),
                     row: i + 1,
                     line: i + 2,
@@ -153,7 +153,7 @@ fn take(
     columns: &mut [Vec<f64>],
 ) -> Result<(), InputError> {
     let damaged = |problem: &str, column: Option<&String>| {
-        let place = Place::Row {
+        let place = Location::Row {
             file: path.to_path_buf(),
             row: row + 1,
             line: row + 2,

@@ -30,10 +30,10 @@ fn dots(colour: Colour, count: usize) -> Style {
 }
 
 /// One measured channel: what was measured, its unit, the times in s, and the readings.
-pub type Channel<'a> = (&'a str, &'a str, &'a [f64], &'a [f64]);
+pub type ChannelSamples<'a> = (&'a str, &'a str, &'a [f64], &'a [f64]);
 
 /// The measured motion, one panel for each channel.
-pub fn observation(channels: &[Channel]) -> Figure {
+pub fn observation(channels: &[ChannelSamples]) -> Figure {
     Figure::new(
         "observation",
         "Record",

@@ -1,6 +1,6 @@
 //! Reading a finished run back.
 
-use super::columns::Columns;
+use super::columns::ResultTable;
 use super::document::{FORMAT, ResultDocument};
 use crate::error::InputError;
 use crate::input::{JSON, read_text_within};
@@ -55,9 +55,9 @@ pub struct Run {
     /// `history.csv`: one row per iteration.
     pub history: Vec<IterationRecord>,
     /// `functions.csv`: one row per node; not a number where a field is empty.
-    pub functions: Columns,
+    pub functions: ResultTable,
     /// `trajectory.csv`: one row per node; not a number where a record has ended or was not read.
-    pub trajectory: Columns,
+    pub trajectory: ResultTable,
 }
 
 impl Run {
@@ -78,8 +78,8 @@ impl Run {
         let (system, quantities) = system(folder, &document)?;
         let nodes = system.grid.nodes();
         memory::check_file(&folder.join("result.json"), nodes as u64 * PER_NODE)?;
-        let functions = Columns::read_rows(&folder.join("functions.csv"), nodes, "node")?;
-        let trajectory = Columns::read_rows(&folder.join("trajectory.csv"), nodes, "node")?;
+        let functions = ResultTable::read_rows(&folder.join("functions.csv"), nodes, "node")?;
+        let trajectory = ResultTable::read_rows(&folder.join("trajectory.csv"), nodes, "node")?;
         let has_truth = functions.headers().iter().any(|h| h.starts_with("true_"));
         Ok(Self {
             folder: folder.to_path_buf(),
@@ -182,7 +182,7 @@ fn document(folder: &Path, value: &Value) -> Result<ResultDocument, InputError> 
 
 fn history(folder: &Path, iterations: u64) -> Result<Vec<IterationRecord>, InputError> {
     let rows = usize::try_from(iterations).unwrap_or(usize::MAX);
-    let table = Columns::read_rows(&folder.join("history.csv"), rows, "iteration")?;
+    let table = ResultTable::read_rows(&folder.join("history.csv"), rows, "iteration")?;
     let column = |name: &str| table.required(name);
     let ratio = "gradient_norm_squared_ratio";
     let (cost, cost_ratio, gradient) = (column("cost")?, column("cost_ratio")?, column(ratio)?);
@@ -201,7 +201,7 @@ fn history(folder: &Path, iterations: u64) -> Result<Vec<IterationRecord>, Input
 
 /// The mass and the functions of the terms `quantities`, which are finite at every node.
 fn device(
-    table: &Columns,
+    table: &ResultTable,
     prefix: &str,
     quantities: &[CoefficientKind],
 ) -> Result<NodalCoefficients, InputError> {

@@ -41,7 +41,7 @@ mod text;
 mod timings;
 
 pub use chart::{Axis, Colour, Dash, Figure, Mark, Panel, Scale, Style, render};
-pub use columns::Columns;
+pub use columns::ResultTable;
 pub use compare::Comparison;
 pub use cost::{CostKind, cost_definition};
 pub use csv::CsvTable;

@@ -1,6 +1,6 @@
 //! Charts of letters: readings against fit, and the functions, for a look in the terminal.
 
-use super::columns::Columns;
+use super::columns::ResultTable;
 use super::document::ResultDocument;
 use crate::error::InputError;
 use kmcfit_core::internals::functions::CoefficientKind;
@@ -28,7 +28,7 @@ pub fn charts(
     for (e, experiment) in document.experiments.iter().enumerate() {
         for channel in &experiment.channels {
             let name = format!("readings/{}-{}.csv", e + 1, channel.kind);
-            let table = Columns::read(&folder.join(name))?;
+            let table = ResultTable::read(&folder.join(name))?;
             let title = format!(
                 "{}: {} in {} (line: fit, o: samples)",
                 experiment.name, channel.kind, channel.unit
@@ -41,7 +41,7 @@ pub fn charts(
             text += &format!("\n{title}\n{}", chart.text());
         }
     }
-    let table = Columns::read(&folder.join("functions.csv"))?;
+    let table = ResultTable::read(&folder.join("functions.csv"))?;
     let times = table.required("t_s")?;
     for (name, function) in document.terms() {
         let Some(quantity) = CoefficientKind::ALL.into_iter().find(|q| q.name() == name) else {

@@ -15,7 +15,7 @@ const WHAT: &str = "the journal of a study or comparison that was begun by kmcfi
 
 /// A line: the name of an analysis and its result.
 #[derive(Serialize, Deserialize)]
-struct Line {
+struct AnalysisLine {
     analysis: String,
     result: Value,
 }
@@ -29,7 +29,7 @@ pub(super) fn is_finished(path: &Path) -> bool {
         return false;
     };
     text.lines()
-        .any(|(line, _): (Line, _)| line.analysis == FINISHED)
+        .any(|(line, _): (AnalysisLine, _)| line.analysis == FINISHED)
 }
 
 /// The finished analyses, on disk as soon as they are.
@@ -70,7 +70,7 @@ impl AnalysisJournal {
         heading.check_same(&text.heading, &path)?;
         let mut done = BTreeMap::new();
         let mut end = text.begin;
-        for (Line { analysis, result }, next) in text.lines() {
+        for (AnalysisLine { analysis, result }, next) in text.lines() {
             done.insert(analysis, result);
             end = next;
         }
@@ -129,7 +129,7 @@ impl AnalysisJournal {
         if !whole() {
             return Ok(None);
         }
-        let line = Line {
+        let line = AnalysisLine {
             analysis: name.to_owned(),
             result: serde_json::to_value(&result).map_err(io::Error::other)?,
         };

@@ -39,15 +39,15 @@ const TAIL: usize = 17;
 
 /// A place between two lines: the bytes before it, and the checksum of the line that ends there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Mark {
+pub(super) struct JournalPosition {
     pub bytes: u64,
     chain: u64,
 }
 
 /// The checksum of a line from that of the line before and its JSON.
-struct Chain(Sha256);
+struct ChainedChecksum(Sha256);
 
-impl Chain {
+impl ChainedChecksum {
     fn after(previous: u64) -> Self {
         Self(Sha256::new().chain_update(previous.to_be_bytes()))
     }
@@ -63,16 +63,16 @@ impl Chain {
 /// Appends a line to a text; the place behind it.
 pub(super) fn push_line(
     text: &mut Vec<u8>,
-    mark: Mark,
+    mark: JournalPosition,
     entry: &impl Serialize,
-) -> io::Result<Mark> {
+) -> io::Result<JournalPosition> {
     write_line(text, mark, entry)
 }
 
 /// A writer that takes the checksum of what passes.
 struct Summing<W> {
     inner: W,
-    chain: Chain,
+    chain: ChainedChecksum,
     bytes: u64,
 }
 
@@ -90,10 +90,14 @@ impl<W: Write> Write for Summing<W> {
 }
 
 /// Writes a line piece by piece: as a text a long one would take a multiple of the memory of a fit.
-pub(super) fn write_line(out: impl Write, mark: Mark, entry: &impl Serialize) -> io::Result<Mark> {
+pub(super) fn write_line(
+    out: impl Write,
+    mark: JournalPosition,
+    entry: &impl Serialize,
+) -> io::Result<JournalPosition> {
     let mut summing = Summing {
         inner: out,
-        chain: Chain::after(mark.chain),
+        chain: ChainedChecksum::after(mark.chain),
         bytes: 0,
     };
     serde_json::to_writer(&mut summing, entry)?;
@@ -105,21 +109,21 @@ pub(super) fn write_line(out: impl Write, mark: Mark, entry: &impl Serialize) ->
     let chain = chain.finish();
     inner.write_all(format!("\t{chain:016x}\n").as_bytes())?;
     inner.flush()?;
-    Ok(Mark {
+    Ok(JournalPosition {
         bytes: mark.bytes + bytes + TAIL as u64 + 1,
         chain,
     })
 }
 
 /// The JSON of a line whose checksum is right, and the place behind it; `None` for any other line.
-fn checked(line: &[u8], mark: Mark) -> Option<(&[u8], Mark)> {
+fn checked(line: &[u8], mark: JournalPosition) -> Option<(&[u8], JournalPosition)> {
     let text = line.strip_suffix(b"\n")?;
     let (json, tail) = text.split_at_checked(text.len().checked_sub(TAIL)?)?;
     let digits = std::str::from_utf8(tail.strip_prefix(b"\t")?).ok()?;
-    let mut chain = Chain::after(mark.chain);
+    let mut chain = ChainedChecksum::after(mark.chain);
     chain.0.update(json);
     let chain = chain.finish();
-    let mark = Mark {
+    let mark = JournalPosition {
         bytes: mark.bytes + line.len() as u64,
         chain,
     };
@@ -132,7 +136,7 @@ fn checked(line: &[u8], mark: Mark) -> Option<(&[u8], Mark)> {
 pub(super) fn heading_of(path: &Path) -> Option<Heading> {
     let (file, _) = open(path, "a journal").ok()?;
     let line = first_line(file).ok()?;
-    let (json, _) = checked(&line, Mark::default())?;
+    let (json, _) = checked(&line, JournalPosition::default())?;
     let heading: Heading = serde_json::from_slice(json).ok()?;
     (!path.is_symlink()).then_some(heading)
 }
@@ -150,21 +154,21 @@ fn first_line(file: File) -> io::Result<Vec<u8>> {
 pub(super) struct JournalFile {
     file: File,
     /// The end of what was written.
-    pub end: Mark,
+    pub end: JournalPosition,
 }
 
 impl JournalFile {
     /// A new journal, in the place of an older one.
     pub fn begin(work: &WorkFolder, path: &Path, heading: &Heading) -> io::Result<Self> {
         let mut text = Vec::new();
-        let end = push_line(&mut text, Mark::default(), heading)?;
+        let end = push_line(&mut text, JournalPosition::default(), heading)?;
         let text = String::from_utf8(text).map_err(io::Error::other)?;
         let file = begin_file(work.path(), path, &text)?;
         Ok(Self { file, end })
     }
 
     /// A journal that was read as far as `end`; the rest is dropped.
-    pub fn resume(path: &Path, end: Mark) -> Result<Self, InputError> {
+    pub fn resume(path: &Path, end: JournalPosition) -> Result<Self, InputError> {
         let resumed = system::open_to_append(path).and_then(|file| {
             let mut journal = Self { file, end };
             journal.truncate(end)?;
@@ -176,14 +180,14 @@ impl JournalFile {
     }
 
     /// Drops what stands behind a place.
-    pub fn truncate(&mut self, end: Mark) -> io::Result<()> {
+    pub fn truncate(&mut self, end: JournalPosition) -> io::Result<()> {
         system::truncate(&self.file, end.bytes)?;
         self.end = end;
         Ok(())
     }
 
     /// Appends lines that were made by [`push_line`] behind the end.
-    pub fn append_text(&mut self, text: &[u8], end: Mark) -> io::Result<()> {
+    pub fn append_text(&mut self, text: &[u8], end: JournalPosition) -> io::Result<()> {
         system::write_all(&self.file, text)?;
         self.end = end;
         Ok(())
@@ -208,7 +212,7 @@ pub(super) struct JournalText {
     /// The first line.
     pub heading: Heading,
     /// The end of the first line.
-    pub begin: Mark,
+    pub begin: JournalPosition,
 }
 
 impl JournalText {
@@ -230,7 +234,7 @@ impl JournalText {
         let value: serde_json::Value = serde_json::from_slice(json.unwrap_or_default())
             .map_err(|error| no_journal(path, what).found(error))?;
         Heading::check_format(&value, path)?;
-        let (_, begin) = checked(line, Mark::default())
+        let (_, begin) = checked(line, JournalPosition::default())
             .ok_or_else(|| no_journal(path, what).found("a first line with a wrong checksum"))?;
         let heading =
             serde_json::from_value(value).map_err(|error| no_journal(path, what).found(error))?;
@@ -242,7 +246,7 @@ impl JournalText {
     }
 
     /// The lines behind the heading up to the first that is damaged, each with the place behind it.
-    pub fn lines<T: DeserializeOwned>(&self) -> impl Iterator<Item = (T, Mark)> {
+    pub fn lines<T: DeserializeOwned>(&self) -> impl Iterator<Item = (T, JournalPosition)> {
         let start = usize::try_from(self.begin.bytes).unwrap_or(usize::MAX);
         let mut rest = self.bytes.get(start..).unwrap_or_default();
         let mut mark = self.begin;
@@ -266,10 +270,10 @@ fn no_journal(path: &Path, what: &str) -> InputError {
 #[doc(hidden)]
 pub fn with_checksums(heading: &Heading, lines: &[u8]) -> io::Result<Vec<u8>> {
     let mut text = Vec::new();
-    let mut mark = push_line(&mut text, Mark::default(), heading)?;
+    let mut mark = push_line(&mut text, JournalPosition::default(), heading)?;
     for json in lines.split_inclusive(|b| *b == b'\n') {
         let json = json.strip_suffix(b"\n").unwrap_or(json);
-        let mut chain = Chain::after(mark.chain);
+        let mut chain = ChainedChecksum::after(mark.chain);
         chain.0.update(json);
         mark.chain = chain.finish();
         text.extend(json);

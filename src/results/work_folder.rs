@@ -122,44 +122,44 @@ pub(super) fn remove_leftovers(parent: &Path) {
         }
         let path = entry.path();
         let _ = match contents(&path) {
-            Contents::Nothing => system::remove_folder(&path),
-            Contents::Marked => remove(&path),
-            Contents::Foreign => Ok(()),
+            FolderContents::Nothing => system::remove_folder(&path),
+            FolderContents::Marked => remove(&path),
+            FolderContents::Foreign => Ok(()),
         };
     }
 }
 
-enum Contents {
+enum FolderContents {
     /// The process was killed before it wrote the marker.
     Nothing,
     Marked,
     Foreign,
 }
 
-fn contents(folder: &Path) -> Contents {
+fn contents(folder: &Path) -> FolderContents {
     let Ok(entries) = std::fs::read_dir(folder) else {
-        return Contents::Foreign;
+        return FolderContents::Foreign;
     };
     let count = entries.count();
     if count == 0 {
-        return Contents::Nothing;
+        return FolderContents::Nothing;
     }
     let marker = folder.join(MARKER);
     let text = match marker.is_symlink() {
-        true => return Contents::Foreign,
+        true => return FolderContents::Foreign,
         false => std::fs::read_to_string(&marker),
     };
     match text {
-        Ok(text) if text == MARKER_TEXT => Contents::Marked,
+        Ok(text) if text == MARKER_TEXT => FolderContents::Marked,
         // Killed while it wrote the marker.
-        Ok(text) if count == 1 && MARKER_TEXT.starts_with(&text) => Contents::Marked,
-        _ => Contents::Foreign,
+        Ok(text) if count == 1 && MARKER_TEXT.starts_with(&text) => FolderContents::Marked,
+        _ => FolderContents::Foreign,
     }
 }
 
 /// Whether a folder holds the marker of a working folder.
 pub(super) fn is_marked(folder: &Path) -> bool {
-    matches!(contents(folder), Contents::Marked)
+    matches!(contents(folder), FolderContents::Marked)
 }
 
 #[cfg(test)]

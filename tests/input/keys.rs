@@ -4,7 +4,7 @@
     reason = "the texts are those of the project"
 )]
 
-use kmcfit::config::keys::{self, Group, Kind, MODEL, SEQUENCE};
+use kmcfit::config::keys::{self, KeyGroup, MODEL, SEQUENCE, ValueType};
 use kmcfit::config::{ModelFile, Override};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -47,7 +47,7 @@ fn accepted(message: &str) -> BTreeSet<String> {
 
 /// Visits a group and all below: the model has a map of the group at `path`. A key whose kind has
 /// several maps is visited with each.
-fn visit(group: &'static Group, path: &str, model: &ModelFile, seen: &mut BTreeSet<String>) {
+fn visit(group: &'static KeyGroup, path: &str, model: &ModelFile, seen: &mut BTreeSet<String>) {
     let at = |key: &str| match path {
         "" => key.to_owned(),
         path => format!("{path}.{key}"),
@@ -74,8 +74,8 @@ fn visit(group: &'static Group, path: &str, model: &ModelFile, seen: &mut BTreeS
 
 /// Puts a map of a group behind a key and visits it.
 fn descend(
-    group: &'static Group,
-    kind: Kind,
+    group: &'static KeyGroup,
+    kind: ValueType,
     here: &str,
     model: &ModelFile,
     seen: &mut BTreeSet<String>,
@@ -85,7 +85,7 @@ fn descend(
         .map(|key| format!("{}: {}", key.name, key.example))
         .collect();
     let map = format!("{{{}}}", required.join(", "));
-    let in_list = matches!(kind, Kind::List(_));
+    let in_list = matches!(kind, ValueType::List(_));
     let (value, path) = match in_list {
         true => (format!("[{map}]"), format!("{here}.0")),
         false => (map, here.to_owned()),
@@ -111,7 +111,7 @@ fn reader_and_registry_know_the_same_keys_and_examples_are_read() {
 
 #[test]
 fn required_keys_are_those_of_the_reader() {
-    fn check(group: &'static Group, path: &str, model: &ModelFile) {
+    fn check(group: &'static KeyGroup, path: &str, model: &ModelFile) {
         let required: Vec<_> = group.keys.iter().filter(|key| key.required).collect();
         for missing in &required {
             let others: Vec<String> = (required.iter())

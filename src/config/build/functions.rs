@@ -1,8 +1,8 @@
 //! Functions of a model file as specifications of the builder; and the truth.
 
-use super::on_grid::{Wanted, column_on_grid};
+use super::on_grid::{NodalColumnRequest, column_on_grid};
 use crate::config::ModelFile;
-use crate::config::scalar::{Count, Knots, Number, NumberOrColumn, Start, Text, Weight};
+use crate::config::scalar::{Count, KnotSpec, Number, NumberOrColumn, StartSpec, Text, Weight};
 use crate::config::spec::{
     self as config, Basis, ColumnSpec, FunctionSpec, PenaltyKind, WeightRule,
 };
@@ -156,8 +156,8 @@ fn basis(
             .expected(expected)
     };
     let knots = || match &spec.knots {
-        Some(Knots::Count(count)) => Ok(builder::Knots::Count(count.0)),
-        Some(Knots::Times(times)) => Ok(builder::Knots::Times(numbers(times))),
+        Some(KnotSpec::Count(count)) => Ok(builder::Knots::Count(count.0)),
+        Some(KnotSpec::Times(times)) => Ok(builder::Knots::Times(numbers(times))),
         None => Err(missing(
             "knots",
             "`knots`: an integer (so many, equally spaced), or a list of times in s",
@@ -192,16 +192,16 @@ fn start(
     grid: &Grid,
     key: &str,
     kind: Basis,
-    given: &Start,
+    given: &StartSpec,
 ) -> Result<builder::Start, InputError> {
     match given {
-        Start::Number(value) => Ok(builder::Start::Constant(value.0)),
-        Start::List(_) if kind == Basis::BSpline => Err(file
+        StartSpec::Number(value) => Ok(builder::Start::Constant(value.0)),
+        StartSpec::List(_) if kind == Basis::BSpline => Err(file
             .error_at(key, "a start of the basis `b-spline` cannot be a list")
             .found("a list")
             .expected("a finite number, or a column: {data: file.csv, column: name}")),
-        Start::List(values) => Ok(builder::Start::Parameters(numbers(values))),
-        Start::Column(c) => Ok(builder::Start::Nodal(column(file, grid, key, c)?)),
+        StartSpec::List(values) => Ok(builder::Start::Parameters(numbers(values))),
+        StartSpec::Column(c) => Ok(builder::Start::Nodal(column(file, grid, key, c)?)),
     }
 }
 
@@ -304,7 +304,7 @@ fn column(
     key: &str,
     given: &ColumnSpec,
 ) -> Result<Vec<f64>, InputError> {
-    let wanted = Wanted {
+    let wanted = NodalColumnRequest {
         data: &given.data.0,
         data_key: &format!("{key}.data"),
         column: &given.column.0,
@@ -324,7 +324,7 @@ pub(super) fn truth(
     let column = |(kind, _): Given| {
         let named: Option<&Text> = (spec.columns.as_ref()).and_then(|c| by_kind!(c, kind));
         let name = named.map_or(kind.column(), |name| name.0.as_str());
-        let wanted = Wanted {
+        let wanted = NodalColumnRequest {
             data: &spec.data.0,
             data_key: "truth.data",
             column: name,

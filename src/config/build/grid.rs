@@ -4,10 +4,10 @@ mod auto;
 mod per_node;
 
 use super::BuildMode;
-use super::experiments::{RawChannel, Record};
+use super::experiments::{RawChannel, RawRecord};
 use crate::config::ModelFile;
 use crate::config::scalar::{Count, Nodes};
-use crate::error::{InputError, Place};
+use crate::error::{InputError, Location};
 use crate::finding::Finding;
 use crate::memory;
 use kmcfit_core::internals::system::{Grid, Method};
@@ -18,7 +18,7 @@ const MOST_CHOSEN: usize = 10_000_000;
 pub(super) fn build(
     file: &ModelFile,
     purpose: BuildMode,
-    records: &[Option<Record>],
+    records: &[Option<RawRecord>],
     notes: &mut Vec<Finding>,
 ) -> Result<Grid, InputError> {
     let asked = file.spec.grid.as_ref().and_then(|g| g.nodes.as_ref());
@@ -56,7 +56,7 @@ pub(super) fn build(
 
 fn about_nodes(file: &ModelFile, purpose: BuildMode, problem: &str) -> InputError {
     match purpose.nodes() {
-        Some(_) => InputError::new(Place::Argument("--nodes".into()), problem),
+        Some(_) => InputError::new(Location::Argument("--nodes".into()), problem),
         None => file.error_at("grid.nodes", problem),
     }
 }
@@ -89,7 +89,7 @@ fn fits_into_memory(file: &ModelFile, purpose: BuildMode, nodes: usize) -> Resul
 }
 
 /// One node per reading, where all channels of all records have the same equally spaced times.
-fn node_per_reading(records: &[Option<Record>]) -> Option<usize> {
+fn node_per_reading(records: &[Option<RawRecord>]) -> Option<usize> {
     let mut channels = records.iter().flatten().flat_map(|r| &r.channels);
     let first = channels.next()?;
     let spacing = first.spacing?;
@@ -104,7 +104,7 @@ fn node_per_reading(records: &[Option<Record>]) -> Option<usize> {
 }
 
 /// First time and length of the records; the length from the model without.
-fn span(file: &ModelFile, records: &[Option<Record>]) -> Result<(f64, f64), InputError> {
+fn span(file: &ModelFile, records: &[Option<RawRecord>]) -> Result<(f64, f64), InputError> {
     let asked = file.spec.grid.as_ref().and_then(|g| g.duration.as_ref());
     if let Some(duration) = asked
         && duration.0 <= 0.0
@@ -122,9 +122,11 @@ fn span(file: &ModelFile, records: &[Option<Record>]) -> Result<(f64, f64), Inpu
         })?;
         return Ok((0.0, duration.0));
     };
-    let start = measured().map(Record::start).fold(f64::INFINITY, f64::min);
+    let start = measured()
+        .map(RawRecord::start)
+        .fold(f64::INFINITY, f64::min);
     let end = measured()
-        .map(Record::end)
+        .map(RawRecord::end)
         .fold(f64::NEG_INFINITY, f64::max);
     let duration = end - start;
     if let Some(asked) = asked

@@ -4,7 +4,7 @@ use super::asked_for;
 use crate::config::ModelFile;
 use crate::error::InputError;
 use crate::observations::{Table, increasing};
-use crate::units::Kind;
+use crate::units::Quantity;
 use kmcfit_core::internals::system::Grid;
 
 /// Column of times in files of functions.
@@ -13,7 +13,7 @@ const TIME_COLUMN: &str = "t_s";
 const SAME_TIME: f64 = 1e-6;
 
 /// Which column of which file, and the keys of the model that say so.
-pub(super) struct Wanted<'a> {
+pub(super) struct NodalColumnRequest<'a> {
     pub data: &'a str,
     pub data_key: &'a str,
     pub column: &'a str,
@@ -23,7 +23,7 @@ pub(super) struct Wanted<'a> {
 /// A column at the nodes: as it stands where its rows are the nodes, linear in between otherwise.
 pub(super) fn column_on_grid(
     file: &ModelFile,
-    wanted: &Wanted<'_>,
+    wanted: &NodalColumnRequest<'_>,
     grid: &Grid,
 ) -> Result<Vec<f64>, InputError> {
     let about_data = asked_for(file, wanted.data_key);
@@ -61,7 +61,7 @@ pub(super) fn column_on_grid(
 /// Refuses times that the file states in another unit than its name does: s.
 fn check_seconds(table: &Table) -> Result<(), InputError> {
     let index = table.find(&TIME_COLUMN.into())?;
-    let unit = table.stated_unit(index).explicit(Kind::Time);
+    let unit = table.stated_unit(index).explicit(Quantity::Time);
     match unit.filter(|unit| unit.factor() != 1.0) {
         None => Ok(()),
         Some(unit) => Err(

@@ -1,7 +1,7 @@
 //! `kmcfit explain`: documentation of a key as text.
 
-use super::{Found, Kind, MODEL, all};
-use crate::error::{InputError, Place};
+use super::{Found, MODEL, ValueType, all};
+use crate::error::{InputError, Location};
 use crate::input::quote;
 use crate::near::did_you_mean;
 use std::fmt::Write;
@@ -51,7 +51,7 @@ fn without_positions(path: &str) -> String {
 }
 
 fn unknown(name: &str, wanted: &str, keys: &[Found]) -> InputError {
-    let error = InputError::new(Place::Argument("KEY".into()), "no such key")
+    let error = InputError::new(Location::Argument("KEY".into()), "no such key")
         .found(quote(name))
         .expected("a key of a model file; `kmcfit explain` lists the top-level keys");
     let last = wanted.rsplit('.').next().unwrap_or_default();
@@ -119,10 +119,10 @@ fn list<'a>(text: &mut String, entries: impl Iterator<Item = (&'a str, &'a str)>
 }
 
 /// Choices of a kind.
-fn choices(kind: Kind) -> Vec<&'static [(&'static str, &'static str)]> {
+fn choices(kind: ValueType) -> Vec<&'static [(&'static str, &'static str)]> {
     match kind {
-        Kind::Choice(words) => vec![words],
-        Kind::AnyOf(kinds) => {
+        ValueType::Choice(words) => vec![words],
+        ValueType::AnyOf(kinds) => {
             let mut all: Vec<_> = kinds.iter().flat_map(|kind| choices(*kind)).collect();
             all.dedup();
             all
@@ -132,22 +132,22 @@ fn choices(kind: Kind) -> Vec<&'static [(&'static str, &'static str)]> {
 }
 
 /// A kind of value as text.
-fn kind(kind: Kind) -> String {
+fn kind(kind: ValueType) -> String {
     match kind {
-        Kind::Format => "the number 1".into(),
-        Kind::Number => "a number".into(),
-        Kind::Count => "an integer, 0 or more".into(),
-        Kind::Text => "text".into(),
-        Kind::Bool => "true or false".into(),
-        Kind::Column => "a column, by name or by number from 1".into(),
-        Kind::Word(word) => format!("`{word}`"),
-        Kind::Choice(_) => "one of the values below".into(),
-        Kind::Map(_) => "a map with the keys below".into(),
-        Kind::List(Kind::Map(_)) => "a list of maps with the keys below".into(),
-        Kind::List(Kind::Number) => "a list of numbers".into(),
-        Kind::List(Kind::Text) => "a list of texts".into(),
-        Kind::List(_) => "a list of the values below".into(),
-        Kind::AnyOf(kinds) => {
+        ValueType::Format => "the number 1".into(),
+        ValueType::Number => "a number".into(),
+        ValueType::Count => "an integer, 0 or more".into(),
+        ValueType::Text => "text".into(),
+        ValueType::Bool => "true or false".into(),
+        ValueType::Column => "a column, by name or by number from 1".into(),
+        ValueType::Word(word) => format!("`{word}`"),
+        ValueType::Choice(_) => "one of the values below".into(),
+        ValueType::Map(_) => "a map with the keys below".into(),
+        ValueType::List(ValueType::Map(_)) => "a list of maps with the keys below".into(),
+        ValueType::List(ValueType::Number) => "a list of numbers".into(),
+        ValueType::List(ValueType::Text) => "a list of texts".into(),
+        ValueType::List(_) => "a list of the values below".into(),
+        ValueType::AnyOf(kinds) => {
             let kinds: Vec<String> = kinds.iter().map(|k| self::kind(*k)).collect();
             kinds.join(", or ")
         }

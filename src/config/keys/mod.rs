@@ -3,7 +3,7 @@
 mod explain;
 mod schema;
 
-pub use super::key::{Group, Key, Kind};
+pub use super::key::{KeyDoc, KeyGroup, ValueType};
 pub use explain::explain;
 pub use schema::schema;
 
@@ -11,15 +11,15 @@ use super::sequence::SequenceSpec;
 use super::spec::ModelSpec;
 
 /// The keys of a model.
-pub static MODEL: &Group = ModelSpec::GROUP;
+pub static MODEL: &KeyGroup = ModelSpec::GROUP;
 /// The keys of a sequence.
-pub static SEQUENCE: &Group = SequenceSpec::GROUP;
+pub static SEQUENCE: &KeyGroup = SequenceSpec::GROUP;
 
 /// A key and where it may stand.
 #[derive(Debug, Clone)]
 pub struct Found {
     /// The key.
-    pub key: &'static Key,
+    pub key: &'static KeyDoc,
     /// Its paths, as `functions.mass.start`, without positions in lists.
     pub paths: Vec<String>,
 }
@@ -32,7 +32,7 @@ pub fn all() -> Vec<Found> {
     found
 }
 
-fn collect(group: &'static Group, above: &str, found: &mut Vec<Found>) {
+fn collect(group: &'static KeyGroup, above: &str, found: &mut Vec<Found>) {
     for key in group.keys {
         let path = match above {
             "" => key.name.to_owned(),

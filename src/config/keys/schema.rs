@@ -1,6 +1,6 @@
 //! The JSON schema (draft 07) of a model file, for editors that complete and check YAML by one.
 
-use super::{Group, Key, Kind, MODEL, SEQUENCE};
+use super::{KeyDoc, KeyGroup, MODEL, SEQUENCE, ValueType};
 use serde_json::{Map, Value, json};
 
 /// The schema of a model file or a sequence.
@@ -21,11 +21,11 @@ pub fn schema() -> Value {
     })
 }
 
-fn reference(group: &Group) -> Value {
+fn reference(group: &KeyGroup) -> Value {
     json!({"$ref": format!("#/definitions/{}", group.name)})
 }
 
-fn define(group: &'static Group, definitions: &mut Map<String, Value>) {
+fn define(group: &'static KeyGroup, definitions: &mut Map<String, Value>) {
     if definitions.contains_key(group.name) {
         return;
     }
@@ -52,20 +52,20 @@ fn define(group: &'static Group, definitions: &mut Map<String, Value>) {
 }
 
 /// A key: what editors show when it is pointed at, and what may stand behind it.
-fn property(key: &Key) -> Value {
+fn property(key: &KeyDoc) -> Value {
     // Beside `$ref` draft 07 ignores everything, so the kind stands apart.
     json!({"description": description(key), "allOf": [kind(key.kind)]})
 }
 
 /// The key in words, with its unit and default.
-fn description(key: &Key) -> String {
+fn description(key: &KeyDoc) -> String {
     let mut text = key.text.to_owned();
     for (name, value) in [("Unit", key.unit), ("Default", key.default)] {
         if let Some(value) = value {
             text += &format!(" {name}: {value}.");
         }
     }
-    if let Kind::Choice(words) = key.kind {
+    if let ValueType::Choice(words) = key.kind {
         for (word, meaning) in words {
             text += &format!("\n- {word}: {meaning}");
         }
@@ -73,26 +73,26 @@ fn description(key: &Key) -> String {
     text
 }
 
-fn kind(kind: Kind) -> Value {
+fn kind(kind: ValueType) -> Value {
     match kind {
-        Kind::Format => json!({"const": 1}),
-        Kind::Number => json!({"type": "number"}),
-        Kind::Count => json!({"type": "integer", "minimum": 0}),
+        ValueType::Format => json!({"const": 1}),
+        ValueType::Number => json!({"type": "number"}),
+        ValueType::Count => json!({"type": "integer", "minimum": 0}),
         // A name such as 12 keeps its spelling without quotes.
-        Kind::Text => json!({"type": ["string", "number"], "minLength": 1}),
-        Kind::Bool => json!({"type": "boolean"}),
-        Kind::Column => json!({"anyOf": [
+        ValueType::Text => json!({"type": ["string", "number"], "minLength": 1}),
+        ValueType::Bool => json!({"type": "boolean"}),
+        ValueType::Column => json!({"anyOf": [
             {"type": "string", "minLength": 1},
             {"type": "integer", "minimum": 1},
         ]}),
-        Kind::Word(word) => json!({"const": word}),
-        Kind::Choice(words) => {
+        ValueType::Word(word) => json!({"const": word}),
+        ValueType::Choice(words) => {
             let words: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
             json!({"enum": words})
         }
-        Kind::Map(group) => reference(group),
-        Kind::List(inner) => json!({"type": "array", "items": self::kind(*inner)}),
-        Kind::AnyOf(kinds) => {
+        ValueType::Map(group) => reference(group),
+        ValueType::List(inner) => json!({"type": "array", "items": self::kind(*inner)}),
+        ValueType::AnyOf(kinds) => {
             let kinds: Vec<Value> = kinds.iter().map(|k| self::kind(*k)).collect();
             json!({"anyOf": kinds})
         }

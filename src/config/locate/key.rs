@@ -6,7 +6,7 @@ use std::cell::Cell;
 use std::fmt;
 
 /// Reads a key and says whether it is the wanted one, or stops at it.
-pub(super) struct Key<'a> {
+pub(super) struct KeySeed<'a> {
     pub wanted: Option<&'a str>,
     /// Where to note that reading stops at the wanted key; `None` to read on.
     pub stop: Option<&'a Cell<bool>>,
@@ -18,7 +18,7 @@ pub(super) fn stop<E: Error>(hit: &Cell<bool>) -> E {
     E::custom("found")
 }
 
-impl<'de> DeserializeSeed<'de> for Key<'_> {
+impl<'de> DeserializeSeed<'de> for KeySeed<'_> {
     type Value = bool;
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<bool, D::Error> {
@@ -26,7 +26,7 @@ impl<'de> DeserializeSeed<'de> for Key<'_> {
     }
 }
 
-impl Key<'_> {
+impl KeySeed<'_> {
     /// A key that is no text is never the wanted one.
     fn scalar<E: Error>(self, key: Scalar<'_>) -> Result<bool, E> {
         let same = matches!(key, Scalar::Text(key) if self.wanted == Some(key));
@@ -37,7 +37,7 @@ impl Key<'_> {
     }
 }
 
-impl<'de> Visitor<'de> for Key<'_> {
+impl<'de> Visitor<'de> for KeySeed<'_> {
     type Value = bool;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

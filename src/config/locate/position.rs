@@ -1,6 +1,6 @@
 //! Lines and columns.
 
-use crate::error::Place;
+use crate::error::Location;
 use std::path::Path;
 
 /// A position in a text; both count from 1, columns in characters.
@@ -27,8 +27,8 @@ impl Position {
 }
 
 /// A position in a file as the place of an error.
-pub(in crate::config) fn place(file: &Path, position: Position) -> Place {
-    Place::Line {
+pub(in crate::config) fn place(file: &Path, position: Position) -> Location {
+    Location::Line {
         file: file.to_path_buf(),
         line: position.line,
         column: position.column,

@@ -1,7 +1,7 @@
 //! The reader that follows a path and stops at its goal.
 
 use super::Segment;
-use super::key::{Key, stop};
+use super::key::{KeySeed, stop};
 use crate::config::value::{Scalar, scalar_visits};
 use serde::de::{
     DeserializeSeed, Deserializer, EnumAccess, Error, IgnoredAny, MapAccess, SeqAccess, Visitor,
@@ -93,7 +93,7 @@ impl<'de> Visitor<'de> for Walk<'_> {
             _ => (None, self.path),
         };
         let mut occurrence = 0;
-        while let Some(same) = map.next_key_seed(Key {
+        while let Some(same) = map.next_key_seed(KeySeed {
             wanted,
             stop: match self.goal {
                 Goal::Key { occurrence: goal } if rest.is_empty() && goal == occurrence + 1 => {

@@ -3,7 +3,7 @@
 use super::quoted;
 use crate::error::InputError;
 use crate::observations::{Table, increasing_at};
-use crate::units::{Kind, Unit};
+use crate::units::{Quantity, Unit};
 use kmcfit_core::internals::diagnostics::spread;
 
 /// What a column may be.
@@ -59,13 +59,13 @@ impl Role {
         }
     }
 
-    fn kind(self) -> Kind {
+    fn kind(self) -> Quantity {
         match self {
-            Role::Time => Kind::Time,
-            Role::Displacement | Role::BaseDisplacement => Kind::Displacement,
-            Role::Velocity => Kind::Velocity,
-            Role::Acceleration | Role::BaseAcceleration => Kind::Acceleration,
-            Role::Force => Kind::Force,
+            Role::Time => Quantity::Time,
+            Role::Displacement | Role::BaseDisplacement => Quantity::Displacement,
+            Role::Velocity => Quantity::Velocity,
+            Role::Acceleration | Role::BaseAcceleration => Quantity::Acceleration,
+            Role::Force => Quantity::Force,
         }
     }
 
@@ -88,7 +88,7 @@ impl Role {
 
 /// A column that is used.
 #[derive(Debug, Clone, Copy)]
-pub struct Column {
+pub struct UsedColumn {
     pub index: usize,
     pub role: Role,
     /// The unit.
@@ -103,12 +103,12 @@ pub struct Column {
 
 /// The columns that are used, and those that are not.
 #[derive(Debug)]
-pub struct Columns {
-    pub used: Vec<Column>,
+pub struct ColumnAssignment {
+    pub used: Vec<UsedColumn>,
     unused: Vec<usize>,
 }
 
-impl Columns {
+impl ColumnAssignment {
     pub fn of(table: &Table, sample_rate: Option<f64>) -> Result<Self, InputError> {
         let mut numeric = Vec::new();
         for i in 0..table.width() {
@@ -154,12 +154,12 @@ impl Columns {
 
     /// Uses a column, or the one of its role that was there before: of several sensors of the motion the one that moves
     /// much more than those before it.
-    fn take(&mut self, table: &Table, column: Column) -> Result<(), InputError> {
+    fn take(&mut self, table: &Table, column: UsedColumn) -> Result<(), InputError> {
         let Some(place) = self.used.iter().position(|c| c.role == column.role) else {
             self.used.push(column);
             return Ok(());
         };
-        let size = |c: &Column| -> Result<f64, InputError> {
+        let size = |c: &UsedColumn| -> Result<f64, InputError> {
             let readings = table.readings(c.index)?.iter().copied();
             let readings: Vec<f64> = readings.filter(|x| x.is_finite()).collect();
             Ok(c.unit.factor() * spread(&readings))
@@ -204,10 +204,10 @@ impl Columns {
             ))
             .expected("a column of samples in addition to the times"));
         };
-        self.used.push(Column {
+        self.used.push(UsedColumn {
             index: self.unused.remove(place),
             role: Role::Displacement,
-            unit: Unit::si(Kind::Displacement),
+            unit: Unit::si(Quantity::Displacement),
             tell_unit: false,
             guessed: true,
             has_unit: false,
@@ -219,7 +219,7 @@ impl Columns {
         self.find(role).is_some()
     }
 
-    pub fn find(&self, role: Role) -> Option<&Column> {
+    pub fn find(&self, role: Role) -> Option<&UsedColumn> {
         self.used.iter().find(|c| c.role == role)
     }
 
@@ -230,7 +230,7 @@ impl Columns {
 
     /// `{time: t_s, displacement: y_m}`
     pub fn named(&self, table: &Table) -> String {
-        let name = |c: &Column| match table.headers().get(c.index) {
+        let name = |c: &UsedColumn| match table.headers().get(c.index) {
             Some(name) if !name.is_empty() => quoted(name),
             _ => (c.index + 1).to_string(),
         };
@@ -252,7 +252,7 @@ impl Columns {
 
     /// What each column was taken for.
     pub fn in_words(&self, table: &Table) -> Vec<String> {
-        let said = |c: &Column| {
+        let said = |c: &UsedColumn| {
             let guess = match (c.guessed, c.has_unit || c.role == Role::Time) {
                 (true, _) => ": a guess, please look",
                 (false, false) => ": the unit is a guess, please look",
@@ -292,7 +292,7 @@ pub fn rate(table: &Table) -> Option<(usize, f64)> {
 }
 
 /// The column of times: by unit, by name, or the first that increases.
-fn time(table: &Table, numeric: &[usize]) -> Result<Column, InputError> {
+fn time(table: &Table, numeric: &[usize]) -> Result<UsedColumn, InputError> {
     let increases = |i: &&usize| increasing_at(table, **i).is_ok();
     let is_time = |i: &&usize| known(table, **i).is_some_and(|c| c.role == Role::Time);
     if let Some(index) = numeric.iter().find(is_time)
@@ -305,10 +305,10 @@ fn time(table: &Table, numeric: &[usize]) -> Result<Column, InputError> {
     match named.or_else(|| numeric.iter().find(increases)) {
         Some(index) => Ok(known(table, *index)
             .filter(|c| c.role == Role::Time)
-            .unwrap_or(Column {
+            .unwrap_or(UsedColumn {
                 index: *index,
                 role: Role::Time,
-                unit: Unit::si(Kind::Time),
+                unit: Unit::si(Quantity::Time),
                 tell_unit: false,
                 guessed: true,
                 has_unit: false,
@@ -320,7 +320,7 @@ fn time(table: &Table, numeric: &[usize]) -> Result<Column, InputError> {
 }
 
 /// What unit and name say of a column.
-fn known(table: &Table, index: usize) -> Option<Column> {
+fn known(table: &Table, index: usize) -> Option<UsedColumn> {
     let label = table.headers().get(index).map_or("", String::as_str);
     let (label, is_base) = without_base(label);
     let by_name = role_of(&label.to_lowercase());
@@ -347,7 +347,7 @@ fn known(table: &Table, index: usize) -> Option<Column> {
         .or(by_name)?;
     let found = unit_of(role);
     let (unit, in_name) = found.unwrap_or((Unit::si(role.kind()), false));
-    Some(Column {
+    Some(UsedColumn {
         index,
         role: role.of_base().filter(|_| is_base).unwrap_or(role),
         unit,

@@ -10,8 +10,8 @@ use crate::digits::significant;
 use crate::error::InputError;
 use crate::memory;
 use crate::observations::Table;
-use columns::{Columns, Role};
-use motion::Motion;
+use columns::{ColumnAssignment, Role};
+use motion::RecordSummary;
 use std::path::Path;
 
 /// Damping ratio that the search starts from: that of a lightly damped structure.
@@ -45,8 +45,8 @@ pub struct Starter {
 pub fn starter(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Starter, InputError> {
     let table = Table::read(csv)?;
     memory::check_file(csv, table.rows() as u64 * PER_ROW)?;
-    let columns = Columns::of(&table, sample_rate)?;
-    let motion = Motion::of(&table, &columns, sample_rate)?;
+    let columns = ColumnAssignment::of(&table, sample_rate)?;
+    let motion = RecordSummary::of(&table, &columns, sample_rate)?;
     let mut found = vec![format!(
         "{} samples over {} s, {}",
         motion.readings,
@@ -99,8 +99,8 @@ pub fn starter(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Start
 fn text(
     table: &Table,
     data: &str,
-    columns: &Columns,
-    motion: &Motion,
+    columns: &ColumnAssignment,
+    motion: &RecordSummary,
     sample_rate: Option<f64>,
 ) -> String {
     let name = Path::new(data)
@@ -138,8 +138,8 @@ fn text(
 /// The keys of the record and the grid, each with its value, if the model needs it, and a comment.
 fn keys(
     table: &Table,
-    columns: &Columns,
-    motion: &Motion,
+    columns: &ColumnAssignment,
+    motion: &RecordSummary,
     sample_rate: Option<f64>,
 ) -> Vec<(&'static str, Option<String>, String)> {
     let sigmas: Vec<String> = (columns.channels())
@@ -200,7 +200,10 @@ fn keys(
 }
 
 /// Sensors with parameters of their own, and the reasons for them.
-fn sensors(columns: &Columns, motion: &Motion) -> (Vec<&'static str>, Vec<&'static str>) {
+fn sensors(
+    columns: &ColumnAssignment,
+    motion: &RecordSummary,
+) -> (Vec<&'static str>, Vec<&'static str>) {
     let mut sensors = Vec::new();
     if columns.has(Role::Acceleration) {
         sensors.push((
@@ -226,7 +229,7 @@ fn sensors(columns: &Columns, motion: &Motion) -> (Vec<&'static str>, Vec<&'stat
 }
 
 /// The functions: a start that has the dominant frequency.
-fn functions(columns: &Columns, motion: &Motion) -> String {
+fn functions(columns: &ColumnAssignment, motion: &RecordSummary) -> String {
     let omega = std::f64::consts::TAU * motion.frequency.unwrap_or(1.0);
     let driven = columns.has(Role::Force);
     let mass = match driven {

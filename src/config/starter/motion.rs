@@ -1,6 +1,6 @@
 //! What the readings say of the motion: how often they come, how fast it is.
 
-use super::columns::{Column, Columns, Role};
+use super::columns::{ColumnAssignment, Role, UsedColumn};
 use crate::error::InputError;
 use crate::observations::{Table, increasing_at};
 use kmcfit_core::internals::diagnostics::{far_off, offset_and_drift, spread, without_line};
@@ -20,7 +20,7 @@ const MOST_JUMPS: f64 = 0.1;
 
 /// The motion of a record.
 #[derive(Debug)]
-pub struct Motion {
+pub struct RecordSummary {
     pub readings: usize,
     pub missing: usize,
     /// s.
@@ -49,10 +49,10 @@ pub struct Motion {
     pub between: &'static str,
 }
 
-impl Motion {
+impl RecordSummary {
     pub fn of(
         table: &Table,
-        columns: &Columns,
+        columns: &ColumnAssignment,
         sample_rate: Option<f64>,
     ) -> Result<Self, InputError> {
         let times = times(table, columns, sample_rate)?;
@@ -200,7 +200,7 @@ fn between(drive: &[f64]) -> &'static str {
 
 fn times(
     table: &Table,
-    columns: &Columns,
+    columns: &ColumnAssignment,
     sample_rate: Option<f64>,
 ) -> Result<Vec<f64>, InputError> {
     match columns.find(Role::Time) {
@@ -216,7 +216,7 @@ fn times(
     }
 }
 
-fn in_si(table: &Table, column: &Column) -> Result<Vec<f64>, InputError> {
+fn in_si(table: &Table, column: &UsedColumn) -> Result<Vec<f64>, InputError> {
     let factor = column.unit.factor();
     let readings = table.readings(column.index)?;
     Ok(readings.iter().map(|x| x * factor).collect())

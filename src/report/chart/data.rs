@@ -1,7 +1,7 @@
 //! The numbers of a figure for the script of the page.
 
 use super::figure::Figure;
-use super::mark::{Kind, Mark};
+use super::mark::{Mark, MarkKind};
 use super::thin::kept;
 use crate::report::text::clean;
 use serde::Serialize;
@@ -25,12 +25,15 @@ pub(in crate::report) fn data(figure: &Figure, off: &[&str]) -> Data {
     let mut thinned = false;
     for panel in &mut figure.panels {
         for mark in &mut panel.marks {
-            if !matches!(mark.kind, Kind::Line | Kind::Points | Kind::Band) {
+            if !matches!(
+                mark.kind,
+                MarkKind::Line | MarkKind::Points | MarkKind::Band
+            ) {
                 continue;
             }
             let mut ys = vec![(mark.y.as_slice(), panel.y.scale)];
-            ys.extend((mark.kind == Kind::Band).then_some((&mark.high[..], panel.y.scale)));
-            let joined = mark.kind != Kind::Points;
+            ys.extend((mark.kind == MarkKind::Band).then_some((&mark.high[..], panel.y.scale)));
+            let joined = mark.kind != MarkKind::Points;
             let (points, is_thinned) = kept((&mark.x, panel.x.scale), &ys, joined);
             thinned |= is_thinned;
             let Mark { x, y, high, .. } = mark;

@@ -25,7 +25,7 @@ const STACKED: f64 = 165.0;
 
 /// Draws a figure.
 pub(super) fn sheet(figure: &Figure) -> Sheet {
-    let grid = Grid::new(figure);
+    let grid = PanelGrid::new(figure);
     let rulers: Vec<Ruler> = (0..figure.panels.len()).map(|i| grid.y_ruler(i)).collect();
     let columns = grid.columns(&rulers);
     let left = columns.first().map_or(EDGE, |column| column.left);
@@ -52,7 +52,7 @@ pub(super) fn sheet(figure: &Figure) -> Sheet {
 }
 
 /// A column of panels, in pixels.
-struct Column {
+struct PanelColumn {
     /// Room for the labels left of the axes.
     labels: f64,
     /// Left edge of the axes.
@@ -62,14 +62,14 @@ struct Column {
 }
 
 /// The panels in rows and columns, with their ranges.
-struct Grid<'a> {
+struct PanelGrid<'a> {
     panels: &'a [Panel],
     columns: usize,
     x: Vec<Option<Range>>,
     y: Vec<Option<Range>>,
 }
 
-impl<'a> Grid<'a> {
+impl<'a> PanelGrid<'a> {
     fn new(figure: &'a Figure) -> Self {
         let panels = figure.panels.as_slice();
         let extents = |of: &dyn Fn(&'a Panel) -> (Scale, Vec<f64>)| {
@@ -145,7 +145,7 @@ impl<'a> Grid<'a> {
     }
 
     /// The columns of the grid; their axes are equally wide.
-    fn columns(&self, rulers: &[Ruler]) -> Vec<Column> {
+    fn columns(&self, rulers: &[Ruler]) -> Vec<PanelColumn> {
         let mut labels = vec![0.0_f64; self.columns];
         for (index, ruler) in rulers.iter().enumerate() {
             let label = &mut labels[index % self.columns];
@@ -158,7 +158,7 @@ impl<'a> Grid<'a> {
         let mut columns = Vec::new();
         for labels in labels {
             left += labels;
-            columns.push(Column {
+            columns.push(PanelColumn {
                 labels,
                 left,
                 width,
@@ -179,7 +179,7 @@ impl<'a> Grid<'a> {
         label_height(labels) + if last { 0.0 } else { ROW_GAP }
     }
 
-    fn place(&self, index: usize, column: &Column, top: f64, y: Ruler) -> Placed<'a> {
+    fn place(&self, index: usize, column: &PanelColumn, top: f64, y: Ruler) -> Placed<'a> {
         let panel = &self.panels[index];
         Placed {
             panel,

@@ -1,9 +1,9 @@
 //! The legend: one line or more above the panels, where it covers no data.
 
 use super::figure::Figure;
-use super::mark::{Kind, Mark};
+use super::mark::{Mark, MarkKind};
 use super::panel::{BAND_OPACITY, SIZE, SPAN};
-use super::shape::{Anchor, Frame, Point, Shape, Stroke, Words};
+use super::shape::{Anchor, Frame, Point, Primitive, Stroke, Words};
 use crate::report::text;
 
 /// Length of the sample beside a label.
@@ -30,7 +30,7 @@ fn alike(one: &Mark, other: &Mark) -> bool {
 }
 
 /// Draws the legend from `left`, `top` on, within a width; returns the shapes and their height.
-pub(super) fn draw(entries: &[&Mark], left: f64, top: f64, width: f64) -> (Vec<Shape>, f64) {
+pub(super) fn draw(entries: &[&Mark], left: f64, top: f64, width: f64) -> (Vec<Primitive>, f64) {
     let places = places(entries, width);
     let mut shapes = Vec::new();
     for (mark, (x, row)) in entries.iter().zip(&places) {
@@ -40,7 +40,7 @@ pub(super) fn draw(entries: &[&Mark], left: f64, top: f64, width: f64) -> (Vec<S
         let at = (x + SAMPLE + SAMPLE_GAP, y);
         let size = text::fit(&mark.label, SIZE, room);
         let words = Words::new(at, mark.label.as_str(), size, Anchor::Start);
-        shapes.push(Shape::Text(words));
+        shapes.push(Primitive::Text(words));
     }
     let rows = places.last().map_or(0, |(_, row)| row + 1);
     (shapes, rows as f64 * ROW)
@@ -68,7 +68,7 @@ fn places(entries: &[&Mark], width: f64) -> Vec<(f64, usize)> {
 }
 
 /// A short piece of a mark, its left end in the middle of the row at `at`.
-fn sample(mark: &Mark, (x, y): Point) -> Vec<Shape> {
+fn sample(mark: &Mark, (x, y): Point) -> Vec<Primitive> {
     let line = vec![(x, y), (x + SAMPLE, y)];
     let block = |ink| {
         let (left, top) = (x, y - 0.4 * SIZE);
@@ -78,16 +78,19 @@ fn sample(mark: &Mark, (x, y): Point) -> Vec<Shape> {
             width: SAMPLE,
             height: 0.8 * SIZE,
         };
-        vec![Shape::Area(frame.corners(), ink)]
+        vec![Primitive::Area(frame.corners(), ink)]
     };
     let stroke = Stroke::of(&mark.style);
     match mark.kind {
-        Kind::Line | Kind::Across | Kind::Upright => vec![Shape::Path(line, stroke)],
-        Kind::Points => {
-            let dot = |share| Shape::Dot((x + share * SAMPLE, y), stroke.width / 2.0, stroke.ink);
+        MarkKind::Line | MarkKind::Across | MarkKind::Upright => {
+            vec![Primitive::Path(line, stroke)]
+        }
+        MarkKind::Points => {
+            let dot =
+                |share| Primitive::Dot((x + share * SAMPLE, y), stroke.width / 2.0, stroke.ink);
             vec![dot(0.2), dot(0.5), dot(0.8)]
         }
-        Kind::Band => block(stroke.ink.opacity(BAND_OPACITY)),
-        Kind::Span => block(SPAN),
+        MarkKind::Band => block(stroke.ink.opacity(BAND_OPACITY)),
+        MarkKind::Span => block(SPAN),
     }
 }

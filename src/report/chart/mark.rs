@@ -118,7 +118,7 @@ impl Style {
 /// What a mark is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum MarkKind {
     /// A curve through the points in their order.
     Line,
     /// A dot at each point.
@@ -138,7 +138,7 @@ pub enum Kind {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mark {
     /// What it is.
-    pub kind: Kind,
+    pub kind: MarkKind,
     /// The label for the legend; empty for none.
     pub label: String,
     /// How it looks; a span has one look only.
@@ -156,7 +156,7 @@ pub struct Mark {
 }
 
 impl Mark {
-    fn new(kind: Kind, label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
+    fn new(kind: MarkKind, label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
         Self {
             kind,
             label: label.into(),
@@ -169,12 +169,12 @@ impl Mark {
 
     /// A curve.
     pub fn line(label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
-        Self::new(Kind::Line, label, x, y, style)
+        Self::new(MarkKind::Line, label, x, y, style)
     }
 
     /// Dots.
     pub fn points(label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
-        Self::new(Kind::Points, label, x, y, style.dash(Dash::Solid))
+        Self::new(MarkKind::Points, label, x, y, style.dash(Dash::Solid))
     }
 
     /// The area between `low` and `high`.
@@ -187,14 +187,14 @@ impl Mark {
     ) -> Self {
         Self {
             high: high.to_vec(),
-            ..Self::new(Kind::Band, label, x, low, Style::new(colour))
+            ..Self::new(MarkKind::Band, label, x, low, Style::new(colour))
         }
     }
 
     /// A shaded interval of x.
     pub fn span(label: impl Into<String>, from: f64, to: f64) -> Self {
         Self::new(
-            Kind::Span,
+            MarkKind::Span,
             label,
             &[from, to],
             &[],
@@ -204,11 +204,11 @@ impl Mark {
 
     /// A line at one y.
     pub fn horizontal(label: impl Into<String>, y: f64, style: Style) -> Self {
-        Self::new(Kind::Across, label, &[], &[y], style)
+        Self::new(MarkKind::Across, label, &[], &[y], style)
     }
 
     /// A line at one x.
     pub fn vertical(label: impl Into<String>, x: f64, style: Style) -> Self {
-        Self::new(Kind::Upright, label, &[x], &[], style)
+        Self::new(MarkKind::Upright, label, &[x], &[], style)
     }
 }

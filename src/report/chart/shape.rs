@@ -96,7 +96,7 @@ impl Words {
 
 /// One thing to draw.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Shape {
+pub(super) enum Primitive {
     Path(Vec<Point>, Stroke),
     Area(Vec<Point>, Ink),
     Dot(Point, f64, Ink),
@@ -133,5 +133,5 @@ impl Frame {
 pub(super) struct Sheet {
     pub width: f64,
     pub height: f64,
-    pub shapes: Vec<Shape>,
+    pub shapes: Vec<Primitive>,
 }

@@ -6,7 +6,7 @@
 use super::figure::Figure;
 use super::layout;
 use super::mark::{Dash, Style};
-use super::shape::{Anchor, Ink, Point, Shape, Words};
+use super::shape::{Anchor, Ink, Point, Primitive, Words};
 use crate::report::text::escape;
 
 /// Units of the drawing in one pixel of the picture.
@@ -38,10 +38,10 @@ pub fn render(figure: &Figure) -> String {
 
 /// The attributes of the group to which a shape belongs: its dash pattern, and the colour of dots,
 /// which would be most of the file if each dot said it again.
-fn common(shape: &Shape) -> String {
+fn common(shape: &Primitive) -> String {
     match shape {
-        Shape::Path(_, stroke) => pattern(stroke.dash),
-        Shape::Dot(_, _, ink) => format!(" fill=\"{}\"", hex(ink)),
+        Primitive::Path(_, stroke) => pattern(stroke.dash),
+        Primitive::Dot(_, _, ink) => format!(" fill=\"{}\"", hex(ink)),
         _ => String::new(),
     }
 }
@@ -54,30 +54,30 @@ fn pattern(dash: Dash) -> String {
     }
 }
 
-fn draw(shape: &Shape) -> String {
+fn draw(shape: &Primitive) -> String {
     match shape {
-        Shape::Path(points, stroke) => format!(
+        Primitive::Path(points, stroke) => format!(
             "<polyline fill=\"none\"{} stroke=\"{}\" stroke-width=\"{}\" points=\"{}\"/>\n",
             opacity(&stroke.ink),
             hex(&stroke.ink),
             units(stroke.width),
             places(points)
         ),
-        Shape::Area(points, ink) => format!(
+        Primitive::Area(points, ink) => format!(
             "<polygon{} fill=\"{}\" points=\"{}\"/>\n",
             opacity(ink),
             hex(ink),
             places(points)
         ),
-        Shape::Dot((x, y), radius, ink) => format!(
+        Primitive::Dot((x, y), radius, ink) => format!(
             "<circle cx=\"{}\" cy=\"{}\" r=\"{}\"{}/>\n",
             units(*x),
             units(*y),
             units(*radius).max(1),
             opacity(ink)
         ),
-        Shape::Text(words) if words.text.is_empty() => String::new(),
-        Shape::Text(words) => text(words),
+        Primitive::Text(words) if words.text.is_empty() => String::new(),
+        Primitive::Text(words) => text(words),
     }
 }
 

@@ -1,7 +1,7 @@
 //! A compared run, read from its folder.
 
 use crate::error::InputError;
-use crate::report::{Columns, Run};
+use crate::report::{ResultTable, Run};
 use std::path::Path;
 
 /// A finished run with the data of its figures.
@@ -66,7 +66,10 @@ impl ComparedRun {
 
 /// The motions that have readings: `y_m` and `observed_y_m`, or with the number of the experiment
 /// where there are several. `names` are those of the experiments with readings, in order.
-fn motions(trajectory: &Columns, mut names: impl Iterator<Item = String>) -> Vec<MatchedMotion> {
+fn motions(
+    trajectory: &ResultTable,
+    mut names: impl Iterator<Item = String>,
+) -> Vec<MatchedMotion> {
     let numbered = (1..=trajectory.headers().len()).map(|i| format!("_{i}"));
     let suffixes = std::iter::once(String::new()).chain(numbered);
     let Some(times) = trajectory.column("t_s") else {

@@ -1,7 +1,7 @@
 //! How to repeat a run, and how to cite it.
 
 use super::table::{pairs, paragraph, table};
-use crate::config::Source;
+use crate::config::ModelSource;
 use crate::report::FittedModel;
 use crate::report::document::ResultDocument;
 use crate::report::text::escape;
@@ -39,7 +39,7 @@ pub(super) fn command(name: &str, document: &ResultDocument) -> String {
     block(&line)
 }
 
-fn data(source: &Source) -> String {
+fn data(source: &ModelSource) -> String {
     let row = |file: &crate::config::DataFile| {
         let (size, digest) = match &file.content {
             Some((bytes, digest)) => (bytes.to_string(), digest.clone()),

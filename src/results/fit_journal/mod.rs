@@ -9,14 +9,16 @@ mod read;
 
 use super::atomic::replace_with;
 use super::heading::Heading;
-use super::journal::{CHECKPOINT, FIT_JOURNAL, JournalFile, Mark, push_line, write_line};
+use super::journal::{
+    CHECKPOINT, FIT_JOURNAL, JournalFile, JournalPosition, push_line, write_line,
+};
 use super::system;
 use super::work_folder::WorkFolder;
 use crate::error::InputError;
 use kmcfit_core::internals::solvers::{
     CheckpointStore, CheckpointUnit, ExactF64s, IterationRecord, SolverState,
 };
-use read::{Contents, Reader};
+use read::{JournalContents, JournalReader};
 use serde::{Deserialize, Serialize};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -35,7 +37,7 @@ const GATHER: Duration = Duration::from_millis(5);
 
 /// A line: the number of the unit that it is about, and what is said of it.
 #[derive(Serialize, Deserialize)]
-struct Line<E>(u64, E);
+struct JournalLine<E>(u64, E);
 
 /// What a line says.
 #[derive(Serialize, Deserialize)]
@@ -60,10 +62,10 @@ pub struct FitJournal {
     work: WorkFolder,
     /// Lines that wait to be written, where they end, and when others were last written.
     waiting: Vec<u8>,
-    waiting_end: Mark,
+    waiting_end: JournalPosition,
     written: Instant,
     /// What an earlier run of the same fit left.
-    before: Contents,
+    before: JournalContents,
     /// The unit that is at work, from 1.
     unit: u64,
     /// Whether it had ended before.
@@ -119,7 +121,7 @@ impl FitJournal {
             folder,
             heading,
             (file, work),
-            Contents::default(),
+            JournalContents::default(),
         ))
     }
 
@@ -129,7 +131,7 @@ impl FitJournal {
     /// If it is not the journal of a fit of this format.
     pub fn heading(folder: &Path) -> Result<Option<Heading>, InputError> {
         match folder.join(FIT_JOURNAL).exists() {
-            true => Reader::open(folder).map(|reader| Some(reader.text.heading)),
+            true => JournalReader::open(folder).map(|reader| Some(reader.text.heading)),
             false => Ok(None),
         }
     }
@@ -140,7 +142,7 @@ impl FitJournal {
     /// If there is none, or it was begun with another model, other data or by another version.
     pub fn resume(folder: &Path, heading: &Heading) -> Result<Self, InputError> {
         let path = folder.join(FIT_JOURNAL);
-        let reader = Reader::open(folder)?;
+        let reader = JournalReader::open(folder)?;
         heading.check_same(&reader.text.heading, &path)?;
         let (before, end) = reader.contents();
         let work = WorkFolder::create_in(folder).map_err(|error| {
@@ -159,7 +161,7 @@ impl FitJournal {
         folder: &Path,
         heading: &Heading,
         (file, work): (JournalFile, WorkFolder),
-        before: Contents,
+        before: JournalContents,
     ) -> Self {
         Self {
             folder: folder.to_path_buf(),
@@ -197,7 +199,7 @@ impl FitJournal {
         if self.trouble.is_some() || self.is_recalled {
             return;
         }
-        let line = Line(self.unit, entry);
+        let line = JournalLine(self.unit, entry);
         if !matches!(line.1, Entry::Row(_)) {
             self.write();
             if self.trouble.is_none() {
@@ -226,8 +228,8 @@ impl FitJournal {
     }
 
     /// Drops what an earlier run left behind a place.
-    fn cut(&mut self, end: Mark) {
-        self.before = Contents::default();
+    fn cut(&mut self, end: JournalPosition) {
+        self.before = JournalContents::default();
         self.write();
         match self.file.truncate(end) {
             Ok(()) => self.waiting_end = end,
@@ -241,7 +243,7 @@ impl FitJournal {
         self.file.sync()?;
         let path = self.folder.join(CHECKPOINT);
         replace_with(self.work.path(), &path, |out| {
-            let begin = write_line(&mut *out, Mark::default(), &self.heading)?;
+            let begin = write_line(&mut *out, JournalPosition::default(), &self.heading)?;
             write_line(out, begin, &(self.unit, standing))?;
             Ok(())
         })

@@ -1,8 +1,8 @@
 //! Reading the journal and checkpoint of a fit that did not come to its end.
 
-use super::{Entry, Line};
+use super::{Entry, JournalLine};
 use crate::error::InputError;
-use crate::results::journal::{CHECKPOINT, FIT_JOURNAL, JournalText, Mark};
+use crate::results::journal::{CHECKPOINT, FIT_JOURNAL, JournalPosition, JournalText};
 use kmcfit_core::internals::solvers::{CheckpointUnit, IterationRecord, SolverState};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,36 +10,36 @@ use std::path::{Path, PathBuf};
 const WHAT: &str = "the journal of a fit that was begun by `kmcfit fit`";
 
 /// A journal that was read.
-pub(super) struct Reader {
+pub(super) struct JournalReader {
     folder: PathBuf,
     pub text: JournalText,
 }
 
 /// What a journal and its checkpoint hold.
 #[derive(Debug, Default)]
-pub(super) struct Contents {
-    pub units: BTreeMap<u64, Unit>,
+pub(super) struct JournalContents {
+    pub units: BTreeMap<u64, JournalUnit>,
     /// Where the running search stood, and which unit it was.
     pub standing: Option<(u64, SolverState)>,
     /// Where the unit that is at work begins.
-    pub begin: Mark,
+    pub begin: JournalPosition,
     /// The end of what was recalled; `None` when all of it was.
-    pub end: Option<Mark>,
+    pub end: Option<JournalPosition>,
 }
 
 /// What a journal holds of one unit.
 #[derive(Debug)]
-pub(super) struct Unit {
-    pub begin: Mark,
-    pub end: Mark,
+pub(super) struct JournalUnit {
+    pub begin: JournalPosition,
+    pub end: JournalPosition,
     /// What it came to, if it ended.
     pub kept: Option<CheckpointUnit>,
     /// The iterations, and where the line of each ends.
-    rows: Vec<(IterationRecord, Mark)>,
+    rows: Vec<(IterationRecord, JournalPosition)>,
 }
 
-impl Unit {
-    fn new(begin: Mark) -> Self {
+impl JournalUnit {
+    fn new(begin: JournalPosition) -> Self {
         Self {
             begin,
             end: begin,
@@ -49,7 +49,7 @@ impl Unit {
     }
 
     /// Takes a line; whether it can follow those before it.
-    fn take(&mut self, entry: Entry, end: Mark) -> bool {
+    fn take(&mut self, entry: Entry, end: JournalPosition) -> bool {
         if self.kept.is_some() {
             return false;
         }
@@ -73,7 +73,10 @@ impl Unit {
     }
 
     /// How a unit that had not ended goes on, and the end of what is of use for it.
-    pub fn at_work(mut self, standing: Option<SolverState>) -> (Mark, Option<CheckpointUnit>) {
+    pub fn at_work(
+        mut self,
+        standing: Option<SolverState>,
+    ) -> (JournalPosition, Option<CheckpointUnit>) {
         let usable = standing.and_then(|standing| {
             let iterations = usize::try_from(standing.iterations).ok()?;
             let (_, end) = *self.rows.get(iterations.checked_sub(1)?)?;
@@ -90,7 +93,7 @@ impl Unit {
     }
 }
 
-impl Reader {
+impl JournalReader {
     /// Reads the journal in a folder.
     pub fn open(folder: &Path) -> Result<Self, InputError> {
         Ok(Self {
@@ -101,25 +104,25 @@ impl Reader {
 
     /// What it holds up to the first line that is damaged or does not follow from those before, where that line begins,
     /// and the checkpoint if it is of this fit.
-    pub fn contents(&self) -> (Contents, Mark) {
+    pub fn contents(&self) -> (JournalContents, JournalPosition) {
         let mut end = self.text.begin;
-        let mut units: BTreeMap<u64, Unit> = BTreeMap::new();
-        for (Line(unit, entry), next) in self.text.lines() {
+        let mut units: BTreeMap<u64, JournalUnit> = BTreeMap::new();
+        for (JournalLine(unit, entry), next) in self.text.lines() {
             let last = units.last_key_value().map_or(0, |(unit, _)| *unit);
             let is_next = unit == last + 1 && units.get(&last).is_none_or(|u| u.kept.is_some());
             if !(is_next || unit == last && last > 0) {
                 break;
             }
-            let known = units.entry(unit).or_insert_with(|| Unit::new(end));
+            let known = units.entry(unit).or_insert_with(|| JournalUnit::new(end));
             if !known.take(entry, next) {
                 break;
             }
             end = next;
         }
-        let contents = Contents {
+        let contents = JournalContents {
             units,
             standing: self.standing(),
-            begin: Mark::default(),
+            begin: JournalPosition::default(),
             end: Some(self.text.begin),
         };
         (contents, end)

@@ -1,12 +1,12 @@
 //! Force and motion of the base.
 
-use super::source::{self, Wanted};
+use super::source::{self, ColumnRequest};
 use crate::config::ModelFile;
 use crate::config::scalar::Number;
 use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec};
 use crate::error::InputError;
 use crate::finding::Finding;
-use crate::units::Kind;
+use crate::units::Quantity;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
 
@@ -70,10 +70,10 @@ pub fn read(
                     .expected("one of the two"));
             }
             let interpolation = force.as_ref().and_then(|f| f.interpolation);
-            let wanted = Wanted {
+            let wanted = ColumnRequest {
                 experiment: i,
                 name: "force",
-                kind: Kind::Force,
+                kind: Quantity::Force,
                 column,
                 unit: units.and_then(|u| u.force.as_ref()),
                 beside: None,
@@ -117,10 +117,10 @@ fn base(
                 .found("`base_acceleration` and `base_displacement`")
                 .expected("one of the two"));
         }
-        (Some(column), None) => (column, Kind::Acceleration),
-        (None, Some(column)) => (column, Kind::Displacement),
+        (Some(column), None) => (column, Quantity::Acceleration),
+        (None, Some(column)) => (column, Quantity::Displacement),
     };
-    let wanted = |name, unit, kind| Wanted {
+    let wanted = |name, unit, kind| ColumnRequest {
         experiment: i,
         name,
         kind,
@@ -128,7 +128,7 @@ fn base(
         unit,
         beside: None,
     };
-    if kind == Kind::Acceleration {
+    if kind == Quantity::Acceleration {
         let unit = units.and_then(|u| u.base_acceleration.as_ref());
         let wanted = wanted("base_acceleration", unit, kind);
         let meant = interpolation.unwrap_or_default();
@@ -158,7 +158,7 @@ fn base(
 fn signal(
     file: &ModelFile,
     spec: &ExperimentSpec,
-    wanted: &Wanted,
+    wanted: &ColumnRequest,
     interpolation: Interpolation,
     warnings: &mut Vec<Finding>,
 ) -> Result<Signal, InputError> {

@@ -25,12 +25,12 @@ use kmcfit_core::internals::system::Grid;
 pub(super) use excitation::shape;
 
 /// What stands in the files of one experiment, at the times of its readings.
-pub(super) struct Record {
+pub(super) struct RawRecord {
     pub channels: Vec<RawChannel>,
     excitation: RawExcitation,
 }
 
-impl Record {
+impl RawRecord {
     /// First time of its rows, s: also of those without a reading.
     pub fn start(&self) -> f64 {
         let first = self.channels.iter().map(|c| c.span[0]);
@@ -95,7 +95,7 @@ pub(super) fn read(
     file: &ModelFile,
     purpose: BuildMode,
     warnings: &mut Vec<Finding>,
-) -> Result<Vec<Option<Record>>, InputError> {
+) -> Result<Vec<Option<RawRecord>>, InputError> {
     let specs = &file.spec.experiments;
     if specs.iter().all(is_held_out) {
         return Err(file
@@ -111,7 +111,7 @@ pub(super) fn read(
             let records = specs.iter().enumerate().map(|(i, spec)| {
                 let excitation = excitation::read(file, i, spec, warnings)?;
                 let channels = Vec::new();
-                Ok((!excitation.is_empty()).then_some(Record {
+                Ok((!excitation.is_empty()).then_some(RawRecord {
                     channels,
                     excitation,
                 }))
@@ -130,9 +130,9 @@ fn read_one(
     i: usize,
     spec: &ExperimentSpec,
     warnings: &mut Vec<Finding>,
-) -> Result<Record, InputError> {
+) -> Result<RawRecord, InputError> {
     let channels = channel::read(file, i, spec, warnings)?;
-    let record = Record {
+    let record = RawRecord {
         channels,
         excitation: excitation::read(file, i, spec, warnings)?,
     };
@@ -146,7 +146,7 @@ pub(super) fn specification(
     purpose: BuildMode,
     grid: &Grid,
     i: usize,
-    record: Option<Record>,
+    record: Option<RawRecord>,
 ) -> Result<(builder::Record, Vec<ChannelNote>), InputError> {
     let spec = &file.spec.experiments[i];
     let estimate = ScalarOr::Scalar(NumberOrEstimate::Estimate);

@@ -8,13 +8,13 @@ use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, Sou
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::observations::{ColumnName, SAMPLE_RATES, Table, TableFormat, increasing_at};
-use crate::units::{Kind, Unit};
+use crate::units::{Quantity, Unit};
 
 /// Default name of the column of times.
 const TIME_COLUMN: &str = "t_s";
 
 /// A column of a file in SI units, in the window; NaN where a reading is missing.
-pub struct Source {
+pub struct ColumnSamples {
     /// s, increasing.
     pub times: Vec<f64>,
     /// In SI.
@@ -32,13 +32,13 @@ pub struct Source {
 }
 
 /// Which column is wanted, and where the model says so.
-pub struct Wanted<'a> {
+pub struct ColumnRequest<'a> {
     /// Number of the experiment.
     pub experiment: usize,
     /// Name of the channel: a key of `columns` and `units`.
     pub name: &'a str,
     /// What it measures.
-    pub kind: Kind,
+    pub kind: Quantity,
     /// The column.
     pub column: &'a ColumnRef,
     /// Unit that the model gives.
@@ -58,9 +58,9 @@ fn column_name(id: &ColumnId) -> ColumnName {
 pub fn read(
     file: &ModelFile,
     spec: &ExperimentSpec,
-    wanted: &Wanted,
+    wanted: &ColumnRequest,
     warnings: &mut Vec<Finding>,
-) -> Result<Source, InputError> {
+) -> Result<ColumnSamples, InputError> {
     let experiment = format!("experiments[{}]", wanted.experiment);
     let column_key = format!("{experiment}.columns.{}", wanted.name);
     let (id, own) = match wanted.column {
@@ -113,7 +113,7 @@ pub fn read(
     }
     let inside = inside(file, &experiment, spec, &times.values)?;
     let zero = spec.time_zero.map_or(0.0, |t| t.0);
-    Ok(Source {
+    Ok(ColumnSamples {
         times: inside.iter().map(|&r| times.values[r] - zero).collect(),
         values: inside.iter().map(|&r| factor * values[r]).collect(),
         beside: beside.map(|b| inside.iter().map(|&r| factor * b[r]).collect()),
@@ -193,7 +193,7 @@ fn format(spec: &ExperimentSpec) -> TableFormat {
 /// A complaint about the format as an argument is one about its key.
 fn about_format(file: &ModelFile, experiment: &str, error: InputError) -> InputError {
     match &error.place {
-        crate::error::Place::Argument(name) => {
+        crate::error::Location::Argument(name) => {
             let key = format!("{experiment}.format.{name}");
             file.error_about(&key, error)
         }
@@ -255,7 +255,7 @@ fn times(
         file,
         experiment,
         name: "time",
-        kind: Kind::Time,
+        kind: Quantity::Time,
         given: spec.units.as_ref().and_then(|u| u.time.as_ref()),
         table,
         index,

@@ -6,7 +6,7 @@ use crate::config::scalar::Text;
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::observations::Table;
-use crate::units::{Kind, Unit};
+use crate::units::{Quantity, Unit};
 
 /// A column of a table, its keys in the model file and its kind of quantity.
 pub(super) struct QuantityColumn<'a> {
@@ -15,7 +15,7 @@ pub(super) struct QuantityColumn<'a> {
     pub experiment: &'a str,
     /// Name of the channel: a key of `columns` and `units`.
     pub name: &'a str,
-    pub kind: Kind,
+    pub kind: Quantity,
     /// Unit that the model gives.
     pub given: Option<&'a Text>,
     pub table: &'a Table,

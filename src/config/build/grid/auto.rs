@@ -6,7 +6,7 @@
 //! shortened so that samples of force and base fall on nodes. For records without a spectrum (too few or equal samples)
 //! the step is the sampling interval.
 
-use crate::config::build::experiments::Record;
+use crate::config::build::experiments::RawRecord;
 use crate::digits::significant;
 use crate::finding::Finding;
 use kmcfit_core::internals::signal::Spectrum;
@@ -31,7 +31,7 @@ const MOST_PER_READING: usize = 64;
 /// Number of nodes over `duration` s; a finding in `notes` states the choice.
 pub fn nodes(
     method: Method,
-    records: &[Option<Record>],
+    records: &[Option<RawRecord>],
     duration: f64,
     most: usize,
     notes: &mut Vec<Finding>,
@@ -59,7 +59,10 @@ pub fn nodes(
     }
     let shortest = duration / (most.min(MOST_PER_READING * readings) - 1) as f64;
     let mut step = longest.clamp(shortest, duration / 8.0);
-    let drives = records.iter().flatten().filter_map(Record::drive_spacing);
+    let drives = records
+        .iter()
+        .flatten()
+        .filter_map(RawRecord::drive_spacing);
     if let Some(spacing) = drives.reduce(f64::min) {
         // Samples on nodes: no step crosses a kink of the force.
         step = spacing / (spacing / step).ceil();

@@ -7,7 +7,7 @@ use crate::config::ModelFile;
 use crate::config::build::BuildMode;
 use crate::config::build::fit::DEFAULT_MEMORY;
 use crate::config::build::functions::{self, Given};
-use crate::config::scalar::Knots;
+use crate::config::scalar::KnotSpec;
 use crate::config::spec::{Basis, FitMethod};
 use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 
@@ -82,8 +82,8 @@ enum FreeValues {
 
 fn free_values((_, spec): &Given) -> FreeValues {
     let knots = match &spec.knots {
-        Some(Knots::Count(count)) => count.0,
-        Some(Knots::Times(times)) => times.len(),
+        Some(KnotSpec::Count(count)) => count.0,
+        Some(KnotSpec::Times(times)) => times.len(),
         None => 0,
     };
     let count = match spec.basis {

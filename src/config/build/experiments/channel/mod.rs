@@ -3,7 +3,7 @@
 mod noise;
 mod sampling;
 
-use super::source::{self, Wanted};
+use super::source::{self, ColumnRequest};
 use super::warning::DataWarning;
 use super::{ChannelNote, names};
 use crate::config::ModelFile;
@@ -11,7 +11,7 @@ use crate::config::scalar::{ColumnId, ScalarOr, Sigma, Text};
 use crate::config::spec::{ColumnRef, ExperimentSpec, LossName, LossSpec, SensorSpec};
 use crate::error::InputError;
 use crate::finding::Finding;
-use crate::units::{Kind, Unit};
+use crate::units::{Quantity, Unit};
 use kmcfit_core::internals::record::{ChannelKind, Loss, Weighting};
 use kmcfit_core::internals::signal::SecondOrder;
 use kmcfit_core::internals::signal::{even_spacing, median_spacing};
@@ -191,13 +191,13 @@ fn read_one(
         Some(Sigma::Column(name)) => Some((name.as_str(), sigma_key.as_str())),
         _ => None,
     };
-    let wanted = Wanted {
+    let wanted = ColumnRequest {
         experiment: i,
         name: kind.name(),
         kind: match kind {
-            ChannelKind::Displacement => Kind::Displacement,
-            ChannelKind::Velocity => Kind::Velocity,
-            ChannelKind::Acceleration => Kind::Acceleration,
+            ChannelKind::Displacement => Quantity::Displacement,
+            ChannelKind::Velocity => Quantity::Velocity,
+            ChannelKind::Acceleration => Quantity::Acceleration,
         },
         column,
         unit: of_kind.unit,
@@ -248,7 +248,7 @@ fn read_one(
 fn present(
     file: &ModelFile,
     column: &str,
-    source: &source::Source,
+    source: &source::ColumnSamples,
 ) -> Result<Vec<usize>, InputError> {
     let rows = 0..source.values.len();
     let present: Vec<usize> = rows.filter(|&r| !source.values[r].is_nan()).collect();

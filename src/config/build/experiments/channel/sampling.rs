@@ -24,7 +24,7 @@ pub(super) fn decimate(
     file: &ModelFile,
     key: &str,
     factor: usize,
-    source: &mut source::Source,
+    source: &mut source::ColumnSamples,
     ignored: &mut Vec<(usize, String)>,
 ) -> Result<(), InputError> {
     let at = format!("{key}.decimate");
