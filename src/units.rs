@@ -5,8 +5,8 @@
 //! without calibration: they count as they are.
 
 use crate::error::InputError;
-use crate::input::{one_of, quote};
-use crate::near::nearest;
+use crate::spelling::nearest;
+use crate::text_io::{one_of, quote};
 
 /// Standard gravity, m/s² (ISO 80000-3).
 const GRAVITY: f64 = 9.806_65;

@@ -1,7 +1,7 @@
 //! `kmcfit explain`
 
 use super::{CommandError, OK, print};
-use crate::config::keys;
+use crate::config::key_documentation;
 
 /// Explain a key of the model file: meaning, type, unit, default, example.
 #[derive(Debug, clap::Args)]
@@ -12,6 +12,6 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
-    print(&keys::explain(arguments.key.as_deref())?);
+    print(&key_documentation::explain(arguments.key.as_deref())?);
     Ok(OK)
 }

@@ -8,7 +8,8 @@ use crate::config::{BuildMode, Model, ModelFile, Override, WeightSearch, build};
 use crate::error::InputError;
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
-    Around, FittedModel, Known, TimingsSummary, charts, fit_claim, json, predict, summary,
+    FittedModel, OverheadTimings, RunAssessment, TimingsSummary, charts, fit_claim, json, predict,
+    summary,
 };
 use crate::results::{FitJournal, Heading, OutputFolder, RESULT};
 use console::Term;
@@ -201,11 +202,11 @@ pub(super) fn fit_into(
     let model = weighted.as_ref().unwrap_or(model);
     let analysis = Instant::now();
     let predictions = predictions(model, &found);
-    let known = Known::of(model, &found);
+    let run_assessment = RunAssessment::of(model, &found);
     let analysis = analysis.elapsed();
     let report = Instant::now();
     let run = FittedModel {
-        known: &known,
+        run_assessment: &run_assessment,
         model,
         fit: &found,
         predictions: &predictions,
@@ -217,14 +218,14 @@ pub(super) fn fit_into(
         .write(&mut stage, &document, with_figures)
         .map_err(full)?;
     let before = &model.preparation;
-    let around = Around {
+    let overhead = OverheadTimings {
         io: before.reading + writing,
         analysis,
         report: report.elapsed().saturating_sub(writing),
     };
     // The time of a resumed fit includes its earlier parts.
-    let total = (before.total + clock.elapsed()).max(around.sum() + found.elapsed);
-    document.timings = TimingsSummary::new(&found, &around, total);
+    let total = (before.total + clock.elapsed()).max(overhead.sum() + found.elapsed);
+    document.timings = TimingsSummary::new(&found, &overhead, total);
     stage.write(RESULT, &json(&document)).map_err(full)?;
     stage.commit().map_err(full)?;
     let status = found.outcome.status;

@@ -1,11 +1,11 @@
 //! `kmcfit init`
 
 use super::{CommandError, OK, print, schema, unwritable};
-use crate::config::{ModelFile, starter};
+use crate::config::{ModelFile, scaffold};
 use crate::error::InputError;
-use crate::observations::SAMPLE_RATES;
 use crate::report::shell_quoted;
 use crate::results::write_together;
+use crate::tables::SAMPLE_RATES;
 use std::path::{Component, Path, PathBuf};
 
 /// Schema file named by the comment in the first line of a model file.
@@ -49,20 +49,20 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
             .into());
     }
     let folder = out.parent().unwrap_or(Path::new(""));
-    let starter = starter(&arguments.data, &named_from(folder, &arguments.data), rate)?;
+    let scaffold = scaffold(&arguments.data, &named_from(folder, &arguments.data), rate)?;
     // The written model must be readable.
-    ModelFile::parse(&out, starter.text.as_str())?;
+    ModelFile::parse(&out, scaffold.text.as_str())?;
     let schema = folder.join(SCHEMA);
     let is_new = schema.symlink_metadata().is_err();
     let schema_text = schema::text();
-    let mut files = vec![(out.as_path(), starter.text.as_str())];
+    let mut files = vec![(out.as_path(), scaffold.text.as_str())];
     if is_new {
         // The model is written last: without it the command can be repeated.
         files.insert(0, (&schema, &schema_text));
     }
     write_together(&files).map_err(|error| unwritable(&out, &error))?;
     let mut text = format!("{}\n", arguments.data.display());
-    for sentence in &starter.found {
+    for sentence in &scaffold.found {
         text += &format!("  {sentence}\n");
     }
     if is_new {

@@ -1,7 +1,7 @@
 //! `kmcfit schema`
 
 use super::{CommandError, OK, print};
-use crate::config::keys;
+use crate::config::key_documentation;
 use crate::report::json;
 
 /// Print the JSON schema (draft 07) of model files, for completion and checks in editors.
@@ -16,5 +16,5 @@ pub fn run(_: &Arguments) -> Result<u8, CommandError> {
 
 /// The schema as a file.
 pub(super) fn text() -> String {
-    json(&keys::schema())
+    json(&key_documentation::schema())
 }

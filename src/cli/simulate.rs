@@ -4,9 +4,9 @@ use super::{CommandError, OK, Overrides, inputs, print, say, unwritable};
 use crate::config::{BuildMode, ModelFile, build};
 use crate::digest::{digest, digest_of_file};
 use crate::error::InputError;
-use crate::input::{one_of, quote, read_text};
 use crate::report::{CsvTable, json};
 use crate::results::write_together;
+use crate::text_io::{one_of, quote, read_text};
 use kmcfit_core::internals::record::Experiment;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -150,7 +150,7 @@ fn check_place(out: &Path, file: &ModelFile) -> Result<(), InputError> {
 /// be missing.
 fn is_own(out: &Path, beside: &Path) -> bool {
     #[derive(Deserialize)]
-    struct Known {
+    struct PriorProvenance {
         made_by: String,
         sha256: String,
     }
@@ -162,7 +162,7 @@ fn is_own(out: &Path, beside: &Path) -> bool {
         LONGEST_RECORD,
     )
     .ok();
-    let known: Option<Known> = known.and_then(|text| serde_json::from_str(&text).ok());
+    let known: Option<PriorProvenance> = known.and_then(|text| serde_json::from_str(&text).ok());
     let has_digest = |sha256: &str| digest_of_file(out).is_ok_and(|found| found == sha256);
     is_file(beside)
         && known.is_some_and(|known| {

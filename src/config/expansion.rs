@@ -5,8 +5,8 @@
 //! that keeps nothing and adds up the lengths of the values, each alias with those that it stands
 //! for, until a limit is passed.
 
-use super::locate;
-use super::locate::Position;
+use super::key_positions;
+use super::key_positions::Position;
 use serde::de::{
     Deserialize, DeserializeSeed, Deserializer, EnumAccess, Error, MapAccess, SeqAccess,
     VariantAccess, Visitor,
@@ -31,7 +31,7 @@ pub(super) fn beyond(text: &str, limit: usize) -> Option<Position> {
             return Some(
                 error
                     .as_ref()
-                    .and_then(locate::position)
+                    .and_then(key_positions::position)
                     .unwrap_or(Position::START),
             );
         }

@@ -8,21 +8,21 @@
 mod build;
 mod choice;
 mod expansion;
-mod failure;
-mod guard;
+mod input_limits;
 pub mod key;
-pub mod keys;
-pub mod locate;
+pub mod key_documentation;
+pub mod key_positions;
 mod map;
 mod model_file;
 mod overrides;
-pub mod scalar;
+mod reader;
+mod scaffold;
 mod sequence;
 mod source;
 pub mod spec;
-mod starter;
 mod syntax;
-mod value;
+pub mod values;
+mod yaml_errors;
 
 pub use build::{
     BuildMode, Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation, StudyPlan,
@@ -30,7 +30,7 @@ pub use build::{
 };
 pub use model_file::ModelFile;
 pub use overrides::Override;
-pub use scalar::{Number, NumberOrColumn, Text};
+pub use scaffold::{Scaffold, scaffold};
 pub use sequence::Sequence;
 pub use source::{DataFile, ModelSource};
-pub use starter::{Starter, starter};
+pub use values::{Number, NumberOrColumn, Text};

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use super::failure;
-use super::guard::{Checked, LONGEST_MODEL};
-use super::locate::{key_path, locate, place};
+use super::input_limits::{Checked, LONGEST_MODEL};
+use super::key_positions::{key_path, locate, place};
 use super::overrides::Override;
 use super::spec::ModelSpec;
+use super::yaml_errors;
 use crate::error::InputError;
-use crate::input::read_text;
+use crate::text_io::read_text;
 
 /// What a model file should be, in messages.
 const MODEL_FILE: &str = "a model file (YAML)";
@@ -131,7 +131,7 @@ impl ModelFile {
                 .expected(MODEL_FILE)
                 .hint("begin with `format: 1`"));
         }
-        let spec = failure::read(&path, &Checked::new(&path, &text)?)?;
+        let spec = yaml_errors::read(&path, &Checked::new(&path, &text)?)?;
         let model = Self {
             path,
             text,

@@ -1,9 +1,9 @@
 //! Values that are given beside a model file, in the place of what it says: `--set KEY=VALUE`.
 
-use super::guard::Checked;
-use super::locate::{Segment, key_path};
+use super::input_limits::Checked;
+use super::key_positions::{Segment, key_path};
 use crate::error::{InputError, Location};
-use crate::input::quote;
+use crate::text_io::quote;
 use serde_yaml::{Mapping, Value};
 use std::fmt;
 use std::path::Path;

@@ -12,9 +12,9 @@ pub use study::*;
 use crate::config::map::keys;
 
 use super::choice::choice;
-pub use super::scalar::{ColumnSpec, WeightRule};
-use super::scalar::{Count, Format, KnotSpec, Nodes, Number, NumberOrColumn, OneOrList};
-use super::scalar::{StartSpec, Text, Weight};
+pub use super::values::{ColumnSpec, WeightRule};
+use super::values::{Count, Format, KnotSpec, Nodes, Number, NumberOrColumn, OneOrList};
+use super::values::{StartSpec, Text, Weight};
 
 keys! {
     /// A model: records of one system, its coefficient functions, and the settings of the fit.

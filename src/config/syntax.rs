@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use super::locate::place;
-use super::locate::{self, Position};
-use super::value::Scalar;
+use super::key_positions::place;
+use super::key_positions::{self, Position};
+use super::reader::Scalar;
 use crate::error::InputError;
-use crate::input::quote;
+use crate::text_io::quote;
 
 /// What the YAML parser says, what it means, and what to do about it.
 const MEANINGS: &[(&str, &str, &str)] = &[
@@ -95,7 +95,7 @@ const MEANINGS: &[(&str, &str, &str)] = &[
 /// The error for a text that the YAML parser refuses.
 pub(super) fn input_error(file: &Path, text: &str, error: &serde_yaml::Error) -> InputError {
     let message = error.to_string();
-    let at = locate::position(error).unwrap_or(Position::START);
+    let at = key_positions::position(error).unwrap_or(Position::START);
     if let Some(tab) = tab_before(text, at) {
         return InputError::new(place(file, tab), "a tab is used as indentation")
             .found("a tab")

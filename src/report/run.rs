@@ -1,18 +1,18 @@
 //! What a fit leaves behind: tables, figures and the result document.
 
+use super::channel_view::ChannelView;
 use super::cost::{CostKind, cost_definition};
 use super::document::{
     ActiveSummary, AttemptSummary, ChannelSummary, ConstraintSummary, CostSummary, CountsSummary,
     ExperimentSummary, FORMAT, GradientSummary, ModelSummary, OutcomeSummary, PathSummary,
     Prediction, ResultDocument, SlackSummary, WeightSummary,
 };
-use super::known::Known;
-use super::measured;
+use super::fit_assessment::RunAssessment;
+use super::fit_quality;
 use super::page::fit_page;
 use super::render;
-use super::seen::SeenChannel;
 use super::suggestions::suggestions;
-use super::timings::{Around, TimingsSummary};
+use super::timings::{OverheadTimings, TimingsSummary};
 use crate::config::{ChannelNote, Model};
 use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, Stage};
 use kmcfit_core::internals::functions::CoefficientFunction;
@@ -37,7 +37,7 @@ pub struct FittedModel<'a> {
     /// The path on which the weight of the smoothness was chosen, if by a rule.
     pub weights: Option<&'a WeightPath>,
     /// Assessment of the fit.
-    pub known: &'a Known,
+    pub run_assessment: &'a RunAssessment,
 }
 
 impl FittedModel<'_> {
@@ -106,7 +106,7 @@ impl FittedModel<'_> {
                 qp: fit.counts.qp,
             },
             seconds: fit.elapsed.as_secs_f64(),
-            timings: TimingsSummary::new(fit, &Around::default(), fit.elapsed),
+            timings: TimingsSummary::new(fit, &OverheadTimings::default(), fit.elapsed),
             functions: self.function_summaries(),
             constraints: self.constraint_summary(),
             identifiability: self.identifiability(),
@@ -114,22 +114,22 @@ impl FittedModel<'_> {
             attempts: self.fit.attempts.iter().map(attempt_summary).collect(),
             experiments: self.experiment_summaries(),
             validation: self
-                .known
+                .run_assessment
                 .validation
                 .iter()
-                .map(measured::validation)
+                .map(fit_quality::validation)
                 .collect(),
             nuisance_parameters: match self.is_simulated() {
                 true => {
-                    let covariance = self.known.covariance();
-                    measured::scalars(&model.problem, &fit.best.evaluation, covariance)
+                    let covariance = self.run_assessment.covariance();
+                    fit_quality::scalars(&model.problem, &fit.best.evaluation, covariance)
                 }
                 false => Vec::new(),
             },
-            statistics: (self.known.assessment.as_ref())
+            statistics: (self.run_assessment.assessment.as_ref())
                 .map(|a| a.statistics.clone())
                 .unwrap_or_default(),
-            step_check: self.known.step_check().cloned(),
+            step_check: self.run_assessment.step_check().cloned(),
             automatic: model.automatic.clone(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),
@@ -146,7 +146,7 @@ impl FittedModel<'_> {
 
     /// The bands of functions and ratios, for models of at most 64 parameters.
     pub(super) fn bands(&self) -> Option<&Bands> {
-        self.known.bands()
+        self.run_assessment.bands()
     }
 
     fn model_summary(&self) -> ModelSummary {
@@ -252,7 +252,7 @@ impl FittedModel<'_> {
             .map(|(e, (experiment, predictions))| {
                 let channels = 0..predictions.len();
                 let channels: Vec<ChannelSummary> = channels
-                    .map(|i| measured::channel(&self.seen(e, i)))
+                    .map(|i| fit_quality::channel(&self.channel_view(e, i)))
                     .collect();
                 let factor = self.note(e, 0).map_or(1.0, |note| note.unit.factor());
                 ExperimentSummary {
@@ -283,8 +283,8 @@ impl FittedModel<'_> {
     }
 
     /// A channel beside what the fit says of it.
-    pub(super) fn seen(&self, experiment: usize, channel: usize) -> SeenChannel<'_> {
-        SeenChannel {
+    pub(super) fn channel_view(&self, experiment: usize, channel: usize) -> ChannelView<'_> {
+        ChannelView {
             channel: &self.model.problem.experiments[experiment].channels[channel],
             predicted: &self.fit.best.evaluation.predictions[experiment][channel],
             note: self.note(experiment, channel),

@@ -2,8 +2,8 @@
 
 use super::document::{ChannelSummary, Prediction, ResultDocument};
 use super::suggestions;
-use crate::digits::significant;
 use crate::finding::Finding;
+use crate::number_format::significant;
 use kmcfit_core::internals::assessment::FunctionSummary;
 use kmcfit_core::internals::diagnostics::NORMAL_975;
 use kmcfit_core::internals::functions::CoefficientKind;

@@ -111,16 +111,16 @@ impl FittedModel<'_> {
     /// the names of the tables; those that took no part in the fit last.
     pub(super) fn readings(&self) -> Vec<(String, CsvTable)> {
         let fitted = self.channels().into_iter().map(|(e, c)| {
-            let seen = self.seen(e, c);
-            let name = format!("readings/{}-{}.csv", e + 1, seen.channel.kind().name());
-            (name, seen.table())
+            let view = self.channel_view(e, c);
+            let name = format!("readings/{}-{}.csv", e + 1, view.channel.kind().name());
+            (name, view.table())
         });
-        let validation = self.known.validation.iter().enumerate();
+        let validation = self.run_assessment.validation.iter().enumerate();
         let validation = validation.flat_map(|(i, out)| {
-            out.channels().into_iter().map(move |seen| {
-                let kind = seen.channel.kind().name();
+            out.channels().into_iter().map(move |view| {
+                let kind = view.channel.kind().name();
                 let name = format!("readings/validation-{}-{kind}.csv", i + 1);
-                (name, seen.table())
+                (name, view.table())
             })
         });
         fitted.chain(validation).collect()

@@ -1,7 +1,7 @@
 //! Charts of letters: readings against fit, and the functions, for a look in the terminal.
 
-use super::columns::ResultTable;
 use super::document::ResultDocument;
+use super::result_table::ResultTable;
 use crate::error::InputError;
 use kmcfit_core::internals::functions::CoefficientKind;
 use std::path::Path;

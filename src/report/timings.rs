@@ -60,7 +60,7 @@ impl PartSummary {
 
 /// What was done around a fit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Around {
+pub struct OverheadTimings {
     /// Reading and writing.
     pub io: Duration,
     /// What [`TimingsSummary::analysis`] is.
@@ -69,7 +69,7 @@ pub struct Around {
     pub report: Duration,
 }
 
-impl Around {
+impl OverheadTimings {
     /// The sum of all.
     pub fn sum(&self) -> Duration {
         self.io + self.analysis + self.report
@@ -78,7 +78,7 @@ impl Around {
 
 impl TimingsSummary {
     /// The time of a run that took `total`.
-    pub fn new(fit: &Fit, around: &Around, total: Duration) -> Self {
+    pub fn new(fit: &Fit, overhead: &OverheadTimings, total: Duration) -> Self {
         let (counts, times) = (&fit.counts, &fit.timings);
         let counted = |time, count| PartSummary::new(time, Some(count));
         let part = |time| PartSummary::new(time, None);
@@ -90,10 +90,10 @@ impl TimingsSummary {
             qp: counted(times.qp, counts.qp),
             linear_algebra: part(times.linear_algebra),
             start: part(times.start),
-            io: part(around.io + times.keeping),
-            analysis: part(around.analysis),
-            report: part(around.report),
-            other: part(total.saturating_sub(times.sum() + around.sum())),
+            io: part(overhead.io + times.keeping),
+            analysis: part(overhead.analysis),
+            report: part(overhead.report),
+            other: part(total.saturating_sub(times.sum() + overhead.sum())),
             total: part(total),
         }
     }

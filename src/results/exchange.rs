@@ -19,7 +19,7 @@ use super::system;
 use super::work_folder::{EXCHANGE, WorkFolder, is_marked};
 use crate::digest::digest;
 use crate::error::InputError;
-use crate::input::read_text;
+use crate::text_io::read_text;
 use kmcfit_core::internals::threads;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};

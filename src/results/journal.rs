@@ -10,7 +10,7 @@ use super::heading::Heading;
 use super::system::{self, Writer};
 use super::work_folder::WorkFolder;
 use crate::error::InputError;
-use crate::input::{open, read_bytes};
+use crate::text_io::{open, read_bytes};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};

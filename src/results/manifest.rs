@@ -5,7 +5,7 @@
 
 use crate::digest::{digest, digest_of_file};
 use crate::error::InputError;
-use crate::input::read_text;
+use crate::text_io::read_text;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Component, Path};

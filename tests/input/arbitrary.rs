@@ -1,8 +1,8 @@
 //! No input makes the readers panic.
 
 use kmcfit::config::ModelFile;
-use kmcfit::config::locate::{key_path, locate};
-use kmcfit::observations::{ColumnName, Table, TableFormat, times};
+use kmcfit::config::key_positions::{key_path, locate};
+use kmcfit::tables::{ColumnName, Table, TableFormat, times};
 use proptest::collection::vec;
 use proptest::prelude::*;
 

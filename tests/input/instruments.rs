@@ -1,6 +1,6 @@
 //! Tables as instruments and spreadsheets write them.
 
-use kmcfit::observations::{ColumnName, Encoding, Table, TableFormat, times};
+use kmcfit::tables::{ColumnName, Encoding, Table, TableFormat, times};
 
 const ANY: TableFormat = TableFormat {
     delimiter: None,

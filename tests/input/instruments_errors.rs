@@ -1,7 +1,7 @@
 //! Messages about tables as instruments write them.
 
 use insta::assert_snapshot;
-use kmcfit::observations::{ColumnName, Table, TableFormat};
+use kmcfit::tables::{ColumnName, Table, TableFormat};
 
 fn parsed(text: &str) -> Table {
     Table::parse("t.csv", text.as_bytes()).unwrap()

@@ -1,7 +1,7 @@
 //! Tables that are understood.
 
 use kmcfit::error::Location;
-use kmcfit::observations::{Table, times};
+use kmcfit::tables::{Table, times};
 
 fn table(text: &str) -> Table {
     Table::parse("t.csv", text.as_bytes()).unwrap()

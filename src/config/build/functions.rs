@@ -2,10 +2,10 @@
 
 use super::on_grid::{NodalColumnRequest, column_on_grid};
 use crate::config::ModelFile;
-use crate::config::scalar::{Count, KnotSpec, Number, NumberOrColumn, StartSpec, Text, Weight};
 use crate::config::spec::{
     self as config, Basis, ColumnSpec, FunctionSpec, PenaltyKind, WeightRule,
 };
+use crate::config::values::{Count, KnotSpec, Number, NumberOrColumn, StartSpec, Text, Weight};
 use crate::error::InputError;
 use kmcfit_core::internals::builder::{
     self, BasisSpec, CoefficientSpec, PenaltySpec, PenaltyWeight,

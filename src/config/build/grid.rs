@@ -6,7 +6,7 @@ mod per_node;
 use super::BuildMode;
 use super::experiments::{RawChannel, RawRecord};
 use crate::config::ModelFile;
-use crate::config::scalar::{Count, Nodes};
+use crate::config::values::{Count, Nodes};
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
 use crate::memory;

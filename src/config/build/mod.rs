@@ -12,7 +12,7 @@ pub use experiments::{ChannelNote, HoldOut};
 pub use kmcfit_core::internals::builder::WeightSearch;
 pub use study::{Candidate, Equivalent, StudyPlan, StudyTarget};
 
-use super::locate::{key_path, locate};
+use super::key_positions::{key_path, locate};
 use super::{ModelFile, ModelSource};
 use crate::error::{InputError, Location};
 use crate::finding::Finding;

@@ -3,7 +3,7 @@
 use super::asked_for;
 use crate::config::ModelFile;
 use crate::error::InputError;
-use crate::observations::{Table, increasing};
+use crate::tables::{Table, increasing};
 use crate::units::Quantity;
 use kmcfit_core::internals::system::Grid;
 

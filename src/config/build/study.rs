@@ -3,13 +3,13 @@
 use super::experiments;
 use super::functions::values;
 use crate::config::ModelFile;
-use crate::config::scalar::Number;
 use crate::config::spec::{
     CandidateSpec, EquivalentSpec, FunctionName, NoiseName, ProfileSpec, StudySpec,
 };
+use crate::config::values::Number;
 use crate::error::InputError;
-use crate::input::{one_of, quote};
-use crate::near::did_you_mean;
+use crate::spelling::did_you_mean;
+use crate::text_io::{one_of, quote};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{
     Channel, ChannelKind, Experiment, Input, Waveform, Weighting,

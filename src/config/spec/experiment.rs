@@ -4,8 +4,8 @@ use crate::config::map::keys;
 
 use super::{OwnFunctionsSpec, RangeSpec};
 use crate::config::choice::choice;
-use crate::config::scalar::{ColumnId, Count, Estimate, Number, NumberOrEstimate, ScalarOr};
-use crate::config::scalar::{Sigma, Text};
+use crate::config::values::{ColumnId, Count, Estimate, Number, NumberOrEstimate, ScalarOr};
+use crate::config::values::{Sigma, Text};
 
 keys! {
     /// An experiment: one record and its input.

@@ -1,6 +1,6 @@
 //! Curves in pixels: gaps, thinning and clipping.
 
-use super::shape::{Frame, Point};
+use super::drawing::{Frame, Point};
 
 /// Splits at points that cannot be drawn.
 pub(super) fn runs(points: impl Iterator<Item = Point>) -> Vec<Vec<Point>> {

@@ -1,7 +1,7 @@
 //! The numbers of a figure for the script of the page.
 
 use super::figure::Figure;
-use super::mark::{Mark, MarkKind};
+use super::plot_mark::{Mark, MarkKind};
 use super::thin::kept;
 use crate::report::text::clean;
 use serde::Serialize;

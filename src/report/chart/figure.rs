@@ -3,7 +3,7 @@
 //! Values that cannot be drawn (not finite, or not positive on a logarithmic axis) leave gaps.
 //! Where `x` and `y` differ in length, the shorter one counts.
 
-use super::mark::Mark;
+use super::plot_mark::Mark;
 use serde::{Serialize, Serializer};
 
 /// One figure: a grid of panels with a common legend above them.

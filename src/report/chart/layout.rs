@@ -1,10 +1,10 @@
 //! Places the panels and the legend on the sheet.
 
 use super::axis::{self, Range, Ruler};
+use super::drawing::{Frame, Sheet};
 use super::figure::{Axis, Figure, Panel, Scale};
 use super::legend;
 use super::panel::{Placed, SIZE, label_height, label_width};
-use super::shape::{Frame, Sheet};
 
 /// Width of a figure in pixels: 180 mm, two columns of a journal.
 const WIDTH: f64 = 680.0;

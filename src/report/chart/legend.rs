@@ -1,9 +1,9 @@
 //! The legend: one line or more above the panels, where it covers no data.
 
+use super::drawing::{Anchor, Frame, Point, Primitive, Stroke, Words};
 use super::figure::Figure;
-use super::mark::{Mark, MarkKind};
 use super::panel::{BAND_OPACITY, SIZE, SPAN};
-use super::shape::{Anchor, Frame, Point, Primitive, Stroke, Words};
+use super::plot_mark::{Mark, MarkKind};
 use crate::report::text;
 
 /// Length of the sample beside a label.

@@ -2,9 +2,9 @@
 
 use super::axis::Ruler;
 use super::curve;
+use super::drawing::{Anchor, Frame, Ink, Point, Primitive, Stroke, Words};
 use super::figure::Panel;
-use super::mark::{Mark, MarkKind, Style};
-use super::shape::{Anchor, Frame, Ink, Point, Primitive, Stroke, Words};
+use super::plot_mark::{Mark, MarkKind, Style};
 use crate::report::text;
 
 /// Font size of labels and ticks, in pixels.

@@ -3,10 +3,10 @@
 //! The drawing is ten times as large as the picture: a unit is a tenth of a pixel, `viewBox` scales it back, and all places
 //! are whole numbers. Neighbouring shapes of one look stand in a group that has the look.
 
+use super::drawing::{Anchor, Ink, Point, Primitive, Words};
 use super::figure::Figure;
 use super::layout;
-use super::mark::{Dash, Style};
-use super::shape::{Anchor, Ink, Point, Primitive, Words};
+use super::plot_mark::{Dash, Style};
 use crate::report::text::escape;
 
 /// Units of the drawing in one pixel of the picture.

@@ -6,13 +6,13 @@
 //! SHA-256: a title or a name that were taken for a script by mistake could not run.
 
 mod fit;
-mod opening;
-mod repeat;
+mod overview;
+mod reproducibility;
 mod settings;
 mod table;
 
 pub(super) use fit::page as fit_page;
-pub(crate) use repeat::quoted as shell_quoted;
+pub(crate) use reproducibility::quoted as shell_quoted;
 pub(super) use table::list;
 
 use super::chart::{Figure, data, render};
@@ -26,7 +26,7 @@ const STYLE: &str = include_str!("page.css");
 const SCRIPTS: [&str; 6] = [
     include_str!("script/scale.js"),
     include_str!("script/draw.js"),
-    include_str!("script/hands.js"),
+    include_str!("script/interaction.js"),
     include_str!("script/chart.js"),
     include_str!("script/panel.js"),
     include_str!("script/start.js"),

@@ -1,7 +1,7 @@
 //! Texts of the suggestions.
 
 use super::{Suggestion, Suspect, percent};
-use crate::digits::significant;
+use crate::number_format::significant;
 use kmcfit_core::internals::assessment::ResidualPattern;
 use kmcfit_core::internals::solvers::Solver;
 use std::fmt;

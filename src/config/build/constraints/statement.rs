@@ -2,8 +2,8 @@
 
 use crate::config::ModelFile;
 use crate::config::build::functions::history;
-use crate::config::scalar::{Number, NumberOrColumn};
 use crate::config::spec::{ConstraintSpec, RangeSpec};
+use crate::config::values::{Number, NumberOrColumn};
 use crate::error::InputError;
 use kmcfit_core::internals::constraints::{Constraint, Shape, TimeHistory};
 use kmcfit_core::internals::functions::CoefficientKind;

@@ -3,8 +3,8 @@
 use super::warning::DataWarning;
 use super::{RawChannel, RawRecord, is_equation_error};
 use crate::config::ModelFile;
-use crate::config::scalar::{NumberOrEstimate, ScalarOr};
 use crate::config::spec::{ExperimentSpec, InitialSpec};
+use crate::config::values::{NumberOrEstimate, ScalarOr};
 use crate::finding::Finding;
 use kmcfit_core::internals::diagnostics::{far_off, spread, without_line};
 use kmcfit_core::internals::record::ChannelKind;

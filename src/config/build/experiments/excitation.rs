@@ -1,9 +1,9 @@
 //! Force and motion of the base.
 
-use super::source::{self, ColumnRequest};
+use super::column_samples::{self, ColumnRequest};
 use crate::config::ModelFile;
-use crate::config::scalar::Number;
 use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec};
+use crate::config::values::Number;
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::units::Quantity;
@@ -167,7 +167,7 @@ fn signal(
         window: None,
         ..spec.clone()
     };
-    let source = source::read(file, &unbounded, wanted, warnings)?;
+    let source = column_samples::read(file, &unbounded, wanted, warnings)?;
     let key = format!("experiments[{}].columns.{}", wanted.experiment, wanted.name);
     let missing = source.values.iter().filter(|v| v.is_nan()).count();
     if missing > 0 {

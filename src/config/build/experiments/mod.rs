@@ -1,19 +1,19 @@
 //! Experiments: readings, forces and initial states from files, put on the grid.
 
 mod channel;
+mod column_samples;
 mod data_checks;
 mod excitation;
-mod source;
 mod unit;
 mod warning;
 
 use super::{BuildMode, functions};
 use crate::config::ModelFile;
-use crate::config::scalar::{Estimate, NumberOrEstimate, ScalarOr};
 use crate::config::spec::{EstimateValue, ExperimentSpec, FitMethod, InitialSpec, SensorSpec};
+use crate::config::values::{Estimate, NumberOrEstimate, ScalarOr};
 use crate::error::InputError;
 use crate::finding::Finding;
-use crate::observations::resample;
+use crate::tables::resample;
 use crate::units::Unit;
 pub(super) use channel::RawChannel;
 use excitation::RawExcitation;

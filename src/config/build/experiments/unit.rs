@@ -2,10 +2,10 @@
 
 use super::warning::DataWarning;
 use crate::config::ModelFile;
-use crate::config::scalar::Text;
+use crate::config::values::Text;
 use crate::error::InputError;
 use crate::finding::Finding;
-use crate::observations::Table;
+use crate::tables::Table;
 use crate::units::{Quantity, Unit};
 
 /// A column of a table, its keys in the model file and its kind of quantity.

@@ -7,8 +7,8 @@
 //! the step is the sampling interval.
 
 use crate::config::build::experiments::RawRecord;
-use crate::digits::significant;
 use crate::finding::Finding;
+use crate::number_format::significant;
 use kmcfit_core::internals::signal::Spectrum;
 use kmcfit_core::internals::system::Method;
 use std::f64::consts::TAU;

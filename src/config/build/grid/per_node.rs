@@ -7,8 +7,8 @@ use crate::config::ModelFile;
 use crate::config::build::BuildMode;
 use crate::config::build::fit::DEFAULT_MEMORY;
 use crate::config::build::functions::{self, Given};
-use crate::config::scalar::KnotSpec;
 use crate::config::spec::{Basis, FitMethod};
+use crate::config::values::KnotSpec;
 use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 
 /// Bytes per node of every run: times, tables and figures.

@@ -3,12 +3,12 @@
 mod noise;
 mod sampling;
 
-use super::source::{self, ColumnRequest};
+use super::column_samples::{self, ColumnRequest};
 use super::warning::DataWarning;
 use super::{ChannelNote, names};
 use crate::config::ModelFile;
-use crate::config::scalar::{ColumnId, ScalarOr, Sigma, Text};
 use crate::config::spec::{ColumnRef, ExperimentSpec, LossName, LossSpec, SensorSpec};
+use crate::config::values::{ColumnId, ScalarOr, Sigma, Text};
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::units::{Quantity, Unit};
@@ -203,7 +203,7 @@ fn read_one(
         unit: of_kind.unit,
         beside: sigma_column,
     };
-    let mut source = source::read(file, spec, &wanted, warnings)?;
+    let mut source = column_samples::read(file, spec, &wanted, warnings)?;
     let mut ignored = Vec::new();
     if source.outside > 0 {
         ignored.push((source.outside, "outside the window".to_owned()));
@@ -248,7 +248,7 @@ fn read_one(
 fn present(
     file: &ModelFile,
     column: &str,
-    source: &source::ColumnSamples,
+    source: &column_samples::ColumnSamples,
 ) -> Result<Vec<usize>, InputError> {
     let rows = 0..source.values.len();
     let present: Vec<usize> = rows.filter(|&r| !source.values[r].is_nan()).collect();

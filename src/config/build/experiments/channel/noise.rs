@@ -2,8 +2,8 @@
 
 use super::Spec;
 use crate::config::ModelFile;
-use crate::config::scalar::{ScalarOr, Sigma};
 use crate::config::spec::LossName;
+use crate::config::values::{ScalarOr, Sigma};
 use crate::error::InputError;
 use kmcfit_core::internals::record::{Loss, Weighting};
 

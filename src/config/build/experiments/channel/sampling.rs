@@ -1,6 +1,6 @@
 //! Times of readings, and what is kept of them: fewer, or a band of frequencies.
 
-use super::super::source;
+use super::super::column_samples;
 use crate::config::ModelFile;
 use crate::config::spec::ExperimentSpec;
 use crate::error::InputError;
@@ -24,7 +24,7 @@ pub(super) fn decimate(
     file: &ModelFile,
     key: &str,
     factor: usize,
-    source: &mut source::ColumnSamples,
+    source: &mut column_samples::ColumnSamples,
     ignored: &mut Vec<(usize, String)>,
 ) -> Result<(), InputError> {
     let at = format!("{key}.decimate");

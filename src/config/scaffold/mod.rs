@@ -1,0 +1,304 @@
+//! A commented starter model for a table of readings: what `kmcfit init` writes.
+//!
+//! Columns are told apart by their units, then by their names; the motion by its spectrum. What cannot
+//! be known from the file (the mass of a free motion) gets a number and a comment that says so.
+
+mod columns;
+mod record_summary;
+
+use crate::error::InputError;
+use crate::memory;
+use crate::number_format::significant;
+use crate::tables::Table;
+use columns::{ColumnAssignment, Role};
+use record_summary::RecordSummary;
+use std::path::Path;
+
+/// Damping ratio that the search starts from: that of a lightly damped structure.
+const DAMPING_RATIO: f64 = 0.02;
+/// Periods of the motion per knot of the stiffness: fewer do not show a value of their own.
+const PERIODS_PER_KNOT: f64 = 2.0;
+/// Most knots: enough to see that and how the stiffness changes.
+const MOST_KNOTS: f64 = 11.0;
+
+/// Two rates that differ by less are the same.
+const SAME_RATE: f64 = 0.01;
+
+/// Memory for each row beside the table, bytes: the times, the readings, their spectrum. The whole was
+/// measured to take 150 bytes for each of a million rows with two columns.
+const PER_ROW: u64 = 200;
+
+/// A starter model and what it was made from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scaffold {
+    /// The text of the model file.
+    pub text: String,
+    /// What was found in the table, in sentences.
+    pub found: Vec<String>,
+}
+
+/// A starter model for the table `csv`, which the model will call `data`. Readings per second are
+/// `sample_rate`, where no column of times.
+///
+/// # Errors
+/// When the table cannot be read, has no column of times or of a motion, or a column is no readings.
+pub fn scaffold(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Scaffold, InputError> {
+    let table = Table::read(csv)?;
+    memory::check_file(csv, table.rows() as u64 * PER_ROW)?;
+    let columns = ColumnAssignment::of(&table, sample_rate)?;
+    let motion = RecordSummary::of(&table, &columns, sample_rate)?;
+    let mut found = vec![format!(
+        "{} samples over {} s, {}",
+        motion.readings,
+        short(motion.duration),
+        motion.spacing_in_words()
+    )];
+    if let Some(begins) = motion.begins {
+        found.insert(
+            0,
+            format!("at rest before {begins} s: excluded by `window`"),
+        );
+    }
+    found.extend(columns.in_words(&table));
+    if let Some((count, first)) = motion.far_off {
+        let lie = match count {
+            1 => "1 reading lies".to_owned(),
+            _ => format!("{count} readings lie"),
+        };
+        found.push(format!(
+            "{lie} far off ({}): empty fields are better; the model has a robust loss",
+            significant(first / motion.channel.1, 4)
+        ));
+    }
+    if let (Some(given), Some((index, rate))) = (sample_rate, columns::rate(&table))
+        && (rate / given - 1.0).abs() > SAME_RATE
+    {
+        found.push(format!(
+            "`--sample-rate {given}` is used, although `{}` has {} Hz",
+            table.label(index),
+            significant(rate, 4)
+        ));
+    }
+    found.push(match motion.frequency {
+        Some(frequency) => format!(
+            "dominant frequency {} Hz: {} in the record",
+            short(frequency),
+            match motion.periods().round() {
+                1.0 => "1 period".to_owned(),
+                periods => format!("{periods} periods"),
+            }
+        ),
+        None => "no dominant frequency was found".into(),
+    });
+    Ok(Scaffold {
+        text: text(&table, data, &columns, &motion, sample_rate),
+        found,
+    })
+}
+
+fn text(
+    table: &Table,
+    data: &str,
+    columns: &ColumnAssignment,
+    motion: &RecordSummary,
+    sample_rate: Option<f64>,
+) -> String {
+    let name = Path::new(data)
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy();
+    let mut text = format!(
+        "# yaml-language-server: $schema=kmcfit.schema.json\n\
+         # Model file written by `kmcfit init`. Check it with `kmcfit check`, fit it with `kmcfit fit`;\n\
+         # `kmcfit explain KEY` explains a key.\n\
+         format: 1\n\
+         title: {}\n\
+         experiments:\n  \
+           - name: record 1\n    \
+             data: {}\n",
+        quoted(&name),
+        quoted(data)
+    );
+    for (key, value, comment) in keys(table, columns, motion, sample_rate) {
+        if let Some(value) = value {
+            text += &commented(&format!("{key}: {value}"), &comment);
+        }
+    }
+    text + &functions(columns, motion)
+        + &commented(
+            "# truth: {data: truth.csv}",
+            "the true functions, where they are known",
+        )
+        + &commented(
+            "fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1e-8}}",
+            "",
+        )
+}
+
+/// The keys of the record and the grid, each with its value, if the model needs it, and a comment.
+fn keys(
+    table: &Table,
+    columns: &ColumnAssignment,
+    motion: &RecordSummary,
+    sample_rate: Option<f64>,
+) -> Vec<(&'static str, Option<String>, String)> {
+    let sigmas: Vec<String> = (columns.channels())
+        .map(|role| format!("{}: estimate", role.key()))
+        .collect();
+    let has_base = columns.has(Role::BaseAcceleration) || columns.has(Role::BaseDisplacement);
+    let between = format!("{{interpolation: {}}}", motion.between);
+    let or = "between samples: or hold, linear, cubic";
+    let (sensors, why) = sensors(columns, motion);
+    let robust = format!("{{{}: huber}}", motion.channel.0.key());
+    let keys = [
+        (
+            "    columns",
+            Some(columns.named(table)),
+            "by name or by number from 1",
+        ),
+        ("    sample_rate", sample_rate.map(|r| r.to_string()), "Hz"),
+        ("    units", columns.units(), "converted to SI"),
+        (
+            "    window",
+            motion.begins.map(|begins| format!("{{min: {begins}}}")),
+            "s; at rest before (not yet released or struck)",
+        ),
+        (
+            "    force",
+            columns.has(Role::Force).then(|| between.clone()),
+            or,
+        ),
+        ("    base", has_base.then_some(between), or),
+        (
+            "    sigma",
+            Some(format!("{{{}}}", sigmas.join(", "))),
+            "standard deviation of a sample, SI; give a number if it is known",
+        ),
+        (
+            "    loss",
+            motion.far_off.map(|_| robust),
+            "robust against outliers; or `squares`",
+        ),
+        (
+            "    sensors",
+            (!sensors.is_empty()).then(|| format!("{{{}}}", sensors.join(", "))),
+            &why.join("; "),
+        ),
+        (
+            "    initial",
+            Some("estimate".into()),
+            "or {displacement: …, velocity: …} in m and m/s",
+        ),
+        (
+            "grid",
+            Some("{nodes: auto}".into()),
+            "chosen from the spectrum of the record",
+        ),
+    ];
+    let owned = keys.map(|(key, value, comment)| (key, value, comment.to_owned()));
+    owned.into()
+}
+
+/// Sensors with parameters of their own, and the reasons for them.
+fn sensors(
+    columns: &ColumnAssignment,
+    motion: &RecordSummary,
+) -> (Vec<&'static str>, Vec<&'static str>) {
+    let mut sensors = Vec::new();
+    if columns.has(Role::Acceleration) {
+        sensors.push((
+            "acceleration: {offset: estimate}",
+            "accelerometers have one; leave it out if yours has none",
+        ));
+    }
+    // A force may be what holds a displacement off zero.
+    if columns.has(Role::Displacement) && !columns.has(Role::Force) {
+        if motion.drifts {
+            sensors.push((
+                "displacement: {offset: estimate, drift: estimate}",
+                "the record oscillates about a sloping line",
+            ));
+        } else if motion.is_off_centre {
+            sensors.push((
+                "displacement: {offset: estimate}",
+                "the record oscillates about a value other than zero",
+            ));
+        }
+    }
+    sensors.into_iter().unzip()
+}
+
+/// The functions: a start that has the dominant frequency.
+fn functions(columns: &ColumnAssignment, motion: &RecordSummary) -> String {
+    let omega = std::f64::consts::TAU * motion.frequency.unwrap_or(1.0);
+    let driven = columns.has(Role::Force);
+    let mass = match driven {
+        true => motion.mass(omega).unwrap_or(1.0),
+        false => 1.0,
+    };
+    let mut text = String::from("functions:\n");
+    text += &match driven {
+        true => commented(
+            &format!("  mass:      {{basis: constant, start: {}}}", short(mass)),
+            "kg; the force shows it",
+        ),
+        false => commented(
+            "  mass:      {fixed: 1.0}",
+            "kg; WRITE YOURS: without a force only k/m and c/m show",
+        ),
+    };
+    let damping = 2.0 * DAMPING_RATIO * mass * omega;
+    text += &commented(
+        &format!(
+            "  damping:   {{basis: constant, start: {}}}",
+            short(damping)
+        ),
+        "N s/m; starts at 2 % of critical",
+    );
+    let stiffness = short(mass * omega * omega);
+    let knots = (motion.periods() / PERIODS_PER_KNOT)
+        .floor()
+        .min(MOST_KNOTS);
+    text += &match knots >= 2.0 {
+        true => commented(
+            &format!(
+                "  stiffness: {{basis: piecewise-linear, knots: {knots}, start: {stiffness}}}"
+            ),
+            "N/m; free to change; basis: constant if it does not",
+        ),
+        false => commented(
+            &format!("  stiffness: {{basis: constant, start: {stiffness}}}"),
+            "N/m; the record is short for one that changes",
+        ),
+    };
+    text
+}
+
+/// A line with a comment in a column of its own, where there is room.
+fn commented(line: &str, comment: &str) -> String {
+    match comment {
+        "" => format!("{line}\n"),
+        _ => format!("{line:<48}  # {comment}\n"),
+    }
+}
+
+/// Four significant digits.
+fn short(x: f64) -> String {
+    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
+    format!("{rounded:?}").trim_end_matches(".0").to_owned()
+}
+
+/// A text as YAML takes it, in a list or map too.
+fn quoted(text: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "_/.- ".contains(c);
+    let begins = text.starts_with(char::is_alphabetic) || text.starts_with("../");
+    let word = matches!(
+        text.to_ascii_lowercase().as_str(),
+        "true" | "false" | "null" | "yes" | "no" | "on" | "off" | "estimate"
+    );
+    let plain = begins && !word && text.chars().all(is_plain) && !text.ends_with(' ');
+    match plain {
+        true => text.to_owned(),
+        false => serde_json::Value::from(text).to_string(),
+    }
+}

@@ -1,0 +1,259 @@
+//! What the readings say of the motion: how often they come, how fast it is.
+
+use super::columns::{ColumnAssignment, Role, UsedColumn};
+use crate::error::InputError;
+use crate::tables::{Table, increasing_at};
+use kmcfit_core::internals::diagnostics::{far_off, offset_and_drift, spread, without_line};
+use kmcfit_core::internals::signal::{Spectrum, onset};
+use kmcfit_core::internals::system::round_time;
+
+/// Fewest readings of which a model can be made.
+const FEWEST: usize = 8;
+/// Spacings that differ by less than this share are equal, but for rounded times.
+const REGULAR: f64 = 0.05;
+/// Fewest periods of readings that may be said to drift, and what share of their squares about the mean the line then holds:
+/// a swing of so many periods has a few hundredths.
+const DRIFT_PERIODS: f64 = 4.0;
+const DRIFT: f64 = 0.1;
+/// A drive that changes at less than this share of its samples jumps.
+const MOST_JUMPS: f64 = 0.1;
+
+/// The motion of a record.
+#[derive(Debug)]
+pub struct RecordSummary {
+    pub readings: usize,
+    pub missing: usize,
+    /// s.
+    pub duration: f64,
+    /// Median distance of readings, s.
+    pub spacing: f64,
+    pub is_regular: bool,
+    /// The channel that the rest is about, and its unit as a factor to SI.
+    pub channel: (Role, f64),
+    /// How many readings lie far off, and the first of them, in SI.
+    pub far_off: Option<(usize, f64)>,
+    /// When the motion begins, s, if the readings stand still before.
+    pub begins: Option<f64>,
+    /// Hz.
+    pub frequency: Option<f64>,
+    /// Whether the mean of the readings is larger than their distances from it.
+    pub is_off_centre: bool,
+    /// Whether a straight line is a good part of readings that swing about it.
+    pub drifts: bool,
+    /// Root-mean-square force, N, and motion with the power of the frequency that makes it an
+    /// acceleration.
+    force: Option<f64>,
+    motion: f64,
+    power: i32,
+    /// How force and base are read between their samples.
+    pub between: &'static str,
+}
+
+impl RecordSummary {
+    pub fn of(
+        table: &Table,
+        columns: &ColumnAssignment,
+        sample_rate: Option<f64>,
+    ) -> Result<Self, InputError> {
+        let times = times(table, columns, sample_rate)?;
+        let channel = |role: Role| columns.find(role);
+        let order = [
+            (Role::Displacement, 2),
+            (Role::Velocity, 1),
+            (Role::Acceleration, 0),
+        ];
+        let mut measured = order
+            .into_iter()
+            .filter_map(|(r, p)| Some((channel(r)?, p)));
+        let Some((column, power)) = measured.next() else {
+            return Err(InputError::file(table.path(), "no column of a response"));
+        };
+        let mut pairs = moving(table, &times, in_si(table, column)?)?;
+        let spacings: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
+        let spacing = median(&spacings);
+        let force = channel(Role::Force).map(|c| in_si(table, c)).transpose()?;
+        let drives = [Role::Force, Role::BaseAcceleration, Role::BaseDisplacement];
+        let drive = drives.into_iter().find_map(channel);
+        let drive = drive.map(|c| in_si(table, c)).transpose()?;
+        let missing = times.len() - pairs.len();
+        let far_off = leave_out_far_off(&mut pairs);
+        let values = values_of(&pairs);
+        // What drives a motion may begin late, too.
+        let begins = match drive {
+            Some(_) => None,
+            None => onset(&values, spacing),
+        };
+        let pairs = &pairs[begins.unwrap_or(0)..];
+        // The line is a drift where the readings swing about it, and not the swing itself.
+        let duration = times[times.len() - 1] - begins.map_or(times[0], |_| pairs[0].0);
+        let beside_line = beside_line(pairs).and_then(|pairs| frequency(&pairs, spacing));
+        let beside_line = beside_line.filter(|f| f * duration >= DRIFT_PERIODS);
+        Ok(Self {
+            between: between(&drive.unwrap_or_default()),
+            readings: pairs.len(),
+            missing,
+            channel: (column.role, column.unit.factor()),
+            far_off,
+            begins: begins.map(|_| round_time(pairs[0].0, spacing)),
+            duration,
+            spacing,
+            is_regular: (spacings.iter()).all(|s| (s - spacing).abs() <= REGULAR * spacing),
+            frequency: beside_line.or_else(|| frequency(pairs, spacing)),
+            is_off_centre: off_centre(pairs),
+            drifts: beside_line.is_some(),
+            force: force.map(|mut force| {
+                force.retain(|x| x.is_finite());
+                spread(&force)
+            }),
+            motion: spread(&values_of(pairs)),
+            power,
+        })
+    }
+
+    /// Number of periods of the dominant frequency in the record.
+    pub fn periods(&self) -> f64 {
+        self.frequency.unwrap_or(0.0) * self.duration
+    }
+
+    /// The mass that the force would move so, if it had nothing else to do, kg.
+    pub fn mass(&self, omega: f64) -> Option<f64> {
+        let mass = self.force? / (self.motion * omega.powi(self.power));
+        (mass.is_finite() && mass > 0.0).then_some(mass)
+    }
+
+    pub fn spacing_in_words(&self) -> String {
+        let kind = match self.is_regular {
+            true => "one every",
+            false => "at irregular times, about one every",
+        };
+        let missing = match self.missing {
+            0 => String::new(),
+            some => format!(", {some} missing"),
+        };
+        format!("{kind} {} s{missing}", super::short(self.spacing))
+    }
+}
+
+/// The readings with their times; there must be enough, and they must not stand still.
+fn moving(table: &Table, times: &[f64], values: Vec<f64>) -> Result<Vec<(f64, f64)>, InputError> {
+    let pairs = times.iter().copied().zip(values);
+    let pairs: Vec<(f64, f64)> = pairs.filter(|(_, value)| value.is_finite()).collect();
+    if pairs.len() < FEWEST {
+        return Err(InputError::file(table.path(), "too few samples")
+            .found(pairs.len())
+            .expected(format!("{FEWEST} or more")));
+    }
+    let still = pairs[0].1;
+    match pairs.iter().all(|(_, x)| *x == still) {
+        false => Ok(pairs),
+        true => Err(InputError::file(table.path(), "all samples are equal")
+            .found(format!("{} samples, all {still}", pairs.len()))
+            .expected("a record of a moving system")),
+    }
+}
+
+/// Leaves out the readings that lie far off the others; how many those are, and the first of them.
+fn leave_out_far_off(pairs: &mut Vec<(f64, f64)>) -> Option<(usize, f64)> {
+    let values: Vec<f64> = pairs.iter().map(|(_, value)| *value).collect();
+    let level = median(&values);
+    let away: Vec<f64> = values.iter().map(|value| value - level).collect();
+    let far = far_off(&away);
+    let first = values[*far.first()?];
+    let mut place = 0..;
+    pairs.retain(|_| place.next().is_some_and(|i| far.binary_search(&i).is_err()));
+    Some((far.len(), first))
+}
+
+/// Readings without their straight line, if that is a good part of them.
+fn beside_line(pairs: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
+    let (times, values): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
+    let [mean, line] = offset_and_drift(&times, &values);
+    if line <= DRIFT * (1.0 - mean) {
+        return None;
+    }
+    let left = without_line(&times, &values);
+    Some(times.into_iter().zip(left).collect())
+}
+
+/// How a drive goes on between its samples, as far as they say: those that are left out tell, every second of them.
+fn between(drive: &[f64]) -> &'static str {
+    let steps: Vec<bool> = drive.windows(2).map(|pair| pair[0] != pair[1]).collect();
+    let jumps = steps.iter().filter(|moves| **moves).count();
+    let run = steps.windows(2).filter(|pair| pair[0] && pair[1]).count();
+    // A hammer's blow runs over some samples.
+    if jumps > 0 && run == 0 && (jumps as f64) < MOST_JUMPS * drive.len() as f64 {
+        return "hold";
+    }
+    let (mut line, mut cubic) = (0.0, 0.0);
+    for x in drive.windows(7) {
+        let near = 0.5 * (x[2] + x[4]);
+        let far = 0.5 * (x[0] + x[6]);
+        line += (x[3] - near).powi(2);
+        cubic += (x[3] - near - (near - far) / 8.0).powi(2);
+    }
+    // Squares: by less than half the error.
+    match cubic < 0.25 * line {
+        true => "cubic",
+        false => "linear",
+    }
+}
+
+fn times(
+    table: &Table,
+    columns: &ColumnAssignment,
+    sample_rate: Option<f64>,
+) -> Result<Vec<f64>, InputError> {
+    match columns.find(Role::Time) {
+        Some(column) => {
+            let times = increasing_at(table, column.index)?;
+            let times = times.iter().map(|t| t * column.unit.factor());
+            Ok(times.collect())
+        }
+        None => {
+            let rate = sample_rate.unwrap_or(1.0);
+            Ok((0..table.rows()).map(|i| i as f64 / rate).collect())
+        }
+    }
+}
+
+fn in_si(table: &Table, column: &UsedColumn) -> Result<Vec<f64>, InputError> {
+    let factor = column.unit.factor();
+    let readings = table.readings(column.index)?;
+    Ok(readings.iter().map(|x| x * factor).collect())
+}
+
+/// The dominant frequency of readings that are joined by straight lines where they are not equally
+/// spaced, Hz.
+fn frequency(pairs: &[(f64, f64)], spacing: f64) -> Option<f64> {
+    let (first, last) = (pairs.first()?.0, pairs.last()?.0);
+    // A gap of hours between readings of milliseconds is no reason to take all memory.
+    let count = (((last - first) / spacing).round() as usize + 1).min(4 * pairs.len());
+    let step = (last - first) / (count - 1) as f64;
+    let mut next = 1;
+    let at = |i: usize| {
+        let t = first + step * i as f64;
+        while next + 1 < pairs.len() && pairs[next].0 < t {
+            next += 1;
+        }
+        let ((t0, y0), (t1, y1)) = (pairs[next - 1], pairs[next]);
+        y0 + (y1 - y0) * ((t - t0) / (t1 - t0)).clamp(0.0, 1.0)
+    };
+    let values: Vec<f64> = (0..count).map(at).collect();
+    let frequency = Spectrum::of(&values, step)?.dominant();
+    (frequency.is_finite() && frequency > 0.0).then_some(frequency)
+}
+
+fn values_of(pairs: &[(f64, f64)]) -> Vec<f64> {
+    pairs.iter().map(|(_, value)| *value).collect()
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() / 2]
+}
+
+fn off_centre(pairs: &[(f64, f64)]) -> bool {
+    let mean = pairs.iter().map(|(_, value)| value).sum::<f64>() / pairs.len() as f64;
+    mean.abs() > spread(&values_of(pairs))
+}

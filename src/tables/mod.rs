@@ -1,0 +1,22 @@
+//! Tables of readings: text files as instruments write them, what their times must be like, and
+//! reading between them.
+
+mod columns;
+mod detect;
+mod encoding;
+mod field;
+mod format;
+mod resample;
+mod rows;
+mod stated;
+mod table;
+mod table_memory;
+pub mod times;
+
+pub use columns::ColumnName;
+pub use encoding::Encoding;
+pub use format::{Detected, TableFormat};
+pub use resample::resample;
+pub use stated::StatedUnit;
+pub use table::Table;
+pub use times::{SAMPLE_RATES, equally_spaced, equally_spaced_at, increasing, increasing_at};
