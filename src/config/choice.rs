@@ -43,7 +43,7 @@ macro_rules! choice {
             }
         }
     };
-    // An enum of the core, under the name that it has here.
+    // A re-exported enum of the core.
     (
         $(#[$doc:meta])*
         pub type $name:ident = $kind:ty { $( $(#[doc = $variant_doc:literal])+ $variant:ident = $word:literal, )+ }

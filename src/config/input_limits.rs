@@ -1,4 +1,5 @@
-//! What is refused before the YAML crate sees it, because the crate does not cope with it.
+//! Limits on a YAML text that are checked before the YAML crate parses it: length, nesting, aliases and repeated
+//! anchors. Beyond them the crate takes quadratic time, unbounded memory, or returns wrong values.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,8 +13,8 @@ use serde::de::DeserializeOwned;
 
 /// Longest model file that is read, in bytes; also its longest length with the aliases written out.
 ///
-/// A model file is written by hand and takes a few kilobytes; readings belong into CSV files. The
-/// limit keeps a data file given by mistake from being taken apart as YAML.
+/// A model file is written by hand and takes a few kilobytes; samples belong in CSV files. The limit rejects a data
+/// file given by mistake before it is parsed as YAML.
 pub(super) const LONGEST_MODEL: u64 = 1 << 18;
 
 /// Most brackets that may be open at once.
@@ -24,15 +25,15 @@ const MOST_OPEN_BRACKETS: usize = 200;
 
 /// Most aliases (`*name`), and as many anchors (`&name`), in a file.
 ///
-/// A model needs a dozen. Each alias repeats all that is behind its anchor, so that a short file of many
-/// of them means a long one.
+/// A model needs a dozen. Each alias repeats its anchored value, so a short file with many aliases can expand to a very
+/// long one.
 const MOST_ALIASES: usize = 1000;
 
-/// A text that passed [`check`]: the YAML crate reads no other into values.
+/// A text within the limits of [`check`]; only such texts are deserialised.
 pub(super) struct Checked<'a>(&'a str);
 
 impl<'a> Checked<'a> {
-    /// Checks a text; `file` is the place in messages.
+    /// Checks a text; messages name `file`.
     pub(super) fn new(file: &Path, text: &'a str) -> Result<Self, InputError> {
         check(file, text)?;
         Ok(Self(text))
@@ -64,7 +65,7 @@ pub(super) fn check(file: &Path, text: &str) -> Result<(), InputError> {
     check_expansion(file, text)
 }
 
-/// Refuses a text whose aliases stand for more than the longest model file.
+/// Refuses a text that expands to more than [`LONGEST_MODEL`] bytes.
 fn check_expansion(file: &Path, text: &str) -> Result<(), InputError> {
     const LONGEST: usize = LONGEST_MODEL as usize;
     let Some(passed) = expansion::beyond(text, LONGEST) else {
@@ -72,7 +73,7 @@ fn check_expansion(file: &Path, text: &str) -> Result<(), InputError> {
     };
     let uses = |name: &str| names(text, '*').filter(|(_, alias)| *alias == name).count();
     let anchors = names(text, '&').map(|(index, name)| (Position::of(text, index), name));
-    // The repeated value that the limit is passed in: the last one anchored before that place.
+    // The anchored value whose repetition exceeds the limit: the last anchor before that position.
     let repeated = anchors
         .take_while(|(begin, _)| *begin <= passed)
         .filter(|(_, name)| uses(name) > 0)
@@ -125,8 +126,8 @@ fn check_brackets(file: &Path, text: &str) -> Result<(), InputError> {
 
 /// Refuses an anchor (`&name`) that is given twice in a text with aliases (`*name`).
 ///
-/// YAML allows it, but yaml_serde 0.10 then gives wrong values to aliases: after `&a`, `&a`, `&b`
-/// the alias `*a` has the value of `&b`. Quotes are not looked at: a text such as `'x &a'` counts.
+/// YAML allows it, but yaml_serde 0.10 then gives wrong values to aliases: after `&a`, `&a`, `&b` the alias `*a` has
+/// the value of `&b`. Quoted texts such as `'x &a'` count as well.
 fn check_anchors(file: &Path, text: &str) -> Result<(), InputError> {
     if names(text, '*').next().is_none() {
         return Ok(());
@@ -170,7 +171,7 @@ fn names(text: &str, mark: char) -> impl Iterator<Item = (usize, &str)> {
     lines.flat_map(move |(begin, line)| {
         line.match_indices(mark).filter_map(move |(index, _)| {
             let before = line[..index].chars().next_back();
-            // A text full of marks would be searched to its end from each of them.
+            // Only marks at the begin of a value count; a search from every mark would take quadratic time.
             let begins = before.is_none_or(|c| c.is_whitespace() || "[{,:-?".contains(c));
             let rest = begins.then(|| &line[index + 1..])?;
             let name = rest

@@ -37,7 +37,7 @@ pub struct KeyGroup {
     pub name: &'static str,
     /// Meaning of the map, as a sentence.
     pub text: &'static str,
-    /// Its keys, in the order of the reader.
+    /// Its keys, in the order of declaration.
     pub keys: &'static [KeyDoc],
 }
 

@@ -1,9 +1,8 @@
-//! The model file: the only place that knows YAML.
+//! The model file. All uses of YAML are in this module.
 //!
-//! [`ModelFile::read`] turns a file into a [`ModelSpec`](spec::ModelSpec), which says what was
-//! written, key by key. Mistakes of spelling, type and syntax end here, with file, line, column and
-//! key; what the values mean together is checked later, through [`ModelFile::error_at`], which
-//! finds the line of a key again.
+//! [`ModelFile::read`] parses a file into a [`ModelSpec`](spec::ModelSpec), with one field for each key. Errors of
+//! syntax, spelling and type are reported here with file, line, column and key. [`build()`] checks the values against
+//! each other and reports errors at the line of a key by [`ModelFile::error_at`].
 
 mod build;
 mod choice;

@@ -1,7 +1,8 @@
-//! Reading of values from YAML, each by its type, with mistakes that stay typed.
+//! Deserialisation of values from YAML with typed errors.
 //!
-//! The YAML crate gives errors as text with a position. So a reader leaves its [`Mistake`] in a [`Report`], which also has
-//! the path of the key, and raises any error of the crate: that one has the position.
+//! The YAML crate reports errors as text with a position. A visitor therefore stores its typed [`Mistake`] in a
+//! [`Report`], together with the path of the current key, and raises a placeholder error, to which the crate adds the
+//! position.
 
 use super::key::{KeyDoc, ValueType};
 use crate::text_io::quote;
@@ -10,7 +11,7 @@ use std::cell::RefCell;
 use std::fmt;
 use std::marker::PhantomData;
 
-/// Content of YAML at one place, as far as a reader distinguishes it.
+/// A YAML node; lists, maps and tags without their contents.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Scalar<'a> {
     Nothing,
@@ -43,7 +44,7 @@ impl Scalar<'_> {
         }
     }
 
-    /// The mistake of a value that is not one of this kind.
+    /// The error for an invalid value.
     pub fn refused(self, problem: &'static str, expected: impl Into<String>) -> Mistake {
         Mistake::Value {
             problem,
@@ -53,7 +54,7 @@ impl Scalar<'_> {
         }
     }
 
-    /// The mistake of a value in the place of a map or a list.
+    /// The error for a value of the wrong type.
     pub fn wrong_kind(self, expected: impl Into<String>) -> Mistake {
         Mistake::Value {
             problem: "wrong type of value",
@@ -68,7 +69,7 @@ impl Scalar<'_> {
     }
 }
 
-/// A mistake in a model file that YAML allows.
+/// An error in well-formed YAML: an unknown, missing or repeated key, or an invalid value.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Mistake {
     Value {
@@ -86,7 +87,7 @@ pub(super) enum Mistake {
 }
 
 impl Mistake {
-    /// The same with another text of what would be accepted.
+    /// Replaces the description of accepted values.
     pub fn expecting(mut self, change: impl FnOnce(&str) -> String) -> Self {
         if let Self::Value { expected, .. } = &mut self {
             *expected = change(expected);
@@ -94,7 +95,7 @@ impl Mistake {
         self
     }
 
-    /// The same with a suggestion, if there is one.
+    /// Adds a suggestion.
     pub fn suggest(mut self, suggestion: Option<String>) -> Self {
         if let Self::Value { hint, .. } = &mut self {
             *hint = suggestion;
@@ -103,7 +104,7 @@ impl Mistake {
     }
 }
 
-/// The key that is being read, and the mistake in it.
+/// Path of the key that is being read, and the error in its value.
 #[derive(Debug, Default)]
 pub(super) struct Report {
     path: RefCell<String>,
@@ -111,18 +112,18 @@ pub(super) struct Report {
 }
 
 impl Report {
-    /// The key and the mistake, after an error.
+    /// The key and the error.
     pub fn into_parts(self) -> (String, Option<Mistake>) {
         (self.path.into_inner(), self.mistake.into_inner())
     }
 
-    /// Keeps a mistake; the error gets its position from the YAML crate.
+    /// Stores an error and raises a placeholder, to which the YAML crate adds the position.
     pub fn raise<E: Error>(&self, mistake: Mistake) -> E {
         *self.mistake.borrow_mut() = Some(mistake);
         E::custom("a value is refused")
     }
 
-    /// Reads what stands one segment further down: `.key` or `[0]`.
+    /// Reads a value one segment further down: `.key` or `[0]`.
     fn below<T, E>(&self, segment: &str, read: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
         let above = self.path.borrow().len();
         *self.path.borrow_mut() += match above {
@@ -158,7 +159,7 @@ impl Report {
         Ok(())
     }
 
-    /// The value of a field, or what stands for a key that is not there.
+    /// The value of a field, or the value for an absent key.
     pub fn required<T: Value, E: Error>(
         &self,
         field: Option<T>,
@@ -186,19 +187,19 @@ impl Report {
     }
 }
 
-/// A type that is read from the value of a key.
+/// A type of values in a model file.
 pub(super) trait Value: Sized {
-    /// What may stand behind the key.
+    /// Type of the value in the schema.
     const KIND: ValueType;
-    /// Whether the key must be there.
+    /// True for a required key.
     const REQUIRED: bool = true;
 
-    /// The value of a key that is not there.
+    /// The value for an absent key.
     fn absent(key: &'static str) -> Result<Self, Mistake> {
         Err(Mistake::MissingKey(key))
     }
 
-    /// The value from a scalar, or the mistake; also that of lists and maps, where the type reads none.
+    /// The value from a scalar, or the error; called for lists and maps as well if the type accepts none.
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake>;
 
     /// The value from a list.
@@ -211,7 +212,7 @@ pub(super) trait Value: Sized {
         Self::scalar(Scalar::Map).map_err(|mistake| report.raise(mistake))
     }
 
-    /// The value from whatever stands there.
+    /// The value from a YAML node of any type.
     fn read<'de, D: Deserializer<'de>>(
         reader: ValueVisitor<'_, Self>,
         from: D,
@@ -260,14 +261,14 @@ impl Value for bool {
     }
 }
 
-/// The reader of a value for serde.
+/// Visitor of a value.
 pub(super) struct ValueVisitor<'a, T> {
     report: &'a Report,
     value: PhantomData<T>,
 }
 
 impl<'a, T: Value> ValueVisitor<'a, T> {
-    /// A reader that leaves its mistakes in `report`.
+    /// A visitor that stores its errors in `report`.
     pub fn new(report: &'a Report) -> Self {
         let value = PhantomData;
         Self { report, value }
@@ -285,7 +286,7 @@ impl<'de, T: Value> DeserializeSeed<'de> for ValueVisitor<'_, T> {
     }
 }
 
-/// The visits of scalars, for a visitor that reads them all by its `scalar`.
+/// Implements the scalar methods of a visitor by its method `scalar`.
 macro_rules! scalar_visits {
     ($result:ty) => {
         fn visit_unit<E: Error>(self) -> Result<$result, E> {
@@ -340,7 +341,7 @@ impl<'de, T: Value> Visitor<'de> for ValueVisitor<'_, T> {
     }
 }
 
-/// The reader of a key of a map.
+/// Visitor of a key of a map.
 struct NextKey<'a> {
     keys: &'static [KeyDoc],
     report: &'a Report,
@@ -360,7 +361,7 @@ impl Visitor<'_> for NextKey<'_> {
         f.write_str("a key")
     }
 
-    // The error is raised here, where the YAML crate knows the position of the key.
+    // An error raised in this visit has the position of the key.
     fn visit_str<E: Error>(self, written: &str) -> Result<&'static str, E> {
         let mut names = self.keys.iter().map(|key| key.name);
         names.clone().find(|name| *name == written).ok_or_else(|| {
@@ -372,7 +373,7 @@ impl Visitor<'_> for NextKey<'_> {
     }
 }
 
-/// The reader of a value that may be missing.
+/// Visitor of an optional value.
 struct Optional<'a, T>(&'a Report, PhantomData<T>);
 
 impl<'de, T: Value> Visitor<'de> for Optional<'_, T> {

@@ -1,6 +1,6 @@
-//! Values of a model file: numbers, counts, texts, and choices from a list.
+//! Types of the values of a model file: numbers, counts, texts, columns, and alternatives of these.
 //!
-//! Each type reads itself, so that a mistake is reported at its line with words of its own.
+//! Each type implements `Value` with its own error messages.
 
 use super::choice::{choice, choose};
 use super::key::ValueType;
@@ -13,7 +13,7 @@ use std::fmt;
 use std::ops::Deref;
 use std::path::Path;
 
-/// The word that asks for an estimate.
+/// The word for an estimated value.
 const ESTIMATE: &str = "estimate";
 
 /// The version of the file format: 1.
@@ -33,7 +33,7 @@ impl Value for Format {
     }
 }
 
-/// A finite number; an integer will do.
+/// A finite number, written as a float or an integer.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 pub struct Number(pub f64);
 
@@ -52,7 +52,7 @@ impl Value for Number {
     }
 }
 
-/// A number of things: an integer, 0 or more.
+/// A count: an integer, 0 or more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Count(pub usize);
 
@@ -114,7 +114,7 @@ impl Value for Text {
         reader: ValueVisitor<'_, Self>,
         from: D,
     ) -> Result<Self, D::Error> {
-        // Read as text, a name such as 12 or 1.50 keeps its spelling.
+        // Deserialised as text so that a name such as 12 or 1.50 keeps its spelling.
         from.deserialize_str(reader)
     }
 }
@@ -157,7 +157,7 @@ impl Value for ColumnId {
     }
 }
 
-/// The word `estimate` where a map would stand.
+/// The word `estimate` in place of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Estimate;
 
@@ -178,7 +178,7 @@ impl Value for Estimate {
 /// A number, or the word `estimate`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NumberOrEstimate {
-    /// Known.
+    /// Given.
     Number(Number),
     /// Estimated with the functions.
     Estimate,
@@ -198,14 +198,14 @@ impl Value for NumberOrEstimate {
     }
 }
 
-/// The standard deviation of readings: a number, a column of the file, or the word `estimate`.
+/// Standard deviation of the samples: a number, a column of the file, or the word `estimate`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Sigma {
-    /// The same for all readings.
+    /// The same for all samples.
     Number(Number),
-    /// One for each reading.
+    /// One for each sample.
     Column(String),
-    /// From the residuals of the fit.
+    /// Estimated from the residuals of the fit.
     Estimate,
 }
 
@@ -226,12 +226,12 @@ impl Value for Sigma {
     }
 }
 
-/// How many nodes a grid has.
+/// Number of nodes of a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Nodes {
-    /// So many.
+    /// Given.
     Count(Count),
-    /// As many as the frequency content of the data asks for.
+    /// Chosen from the frequency content of the data.
     Auto,
 }
 
@@ -246,12 +246,12 @@ impl Value for Nodes {
     }
 }
 
-/// Break points: how many, equally spaced over the record, or their times in s.
+/// Break points: their number, equally spaced over the record, or their times in s.
 #[derive(Debug, Clone, PartialEq)]
 pub enum KnotSpec {
-    /// So many over the record, both ends included.
+    /// Number of equally spaced break points over the record, both ends included.
     Count(Count),
-    /// At these times, in s.
+    /// Times, s.
     Times(Vec<Number>),
 }
 
@@ -269,15 +269,15 @@ impl Value for KnotSpec {
 }
 
 choice! {
-    /// How the weight of a penalty follows from the data.
+    /// Rule that chooses the weight of a penalty from the data.
     pub enum WeightRule {
-        /// The largest weight that still fits the readings within their noise.
+        /// Discrepancy principle: the largest weight whose residuals agree with the noise.
         Discrepancy = "discrepancy",
-        /// The corner of misfit against roughness.
+        /// L-curve: the corner of misfit against roughness.
         LCurve = "l-curve",
         /// Generalised cross-validation.
         Gcv = "gcv",
-        /// So that the function follows the readings within a dominant period of the motion.
+        /// Weight at which the function resolves changes within one dominant period of the response.
         Period = "period",
     }
 }
@@ -287,7 +287,7 @@ choice! {
 pub enum Weight {
     /// Given.
     Number(Number),
-    /// Chosen from the data.
+    /// Chosen from the data by a rule.
     Rule(WeightRule),
 }
 
@@ -306,7 +306,7 @@ impl Value for Weight {
 }
 
 keys! {
-    /// A column of a file with times in `t_s`, read linearly between its rows.
+    /// A column of a file with times in `t_s`, interpolated linearly between its rows.
     pub struct ColumnSpec = "column", expecting "a map such as {data: file.csv, column: mass_kg}" {
         /// The file, relative to the model file; the `functions.csv` of a finished run is one.
         data: Text, example "device.csv";
@@ -335,7 +335,7 @@ impl Value for NumberOrColumn {
     }
 }
 
-/// Where a fit starts: a number, a list of values, or a column of a file.
+/// Start value of a function: a number, a list of values, or a column of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StartSpec {
     /// The same number at all times.
@@ -365,7 +365,7 @@ impl Value for StartSpec {
     }
 }
 
-/// One value, or a map that says more.
+/// A single value, or a map with further settings.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ScalarOr<S, M> {
     /// One value.
@@ -402,12 +402,12 @@ impl<T> OneOrList<T> {
         }
     }
 
-    /// The values, each with its place as in [`place`](Self::place).
+    /// The values, each with its key as in [`place`](Self::place).
     pub fn iter(&self) -> impl Iterator<Item = (String, &T)> {
         (self.values().iter().enumerate()).map(|(i, value)| (self.place(i), value))
     }
 
-    /// The key of value `i` below the key of them all: nothing, or an index such as `[1]`.
+    /// Suffix of the key of value `i`: empty for a single value, else an index such as `[1]`.
     pub fn place(&self, i: usize) -> String {
         match self {
             Self::One(_) => String::new(),
@@ -437,7 +437,7 @@ impl<T: Value> Value for OneOrList<T> {
     }
 }
 
-/// A number where something else would do as well.
+/// A number where another type is accepted as well.
 fn number_or(scalar: Scalar<'_>, expected: &str) -> Result<Number, Mistake> {
     Number::scalar(scalar).map_err(|mistake| mistake.expecting(|_| expected.to_owned()))
 }

@@ -1,4 +1,4 @@
-//! Mistakes in a model file as errors with file, line, column and key.
+//! Conversion of errors of the YAML crate and of [`Mistake`]s into [`InputError`]s with file, line, column and key.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use serde::de::DeserializeSeed;
 
 /// Reads the keys of a file.
 ///
-/// A mistake of syntax comes first: what the values before it seem to be may be its consequence.
+/// An error of syntax takes precedence, because it can cause apparent errors in the values before it.
 pub(super) fn read<T: Value>(file: &Path, checked: &Checked) -> Result<T, InputError> {
     let text = checked.text();
     let report = Report::default();
@@ -48,7 +48,7 @@ fn input_error(file: &Path, text: &str, error: &serde_yaml::Error, report: Repor
     )
 }
 
-/// An error in the making.
+/// File, text, position and key of an error.
 struct YamlError<'a> {
     file: &'a Path,
     text: &'a str,
@@ -57,7 +57,7 @@ struct YamlError<'a> {
 }
 
 impl YamlError<'_> {
-    /// An error at the position that the YAML crate gave.
+    /// An error at the position given by the YAML crate.
     fn here(&self, problem: impl Into<String>) -> InputError {
         self.at_position(self.at.unwrap_or(Position::START), problem)
     }
@@ -88,7 +88,7 @@ impl YamlError<'_> {
         }
     }
 
-    /// More than one document in a file.
+    /// The error for a file with more than one document.
     fn several_documents(&self, at: Position) -> InputError {
         InputError::new(place(self.file, at), "second YAML document")
             .found("two documents in one file")
@@ -149,7 +149,7 @@ impl YamlError<'_> {
     }
 }
 
-/// How a required key is written.
+/// Example of a required key.
 fn example(key: &str) -> Option<&'static str> {
     Some(match key {
         "format" => "`format: 1`",

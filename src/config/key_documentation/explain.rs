@@ -118,7 +118,7 @@ fn list<'a>(text: &mut String, entries: impl Iterator<Item = (&'a str, &'a str)>
     }
 }
 
-/// Choices of a kind.
+/// Choices of a type.
 fn choices(kind: ValueType) -> Vec<&'static [(&'static str, &'static str)]> {
     match kind {
         ValueType::Choice(words) => vec![words],
@@ -131,7 +131,7 @@ fn choices(kind: ValueType) -> Vec<&'static [(&'static str, &'static str)]> {
     }
 }
 
-/// A kind of value as text.
+/// A type as text.
 fn kind(kind: ValueType) -> String {
     match kind {
         ValueType::Format => "the number 1".into(),

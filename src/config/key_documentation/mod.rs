@@ -15,7 +15,7 @@ pub static MODEL: &KeyGroup = ModelSpec::GROUP;
 /// The keys of a sequence.
 pub static SEQUENCE: &KeyGroup = SequenceSpec::GROUP;
 
-/// A key and where it may stand.
+/// A key with its paths.
 #[derive(Debug, Clone)]
 pub struct Found {
     /// The key.

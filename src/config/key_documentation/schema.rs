@@ -1,11 +1,11 @@
-//! The JSON schema (draft 07) of a model file, for editors that complete and check YAML by one.
+//! JSON schema (draft 07) of a model file, for completion and validation in editors.
 
 use super::{KeyDoc, KeyGroup, MODEL, SEQUENCE, ValueType};
 use serde_json::{Map, Value, json};
 
 /// The schema of a model file or a sequence.
 ///
-/// It knows keys, kinds and words; what they mean together is checked by the program alone.
+/// The schema covers keys, types and choices; relations between keys are checked by the program.
 pub fn schema() -> Value {
     let mut definitions = Map::new();
     define(MODEL, &mut definitions);
@@ -51,13 +51,13 @@ fn define(group: &'static KeyGroup, definitions: &mut Map<String, Value>) {
     }
 }
 
-/// A key: what editors show when it is pointed at, and what may stand behind it.
+/// Schema of a key: description for editors, and type of the value.
 fn property(key: &KeyDoc) -> Value {
-    // Beside `$ref` draft 07 ignores everything, so the kind stands apart.
+    // Draft 07 ignores everything beside `$ref`, so the type is in `allOf`.
     json!({"description": description(key), "allOf": [kind(key.kind)]})
 }
 
-/// The key in words, with its unit and default.
+/// Description of a key, with unit and default.
 fn description(key: &KeyDoc) -> String {
     let mut text = key.text.to_owned();
     for (name, value) in [("Unit", key.unit), ("Default", key.default)] {

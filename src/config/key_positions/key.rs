@@ -1,18 +1,18 @@
-//! The reader of one key of a map.
+//! Visitor of one key of a map.
 
 use crate::config::reader::{Scalar, scalar_visits};
 use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::cell::Cell;
 use std::fmt;
 
-/// Reads a key and says whether it is the wanted one, or stops at it.
+/// Compares a key with the wanted one; optionally stops reading there.
 pub(super) struct KeySeed<'a> {
     pub wanted: Option<&'a str>,
-    /// Where to note that reading stops at the wanted key; `None` to read on.
+    /// Flag to set before reading stops at the wanted key; `None` to continue past it.
     pub stop: Option<&'a Cell<bool>>,
 }
 
-/// The error on purpose, at the goal; `hit` tells it from others.
+/// The error that stops reading at the goal; sets `hit` to distinguish it from errors of syntax.
 pub(super) fn stop<E: Error>(hit: &Cell<bool>) -> E {
     hit.set(true);
     E::custom("found")
@@ -27,7 +27,7 @@ impl<'de> DeserializeSeed<'de> for KeySeed<'_> {
 }
 
 impl KeySeed<'_> {
-    /// A key that is no text is never the wanted one.
+    /// A key that is not a text never matches.
     fn scalar<E: Error>(self, key: Scalar<'_>) -> Result<bool, E> {
         let same = matches!(key, Scalar::Text(key) if self.wanted == Some(key));
         match self.stop.filter(|_| same) {

@@ -1,8 +1,8 @@
-//! Line and column of a key and its value, for mistakes found after the file was read.
+//! Line and column of a key and its value, for errors found after parsing.
 //!
-//! The YAML crate adds line and column to errors only. So the text is read once more by a reader
-//! that follows the path of the key, skips everything else, and fails on purpose at its goal: the
-//! crate then says where that was.
+//! The YAML crate attaches line and column only to errors. The text is therefore parsed once more by a visitor that
+//! follows the path of the key, skips all other values, and raises an error at the goal, whose position the crate
+//! supplies.
 
 mod key;
 mod path;
@@ -17,20 +17,20 @@ use serde::de::{Deserialize, DeserializeSeed, IgnoredAny};
 use std::cell::Cell;
 use walk::{Goal, Walk};
 
-/// Where a value is.
+/// Position of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Located {
     /// Begin of the value; that of an alias (`*name`) is where it is anchored (`&name`).
     pub value: Position,
     /// Begin of its key, unless it is the whole file or an element of a list.
     pub key: Option<Position>,
-    /// How many segments of the path exist: all of them, or the value is an ancestor.
+    /// Number of segments of the path that exist; if fewer than all, the value is an ancestor.
     pub depth: usize,
 }
 
 /// Finds the value at `path` in a YAML text, or its deepest existing ancestor.
 ///
-/// Never fails: in a text that is not YAML everything is at the beginning.
+/// Never fails: in a text that is not YAML every position is the beginning.
 pub fn locate(text: &str, path: &[Segment]) -> Located {
     (0..=path.len())
         .rev()
@@ -52,7 +52,7 @@ pub(super) fn second_occurrence(text: &str, path: &[Segment]) -> Option<Position
     find(text, path, Goal::Key { occurrence: 2 })
 }
 
-/// The first place where a text is not YAML, if there is one.
+/// The first syntax error of a text, if any.
 pub(super) fn syntax_error(text: &str) -> Option<serde_yaml::Error> {
     serde_yaml::Deserializer::from_str(text)
         .find_map(|document| IgnoredAny::deserialize(document).err())
@@ -127,7 +127,7 @@ indentless:
 last: end
 ";
 
-    /// `line:column` of the value and of the key, and what is missing of the path.
+    /// `line:column` of the value and of the key, and the number of missing segments.
     fn at(path: &str) -> String {
         let path = key_path(path);
         let found = locate(TEXT, &path);

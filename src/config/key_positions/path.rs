@@ -9,9 +9,9 @@ pub enum Segment {
     Index(usize),
 }
 
-/// Takes a path such as `experiments[0].initial.velocity` apart.
+/// Splits a path such as `experiments[0].initial.velocity` into segments.
 ///
-/// What is not a well-formed index is taken as part of a key.
+/// A malformed index is part of a key.
 pub fn key_path(path: &str) -> Vec<Segment> {
     let mut segments = Vec::new();
     for part in path.split('.').filter(|part| !part.is_empty()) {

@@ -1,4 +1,4 @@
-//! Lines and columns.
+//! Positions in a text as line and column.
 
 use crate::error::Location;
 use std::path::Path;
@@ -26,7 +26,7 @@ impl Position {
     }
 }
 
-/// A position in a file as the place of an error.
+/// A position in a file as the location of an error.
 pub(in crate::config) fn place(file: &Path, position: Position) -> Location {
     Location::Line {
         file: file.to_path_buf(),

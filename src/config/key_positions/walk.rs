@@ -1,4 +1,4 @@
-//! The reader that follows a path and stops at its goal.
+//! Visitor that follows a path and stops at its goal.
 
 use super::Segment;
 use super::key::{KeySeed, stop};
@@ -9,7 +9,7 @@ use serde::de::{
 use std::cell::Cell;
 use std::fmt;
 
-/// What to find at the end of a path.
+/// Goal at the end of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Goal {
     Value,
@@ -25,12 +25,12 @@ pub(super) struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// The error on purpose, at the goal.
+    /// The error that stops reading at the goal.
     pub fn stop<E: Error>(&self) -> E {
         stop(self.hit)
     }
 
-    /// A scalar: stop if it is the goal, go on if it is not.
+    /// Stops at a scalar that is the goal, else continues.
     fn scalar<E: Error>(self, _: Scalar<'_>) -> Result<(), E> {
         match self.path.is_empty() && self.goal == Goal::Value {
             true => Err(self.stop()),

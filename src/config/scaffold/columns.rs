@@ -1,4 +1,4 @@
-//! Which column of a table is what.
+//! Assignment of the columns of a table to time, channels, force and base motion, from units, names and values.
 
 use super::quoted;
 use crate::error::InputError;
@@ -6,7 +6,7 @@ use crate::tables::{Table, increasing_at};
 use crate::units::{Quantity, Unit};
 use kmcfit_core::internals::diagnostics::spread;
 
-/// What a column may be.
+/// Role of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     Time,
@@ -18,7 +18,7 @@ pub enum Role {
     BaseDisplacement,
 }
 
-/// Beginnings of names, in small letters, and what they name.
+/// Prefixes of column names, in lower case, by role.
 const NAMES: [(Role, &[&str]); 5] = [
     (Role::Time, &["time", "zeit", "uhrzeit", "t"]),
     (
@@ -31,18 +31,18 @@ const NAMES: [(Role, &[&str]); 5] = [
     (Role::Acceleration, &["acc", "a"]),
     (Role::Force, &["force", "load", "torque", "f"]),
 ];
-/// Words in a name that speak of the base.
+/// Words in a name that denote the base.
 const BASE: [&str; 5] = ["base", "table", "ground", "floor", "support"];
-/// Names that are no beginnings: a roller does not roll.
+/// Names that match only as whole words, not as prefixes (`roller` is not `roll`).
 const WHOLE: [&str; 2] = ["roll", "pitch"];
-/// Units at the end of names that no role has, in small letters.
+/// Unit suffixes, in lower case, of quantities without a role.
 const FOREIGN: [&str; 18] = [
     "hz", "khz", "rpm", "degc", "°c", "celsius", "kelvin", "%", "percent", "pa", "kpa", "mpa",
     "bar", "ohm", "ma", "db", "kg", "volt",
 ];
-/// Of two sensors the later one is taken if it moves so many times as much: with less there is no telling.
+/// Ratio of standard deviations beyond which a later sensor replaces an earlier one of the same role.
 const MUCH: f64 = 3.0;
-/// Longest name that is taken for a single letter with a number or unit: `y1`, `acc 1`.
+/// Longest name that is compared as a single letter with a number or unit: `y1`.
 const LONGEST_LETTER: usize = 2;
 
 impl Role {
@@ -77,7 +77,7 @@ impl Role {
         }
     }
 
-    /// Whether it is a motion that can be fitted.
+    /// True for a measured response.
     pub fn is_channel(self) -> bool {
         matches!(
             self,
@@ -93,15 +93,15 @@ pub struct UsedColumn {
     pub role: Role,
     /// The unit.
     pub unit: Unit,
-    /// Whether the model must say the unit, since the file does so in no way that is read.
+    /// True if the model file must state the unit, because no row of units or name does so in a recognised form.
     tell_unit: bool,
-    /// Whether nothing but its place says what it is.
+    /// True if the role follows from the position of the column alone.
     guessed: bool,
-    /// Whether the file says its unit.
+    /// True if the file states the unit.
     has_unit: bool,
 }
 
-/// The columns that are used, and those that are not.
+/// Columns of a table by role, and unused columns.
 #[derive(Debug)]
 pub struct ColumnAssignment {
     pub used: Vec<UsedColumn>,
@@ -115,7 +115,7 @@ impl ColumnAssignment {
             match table.readings(i) {
                 Ok(readings) if readings.iter().any(|x| x.is_finite()) => numeric.push(i),
                 Ok(_) => {}
-                // A name that is known says that numbers were meant.
+                // A recognised name requires numbers.
                 Err(error) => match known(table, i).map(|column| column.role) {
                     Some(Role::Time) if sample_rate.is_some() => {}
                     Some(Role::Time) => {
@@ -152,8 +152,8 @@ impl ColumnAssignment {
         Ok(columns)
     }
 
-    /// Uses a column, or the one of its role that was there before: of several sensors of the motion the one that moves
-    /// much more than those before it.
+    /// Assigns a column to its role. Among several sensors of one role a later one replaces an earlier one if its
+    /// standard deviation is much larger.
     fn take(&mut self, table: &Table, column: UsedColumn) -> Result<(), InputError> {
         let Some(place) = self.used.iter().position(|c| c.role == column.role) else {
             self.used.push(column);
@@ -177,7 +177,7 @@ impl ColumnAssignment {
         Ok(())
     }
 
-    /// The first column that nothing is known of, and that has no unit of something else, is a displacement.
+    /// Assigns the first column without a recognised name or foreign unit to the displacement.
     fn guess(&mut self, table: &Table) -> Result<(), InputError> {
         let is_empty = |i: &usize| match table.readings(*i) {
             Ok(readings) => readings.iter().all(|x| x.is_nan()),
@@ -223,7 +223,7 @@ impl ColumnAssignment {
         self.used.iter().find(|c| c.role == role)
     }
 
-    /// The kinds of motion that were measured.
+    /// Roles of the measured responses.
     pub fn channels(&self) -> impl Iterator<Item = Role> {
         self.used.iter().map(|c| c.role).filter(|r| r.is_channel())
     }
@@ -241,7 +241,7 @@ impl ColumnAssignment {
         format!("{{{}}}", pairs.collect::<Vec<_>>().join(", "))
     }
 
-    /// The units that the file does not say by itself.
+    /// The units that the model file must state, as a YAML map.
     pub fn units(&self) -> Option<String> {
         let told = self.used.iter().filter(|c| c.tell_unit);
         let pairs: Vec<String> = told
@@ -250,7 +250,7 @@ impl ColumnAssignment {
         (!pairs.is_empty()).then(|| format!("{{{}}}", pairs.join(", ")))
     }
 
-    /// What each column was taken for.
+    /// One sentence for each column: its role and unit.
     pub fn in_words(&self, table: &Table) -> Vec<String> {
         let said = |c: &UsedColumn| {
             let guess = match (c.guessed, c.has_unit || c.role == Role::Time) {
@@ -281,7 +281,7 @@ impl ColumnAssignment {
     }
 }
 
-/// Readings per second by the column of times, if there is one whose numbers increase.
+/// Column of times and sampling rate, Hz; `None` without a column of increasing times.
 pub fn rate(table: &Table) -> Option<(usize, f64)> {
     (0..table.width()).find_map(|i| {
         let column = known(table, i).filter(|c| c.role == Role::Time)?;
@@ -319,7 +319,7 @@ fn time(table: &Table, numeric: &[usize]) -> Result<UsedColumn, InputError> {
     }
 }
 
-/// What unit and name say of a column.
+/// Role and unit of a column from its name and stated unit.
 fn known(table: &Table, index: usize) -> Option<UsedColumn> {
     let label = table.headers().get(index).map_or("", String::as_str);
     let (label, is_base) = without_base(label);
@@ -340,7 +340,7 @@ fn known(table: &Table, index: usize) -> Option<UsedColumn> {
     if by_unit.is_none() && is_foreign(&label) {
         return None;
     }
-    // A name that the unit agrees with comes first: volts and letters may be of several kinds.
+    // A role by name takes precedence if its unit agrees, because some units fit several quantities.
     let role = by_name
         .filter(|r| unit_of(*r).is_some())
         .or(by_unit)
@@ -357,9 +357,9 @@ fn known(table: &Table, index: usize) -> Option<UsedColumn> {
     })
 }
 
-/// A label without its word that speaks of the base, and whether there was one: `table_acc` is an acceleration, too.
+/// A label without a word for the base, and true if it had one: `table_acc` is an acceleration of the base.
 fn without_base(label: &str) -> (String, bool) {
-    // Of the same length, whatever letters there are.
+    // ASCII lower case keeps the byte length.
     let small = label.to_ascii_lowercase();
     let found = BASE
         .iter()
@@ -372,7 +372,7 @@ fn without_base(label: &str) -> (String, bool) {
     (rest.trim_start_matches(is_separator).to_owned(), true)
 }
 
-/// Whether a name ends with a unit of something else.
+/// True for a name that ends with a unit of [`FOREIGN`].
 fn is_foreign(label: &str) -> bool {
     let small = label.to_lowercase();
     let mut words = small.split(['_', ' ', '[', ']', '(', ')', '/']);
@@ -382,7 +382,7 @@ fn is_foreign(label: &str) -> bool {
         .is_some_and(|unit| FOREIGN.contains(&unit))
 }
 
-/// What a name in small letters says.
+/// Role of a column by its name in lower case.
 fn role_of(name: &str) -> Option<Role> {
     let bare = name
         .split(['_', ' ', '[', '(', '/'])

@@ -1,7 +1,7 @@
-//! A commented starter model for a table of readings: what `kmcfit init` writes.
+//! A commented model file for a table of samples, as `kmcfit init` writes it.
 //!
-//! Columns are told apart by their units, then by their names; the motion by its spectrum. What cannot
-//! be known from the file (the mass of a free motion) gets a number and a comment that says so.
+//! Columns are assigned by units, then by names; the start value of the stiffness follows from the dominant frequency.
+//! Quantities that the table does not determine (the mass in a free decay) get a placeholder and a comment.
 
 mod columns;
 mod record_summary;
@@ -14,34 +14,34 @@ use columns::{ColumnAssignment, Role};
 use record_summary::RecordSummary;
 use std::path::Path;
 
-/// Damping ratio that the search starts from: that of a lightly damped structure.
+/// Start value of the damping ratio: that of a lightly damped structure.
 const DAMPING_RATIO: f64 = 0.02;
-/// Periods of the motion per knot of the stiffness: fewer do not show a value of their own.
+/// Periods of the response per knot of the stiffness: fewer do not determine a value.
 const PERIODS_PER_KNOT: f64 = 2.0;
-/// Most knots: enough to see that and how the stiffness changes.
+/// Most knots: enough for the course of the stiffness.
 const MOST_KNOTS: f64 = 11.0;
 
-/// Two rates that differ by less are the same.
+/// Relative difference below which two sampling rates are equal.
 const SAME_RATE: f64 = 0.01;
 
-/// Memory for each row beside the table, bytes: the times, the readings, their spectrum. The whole was
-/// measured to take 150 bytes for each of a million rows with two columns.
+/// Memory for each row beside the table, bytes: times, samples and spectrum. Measured: 150 bytes per row in total for a
+/// million rows of two columns.
 const PER_ROW: u64 = 200;
 
-/// A starter model and what it was made from.
+/// A model file and the findings that it is based on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scaffold {
     /// The text of the model file.
     pub text: String,
-    /// What was found in the table, in sentences.
+    /// Findings on the table, one sentence each.
     pub found: Vec<String>,
 }
 
-/// A starter model for the table `csv`, which the model will call `data`. Readings per second are
-/// `sample_rate`, where no column of times.
+/// A model file for the table at `csv`, under the name `data`. `sample_rate` is the sampling rate in Hz of a table
+/// without a column of times.
 ///
-/// # Errors
-/// When the table cannot be read, has no column of times or of a motion, or a column is no readings.
+/// # Errors When the table cannot be read, has no times or no measured response, or a column cannot be converted to
+/// samples.
 pub fn scaffold(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Scaffold, InputError> {
     let table = Table::read(csv)?;
     memory::check_file(csv, table.rows() as u64 * PER_ROW)?;
@@ -135,7 +135,7 @@ fn text(
         )
 }
 
-/// The keys of the record and the grid, each with its value, if the model needs it, and a comment.
+/// The keys of the record and the grid, each with its value and a comment.
 fn keys(
     table: &Table,
     columns: &ColumnAssignment,
@@ -199,7 +199,7 @@ fn keys(
     owned.into()
 }
 
-/// Sensors with parameters of their own, and the reasons for them.
+/// Sensors with estimated parameters, and the reasons.
 fn sensors(
     columns: &ColumnAssignment,
     motion: &RecordSummary,
@@ -211,7 +211,7 @@ fn sensors(
             "accelerometers have one; leave it out if yours has none",
         ));
     }
-    // A force may be what holds a displacement off zero.
+    // A static force can cause the offset of a displacement.
     if columns.has(Role::Displacement) && !columns.has(Role::Force) {
         if motion.drifts {
             sensors.push((
@@ -228,7 +228,7 @@ fn sensors(
     sensors.into_iter().unzip()
 }
 
-/// The functions: a start that has the dominant frequency.
+/// The coefficient functions, with start values that give the dominant frequency.
 fn functions(columns: &ColumnAssignment, motion: &RecordSummary) -> String {
     let omega = std::f64::consts::TAU * motion.frequency.unwrap_or(1.0);
     let driven = columns.has(Role::Force);
@@ -274,7 +274,7 @@ fn functions(columns: &ColumnAssignment, motion: &RecordSummary) -> String {
     text
 }
 
-/// A line with a comment in a column of its own, where there is room.
+/// A line followed by a comment, aligned where the line is short enough.
 fn commented(line: &str, comment: &str) -> String {
     match comment {
         "" => format!("{line}\n"),
@@ -288,7 +288,7 @@ fn short(x: f64) -> String {
     format!("{rounded:?}").trim_end_matches(".0").to_owned()
 }
 
-/// A text as YAML takes it, in a list or map too.
+/// A text quoted for YAML where necessary, also inside a list or map.
 fn quoted(text: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "_/.- ".contains(c);
     let begins = text.starts_with(char::is_alphabetic) || text.starts_with("../");

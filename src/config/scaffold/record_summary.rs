@@ -1,4 +1,5 @@
-//! What the readings say of the motion: how often they come, how fast it is.
+//! Summary of a record: sampling, onset, dominant frequency, outliers, offset and drift, and the size of the
+//! excitation.
 
 use super::columns::{ColumnAssignment, Role, UsedColumn};
 use crate::error::InputError;
@@ -7,45 +8,45 @@ use kmcfit_core::internals::diagnostics::{far_off, offset_and_drift, spread, wit
 use kmcfit_core::internals::signal::{Spectrum, onset};
 use kmcfit_core::internals::system::round_time;
 
-/// Fewest readings of which a model can be made.
+/// Fewest samples for a model.
 const FEWEST: usize = 8;
-/// Spacings that differ by less than this share are equal, but for rounded times.
+/// Relative difference below which spacings are equal up to rounded times.
 const REGULAR: f64 = 0.05;
-/// Fewest periods of readings that may be said to drift, and what share of their squares about the mean the line then holds:
-/// a swing of so many periods has a few hundredths.
+/// Fewest periods for a test of drift, and the share of the variance that a straight line must explain; for an
+/// oscillation without drift of that many periods it explains a few per cent.
 const DRIFT_PERIODS: f64 = 4.0;
 const DRIFT: f64 = 0.1;
-/// A drive that changes at less than this share of its samples jumps.
+/// An excitation that changes at less than this share of its samples is piecewise constant.
 const MOST_JUMPS: f64 = 0.1;
 
-/// The motion of a record.
+/// Summary of a record.
 #[derive(Debug)]
 pub struct RecordSummary {
     pub readings: usize,
     pub missing: usize,
     /// s.
     pub duration: f64,
-    /// Median distance of readings, s.
+    /// Median sampling interval, s.
     pub spacing: f64,
     pub is_regular: bool,
-    /// The channel that the rest is about, and its unit as a factor to SI.
+    /// The summarised channel, and the factor of its unit to SI.
     pub channel: (Role, f64),
-    /// How many readings lie far off, and the first of them, in SI.
+    /// Number of outliers, and the first one in SI.
     pub far_off: Option<(usize, f64)>,
-    /// When the motion begins, s, if the readings stand still before.
+    /// Onset of the response, s; `None` without an initial rest.
     pub begins: Option<f64>,
-    /// Hz.
+    /// Dominant frequency, Hz.
     pub frequency: Option<f64>,
-    /// Whether the mean of the readings is larger than their distances from it.
+    /// True if the mean of the samples exceeds their deviations from it.
     pub is_off_centre: bool,
-    /// Whether a straight line is a good part of readings that swing about it.
+    /// True if the samples drift along a straight line.
     pub drifts: bool,
-    /// Root-mean-square force, N, and motion with the power of the frequency that makes it an
+    /// Root-mean-square force, N, and root-mean-square response with the power of omega that converts it to an
     /// acceleration.
     force: Option<f64>,
     motion: f64,
     power: i32,
-    /// How force and base are read between their samples.
+    /// Interpolation of force and base motion between samples.
     pub between: &'static str,
 }
 
@@ -78,13 +79,13 @@ impl RecordSummary {
         let missing = times.len() - pairs.len();
         let far_off = leave_out_far_off(&mut pairs);
         let values = values_of(&pairs);
-        // What drives a motion may begin late, too.
+        // The excitation can set in late as well.
         let begins = match drive {
             Some(_) => None,
             None => onset(&values, spacing),
         };
         let pairs = &pairs[begins.unwrap_or(0)..];
-        // The line is a drift where the readings swing about it, and not the swing itself.
+        // The line is a drift only if the samples oscillate about it.
         let duration = times[times.len() - 1] - begins.map_or(times[0], |_| pairs[0].0);
         let beside_line = beside_line(pairs).and_then(|pairs| frequency(&pairs, spacing));
         let beside_line = beside_line.filter(|f| f * duration >= DRIFT_PERIODS);
@@ -115,7 +116,7 @@ impl RecordSummary {
         self.frequency.unwrap_or(0.0) * self.duration
     }
 
-    /// The mass that the force would move so, if it had nothing else to do, kg.
+    /// Mass for which the inertia force equals the measured force, kg.
     pub fn mass(&self, omega: f64) -> Option<f64> {
         let mass = self.force? / (self.motion * omega.powi(self.power));
         (mass.is_finite() && mass > 0.0).then_some(mass)
@@ -134,7 +135,7 @@ impl RecordSummary {
     }
 }
 
-/// The readings with their times; there must be enough, and they must not stand still.
+/// Samples with their times. Refuses too few samples and constant ones.
 fn moving(table: &Table, times: &[f64], values: Vec<f64>) -> Result<Vec<(f64, f64)>, InputError> {
     let pairs = times.iter().copied().zip(values);
     let pairs: Vec<(f64, f64)> = pairs.filter(|(_, value)| value.is_finite()).collect();
@@ -152,7 +153,7 @@ fn moving(table: &Table, times: &[f64], values: Vec<f64>) -> Result<Vec<(f64, f6
     }
 }
 
-/// Leaves out the readings that lie far off the others; how many those are, and the first of them.
+/// Removes outliers; returns their number and the first one.
 fn leave_out_far_off(pairs: &mut Vec<(f64, f64)>) -> Option<(usize, f64)> {
     let values: Vec<f64> = pairs.iter().map(|(_, value)| *value).collect();
     let level = median(&values);
@@ -164,7 +165,7 @@ fn leave_out_far_off(pairs: &mut Vec<(f64, f64)>) -> Option<(usize, f64)> {
     Some((far.len(), first))
 }
 
-/// Readings without their straight line, if that is a good part of them.
+/// Samples minus their straight line, if it explains a large part of them.
 fn beside_line(pairs: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
     let (times, values): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
     let [mean, line] = offset_and_drift(&times, &values);
@@ -175,12 +176,12 @@ fn beside_line(pairs: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
     Some(times.into_iter().zip(left).collect())
 }
 
-/// How a drive goes on between its samples, as far as they say: those that are left out tell, every second of them.
+/// Interpolation that predicts every second sample of an excitation best from the others.
 fn between(drive: &[f64]) -> &'static str {
     let steps: Vec<bool> = drive.windows(2).map(|pair| pair[0] != pair[1]).collect();
     let jumps = steps.iter().filter(|moves| **moves).count();
     let run = steps.windows(2).filter(|pair| pair[0] && pair[1]).count();
-    // A hammer's blow runs over some samples.
+    // A hammer impact extends over several samples.
     if jumps > 0 && run == 0 && (jumps as f64) < MOST_JUMPS * drive.len() as f64 {
         return "hold";
     }
@@ -191,7 +192,7 @@ fn between(drive: &[f64]) -> &'static str {
         line += (x[3] - near).powi(2);
         cubic += (x[3] - near - (near - far) / 8.0).powi(2);
     }
-    // Squares: by less than half the error.
+    // Ratio of squared errors: less than half the error.
     match cubic < 0.25 * line {
         true => "cubic",
         false => "linear",
@@ -222,11 +223,10 @@ fn in_si(table: &Table, column: &UsedColumn) -> Result<Vec<f64>, InputError> {
     Ok(readings.iter().map(|x| x * factor).collect())
 }
 
-/// The dominant frequency of readings that are joined by straight lines where they are not equally
-/// spaced, Hz.
+/// Dominant frequency of the samples, interpolated linearly where they are not equally spaced, Hz.
 fn frequency(pairs: &[(f64, f64)], spacing: f64) -> Option<f64> {
     let (first, last) = (pairs.first()?.0, pairs.last()?.0);
-    // A gap of hours between readings of milliseconds is no reason to take all memory.
+    // Bounds the memory for records with long gaps.
     let count = (((last - first) / spacing).round() as usize + 1).min(4 * pairs.len());
     let step = (last - first) / (count - 1) as f64;
     let mut next = 1;

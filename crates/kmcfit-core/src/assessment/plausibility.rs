@@ -225,7 +225,7 @@ fn coarse(
     let predictions = evaluation.predictions.iter().flatten();
     let mut fits = (problem.channels().zip(predictions))
         .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent);
-    // Samples simulated with these steps are matched to rounding errors.
+    // Samples simulated with these steps are matched to machine precision.
     let is_exact = fits.all(|fit| fit > EXACT);
     let times = half.change_per_residual;
     (times > 1.0 && !is_exact).then_some(FitWarning::CoarseSteps { times })
