@@ -1,4 +1,4 @@
-//! Functions of a model file as specifications of the builder; and the truth.
+//! Coefficient functions of a model file as specifications of the builder, and the true coefficients.
 
 use super::on_grid::{NodalColumnRequest, column_on_grid};
 use crate::config::ModelFile;
@@ -15,7 +15,7 @@ use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::solvers;
 use kmcfit_core::internals::system::{Grid, NodalCoefficients};
 
-/// The part of a map with a key for each function, required or not.
+/// The function of a kind in a map with one key for each function.
 macro_rules! by_kind {
     ($map:expr, $kind:expr) => {
         match $kind {
@@ -30,10 +30,10 @@ macro_rules! by_kind {
     };
 }
 
-/// A function as the model gives it: its kind and what is said about it.
+/// A coefficient function of the model file: kind and settings.
 pub(super) type Given<'a> = (CoefficientKind, &'a FunctionSpec);
 
-/// The functions that all experiments share, mass first.
+/// The functions common to all experiments, mass first.
 pub(super) fn shared(file: &ModelFile) -> Vec<Given<'_>> {
     let kinds = CoefficientKind::ALL.into_iter();
     kinds
@@ -41,7 +41,7 @@ pub(super) fn shared(file: &ModelFile) -> Vec<Given<'_>> {
         .collect()
 }
 
-/// The functions that experiment `i` has for itself.
+/// The functions of experiment `i` alone.
 pub(super) fn own(file: &ModelFile, i: usize) -> Vec<Given<'_>> {
     let kinds = CoefficientKind::ALL.into_iter();
     let own = file.spec.experiments[i].functions.as_ref();
@@ -107,7 +107,7 @@ pub(super) fn specification(
     })
 }
 
-/// The key that a kind of basis has besides its name.
+/// The additional key of a basis.
 fn own_key(kind: Basis) -> Option<&'static str> {
     match kind {
         Basis::Nodal | Basis::Constant => None,
@@ -237,7 +237,7 @@ fn penalty(
     })
 }
 
-/// A penalty on total variation, which has a weight and nothing else.
+/// A penalty on total variation; refuses keys other than the weight.
 fn total_variation(
     file: &ModelFile,
     key: &str,
@@ -268,7 +268,7 @@ fn total_variation(
     }
 }
 
-/// A number at all times, or a column that `key` names, read at the nodes.
+/// A constant, or a column named by `key`, interpolated at the nodes.
 pub(super) fn history(
     file: &ModelFile,
     grid: &Grid,
@@ -284,7 +284,7 @@ pub(super) fn history(
     }
 }
 
-/// Values at the nodes: the same number, or a column that `key` names.
+/// Values at the nodes: a constant, or a column named by `key`.
 pub(super) fn values(
     file: &ModelFile,
     grid: &Grid,
@@ -297,7 +297,7 @@ pub(super) fn values(
     }
 }
 
-/// The nodal values of a column that `key` names.
+/// Nodal values of a column named by `key`.
 fn column(
     file: &ModelFile,
     grid: &Grid,

@@ -1,4 +1,4 @@
-//! The time grid: from the model, or one node per reading.
+//! The time grid: given by the model file, one node per sample, or an automatic number of nodes.
 
 mod auto;
 mod per_node;
@@ -12,7 +12,7 @@ use crate::finding::Finding;
 use crate::memory;
 use kmcfit_core::internals::system::{Grid, Method};
 
-/// Most nodes that are chosen for the user: the same on every machine.
+/// Most nodes of an automatic choice: the same on every machine.
 const MOST_CHOSEN: usize = 10_000_000;
 
 pub(super) fn build(
@@ -61,12 +61,12 @@ fn about_nodes(file: &ModelFile, purpose: BuildMode, problem: &str) -> InputErro
     }
 }
 
-/// Memory that a run of the model on so many nodes may need, bytes.
+/// Upper estimate of the memory of a run with this number of nodes, bytes.
 pub(super) fn memory_of(file: &ModelFile, purpose: BuildMode, nodes: usize) -> f64 {
     nodes as f64 * per_node::per_node(file, purpose) as f64 + memory::BASE as f64
 }
 
-/// Refuses a grid that the machine has no memory for, before any is taken.
+/// Refuses a grid that exceeds the available memory, before allocation.
 fn fits_into_memory(file: &ModelFile, purpose: BuildMode, nodes: usize) -> Result<(), InputError> {
     let needed = memory_of(file, purpose, nodes);
     let Err(available) = memory::check(needed as u64) else {
@@ -88,7 +88,7 @@ fn fits_into_memory(file: &ModelFile, purpose: BuildMode, nodes: usize) -> Resul
     )))
 }
 
-/// One node per reading, where all channels of all records have the same equally spaced times.
+/// Number of nodes for one node per sample, if all channels of all records have the same equally spaced times.
 fn node_per_reading(records: &[Option<RawRecord>]) -> Option<usize> {
     let mut channels = records.iter().flatten().flat_map(|r| &r.channels);
     let first = channels.next()?;
@@ -103,7 +103,7 @@ fn node_per_reading(records: &[Option<RawRecord>]) -> Option<usize> {
     (usable && channels.all(same)).then_some(first.times.len())
 }
 
-/// First time and length of the records; the length from the model without.
+/// First time and length of the records, s; without samples the length given by the model.
 fn span(file: &ModelFile, records: &[Option<RawRecord>]) -> Result<(f64, f64), InputError> {
     let asked = file.spec.grid.as_ref().and_then(|g| g.duration.as_ref());
     if let Some(duration) = asked

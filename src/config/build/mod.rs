@@ -209,7 +209,7 @@ pub fn build(file: &ModelFile, purpose: BuildMode) -> Result<Model, InputError> 
     let searches = built.weight_search.is_some();
     let settings = fit::build(file, &built.problem, solver, searches)?;
     let given_start = built.problem.functions.start();
-    // A simulation is of the functions as they are given.
+    // A simulation uses the functions as given.
     if !matches!(purpose, BuildMode::Simulate { .. }) {
         built.move_start().map_err(about)?;
     }
@@ -283,8 +283,7 @@ impl Model {
         })
     }
 
-    /// The threads, of so many that are wanted, that have the memory to fit the model at the same time:
-    /// at least one.
+    /// Number of threads, at most `wanted` and at least one, whose simultaneous fits fit into memory.
     pub fn threads_within_memory(&self, wanted: usize) -> usize {
         memory::threads_within(wanted, self.memory)
     }

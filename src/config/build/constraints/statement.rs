@@ -1,4 +1,4 @@
-//! From one map of `constraints` to what it demands.
+//! Conversion of one map of `constraints` into constraints of the builder.
 
 use crate::config::ModelFile;
 use crate::config::build::functions::history;
@@ -9,10 +9,10 @@ use kmcfit_core::internals::constraints::{Constraint, Shape, TimeHistory};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::system::Grid;
 
-/// How far outside the record a time may be, in steps, to be taken for its end.
+/// Distance of a time outside the record, in steps, up to which it counts as the end of the record.
 const SAME_TIME: f64 = 1e-6;
 
-/// What a constraint can say, by its key.
+/// Kind of a constraint, by its key.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum ConstraintKey {
     Bounds,
@@ -28,7 +28,7 @@ enum ConstraintKey {
 }
 
 impl ConstraintKey {
-    /// All kinds with the keys that they are written with.
+    /// All kinds with their keys.
     const ALL: [(ConstraintKey, &'static str); 10] = [
         (ConstraintKey::Bounds, "`min` or `max`"),
         (ConstraintKey::Slope, "`slope`"),
@@ -73,7 +73,7 @@ impl ConstraintKey {
     }
 }
 
-/// One map at a key.
+/// One map of `constraints` and its key.
 struct ConstraintReader<'a> {
     file: &'a ModelFile,
     grid: &'a Grid,
@@ -81,7 +81,7 @@ struct ConstraintReader<'a> {
     spec: &'a ConstraintSpec,
 }
 
-/// What the map at `key` demands, each with the key that says so.
+/// The constraints of the map at `key`, each with the key that states it.
 pub(super) fn read(
     file: &ModelFile,
     grid: &Grid,
@@ -117,7 +117,7 @@ impl ConstraintReader<'_> {
         }
     }
 
-    /// The one thing that the map says.
+    /// The kind of the map: exactly one of its keys must be given.
     fn kind(&self) -> Result<ConstraintKey, InputError> {
         let given: Vec<ConstraintKey> = (ConstraintKey::ALL.iter().map(|(kind, _)| *kind))
             .filter(|kind| kind.is_given(self.spec))
@@ -167,7 +167,7 @@ impl ConstraintReader<'_> {
     }
 
     fn of(&self) -> CoefficientKind {
-        // Kinds without a function do not ask.
+        // Kinds without a function do not use it.
         self.spec.function.unwrap_or(CoefficientKind::Mass)
     }
 

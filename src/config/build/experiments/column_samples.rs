@@ -1,4 +1,4 @@
-//! Columns of files as times and values.
+//! Reading of a column of a file: times, and values in SI units within the time window.
 
 use super::unit::QuantityColumn;
 use crate::config::ModelFile;
@@ -13,35 +13,35 @@ use crate::units::{Quantity, Unit};
 /// Default name of the column of times.
 const TIME_COLUMN: &str = "t_s";
 
-/// A column of a file in SI units, in the window; NaN where a reading is missing.
+/// Samples of a column in SI units within the time window; NaN for a missing sample.
 pub struct ColumnSamples {
-    /// s, increasing.
+    /// Times, s, increasing.
     pub times: Vec<f64>,
-    /// In SI.
+    /// Values, SI.
     pub values: Vec<f64>,
-    /// The values' unit in the file.
+    /// Unit of the values in the file.
     pub unit: Unit,
-    /// What else is wanted from the same file: the values of another column at the same times.
+    /// Values of a second column of the same file at the same times, SI.
     pub beside: Option<Vec<f64>>,
     /// Rows outside the window.
     pub outside: usize,
     /// Name of the column in the file.
     pub label: String,
-    /// How the file was found to be written, in words.
+    /// Detected format of the file, as text.
     pub format: String,
 }
 
-/// Which column is wanted, and where the model says so.
+/// A requested column, with its keys in the model file.
 pub struct ColumnRequest<'a> {
     /// Number of the experiment.
     pub experiment: usize,
     /// Name of the channel: a key of `columns` and `units`.
     pub name: &'a str,
-    /// What it measures.
+    /// Measured quantity.
     pub kind: Quantity,
     /// The column.
     pub column: &'a ColumnRef,
-    /// Unit that the model gives.
+    /// Unit given in the model file.
     pub unit: Option<&'a Text>,
     /// Another column of the same file, in the same unit, and its key.
     pub beside: Option<(&'a str, &'a str)>,
@@ -54,7 +54,7 @@ fn column_name(id: &ColumnId) -> ColumnName {
     }
 }
 
-/// Reads the wanted column.
+/// Reads the requested column.
 pub fn read(
     file: &ModelFile,
     spec: &ExperimentSpec,
@@ -169,7 +169,7 @@ fn inside(
     }
 }
 
-/// How the files of an experiment are written.
+/// Table format of the files of an experiment, as far as the model gives it.
 fn format(spec: &ExperimentSpec) -> TableFormat {
     let Some(given) = &spec.format else {
         return TableFormat::default();
@@ -190,7 +190,7 @@ fn format(spec: &ExperimentSpec) -> TableFormat {
     }
 }
 
-/// A complaint about the format as an argument is one about its key.
+/// Moves an error about an argument of the format to its key.
 fn about_format(file: &ModelFile, experiment: &str, error: InputError) -> InputError {
     match &error.place {
         crate::error::Location::Argument(name) => {
@@ -283,7 +283,7 @@ fn two_times(file: &ModelFile, experiment: &str) -> InputError {
     .expected("one of the two")
 }
 
-/// First and last time that is used, as the file counts.
+/// First and last time of the window, on the time axis of the file.
 fn window(
     file: &ModelFile,
     experiment: &str,

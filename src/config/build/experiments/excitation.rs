@@ -1,4 +1,4 @@
-//! Force and motion of the base.
+//! Excitation of an experiment: force and base motion.
 
 use super::column_samples::{self, ColumnRequest};
 use crate::config::ModelFile;
@@ -10,14 +10,14 @@ use crate::units::Quantity;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
 
-/// What drives an experiment, as the model gives it.
+/// Excitation of an experiment, as samples or shapes.
 #[derive(Default)]
 pub struct RawExcitation {
     drive: Input,
 }
 
 impl RawExcitation {
-    /// Whether nothing drives it.
+    /// True for a free response.
     pub fn is_empty(&self) -> bool {
         self.drive.force.is_none() && self.drive.base.is_none()
     }
@@ -27,7 +27,7 @@ impl RawExcitation {
         self.drive
     }
 
-    /// Spacing of the samples, where they are equally spaced, s.
+    /// Sampling interval of equally spaced samples, s.
     pub fn spacing(&self) -> Option<f64> {
         let force = match &self.drive.force {
             Some(Waveform::Samples(signal)) => Some(signal),
@@ -48,7 +48,7 @@ impl RawExcitation {
     }
 }
 
-/// Reads what drives experiment `i`.
+/// Reads the excitation of experiment `i`.
 pub fn read(
     file: &ModelFile,
     i: usize,
@@ -154,7 +154,7 @@ fn base(
     Ok(Some(BaseMotion::Displacement(signal)))
 }
 
-/// A column as a signal; it must have no gaps, as what drives a motion acts at all times.
+/// A column as a signal. Refuses missing samples, because an excitation acts at all times.
 fn signal(
     file: &ModelFile,
     spec: &ExperimentSpec,
@@ -162,7 +162,7 @@ fn signal(
     interpolation: Interpolation,
     warnings: &mut Vec<Finding>,
 ) -> Result<Signal, InputError> {
-    // What drives the motion is needed a little beyond the window of the readings.
+    // Interpolation needs samples of the excitation slightly beyond the window of the response.
     let unbounded = ExperimentSpec {
         window: None,
         ..spec.clone()
@@ -189,7 +189,7 @@ fn signal(
     })
 }
 
-/// A force without samples.
+/// A force given by its shape instead of samples.
 pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<ExcitationShape, InputError> {
     let key = format!("{key}.force");
     let Some(shape) = spec.shape else {
@@ -225,7 +225,7 @@ pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Excitation
     })
 }
 
-/// Refuses keys that a shape does not have, the absence of those that it needs, and values that make none.
+/// Refuses unknown and missing keys of a shape, and invalid values.
 fn shape_keys(
     file: &ModelFile,
     key: &str,

@@ -16,7 +16,7 @@ pub(super) struct QuantityColumn<'a> {
     /// Name of the channel: a key of `columns` and `units`.
     pub name: &'a str,
     pub kind: Quantity,
-    /// Unit that the model gives.
+    /// Unit given in the model file.
     pub given: Option<&'a Text>,
     pub table: &'a Table,
     pub index: usize,

@@ -23,7 +23,7 @@ const ALL_ENERGY: f64 = 0.999;
 const STEPS_PER_PERIOD: f64 = 10.0;
 /// A response has decayed if the later half of its samples has less than this share of the energy of the earlier half.
 const AT_REST: f64 = 0.01;
-/// Fewest samples that are halved.
+/// Fewest samples for a comparison of halves.
 const FEWEST_LIVELY: usize = 128;
 /// Most nodes per sample: more only slow down the fit of a coarse record.
 const MOST_PER_READING: usize = 64;

@@ -1,4 +1,4 @@
-//! Channels: readings from columns, with their noise, loss, sensor and filter.
+//! Channels of an experiment: samples from a column, with noise, loss, sensor and filter.
 
 mod noise;
 mod sampling;
@@ -22,19 +22,19 @@ use sampling::{band, decimate, nearly_equal};
 /// Default name of the column of the displacement, for files without `columns`.
 const DISPLACEMENT_COLUMN: &str = "y_m";
 
-/// One channel before it is put on the grid.
+/// A channel before it is placed on the grid.
 pub struct RawChannel {
-    /// What is measured.
+    /// Measured quantity.
     pub kind: ChannelKind,
-    /// s.
+    /// Times, s.
     pub times: Vec<f64>,
-    /// SI.
+    /// Samples, SI.
     pub values: Vec<f64>,
-    /// Spacing of the readings where it is equal and none is missing, s.
+    /// Sampling interval of equally spaced samples without gaps, s.
     pub spacing: Option<f64>,
-    /// First and last time of the rows, with a reading or without, s.
+    /// First and last time of the rows, missing samples included, s.
     pub span: [f64; 2],
-    /// Whether most readings were left out, so that they no longer tell how fine the steps must be.
+    /// True after decimation: the sampling interval then no longer bounds the step.
     pub decimated: bool,
     /// s.
     pub median_spacing: f64,
@@ -49,12 +49,12 @@ pub struct RawChannel {
 }
 
 impl RawChannel {
-    /// Whether its residuals count by their squares.
+    /// True for a quadratic loss.
     pub fn is_squared(&self) -> bool {
         self.loss == Loss::Squares
     }
 
-    /// What a report says about it.
+    /// Notes for reports.
     pub fn note(&self) -> ChannelNote {
         ChannelNote {
             kind: self.kind,
@@ -65,7 +65,7 @@ impl RawChannel {
     }
 }
 
-/// What the model says about one kind of channel.
+/// Settings of the model file for one channel.
 struct Spec<'a> {
     kind: ChannelKind,
     column: Option<&'a ColumnRef>,
@@ -95,7 +95,7 @@ fn spec_of(spec: &ExperimentSpec, kind: ChannelKind) -> Spec<'_> {
     }
 }
 
-/// What the model says of the sensor of a channel.
+/// Settings of the sensor of a channel in the model file.
 pub fn sensor_of(spec: &ExperimentSpec, kind: ChannelKind) -> Option<&SensorSpec> {
     spec_of(spec, kind).sensor
 }
@@ -126,7 +126,7 @@ pub fn read(
     Ok(channels)
 }
 
-/// Whether `columns` names what drives the motion or nothing but the time.
+/// True if `columns` names an excitation, or the time only.
 fn named_something_else(spec: &ExperimentSpec) -> bool {
     let columns = spec.columns.as_ref();
     columns.is_some_and(|c| {
@@ -147,7 +147,7 @@ fn no_channel(file: &ModelFile, i: usize, spec: &ExperimentSpec) -> InputError {
     }
 }
 
-/// Refuses a sigma, a loss or a sensor of a channel that is not read.
+/// Refuses a sigma, a loss or a sensor of a channel without a column.
 fn without_column(
     file: &ModelFile,
     i: usize,
@@ -244,7 +244,7 @@ fn read_one(
     })
 }
 
-/// The rows with a reading; there must be enough of them.
+/// The rows without a missing sample. Refuses too few of them.
 fn present(
     file: &ModelFile,
     column: &str,

@@ -1,4 +1,4 @@
-//! The standard deviation of readings, and the loss of their residuals.
+//! Standard deviation of the samples, and loss of the residuals.
 
 use super::Spec;
 use crate::config::ModelFile;
@@ -11,7 +11,7 @@ use kmcfit_core::internals::record::{Loss, Weighting};
 const HUBER: f64 = 1.345;
 /// Degrees of freedom of Student's t.
 const STUDENT: f64 = 4.0;
-/// First guess of a sigma that is estimated, as a share of the readings' size.
+/// Start value of an estimated sigma relative to the size of the samples.
 const FIRST_SIGMA: f64 = 0.05;
 
 pub(super) fn weighting(
