@@ -60,7 +60,8 @@ impl Override {
 
     /// Parses each text of a list as [`parse`](Self::parse) does.
     ///
-    /// # Errors As there, for the first invalid text.
+    /// # Errors
+    /// As there, for the first invalid text.
     pub fn parse_all(texts: &[String]) -> Result<Vec<Self>, InputError> {
         texts.iter().map(|text| Self::parse(text)).collect()
     }

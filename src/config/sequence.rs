@@ -34,7 +34,8 @@ pub struct Sequence {
 impl Sequence {
     /// Reads a sequence; `None` if the file does not have the key `sequence`, so that it is a model.
     ///
-    /// # Errors When the file cannot be read, or is an invalid sequence.
+    /// # Errors
+    /// When the file cannot be read, or is an invalid sequence.
     pub fn read(path: &Path) -> Result<Option<Self>, InputError> {
         check_path(path)?;
         let text = read_text(path, "a model file or a sequence (YAML)", LONGEST_MODEL)?;

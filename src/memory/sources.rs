@@ -5,10 +5,10 @@ use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What limits the memory of the process.
+/// Limit on the memory of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Limit {
-    /// The memory of the machine that can be had without swapping.
+    /// Memory of the machine that is available without swapping.
     Machine,
     /// The limit on the address space (`RLIMIT_AS`, `ulimit -v`).
     AddressSpace,
@@ -20,7 +20,7 @@ pub enum Limit {
     Assumed,
 }
 
-/// Memory that may be taken, and what limits it; its `Display` states both.
+/// Available memory and its limit; `Display` states both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Available {
     /// Bytes.
@@ -48,7 +48,7 @@ impl fmt::Display for Available {
 }
 
 impl Available {
-    /// The least that any limit leaves, by the files under a root; `None` where there are none.
+    /// The least memory that any limit leaves, by the files under a root; `None` without such files.
     pub(super) fn under(root: &Path) -> Option<Self> {
         let read = |name: &str| fs::read_to_string(root.join(name)).unwrap_or_default();
         let (limits, status) = (read("proc/self/limits"), read("proc/self/status"));
@@ -81,7 +81,7 @@ impl Available {
     }
 }
 
-/// Whether the process has a limit on its address space or data.
+/// True if the process has a limit on its address space or data.
 pub(super) fn has_process_limit(root: &Path) -> bool {
     let limits = fs::read_to_string(root.join("proc/self/limits")).unwrap_or_default();
     let names = ["Max address space", "Max data size"];
@@ -125,7 +125,7 @@ fn directories(cgroup: &str, mountinfo: &str) -> Vec<ControlGroup> {
             _ => continue,
         };
         for (root, mount) in mounts(mountinfo, version) {
-            // A path outside of the mount's root is one of another namespace: its own is the root.
+            // A path outside the mount's root belongs to another namespace, so the root is used.
             let inside = Path::new(path).strip_prefix(&root).unwrap_or(Path::new(""));
             groups.push(ControlGroup {
                 folder: mount.join(inside),
@@ -170,7 +170,7 @@ fn left(root: &Path, group: &ControlGroup) -> Option<u64> {
         let folder = root.join(folder.strip_prefix("/").unwrap_or(folder));
         let read = |name: &str| fs::read_to_string(folder.join(name)).ok();
         let number = |name: &str| read(name)?.trim().parse::<u64>().ok();
-        // Pages of files that were read count as used, but are given back where memory is needed.
+        // Cached file pages count as used, but the system reclaims them when necessary.
         let stat = read("memory.stat").unwrap_or_default();
         let cached = stat.lines().find_map(|line| {
             let (name, bytes) = line.split_once(' ')?;

@@ -45,7 +45,7 @@ impl FittedModel<'_> {
     /// itself. Returns what the writing took.
     ///
     /// # Errors
-    /// What the file system says.
+    /// Errors of the file system.
     pub fn write(
         &self,
         stage: &mut Stage,

@@ -1,4 +1,4 @@
-//! Which column is meant.
+//! Selection of a column by name, with or without its unit, or by number.
 
 use std::fmt;
 
@@ -10,8 +10,8 @@ use crate::text_io::{one_of, quote};
 /// A column, by its name or by its number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ColumnName {
-    /// By name: as it stands in the file or, if that is unambiguous, without the unit that follows
-    /// in brackets or after a slash: `acc` for `acc [m/s²]` or `acc / m/s²`.
+    /// By name: the full header or, if unambiguous, the header without its unit in brackets or after a slash: `acc` for
+    /// `acc [m/s²]` or `acc / m/s²`.
     Name(String),
     /// By number, from 1.
     Number(usize),
@@ -37,7 +37,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// When there is no such column, or the name without its unit is that of several.
+    /// When there is no such column, or several have this name up to their units.
     pub fn find(&self, column: &ColumnName) -> Result<usize, InputError> {
         match column {
             ColumnName::Name(name) => self.find_name(name),
@@ -50,7 +50,7 @@ impl Table {
         }
     }
 
-    /// What a column is called in messages: its name or, without one, its number from 1.
+    /// Label of a column in messages: its name or, without one, its number from 1.
     pub fn label(&self, index: usize) -> String {
         match self.headers().get(index) {
             Some(name) if !name.is_empty() => name.clone(),
@@ -58,8 +58,7 @@ impl Table {
         }
     }
 
-    /// The unit of a column as the file has it, without brackets: from the row of units, or from
-    /// the end of its name.
+    /// The unit of a column as spelt in the file, without brackets: from the row of units, or from the end of its name.
     ///
     /// ```
     /// use kmcfit::tables::Table;
@@ -111,7 +110,7 @@ impl Table {
     }
 }
 
-/// What is expected of a column number.
+/// Valid column numbers, for messages.
 fn numbers(width: usize) -> String {
     match width {
         1 => "the number 1: there is one column".to_owned(),

@@ -1,8 +1,7 @@
-//! What separates the fields of a table, and which of its rows are names, units and data.
+//! Detection of delimiter, decimal sign, and the rows of names, units and data of a table.
 //!
-//! A delimiter is right when it makes numbers: among the first rows those of the most frequent
-//! number of fields are counted, and the delimiter and decimal sign win that make the most numbers
-//! and the least text of them. Where two do equally well, the more usual one wins.
+//! Every pair of delimiter and decimal sign is scored on the first rows that have the most frequent number of fields:
+//! numbers raise the score, text lowers it. The highest score wins; among equal scores, the more common pair.
 
 use std::path::Path;
 
@@ -13,13 +12,13 @@ use super::format::TableFormat;
 use super::rows::CsvText;
 use crate::units::Unit;
 
-/// As much of a file as is looked at, in bytes: some thousand rows, more than any preamble.
+/// Length of the examined beginning of a file, bytes: some thousand rows, more than any preamble.
 const SAMPLE: usize = 1 << 16;
 
-/// Delimiters that are looked for, the usual ones first; the blank stands for runs of blanks.
+/// Delimiters, most common first; a blank denotes runs of blanks.
 const DELIMITERS: [char; 4] = [',', ';', '\t', ' '];
 
-/// Which signs a table is written with, and which of its rows are what.
+/// Delimiter, decimal sign, and rows of names, units and data of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     pub delimiter: char,
@@ -32,7 +31,7 @@ pub struct Layout {
     pub data: usize,
 }
 
-/// Finds out what `format` leaves open.
+/// Detects every property that `format` does not give.
 pub fn detect(path: &Path, text: &str, format: &TableFormat) -> Layout {
     let sample = beginning(text);
     let records = |delimiter| records(path, sample, format, delimiter);
@@ -44,7 +43,7 @@ pub fn detect(path: &Path, text: &str, format: &TableFormat) -> Layout {
         let guessed_comma =
             decimal == ',' && format.decimal.is_none() && format.delimiter.is_none();
         let place = match candidate.width {
-            // Numbers with one comma are rather two columns than decimals of one.
+            // Numbers with one comma are read as two columns rather than as decimal commas in one.
             1 if guessed_comma => continue,
             1 => &mut single,
             _ => &mut best,
@@ -53,7 +52,7 @@ pub fn detect(path: &Path, text: &str, format: &TableFormat) -> Layout {
             *place = Some(candidate);
         }
     }
-    // A single column is what remains, unless the others make hardly any numbers of the file.
+    // A single column is the last choice, unless all other candidates give hardly any numbers.
     let explains = |b: &DialectCandidate| single.as_ref().is_none_or(|s| 2.0 * b.score >= s.score);
     let found = match best.filter(explains) {
         Some(best) => Some(best),
@@ -65,7 +64,7 @@ pub fn detect(path: &Path, text: &str, format: &TableFormat) -> Layout {
     }
 }
 
-/// Delimiters and decimal signs that may be meant.
+/// Candidate delimiters and decimal signs.
 fn signs(format: &TableFormat) -> impl Iterator<Item = (char, char)> + use<> {
     let delimiters = match format.delimiter {
         Some(delimiter) => vec![delimiter],
@@ -104,7 +103,7 @@ fn records(path: &Path, sample: &str, format: &TableFormat, delimiter: char) -> 
     records
 }
 
-/// A table with no row of numbers: its first row has the names, at the delimiter that makes most.
+/// Layout of a table without a row of numbers: names in the first row, at the delimiter that gives the most fields.
 fn without_numbers(
     signs: impl Iterator<Item = (char, char)>,
     records: impl Fn(char) -> Vec<StringRecord>,
@@ -112,7 +111,7 @@ fn without_numbers(
 ) -> Layout {
     let mut widest: Option<(usize, char, char)> = None;
     for (delimiter, decimal) in signs {
-        // Words of a sentence are no columns.
+        // The words of a sentence are not columns.
         let guessed_blank = delimiter == ' ' && format.delimiter.is_none();
         let width = match guessed_blank {
             true => 0,
@@ -135,7 +134,7 @@ fn without_numbers(
     }
 }
 
-/// The rows that one delimiter and decimal sign make.
+/// Rows of a table at one delimiter and decimal sign, with their score.
 struct DialectCandidate {
     delimiter: char,
     decimal: char,
@@ -177,8 +176,8 @@ impl DialectCandidate {
             .map_or(Field::Missing, |text| field::read(text, self.decimal))
     }
 
-    /// The columns that hold numbers rather than text, in the last half of the rows with numbers:
-    /// the first ones may be of the preamble.
+    /// Numeric columns, judged in the last half of the rows with numbers, because the first ones can belong to the
+    /// preamble.
     fn numeric(&self) -> Vec<usize> {
         let bears_numbers = |record: &&StringRecord| {
             record.len() == self.width && FieldCounts::of(record, self.decimal).numbers > 0
@@ -208,7 +207,7 @@ impl DialectCandidate {
                 && fields.all(|f| f != Field::Text)
         };
         let mut data = self.records.iter().position(is_data)?;
-        // Rows before the first good one that begin as data do are data with a mistake.
+        // Rows before the first valid one that begin like data are data with an error.
         let begins_as_data = |record: &StringRecord| {
             let nothing = record.len() == self.width
                 && record
@@ -235,7 +234,7 @@ impl DialectCandidate {
         })
     }
 
-    /// The rows of names and units where the first row is not preamble, and where the data begin.
+    /// Rows of names and units of a table without preamble, and the first data row.
     fn top(
         &self,
         format: &TableFormat,
@@ -253,7 +252,7 @@ impl DialectCandidate {
         )
     }
 
-    /// The rows of names and units before the row `data`, and where the data begin.
+    /// Rows of names and units before the row `data`, and the first data row.
     fn head(&self, format: &TableFormat, data: usize) -> (Option<usize>, Option<usize>, usize) {
         let above = data.checked_sub(1);
         let two_above = data.checked_sub(2);
@@ -276,7 +275,7 @@ impl DialectCandidate {
         }
     }
 
-    /// Whether the row before the data has the column names; else it is text before them.
+    /// True if the row before the data has the column names; else it is preamble.
     fn has_names(&self, row: usize) -> bool {
         let record = &self.records[row];
         if record.len() == self.width {
@@ -289,17 +288,17 @@ impl DialectCandidate {
             return false;
         }
         if record.len() > 1 {
-            // Blanks within names make more of them: rather no names than wrong ones.
+            // Blanks inside names split them, so names separated by blanks are not used.
             return self.delimiter != ' ';
         }
-        // One name over two columns of numbers separated by commas: rather one column with decimal
-        // commas, which must not be read as two.
+        // One name above two columns separated by commas suggests one column with decimal commas, which must not be
+        // read as two.
         let name = record.get(0).unwrap_or_default();
         let is_name = name.chars().all(|c| c.is_alphanumeric() || c == '_');
         self.delimiter == ',' && self.width == 2 && is_name
     }
 
-    /// Whether the one row has names, and the other one units for them.
+    /// True if row `names` has names and row `units` has units for them.
     fn names_and_units(&self, names: usize, units: usize) -> bool {
         let (names, units) = (&self.records[names], &self.records[units]);
         let is_number = |text| matches!(field::read(text, self.decimal), Field::Number(_));
@@ -307,13 +306,13 @@ impl DialectCandidate {
     }
 }
 
-/// Whether all fields are units or empty, and at least one is a unit.
+/// True if all fields are units or empty, and at least one is a unit.
 fn are_units(record: &StringRecord) -> bool {
     let mut texts = record.iter().filter(|text| !matches!(*text, "" | "-"));
     record.iter().any(Unit::looks_like) && texts.all(Unit::looks_like)
 }
 
-/// The fields of one row.
+/// Numbers of numeric and other fields of a row.
 struct FieldCounts {
     numbers: usize,
     others: usize,
@@ -335,7 +334,7 @@ impl FieldCounts {
         count
     }
 
-    /// Many numbers among little else; a missing reading tells nothing.
+    /// Score of a row: increases with numbers, decreases with text, unaffected by missing samples.
     fn score(&self) -> f64 {
         match self.numbers {
             0 => 0.0,

@@ -1,4 +1,4 @@
-//! Bytes of a table as text: instruments write more encodings than UTF-8.
+//! Decoding of the bytes of a table: UTF-8, UTF-16, or Windows-1252.
 
 use std::fmt;
 use std::path::Path;
@@ -7,14 +7,14 @@ use encoding_rs::{UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 use crate::error::InputError;
 
-/// How the letters of a file were written.
+/// Character encoding of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
-    /// UTF-8, with or without a byte order mark; ASCII is a part of it.
+    /// UTF-8, with or without a byte order mark; includes ASCII.
     Utf8,
     /// UTF-16 with a byte order mark.
     Utf16,
-    /// Windows-1252, of which Latin-1 is a part: what is not UTF-8 is taken for it.
+    /// Windows-1252, assumed for bytes that are not UTF-8; includes the letters of Latin-1.
     Windows1252,
 }
 
@@ -28,11 +28,11 @@ impl fmt::Display for Encoding {
     }
 }
 
-/// The text that the bytes mean, without a byte order mark.
+/// Decodes bytes; removes the byte order mark.
 ///
 /// # Errors
 ///
-/// When the bytes are no text: broken UTF-16, or a zero byte, which no table has.
+/// When the bytes are not text: invalid UTF-16, or a zero byte.
 pub fn decode(path: &Path, bytes: Vec<u8>) -> Result<(String, Encoding), InputError> {
     for (mark, encoding) in [([0xff, 0xfe], UTF_16LE), ([0xfe, 0xff], UTF_16BE)] {
         if bytes.starts_with(&mark) {

@@ -1,29 +1,28 @@
-//! One field of a table: a number, a missing reading, or neither.
+//! Parsing of one field of a table: a number, a missing sample, or text.
 
 use crate::error::{InputError, Location};
 use crate::text_io::quote;
 
-/// What stands for a missing reading, in small letters; also an empty field.
+/// Markers of a missing sample, in lower case; an empty field is one as well.
 const MISSING: [&str; 7] = ["nan", "na", "n/a", "-", "null", "#n/a", "--"];
 
-/// Longest field that is compared with the words for missing readings, or is a number with a
-/// decimal comma, in bytes.
+/// Longest field that is compared with the markers or read with a decimal comma, bytes.
 const LONGEST: usize = 64;
 
-/// What a field says.
+/// Content of a field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Field {
     /// A finite number.
     Number(f64),
-    /// A number beyond the largest, or a word for it.
+    /// Infinity, or a number beyond the largest.
     Infinite,
-    /// A missing reading.
+    /// A missing sample.
     Missing,
     /// Text.
     Text,
 }
 
-/// Reads a field that is trimmed.
+/// Parses a trimmed field.
 pub fn read(field: &str, decimal: char) -> Field {
     match parse(field, decimal) {
         Some(value) if value.is_finite() => Field::Number(value),
@@ -34,12 +33,12 @@ pub fn read(field: &str, decimal: char) -> Field {
     }
 }
 
-/// A number with this decimal sign, also an infinite one or not-a-number.
+/// Parses a number with this decimal sign, infinities and NaN included.
 fn parse(field: &str, decimal: char) -> Option<f64> {
     if decimal == '.' {
         return field.parse().ok();
     }
-    // With a decimal comma a point would separate thousands, which nothing here does.
+    // With a decimal comma a point would be a thousands separator, which is not supported.
     if field.len() > LONGEST || field.contains('.') || field.ends_with(',') {
         return None;
     }
@@ -101,7 +100,7 @@ fn wrong(place: Location, problem: &str, field: &str, decimal: char) -> InputErr
     }
 }
 
-/// Whether it looks like a date or a time of day, as `12:00:01.5`, `2026-03-01T12:00` or `1.3.2026`.
+/// True for a date or a time of day such as `12:00:01.5`, `2026-03-01T12:00` or `1.3.2026`.
 fn is_clock(field: &str) -> bool {
     let belongs = |c: char| c.is_ascii_digit() || ":-/., TZ+".contains(c);
     let signs = |sign: char| field.chars().filter(|c| *c == sign).count();

@@ -1,4 +1,4 @@
-//! How a table is written: what its reader says of it, and what was detected.
+//! Format of a table: given properties, and detected ones.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use super::encoding::Encoding;
 use crate::error::InputError;
 use crate::text_io::quote;
 
-/// How a table is written; what is `None` is detected.
+/// Format of a table; properties that are `None` are detected.
 ///
 /// ```
 /// use kmcfit::tables::{Table, TableFormat};
@@ -22,21 +22,20 @@ use crate::text_io::quote;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TableFormat {
-    /// What separates the fields: a sign as `,`, `;`, `|` or a tab; a blank stands for runs of
-    /// blanks and tabs.
+    /// Delimiter of the fields: a character such as `,`, `;`, `|` or a tab; a blank denotes runs of blanks and tabs.
     pub delimiter: Option<char>,
     /// The decimal sign, `.` or `,`.
     pub decimal: Option<char>,
-    /// Lines of the file, of whatever kind, before the column names or, without names, the data.
+    /// Number of lines before the column names or, without names, before the data.
     pub skip: Option<usize>,
-    /// Whether there is a row of column names.
+    /// True with a row of column names.
     pub header: Option<bool>,
-    /// Whether a row of units follows the names.
+    /// True if a row of units follows the names.
     pub units_row: Option<bool>,
 }
 
 impl TableFormat {
-    /// Refuses signs that cannot be what they are said to be.
+    /// Refuses invalid delimiters and decimal signs.
     pub(super) fn check(&self) -> Result<(), InputError> {
         if let Some(sign) = self.decimal
             && !matches!(sign, '.' | ',')
@@ -70,17 +69,16 @@ impl TableFormat {
     }
 }
 
-/// How a table was found to be written; its `Display` says it in words.
+/// Detected format of a table; `Display` gives it as text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Detected {
-    /// How the letters are written.
+    /// Character encoding.
     pub encoding: Encoding,
-    /// What separates the fields; a blank stands for runs of blanks and tabs.
+    /// Delimiter of the fields; a blank denotes runs of blanks and tabs.
     pub delimiter: char,
     /// The decimal sign, `.` or `,`.
     pub decimal: char,
-    /// Lines before the column names, or before the data where there are no names: preamble,
-    /// comments and blank lines.
+    /// Number of lines before the column names or, without names, before the data: preamble, comments and blank lines.
     pub skipped: usize,
     /// Line of the column names, from 1, if there are any.
     pub header: Option<usize>,

@@ -1,5 +1,4 @@
-//! Tables of readings: text files as instruments write them, what their times must be like, and
-//! reading between them.
+//! Tables of samples: reading of text files as data loggers write them, checks of their times, and resampling.
 
 mod columns;
 mod detect;

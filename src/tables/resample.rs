@@ -1,7 +1,7 @@
-//! Values between equally spaced readings.
+//! Resampling of equally spaced samples.
 
-/// `values` at `count` equally spaced places from the first to the last, by cubic polynomials
-/// through the four nearest readings; error of order 4 in the spacing.
+/// Interpolates `values` at `count` equally spaced points from the first to the last sample, by cubic polynomials
+/// through the four nearest samples; error of order 4 in the spacing.
 ///
 /// # Panics
 /// If there are fewer than two values or places.

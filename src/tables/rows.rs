@@ -1,4 +1,4 @@
-//! The rows of a text with their lines: no comments, no blank lines.
+//! Iteration over the rows of a text with their line numbers, without comments and blank lines.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -7,7 +7,7 @@ use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::error::InputError;
 
-/// A text as the csv crate reads it: what the delimiters and line ends of instruments become.
+/// A text prepared for the csv crate: runs of blanks replaced by tabs, leading lines removed.
 pub struct CsvText<'a> {
     text: Cow<'a, str>,
     delimiter: u8,
@@ -15,7 +15,7 @@ pub struct CsvText<'a> {
 }
 
 impl<'a> CsvText<'a> {
-    /// The text after `skip` lines; a blank as the delimiter stands for runs of blanks and tabs.
+    /// The text after `skip` lines; a blank as delimiter denotes runs of blanks and tabs.
     pub fn new(text: &'a str, skip: usize, delimiter: char) -> Self {
         let rest = after_lines(text, skip);
         let (text, delimiter) = match delimiter {
@@ -29,7 +29,7 @@ impl<'a> CsvText<'a> {
         }
     }
 
-    /// Its rows; `path` is what messages call it.
+    /// Its rows; messages name `path`.
     pub fn rows(&'a self, path: &'a Path) -> TableRows<'a> {
         let records = ReaderBuilder::new()
             .has_headers(false)
@@ -48,8 +48,7 @@ impl<'a> CsvText<'a> {
     }
 }
 
-/// Line ends that the csv crate understands: to it a comment ends at `\n` only, so that one would
-/// swallow the rest of a file of old, with `\r` alone.
+/// Replaces line ends `\r` by `\n`: for the csv crate a comment ends at `\n` only.
 pub fn with_newlines(text: String) -> String {
     match text.contains('\r') && !text.contains('\n') {
         true => text.replace('\r', "\n"),
@@ -57,7 +56,7 @@ pub fn with_newlines(text: String) -> String {
     }
 }
 
-/// What comes after so many lines.
+/// The text after the first `lines` lines.
 fn after_lines(text: &str, lines: usize) -> &str {
     let Some(last) = lines.checked_sub(1) else {
         return text;
@@ -68,7 +67,7 @@ fn after_lines(text: &str, lines: usize) -> &str {
     }
 }
 
-/// Each run of blanks and tabs outside quotes becomes one tab; none is left at the ends of a line.
+/// Replaces each run of blanks and tabs outside quotes by one tab, and removes those at the ends of lines.
 fn runs_to_tabs(text: &str) -> String {
     let mut tabbed = String::with_capacity(text.len());
     let (mut quoted, mut run, mut begun) = (false, false, false);
@@ -92,7 +91,7 @@ fn runs_to_tabs(text: &str) -> String {
     tabbed
 }
 
-/// Reads row after row.
+/// Rows of a table.
 pub struct TableRows<'a> {
     path: &'a Path,
     text: &'a str,
@@ -102,7 +101,7 @@ pub struct TableRows<'a> {
 }
 
 impl TableRows<'_> {
-    /// Reads the next row into `record` and gives its line; `None` at the end.
+    /// Reads the next row into `record` and returns its line number; `None` at the end.
     pub fn read(&mut self, record: &mut StringRecord) -> Result<Option<usize>, InputError> {
         loop {
             let more = self.records.read_record(record).map_err(|error| {

@@ -1,5 +1,4 @@
-//! The units that a table states: in its row of units, in brackets behind a column's name, and at the
-//! end of the name.
+//! Units stated by a table: in its row of units, in brackets after a column's name, and at the end of the name.
 
 use super::Table;
 use super::columns::split_unit;
@@ -7,30 +6,30 @@ use crate::error::InputError;
 use crate::text_io::quote;
 use crate::units::{Quantity, Unit, unbracketed};
 
-/// What a table states as the unit of one column.
+/// Unit of one column as stated by a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StatedUnit<'a> {
     /// The field in the row of units, without brackets.
     row: Option<&'a str>,
-    /// The text in brackets or behind a slash that follows the name.
+    /// The text in brackets or after a slash that follows the name.
     header: Option<&'a str>,
-    /// The name without that.
+    /// The name without this text.
     name: &'a str,
 }
 
 impl<'a> StatedUnit<'a> {
-    /// The text that states the unit: the field in the row of units, else the one behind the name.
+    /// The text that states the unit: the field in the row of units, else the text after the name.
     pub fn text(&self) -> Option<&'a str> {
         self.row.or(self.header)
     }
 
-    /// The unit of this kind that the row of units or the text behind the name states.
+    /// The unit of this quantity in the row of units or after the name.
     pub fn explicit(&self, kind: Quantity) -> Option<Unit> {
         let unit = |text: Option<&str>| Unit::recognise(kind, text?);
         unit(self.row).or_else(|| unit(self.header))
     }
 
-    /// The unit of this kind at the end of the name, as in `y_mm` and `a_m_per_s2`.
+    /// The unit of this quantity at the end of the name, as in `y_mm` and `a_m_per_s2`.
     pub fn suffix(&self, kind: Quantity) -> Option<Unit> {
         self.name.match_indices('_').find_map(|(at, _)| {
             let end = &self.name[at + 1..];
@@ -38,7 +37,7 @@ impl<'a> StatedUnit<'a> {
         })
     }
 
-    /// Whether row and name state units of which no kind has both as one.
+    /// True if the row of units and the name state different units for every quantity.
     fn is_contradiction(&self) -> bool {
         let (Some(row), Some(header)) = (self.row, self.header) else {
             return false;
@@ -52,12 +51,12 @@ impl<'a> StatedUnit<'a> {
 }
 
 impl Table {
-    /// What the table states as the unit of a column.
+    /// The stated unit of a column.
     pub fn stated_unit(&self, index: usize) -> StatedUnit<'_> {
         let (name, header) = split_unit(self.headers().get(index).map_or("", String::as_str));
         let row = self.units_row().get(index).map(|text| unbracketed(text));
         StatedUnit {
-            // A dash stands for no unit.
+            // A dash denotes no unit.
             row: row.filter(|text| !matches!(*text, "" | "-")),
             header,
             name,

@@ -1,4 +1,4 @@
-//! A table in a text file, as people and instruments write it.
+//! A table of numeric columns, parsed from a text file.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -14,20 +14,20 @@ use super::table_memory::TableMemory;
 use crate::error::{InputError, Location};
 use crate::text_io::{LONGEST_TABLE, check_lines, listed, quote, read_bytes, read_bytes_from};
 
-/// Most columns: each takes some hundred bytes, whatever its fields take.
+/// Most columns: each takes some hundred bytes beside its fields.
 const MOST_COLUMNS: usize = 10_000;
 
-/// What a table should be, in messages.
+/// Description of a table, for messages.
 const TABLE: &str = "a CSV file with one row of column names and rows of numbers";
 
-/// A file of columns of equal length.
+/// A table: columns of equal length.
 ///
-/// The plain form is comma-separated, one row of column names first. What instruments write is
-/// detected, or told by a [`TableFormat`]: other delimiters, decimal commas, lines of text before
-/// the names, a row of units after them, no names at all, encodings other than UTF-8.
+/// The plain form is comma-separated, one row of column names first. Other forms are detected, or given by a
+/// [`TableFormat`]: other delimiters, decimal commas, lines of text before the names, a row of units after them, no
+/// names, encodings other than UTF-8.
 ///
-/// Lines that begin with `#` and blank lines do not count; spaces around a field, a byte order mark
-/// and the line ends of any system do no harm. A column that is never asked for may hold text.
+/// Lines that begin with `#`, blank lines, spaces around a field and a byte order mark are ignored; the line ends of
+/// any system are accepted. A column that is not used may hold text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     path: PathBuf,
@@ -38,38 +38,37 @@ pub struct Table {
     lines: Vec<usize>,
 }
 
-/// The readings of a column, NaN where one is missing, up to the first field that is none.
+/// Samples of a column, NaN if missing, up to the first invalid field.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct ColumnValues {
     readings: Vec<f64>,
     /// The first field that is not a finite number.
     unnumbered: Option<InputError>,
-    /// The first field that is neither that nor missing.
+    /// The first field that is neither a finite number nor missing.
     unreadable: Option<InputError>,
 }
 
 impl Table {
-    /// Reads a table from a file; how it is written is detected.
+    /// Reads a table from a file; its format is detected.
     ///
     /// # Errors
     ///
-    /// When no such file, it is not text, or [`parse`](Self::parse) finds a mistake.
+    /// When there is no such file, it is not text, or [`parse`](Self::parse) fails.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
         Self::read_with(path, &TableFormat::default())
     }
 
-    /// Reads a table from a file that is written in this way.
+    /// Reads a table of a given format from a file.
     ///
     /// # Errors
     ///
-    /// When no such file, it is not text, or [`parse_with`](Self::parse_with) finds a
-    /// mistake.
+    /// When there is no such file, it is not text, or [`parse_with`](Self::parse_with) fails.
     pub fn read_with(path: impl AsRef<Path>, format: &TableFormat) -> Result<Self, InputError> {
         let path = path.as_ref();
         Self::from_bytes(path, read_bytes(path, TABLE, LONGEST_TABLE)?, format)
     }
 
-    /// Reads a table from a reader; `path` is what messages call it.
+    /// Parses a table; messages name `path`.
     ///
     /// ```
     /// use kmcfit::tables::Table;
@@ -81,16 +80,16 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// When it is not text, has no rows, rows of different length, or two columns of one name.
+    /// When it is not text, has no rows, rows of different length, or two columns with the same name.
     pub fn parse(path: impl AsRef<Path>, reader: impl Read) -> Result<Self, InputError> {
         Self::parse_with(path, reader, &TableFormat::default())
     }
 
-    /// Reads a table that is written in this way from a reader; `path` is what messages call it.
+    /// Parses a table of a given format; messages name `path`.
     ///
     /// # Errors
     ///
-    /// As [`parse`](Self::parse), and when the format asks for signs that cannot be.
+    /// As [`parse`](Self::parse), and when the format has an invalid delimiter or decimal sign.
     pub fn parse_with(
         path: impl AsRef<Path>,
         reader: impl Read,
@@ -100,12 +99,12 @@ impl Table {
         Self::from_bytes(path, read_bytes_from(path, reader, LONGEST_TABLE)?, format)
     }
 
-    /// The file, as it was given.
+    /// The path, as given.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// How the file was found to be written.
+    /// The detected format.
     pub fn format(&self) -> &Detected {
         &self.format
     }
@@ -157,8 +156,8 @@ impl Table {
         }
     }
 
-    /// The readings of a column, by its index from 0: NaN where one is missing, that is where the
-    /// field is empty, `NaN`, `NA`, `N/A`, `#N/A`, `null`, `-` or `--`.
+    /// The samples of a column, by its index from 0; NaN for a missing sample: a field that is empty, `NaN`, `NA`,
+    /// `N/A`, `#N/A`, `null`, `-` or `--`.
     ///
     /// ```
     /// use kmcfit::tables::Table;
@@ -171,8 +170,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// When one of its fields is anything else than that or a finite number, or there is no such
-    /// column.
+    /// When one of its fields is neither a finite number nor missing, or there is no such column.
     pub fn readings(&self, index: usize) -> Result<&[f64], InputError> {
         let column = self.at(index)?;
         match &column.unreadable {
@@ -181,7 +179,7 @@ impl Table {
         }
     }
 
-    /// The place of a data row, counted from 0, for errors about it.
+    /// Location of a data row, counted from 0, for errors.
     pub fn place(&self, row: usize, column: Option<&str>) -> Location {
         Location::Row {
             file: self.path.clone(),
@@ -266,7 +264,7 @@ impl Table {
         }
     }
 
-    /// Adds a data row; a field that is not a number makes its column unusable.
+    /// Adds a data row. A field that is not a number makes its column unusable.
     fn push(
         &mut self,
         line: usize,
@@ -280,7 +278,7 @@ impl Table {
             let width = layout.width.unwrap_or(fields.len());
             self.columns = columns(width, room)?;
         }
-        // Some instruments end every row of data, but not the names, with a delimiter.
+        // Some loggers end every row of data, but not the row of names, with a delimiter.
         let width = self.columns.len();
         let ended = layout.width == Some(width + 1) && fields.get(width) == Some("");
         if fields.len() != width + usize::from(ended) {
@@ -314,7 +312,7 @@ impl Table {
     }
 }
 
-/// So many columns with room for the values of all rows.
+/// Allocates the columns with capacity for all rows.
 fn columns(width: usize, room: TableMemory) -> Result<Vec<ColumnValues>, InputError> {
     let column = |_| {
         Ok(ColumnValues {
@@ -325,7 +323,7 @@ fn columns(width: usize, room: TableMemory) -> Result<Vec<ColumnValues>, InputEr
     (0..width).map(column).collect()
 }
 
-/// The error for a file without rows after the lines that are skipped.
+/// The error for a file without rows after the skipped lines.
 fn empty(path: &Path, skipped: usize) -> InputError {
     let error = InputError::file(path, "the file is empty").expected(TABLE);
     match skipped {
@@ -334,7 +332,7 @@ fn empty(path: &Path, skipped: usize) -> InputError {
     }
 }
 
-/// A row with more fields than any table has.
+/// Refuses a row with more than [`MOST_COLUMNS`] fields.
 fn check_width(path: &Path, line: usize, fields: usize) -> Result<(), InputError> {
     if fields <= MOST_COLUMNS {
         return Ok(());
@@ -346,7 +344,7 @@ fn check_width(path: &Path, line: usize, fields: usize) -> Result<(), InputError
     )
 }
 
-/// Column names: each once, and not all numbers.
+/// Refuses repeated column names, and a row of names that are all numbers.
 fn check_headers(
     path: &Path,
     line: usize,
@@ -372,7 +370,7 @@ fn check_headers(
     Ok(())
 }
 
-/// A row with more or fewer fields than there are columns.
+/// The error for a row with more or fewer fields than there are columns.
 fn ragged(place: Location, fields: &StringRecord, expected: usize, named: bool) -> InputError {
     let plural = |n: usize| match n {
         1 => "1 field".to_owned(),

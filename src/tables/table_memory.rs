@@ -1,15 +1,15 @@
-//! Memory for the values of a table, asked for before it is taken.
+//! Upper estimate of the memory of a table, checked against the available memory before allocation.
 
 use crate::error::InputError;
 use crate::memory;
 use std::path::Path;
 
-/// Numbers for each row beside its fields: its line, and the times and samples of the record that are
-/// made of the table while it is there. Reading a record of a million rows with two columns was measured
-/// to take 107 bytes for each row, its text included; a third more is for what the allocator cannot use.
+/// Numbers stored for each row beside its fields: its line, and the times and samples of the record made from the
+/// table. Measured: 107 bytes per row, text included, for a record of a million rows with two columns; one third is
+/// added for losses of the allocator.
 const BESIDE: usize = 14;
 
-/// How many rows the values of a text can have.
+/// Bounds on the number of rows of a text.
 #[derive(Debug, Clone, Copy)]
 pub struct TableMemory<'a> {
     path: &'a Path,
@@ -18,7 +18,7 @@ pub struct TableMemory<'a> {
 }
 
 impl<'a> TableMemory<'a> {
-    /// The room that a text needs; `path` is what messages call it.
+    /// Bounds for a text; messages name `path`.
     pub fn of(path: &'a Path, text: &str) -> Self {
         let ends = text.bytes().filter(|byte| *byte == b'\n');
         Self {
@@ -28,25 +28,25 @@ impl<'a> TableMemory<'a> {
         }
     }
 
-    /// Most rows of so many fields: each takes at least its delimiters and its line end.
+    /// Most rows with `width` fields: each takes at least its delimiters and its line end.
     fn rows(&self, width: usize) -> usize {
         self.lines.min(self.bytes / width.max(1) + 1)
     }
 
-    /// Refuses a table of so many columns whose values do not fit into memory.
+    /// Refuses a table with `width` columns that exceeds the available memory.
     ///
     /// # Errors
-    /// With what it may need and what is available.
+    /// With the needed and the available memory.
     pub fn check(&self, width: usize) -> Result<(), InputError> {
         let numbers = self.rows(width).saturating_mul(width + BESIDE);
         let bytes = numbers.saturating_mul(size_of::<f64>());
         memory::check_file(self.path, bytes as u64)
     }
 
-    /// An empty list with room for a value of each row of so many fields.
+    /// An empty list with capacity for one value of each row with `width` fields.
     ///
     /// # Errors
-    /// When the system has no such memory.
+    /// When the allocation fails.
     pub fn list<T>(&self, width: usize) -> Result<Vec<T>, InputError> {
         let mut list = Vec::new();
         let rows = self.rows(width);

@@ -1,23 +1,23 @@
-//! What the times of readings must be like: increasing, and for some purposes equally spaced.
+//! Checks of the times of a table: strictly increasing, and equally spaced where required.
 
 use super::Table;
 use crate::error::InputError;
 use kmcfit_core::internals::signal::median;
 
-/// How far a spacing may be from the step, and a time from its place, as a part of the step.
+/// Largest deviation of a spacing from the step, and of a time from `t_0 + i dt`, relative to the step.
 ///
-/// Times that were computed as i·dt in double precision differ from equal spacing by some 1e-16 T,
-/// which is below 1e-10 of a step for up to a million readings; this leaves room for times
-/// printed with nine or more digits, and is far below what moves a reading noticeably.
+/// Times computed as i·dt in double precision deviate from equal spacing by some 1e-16 T, below 1e-10 of a step for up
+/// to a million samples. The tolerance accepts times printed with nine or more digits, and its effect on a sample is
+/// negligible.
 pub const SPACING_TOLERANCE: f64 = 1e-6;
 
 /// Sampling rates that are accepted, Hz.
 ///
-/// From one sample in 30,000 years to one in a picosecond: no motion is measured outside of that, and
-/// times, their squares and their reciprocals stay far from overflow and underflow.
+/// From one sample in 30,000 years to one in a picosecond, so that times, their squares and their reciprocals stay far
+/// from overflow and underflow.
 pub const SAMPLE_RATES: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
 
-/// A spacing that is off by less than this part of the step looks like rounding.
+/// Deviation of a spacing, relative to the step, below which it is attributed to rounding.
 const ROUNDED: f64 = 0.05;
 
 /// The times in a column, strictly increasing.
@@ -44,8 +44,8 @@ pub fn increasing_at(table: &Table, index: usize) -> Result<&[f64], InputError> 
 
 /// The step dt, in the unit of the column, of times t_i = t_0 + i dt.
 ///
-/// The step is the mean spacing, (t_last - t_0)/(rows - 1). The rows are compared with the median
-/// spacing, so that a single gap is reported where it is.
+/// The step is the mean spacing, (t_last - t_0)/(rows - 1). Spacings are compared with their median, so that a single
+/// gap is reported at its row.
 ///
 /// # Errors
 ///
@@ -102,7 +102,7 @@ pub fn equally_spaced_at(table: &Table, index: usize) -> Result<f64, InputError>
     }
 }
 
-/// The step, if every time is where it should be: small differences of spacing must not add up.
+/// The step, if every time agrees with `t_0 + i dt`: small deviations of the spacing must not add up.
 fn in_place(table: &Table, column: &str, times: &[f64], step: f64) -> Result<f64, InputError> {
     let place = |i: usize| times[0] + i as f64 * step;
     let astray = |i: &usize| (times[*i] - place(*i)).abs() > SPACING_TOLERANCE * step;
@@ -133,7 +133,7 @@ fn not_increasing(table: &Table, column: &str, times: &[f64], row: usize) -> Inp
         .expected(format!("a time greater than {before}"))
 }
 
-/// A spacing without the last digits, which are rounding of the difference.
+/// A spacing without the last digits, which are rounding errors of the difference.
 fn spacing(value: f64) -> f64 {
     format!("{value:.9e}").parse().unwrap_or(value)
 }

@@ -40,8 +40,8 @@ pub struct Scaffold {
 /// A model file for the table at `csv`, under the name `data`. `sample_rate` is the sampling rate in Hz of a table
 /// without a column of times.
 ///
-/// # Errors When the table cannot be read, has no times or no measured response, or a column cannot be converted to
-/// samples.
+/// # Errors
+/// When the table cannot be read, has no times or no measured response, or a column cannot be converted to samples.
 pub fn scaffold(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Scaffold, InputError> {
     let table = Table::read(csv)?;
     memory::check_file(csv, table.rows() as u64 * PER_ROW)?;

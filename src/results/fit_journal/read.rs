@@ -1,4 +1,4 @@
-//! Reading the journal and checkpoint of a fit that did not come to its end.
+//! Reading the journal and checkpoint of an unfinished fit.
 
 use super::{Entry, JournalLine};
 use crate::error::InputError;
@@ -15,26 +15,26 @@ pub(super) struct JournalReader {
     pub text: JournalText,
 }
 
-/// What a journal and its checkpoint hold.
+/// Contents of a journal and its checkpoint.
 #[derive(Debug, Default)]
 pub(super) struct JournalContents {
     pub units: BTreeMap<u64, JournalUnit>,
-    /// Where the running search stood, and which unit it was.
+    /// Number of the unfinished unit and its state.
     pub standing: Option<(u64, SolverState)>,
-    /// Where the unit that is at work begins.
+    /// Begin of the unfinished unit.
     pub begin: JournalPosition,
-    /// The end of what was recalled; `None` when all of it was.
+    /// End of the recalled part; `None` for all of it.
     pub end: Option<JournalPosition>,
 }
 
-/// What a journal holds of one unit.
+/// Entries of one unit.
 #[derive(Debug)]
 pub(super) struct JournalUnit {
     pub begin: JournalPosition,
     pub end: JournalPosition,
-    /// What it came to, if it ended.
+    /// Result, if it ended.
     pub kept: Option<CheckpointUnit>,
-    /// The iterations, and where the line of each ends.
+    /// Iterations, each with the end of its line.
     rows: Vec<(IterationRecord, JournalPosition)>,
 }
 
@@ -48,7 +48,7 @@ impl JournalUnit {
         }
     }
 
-    /// Takes a line; whether it can follow those before it.
+    /// Adds an entry; false if it cannot follow the previous ones.
     fn take(&mut self, entry: Entry, end: JournalPosition) -> bool {
         if self.kept.is_some() {
             return false;
@@ -72,7 +72,7 @@ impl JournalUnit {
         true
     }
 
-    /// How a unit that had not ended goes on, and the end of what is of use for it.
+    /// End of the usable entries of an unfinished unit, and the state to continue from.
     pub fn at_work(
         mut self,
         standing: Option<SolverState>,
@@ -102,8 +102,8 @@ impl JournalReader {
         })
     }
 
-    /// What it holds up to the first line that is damaged or does not follow from those before, where that line begins,
-    /// and the checkpoint if it is of this fit.
+    /// Contents up to the first line that is damaged or cannot follow the previous ones, with the checkpoint if it
+    /// belongs to this fit; and the begin of that line.
     pub fn contents(&self) -> (JournalContents, JournalPosition) {
         let mut end = self.text.begin;
         let mut units: BTreeMap<u64, JournalUnit> = BTreeMap::new();
@@ -128,7 +128,7 @@ impl JournalReader {
         (contents, end)
     }
 
-    /// The checkpoint, if it is of this fit and undamaged.
+    /// The checkpoint, if undamaged and of this fit.
     fn standing(&self) -> Option<(u64, SolverState)> {
         let checkpoint = JournalText::read(&self.folder.join(CHECKPOINT), WHAT).ok()?;
         let is_of_this_fit = checkpoint.heading == self.text.heading;
