@@ -1,4 +1,4 @@
-//! A channel beside what a model says of it.
+//! A channel with its prediction: figures and table in the unit of the file.
 
 use super::chart::Figure;
 use super::csv::CsvTable;
@@ -7,7 +7,7 @@ use crate::config::ChannelNote;
 use kmcfit_core::internals::assessment::diagnostics;
 use kmcfit_core::internals::record::Channel;
 
-/// A channel, what the model says of its readings, and how reports speak of it.
+/// A channel, its prediction, and its notes for reports.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ChannelView<'a> {
     pub channel: &'a Channel,
@@ -16,7 +16,7 @@ pub(super) struct ChannelView<'a> {
 }
 
 impl ChannelView<'_> {
-    /// The factor from the unit of the file to that of the SI.
+    /// Factor from the unit of the file to SI.
     pub fn factor(&self) -> f64 {
         self.note.map_or(1.0, |n| n.unit.factor())
     }
@@ -49,13 +49,13 @@ impl ChannelView<'_> {
         format!("{} {}", kind.name(), kind.symbol())
     }
 
-    /// The readings alone.
+    /// Figure of the samples.
     pub fn observation(&self) -> Figure {
         let (label, unit) = (self.label(), self.unit());
         figures::observation(&[(&label, unit, self.channel.times(), &self.observed())])
     }
 
-    /// The readings with what the model says of them, and the residuals.
+    /// Figures of the samples with the prediction, and of the residuals.
     pub fn figures(&self) -> [Figure; 2] {
         let (label, unit) = (self.label(), self.unit());
         let label = (label.as_str(), unit);
@@ -67,7 +67,7 @@ impl ChannelView<'_> {
         ]
     }
 
-    /// The readings beside what the model says of them, in the unit of the file.
+    /// Table of samples and prediction, in the unit of the file.
     pub fn table(&self) -> CsvTable {
         CsvTable::new()
             .column("t_s", self.channel.times().to_vec())

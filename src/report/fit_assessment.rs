@@ -1,4 +1,4 @@
-//! Assessment of a fit and of the records that took no part in it.
+//! Assessment of a fit and of the validation records: statistics, step-size check, bands, predictions.
 
 use super::channel_view::ChannelView;
 use crate::config::{HoldOut, Model};
@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 pub struct RunAssessment {
     /// `None` for the equation error, which simulates no response.
     pub(super) assessment: Option<FitAssessment>,
-    /// The records that took no part.
+    /// Validation records.
     pub(super) validation: Vec<ValidationRecord>,
 }
 
@@ -32,28 +32,29 @@ impl RunAssessment {
         }
     }
 
-    /// Covariance of the parameters, where standard errors are meaningful.
+    /// Covariance of the parameters, if standard errors are meaningful.
     pub(super) fn covariance(&self) -> Option<&DMatrix<f64>> {
         self.assessment.as_ref()?.covariance.as_ref()
     }
 
-    /// Bands of functions and ratios, where standard errors are meaningful.
+    /// Bands of functions and ratios, if standard errors are meaningful.
     pub(super) fn bands(&self) -> Option<&Bands> {
         self.assessment.as_ref()?.bands.as_ref()
     }
 
-    /// The step-size check, where there is a response on the finer grid.
+    /// The step-size check, if there is a response on the finer grid.
     pub(super) fn step_check(&self) -> Option<&StepCheck> {
         self.assessment.as_ref()?.step_check.as_ref().ok()?.as_ref()
     }
 }
 
-/// A record that took no part in the fit, and what the found device says of it.
+/// A validation record and its prediction by the fitted system.
 #[derive(Debug, Clone)]
 pub(super) struct ValidationRecord {
     /// The record.
     pub out: HoldOut,
-    /// The problem of that record alone and its point; what the record leaves open is found from its own readings.
+    /// The problem of this record alone, with the functions fixed, and its evaluation at the optimum of the record's
+    /// own parameters.
     pub found: Result<(Problem, Evaluation), SimulationError>,
 }
 
@@ -71,7 +72,7 @@ impl ValidationRecord {
         }
     }
 
-    /// Its name and the fit of its worst channel, per cent, where the found system does not predict it.
+    /// Its name and the fit of its worst channel, per cent, if the fitted system does not predict it.
     pub fn poor(&self) -> Option<(&str, f64)> {
         let channels = self.channels();
         let fits = channels.iter();
@@ -80,7 +81,7 @@ impl ValidationRecord {
         Some((&self.out.experiment.name, worst))
     }
 
-    /// Its channels; none where there is no motion.
+    /// Its channels; empty without a response.
     pub fn channels(&self) -> Vec<ChannelView<'_>> {
         let Ok((problem, evaluation)) = &self.found else {
             return Vec::new();

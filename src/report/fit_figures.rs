@@ -1,4 +1,4 @@
-//! The figures of a fit, from the run.
+//! The figures of a fit.
 
 use super::FittedModel;
 use super::chart::Figure;
@@ -33,7 +33,7 @@ impl FittedModel<'_> {
             .collect()
     }
 
-    /// A figure of one channel with a name and a title of its own, where there are others.
+    /// Adds experiment and channel to the name and title of a figure, if there are several channels.
     pub(super) fn titled(&self, mut figure: Figure, experiment: usize, channel: usize) -> Figure {
         figure.name += &self.suffix(experiment, channel);
         if self.channels().len() > 1 {
@@ -44,7 +44,7 @@ impl FittedModel<'_> {
         figure
     }
 
-    /// What tells the figures of one channel from those of others.
+    /// Suffix for the names of the figures of one channel.
     fn suffix(&self, experiment: usize, channel: usize) -> String {
         let experiments = &self.model.problem.experiments;
         let number = match experiments.len() {
@@ -60,7 +60,7 @@ impl FittedModel<'_> {
         }
     }
 
-    /// The figures of one channel: readings, readings beside the motion, residuals.
+    /// The figures of one channel: samples, samples with the response, residuals.
     fn channel_figures(&self, experiment: usize, index: usize) -> [Figure; 3] {
         let view = self.channel_view(experiment, index);
         let [beside, residuals] = view.figures();

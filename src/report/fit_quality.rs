@@ -1,4 +1,4 @@
-//! Parts of the result document from the assessment of a fit: channels, scalars, validation records.
+//! Fit quality in the result document: channels, nuisance parameters, validation records.
 
 use super::channel_view::ChannelView;
 use super::document::{ChannelSummary, IgnoredSummary, NuisanceParameter, ValidationSummary};
@@ -46,7 +46,7 @@ pub fn channel(view: &ChannelView) -> ChannelSummary {
     }
 }
 
-/// The scalars of a problem at a point, whose parameters have this covariance where it is known.
+/// The nuisance parameters of a problem at a point, with standard errors from the covariance if available.
 pub fn scalars(
     problem: &Problem,
     evaluation: &Evaluation,
@@ -64,7 +64,7 @@ pub fn scalars(
         .collect()
 }
 
-/// A record that took no part in the fit.
+/// Summary of a validation record.
 pub(super) fn validation(held: &ValidationRecord) -> ValidationSummary {
     let channels = held.channels();
     let summaries = channels.iter().map(channel);

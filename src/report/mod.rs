@@ -1,8 +1,7 @@
-//! What a run leaves behind: tables, figures, and the result document; imported by the cli alone.
+//! Reports of a run: result document, tables, figures, HTML pages and terminal summaries.
 //!
-//! The way from data to picture runs through the files in this order: [`figures`] states what each
-//! standard figure shows, in the data model of [`chart`], which draws it; `page` puts figures and what is said of them into
-//! pages.
+//! [`figures`] builds the standard figures in the data model of [`chart`], which renders them; `page` assembles figures
+//! and text into HTML pages.
 //!
 //! ```
 //! use kmcfit::report::{render, Axis, Colour, Figure, Mark, Panel, Style};

@@ -1,4 +1,4 @@
-//! Tables that a run wrote, read back.
+//! Reading of tables written by a run.
 
 use crate::error::{InputError, Location};
 use crate::memory;
@@ -8,8 +8,7 @@ use std::path::{Path, PathBuf};
 
 const TABLE: &str = "a CSV file with one row of column names and rows of numbers";
 
-/// A table that a run wrote: unlike a user's, it may have no rows and empty fields, and every field
-/// that is not empty is a number.
+/// A table written by a run: every field is a number or empty, and the number of rows can be zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResultTable {
     path: PathBuf,
@@ -31,15 +30,15 @@ impl ResultTable {
         Self::read_rows(path, rows.saturating_sub(1), "row")
     }
 
-    /// Reads a table of so many rows, one per `what`.
+    /// Reads a table with `rows` rows, one per `what`.
     ///
-    /// Line by line: the memory that it takes is that of its values, whatever the length of the file is.
-    /// So every table that a run wrote can be read where the run itself fitted into memory.
+    /// The file is read line by line, so the memory is that of the values, independent of the length of the file: a
+    /// table can be read wherever the run itself fitted into memory.
     ///
     /// # Errors
-    /// If no such file, or a row has another number of fields than the header, or a field that
-    /// is neither empty nor a number; if it has another number of rows, so that it does not belong to the
-    /// result beside it, or was cut off; if its values do not fit into memory.
+    /// If there is no such file; if a row has another number of fields than the header, or a field that is neither
+    /// empty nor a number; if the number of rows differs, so that the table is truncated or belongs to another result;
+    /// if its values do not fit into memory.
     pub fn read_rows(path: &Path, rows: usize, what: &str) -> Result<Self, InputError> {
         let (file, length) = open(path, TABLE)?;
         let mut lines = Lines::new(path, file);
@@ -51,7 +50,7 @@ impl ResultTable {
         let mut columns = reserved(path, headers.len(), rows, length)?;
         let mut count = 0;
         while let Some(line) = lines.next()? {
-            // The rest is only counted.
+            // Further rows are only counted.
             if count < rows {
                 take(path, count, line, &headers, &mut columns)?;
             }
@@ -81,16 +80,16 @@ impl ResultTable {
         self.columns.first().map_or(0, Vec::len)
     }
 
-    /// A column, not a number where a field is empty; `None` where there is no such column.
+    /// A column, NaN for an empty field; `None` if there is no such column.
     pub fn column(&self, name: &str) -> Option<Vec<f64>> {
         let index = self.headers.iter().position(|h| h == name)?;
         Some(self.columns[index].clone())
     }
 
-    /// A column that must be there.
+    /// A required column.
     ///
     /// # Errors
-    /// If it is not.
+    /// If it is missing.
     pub fn required(&self, name: &str) -> Result<Vec<f64>, InputError> {
         self.column(name).ok_or_else(|| {
             let names = || self.headers.iter().map(String::as_str);
@@ -100,10 +99,10 @@ impl ResultTable {
         })
     }
 
-    /// A column that must be there, with a finite number in every row.
+    /// A required column with a finite number in every row.
     ///
     /// # Errors
-    /// If it is not, or has another value.
+    /// If it is missing, or has another value.
     pub fn finite(&self, name: &str) -> Result<Vec<f64>, InputError> {
         let values = self.required(name)?;
         match values.iter().position(|v| !v.is_finite()) {
@@ -121,7 +120,7 @@ impl ResultTable {
     }
 }
 
-/// Empty columns with room for so many rows, of which a file of this length has no more than bytes.
+/// Empty columns with capacity for `rows` rows, at most the number that a file of this length can have.
 fn reserved(
     path: &Path,
     width: usize,
@@ -144,7 +143,7 @@ fn reserved(
     Ok(columns)
 }
 
-/// Adds the fields of a line, the row of this number from 0, to the columns.
+/// Adds the fields of a line, row `row` from 0, to the columns.
 fn take(
     path: &Path,
     row: usize,

@@ -1,4 +1,4 @@
-//! What a fit leaves behind: tables, figures and the result document.
+//! Output of a fit: the result document, tables, figures and the page.
 
 use super::channel_view::ChannelView;
 use super::cost::{CostKind, cost_definition};
@@ -25,24 +25,24 @@ use kmcfit_core::internals::system::{Excitation, Term};
 use std::io;
 use std::time::Duration;
 
-/// A fitted model and what it predicts.
+/// A fitted model with its predictions and assessment.
 #[derive(Debug, Clone, Copy)]
 pub struct FittedModel<'a> {
-    /// What was fitted.
+    /// Model.
     pub model: &'a Model,
-    /// What was found.
+    /// Result of the fit.
     pub fit: &'a Fit,
-    /// The motion of the found device from other initial states.
+    /// Responses of the fitted system to other initial states.
     pub predictions: &'a [Prediction],
-    /// The path on which the weight of the smoothness was chosen, if by a rule.
+    /// Weight path, if a rule chose the weight of a penalty.
     pub weights: Option<&'a WeightPath>,
     /// Assessment of the fit.
     pub run_assessment: &'a RunAssessment,
 }
 
 impl FittedModel<'_> {
-    /// Writes tables and, if asked for, figures and the page of `document`: all but the result document
-    /// itself. Returns what the writing took.
+    /// Writes tables and, if requested, figures and the page of `document`, but not the result document itself. Returns
+    /// the time taken to render and to write them.
     ///
     /// # Errors
     /// Errors of the file system.
@@ -69,7 +69,7 @@ impl FittedModel<'_> {
         Ok(writing)
     }
 
-    /// The page that people keep, of the run and its document: one HTML file that loads nothing.
+    /// The HTML page of the run: one file without external resources.
     pub fn page(&self, document: &ResultDocument) -> String {
         fit_page(self, document)
     }
@@ -139,7 +139,7 @@ impl FittedModel<'_> {
         document
     }
 
-    /// Whether the fit compares a simulated motion with the readings, and not the equation of motion.
+    /// True if the fit minimises the misfit of a simulated response; false for the equation error.
     pub(super) fn is_simulated(&self) -> bool {
         self.model.settings.solver != Solver::EquationError
     }
@@ -180,7 +180,7 @@ impl FittedModel<'_> {
         let worst = problem
             .constraints
             .largest_violation(&self.fit.best.parameters);
-        // What pushes where is a matter of points that satisfy the constraints.
+        // Multipliers are meaningful only at points that satisfy the constraints.
         let active = match self.fit.outcome.status {
             Status::Infeasible => Vec::new(),
             _ => active_constraints(problem, &self.fit.best),
@@ -233,7 +233,7 @@ impl FittedModel<'_> {
         })
     }
 
-    /// All functions with what they are and what they are called, those of single experiments last.
+    /// All coefficient functions with their nodal values, those of single experiments last.
     pub(super) fn named_functions(&self) -> Vec<(&CoefficientFunction, Vec<f64>)> {
         let functions = &self.model.problem.functions;
         let values = functions.values(&self.fit.best.parameters);
@@ -268,7 +268,7 @@ impl FittedModel<'_> {
             .collect()
     }
 
-    /// SI unit of a function: of a rotation if the channels are.
+    /// SI unit of a function, for a rotation if the channels are angles.
     pub(super) fn unit(&self, function: &CoefficientFunction) -> &'static str {
         match self.is_rotation() {
             true => function.quantity.angular_unit(),
@@ -276,13 +276,13 @@ impl FittedModel<'_> {
         }
     }
 
-    /// Whether the channels are those of a rotation.
+    /// True if the channels are angles.
     pub(super) fn is_rotation(&self) -> bool {
         let mut units = self.model.notes.iter().flatten().map(|note| note.unit);
         units.any(|unit| unit.is_angular())
     }
 
-    /// A channel beside what the fit says of it.
+    /// A channel with its prediction.
     pub(super) fn channel_view(&self, experiment: usize, channel: usize) -> ChannelView<'_> {
         ChannelView {
             channel: &self.model.problem.experiments[experiment].channels[channel],
@@ -351,7 +351,7 @@ pub fn fit_claim(model: &Model) -> Claim {
         .journals(&[FIT_JOURNAL, CHECKPOINT])
 }
 
-/// Pretty JSON with a final newline. Numbers that JSON cannot hold become `null`.
+/// Formatted JSON with a final newline. Numbers that JSON cannot represent become `null`.
 pub fn json<T: serde::Serialize>(document: &T) -> String {
     // The documents are plain structs with text keys, which always serialise.
     let mut text = serde_json::to_string_pretty(document).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Reading a finished run back.
+//! Reading of a finished run from its output folder.
 
 use super::document::{FORMAT, ResultDocument};
 use super::result_table::ResultTable;
@@ -15,12 +15,11 @@ use std::path::{Path, PathBuf};
 
 /// Longest result document, bytes.
 const LONGEST_DOCUMENT: u64 = 1 << 26;
-/// Most nodes that a run is believed to have: a hundred GB of memory for a fit with the fewest unknowns.
+/// Most nodes of a run that is accepted: a hundred GB of memory for a fit with the fewest unknowns.
 const MOST_NODES: usize = 1 << 28;
 
-/// Memory for each node of a run that is read, predicted from, compared and drawn, bytes. Measured to be
-/// 210 to 450 with the eleven columns of a run whose truth is known; the rest is for what the allocator
-/// cannot use.
+/// Memory for each node of a run that is read, used for predictions, compared and drawn, bytes. Measured: 210 to 450
+/// with the eleven columns of a run with true coefficients; the rest is for losses of the allocator.
 const PER_NODE: u64 = 600;
 
 /// A finished run, loaded from the folder that `kmcfit fit` wrote it to.
@@ -44,19 +43,19 @@ pub struct Run {
     pub folder: PathBuf,
     /// `result.json`.
     pub document: ResultDocument,
-    /// The same with every key that is there, those of later versions included.
+    /// The result document as JSON, unknown keys of later versions included.
     pub value: Value,
     /// Grid, stepper and terms of the run.
     pub system: System,
-    /// The device that was found.
+    /// Estimated nodal coefficients.
     pub device: NodalCoefficients,
-    /// The true device, where the model named it.
+    /// True nodal coefficients, if the model names them.
     pub truth: Option<NodalCoefficients>,
     /// `history.csv`: one row per iteration.
     pub history: Vec<IterationRecord>,
-    /// `functions.csv`: one row per node; not a number where a field is empty.
+    /// `functions.csv`: one row per node; NaN for an empty field.
     pub functions: ResultTable,
-    /// `trajectory.csv`: one row per node; not a number where a record has ended or was not read.
+    /// `trajectory.csv`: one row per node; NaN beyond the end of a record or without a sample.
     pub trajectory: ResultTable,
 }
 
@@ -96,8 +95,8 @@ impl Run {
         })
     }
 
-    /// Lower and upper end of the 95 % band of a function or ratio at the nodes, by its name (`mass`,
-    /// `k/m`, `damping of shaker`), in its unit; `None` where none was computed.
+    /// Lower and upper end of the 95 % band of a function or ratio at the nodes, by its name (`mass`, `k/m`, `damping
+    /// of shaker`), in its unit; `None` if there is none.
     pub fn band(&self, name: &str) -> Option<[Vec<f64>; 2]> {
         let name = name.replace([' ', '/', ','], "_");
         let end = |side: &str| self.functions.column(&format!("{name}_{side}_95"));
@@ -166,7 +165,7 @@ fn document(folder: &Path, value: &Value) -> Result<ResultDocument, InputError> 
     if value.get("model").is_none()
         && let Some(reason) = value.pointer("/outcome/reason").and_then(|r| r.as_str())
     {
-        // Written by a run that could not begin: its outcome is all there is.
+        // A run that failed before the fit wrote its outcome only.
         return Err(
             InputError::file(&path, "this run failed and has no estimates")
                 .found(reason)
@@ -199,7 +198,7 @@ fn history(folder: &Path, iterations: u64) -> Result<Vec<IterationRecord>, Input
         .collect())
 }
 
-/// The mass and the functions of the terms `quantities`, which are finite at every node.
+/// The mass and the functions of the terms `quantities`; refuses values that are not finite.
 fn device(
     table: &ResultTable,
     prefix: &str,

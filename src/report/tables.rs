@@ -85,7 +85,7 @@ impl FittedModel<'_> {
                 true => format!("{column}_{}", i + 1),
                 false => column.to_string(),
             };
-            // A record may end before the grid does.
+            // A record can end before the grid.
             let full = |values: &[f64]| {
                 let mut values = values.to_vec();
                 values.resize(problem.system.grid.nodes(), f64::NAN);
@@ -107,8 +107,8 @@ impl FittedModel<'_> {
         table
     }
 
-    /// The readings of each channel beside what the model says of them, in the unit of the file, and
-    /// the names of the tables; those that took no part in the fit last.
+    /// Tables of the samples and predictions of each channel in the unit of the file, with their names; validation
+    /// records last.
     pub(super) fn readings(&self) -> Vec<(String, CsvTable)> {
         let fitted = self.channels().into_iter().map(|(e, c)| {
             let view = self.channel_view(e, c);

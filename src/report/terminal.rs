@@ -1,4 +1,4 @@
-//! Charts of letters: readings against fit, and the functions, for a look in the terminal.
+//! Text charts for the terminal: samples with the fitted response, and the coefficient functions.
 
 use super::document::ResultDocument;
 use super::result_table::ResultTable;
@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// Columns for the numbers beside a chart.
 const MARGIN: usize = 10;
-/// Rows of a chart of readings, and of a function.
+/// Rows of a chart of samples, and of a function.
 const TALL: usize = 10;
 const LOW: usize = 5;
 /// Narrowest and widest chart, in columns.
@@ -130,7 +130,7 @@ impl Chart {
         self.dots[y / 4 * self.width + x / 2] |= BITS[y % 4][x % 2];
     }
 
-    /// Points, seen where the line is not.
+    /// Adds points; the line overdraws them.
     fn points(&mut self, times: &[f64], values: &[f64]) {
         for (t, y) in times.iter().zip(values) {
             if let Some([x, y]) = self.dot(*t, *y) {
@@ -143,7 +143,7 @@ impl Chart {
         let mut text = String::new();
         for row in 0..self.height {
             let label = match row {
-                // A constant lies in the middle.
+                // A constant is drawn in the middle.
                 _ if self.values[0] == self.values[1] => match row == self.height / 2 {
                     true => number(self.values[0]),
                     false => String::new(),

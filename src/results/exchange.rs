@@ -1,10 +1,10 @@
 //! Atomic exchange of the files of an older run for new ones: at every instant one of the two runs is complete.
 //!
 //! 1. All new files are written into a working folder and made durable ([`Stage`]), with a plan of what replaces what.
-//!   The older run is unchanged so far.
+//!    The older run is unchanged so far.
 //! 2. The working folder is renamed to `.kmcfit-exchange`. From this instant the new run is the valid one.
 //! 3. The files move into their places one by one, the replaced ones into the exchange folder. If a move fails, the
-//!   moves before it are undone, which restores the older run.
+//!    moves before it are undone, which restores the older run.
 //! 4. The exchange folder is removed.
 //!
 //! A process that is killed in step 3 leaves the exchange folder with its plan; the next command that opens the output

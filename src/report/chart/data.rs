@@ -1,4 +1,4 @@
-//! The numbers of a figure for the script of the page.
+//! Serialisation of a figure for the script of a page.
 
 use super::figure::Figure;
 use super::plot_mark::{Mark, MarkKind};
@@ -6,14 +6,14 @@ use super::thin::kept;
 use crate::report::text::clean;
 use serde::Serialize;
 
-/// A figure as text that may stand in a script element.
+/// A figure as text for a script element.
 pub(in crate::report) struct Data {
     pub json: String,
-    /// Whether points were left out that could be seen when zoomed.
+    /// True if thinning removed points that would be visible when zoomed.
     pub thinned: bool,
 }
 
-/// The numbers of a figure; the chart begins without the curves of the labels `off`.
+/// Serialises a figure; curves with the labels `off` are initially hidden.
 pub(in crate::report) fn data(figure: &Figure, off: &[&str]) -> Data {
     #[derive(Serialize)]
     struct Chart<'a> {
@@ -51,7 +51,7 @@ pub(in crate::report) fn data(figure: &Figure, off: &[&str]) -> Data {
     }
 }
 
-/// JSON without the letters that could end a script or begin markup; in JSON they only stand in texts.
+/// Escapes the characters of JSON that could end a script or begin markup; they occur only in strings.
 fn inert(json: &str) -> String {
     clean(json)
         .replace('<', "\\u003c")

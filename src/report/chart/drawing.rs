@@ -1,4 +1,4 @@
-//! Plain shapes in pixels, from the upper left corner, x to the right and y downward.
+//! Primitives of a drawing in pixels; origin at the upper left corner, x to the right, y downward.
 
 use super::plot_mark::{Colour, Dash, Style};
 
@@ -35,7 +35,7 @@ impl Ink {
     }
 }
 
-/// How a path is stroked.
+/// Stroke of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stroke {
     pub ink: Ink,
@@ -61,7 +61,7 @@ impl Stroke {
     }
 }
 
-/// Which point of a text stands at its position; vertically it is always the middle.
+/// Horizontal alignment of a text at its position; vertically it is centred.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Anchor {
     Start,
@@ -77,7 +77,7 @@ pub(super) struct Words {
     pub size: f64,
     pub anchor: Anchor,
     pub bold: bool,
-    /// Reads upward, as beside a vertical axis.
+    /// True for text rotated upward, as beside a vertical axis.
     pub upward: bool,
 }
 
@@ -94,7 +94,7 @@ impl Words {
     }
 }
 
-/// One thing to draw.
+/// A primitive of a drawing.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Primitive {
     Path(Vec<Point>, Stroke),

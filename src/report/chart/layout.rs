@@ -1,4 +1,4 @@
-//! Places the panels and the legend on the sheet.
+//! Layout of the panels and the legend of a figure.
 
 use super::axis::{self, Range, Ruler};
 use super::drawing::{Frame, Sheet};
@@ -10,12 +10,12 @@ use super::panel::{Placed, SIZE, label_height, label_width};
 const WIDTH: f64 = 680.0;
 /// Blank edge around everything.
 const EDGE: f64 = 8.0;
-/// Room right of the last column, for a tick label that reaches beyond its axis.
+/// Margin right of the last column, for a tick label that extends beyond its axis.
 const RIGHT: f64 = 10.0;
 /// Gap between neighbouring columns and rows, beside their labels.
 const COLUMN_GAP: f64 = 24.0;
 const ROW_GAP: f64 = 7.0;
-/// Axes keep this width, however many columns there are.
+/// Least width of the axes.
 const NARROWEST: f64 = 60.0;
 const TITLE: f64 = 1.6 * SIZE;
 /// Height of the axes in pixels: alone, side by side, and in a stack.
@@ -53,7 +53,7 @@ pub(super) fn sheet(figure: &Figure) -> Sheet {
 
 /// A column of panels, in pixels.
 struct PanelColumn {
-    /// Room for the labels left of the axes.
+    /// Width of the labels left of the axes.
     labels: f64,
     /// Left edge of the axes.
     left: f64,
@@ -133,13 +133,13 @@ impl<'a> PanelGrid<'a> {
         Ruler::new(self.panels[index].y.scale, self.y_range(index), most)
     }
 
-    /// Whether the panel below carries the labels of this one's horizontal axis.
+    /// True if the panel below has the labels of this one's horizontal axis.
     fn x_labels(&self, index: usize) -> bool {
         let below = self.panels.get(index + self.columns);
         below.is_none_or(|below| below.x != self.panels[index].x)
     }
 
-    /// Whether the panel to the left carries the labels of this one's vertical axis.
+    /// True if the panel to the left has the labels of this one's vertical axis.
     fn y_labels(&self, index: usize) -> bool {
         index.is_multiple_of(self.columns) || self.panels[index - 1].y != self.panels[index].y
     }

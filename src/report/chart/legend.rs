@@ -1,4 +1,4 @@
-//! The legend: one line or more above the panels, where it covers no data.
+//! The legend: one or more lines above the panels.
 
 use super::drawing::{Anchor, Frame, Point, Primitive, Stroke, Words};
 use super::figure::Figure;
@@ -12,7 +12,7 @@ const SAMPLE_GAP: f64 = 6.0;
 const ENTRY_GAP: f64 = 18.0;
 const ROW: f64 = 18.0;
 
-/// The marks in the legend: labelled, and each label with the same look once.
+/// The marks in the legend: labelled marks, equal labels with equal style once.
 pub(super) fn entries(figure: &Figure) -> Vec<&Mark> {
     let mut entries: Vec<&Mark> = Vec::new();
     let marks = figure.panels.iter().flat_map(|panel| &panel.marks);
@@ -24,7 +24,7 @@ pub(super) fn entries(figure: &Figure) -> Vec<&Mark> {
     entries
 }
 
-/// Whether two marks have the same label and the same sample.
+/// True for two marks with the same label and the same sample.
 fn alike(one: &Mark, other: &Mark) -> bool {
     one.label == other.label && sample(one, (0.0, 0.0)) == sample(other, (0.0, 0.0))
 }
@@ -46,7 +46,7 @@ pub(super) fn draw(entries: &[&Mark], left: f64, top: f64, width: f64) -> (Vec<P
     (shapes, rows as f64 * ROW)
 }
 
-/// Horizontal place and row of each entry: side by side if that fits, or else in even columns.
+/// Horizontal position and row of each entry: side by side if they fit, else in equal columns.
 fn places(entries: &[&Mark], width: f64) -> Vec<(f64, usize)> {
     let need = |mark: &&Mark| SAMPLE + SAMPLE_GAP + text::width(&mark.label, SIZE) + ENTRY_GAP;
     let needs: Vec<f64> = entries.iter().map(need).collect();
@@ -67,7 +67,7 @@ fn places(entries: &[&Mark], width: f64) -> Vec<(f64, usize)> {
     (0..entries.len()).map(place).collect()
 }
 
-/// A short piece of a mark, its left end in the middle of the row at `at`.
+/// A sample of a mark, with its left end at a point at mid-height of the row.
 fn sample(mark: &Mark, (x, y): Point) -> Vec<Primitive> {
     let line = vec![(x, y), (x + SAMPLE, y)];
     let block = |ink| {

@@ -1,4 +1,4 @@
-//! Draws one panel: grid, marks, axes.
+//! Rendering of one panel: grid, marks, axes.
 
 use super::axis::Ruler;
 use super::curve;
@@ -14,7 +14,7 @@ const TICK: f64 = 4.5;
 const MINOR_TICK: f64 = 2.5;
 /// Gap between ticks, their labels and the axis label.
 const GAP: f64 = 5.0;
-/// Dots beyond this number cover each other, and are drawn as one thick thinned line.
+/// Most points drawn as dots; more overlap and are drawn as a thick thinned line.
 const MOST_DOTS: usize = 2000;
 
 const AXIS: Ink = Ink::solid((51, 51, 51));
@@ -22,17 +22,17 @@ const GRID: Ink = Ink::solid((228, 228, 228));
 pub(super) const SPAN: Ink = Ink::solid((238, 238, 238));
 pub(super) const BAND_OPACITY: f64 = 0.25;
 
-/// A panel in its place.
+/// A panel with its frame and rulers.
 pub(super) struct Placed<'a> {
     pub panel: &'a Panel,
     pub frame: Frame,
     pub x: Ruler,
     pub y: Ruler,
-    /// Whether tick labels and axis label are written, or left to the neighbour below.
+    /// True if tick labels and axis label are drawn; false if the panel below has them.
     pub x_labels: bool,
-    /// The same for the vertical axis and the neighbour to the left.
+    /// The same for the vertical axis and the panel to the left.
     pub y_labels: bool,
-    /// Room for the labels left of the frame, common to a column so that its axis labels align.
+    /// Width of the labels left of the frame, common to a column so that its axis labels align.
     pub label_width: f64,
 }
 
@@ -55,7 +55,7 @@ pub(super) fn label_width(ruler: &Ruler, labels: bool) -> f64 {
 }
 
 impl Placed<'_> {
-    /// Everything in the panel, from back to front.
+    /// All primitives of the panel, from back to front.
     pub fn shapes(&self) -> Vec<Primitive> {
         let mut shapes = Vec::new();
         self.spans(&mut shapes);
@@ -84,7 +84,7 @@ impl Placed<'_> {
         x.iter().zip(y).map(|(&x, &y)| self.pixel(x, y))
     }
 
-    /// Spans lie behind the grid, whatever their order among the marks.
+    /// Draws spans; they are behind the grid regardless of their order among the marks.
     fn spans(&self, shapes: &mut Vec<Primitive>) {
         for mark in (self.panel.marks.iter()).filter(|mark| mark.kind == MarkKind::Span) {
             let [from, to] = [0, 1].map(|end| self.x.share(mark.x[end]));
@@ -145,7 +145,7 @@ impl Placed<'_> {
 
     fn line(&self, Mark { x, y, style, .. }: &Mark, shapes: &mut Vec<Primitive>) {
         for run in curve::runs(self.pixels(x, y)) {
-            // A reading between two gaps has no segment to show it.
+            // A point between two gaps has no line segment and is drawn as a dot.
             if let [alone] = run[..] {
                 self.dot(alone, &style.width(2.0 * style.width), shapes);
             }
@@ -215,7 +215,7 @@ impl Placed<'_> {
         shapes.extend(self.y.minor.iter().map(|share| y_tick(*share, MINOR_TICK)));
     }
 
-    /// Axis labels and heading; smaller where they would run into a neighbour.
+    /// Axis labels and heading, reduced in size where they would overlap a neighbour.
     fn titles(&self, shapes: &mut Vec<Primitive>) {
         let Frame {
             left,

@@ -1,9 +1,9 @@
-//! What a panel shows: curves, dots, bands, lines across, and how they look.
+//! Marks of a panel (curves, dots, bands, spans, reference lines) and their style.
 
 use super::numbers::{places, rounded};
 use serde::Serialize;
 
-/// The colours of Okabe and Ito, which readers with any colour vision can tell apart, and a grey.
+/// The colours of Okabe and Ito, distinguishable with any colour vision, and a grey.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 #[allow(missing_docs)]
@@ -74,7 +74,7 @@ impl Serialize for Dash {
     }
 }
 
-/// How a line is drawn, or points, of which `width` is the diameter.
+/// Style of a line or of points; for points `width` is the diameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Style {
     /// Colour.
@@ -95,7 +95,7 @@ impl Style {
         }
     }
 
-    /// The look of series `index`, from 0: a colour and a dash pattern of its own.
+    /// The style of series `index`, from 0: its colour and dash pattern.
     pub fn nth(index: usize) -> Self {
         Self::new(Colour::nth(index)).dash(Dash::nth(index))
     }
@@ -115,7 +115,7 @@ impl Style {
     }
 }
 
-/// What a mark is.
+/// Kind of a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MarkKind {
@@ -133,21 +133,21 @@ pub enum MarkKind {
     Upright,
 }
 
-/// Something drawn in a panel. A mark with a label appears in the legend; equal labels with equal
-/// looks, in any panel, appear there once.
+/// A mark in a panel. A mark with a label appears in the legend; equal labels with equal style, in any panel, appear
+/// there once.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mark {
-    /// What it is.
+    /// Kind.
     pub kind: MarkKind,
     /// The label for the legend; empty for none.
     pub label: String,
-    /// How it looks; a span has one look only.
+    /// Style; spans ignore it.
     #[serde(flatten)]
     pub style: Style,
-    /// The x values that the axis should reach; none of a line across.
+    /// x values; empty for a horizontal line.
     #[serde(serialize_with = "places")]
     pub x: Vec<f64>,
-    /// The y values that the axis should reach, of a band those of its lower edge; none of a span or an upright line.
+    /// y values, for a band those of its lower edge; empty for a span or a vertical line.
     #[serde(serialize_with = "rounded")]
     pub y: Vec<f64>,
     /// The upper edge of a band.

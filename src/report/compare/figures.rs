@@ -14,7 +14,7 @@ pub(super) fn style(index: usize) -> Style {
     // Black and grey, the last two, are left to the truth.
     let colour = Colour::nth(index % (Colour::ALL.len() - 2));
     let dash = Dash::nth(index + index / 12);
-    // Dots need more ink to be seen.
+    // Dots are drawn larger than lines are wide.
     let width = if dash == Dash::Dotted { 2.2 } else { 1.6 };
     Style::new(colour).dash(dash).width(width)
 }
@@ -34,7 +34,7 @@ pub(super) fn all(comparison: &Comparison) -> Vec<Figure> {
     figures
 }
 
-/// A curve of each device: its caption, its unit, its values.
+/// A curve of each system: caption, unit, values.
 type Curve = (
     &'static str,
     &'static str,
@@ -119,17 +119,17 @@ fn overlay(figure: Figure, runs: &[ComparedRun], curves: &[Curve]) -> Figure {
     }))
 }
 
-/// Share of the nodes at either end of the values of a run that may be spikes.
+/// Share of the nodes, at either end of the sorted values of a run, that can be spikes.
 const SPIKES: f64 = 0.03;
 /// Spikes that take more than this many times the room of everything else are cut off: what the
 /// figure is for would be a flat line.
 const ROOM: f64 = 3.0;
 
-/// What stays within this share of its size is flat to the eye.
+/// Relative variation below which a curve is treated as constant.
 const FLAT: f64 = 0.1;
 
-/// The range to be shown where a few nodes of some runs would hide everything else; all of `real`
-/// is in it. `None` where everything can be shown.
+/// Range of the axis that excludes the spikes of some runs but includes all of `real`; `None` if no spikes need to be
+/// cut off.
 fn without_spikes(real: &[Vec<f64>], found: &[Vec<f64>]) -> Option<(f64, f64)> {
     let empty = (f64::INFINITY, f64::NEG_INFINITY);
     let union = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
@@ -137,7 +137,7 @@ fn without_spikes(real: &[Vec<f64>], found: &[Vec<f64>]) -> Option<(f64, f64)> {
     let truth = real.iter().map(|f| span(f, 0.0)).fold(empty, union);
     let (all, most) = (union(truth, spans(0.0)), union(truth, spans(SPIKES)));
     let room = most.1 - most.0;
-    // Where the rest is constant, its own size is its room.
+    // For constant values their magnitude is the reference.
     let room = room.max(FLAT * most.0.abs().max(most.1.abs()));
     let pad = 0.25 * room;
     let hidden = all.1 - all.0 > ROOM * room && room > 0.0;
@@ -156,7 +156,7 @@ fn span(f: &[f64], skip: f64) -> (f64, f64) {
     }
 }
 
-/// Which runs leave the range, and how far they go.
+/// Runs with values outside the range, and these values.
 fn reaches(
     runs: &[ComparedRun],
     found: &[Vec<f64>],
@@ -174,7 +174,7 @@ fn reaches(
     all.join(", ")
 }
 
-/// The true devices, each once, with its label and the run whose grid it is on.
+/// The true systems, each once, with label and the run that has its grid.
 fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &NodalCoefficients)> {
     let mut found: Vec<(&ComparedRun, &NodalCoefficients)> = Vec::new();
     let grid = |run: &'_ ComparedRun| run.finished.system.grid;
@@ -200,7 +200,7 @@ fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &NodalCoefficients
         .collect()
 }
 
-/// The residuals of the measured motions, one panel for each name of an experiment.
+/// The residuals of the records, one panel for each name of an experiment.
 fn residuals(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
     let mut names: Vec<&str> = Vec::new();
     for motion in runs.iter().flat_map(|run| &run.motions) {

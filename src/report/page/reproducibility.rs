@@ -1,4 +1,4 @@
-//! How to repeat a run, and how to cite it.
+//! Reproducibility section of the page of a fit: command, model file and data files with digests; and the citation.
 
 use super::table::{pairs, paragraph, table};
 use crate::config::ModelSource;
@@ -7,7 +7,7 @@ use crate::report::document::ResultDocument;
 use crate::report::text::escape;
 use kmcfit_core::internals::simulate::arithmetic;
 
-/// The command, what it was run with, the model and its data.
+/// The command, versions, overrides, model file and data files.
 pub(super) fn reproducibility(run: &FittedModel, document: &ResultDocument) -> String {
     let mut rows = vec![
         ("program", format!("kmcfit {}", document.version)),
@@ -64,12 +64,12 @@ pub(super) fn cite() -> String {
            Linear system</cite>.</p>\n"
 }
 
-/// Text as it is, in a box that scrolls.
+/// Preformatted text in a scrolling box.
 fn block(text: &str) -> String {
     format!("<pre tabindex=\"0\"><code>{}</code></pre>\n", escape(text))
 }
 
-/// A path or an argument as a shell takes it.
+/// A path or an argument quoted for a shell.
 pub fn quoted(path: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+,:@=".contains(c) || !c.is_ascii();
     match !path.is_empty() && path.chars().all(plain) && !path.starts_with('-') {
