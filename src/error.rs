@@ -1,13 +1,13 @@
-//! Errors that say where: misuse is an error, what happens during a fit is an outcome.
+//! Errors of input with their location. Invalid input is an error; the end of a fit, successful or not, is an outcome.
 //!
-//! An [`InputError`] names the place (file, line or row, key), what was found there, what was
-//! expected, and, where one fits, a near spelling. The program prints it and ends with exit code 2.
+//! An [`InputError`] has the location (file, line or row, key), the problem, the value found, the value expected, and a
+//! hint. The program prints it and ends with exit code 2.
 
 use crate::escape::harmless;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Where in the input something is wrong.
+/// Location of an error in the input.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Location {
     /// A command-line option or argument, or a library argument, by name.
@@ -31,7 +31,7 @@ pub enum Location {
         row: usize,
         /// Line in the file, from 1.
         line: usize,
-        /// Column name, where one column is meant.
+        /// Column name, for an error in one column.
         column: Option<String>,
     },
 }
@@ -60,7 +60,7 @@ impl fmt::Display for Location {
     }
 }
 
-/// An input that cannot be used: where, what was found, what was expected.
+/// An error of input: location, problem, value found, value expected, hint.
 ///
 /// ```
 /// use kmcfit::error::{InputError, Place};
@@ -74,22 +74,22 @@ impl fmt::Display for Location {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct InputError {
-    /// Where.
+    /// Location.
     pub place: Location,
     /// Dotted path of the key, as in `functions.mass.start`.
     pub key: Option<String>,
-    /// What is wrong, in one sentence without a full stop.
+    /// The problem, as a sentence without a full stop.
     pub problem: String,
-    /// What was found there.
+    /// The value found.
     pub found: Option<String>,
-    /// What would be accepted.
+    /// Accepted values.
     pub expected: Option<String>,
-    /// What to try, for instance a near spelling.
+    /// Remedy, for instance a similar spelling.
     pub hint: Option<String>,
 }
 
 impl InputError {
-    /// An error at `place` that says what is wrong.
+    /// An error at `place` with its problem.
     pub fn new(place: Location, problem: impl Into<String>) -> Self {
         Self {
             place,
@@ -136,27 +136,27 @@ impl InputError {
         self
     }
 
-    /// Adds what was found.
+    /// Sets the value found.
     #[must_use]
     pub fn found(mut self, found: impl fmt::Display) -> Self {
         self.found = Some(found.to_string());
         self
     }
 
-    /// Adds what was expected.
+    /// Sets the accepted values.
     #[must_use]
     pub fn expected(mut self, expected: impl Into<String>) -> Self {
         self.expected = Some(expected.into());
         self
     }
 
-    /// Adds what to try.
+    /// Adds a remedy.
     #[must_use]
     pub fn hint(self, hint: impl Into<String>) -> Self {
         self.hint_if(Some(hint.into()))
     }
 
-    /// Adds what to try, where there is something.
+    /// Adds a remedy, if any.
     #[must_use]
     pub fn hint_if(mut self, hint: Option<String>) -> Self {
         self.hint = hint.or(self.hint);
@@ -180,7 +180,7 @@ impl fmt::Display for InputError {
                 message += &format!("\n  {label}: {text}");
             }
         }
-        // It may repeat what somebody else wrote, file names included.
+        // The message can contain text of input files and their names, so control characters are escaped.
         f.write_str(&harmless(&message))
     }
 }

@@ -1,7 +1,7 @@
 //! The application kmcfit: identifies time-varying mass, damping and stiffness of a vibrating system from measured
 //! records. The numerics are in [`kmcfit_core`].
 //!
-//! [`guide`] is a short course: a tutorial, how to choose and what goes wrong, the theory.
+//! [`guide`] is the user guide: tutorial, choice of methods, theory.
 //!
 #![cfg_attr(doc, doc = include_str!("guide/equations.md"))]
 //!

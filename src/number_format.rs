@@ -1,6 +1,7 @@
 //! Numbers as people write them in a sentence.
 
-/// So many significant digits, without zeros behind; very small and very large numbers in powers of ten.
+/// A number with `digits` significant digits, without trailing zeros; very small and very large numbers in powers of
+/// ten.
 pub(crate) fn significant(x: f64, digits: usize) -> String {
     let rounded: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
     match rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) {

@@ -14,7 +14,7 @@ const MOST_BEFORE: usize = 50;
 /// Longest line that is looked at, bytes.
 const LONGEST_LINE: u64 = 1 << 16;
 
-/// A line of a file and what is marked in it.
+/// A line of a file with the marked part.
 ///
 /// ```text
 ///    |
@@ -34,8 +34,7 @@ pub struct Excerpt {
 }
 
 impl Excerpt {
-    /// The line that an error is about, read from its file; nothing where the error is not about a
-    /// line, or the file is no text.
+    /// The line of an error, read from its file; `None` for an error without a line, or a file that is not text.
     pub fn of(error: &InputError) -> Option<Self> {
         match &error.place {
             Location::Line { file, line, column } => {
@@ -100,7 +99,7 @@ impl fmt::Display for Excerpt {
 
 /// A line of a text file, its tabs as blanks and without characters that a terminal would obey.
 fn line_of(file: &Path, line: usize) -> Option<Vec<char>> {
-    // What is no file on a disk cannot be read twice.
+    // Only regular files can be read twice.
     file.metadata().ok()?.is_file().then_some(())?;
     let mut reader = BufReader::new(File::open(file).ok()?);
     for _ in 1..line {
@@ -121,7 +120,7 @@ fn line_of(file: &Path, line: usize) -> Option<Vec<char>> {
     (!is_binary).then(|| text.chars().map(clean).collect())
 }
 
-/// Where the word of a model file that begins at `start` ends.
+/// End of the word of a model file that begins at `start`.
 fn token_end(text: &[char], start: usize) -> usize {
     let at = |i: usize| text.get(i).copied();
     let Some(first) = at(start) else {

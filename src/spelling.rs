@@ -1,4 +1,4 @@
-//! Near spellings: what the writer of an unknown word probably meant.
+//! Suggestions for unknown words, by edit distance to the known ones.
 
 /// Longest word that is compared; longer ones are no slip of the finger.
 const LONGEST_WORD: usize = 64;
@@ -6,7 +6,7 @@ const LONGEST_WORD: usize = 64;
 /// Shortest word that is taken for the beginning of a longer one.
 const SHORTEST_STEM: usize = 3;
 
-/// Words that are near the opposite of what they mean, and what they mean.
+/// Words whose nearest spelling would be wrong, with the correct suggestion.
 const MEANT: [(&str, &str); 4] = [
     ("decreasing", "nonincreasing"),
     ("falling", "nonincreasing"),
@@ -51,7 +51,7 @@ pub fn did_you_mean<'a>(
     nearest(word, candidates).map(|near| format!("did you mean `{near}`?"))
 }
 
-/// The word without what people vary: capitals and separators.
+/// The word in lower case without separators.
 fn plain(word: &str) -> String {
     word.chars()
         .filter(|c| !matches!(c, '-' | '_' | ' '))
@@ -59,7 +59,7 @@ fn plain(word: &str) -> String {
         .collect()
 }
 
-/// Edits between two plain words, or `None` where they are too far apart to be the same word.
+/// Edit distance of two plain words; `None` if it is too large for a suggestion.
 fn distance(word: &str, candidate: &str) -> Option<usize> {
     let lengths = (word.chars().count(), candidate.chars().count());
     let (shorter, longer) = (lengths.0.min(lengths.1), lengths.0.max(lengths.1));
@@ -75,7 +75,7 @@ fn distance(word: &str, candidate: &str) -> Option<usize> {
     stem.then_some(edits)
 }
 
-/// What to write instead of a text that was probably meant as a number.
+/// Correction of a text that is a misspelt number.
 pub(crate) fn number_in(text: &str) -> Option<String> {
     let text = text.trim();
     let finite = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite());

@@ -1,4 +1,4 @@
-//! Reading text files, with errors that say what is wrong with the file.
+//! Reading of text files with limits on length and memory, and quotation of their contents in messages.
 
 use std::ffi::OsStr;
 use std::fs::{self, File, Metadata};
@@ -15,17 +15,16 @@ const LONGEST_QUOTE: usize = 40;
 /// Most names that are listed in a message.
 const MOST_NAMES: usize = 30;
 
-/// Longest table of measurements that is read, in bytes: a hundred million rows of time and reading, so
-/// more than `simulate` writes on any grid that fits into memory. What fits into the memory of a smaller
-/// machine is asked before it is read.
+/// Longest table of measurements, bytes: a hundred million rows of time and sample, more than `simulate` writes on any
+/// grid that fits into memory. The available memory is checked before reading.
 pub const LONGEST_TABLE: u64 = 1 << 32;
 
 /// Memory that a file's text takes for each of its bytes: itself, and a copy in another encoding or with
 /// other delimiters.
 const TEXT: u64 = 2;
 
-/// Memory that a JSON document takes for each of its bytes: its text, and its values twice, as a tree
-/// and as what they mean. A list of short numbers, the longest that results have, takes half of it.
+/// Memory of a JSON document per byte of its text: the text, and its values as a tree and as a struct. A list of short
+/// numbers, the longest of the results, takes half of it.
 pub const JSON: u64 = 64;
 
 /// Longest line of a table, in bytes: hundreds of columns take a hundredth of it. A longer one is no
@@ -34,7 +33,7 @@ pub const LONGEST_LINE: usize = 1 << 20;
 
 /// Reads a text file of at most `limit` bytes; a byte order mark is dropped.
 ///
-/// `what` says what the file should be, for instance `a model file (YAML)`.
+/// `what` describes the expected file in messages, for instance `a model file (YAML)`.
 ///
 /// # Errors
 ///
@@ -45,8 +44,7 @@ pub fn read_text(path: &Path, what: &str, limit: u64) -> Result<String, InputErr
     utf8(path, bytes).map_err(|error| error.expected_if_none(what))
 }
 
-/// Reads a text file as [`read_text`] does, if there is so much memory for each of its bytes: where
-/// more is made of the text than its values.
+/// Reads a text file as [`read_text`] does, after a check of the available memory for `each` bytes per byte of text.
 ///
 /// # Errors
 ///
@@ -65,31 +63,31 @@ pub fn read_text_within(
     read_text(path, what, limit)
 }
 
-/// Reads a file of at most `limit` bytes; `what` says what it should be.
+/// Reads a file of at most `limit` bytes; `what` describes it in messages.
 ///
 /// # Errors
 ///
-/// When no such file, it is a folder, a device or somebody else's pipe, it cannot be read, it
-/// is longer than `limit`, or does not fit into memory.
+/// When the file does not exist, is a folder, a device or a pipe of another process, cannot be read, is longer than
+/// `limit`, or does not fit into memory.
 pub fn read_bytes(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>, InputError> {
     let (file, length) = open(path, what)?;
-    // Nothing is read of what is too long, or may not even be there: a file can have holes.
+    // A file that is too long is not read at all; sparse files can be longer than the disk.
     if length > limit {
         return Err(too_long(path, limit).expected(what));
     }
     memory::check_file(path, length.saturating_mul(TEXT))?;
     // At once: bytes that grow leave their smaller selves behind in memory that costs time to get.
     let mut bytes = Vec::new();
-    // Where there is not so much, reading says so.
+    // A failed reservation is reported by the read.
     let _ = bytes.try_reserve_exact(usize::try_from(length).unwrap_or(0));
     read_into(bytes, path, file, limit).map_err(|error| error.expected_if_none(what))
 }
 
-/// Opens a file and tells its length; `what` says what it should be.
+/// Opens a file and returns its length; `what` describes it in messages.
 ///
 /// # Errors
 ///
-/// When no such file, it is a folder, a device or somebody else's pipe, or cannot be opened.
+/// When the file does not exist, is a folder, a device or a pipe of another process, or cannot be opened.
 pub fn open(path: &Path, what: &str) -> Result<(File, u64), InputError> {
     let metadata = fs::metadata(path).map_err(|error| unreadable(path, what, &error))?;
     if let Some(other) = no_file(path, &metadata) {
@@ -99,8 +97,8 @@ pub fn open(path: &Path, what: &str) -> Result<(File, u64), InputError> {
     Ok((file, metadata.len()))
 }
 
-/// What stands at a path in the place of a file. A device may never end, and a pipe never begin; but the
-/// program's own (`/dev/stdin`) belongs to the process that started it.
+/// Description of a path that is not a regular file: a folder, a device, which may never end, or a pipe of another
+/// process, which may never begin. `None` for a regular file and for the program's own pipes (`/dev/stdin`).
 fn no_file(path: &Path, metadata: &Metadata) -> Option<&'static str> {
     let is_own = ["/dev", "/proc"].iter().any(|own| path.starts_with(own));
     match () {
@@ -122,7 +120,7 @@ fn is_pipe(_: &Metadata) -> bool {
     false
 }
 
-/// Reads at most `limit` bytes from a reader; `path` is what messages call it.
+/// Reads at most `limit` bytes from a reader; messages name `path`.
 ///
 /// # Errors
 ///
@@ -178,7 +176,7 @@ pub struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// The lines of a file; `path` is what messages call it.
+    /// The lines of a file; messages name `path`.
     pub fn new(path: &'a Path, file: File) -> Self {
         Self {
             path,
@@ -226,7 +224,7 @@ fn not_utf8(path: &Path, number: usize, line: &[u8], at: usize) -> InputError {
         .found(format!("the byte 0x{:02x}", line[at]))
 }
 
-/// A short quotation of somebody's text for a message: one line, cut where it is long.
+/// A quotation for a message: one line, shortened if long.
 pub fn quote(text: &str) -> String {
     let mut quoted = String::from("`");
     for (count, c) in text.chars().enumerate() {
@@ -243,7 +241,7 @@ pub fn quote(text: &str) -> String {
     quoted
 }
 
-/// Names in a row: `a, b, c`; the first of them where there are many.
+/// Names separated by commas, `a, b, c`; the first ones if there are many.
 pub fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.into_iter().collect();
     match names.len().checked_sub(MOST_NAMES) {
@@ -252,7 +250,7 @@ pub fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     }
 }
 
-/// What is expected where only some names will do: `one of: a, b, c`.
+/// Accepted names for a message: `one of: a, b, c`.
 pub fn one_of<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let mut names = names.into_iter().peekable();
     match (names.next(), names.peek()) {
@@ -271,7 +269,7 @@ fn unreadable(path: &Path, what: &str, error: &std::io::Error) -> InputError {
         .hint_if(neighbour(path))
 }
 
-/// What may have been meant by a path that leads nowhere: a missing folder or a near file name.
+/// Remedy for a missing file: a missing folder, or a similar file name.
 fn neighbour(path: &Path) -> Option<String> {
     let folder = match path.parent() {
         Some(folder) if folder.as_os_str().is_empty() => Path::new("."),
@@ -316,7 +314,7 @@ fn utf8(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
 }
 
 impl InputError {
-    /// Adds what was expected where nothing is said about it yet.
+    /// Sets the accepted values unless set before.
     fn expected_if_none(mut self, expected: &str) -> Self {
         self.expected.get_or_insert_with(|| expected.to_owned());
         self

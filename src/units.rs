@@ -1,8 +1,7 @@
-//! Units of what is measured, and their factors to SI.
+//! Units of measured quantities and their factors to SI.
 //!
-//! A device may turn instead of move: then displacements are angles in rad, forces are torques in
-//! N m, and mass, damping and stiffness are a moment of inertia and so on. Volts stand for readings
-//! without calibration: they count as they are.
+//! For rotational systems displacements are angles in rad, forces are torques in N m, and the mass is a moment of
+//! inertia in kg m². Volts denote uncalibrated samples, which are not converted.
 
 use crate::error::InputError;
 use crate::spelling::nearest;
@@ -19,7 +18,7 @@ const INCH: f64 = 0.0254;
 const FOOT: f64 = 0.3048;
 const POUND_FORCE: f64 = 0.453_592_37 * GRAVITY;
 
-/// What a channel measures.
+/// Measured quantity of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Displacement or angle; SI: m or rad.
@@ -66,7 +65,7 @@ impl Quantity {
     }
 }
 
-/// What a unit belongs to: moving along a line, turning, or neither for sure.
+/// Motion that a unit belongs to: translation, rotation, or either.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Dimension {
     Linear,
@@ -94,12 +93,12 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// The SI unit of motion along a line.
+    /// The SI unit for translation.
     pub fn si(kind: Quantity) -> Self {
         kind.units()[0]
     }
 
-    /// The unit that a text names, or `None` where it names none of this kind.
+    /// The unit named by a text, or `None` if it names none of this quantity.
     ///
     /// Brackets around it do not count, nor do blanks and signs between factors; `²`, `^2`, `**2`
     /// and `2` are the same, as are `µ`, `u` and `μ`. Capitals count, since `mN` is not `MN`.
@@ -124,7 +123,7 @@ impl Unit {
         kind.units().iter().map(|unit| unit.symbol)
     }
 
-    /// Whether a text is a unit of any kind, or anything in brackets: a field in a row of units.
+    /// True for a unit of any quantity, or any text in brackets: a field of a row of units.
     pub fn looks_like(text: &str) -> bool {
         let known = || {
             Quantity::ALL
@@ -140,17 +139,17 @@ impl Unit {
         self.symbol
     }
 
-    /// What a value in this unit is multiplied by to be in SI; 1 for volts.
+    /// Factor from this unit to SI; 1 for volts.
     pub fn factor(&self) -> f64 {
         self.factor
     }
 
-    /// Whether it is a unit of turning: of angles, or torques.
+    /// True for units of angles and torques.
     pub fn is_angular(&self) -> bool {
         self.motion == Dimension::Angular
     }
 
-    /// Whether it says nothing of the size of what is measured: volts.
+    /// True for uncalibrated units: volts.
     pub fn is_arbitrary(&self) -> bool {
         self.symbol == VOLT.symbol
     }
@@ -281,7 +280,7 @@ const TIME: [Unit; 4] = [
     unit("min", &["minute", "minutes"], 60.0, Either),
 ];
 
-/// Units that no channel of ours has, but that stand in rows of units.
+/// Units of other quantities that occur in rows of units.
 const OTHERS: [&str; 17] = [
     "mV", "uV", "A", "mA", "Hz", "kHz", "rpm", "1/min", "%", "degC", "degF", "K", "bar", "Pa",
     "kPa", "kg", "W",

@@ -172,7 +172,7 @@ impl Job<'_> {
         is_resumed: bool,
     ) -> Result<u8, CommandError> {
         let full = |error| unwritable(folder.path(), &error);
-        // What is wrong with the place of one model is found before the first fit.
+        // The output folders of all models are checked before the first fit.
         let children = self.entries.iter();
         let children = children.map(|(name, entry)| entry.prepare(name, folder));
         let children = children.collect::<Result<Vec<_>, _>>()?;
@@ -213,7 +213,8 @@ impl Job<'_> {
     }
 }
 
-/// The journal of a study or comparison: resumed, which is refused where an input has changed, or begun.
+/// Opens the journal of a study or comparison: a new one, or to resume an older one, which is refused if an input has
+/// changed.
 pub(super) fn open_analyses(
     folder: &OutputFolder,
     name: &str,
@@ -269,8 +270,8 @@ struct Compared {
 }
 
 impl Compared {
-    /// Fits a model into its folder. Where the comparison is resumed, a fit that the journal lists as finished is read
-    /// from there, and one with a journal of its own is resumed.
+    /// Fits a model into its folder. A resumed comparison reads the fits that its journal lists as finished, and
+    /// resumes a fit that has its own journal.
     fn model(
         &mut self,
         name: &str,

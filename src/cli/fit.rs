@@ -137,7 +137,7 @@ pub(super) fn note_discarded(folder: &OutputFolder, heading: &Heading) -> Result
     Ok(())
 }
 
-/// The journal of a fit: resumed, which is refused where an input has changed, or begun.
+/// Opens the journal of a fit: a new one, or to resume an older one, which is refused if an input has changed.
 pub(super) fn open_journal(
     folder: &OutputFolder,
     heading: &Heading,

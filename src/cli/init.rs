@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     Ok(OK)
 }
 
-/// The path of a file from a folder; as it is given where there is no such path.
+/// The path of a file relative to a folder; as given if there is none.
 fn named_from(folder: &Path, file: &Path) -> String {
     let folder = match folder.as_os_str().is_empty() {
         true => Path::new("."),

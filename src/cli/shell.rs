@@ -54,7 +54,7 @@ fn page() -> io::Result<Vec<u8>> {
     Ok(page)
 }
 
-/// A command: its usage, what it does, its options.
+/// Manual section of a command: usage, description, options.
 fn section(command: &Command, page: &mut Vec<u8>) -> io::Result<()> {
     let man = Man::new(command.clone());
     page.extend(format!(".SS {}\n", command.get_name()).as_bytes());

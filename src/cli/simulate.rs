@@ -146,8 +146,8 @@ fn check_place(out: &Path, file: &ModelFile) -> Result<(), InputError> {
     }
 }
 
-/// Whether a table and its record were both written by this command: the record has the digest of the table, which may
-/// be missing.
+/// True if this command wrote the table and its provenance file, which has the digest of the table; the table may be
+/// missing.
 fn is_own(out: &Path, beside: &Path) -> bool {
     #[derive(Deserialize)]
     struct PriorProvenance {
@@ -174,14 +174,14 @@ fn is_own(out: &Path, beside: &Path) -> bool {
 /// Longest record that is read, bytes: it takes some hundred, and the paths and values that were given.
 const LONGEST_RECORD: u64 = 1 << 20;
 
-/// Where the record of a table stands.
+/// Path of the provenance file of a table.
 fn record_path(out: &Path) -> PathBuf {
     let mut beside = out.as_os_str().to_owned();
     beside.push(".json");
     beside.into()
 }
 
-/// How a file of readings was made: `OUT.json` beside `OUT`.
+/// Provenance of a simulated record: `OUT.json` beside `OUT`.
 #[derive(Debug, Serialize)]
 struct Provenance<'a> {
     made_by: &'static str,
@@ -190,7 +190,7 @@ struct Provenance<'a> {
     sha256: String,
     /// The model file as it was given.
     model: String,
-    /// What was given beside it.
+    /// Overrides.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     overrides: Vec<String>,
     experiment: &'a str,
@@ -198,7 +198,7 @@ struct Provenance<'a> {
     /// s.
     duration: f64,
     stepper: &'static str,
-    /// `null` for readings without noise.
+    /// `null` for samples without noise.
     noise: Option<Noise>,
 }
 
@@ -221,7 +221,7 @@ impl Noise {
     }
 }
 
-/// The readings and, before them, their record: readings with noise are never without a seed.
+/// Writes the provenance file, then the samples, so that samples with noise never exist without their seed.
 fn write(path: &Path, table: &str, record: &Provenance) -> io::Result<()> {
     write_together(&[(&record_path(path), &json(record)), (path, table)])
 }

@@ -121,8 +121,7 @@ fn overlay(figure: Figure, runs: &[ComparedRun], curves: &[Curve]) -> Figure {
 
 /// Share of the nodes, at either end of the sorted values of a run, that can be spikes.
 const SPIKES: f64 = 0.03;
-/// Spikes that take more than this many times the room of everything else are cut off: what the
-/// figure is for would be a flat line.
+/// Spikes that extend the range by more than this factor are cut off, because they would flatten the curves.
 const ROOM: f64 = 3.0;
 
 /// Relative variation below which a curve is treated as constant.
