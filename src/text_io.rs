@@ -44,7 +44,7 @@ pub fn read_text(path: &Path, what: &str, limit: u64) -> Result<String, InputErr
     utf8(path, bytes).map_err(|error| error.expected_if_none(what))
 }
 
-/// Reads a text file as [`read_text`] does, after a check of the available memory for `each` bytes per byte of text.
+/// Reads a text file as [`read_text`] does, after a check of the available memory for `bytes_per_byte` bytes per byte of text.
 ///
 /// # Errors
 ///

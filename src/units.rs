@@ -89,7 +89,7 @@ pub struct Unit {
     /// Other spellings, as [`plain`] makes them.
     others: &'static [&'static str],
     factor: f64,
-    motion: Dimension,
+    dimension: Dimension,
 }
 
 impl Unit {
@@ -146,7 +146,7 @@ impl Unit {
 
     /// True for units of angles and torques.
     pub fn is_angular(&self) -> bool {
-        self.motion == Dimension::Angular
+        self.dimension == Dimension::Angular
     }
 
     /// True for uncalibrated units: volts.
@@ -214,13 +214,13 @@ const fn unit(
     symbol: &'static str,
     others: &'static [&'static str],
     factor: f64,
-    motion: Dimension,
+    dimension: Dimension,
 ) -> Unit {
     Unit {
         symbol,
         others,
         factor,
-        motion,
+        dimension,
     }
 }
 

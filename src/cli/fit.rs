@@ -280,12 +280,12 @@ pub(super) fn search(
 
 /// Predictions of the model file; a failed one has its reason.
 fn predictions(model: &Model, found: &Fit) -> Vec<Prediction> {
-    let device = &found.best.evaluation.nodal;
+    let coefficients = &found.best.evaluation.nodal;
     let system = &model.problem.system;
     let one = |state: &State| {
-        let motions = predict(system, device, model.truth.as_ref(), &[*state]);
-        match motions {
-            Ok(motions) => motions.into_iter().map(|m| m.summary).collect(),
+        let responses = predict(system, coefficients, model.truth.as_ref(), &[*state]);
+        match responses {
+            Ok(responses) => responses.into_iter().map(|m| m.summary).collect(),
             Err(breakdown) => vec![Prediction {
                 displacement: state.displacement,
                 velocity: state.velocity,

@@ -68,22 +68,26 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
             .expected("an experiment with an initial state in numbers")
             .into());
     }
-    let mut device = problem.functions.empty_nodal();
+    let mut coefficients = problem.functions.empty_nodal();
     let start = problem.start();
     problem
         .functions
-        .nodal_into(&start, experiment.coefficient_set, &mut device);
-    let motion = problem
+        .nodal_into(&start, experiment.coefficient_set, &mut coefficients);
+    let response = problem
         .system
-        .forward(&device, experiment.initial, experiment.excitation.as_ref())
-        .map_err(|breakdown| CommandError::Numerical(format!("no motion: {breakdown}")))?;
-    let mut readings = motion.displacement;
+        .forward(
+            &coefficients,
+            experiment.initial,
+            experiment.excitation.as_ref(),
+        )
+        .map_err(|breakdown| CommandError::Numerical(format!("no response: {breakdown}")))?;
+    let mut samples = response.displacement;
     if let Some(noise) = &noise {
-        noise.add_to(&mut readings);
+        noise.add_to(&mut samples);
     }
     let table = CsvTable::new()
         .column("t_s", problem.system.grid.times())
-        .column("y_m", readings)
+        .column("y_m", samples)
         .to_csv();
     let record = Provenance {
         made_by: MADE_BY,
@@ -212,9 +216,9 @@ struct Noise {
 }
 
 impl Noise {
-    fn add_to(&self, readings: &mut [f64]) {
+    fn add_to(&self, samples: &mut [f64]) {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        for y in readings {
+        for y in samples {
             let z: f64 = StandardNormal.sample(&mut random);
             *y += self.sigma * z;
         }

@@ -309,7 +309,7 @@ keys! {
     /// A column of a file with times in `t_s`, interpolated linearly between its rows.
     pub struct ColumnSpec = "column", expecting "a map such as {data: file.csv, column: mass_kg}" {
         /// The file, relative to the model file; the `functions.csv` of a finished run is one.
-        data: Text, example "device.csv";
+        data: Text, example "coefficients.csv";
         /// Name of the column.
         column: Text, example "mass_kg";
     }

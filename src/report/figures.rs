@@ -47,14 +47,14 @@ pub fn observation(channels: &[ChannelSamples]) -> Figure {
 
 /// Samples and prediction of a channel, in the unit of the channel.
 pub fn channel((label, unit): (&str, &str), t: &[f64], observed: &[f64], model: &[f64]) -> Figure {
-    let readings = Mark::points("readings", t, observed, dots(Colour::Grey, t.len()));
+    let samples = Mark::points("samples", t, observed, dots(Colour::Grey, t.len()));
     let line = Style::new(Colour::Blue).width(1.4);
     Figure::new(
         "channel",
         "Readings and model",
         "Samples of the channel and the fitted response against time.",
     )
-    .panel(Panel::of_time(label, unit).marks([readings, Mark::line("model", t, model, line)]))
+    .panel(Panel::of_time(label, unit).marks([samples, Mark::line("model", t, model, line)]))
 }
 
 /// The residuals of a channel against time, and their autocorrelation with the band that contains 95 % of the lags for
@@ -117,7 +117,7 @@ pub fn convergence(
 pub type Snapshot<'a> = (usize, &'a [f64], &'a [f64]);
 
 /// The measured displacement and the response of the fit at some iterations; times in s, displacements in m.
-pub fn motion(t_obs: &[f64], y_obs: &[f64], snapshots: &[Snapshot]) -> Figure {
+pub fn response(t_obs: &[f64], y_obs: &[f64], snapshots: &[Snapshot]) -> Figure {
     let grey = Style::new(Colour::Grey).width(4.5);
     let last = snapshots.len().saturating_sub(1);
     let lines = snapshots.iter().enumerate();
@@ -134,7 +134,7 @@ pub fn motion(t_obs: &[f64], y_obs: &[f64], snapshots: &[Snapshot]) -> Figure {
         .marks(lines);
     Figure::new(
         "motion",
-        "Motion during the fit",
+        "Response during the fit",
         "Measured displacement against time, and the response at some iterations.",
     )
     .panel(panel)
@@ -286,13 +286,13 @@ pub fn ratios(
 }
 
 /// The response to other initial states, one panel each, and the true one if known; times in s, displacements in m.
-pub fn predictions(t: &[f64], motions: &[PredictedResponse]) -> Figure {
+pub fn predictions(t: &[f64], responses: &[PredictedResponse]) -> Figure {
     Figure::new(
         "predictions",
         "Predictions",
         "Predicted free response from other initial states against time.",
     )
-    .panels(motions.iter().map(|predicted| {
+    .panels(responses.iter().map(|predicted| {
         let state = &predicted.summary;
         let (y, v) = (state.displacement, state.velocity);
         Panel::of_time("displacement y", "m")

@@ -67,7 +67,7 @@ impl FittedModel<'_> {
         let channel = view.channel;
         let beside = match channel.stride() {
             Some(_) if view.factor() == 1.0 => {
-                self.motion(experiment, channel.times(), channel.observed())
+                self.response(experiment, channel.times(), channel.observed())
             }
             _ => beside,
         };
@@ -103,26 +103,26 @@ impl FittedModel<'_> {
         )
     }
 
-    pub(super) fn motion(&self, experiment: usize, times: &[f64], observed: &[f64]) -> Figure {
+    pub(super) fn response(&self, experiment: usize, times: &[f64], observed: &[f64]) -> Figure {
         let grid_times = self.model.problem.system.grid.times();
         let nodes = self.model.problem.experiments[experiment].nodes;
         let grid_times = &grid_times[..nodes];
         let mut snapshots: Vec<(usize, &[f64], &[f64])> = (self.fit.snapshots.iter())
             .map(|s| {
-                let motion = &s.trajectories[experiment];
+                let response = &s.trajectories[experiment];
                 (
                     s.iteration as usize,
                     grid_times,
-                    motion.displacement.as_slice(),
+                    response.displacement.as_slice(),
                 )
             })
             .collect();
         let last = self.fit.history.len();
         if snapshots.last().is_none_or(|s| s.0 != last) {
-            let motion = &self.fit.best.evaluation.trajectories[experiment];
-            snapshots.push((last, grid_times, &motion.displacement));
+            let response = &self.fit.best.evaluation.trajectories[experiment];
+            snapshots.push((last, grid_times, &response.displacement));
         }
-        figures::motion(times, observed, &snapshots)
+        figures::response(times, observed, &snapshots)
     }
 
     pub(super) fn functions_figure(&self) -> Figure {

@@ -22,10 +22,10 @@ pub fn channel(view: &ChannelView) -> ChannelSummary {
     ChannelSummary {
         kind: channel.kind().name().into(),
         unit: view.unit().into(),
-        readings: channel.len(),
+        samples: channel.len(),
         ignored: note.map_or(Vec::new(), |n| {
-            let ignored = n.ignored.iter().map(|(readings, reason)| IgnoredSummary {
-                readings: *readings,
+            let ignored = n.ignored.iter().map(|(samples, reason)| IgnoredSummary {
+                samples: *samples,
                 reason: reason.clone(),
             });
             ignored.collect()

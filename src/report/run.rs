@@ -57,7 +57,7 @@ impl FittedModel<'_> {
         write("history.csv", &self.history().to_csv())?;
         write("functions.csv", &self.functions_table().to_csv())?;
         write("trajectory.csv", &self.trajectories().to_csv())?;
-        for (name, table) in self.readings() {
+        for (name, table) in self.samples() {
             write(&name, &table.to_csv())?;
         }
         if with_figures {
@@ -258,7 +258,7 @@ impl FittedModel<'_> {
                 ExperimentSummary {
                     name: experiment.name.clone(),
                     driven_by: driven_by(experiment.excitation.as_ref()),
-                    readings: experiment.sample_count(),
+                    samples: experiment.sample_count(),
                     rms_residual: channels
                         .first()
                         .map_or(f64::NAN, |first| factor * first.rms_residual),
@@ -337,7 +337,7 @@ pub fn fit_claim(model: &Model) -> Claim {
         "weights",
     ];
     let records = 1..=model.problem.experiments.len();
-    let readings = records.map(|number| number.to_string());
+    let samples = records.map(|number| number.to_string());
     Claim::new("fit")
         .files([
             RESULT,
@@ -346,7 +346,7 @@ pub fn fit_claim(model: &Model) -> Claim {
             "trajectory.csv",
             "report.html",
         ])
-        .family("readings", "csv", readings.chain(["validation".to_owned()]))
+        .family("readings", "csv", samples.chain(["validation".to_owned()]))
         .family("figures", "svg", FIGURES)
         .journals(&[FIT_JOURNAL, CHECKPOINT])
 }

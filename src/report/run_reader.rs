@@ -28,7 +28,7 @@ const PER_NODE: u64 = 600;
 /// use kmcfit::Run;
 /// let run = Run::open("runs/paper")?;
 /// println!("{}: J = {:e}", run.document.outcome.status.name(), run.document.cost.r#final);
-/// let mass = &run.device.mass;                            // kg, one value per node
+/// let mass = &run.coefficients.mass;                            // kg, one value per node
 /// for (t, m) in run.system.grid.times().iter().zip(mass) {
 ///     println!("{t} s: {m} kg");
 /// }
@@ -48,7 +48,7 @@ pub struct Run {
     /// Grid, stepper and terms of the run.
     pub system: System,
     /// Estimated nodal coefficients.
-    pub device: NodalCoefficients,
+    pub coefficients: NodalCoefficients,
     /// True nodal coefficients, if the model names them.
     pub truth: Option<NodalCoefficients>,
     /// `history.csv`: one row per iteration.
@@ -82,9 +82,9 @@ impl Run {
         let has_truth = functions.headers().iter().any(|h| h.starts_with("true_"));
         Ok(Self {
             folder: folder.to_path_buf(),
-            device: device(&functions, "", &quantities)?,
+            coefficients: coefficients(&functions, "", &quantities)?,
             truth: has_truth
-                .then(|| device(&functions, "true_", &quantities))
+                .then(|| coefficients(&functions, "true_", &quantities))
                 .transpose()?,
             history: history(folder, document.counts.iterations)?,
             document,
@@ -199,7 +199,7 @@ fn history(folder: &Path, iterations: u64) -> Result<Vec<IterationRecord>, Input
 }
 
 /// The mass and the functions of the terms `quantities`; refuses values that are not finite.
-fn device(
+fn coefficients(
     table: &ResultTable,
     prefix: &str,
     quantities: &[CoefficientKind],

@@ -196,13 +196,13 @@ mod tests {
     fn a_wave_with_readings_off_it() {
         let times: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.05).collect();
         let model: Vec<f64> = times.iter().map(|t| 3.0 * t.sin()).collect();
-        let mut readings = model.clone();
-        readings[100] = 2.5;
-        readings[50] = f64::NAN;
+        let mut samples = model.clone();
+        samples[100] = 2.5;
+        samples[50] = f64::NAN;
         let mut chart = Chart::new(60, 6, &times);
-        chart.scale(&[&model, &readings]);
+        chart.scale(&[&model, &samples]);
         chart.line(&times, &model);
-        chart.points(&times, &readings);
+        chart.points(&times, &samples);
         assert_snapshot!(chart.text(), @"
          3 │    ⡠⠔⠋⠉⠉⠓⢦⡀            o         ⡠⠖⠊⠉⠉⠒⠦⣀
            │  ⡴⠊       ⠈⠢⡀                 ⢀⡴⠋       ⠈⠣⡀

@@ -69,7 +69,7 @@ pub fn not_a_number(place: Location, field: &str, decimal: char) -> InputError {
 }
 
 /// The error for a field that is neither a finite number nor missing.
-pub fn not_a_reading(place: Location, field: &str, decimal: char) -> InputError {
+pub fn not_a_sample(place: Location, field: &str, decimal: char) -> InputError {
     let expected = "a finite number, or an empty field for a missing sample";
     match parse(field, decimal) {
         Some(_) => wrong(place, "not a finite number", field, decimal)

@@ -41,7 +41,7 @@ pub struct Table {
 /// Samples of a column, NaN if missing, up to the first invalid field.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct ColumnValues {
-    readings: Vec<f64>,
+    samples: Vec<f64>,
     /// The first field that is not a finite number.
     unnumbered: Option<InputError>,
     /// The first field that is neither a finite number nor missing.
@@ -151,7 +151,7 @@ impl Table {
     pub fn values(&self, index: usize) -> Result<&[f64], InputError> {
         let column = self.at(index)?;
         match &column.unnumbered {
-            None => Ok(&column.readings),
+            None => Ok(&column.samples),
             Some(error) => Err(error.clone()),
         }
     }
@@ -162,19 +162,19 @@ impl Table {
     /// ```
     /// use kmcfit::tables::Table;
     /// let table = Table::parse("gaps.csv", "t,y\n0,3.3\n1,\n2,3.1\n".as_bytes())?;
-    /// let readings = table.readings(1)?;
-    /// assert_eq!((readings[0], readings[2]), (3.3, 3.1));
-    /// assert!(readings[1].is_nan());
+    /// let samples = table.samples(1)?;
+    /// assert_eq!((samples[0], samples[2]), (3.3, 3.1));
+    /// assert!(samples[1].is_nan());
     /// # Ok::<(), kmcfit::error::InputError>(())
     /// ```
     ///
     /// # Errors
     ///
     /// When one of its fields is neither a finite number nor missing, or there is no such column.
-    pub fn readings(&self, index: usize) -> Result<&[f64], InputError> {
+    pub fn samples(&self, index: usize) -> Result<&[f64], InputError> {
         let column = self.at(index)?;
         match &column.unreadable {
-            None => Ok(&column.readings),
+            None => Ok(&column.samples),
             Some(error) => Err(error.clone()),
         }
     }
@@ -293,7 +293,7 @@ impl Table {
             }
             let read = field::read(text, layout.decimal);
             if let Field::Number(value) = read {
-                self.columns[index].readings.push(value);
+                self.columns[index].samples.push(value);
                 continue;
             }
             let place = || self.place(row, Some(&self.label(index)));
@@ -302,9 +302,9 @@ impl Table {
                 .is_none()
                 .then(|| field::not_a_number(place(), text, layout.decimal));
             let unreadable = (read != Field::Missing)
-                .then(|| field::not_a_reading(place(), text, layout.decimal));
+                .then(|| field::not_a_sample(place(), text, layout.decimal));
             let column = &mut self.columns[index];
-            column.readings.push(f64::NAN);
+            column.samples.push(f64::NAN);
             column.unnumbered = column.unnumbered.take().or(unnumbered);
             column.unreadable = unreadable;
         }
@@ -316,7 +316,7 @@ impl Table {
 fn columns(width: usize, room: TableMemory) -> Result<Vec<ColumnValues>, InputError> {
     let column = |_| {
         Ok(ColumnValues {
-            readings: room.list(width)?,
+            samples: room.list(width)?,
             ..ColumnValues::default()
         })
     };

@@ -346,7 +346,7 @@ fn columns(table: &Table) {
         assert_eq!(table.find(&ColumnName::Number(index + 1)), Ok(index));
         table.unit(index);
         let _ = table.check_stated_unit(index);
-        if let Ok(readings) = table.readings(index) {
+        if let Ok(readings) = table.samples(index) {
             assert_eq!(readings.len(), table.rows());
         }
     }
@@ -380,7 +380,7 @@ pub fn run(bytes: &[u8]) -> Verdict {
                 displacement: 1.0,
                 velocity: 0.0,
             };
-            let _ = predict(&run.system, &run.device, run.truth.as_ref(), &[state]);
+            let _ = predict(&run.system, &run.coefficients, run.truth.as_ref(), &[state]);
             run.band("mass");
             Verdict::Accepted
         }

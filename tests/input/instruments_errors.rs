@@ -13,7 +13,7 @@ fn with(text: &str, format: &TableFormat) -> String {
 }
 
 fn readings(text: &str, index: usize) -> String {
-    parsed(text).readings(index).unwrap_err().to_string()
+    parsed(text).samples(index).unwrap_err().to_string()
 }
 
 #[test]

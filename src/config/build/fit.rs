@@ -129,8 +129,8 @@ fn can_regularise(
 
 fn gradient(file: &ModelFile, problem: &Problem) -> Result<GradientKind, InputError> {
     let asked = file.spec.fit.as_ref().and_then(|f| f.gradient);
-    let has_readings = problem.experiments.iter().any(|e| !e.channels.is_empty());
-    if asked == Some(GradientKind::Continuous) && has_readings && !problem.supports_continuous() {
+    let has_samples = problem.experiments.iter().any(|e| !e.channels.is_empty());
+    if asked == Some(GradientKind::Continuous) && has_samples && !problem.supports_continuous() {
         return Err(file
             .error_at(
                 "fit.gradient",

@@ -36,7 +36,7 @@ pub(super) fn build(
                 .expected("`nodes`, because there is no record"));
         }
         Some(Nodes::Auto) => auto::nodes(method(file), records, duration, MOST_CHOSEN, notes),
-        None => match node_per_reading(records) {
+        None => match node_per_sample(records) {
             Some(nodes) => nodes,
             None => auto::nodes(method(file), records, duration, MOST_CHOSEN, notes),
         },
@@ -89,7 +89,7 @@ fn fits_into_memory(file: &ModelFile, purpose: BuildMode, nodes: usize) -> Resul
 }
 
 /// Number of nodes for one node per sample, if all channels of all records have the same equally spaced times.
-fn node_per_reading(records: &[Option<RawRecord>]) -> Option<usize> {
+fn node_per_sample(records: &[Option<RawRecord>]) -> Option<usize> {
     let mut channels = records.iter().flatten().flat_map(|r| &r.channels);
     let first = channels.next()?;
     let spacing = first.spacing?;

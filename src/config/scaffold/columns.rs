@@ -112,8 +112,8 @@ impl ColumnAssignment {
     pub fn of(table: &Table, sample_rate: Option<f64>) -> Result<Self, InputError> {
         let mut numeric = Vec::new();
         for i in 0..table.width() {
-            match table.readings(i) {
-                Ok(readings) if readings.iter().any(|x| x.is_finite()) => numeric.push(i),
+            match table.samples(i) {
+                Ok(samples) if samples.iter().any(|x| x.is_finite()) => numeric.push(i),
                 Ok(_) => {}
                 // A recognised name requires numbers.
                 Err(error) => match known(table, i).map(|column| column.role) {
@@ -160,9 +160,9 @@ impl ColumnAssignment {
             return Ok(());
         };
         let size = |c: &UsedColumn| -> Result<f64, InputError> {
-            let readings = table.readings(c.index)?.iter().copied();
-            let readings: Vec<f64> = readings.filter(|x| x.is_finite()).collect();
-            Ok(c.unit.factor() * spread(&readings))
+            let samples = table.samples(c.index)?.iter().copied();
+            let samples: Vec<f64> = samples.filter(|x| x.is_finite()).collect();
+            Ok(c.unit.factor() * spread(&samples))
         };
         let there = &self.used[place];
         let alike = column.has_unit == there.has_unit
@@ -179,8 +179,8 @@ impl ColumnAssignment {
 
     /// Assigns the first column without a recognised name or foreign unit to the displacement.
     fn guess(&mut self, table: &Table) -> Result<(), InputError> {
-        let is_empty = |i: &usize| match table.readings(*i) {
-            Ok(readings) => readings.iter().all(|x| x.is_nan()),
+        let is_empty = |i: &usize| match table.samples(*i) {
+            Ok(samples) => samples.iter().all(|x| x.is_nan()),
             Err(_) => false,
         };
         let is_channel = |i: &usize| known(table, *i).is_some_and(|c| c.role.is_channel());

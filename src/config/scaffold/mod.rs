@@ -46,28 +46,28 @@ pub fn scaffold(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Scaf
     let table = Table::read(csv)?;
     memory::check_file(csv, table.rows() as u64 * PER_ROW)?;
     let columns = ColumnAssignment::of(&table, sample_rate)?;
-    let motion = RecordSummary::of(&table, &columns, sample_rate)?;
+    let record = RecordSummary::of(&table, &columns, sample_rate)?;
     let mut found = vec![format!(
         "{} samples over {} s, {}",
-        motion.readings,
-        short(motion.duration),
-        motion.spacing_in_words()
+        record.samples,
+        short(record.duration),
+        record.spacing_in_words()
     )];
-    if let Some(begins) = motion.begins {
+    if let Some(begins) = record.begins {
         found.insert(
             0,
             format!("at rest before {begins} s: excluded by `window`"),
         );
     }
     found.extend(columns.in_words(&table));
-    if let Some((count, first)) = motion.far_off {
+    if let Some((count, first)) = record.far_off {
         let lie = match count {
-            1 => "1 reading lies".to_owned(),
-            _ => format!("{count} readings lie"),
+            1 => "1 sample lies".to_owned(),
+            _ => format!("{count} samples lie"),
         };
         found.push(format!(
             "{lie} far off ({}): empty fields are better; the model has a robust loss",
-            significant(first / motion.channel.1, 4)
+            significant(first / record.channel.1, 4)
         ));
     }
     if let (Some(given), Some((index, rate))) = (sample_rate, columns::rate(&table))
@@ -79,11 +79,11 @@ pub fn scaffold(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Scaf
             significant(rate, 4)
         ));
     }
-    found.push(match motion.frequency {
+    found.push(match record.frequency {
         Some(frequency) => format!(
             "dominant frequency {} Hz: {} in the record",
             short(frequency),
-            match motion.periods().round() {
+            match record.periods().round() {
                 1.0 => "1 period".to_owned(),
                 periods => format!("{periods} periods"),
             }
@@ -91,7 +91,7 @@ pub fn scaffold(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Scaf
         None => "no dominant frequency was found".into(),
     });
     Ok(Scaffold {
-        text: text(&table, data, &columns, &motion, sample_rate),
+        text: text(&table, data, &columns, &record, sample_rate),
         found,
     })
 }
@@ -100,7 +100,7 @@ fn text(
     table: &Table,
     data: &str,
     columns: &ColumnAssignment,
-    motion: &RecordSummary,
+    record: &RecordSummary,
     sample_rate: Option<f64>,
 ) -> String {
     let name = Path::new(data)
@@ -119,12 +119,12 @@ fn text(
         quoted(&name),
         quoted(data)
     );
-    for (key, value, comment) in keys(table, columns, motion, sample_rate) {
+    for (key, value, comment) in keys(table, columns, record, sample_rate) {
         if let Some(value) = value {
             text += &commented(&format!("{key}: {value}"), &comment);
         }
     }
-    text + &functions(columns, motion)
+    text + &functions(columns, record)
         + &commented(
             "# truth: {data: truth.csv}",
             "the true functions, where they are known",
@@ -139,17 +139,17 @@ fn text(
 fn keys(
     table: &Table,
     columns: &ColumnAssignment,
-    motion: &RecordSummary,
+    record: &RecordSummary,
     sample_rate: Option<f64>,
 ) -> Vec<(&'static str, Option<String>, String)> {
     let sigmas: Vec<String> = (columns.channels())
         .map(|role| format!("{}: estimate", role.key()))
         .collect();
     let has_base = columns.has(Role::BaseAcceleration) || columns.has(Role::BaseDisplacement);
-    let between = format!("{{interpolation: {}}}", motion.between);
+    let between = format!("{{interpolation: {}}}", record.between);
     let or = "between samples: or hold, linear, cubic";
-    let (sensors, why) = sensors(columns, motion);
-    let robust = format!("{{{}: huber}}", motion.channel.0.key());
+    let (sensors, why) = sensors(columns, record);
+    let robust = format!("{{{}: huber}}", record.channel.0.key());
     let keys = [
         (
             "    columns",
@@ -160,7 +160,7 @@ fn keys(
         ("    units", columns.units(), "converted to SI"),
         (
             "    window",
-            motion.begins.map(|begins| format!("{{min: {begins}}}")),
+            record.begins.map(|begins| format!("{{min: {begins}}}")),
             "s; at rest before (not yet released or struck)",
         ),
         (
@@ -176,7 +176,7 @@ fn keys(
         ),
         (
             "    loss",
-            motion.far_off.map(|_| robust),
+            record.far_off.map(|_| robust),
             "robust against outliers; or `squares`",
         ),
         (
@@ -202,7 +202,7 @@ fn keys(
 /// Sensors with estimated parameters, and the reasons.
 fn sensors(
     columns: &ColumnAssignment,
-    motion: &RecordSummary,
+    record: &RecordSummary,
 ) -> (Vec<&'static str>, Vec<&'static str>) {
     let mut sensors = Vec::new();
     if columns.has(Role::Acceleration) {
@@ -213,12 +213,12 @@ fn sensors(
     }
     // A static force can cause the offset of a displacement.
     if columns.has(Role::Displacement) && !columns.has(Role::Force) {
-        if motion.drifts {
+        if record.drifts {
             sensors.push((
                 "displacement: {offset: estimate, drift: estimate}",
                 "the record oscillates about a sloping line",
             ));
-        } else if motion.is_off_centre {
+        } else if record.is_off_centre {
             sensors.push((
                 "displacement: {offset: estimate}",
                 "the record oscillates about a value other than zero",
@@ -229,11 +229,11 @@ fn sensors(
 }
 
 /// The coefficient functions, with start values that give the dominant frequency.
-fn functions(columns: &ColumnAssignment, motion: &RecordSummary) -> String {
-    let omega = std::f64::consts::TAU * motion.frequency.unwrap_or(1.0);
+fn functions(columns: &ColumnAssignment, record: &RecordSummary) -> String {
+    let omega = std::f64::consts::TAU * record.frequency.unwrap_or(1.0);
     let driven = columns.has(Role::Force);
     let mass = match driven {
-        true => motion.mass(omega).unwrap_or(1.0),
+        true => record.mass(omega).unwrap_or(1.0),
         false => 1.0,
     };
     let mut text = String::from("functions:\n");
@@ -256,7 +256,7 @@ fn functions(columns: &ColumnAssignment, motion: &RecordSummary) -> String {
         "N s/m; starts at 2 % of critical",
     );
     let stiffness = short(mass * omega * omega);
-    let knots = (motion.periods() / PERIODS_PER_KNOT)
+    let knots = (record.periods() / PERIODS_PER_KNOT)
         .floor()
         .min(MOST_KNOTS);
     text += &match knots >= 2.0 {

@@ -22,7 +22,7 @@ const MOST_JUMPS: f64 = 0.1;
 /// Summary of a record.
 #[derive(Debug)]
 pub struct RecordSummary {
-    pub readings: usize,
+    pub samples: usize,
     pub missing: usize,
     /// s.
     pub duration: f64,
@@ -44,7 +44,7 @@ pub struct RecordSummary {
     /// Root-mean-square force, N, and root-mean-square response with the power of omega that converts it to an
     /// acceleration.
     force: Option<f64>,
-    motion: f64,
+    response: f64,
     power: i32,
     /// Interpolation of force and base motion between samples.
     pub between: &'static str,
@@ -91,7 +91,7 @@ impl RecordSummary {
         let beside_line = beside_line.filter(|f| f * duration >= DRIFT_PERIODS);
         Ok(Self {
             between: between(&drive.unwrap_or_default()),
-            readings: pairs.len(),
+            samples: pairs.len(),
             missing,
             channel: (column.role, column.unit.factor()),
             far_off,
@@ -106,7 +106,7 @@ impl RecordSummary {
                 force.retain(|x| x.is_finite());
                 spread(&force)
             }),
-            motion: spread(&values_of(pairs)),
+            response: spread(&values_of(pairs)),
             power,
         })
     }
@@ -118,7 +118,7 @@ impl RecordSummary {
 
     /// Mass for which the inertia force equals the measured force, kg.
     pub fn mass(&self, omega: f64) -> Option<f64> {
-        let mass = self.force? / (self.motion * omega.powi(self.power));
+        let mass = self.force? / (self.response * omega.powi(self.power));
         (mass.is_finite() && mass > 0.0).then_some(mass)
     }
 
@@ -219,8 +219,8 @@ fn times(
 
 fn in_si(table: &Table, column: &UsedColumn) -> Result<Vec<f64>, InputError> {
     let factor = column.unit.factor();
-    let readings = table.readings(column.index)?;
-    Ok(readings.iter().map(|x| x * factor).collect())
+    let samples = table.samples(column.index)?;
+    Ok(samples.iter().map(|x| x * factor).collect())
 }
 
 /// Dominant frequency of the samples, interpolated linearly where they are not equally spaced, Hz.

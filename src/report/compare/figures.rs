@@ -103,7 +103,10 @@ fn list(measures: &[Measures], of: impl Fn(&Measures) -> Option<String>) -> Stri
 fn overlay(figure: Figure, runs: &[ComparedRun], curves: &[Curve]) -> Figure {
     let truths = truths(runs);
     figure.panels(curves.iter().map(|(label, unit, of)| {
-        let found: Vec<Vec<f64>> = runs.iter().map(|run| of(&run.finished.device)).collect();
+        let found: Vec<Vec<f64>> = runs
+            .iter()
+            .map(|run| of(&run.finished.coefficients))
+            .collect();
         let real: Vec<Vec<f64>> = truths.iter().map(|(_, _, truth)| of(truth)).collect();
         let mut panel = Panel::of_time(*label, *unit);
         if let Some((low, high)) = without_spikes(&real, &found) {
@@ -202,9 +205,9 @@ fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &NodalCoefficients
 /// The residuals of the records, one panel for each name of an experiment.
 fn residuals(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
     let mut names: Vec<&str> = Vec::new();
-    for motion in runs.iter().flat_map(|run| &run.motions) {
-        if !names.contains(&motion.experiment.as_str()) {
-            names.push(&motion.experiment);
+    for response in runs.iter().flat_map(|run| &run.responses) {
+        if !names.contains(&response.experiment.as_str()) {
+            names.push(&response.experiment);
         }
     }
     let misfits = list(measures, |m| Some(format!("J/J0 {:.1e}", m.cost_ratio)));
@@ -217,9 +220,9 @@ fn residuals(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
         let title = if names.len() > 1 { *name } else { "" };
         let zero = Mark::horizontal("", 0.0, Style::new(Colour::Grey).width(0.8));
         let runs = runs.iter().enumerate().flat_map(|(i, run)| {
-            let motions = run.motions.iter().filter(|m| m.experiment == *name);
+            let responses = run.responses.iter().filter(|m| m.experiment == *name);
             let style = style(i).width(1.2);
-            motions.map(move |m| Mark::line(&run.name, &m.times, &m.residual, style))
+            responses.map(move |m| Mark::line(&run.name, &m.times, &m.residual, style))
         });
         let panel = Panel::of_time("y − y_obs", "m").title(title);
         panel.mark(zero).marks(runs)

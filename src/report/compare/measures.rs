@@ -73,9 +73,10 @@ impl Measures {
     /// Quantities of a run.
     pub fn of(run: &ComparedRun) -> Self {
         let document = &run.finished.document;
-        let device = &run.finished.device;
+        let coefficients = &run.finished.coefficients;
         let response = ResponseFit::of(run);
-        let errors = (run.finished.truth.as_ref()).map(|truth| TruthErrors::of(device, truth));
+        let errors =
+            (run.finished.truth.as_ref()).map(|truth| TruthErrors::of(coefficients, truth));
         Self {
             name: run.name.clone(),
             title: document.title.clone(),
@@ -103,10 +104,10 @@ impl Measures {
                 + document.weights.as_ref().map_or(0, |w| w.iterations()),
             seconds: document.seconds,
             errors,
-            smallest_mass: smallest(&device.mass),
-            smallest_damping: smallest(&device.coefficients[0]),
+            smallest_mass: smallest(&coefficients.mass),
+            smallest_damping: smallest(&coefficients.coefficients[0]),
             max_violation: run.max_violation,
-            roughness: Roughness::of(device, run.finished.system.grid.step()),
+            roughness: Roughness::of(coefficients, run.finished.system.grid.step()),
             predictions: document.predictions.clone(),
             assumptions: document.identifiability.assumptions.clone(),
             identifiability: document.identifiability.warnings.clone(),

@@ -12,7 +12,7 @@ pub struct ChannelSummary {
     /// Unit of the values, that of the file.
     pub unit: String,
     /// Number of used samples.
-    pub readings: usize,
+    pub samples: usize,
     /// Unused samples.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ignored: Vec<IgnoredSummary>,
@@ -61,7 +61,7 @@ fn is_zero(count: &usize) -> bool {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct IgnoredSummary {
     /// Number of samples.
-    pub readings: usize,
+    pub samples: usize,
     /// Reason.
     pub reason: String,
 }

@@ -262,7 +262,7 @@ pub struct ExperimentSummary {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub driven_by: Vec<String>,
     /// Number of samples of all channels.
-    pub readings: usize,
+    pub samples: usize,
     /// Root-mean-square residual of the first channel, in its SI unit.
     #[serde(deserialize_with = "number_or_nan")]
     pub rms_residual: f64,

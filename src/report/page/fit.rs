@@ -99,8 +99,8 @@ fn convergence(run: &FittedModel, document: &ResultDocument) -> String {
         let Some(channel) = channel.filter(|_| !run.fit.snapshots.is_empty()) else {
             continue;
         };
-        let motion = run.motion(i, channel.times(), channel.observed());
-        drawn.push(run.titled(motion, i, 0));
+        let response = run.response(i, channel.times(), channel.observed());
+        drawn.push(run.titled(response, i, 0));
     }
     let work = paragraph(&overview::work(document));
     work + &list(&lines(|text| write_attempts(text, document))) + &figures(&drawn)

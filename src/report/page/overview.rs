@@ -45,7 +45,7 @@ fn state(document: &ResultDocument) -> String {
 
 /// Main figures: cost ratio, fit, chi-square, samples, parameters, rank bound.
 fn facts(document: &ResultDocument) -> String {
-    let readings: usize = document.experiments.iter().map(|e| e.readings).sum();
+    let samples: usize = document.experiments.iter().map(|e| e.samples).sum();
     let mut facts = Vec::new();
     if document.has_ratio() {
         facts.push(("cost ratio J/J0", number(document.cost.ratio)));
@@ -60,7 +60,7 @@ fn facts(document: &ResultDocument) -> String {
     if let Some(reduced) = document.statistics.reduced_chi_square {
         facts.push(("chi-square per degree of freedom", number(reduced)));
     }
-    facts.push(("samples", readings.to_string()));
+    facts.push(("samples", samples.to_string()));
     facts.push(("parameters", document.model.parameters.to_string()));
     let known = &document.identifiability;
     if known.rank_bound < known.parameters && document.is_simulated() {
@@ -138,8 +138,8 @@ pub(super) fn records(document: &ResultDocument) -> String {
             notes.push(format!("{about}: {}", channel.whiteness));
         }
         notes.extend(channel.ignored.iter().map(|ignored| {
-            let readings = count(ignored.readings, "sample");
-            format!("{about}: {readings} not used: {}", ignored.reason)
+            let samples = count(ignored.samples, "sample");
+            format!("{about}: {samples} not used: {}", ignored.reason)
         }));
     }
     for out in &document.validation {
@@ -174,7 +174,7 @@ fn record(name: &str, channel: &ChannelSummary) -> Vec<String> {
         },
         with_unit(channel.rms_residual),
         sigma,
-        channel.readings.to_string(),
+        channel.samples.to_string(),
     ]
 }
 

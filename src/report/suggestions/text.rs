@@ -150,13 +150,10 @@ fn write_pattern(
     pattern: &ResidualPattern,
 ) -> fmt::Result {
     match pattern {
-        ResidualPattern::Outliers {
-            samples: readings,
-            first,
-        } => {
-            match readings {
+        ResidualPattern::Outliers { samples, first } => {
+            match samples {
                 1 => write!(f, "{channel}: one outlier, at {first} s")?,
-                _ => write!(f, "{channel}: {readings} outliers, the first at {first} s")?,
+                _ => write!(f, "{channel}: {samples} outliers, the first at {first} s")?,
             }
             let sigma = match has_sigma {
                 true => "",

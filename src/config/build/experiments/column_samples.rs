@@ -85,16 +85,14 @@ pub fn read(
     let unit = column(index).unit(warnings)?;
     let factor = unit.factor();
     let times = times(file, spec, &experiment, own, &table, warnings)?;
-    let values = table
-        .readings(index)
-        .map_err(asked_for(file, &column_key))?;
+    let values = table.samples(index).map_err(asked_for(file, &column_key))?;
     let beside = match wanted.beside {
         Some((name, key)) => {
             let found = table
                 .find(&ColumnName::from(name))
                 .map_err(asked_for(file, key))?;
             column(found).same_as(unit, key, warnings);
-            Some(table.readings(found).map_err(asked_for(file, key))?)
+            Some(table.samples(found).map_err(asked_for(file, key))?)
         }
         None => None,
     };

@@ -167,7 +167,7 @@ pub(super) fn specification(
     if let Some(mut record) = record {
         found = found.input(record.excitation.into_input());
         if let (BuildMode::Check { .. }, [only]) = (purpose, record.channels.as_mut_slice()) {
-            reading_per_node(only, grid);
+            sample_per_node(only, grid);
         }
         for raw in record.channels {
             notes.push(raw.note());
@@ -215,7 +215,7 @@ fn channel(spec: &ExperimentSpec, raw: RawChannel) -> ChannelSpec {
 
 /// Interpolates the samples of an integral cost at every node, so that a gradient check of the continuous adjoint is
 /// possible on any grid.
-fn reading_per_node(raw: &mut RawChannel, grid: &Grid) {
+fn sample_per_node(raw: &mut RawChannel, grid: &Grid) {
     let plain = raw.kind == ChannelKind::Displacement && raw.filter.is_empty();
     let integral = matches!(raw.weighting, Some(Weighting::Integral { .. }) | None);
     if plain && integral && raw.spacing.is_some() && raw.times.len() != grid.nodes() {

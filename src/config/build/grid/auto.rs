@@ -26,7 +26,7 @@ const AT_REST: f64 = 0.01;
 /// Fewest samples for a comparison of halves.
 const FEWEST_LIVELY: usize = 128;
 /// Most nodes per sample: more only slow down the fit of a coarse record.
-const MOST_PER_READING: usize = 64;
+const MOST_PER_SAMPLE: usize = 64;
 
 /// Number of nodes over `duration` s; a finding in `notes` states the choice.
 pub fn nodes(
@@ -38,9 +38,9 @@ pub fn nodes(
 ) -> usize {
     let mut longest = f64::INFINITY;
     let mut fastest = 0.0f64;
-    let mut readings = 2;
+    let mut samples = 2;
     for channel in records.iter().flatten().flat_map(|r| &r.channels) {
-        readings = readings.max(channel.times.len());
+        samples = samples.max(channel.times.len());
         let spectrum = Spectrum::of(lively(&channel.values), channel.median_spacing);
         let spectrum = spectrum.map(|s| s.without_noise());
         let frequency = spectrum.as_ref().map(|s| s.energy_quantile(ENERGY));
@@ -57,7 +57,7 @@ pub fn nodes(
             .min((ACCURACY * constant / (omega * duration)).powf(1.0 / order) / omega)
             .min(1.0 / (STEPS_PER_PERIOD * spectrum.energy_quantile(ALL_ENERGY)));
     }
-    let shortest = duration / (most.min(MOST_PER_READING * readings) - 1) as f64;
+    let shortest = duration / (most.min(MOST_PER_SAMPLE * samples) - 1) as f64;
     let mut step = longest.clamp(shortest, duration / 8.0);
     let drives = records
         .iter()

@@ -18,10 +18,10 @@ const readAt = (panel, place) => {
   refresh(panel.axis);
 };
 
-/** The wheel belongs to the page until a chart has the focus, so that reading on is never stopped. */
+/** The wheel scrolls the page until a chart has the focus. */
 const onWheel = (panel, event) => {
   if (!event.ctrlKey && document.activeElement !== panel.plot) return;
-  // Where everything is in sight already, turning on scrolls the page.
+  // At the full range the wheel scrolls the page.
   if (event.deltaY > 0 && !event.shiftKey && !isZoomed(panel.axis)) return;
   event.preventDefault();
   const { place, py, view } = placeOf(panel, event);

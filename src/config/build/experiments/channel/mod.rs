@@ -260,8 +260,8 @@ fn present(
                 .found(format!("{missing} rows without a number in `{label}`"))
                 .expected("at least one sample"));
         }
-        1 => "1 reading".to_owned(),
-        count if count < Grid::FEWEST_NODES => format!("{count} readings"),
+        1 => "1 sample".to_owned(),
+        count if count < Grid::FEWEST_NODES => format!("{count} samples"),
         _ => return Ok(present),
     };
     Err(file

@@ -35,7 +35,7 @@ pub(super) fn weighting(
                     .error_at(key, "a standard deviation must be positive")
                     .found(match sigmas[row].is_nan() {
                         true => format!("an empty field in `{name}` for sample {}", row + 1),
-                        false => format!("{} in `{name}` beside reading {}", sigmas[row], row + 1),
+                        false => format!("{} in `{name}` beside sample {}", sigmas[row], row + 1),
                     })
                     .expected("a number greater than 0 for every sample")),
                 None => Ok(Some(Weighting::Sigmas(sigmas))),

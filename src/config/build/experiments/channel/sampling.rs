@@ -40,7 +40,7 @@ pub(super) fn decimate(
             .error_at(&at, "decimation needs equally spaced samples without gaps")
             .found(match whole {
                 true => "times that are not equally spaced",
-                false => "missing readings",
+                false => "missing samples",
             })
             .expected("no `decimate`, or a window without gaps"));
     }
@@ -74,7 +74,7 @@ pub(super) fn band(
             .error_at(&at, "filtering needs equally spaced samples without gaps")
             .found(match missing {
                 0 => "times that are not equally spaced".to_owned(),
-                count => format!("{count} missing readings"),
+                count => format!("{count} missing samples"),
             })
             .expected("no `band`, or a window without gaps"));
     };
