@@ -1,7 +1,7 @@
 //! Problems from Rust: the same as from a model file, and refusals with a place.
 
 use kmcfit::config::{BuildMode, ModelFile, build};
-use kmcfit::observations::Table;
+use kmcfit::tables::Table;
 use kmcfit_core::internals::builder::{
     BasisSpec, Builder, CoefficientSpec, Knots, Record, ScalarSpec, Start,
 };
