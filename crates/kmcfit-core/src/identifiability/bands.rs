@@ -311,7 +311,7 @@ impl Maker<'_> {
         BandSide::Both
     }
 
-    /// CovarianceRoot of the simultaneous band: the 95 % quantile of `max |z_i|` over the nodes.
+    /// Factor of the simultaneous band: the 95 % quantile of `max |z_i|` over the nodes.
     fn simultaneous(
         &self,
         linear: &LinearisedCurve,
