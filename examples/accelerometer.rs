@@ -1,6 +1,6 @@
 // A shaken mass with an accelerometer and a force gauge: mass, damping and stiffness, and how sure.
 
-use kmcfit::observations::Table;
+use kmcfit::tables::Table;
 use kmcfit_core::Interpolation;
 use kmcfit_core::{BandSettings, Bands};
 use kmcfit_core::{Builder, CoefficientSpec, Record};

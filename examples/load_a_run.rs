@@ -12,7 +12,7 @@ pub fn found(folder: &Path) -> Result<[f64; 2], Box<dyn Error>> {
         displacement: 1.0,
         velocity: 0.0,
     };
-    let response = run.system.forward(&run.device, let_go, None)?;
+    let response = run.system.forward(&run.coefficients, let_go, None)?;
     let most = response
         .displacement
         .iter()

@@ -1,6 +1,6 @@
 // The paper's record: what turns an optimum that matches the data into the system that made them.
 
-use kmcfit::observations::Table;
+use kmcfit::tables::Table;
 use kmcfit_core::CoefficientKind;
 use kmcfit_core::Method;
 use kmcfit_core::{Builder, CoefficientSpec, Record};

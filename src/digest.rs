@@ -1,4 +1,4 @@
-//! SHA-256 digests of files, by which the program recognises what it wrote and whether an input has changed.
+//! SHA-256 digests of files, used to recognise files written by kmcfit and changed inputs.
 
 use data_encoding::HEXLOWER;
 use sha2::{Digest as _, Sha256};

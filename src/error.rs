@@ -1,15 +1,15 @@
-//! Errors that say where: misuse is an error, what happens during a fit is an outcome.
+//! Errors of input with their location. Invalid input is an error; the end of a fit, successful or not, is an outcome.
 //!
-//! An [`InputError`] names the place (file, line or row, key), what was found there, what was
-//! expected, and, where one fits, a near spelling. The program prints it and ends with exit code 2.
+//! An [`InputError`] has the location (file, line or row, key), the problem, the value found, the value expected, and a
+//! hint. The program prints it and ends with exit code 2.
 
 use crate::escape::harmless;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Where in the input something is wrong.
+/// Location of an error in the input.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Place {
+pub enum Location {
     /// A command-line option or argument, or a library argument, by name.
     Argument(String),
     /// A file as a whole.
@@ -31,20 +31,20 @@ pub enum Place {
         row: usize,
         /// Line in the file, from 1.
         line: usize,
-        /// Column name, where one column is meant.
+        /// Column name, for an error in one column.
         column: Option<String>,
     },
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Place::Argument(name) => write!(f, "{name}"),
-            Place::File(file) => write!(f, "{}", file.display()),
-            Place::Line { file, line, column } => {
+            Location::Argument(name) => write!(f, "{name}"),
+            Location::File(file) => write!(f, "{}", file.display()),
+            Location::Line { file, line, column } => {
                 write!(f, "{}:{line}:{column}", file.display())
             }
-            Place::Row {
+            Location::Row {
                 file,
                 row,
                 line,
@@ -60,11 +60,11 @@ impl fmt::Display for Place {
     }
 }
 
-/// An input that cannot be used: where, what was found, what was expected.
+/// An error of input: location, problem, value found, value expected, hint.
 ///
 /// ```
 /// use kmcfit::error::{InputError, Place};
-/// let error = InputError::new(Place::Argument("--nodes".into()), "a grid needs at least 3 nodes")
+/// let error = InputError::new(Location::Argument("--nodes".into()), "a grid needs at least 3 nodes")
 ///     .found("2")
 ///     .expected("3 or more");
 /// assert_eq!(
@@ -74,23 +74,23 @@ impl fmt::Display for Place {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct InputError {
-    /// Where.
-    pub place: Place,
+    /// Location.
+    pub place: Location,
     /// Dotted path of the key, as in `functions.mass.start`.
     pub key: Option<String>,
-    /// What is wrong, in one sentence without a full stop.
+    /// The problem, as a sentence without a full stop.
     pub problem: String,
-    /// What was found there.
+    /// The value found.
     pub found: Option<String>,
-    /// What would be accepted.
+    /// Accepted values.
     pub expected: Option<String>,
-    /// What to try, for instance a near spelling.
+    /// Remedy, for instance a similar spelling.
     pub hint: Option<String>,
 }
 
 impl InputError {
-    /// An error at `place` that says what is wrong.
-    pub fn new(place: Place, problem: impl Into<String>) -> Self {
+    /// An error at `place` with its problem.
+    pub fn new(place: Location, problem: impl Into<String>) -> Self {
         Self {
             place,
             key: None,
@@ -103,7 +103,7 @@ impl InputError {
 
     /// An error about an argument.
     pub fn argument(name: impl Into<String>, problem: impl Into<String>) -> Self {
-        Self::new(Place::Argument(name.into()), problem)
+        Self::new(Location::Argument(name.into()), problem)
     }
 
     /// An error at a line of a file and a column in it, both from 1.
@@ -114,7 +114,7 @@ impl InputError {
         problem: impl Into<String>,
     ) -> Self {
         let file = file.as_ref().to_path_buf();
-        Self::new(Place::Line { file, line, column }, problem)
+        Self::new(Location::Line { file, line, column }, problem)
     }
 
     /// An error in a text file behind some text.
@@ -126,7 +126,7 @@ impl InputError {
 
     /// An error about a file as a whole.
     pub fn file(file: impl AsRef<Path>, problem: impl Into<String>) -> Self {
-        Self::new(Place::File(file.as_ref().to_path_buf()), problem)
+        Self::new(Location::File(file.as_ref().to_path_buf()), problem)
     }
 
     /// Adds the dotted path of the key.
@@ -136,27 +136,27 @@ impl InputError {
         self
     }
 
-    /// Adds what was found.
+    /// Sets the value found.
     #[must_use]
     pub fn found(mut self, found: impl fmt::Display) -> Self {
         self.found = Some(found.to_string());
         self
     }
 
-    /// Adds what was expected.
+    /// Sets the accepted values.
     #[must_use]
     pub fn expected(mut self, expected: impl Into<String>) -> Self {
         self.expected = Some(expected.into());
         self
     }
 
-    /// Adds what to try.
+    /// Adds a remedy.
     #[must_use]
     pub fn hint(self, hint: impl Into<String>) -> Self {
         self.hint_if(Some(hint.into()))
     }
 
-    /// Adds what to try, where there is something.
+    /// Adds a remedy, if any.
     #[must_use]
     pub fn hint_if(mut self, hint: Option<String>) -> Self {
         self.hint = hint.or(self.hint);
@@ -180,7 +180,7 @@ impl fmt::Display for InputError {
                 message += &format!("\n  {label}: {text}");
             }
         }
-        // It may repeat what somebody else wrote, file names included.
+        // The message can contain text of input files and their names, so control characters are escaped.
         f.write_str(&harmless(&message))
     }
 }

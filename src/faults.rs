@@ -1,4 +1,4 @@
-//! Injected faults: makes one operation of the operating system fail, to test what follows from it.
+//! Injected faults for tests: makes one chosen operation of the operating system fail.
 //!
 //! Every write, rename, sync, removal and thread start of the program passes [`check`]. In builds with
 //! debug assertions the environment variable `KMCFIT_FAULT` selects the operations that fail, counted from 1

@@ -1,13 +1,13 @@
 //! The application kmcfit: identifies time-varying mass, damping and stiffness of a vibrating system from measured
 //! records. The numerics are in [`kmcfit_core`].
 //!
-//! [`guide`] is a short course: a tutorial, how to choose and what goes wrong, the theory.
+//! [`guide`] is the user guide: tutorial, choice of methods, theory.
 //!
 #![cfg_attr(doc, doc = include_str!("guide/equations.md"))]
 //!
 //! # Modules, in the order in which data flow
 //!
-//! 1. [`config`] reads a model file, and through [`observations`] its tables, and builds a problem of [`kmcfit_core`]
+//! 1. [`config`] reads a model file, and through [`tables`] its tables, and builds a problem of [`kmcfit_core`]
 //!    from it; errors in the input are an [`mod@error`]; [`units`] has units and their factors to SI.
 //! 2. [`report`] writes tables, figures, pages and the result document, loads them back ([`Run::open`]), and compares
 //!    runs; [`results`] makes output folders, journals and files crash-safe.
@@ -21,19 +21,19 @@
 pub mod cli;
 pub mod config;
 pub mod digest;
-mod digits;
 pub mod error;
 mod escape;
-mod excerpt;
 mod faults;
 pub mod finding;
 pub mod guide;
-mod input;
 mod memory;
-mod near;
-pub mod observations;
+mod number_format;
 pub mod report;
 pub mod results;
+mod source_snippet;
+mod spelling;
+pub mod tables;
+mod text_io;
 pub mod units;
 
 pub use report::Run;

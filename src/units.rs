@@ -1,12 +1,11 @@
-//! Units of what is measured, and their factors to SI.
+//! Units of measured quantities and their factors to SI.
 //!
-//! A device may turn instead of move: then displacements are angles in rad, forces are torques in
-//! N m, and mass, damping and stiffness are a moment of inertia and so on. Volts stand for readings
-//! without calibration: they count as they are.
+//! For rotational systems displacements are angles in rad, forces are torques in N m, and the mass is a moment of
+//! inertia in kg m². Volts denote uncalibrated samples, which are not converted.
 
 use crate::error::InputError;
-use crate::input::{one_of, quote};
-use crate::near::nearest;
+use crate::spelling::nearest;
+use crate::text_io::{one_of, quote};
 
 /// Standard gravity, m/s² (ISO 80000-3).
 const GRAVITY: f64 = 9.806_65;
@@ -19,9 +18,9 @@ const INCH: f64 = 0.0254;
 const FOOT: f64 = 0.3048;
 const POUND_FORCE: f64 = 0.453_592_37 * GRAVITY;
 
-/// What a channel measures.
+/// Measured quantity of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum Quantity {
     /// Displacement or angle; SI: m or rad.
     Displacement,
     /// Velocity; SI: m/s or rad/s.
@@ -34,7 +33,7 @@ pub enum Kind {
     Time,
 }
 
-impl Kind {
+impl Quantity {
     /// All kinds.
     pub const ALL: [Self; 5] = [
         Self::Displacement,
@@ -66,9 +65,9 @@ impl Kind {
     }
 }
 
-/// What a unit belongs to: moving along a line, turning, or neither for sure.
+/// Motion that a unit belongs to: translation, rotation, or either.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Motion {
+enum Dimension {
     Linear,
     Angular,
     Either,
@@ -78,10 +77,10 @@ enum Motion {
 ///
 /// ```
 /// use kmcfit::units::{Kind, Unit};
-/// let unit = Unit::parse(Kind::Acceleration, "[g]")?;
+/// let unit = Unit::parse(Quantity::Acceleration, "[g]")?;
 /// assert_eq!((unit.symbol(), unit.factor()), ("g", 9.80665));
-/// assert_eq!(Unit::parse(Kind::Acceleration, "m/s^2")?.symbol(), "m/s²");
-/// assert!(Unit::parse(Kind::Force, "g").is_err());
+/// assert_eq!(Unit::parse(Quantity::Acceleration, "m/s^2")?.symbol(), "m/s²");
+/// assert!(Unit::parse(Quantity::Force, "g").is_err());
 /// # Ok::<(), kmcfit::error::InputError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -90,20 +89,20 @@ pub struct Unit {
     /// Other spellings, as [`plain`] makes them.
     others: &'static [&'static str],
     factor: f64,
-    motion: Motion,
+    dimension: Dimension,
 }
 
 impl Unit {
-    /// The SI unit of motion along a line.
-    pub fn si(kind: Kind) -> Self {
+    /// The SI unit for translation.
+    pub fn si(kind: Quantity) -> Self {
         kind.units()[0]
     }
 
-    /// The unit that a text names, or `None` where it names none of this kind.
+    /// The unit named by a text, or `None` if it names none of this quantity.
     ///
     /// Brackets around it do not count, nor do blanks and signs between factors; `²`, `^2`, `**2`
     /// and `2` are the same, as are `µ`, `u` and `μ`. Capitals count, since `mN` is not `MN`.
-    pub fn recognise(kind: Kind, text: &str) -> Option<Self> {
+    pub fn recognise(kind: Quantity, text: &str) -> Option<Self> {
         let wanted = plain(text);
         let named =
             |unit: &&Self| wanted == plain(unit.symbol) || unit.others.contains(&wanted.as_str());
@@ -115,19 +114,19 @@ impl Unit {
     /// # Errors
     ///
     /// When there is no such unit of this kind; the place is an argument of the kind's name.
-    pub fn parse(kind: Kind, text: &str) -> Result<Self, InputError> {
+    pub fn parse(kind: Quantity, text: &str) -> Result<Self, InputError> {
         Self::recognise(kind, text).ok_or_else(|| unknown(kind, text))
     }
 
     /// The symbols of all units of a kind.
-    pub fn symbols(kind: Kind) -> impl Iterator<Item = &'static str> {
+    pub fn symbols(kind: Quantity) -> impl Iterator<Item = &'static str> {
         kind.units().iter().map(|unit| unit.symbol)
     }
 
-    /// Whether a text is a unit of any kind, or anything in brackets: a field in a row of units.
+    /// True for a unit of any quantity, or any text in brackets: a field of a row of units.
     pub fn looks_like(text: &str) -> bool {
         let known = || {
-            Kind::ALL
+            Quantity::ALL
                 .iter()
                 .any(|&k| Self::recognise(k, text).is_some())
         };
@@ -140,28 +139,28 @@ impl Unit {
         self.symbol
     }
 
-    /// What a value in this unit is multiplied by to be in SI; 1 for volts.
+    /// Factor from this unit to SI; 1 for volts.
     pub fn factor(&self) -> f64 {
         self.factor
     }
 
-    /// Whether it is a unit of turning: of angles, or torques.
+    /// True for units of angles and torques.
     pub fn is_angular(&self) -> bool {
-        self.motion == Motion::Angular
+        self.dimension == Dimension::Angular
     }
 
-    /// Whether it says nothing of the size of what is measured: volts.
+    /// True for uncalibrated units: volts.
     pub fn is_arbitrary(&self) -> bool {
         self.symbol == VOLT.symbol
     }
 }
 
 /// The error for a text that is no unit of this kind.
-fn unknown(kind: Kind, text: &str) -> InputError {
+fn unknown(kind: Quantity, text: &str) -> InputError {
     let error = InputError::argument(format!("unit of the {}", kind.name()), "unknown unit")
         .found(quote(text))
         .expected(one_of(Unit::symbols(kind)));
-    let of_other = Kind::ALL
+    let of_other = Quantity::ALL
         .iter()
         .find(|&&other| Unit::recognise(other, text).is_some());
     if let Some(other) = of_other {
@@ -215,17 +214,17 @@ const fn unit(
     symbol: &'static str,
     others: &'static [&'static str],
     factor: f64,
-    motion: Motion,
+    dimension: Dimension,
 ) -> Unit {
     Unit {
         symbol,
         others,
         factor,
-        motion,
+        dimension,
     }
 }
 
-use Motion::{Angular, Either, Linear};
+use Dimension::{Angular, Either, Linear};
 
 const VOLT: Unit = unit("V", &["volt", "Volt", "volts", "Volts"], 1.0, Either);
 
@@ -281,7 +280,7 @@ const TIME: [Unit; 4] = [
     unit("min", &["minute", "minutes"], 60.0, Either),
 ];
 
-/// Units that no channel of ours has, but that stand in rows of units.
+/// Units of other quantities that occur in rows of units.
 const OTHERS: [&str; 17] = [
     "mV", "uV", "A", "mA", "Hz", "kHz", "rpm", "1/min", "%", "degC", "degF", "K", "bar", "Pa",
     "kPa", "kg", "W",
@@ -294,41 +293,51 @@ mod tests {
     #[test]
     fn factors_are_those_of_the_definitions() {
         for (kind, text, factor, angular) in [
-            (Kind::Displacement, "um", 1e-6, false),
-            (Kind::Displacement, "µm", 1e-6, false),
-            (Kind::Displacement, "in", 0.0254, false),
-            (Kind::Displacement, "ft", 12.0 * 0.0254, false),
-            (Kind::Displacement, "°", std::f64::consts::PI / 180.0, true),
-            (Kind::Displacement, "mrad", 1e-3, true),
-            (Kind::Velocity, "cm/s", 1e-2, false),
-            (Kind::Velocity, "deg/s", std::f64::consts::PI / 180.0, true),
-            (Kind::Acceleration, "m/s2", 1.0, false),
-            (Kind::Acceleration, "m s^-2", 1.0, false),
-            (Kind::Acceleration, "(m/s²)", 1.0, false),
-            (Kind::Acceleration, "mg", 9.80665e-3, false),
-            (Kind::Acceleration, "cm/s²", 1e-2, false),
-            (Kind::Acceleration, "rad/s**2", 1.0, true),
-            (Kind::Force, "lbf", 4.448_221_615_260_5, false),
-            (Kind::Force, "mN", 1e-3, false),
-            (Kind::Force, "Nm", 1.0, true),
-            (Kind::Force, "N·m", 1.0, true),
-            (Kind::Force, "N-m", 1.0, true),
-            (Kind::Force, "V", 1.0, false),
-            (Kind::Time, "[us]", 1e-6, false),
-            (Kind::Time, "min", 60.0, false),
+            (Quantity::Displacement, "um", 1e-6, false),
+            (Quantity::Displacement, "µm", 1e-6, false),
+            (Quantity::Displacement, "in", 0.0254, false),
+            (Quantity::Displacement, "ft", 12.0 * 0.0254, false),
+            (
+                Quantity::Displacement,
+                "°",
+                std::f64::consts::PI / 180.0,
+                true,
+            ),
+            (Quantity::Displacement, "mrad", 1e-3, true),
+            (Quantity::Velocity, "cm/s", 1e-2, false),
+            (
+                Quantity::Velocity,
+                "deg/s",
+                std::f64::consts::PI / 180.0,
+                true,
+            ),
+            (Quantity::Acceleration, "m/s2", 1.0, false),
+            (Quantity::Acceleration, "m s^-2", 1.0, false),
+            (Quantity::Acceleration, "(m/s²)", 1.0, false),
+            (Quantity::Acceleration, "mg", 9.80665e-3, false),
+            (Quantity::Acceleration, "cm/s²", 1e-2, false),
+            (Quantity::Acceleration, "rad/s**2", 1.0, true),
+            (Quantity::Force, "lbf", 4.448_221_615_260_5, false),
+            (Quantity::Force, "mN", 1e-3, false),
+            (Quantity::Force, "Nm", 1.0, true),
+            (Quantity::Force, "N·m", 1.0, true),
+            (Quantity::Force, "N-m", 1.0, true),
+            (Quantity::Force, "V", 1.0, false),
+            (Quantity::Time, "[us]", 1e-6, false),
+            (Quantity::Time, "min", 60.0, false),
         ] {
             let unit = Unit::parse(kind, text).unwrap();
             // The factors are products of two exact decimals: one rounding each.
             assert!((unit.factor() / factor - 1.0).abs() < 1e-15, "{text}");
             assert_eq!(unit.is_angular(), angular, "{text}");
         }
-        assert!(Unit::parse(Kind::Velocity, "V").unwrap().is_arbitrary());
-        assert!(!Unit::si(Kind::Time).is_arbitrary());
+        assert!(Unit::parse(Quantity::Velocity, "V").unwrap().is_arbitrary());
+        assert!(!Unit::si(Quantity::Time).is_arbitrary());
     }
 
     #[test]
     fn every_symbol_names_its_unit_alone() {
-        for kind in Kind::ALL {
+        for kind in Quantity::ALL {
             for unit in kind.units() {
                 let spellings = std::iter::once(&unit.symbol).chain(unit.others);
                 for spelling in spellings {
@@ -342,12 +351,12 @@ mod tests {
     fn unknown_units_are_refused_with_a_hint() {
         let message = |kind, text| Unit::parse(kind, text).unwrap_err().to_string();
         assert_eq!(
-            message(Kind::Time, "hours"),
+            message(Quantity::Time, "hours"),
             "unit of the time: unknown unit\n  found: `hours`\n  expected: one of: s, ms, µs, min"
         );
-        assert!(message(Kind::Force, "m/s²").ends_with("hint: this is a unit of acceleration"));
-        assert!(message(Kind::Force, "newtn").ends_with("hint: did you mean `N`?"));
-        assert!(message(Kind::Force, "kn").ends_with("hint: did you mean `kN`?"));
+        assert!(message(Quantity::Force, "m/s²").ends_with("hint: this is a unit of acceleration"));
+        assert!(message(Quantity::Force, "newtn").ends_with("hint: did you mean `N`?"));
+        assert!(message(Quantity::Force, "kn").ends_with("hint: did you mean `kN`?"));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Problems from Rust: the same as from a model file, and refusals with a place.
 
 use kmcfit::config::{BuildMode, ModelFile, build};
-use kmcfit::observations::Table;
+use kmcfit::tables::Table;
 use kmcfit_core::internals::builder::{
     BasisSpec, Builder, CoefficientSpec, Knots, Record, ScalarSpec, Start,
 };
@@ -144,7 +144,7 @@ fn what_cannot_be_meant_is_refused() {
         (Builder::new(system()), "experiments: there are no records"),
         (
             Builder::new(system()).record(short()),
-            "experiments[0]: this experiment has no data",
+            "experiments[0]: this experiment has no samples",
         ),
         (
             Builder::new(system()).record(short().displacement(&times, &values[..2])),

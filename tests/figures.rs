@@ -1,7 +1,7 @@
 //! The standard figures as SVG documents: well-formed, stable, small, and safe with any data.
 
 use kmcfit::report::figures::{
-    FunctionCurve, convergence, functions, gradient_error, motion, observation, ratios,
+    FunctionCurve, convergence, functions, gradient_error, observation, ratios, response,
 };
 use kmcfit::report::{Axis, Colour, Figure, Mark, Panel, Style, render};
 use kmcfit_core::internals::functions::Ratios;
@@ -30,7 +30,7 @@ fn standard(t: &[f64], y: &[f64]) -> Vec<Figure> {
     vec![
         observation(&[("displacement y", "m", t, y), ("velocity v", "m/s", t, t)]),
         convergence(t, y, t),
-        motion(t, y, &[(0, t, y), (10, t, t)]),
+        response(t, y, &[(0, t, y), (10, t, t)]),
         functions(t, &[curve, curve, curve]),
         gradient_error(&[
             gradient(1000, GradientKind::Discrete),
@@ -149,13 +149,13 @@ fn decades_are_labelled_in_superscripts() {
 #[test]
 fn long_series_make_small_files_and_keep_their_spikes() {
     let (t, mut y) = wave(128_000);
-    let dull = render(&motion(&t, &y, &[(0, &t, &y)]));
+    let dull = render(&response(&t, &y, &[(0, &t, &y)]));
     y[100_001] = 3.35;
-    let spiked = render(&motion(&t, &y, &[(0, &t, &y)]));
+    let spiked = render(&response(&t, &y, &[(0, &t, &y)]));
     assert_ne!(dull, spiked);
     let (t, y) = wave(2000);
     let snapshots = [0, 10, 30, 100, 300, 1000].map(|i| (i, t.as_slice(), y.as_slice()));
-    for svg in [dull, spiked, render(&motion(&t, &y, &snapshots))] {
+    for svg in [dull, spiked, render(&response(&t, &y, &snapshots))] {
         assert!(svg.len() < 200_000, "{} bytes", svg.len());
     }
 }

@@ -1,7 +1,7 @@
 //! Errors in command-line arguments, with more detail than clap gives.
 
 use crate::error::InputError;
-use crate::near::nearest;
+use crate::spelling::nearest;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use std::error::Error;
 use std::num::{ParseFloatError, ParseIntError};

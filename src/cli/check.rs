@@ -1,6 +1,6 @@
 //! `kmcfit check`
 
-use super::{Failure, NOT_CONVERGED, OK, Overrides, announce, inputs, print, say, unwritable};
+use super::{CommandError, NOT_CONVERGED, OK, Overrides, announce, inputs, print, say, unwritable};
 use crate::config::{BuildMode, Model, build};
 use crate::report::{CsvTable, figures, render};
 use crate::results::{Claim, OutputFolder};
@@ -27,14 +27,14 @@ pub struct Arguments {
     out: Option<PathBuf>,
 }
 
-fn no_response(breakdown: SimulationError) -> Failure {
-    Failure::Numerical(format!("the start has no response: {breakdown}"))
+fn no_response(breakdown: SimulationError) -> CommandError {
+    CommandError::Numerical(format!("the start has no response: {breakdown}"))
 }
 
 /// The files in the output folder.
 const FILES: [&str; 2] = ["gradient.csv", "figures/gradient.svg"];
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let file = arguments.set.read(&arguments.model)?;
     let model = build(&file, BuildMode::Fit)?;
     announce(&model);
@@ -122,7 +122,7 @@ fn describe(model: &Model) -> String {
     )
 }
 
-fn check(model: &Model, steps: &[f64]) -> Result<Vec<GradientCheck>, Failure> {
+fn check(model: &Model, steps: &[f64]) -> Result<Vec<GradientCheck>, CommandError> {
     let problem = &model.problem;
     let mut kinds = vec![GradientKind::Discrete];
     if problem.supports_continuous() {

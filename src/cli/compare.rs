@@ -2,7 +2,9 @@
 
 use super::fit::{fit_into, note_discarded, open_journal};
 use super::progress::Progress;
-use super::{Failure, NOT_CONVERGED, OK, exit_code, inputs, interrupt, print, say, unwritable};
+use super::{
+    CommandError, NOT_CONVERGED, OK, exit_code, inputs, interrupt, print, say, unwritable,
+};
 use crate::config::{BuildMode, Model, ModelFile, Sequence, build};
 use crate::error::InputError;
 use crate::report::compare::{ComparedRun, Comparison, LeftOut};
@@ -31,17 +33,22 @@ pub struct Arguments {
     json: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     compare(&arguments.runs, &arguments.out, arguments.json, false)
 }
 
 /// Resumes an unfinished comparison.
-pub(super) fn resume(place: &Path, as_json: bool) -> Result<u8, Failure> {
+pub(super) fn resume(place: &Path, as_json: bool) -> Result<u8, CommandError> {
     let runs = AnalysisJournal::heading(place, COMPARE_JOURNAL)?.inputs;
     compare(&runs, place, as_json, true)
 }
 
-fn compare(runs: &[PathBuf], out: &Path, as_json: bool, is_resumed: bool) -> Result<u8, Failure> {
+fn compare(
+    runs: &[PathBuf],
+    out: &Path,
+    as_json: bool,
+    is_resumed: bool,
+) -> Result<u8, CommandError> {
     let job = Job::of_runs(runs, out)?;
     let folder = OutputFolder::prepare(out, job.claim())?;
     job.run(&folder, as_json, is_resumed)
@@ -53,7 +60,7 @@ pub(super) fn prepare(parent: &OutputFolder, name: &str) -> Result<OutputFolder,
 }
 
 /// Compares models and runs in a folder that was prepared.
-pub(super) fn run_in(folder: &OutputFolder, runs: &[PathBuf]) -> Result<u8, Failure> {
+pub(super) fn run_in(folder: &OutputFolder, runs: &[PathBuf]) -> Result<u8, CommandError> {
     Job::of_runs(runs, folder.path())?.run(folder, false, false)
 }
 
@@ -64,7 +71,7 @@ pub(super) fn run_sequence(
     out: &Path,
     as_json: bool,
     is_resumed: bool,
-) -> Result<u8, Failure> {
+) -> Result<u8, CommandError> {
     let heading = Heading::new("study", vec![path.to_path_buf()]).with_file(path.into());
     let job = Job {
         entries: entries(&sequence.models, out)?,
@@ -158,9 +165,14 @@ impl Job<'_> {
         })
     }
 
-    fn run(self, folder: &OutputFolder, as_json: bool, is_resumed: bool) -> Result<u8, Failure> {
+    fn run(
+        self,
+        folder: &OutputFolder,
+        as_json: bool,
+        is_resumed: bool,
+    ) -> Result<u8, CommandError> {
         let full = |error| unwritable(folder.path(), &error);
-        // What is wrong with the place of one model is found before the first fit.
+        // The output folders of all models are checked before the first fit.
         let children = self.entries.iter();
         let children = children.map(|(name, entry)| entry.prepare(name, folder));
         let children = children.collect::<Result<Vec<_>, _>>()?;
@@ -201,7 +213,8 @@ impl Job<'_> {
     }
 }
 
-/// The journal of a study or comparison: resumed, which is refused where an input has changed, or begun.
+/// Opens the journal of a study or comparison: a new one, or to resume an older one, which is refused if an input has
+/// changed.
 pub(super) fn open_analyses(
     folder: &OutputFolder,
     name: &str,
@@ -257,15 +270,15 @@ struct Compared {
 }
 
 impl Compared {
-    /// Fits a model into its folder. Where the comparison is resumed, a fit that the journal lists as finished is read
-    /// from there, and one with a journal of its own is resumed.
+    /// Fits a model into its folder. A resumed comparison reads the fits that its journal lists as finished, and
+    /// resumes a fit that has its own journal.
     fn model(
         &mut self,
         name: &str,
         ToFit { model, heading, .. }: ToFit,
         folder: &OutputFolder,
         journal: &mut AnalysisJournal,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), CommandError> {
         let finished = ComparedRun::read(name, folder.path()).ok();
         match finished.filter(|_| journal.has(name)) {
             Some(run) => self.runs.push(run),
@@ -292,7 +305,7 @@ impl Compared {
         mut model: Model,
         journal: FitJournal,
         folder: &OutputFolder,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), CommandError> {
         if self.flag.load(Ordering::Relaxed) {
             self.interrupted = true;
             self.leave_out(name, "not started: interrupted".into());
@@ -312,7 +325,7 @@ impl Compared {
                 }
                 Ok(())
             }
-            Err(Failure::Numerical(reason)) => {
+            Err(CommandError::Numerical(reason)) => {
                 say("failed", format!("{name}: {reason}"));
                 self.leave_out(name, reason);
                 Ok(())

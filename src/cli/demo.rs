@@ -1,6 +1,6 @@
 //! `kmcfit demo`
 
-use super::{Failure, compare, print, unwritable};
+use super::{CommandError, compare, print, unwritable};
 use crate::results::{Claim, OutputFolder};
 use std::path::PathBuf;
 
@@ -35,7 +35,7 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let out = &arguments.out;
     let folder = OutputFolder::prepare(out, Claim::new("demo").files(FILES.map(|(name, _)| name)))?;
     let results = compare::prepare(&folder, "results")?;

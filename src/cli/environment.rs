@@ -3,7 +3,7 @@
 use crate::error::InputError;
 use crate::faults::{self, Operation};
 use crate::memory;
-use crate::near::did_you_mean;
+use crate::spelling::did_you_mean;
 use kmcfit_core::internals::host::{self, Host};
 use kmcfit_core::internals::simd::{LIMIT, arithmetics, check_limit};
 use std::sync::LazyLock;

@@ -1,7 +1,7 @@
 //! `kmcfit explain`
 
-use super::{Failure, OK, print};
-use crate::config::keys;
+use super::{CommandError, OK, print};
+use crate::config::key_documentation;
 
 /// Explain a key of the model file: meaning, type, unit, default, example.
 #[derive(Debug, clap::Args)]
@@ -11,7 +11,7 @@ pub struct Arguments {
     key: Option<String>,
 }
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
-    print(&keys::explain(arguments.key.as_deref())?);
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
+    print(&key_documentation::explain(arguments.key.as_deref())?);
     Ok(OK)
 }

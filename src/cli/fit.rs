@@ -2,13 +2,14 @@
 
 use super::progress::Progress;
 use super::{
-    Failure, Overrides, announce, exit_code, inputs, interrupt, print, say, stem, unwritable,
+    CommandError, Overrides, announce, exit_code, inputs, interrupt, print, say, stem, unwritable,
 };
 use crate::config::{BuildMode, Model, ModelFile, Override, WeightSearch, build};
 use crate::error::InputError;
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
-    Around, FittedModel, Known, TimingsSummary, charts, fit_claim, json, predict, summary,
+    FittedModel, OverheadTimings, RunAssessment, TimingsSummary, charts, fit_claim, json, predict,
+    summary,
 };
 use crate::results::{FitJournal, Heading, OutputFolder, RESULT};
 use console::Term;
@@ -61,7 +62,7 @@ pub(super) struct Printed {
     pub plot: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     if let Some(seconds) = arguments.checkpoint.filter(|s| !(0.0..=1e9).contains(s)) {
         return Err(InputError::argument("--checkpoint", "invalid time")
             .found(seconds)
@@ -81,7 +82,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 }
 
 /// Resumes an unfinished fit.
-pub(super) fn resume(place: &Path, heading: &Heading, printed: &Printed) -> Result<u8, Failure> {
+pub(super) fn resume(
+    place: &Path,
+    heading: &Heading,
+    printed: &Printed,
+) -> Result<u8, CommandError> {
     let path = heading.inputs.first().cloned().unwrap_or_default();
     let file = ModelFile::read_with(path, &Override::parse_all(&heading.overrides)?)?;
     let now = Heading::of_model("fit", &file, heading.figures, heading.checkpoint);
@@ -94,7 +99,7 @@ fn fit(
     out: &Path,
     printed: &Printed,
     is_resumed: bool,
-) -> Result<u8, Failure> {
+) -> Result<u8, CommandError> {
     let mut model = build(file, BuildMode::Fit)?;
     model.settings.interrupt = Some(interrupt::flag());
     let folder = OutputFolder::prepare(out, fit_claim(&model).inputs(inputs(file)))?;
@@ -132,7 +137,7 @@ pub(super) fn note_discarded(folder: &OutputFolder, heading: &Heading) -> Result
     Ok(())
 }
 
-/// The journal of a fit: resumed, which is refused where an input has changed, or begun.
+/// Opens the journal of a fit: a new one, or to resume an older one, which is refused if an input has changed.
 pub(super) fn open_journal(
     folder: &OutputFolder,
     heading: &Heading,
@@ -173,7 +178,7 @@ pub(super) fn fit_into(
     progress: &Progress,
     with_figures: bool,
     mut journal: FitJournal,
-) -> Result<(ResultDocument, Status), Failure> {
+) -> Result<(ResultDocument, Status), CommandError> {
     let clock = Instant::now();
     let full = |error| unwritable(folder.path(), &error);
     let result = search(model, progress, Some(&mut journal));
@@ -191,17 +196,17 @@ pub(super) fn fit_into(
             stage.write(RESULT, &json(&document)).map_err(full)?;
             stage.commit().map_err(full)?;
             FitJournal::clear(folder.path()).map_err(full)?;
-            return Err(Failure::Numerical(reason));
+            return Err(CommandError::Numerical(reason));
         }
     };
     let model = weighted.as_ref().unwrap_or(model);
     let analysis = Instant::now();
     let predictions = predictions(model, &found);
-    let known = Known::of(model, &found);
+    let run_assessment = RunAssessment::of(model, &found);
     let analysis = analysis.elapsed();
     let report = Instant::now();
     let run = FittedModel {
-        known: &known,
+        run_assessment: &run_assessment,
         model,
         fit: &found,
         predictions: &predictions,
@@ -213,14 +218,14 @@ pub(super) fn fit_into(
         .write(&mut stage, &document, with_figures)
         .map_err(full)?;
     let before = &model.preparation;
-    let around = Around {
+    let overhead = OverheadTimings {
         io: before.reading + writing,
         analysis,
         report: report.elapsed().saturating_sub(writing),
     };
     // The time of a resumed fit includes its earlier parts.
-    let total = (before.total + clock.elapsed()).max(around.sum() + found.elapsed);
-    document.timings = TimingsSummary::new(&found, &around, total);
+    let total = (before.total + clock.elapsed()).max(overhead.sum() + found.elapsed);
+    document.timings = TimingsSummary::new(&found, &overhead, total);
     stage.write(RESULT, &json(&document)).map_err(full)?;
     stage.commit().map_err(full)?;
     let status = found.outcome.status;
@@ -275,12 +280,12 @@ pub(super) fn search(
 
 /// Predictions of the model file; a failed one has its reason.
 fn predictions(model: &Model, found: &Fit) -> Vec<Prediction> {
-    let device = &found.best.evaluation.nodal;
+    let coefficients = &found.best.evaluation.nodal;
     let system = &model.problem.system;
     let one = |state: &State| {
-        let motions = predict(system, device, model.truth.as_ref(), &[*state]);
-        match motions {
-            Ok(motions) => motions.into_iter().map(|m| m.summary).collect(),
+        let responses = predict(system, coefficients, model.truth.as_ref(), &[*state]);
+        match responses {
+            Ok(responses) => responses.into_iter().map(|m| m.summary).collect(),
             Err(breakdown) => vec![Prediction {
                 displacement: state.displacement,
                 velocity: state.velocity,

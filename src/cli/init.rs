@@ -1,11 +1,11 @@
 //! `kmcfit init`
 
-use super::{Failure, OK, print, schema, unwritable};
-use crate::config::{ModelFile, starter};
+use super::{CommandError, OK, print, schema, unwritable};
+use crate::config::{ModelFile, scaffold};
 use crate::error::InputError;
-use crate::observations::SAMPLE_RATES;
 use crate::report::shell_quoted;
 use crate::results::write_together;
+use crate::tables::SAMPLE_RATES;
 use std::path::{Component, Path, PathBuf};
 
 /// Schema file named by the comment in the first line of a model file.
@@ -25,7 +25,7 @@ pub struct Arguments {
     sample_rate: Option<f64>,
 }
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let rate = arguments.sample_rate;
     if let Some(rate) = rate.filter(|rate| !SAMPLE_RATES.contains(rate)) {
         return Err(
@@ -49,20 +49,20 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             .into());
     }
     let folder = out.parent().unwrap_or(Path::new(""));
-    let starter = starter(&arguments.data, &named_from(folder, &arguments.data), rate)?;
+    let scaffold = scaffold(&arguments.data, &named_from(folder, &arguments.data), rate)?;
     // The written model must be readable.
-    ModelFile::parse(&out, starter.text.as_str())?;
+    ModelFile::parse(&out, scaffold.text.as_str())?;
     let schema = folder.join(SCHEMA);
     let is_new = schema.symlink_metadata().is_err();
     let schema_text = schema::text();
-    let mut files = vec![(out.as_path(), starter.text.as_str())];
+    let mut files = vec![(out.as_path(), scaffold.text.as_str())];
     if is_new {
         // The model is written last: without it the command can be repeated.
         files.insert(0, (&schema, &schema_text));
     }
     write_together(&files).map_err(|error| unwritable(&out, &error))?;
     let mut text = format!("{}\n", arguments.data.display());
-    for sentence in &starter.found {
+    for sentence in &scaffold.found {
         text += &format!("  {sentence}\n");
     }
     if is_new {
@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
     Ok(OK)
 }
 
-/// The path of a file from a folder; as it is given where there is no such path.
+/// The path of a file relative to a folder; as given if there is none.
 fn named_from(folder: &Path, file: &Path) -> String {
     let folder = match folder.as_os_str().is_empty() {
         true => Path::new("."),

@@ -73,16 +73,16 @@ const TERMINATED: u8 = 143;
 
 /// Reason for which a command failed.
 #[derive(Debug)]
-enum Failure {
+enum CommandError {
     /// Invalid input.
     Input(InputError),
     /// Numerical failure before there was a result, as a sentence.
     Numerical(String),
 }
 
-impl From<InputError> for Failure {
+impl From<InputError> for CommandError {
     fn from(error: InputError) -> Self {
-        Failure::Input(error)
+        CommandError::Input(error)
     }
 }
 
@@ -125,11 +125,11 @@ pub fn main() -> ExitCode {
     };
     let code = match result {
         Ok(code) => code,
-        Err(Failure::Input(error)) => {
+        Err(CommandError::Input(error)) => {
             complain(&error);
             BAD_INPUT
         }
-        Err(Failure::Numerical(reason)) => {
+        Err(CommandError::Numerical(reason)) => {
             output::say_failed(&reason);
             NOT_CONVERGED
         }

@@ -7,8 +7,8 @@
 use super::{BAD_INPUT, OK};
 use crate::error::InputError;
 use crate::escape::harmless;
-use crate::excerpt::Excerpt;
 use crate::faults::{self, Operation};
+use crate::source_snippet::Excerpt;
 use console::style;
 use std::fmt::Display;
 use std::io::{self, Write};

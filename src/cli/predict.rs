@@ -1,6 +1,6 @@
 //! `kmcfit predict`
 
-use super::{Failure, OK, print, unwritable};
+use super::{CommandError, OK, print, unwritable};
 use crate::error::InputError;
 use crate::report::{
     CsvTable, PredictedResponse, Run, figures, json, predict, prediction_table, render,
@@ -29,7 +29,7 @@ pub struct Arguments {
 /// The files in the output folder.
 const FILES: [&str; 2] = ["predictions.csv", "figures/predictions.svg"];
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let states: Vec<State> = arguments
         .initial
         .iter()
@@ -42,18 +42,18 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             OutputFolder::prepare(out, claim)
         })
         .transpose()?;
-    let motions = predict(&run.system, &run.device, run.truth.as_ref(), &states)
-        .map_err(|breakdown| Failure::Numerical(format!("no response: {breakdown}")))?;
+    let responses = predict(&run.system, &run.coefficients, run.truth.as_ref(), &states)
+        .map_err(|breakdown| CommandError::Numerical(format!("no response: {breakdown}")))?;
     if let Some(folder) = folder {
         let unit = if run.document.is_rotation() {
             "rad"
         } else {
             "m"
         };
-        write(&folder, &run.system.grid.times(), &motions, unit)
+        write(&folder, &run.system.grid.times(), &responses, unit)
             .map_err(|error| unwritable(folder.path(), &error))?;
     }
-    let summaries: Vec<_> = motions.into_iter().map(|m| m.summary).collect();
+    let summaries: Vec<_> = responses.into_iter().map(|m| m.summary).collect();
     match arguments.json {
         true => print(&json(&summaries)),
         false => print(&prediction_table(&summaries, run.document.is_rotation())),
@@ -81,21 +81,21 @@ fn state(text: &str) -> Result<State, InputError> {
 fn write(
     folder: &OutputFolder,
     times: &[f64],
-    motions: &[PredictedResponse],
+    responses: &[PredictedResponse],
     unit: &str,
 ) -> std::io::Result<()> {
     let mut table = CsvTable::new().column("t_s", times.to_vec());
-    for (i, motion) in motions.iter().enumerate() {
+    for (i, predicted) in responses.iter().enumerate() {
         let header = format!("y_{unit}_{}", i + 1);
-        table = table.column(header, motion.response.displacement.clone());
-        if let Some(truth) = &motion.truth {
+        table = table.column(header, predicted.response.displacement.clone());
+        if let Some(truth) = &predicted.truth {
             table = table.column(
                 format!("true_y_{unit}_{}", i + 1),
                 truth.displacement.clone(),
             );
         }
     }
-    let figure = figures::predictions(times, motions);
+    let figure = figures::predictions(times, responses);
     let mut stage = folder.stage()?;
     let [table_name, figure_name] = FILES;
     stage.write(table_name, &table.to_csv())?;

@@ -1,7 +1,7 @@
 //! `kmcfit resume`
 
 use super::fit::{self, Printed};
-use super::{Failure, INTERRUPTED, compare, exit_code, say, study};
+use super::{CommandError, INTERRUPTED, compare, exit_code, say, study};
 use crate::error::InputError;
 use crate::report::Run;
 use crate::results::{self, COMPARE_JOURNAL, FitJournal, STUDY_JOURNAL};
@@ -25,7 +25,7 @@ pub struct Arguments {
     threads: Option<usize>,
 }
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let folder = &arguments.folder;
     if !folder.is_dir() {
         return Err(InputError::file(folder, "no such folder")
@@ -51,7 +51,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 }
 
 /// Prints the results of a finished run.
-fn finished(arguments: &Arguments, printed: &Printed) -> Result<u8, Failure> {
+fn finished(arguments: &Arguments, printed: &Printed) -> Result<u8, CommandError> {
     let folder = &arguments.folder;
     if !folder.join("result.json").exists() {
         return Err(InputError::file(folder, "no unfinished run in this folder")

@@ -1,7 +1,7 @@
 //! `kmcfit schema`
 
-use super::{Failure, OK, print};
-use crate::config::keys;
+use super::{CommandError, OK, print};
+use crate::config::key_documentation;
 use crate::report::json;
 
 /// Print the JSON schema (draft 07) of model files, for completion and checks in editors.
@@ -9,12 +9,12 @@ use crate::report::json;
 #[command(after_help = "Example:\n  kmcfit schema > kmcfit.schema.json")]
 pub struct Arguments {}
 
-pub fn run(_: &Arguments) -> Result<u8, Failure> {
+pub fn run(_: &Arguments) -> Result<u8, CommandError> {
     print(&text());
     Ok(OK)
 }
 
 /// The schema as a file.
 pub(super) fn text() -> String {
-    json(&keys::schema())
+    json(&key_documentation::schema())
 }

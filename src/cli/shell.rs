@@ -1,6 +1,6 @@
 //! `kmcfit completions` and `kmcfit man`
 
-use super::{Failure, OK, print};
+use super::{CommandError, OK, print};
 use clap::{Command, CommandFactory};
 use clap_complete::Shell;
 use clap_mangen::Man;
@@ -22,7 +22,7 @@ pub struct Completions {
 #[command(after_help = "Example:\n  kmcfit man > kmcfit.1")]
 pub struct Manual {}
 
-pub fn completions(arguments: &Completions) -> Result<u8, Failure> {
+pub fn completions(arguments: &Completions) -> Result<u8, CommandError> {
     let mut script = Vec::new();
     let mut command = super::Arguments::command();
     clap_complete::generate(arguments.shell, &mut command, "kmcfit", &mut script);
@@ -30,8 +30,8 @@ pub fn completions(arguments: &Completions) -> Result<u8, Failure> {
     Ok(OK)
 }
 
-pub fn manual(_: &Manual) -> Result<u8, Failure> {
-    let page = page().map_err(|error| Failure::Numerical(error.to_string()))?;
+pub fn manual(_: &Manual) -> Result<u8, CommandError> {
+    let page = page().map_err(|error| CommandError::Numerical(error.to_string()))?;
     print(&String::from_utf8_lossy(&page));
     Ok(OK)
 }
@@ -54,7 +54,7 @@ fn page() -> io::Result<Vec<u8>> {
     Ok(page)
 }
 
-/// A command: its usage, what it does, its options.
+/// Manual section of a command: usage, description, options.
 fn section(command: &Command, page: &mut Vec<u8>) -> io::Result<()> {
     let man = Man::new(command.clone());
     page.extend(format!(".SS {}\n", command.get_name()).as_bytes());

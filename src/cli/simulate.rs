@@ -1,12 +1,12 @@
 //! `kmcfit simulate`
 
-use super::{Failure, OK, Overrides, inputs, print, say, unwritable};
+use super::{CommandError, OK, Overrides, inputs, print, say, unwritable};
 use crate::config::{BuildMode, ModelFile, build};
 use crate::digest::{digest, digest_of_file};
 use crate::error::InputError;
-use crate::input::{one_of, quote, read_text};
 use crate::report::{CsvTable, json};
 use crate::results::write_together;
+use crate::text_io::{one_of, quote, read_text};
 use kmcfit_core::internals::record::Experiment;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -47,7 +47,7 @@ pub struct Arguments {
     experiment: Option<String>,
 }
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let file = arguments.set.read(&arguments.model)?;
     let purpose = BuildMode::Simulate {
         nodes: arguments.nodes,
@@ -68,24 +68,28 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
             .expected("an experiment with an initial state in numbers")
             .into());
     }
-    let mut device = problem.functions.empty_nodal();
+    let mut coefficients = problem.functions.empty_nodal();
     let start = problem.start();
     problem
         .functions
-        .nodal_into(&start, experiment.coefficient_set, &mut device);
-    let motion = problem
+        .nodal_into(&start, experiment.coefficient_set, &mut coefficients);
+    let response = problem
         .system
-        .forward(&device, experiment.initial, experiment.excitation.as_ref())
-        .map_err(|breakdown| Failure::Numerical(format!("no motion: {breakdown}")))?;
-    let mut readings = motion.displacement;
+        .forward(
+            &coefficients,
+            experiment.initial,
+            experiment.excitation.as_ref(),
+        )
+        .map_err(|breakdown| CommandError::Numerical(format!("no response: {breakdown}")))?;
+    let mut samples = response.displacement;
     if let Some(noise) = &noise {
-        noise.add_to(&mut readings);
+        noise.add_to(&mut samples);
     }
     let table = CsvTable::new()
         .column("t_s", problem.system.grid.times())
-        .column("y_m", readings)
+        .column("y_m", samples)
         .to_csv();
-    let record = Record {
+    let record = Provenance {
         made_by: MADE_BY,
         version: env!("CARGO_PKG_VERSION"),
         sha256: digest(table.as_bytes()),
@@ -146,11 +150,11 @@ fn check_place(out: &Path, file: &ModelFile) -> Result<(), InputError> {
     }
 }
 
-/// Whether a table and its record were both written by this command: the record has the digest of the table, which may
-/// be missing.
+/// True if this command wrote the table and its provenance file, which has the digest of the table; the table may be
+/// missing.
 fn is_own(out: &Path, beside: &Path) -> bool {
     #[derive(Deserialize)]
-    struct Known {
+    struct PriorProvenance {
         made_by: String,
         sha256: String,
     }
@@ -162,7 +166,7 @@ fn is_own(out: &Path, beside: &Path) -> bool {
         LONGEST_RECORD,
     )
     .ok();
-    let known: Option<Known> = known.and_then(|text| serde_json::from_str(&text).ok());
+    let known: Option<PriorProvenance> = known.and_then(|text| serde_json::from_str(&text).ok());
     let has_digest = |sha256: &str| digest_of_file(out).is_ok_and(|found| found == sha256);
     is_file(beside)
         && known.is_some_and(|known| {
@@ -174,23 +178,23 @@ fn is_own(out: &Path, beside: &Path) -> bool {
 /// Longest record that is read, bytes: it takes some hundred, and the paths and values that were given.
 const LONGEST_RECORD: u64 = 1 << 20;
 
-/// Where the record of a table stands.
+/// Path of the provenance file of a table.
 fn record_path(out: &Path) -> PathBuf {
     let mut beside = out.as_os_str().to_owned();
     beside.push(".json");
     beside.into()
 }
 
-/// How a file of readings was made: `OUT.json` beside `OUT`.
+/// Provenance of a simulated record: `OUT.json` beside `OUT`.
 #[derive(Debug, Serialize)]
-struct Record<'a> {
+struct Provenance<'a> {
     made_by: &'static str,
     version: &'static str,
     /// Digest of the table: the proof that this command wrote it.
     sha256: String,
     /// The model file as it was given.
     model: String,
-    /// What was given beside it.
+    /// Overrides.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     overrides: Vec<String>,
     experiment: &'a str,
@@ -198,7 +202,7 @@ struct Record<'a> {
     /// s.
     duration: f64,
     stepper: &'static str,
-    /// `null` for readings without noise.
+    /// `null` for samples without noise.
     noise: Option<Noise>,
 }
 
@@ -212,17 +216,17 @@ struct Noise {
 }
 
 impl Noise {
-    fn add_to(&self, readings: &mut [f64]) {
+    fn add_to(&self, samples: &mut [f64]) {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        for y in readings {
+        for y in samples {
             let z: f64 = StandardNormal.sample(&mut random);
             *y += self.sigma * z;
         }
     }
 }
 
-/// The readings and, before them, their record: readings with noise are never without a seed.
-fn write(path: &Path, table: &str, record: &Record) -> io::Result<()> {
+/// Writes the provenance file, then the samples, so that samples with noise never exist without their seed.
+fn write(path: &Path, table: &str, record: &Provenance) -> io::Result<()> {
     write_together(&[(&record_path(path), &json(record)), (path, table)])
 }
 

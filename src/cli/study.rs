@@ -4,8 +4,8 @@ use super::compare::{open_analyses, run_sequence};
 use super::fit::search;
 use super::progress::Progress;
 use super::{
-    Failure, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, say, stem,
-    unwritable,
+    CommandError, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, say,
+    stem, unwritable,
 };
 use crate::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
 use crate::error::InputError;
@@ -45,7 +45,7 @@ pub struct Arguments {
     threads: Option<usize>,
 }
 
-pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let threads = threads(arguments.threads)?;
     let out = arguments
         .out
@@ -71,7 +71,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, Failure> {
 }
 
 /// Resumes an unfinished study or sequence.
-pub(super) fn resume(folder: &Path, as_json: bool, asked: Option<usize>) -> Result<u8, Failure> {
+pub(super) fn resume(
+    folder: &Path,
+    as_json: bool,
+    asked: Option<usize>,
+) -> Result<u8, CommandError> {
     let threads = threads(asked)?;
     let Heading {
         inputs, overrides, ..
@@ -104,7 +108,7 @@ fn run_in(
     as_json: bool,
     threads: usize,
     is_resumed: bool,
-) -> Result<u8, Failure> {
+) -> Result<u8, CommandError> {
     let mut model = build(file, BuildMode::Fit)?;
     can_be_studied(file, &model)?;
     model.check_study_memory()?;
@@ -140,7 +144,7 @@ fn run_in(
         Ok(()) => true,
         Err(StudyError::Interrupted) => false,
         Err(StudyError::Disk(error)) => return Err(unwritable(folder.path(), &error).into()),
-        Err(StudyError::Numerical(reason)) => return Err(Failure::Numerical(reason)),
+        Err(StudyError::Numerical(reason)) => return Err(CommandError::Numerical(reason)),
     };
     let mut document = work.document;
     if done {

@@ -1,8 +1,8 @@
 //! Choices from a list of names.
 
-use super::value::{Mistake, Scalar};
-use crate::input::{one_of, quote};
-use crate::near::did_you_mean;
+use super::reader::{Mistake, Scalar};
+use crate::spelling::did_you_mean;
+use crate::text_io::{one_of, quote};
 
 /// An enum whose variants are names in the YAML.
 macro_rules! choice {
@@ -34,16 +34,16 @@ macro_rules! choice {
             }
         }
 
-        impl $crate::config::value::Value for $name {
-            const KIND: $crate::config::key::Kind = $crate::config::key::Kind::Choice(Self::NAMES);
+        impl $crate::config::reader::Value for $name {
+            const KIND: $crate::config::key::ValueType = $crate::config::key::ValueType::Choice(Self::NAMES);
             fn scalar(
-                scalar: $crate::config::value::Scalar<'_>,
-            ) -> Result<Self, $crate::config::value::Mistake> {
+                scalar: $crate::config::reader::Scalar<'_>,
+            ) -> Result<Self, $crate::config::reader::Mistake> {
                 $crate::config::choice::choose(scalar, Self::ALL)
             }
         }
     };
-    // An enum of the core, under the name that it has here.
+    // A re-exported enum of the core.
     (
         $(#[$doc:meta])*
         pub type $name:ident = $kind:ty { $( $(#[doc = $variant_doc:literal])+ $variant:ident = $word:literal, )+ }
@@ -51,13 +51,13 @@ macro_rules! choice {
         $(#[$doc])*
         pub type $name = $kind;
 
-        impl $crate::config::value::Value for $kind {
-            const KIND: $crate::config::key::Kind = $crate::config::key::Kind::Choice(&[
+        impl $crate::config::reader::Value for $kind {
+            const KIND: $crate::config::key::ValueType = $crate::config::key::ValueType::Choice(&[
                 $(($word, concat!($($variant_doc),+).trim_ascii_start()),)+
             ]);
             fn scalar(
-                scalar: $crate::config::value::Scalar<'_>,
-            ) -> Result<Self, $crate::config::value::Mistake> {
+                scalar: $crate::config::reader::Scalar<'_>,
+            ) -> Result<Self, $crate::config::reader::Mistake> {
                 $crate::config::choice::choose(scalar, &[$(($word, <$kind>::$variant),)+])
             }
         }

@@ -1,12 +1,11 @@
-//! The length of a YAML text with its aliases written out.
+//! Length of a YAML text after expansion of its aliases, bytes.
 //!
-//! An alias (`*name`) and a merge key (`<<: *name`) stand for all of the value behind the anchor
-//! (`&name`), and anchored values may contain aliases themselves. The text is read once by a reader
-//! that keeps nothing and adds up the lengths of the values, each alias with those that it stands
-//! for, until a limit is passed.
+//! An alias (`*name`) and a merge key (`<<: *name`) stand for all of the value behind the anchor (`&name`), and
+//! anchored values may contain aliases themselves. A streaming reader adds up the lengths of all values, each alias
+//! with the length of its anchored value, and stops as soon as a limit is exceeded.
 
-use super::locate;
-use super::locate::Position;
+use super::key_positions;
+use super::key_positions::Position;
 use serde::de::{
     Deserialize, DeserializeSeed, Deserializer, EnumAccess, Error, MapAccess, SeqAccess,
     VariantAccess, Visitor,
@@ -14,10 +13,10 @@ use serde::de::{
 use std::cell::Cell;
 use std::fmt;
 
-/// The value at which a text with its aliases written out passes `limit` bytes; `None` for a text
-/// that stays below it, and for one that is not YAML up to there.
+/// Position of the value at which the expanded text exceeds `limit` bytes; `None` for a text within the limit, and for
+/// one with a syntax error before it.
 pub(super) fn beyond(text: &str, limit: usize) -> Option<Position> {
-    // Without this sign there is no alias.
+    // Every alias begins with this character.
     if !text.contains('*') {
         return None;
     }
@@ -31,7 +30,7 @@ pub(super) fn beyond(text: &str, limit: usize) -> Option<Position> {
             return Some(
                 error
                     .as_ref()
-                    .and_then(locate::position)
+                    .and_then(key_positions::position)
                     .unwrap_or(Position::START),
             );
         }
@@ -42,8 +41,7 @@ pub(super) fn beyond(text: &str, limit: usize) -> Option<Position> {
     None
 }
 
-/// Adds up lengths: of a scalar that of its text and a sign that separates it from the next, of a
-/// list or map two brackets.
+/// Sum of lengths: for a scalar its text and one separator, for a list or map two brackets.
 #[derive(Clone, Copy)]
 struct Counter<'a> {
     rest: &'a Cell<usize>,
@@ -73,7 +71,7 @@ impl<'de> DeserializeSeed<'de> for Counter<'_> {
     }
 }
 
-/// A number counts as one digit: fewer bytes than it has cannot be written.
+/// A number counts as one digit, its least length.
 macro_rules! short {
     ($($visit:ident($($value:ty)?)),+) => {$(
         fn $visit<E: Error>(self $(, _: $value)?) -> Result<(), E> {

@@ -5,7 +5,7 @@
 
 /// Type of a value.
 #[derive(Debug, Clone, Copy)]
-pub enum Kind {
+pub enum ValueType {
     /// The version of the file format: 1.
     Format,
     /// A finite number.
@@ -23,31 +23,31 @@ pub enum Kind {
     /// One of these words, each with its meaning.
     Choice(&'static [(&'static str, &'static str)]),
     /// A map with these keys.
-    Map(&'static Group),
+    Map(&'static KeyGroup),
     /// A list.
-    List(&'static Kind),
+    List(&'static ValueType),
     /// One of several kinds.
-    AnyOf(&'static [Kind]),
+    AnyOf(&'static [ValueType]),
 }
 
 /// Keys of one map.
 #[derive(Debug)]
-pub struct Group {
+pub struct KeyGroup {
     /// Its name in the schema.
     pub name: &'static str,
     /// Meaning of the map, as a sentence.
     pub text: &'static str,
-    /// Its keys, in the order of the reader.
-    pub keys: &'static [Key],
+    /// Its keys, in the order of declaration.
+    pub keys: &'static [KeyDoc],
 }
 
 /// A key.
 #[derive(Debug)]
-pub struct Key {
+pub struct KeyDoc {
     /// Name in the file.
     pub name: &'static str,
     /// Type of its value.
-    pub kind: Kind,
+    pub kind: ValueType,
     /// Meaning.
     pub text: &'static str,
     /// Example of a value.
@@ -60,13 +60,13 @@ pub struct Key {
     pub required: bool,
 }
 
-impl Kind {
+impl ValueType {
     /// Maps among the values of this type, those in lists included.
-    pub fn groups(self) -> Vec<&'static Group> {
+    pub fn groups(self) -> Vec<&'static KeyGroup> {
         match self {
-            Kind::Map(group) => vec![group],
-            Kind::List(inner) => inner.groups(),
-            Kind::AnyOf(kinds) => kinds.iter().flat_map(|kind| kind.groups()).collect(),
+            ValueType::Map(group) => vec![group],
+            ValueType::List(inner) => inner.groups(),
+            ValueType::AnyOf(kinds) => kinds.iter().flat_map(|kind| kind.groups()).collect(),
             _ => Vec::new(),
         }
     }

@@ -22,36 +22,36 @@ macro_rules! keys {
 
         impl $name {
             /// The keys of the map.
-            pub const GROUP: &'static $crate::config::key::Group = {
-                static GROUP: $crate::config::key::Group = $crate::config::key::Group {
+            pub const GROUP: &'static $crate::config::key::KeyGroup = {
+                static GROUP: $crate::config::key::KeyGroup = $crate::config::key::KeyGroup {
                     name: $group,
                     text: concat!($($text),+).trim_ascii_start(),
-                    keys: &[$($crate::config::key::Key {
+                    keys: &[$($crate::config::key::KeyDoc {
                         name: stringify!($key),
-                        kind: <$value as $crate::config::value::Value>::KIND,
+                        kind: <$value as $crate::config::reader::Value>::KIND,
                         text: concat!($($about),+).trim_ascii_start(),
                         example: $example,
                         unit: $crate::config::map::given(&[$($unit)?]),
                         default: $crate::config::map::given(&[$($default)?]),
-                        required: <$value as $crate::config::value::Value>::REQUIRED,
+                        required: <$value as $crate::config::reader::Value>::REQUIRED,
                     }),+],
                 };
                 &GROUP
             };
         }
 
-        impl $crate::config::value::Value for $name {
-            const KIND: $crate::config::key::Kind = $crate::config::key::Kind::Map($name::GROUP);
+        impl $crate::config::reader::Value for $name {
+            const KIND: $crate::config::key::ValueType = $crate::config::key::ValueType::Map($name::GROUP);
 
             fn scalar(
-                scalar: $crate::config::value::Scalar<'_>,
-            ) -> Result<Self, $crate::config::value::Mistake> {
+                scalar: $crate::config::reader::Scalar<'_>,
+            ) -> Result<Self, $crate::config::reader::Mistake> {
                 Err(scalar.wrong_kind($expecting))
             }
 
             fn map<'de, A: serde::de::MapAccess<'de>>(
                 mut map: A,
-                report: &$crate::config::value::Report,
+                report: &$crate::config::reader::Report,
             ) -> Result<Self, A::Error> {
                 $(let mut $key: Option<$value> = None;)+
                 while let Some(key) = report.key(&mut map, Self::GROUP.keys)? {

@@ -1,28 +1,27 @@
-//! The model file: the only place that knows YAML.
+//! The model file. All uses of YAML are in this module.
 //!
-//! [`ModelFile::read`] turns a file into a [`ModelSpec`](spec::ModelSpec), which says what was
-//! written, key by key. Mistakes of spelling, type and syntax end here, with file, line, column and
-//! key; what the values mean together is checked later, through [`ModelFile::error_at`], which
-//! finds the line of a key again.
+//! [`ModelFile::read`] parses a file into a [`ModelSpec`](spec::ModelSpec), with one field for each key. Errors of
+//! syntax, spelling and type are reported here with file, line, column and key. [`build()`] checks the values against
+//! each other and reports errors at the line of a key by [`ModelFile::error_at`].
 
 mod build;
 mod choice;
 mod expansion;
-mod failure;
-mod guard;
+mod input_limits;
 pub mod key;
-pub mod keys;
-pub mod locate;
+pub mod key_documentation;
+pub mod key_positions;
 mod map;
 mod model_file;
 mod overrides;
-pub mod scalar;
+mod reader;
+mod scaffold;
 mod sequence;
 mod source;
 pub mod spec;
-mod starter;
 mod syntax;
-mod value;
+pub mod values;
+mod yaml_errors;
 
 pub use build::{
     BuildMode, Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation, StudyPlan,
@@ -30,7 +29,7 @@ pub use build::{
 };
 pub use model_file::ModelFile;
 pub use overrides::Override;
-pub use scalar::{Number, NumberOrColumn, Text};
+pub use scaffold::{Scaffold, scaffold};
 pub use sequence::Sequence;
-pub use source::{DataFile, Source};
-pub use starter::{Starter, starter};
+pub use source::{DataFile, ModelSource};
+pub use values::{Number, NumberOrColumn, Text};

@@ -1,34 +1,33 @@
-//! A model file: where it is, its text, and what it says.
+//! A model file: path, text, parsed specification and overrides.
 
 use std::path::{Path, PathBuf};
 
-use super::failure;
-use super::guard::{Checked, LONGEST_MODEL};
-use super::locate::{key_path, locate, place};
+use super::input_limits::{Checked, LONGEST_MODEL};
+use super::key_positions::{key_path, locate, place};
 use super::overrides::Override;
 use super::spec::ModelSpec;
+use super::yaml_errors;
 use crate::error::InputError;
-use crate::input::read_text;
+use crate::text_io::read_text;
 
 /// What a model file should be, in messages.
 const MODEL_FILE: &str = "a model file (YAML)";
 
-/// Most experiments: each reads its own files, so that a short text could ask for more than fits into
-/// memory.
+/// Most experiments. Each reads its own files, so a short text could need more memory than is available.
 const MOST_EXPERIMENTS: usize = 2000;
 
-/// A model file that was read: where it is, its text, and what it says.
+/// A parsed model file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelFile {
-    /// The file, as it was given.
+    /// Path, as given on the command line.
     pub path: PathBuf,
-    /// Its text, without a byte order mark.
+    /// Text, without a byte order mark.
     pub text: String,
-    /// What it says, with the overrides.
+    /// Parsed specification, with the overrides applied.
     pub spec: ModelSpec,
-    /// What was given beside it, in the place of its own values.
+    /// Overrides (`--set`).
     pub overrides: Vec<Override>,
-    /// The model with the overrides as text, where there are any.
+    /// Text with the overrides applied; `None` without overrides.
     edited: Option<String>,
 }
 
@@ -46,7 +45,7 @@ impl ModelFile {
         Self::parse(path, text)
     }
 
-    /// Reads a model file and puts other values in the place of some of its own.
+    /// Reads a model file and applies overrides.
     ///
     /// # Errors
     ///
@@ -55,12 +54,11 @@ impl ModelFile {
         Self::read(path)?.with(overrides)
     }
 
-    /// The model with other values, put in one after the other.
+    /// Applies overrides one after another.
     ///
     /// # Errors
     ///
-    /// When a key is not one of a model file, or its value is of the wrong kind: the place is the
-    /// override.
+    /// When a key is unknown or its value has the wrong type; the location is the override.
     pub fn with(mut self, overrides: &[Override]) -> Result<Self, InputError> {
         for change in overrides {
             let unreadable = |error: serde_yaml::Error| {
@@ -86,7 +84,7 @@ impl ModelFile {
         Ok(self)
     }
 
-    /// The text of the model with the overrides in it; without any that of the file.
+    /// The text of the model with the overrides applied.
     pub fn effective_text(&self) -> &str {
         self.edited.as_deref().unwrap_or(&self.text)
     }
@@ -96,8 +94,7 @@ impl ModelFile {
         self.overrides.iter().map(Override::to_string).collect()
     }
 
-    /// Takes the text of a model file apart; `path` is what messages call it and what relative
-    /// paths in it start from.
+    /// Parses the text of a model file. Messages name `path`, and relative paths in the text start from its folder.
     ///
     /// ```
     /// use kmcfit::config::ModelFile;
@@ -121,8 +118,7 @@ impl ModelFile {
     ///
     /// # Errors
     ///
-    /// When the text is not YAML, or has unknown, missing or repeated keys, or values of the wrong
-    /// kind.
+    /// When the text is not YAML, has unknown, missing or repeated keys, or values of the wrong type.
     pub fn parse(path: impl AsRef<Path>, text: impl Into<String>) -> Result<Self, InputError> {
         let path = path.as_ref().to_path_buf();
         let text = text.into();
@@ -131,7 +127,7 @@ impl ModelFile {
                 .expected(MODEL_FILE)
                 .hint("begin with `format: 1`"));
         }
-        let spec = failure::read(&path, &Checked::new(&path, &text)?)?;
+        let spec = yaml_errors::read(&path, &Checked::new(&path, &text)?)?;
         let model = Self {
             path,
             text,
@@ -162,7 +158,7 @@ impl ModelFile {
         given.map_or_else(|| format!("experiment {}", i + 1), |name| name.0.clone())
     }
 
-    /// `error` about an argument, placed at the key of the model that gives it.
+    /// An error about an argument, moved to the key of the model that supplies it.
     pub(super) fn error_about(&self, key: &str, error: InputError) -> InputError {
         let here = self.error_at(key, &error.problem);
         InputError {
@@ -174,8 +170,8 @@ impl ModelFile {
 
     /// An error about the value at a key such as `experiments[0].initial.velocity`.
     ///
-    /// The place is the line and column of the value; where the file does not say it, those of the
-    /// nearest enclosing key. An aliased value (`*name`) is found where it is written (`&name`).
+    /// The location is the line and column of the value, or of the nearest enclosing key if the file omits it. The
+    /// location of an aliased value (`*name`) is its anchor (`&name`).
     pub fn error_at(&self, key: &str, problem: impl Into<String>) -> InputError {
         let path = key_path(key);
         if let Some(change) = self.overrides.iter().rev().find(|o| o.covers(&path)) {
@@ -203,7 +199,7 @@ impl ModelFile {
     /// The values of all keys `data` that name a file, each once, in the order of the text.
     pub(super) fn data_names(&self) -> Vec<String> {
         let mut names = Vec::new();
-        // The text was read before: neither step fails.
+        // The text was parsed before, so neither step fails.
         let value = Checked::new(&self.path, self.effective_text())
             .ok()
             .and_then(|text| text.read().ok());
@@ -253,7 +249,7 @@ pub(super) fn check_path(path: &Path) -> Result<(), InputError> {
     }
 }
 
-/// Whether a text has nothing but blank lines, comments and document markers.
+/// True for a text that consists of blank lines, comments and document markers.
 fn is_blank(text: &str) -> bool {
     text.lines()
         .map(|line| line.split('#').next().unwrap_or_default().trim())

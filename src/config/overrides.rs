@@ -1,9 +1,9 @@
-//! Values that are given beside a model file, in the place of what it says: `--set KEY=VALUE`.
+//! Overrides of values of a model file: `--set KEY=VALUE`.
 
-use super::guard::Checked;
-use super::locate::{Segment, key_path};
-use crate::error::{InputError, Place};
-use crate::input::quote;
+use super::input_limits::Checked;
+use super::key_positions::{Segment, key_path};
+use crate::error::{InputError, Location};
+use crate::text_io::quote;
 use serde_yaml::{Mapping, Value};
 use std::fmt;
 use std::path::Path;
@@ -11,7 +11,7 @@ use std::path::Path;
 /// What the value of an override may be, in messages.
 const VALUE: &str = "a value as in a model file: 50, constant, {order: 2, weight: 0.1}, …";
 
-/// One key of a model file with another value.
+/// An override: a key of the model file and its new value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Override {
     key: String,
@@ -34,7 +34,7 @@ impl Override {
     /// When missing `=`, no key, or the value is not YAML.
     pub fn parse(text: &str) -> Result<Self, InputError> {
         let wrong = |problem: &str| {
-            InputError::new(Place::Argument("--set".into()), problem).found(quote(text))
+            InputError::new(Location::Argument("--set".into()), problem).found(quote(text))
         };
         let Some((key, written)) = text.split_once('=') else {
             return Err(
@@ -58,25 +58,25 @@ impl Override {
         }
     }
 
-    /// Reads all of a list; see [`parse`](Self::parse).
+    /// Parses each text of a list as [`parse`](Self::parse) does.
     ///
     /// # Errors
-    /// As there, for the first that cannot be read.
+    /// As there, for the first invalid text.
     pub fn parse_all(texts: &[String]) -> Result<Vec<Self>, InputError> {
         texts.iter().map(|text| Self::parse(text)).collect()
     }
 
-    /// Whether the value at a path comes from here.
+    /// True if this override supplies the value at a path.
     pub(super) fn covers(&self, path: &[Segment]) -> bool {
         path.starts_with(&self.path)
     }
 
-    /// The override as the place of an error.
-    pub(super) fn place(&self) -> Place {
-        Place::Argument(format!("--set {self}"))
+    /// The override as the location of an error.
+    pub(super) fn place(&self) -> Location {
+        Location::Argument(format!("--set {self}"))
     }
 
-    /// Puts the value into a model; maps on the way that are not there are made.
+    /// Sets the value in a model; creates missing maps along the path.
     pub(super) fn apply(&self, model: &mut Value) -> Result<(), InputError> {
         let mut here = model;
         for (depth, segment) in self.path.iter().enumerate() {
@@ -86,7 +86,7 @@ impl Override {
         Ok(())
     }
 
-    /// Into a map or list, one segment down.
+    /// Descends one segment into a map or list.
     fn step<'a>(
         &self,
         here: &'a mut Value,
@@ -146,7 +146,7 @@ fn path(key: &str) -> Vec<Segment> {
     key_path(key).into_iter().map(segment).collect()
 }
 
-/// A path as messages write it.
+/// A path in the notation of messages.
 fn written(path: &[Segment]) -> String {
     let mut text = String::new();
     for segment in path {

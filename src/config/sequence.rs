@@ -1,13 +1,13 @@
 //! Sequences: lists of models that are analysed in order.
 
-use super::failure;
-use super::guard::{Checked, LONGEST_MODEL};
-use super::locate::{Segment, locate};
+use super::input_limits::{Checked, LONGEST_MODEL};
+use super::key_positions::{Segment, locate};
 use super::model_file::check_path;
-use super::scalar::{Format, Text};
+use super::values::{Format, Text};
+use super::yaml_errors;
 use crate::config::map::keys;
 use crate::error::InputError;
-use crate::input::read_text;
+use crate::text_io::read_text;
 use std::path::{Path, PathBuf};
 
 keys! {
@@ -35,7 +35,7 @@ impl Sequence {
     /// Reads a sequence; `None` if the file does not have the key `sequence`, so that it is a model.
     ///
     /// # Errors
-    /// When the file cannot be read, or is a sequence that is not well written.
+    /// When the file cannot be read, or is an invalid sequence.
     pub fn read(path: &Path) -> Result<Option<Self>, InputError> {
         check_path(path)?;
         let text = read_text(path, "a model file or a sequence (YAML)", LONGEST_MODEL)?;
@@ -44,7 +44,7 @@ impl Sequence {
         if locate(&text, &[Segment::Key("sequence".into())]).depth == 0 {
             return Ok(None);
         }
-        let spec: SequenceSpec = failure::read(path, &checked)?;
+        let spec: SequenceSpec = yaml_errors::read(path, &checked)?;
         if spec.sequence.is_empty() {
             return Err(InputError::file(path, "the sequence has no model")
                 .key("sequence")

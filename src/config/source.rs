@@ -1,30 +1,30 @@
-//! What a model was made from: its text and its data files, so that a run can be repeated.
+//! Sources of a model, for reproducible runs: its text, overrides, and data files with digests.
 
 use super::ModelFile;
 use crate::digest::digest_of_file;
 use std::path::Path;
 
-/// The text of a model and the data files that it names.
+/// Text, overrides and data files of a model.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Source {
+pub struct ModelSource {
     /// The text of the model file.
     pub text: String,
-    /// What was given beside it, in the place of its own values.
+    /// Overrides, as given on the command line.
     pub overrides: Vec<String>,
-    /// In the order in which the text names them, each once.
+    /// Data files, each once, in the order of the text.
     pub data: Vec<DataFile>,
 }
 
-/// A data file as it was when the model was built.
+/// A data file with its digest at the time when the model was built.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DataFile {
-    /// As the model names it: relative paths start from the model.
+    /// Path as in the model file, relative to its folder.
     pub name: String,
-    /// Size in bytes and SHA-256 in hexadecimal digits; `None` if the file cannot be read any more.
+    /// Size in bytes and SHA-256 in hexadecimal digits; `None` for a file that can no longer be read.
     pub content: Option<(u64, String)>,
 }
 
-impl Source {
+impl ModelSource {
     /// The text of a model file, and the files behind its keys `data`.
     pub fn of(file: &ModelFile) -> Self {
         let data = file.data_names().into_iter().map(|name| DataFile {
@@ -60,7 +60,7 @@ functions: {mass: {fixed: 1}, damping: {fixed: {data: b.csv, column: c}}, stiffn
 fit: {initial: data}
 ";
         let file = ModelFile::parse(folder.path().join("model.yaml"), text).expect("a model");
-        let source = Source::of(&file);
+        let source = ModelSource::of(&file);
         assert_eq!(source.text, text);
         let digest = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         let expected = [("a.csv", Some((3, digest.to_string()))), ("b.csv", None)];

@@ -12,9 +12,9 @@ pub use study::*;
 use crate::config::map::keys;
 
 use super::choice::choice;
-pub use super::scalar::{ColumnSpec, WeightRule};
-use super::scalar::{Count, Format, Knots, Nodes, Number, NumberOrColumn, OneOrList};
-use super::scalar::{Start, Text, Weight};
+pub use super::values::{ColumnSpec, WeightRule};
+use super::values::{Count, Format, KnotSpec, Nodes, Number, NumberOrColumn, OneOrList};
+use super::values::{StartSpec, Text, Weight};
 
 keys! {
     /// A model: records of one system, its coefficient functions, and the settings of the fit.
@@ -132,12 +132,12 @@ keys! {
         /// Basis of an estimated function, which defines its parameters.
         basis: Option<Basis>, example "piecewise-linear";
         /// Knots of a piecewise function or spline: their number (equally spaced, ends included) or their times.
-        knots: Option<Knots>, example "11", unit "s, of times";
+        knots: Option<KnotSpec>, example "11", unit "s, of times";
         /// Degree of a polynomial.
         degree: Option<Count>, example "2";
         /// Start values of the search: one number, one value per node, cell or knot, polynomial coefficients, or a column of
         /// a file.
-        start: Option<Start>, example "2.0", unit "that of the function";
+        start: Option<StartSpec>, example "2.0", unit "that of the function";
         /// Fixed values, in place of `basis`.
         fixed: Option<NumberOrColumn>, example "1.0", unit "that of the function";
         /// Lower bound.

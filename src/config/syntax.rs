@@ -1,14 +1,14 @@
-//! Text that is not YAML, said kindly.
+//! Error messages for texts that are not YAML: the parser's message replaced by a description and a remedy.
 
 use std::path::Path;
 
-use super::locate::place;
-use super::locate::{self, Position};
-use super::value::Scalar;
+use super::key_positions::place;
+use super::key_positions::{self, Position};
+use super::reader::Scalar;
 use crate::error::InputError;
-use crate::input::quote;
+use crate::text_io::quote;
 
-/// What the YAML parser says, what it means, and what to do about it.
+/// Message of the YAML parser, its meaning, and the remedy.
 const MEANINGS: &[(&str, &str, &str)] = &[
     (
         "mapping values are not allowed in this context",
@@ -92,10 +92,10 @@ const MEANINGS: &[(&str, &str, &str)] = &[
     ),
 ];
 
-/// The error for a text that the YAML parser refuses.
+/// The error for a text with a syntax error.
 pub(super) fn input_error(file: &Path, text: &str, error: &serde_yaml::Error) -> InputError {
     let message = error.to_string();
-    let at = locate::position(error).unwrap_or(Position::START);
+    let at = key_positions::position(error).unwrap_or(Position::START);
     if let Some(tab) = tab_before(text, at) {
         return InputError::new(place(file, tab), "a tab is used as indentation")
             .found("a tab")
@@ -124,7 +124,7 @@ pub(super) fn input_error(file: &Path, text: &str, error: &serde_yaml::Error) ->
     }
 }
 
-/// A list or a map in the place of a text. The YAML crate refuses these itself, and says so as text alone.
+/// A list or a map in place of a text, recognised from the message of the YAML crate.
 pub(super) fn unexpected(error: &serde_yaml::Error) -> Option<Scalar<'static>> {
     let message = error.to_string();
     let kinds = [("sequence", Scalar::List), ("map", Scalar::Map)];
@@ -134,7 +134,7 @@ pub(super) fn unexpected(error: &serde_yaml::Error) -> Option<Scalar<'static>> {
     })
 }
 
-/// The error for a character that YAML does not allow; the parser does not say where it is.
+/// The error for a character that YAML does not allow. The parser gives no position, so the text is searched.
 fn control_character(file: &Path, text: &str) -> InputError {
     let forbidden = |c: char| c.is_control() && !matches!(c, '\t' | '\n' | '\r' | '\u{85}');
     let (index, found) = match text.char_indices().find(|&(_, c)| forbidden(c)) {

@@ -1,11 +1,9 @@
-//! A short course: from a record to the device behind it.
+//! User guide: identification of a system from a record.
 //!
 //! 1. [`tutorial`] fits the paper's record, then a record of one's own. Each step is a
 //!    shipped model and one command.
-//! 2. [`choosing`] says which method, which basis and which constraint fit which record, and shows how fits
-//!    go wrong and what cures them.
-//! 3. [`theory`] has the equations: the device, the cost, the adjoints, Gauss–Newton, and what a record can
-//!    show.
+//! 2. [`choosing`]: choice of method, basis and constraints for a record; failures of fits and their remedies.
+//! 3. [`theory`]: the equations of system, cost, adjoints and Gauss–Newton, and identifiability.
 //!
 //! Programs in Rust use [`builder`](kmcfit_core::internals::builder); [`Run`](crate::Run)
 //! loads results back.

@@ -1,7 +1,7 @@
-//! The memory that the process may still take, and refusals in time.
+//! Available memory of the process, and checks against it before large allocations.
 //!
-//! An allocation that fails ends a Rust program at once. So what needs much memory asks here before it
-//! takes any, and is refused with a message that states what is needed and what is available.
+//! A failed allocation aborts a Rust program. Computations with large memory therefore check the available memory
+//! first, and fail with a message that states the needed and the available memory.
 
 mod restart;
 mod sources;
@@ -12,24 +12,24 @@ pub use sources::{Available, Limit};
 use crate::error::InputError;
 use std::path::Path;
 
-/// Assumed to be available where the system does not say, bytes.
+/// Available memory on systems without a stated limit, bytes.
 const ASSUMED: u64 = 4_000_000_000;
 
-/// Taken by a command beside what grows with its input, bytes: parsed models, figures, pages, and the
-/// stacks of its threads. Commands on small models were measured to take up to 40 MB.
+/// Memory of a command on a small model, bytes: parsed models, figures, pages, and stacks of threads. Measured: up to
+/// 40 MB.
 pub(crate) const BASE: u64 = 64_000_000;
 
-/// Address space of a thread: 2 MB of stack and a segment of 32 MB of the allocator, which is reserved
-/// with its alignment.
+/// Address space of a thread, bytes: 2 MB of stack and a segment of 32 MB of the allocator, reserved with its
+/// alignment.
 const THREAD_ADDRESSES: u64 = 72_000_000;
 
-/// Memory of a thread that waits for work: its stack and the first pages of its segment.
+/// Memory of an idle thread, bytes: its stack and the first pages of its segment.
 const THREAD_PAGES: u64 = 2_000_000;
 
-/// Less than this is not worth a look at the limits, bytes: [`BASE`] has room for it.
+/// Requests below this are not checked, bytes: [`BASE`] covers them.
 const SMALL: u64 = 4_000_000;
 
-/// The memory that the process may still take: the least that any of its limits leaves.
+/// Available memory of the process: the least that any of its limits leaves.
 pub fn available() -> Available {
     Available::under(Path::new("/")).unwrap_or(Available {
         bytes: ASSUMED,
@@ -64,7 +64,7 @@ pub fn check_file(path: &Path, needed: u64) -> Result<(), InputError> {
     })
 }
 
-/// Refuses to begin where a command on a small model might not find the memory that it takes.
+/// Refuses to start with less memory than a command on a small model needs.
 ///
 /// # Errors
 /// When less than that is available.
@@ -76,8 +76,7 @@ pub(crate) fn check_base() -> Result<(), InputError> {
     })
 }
 
-/// The threads that have the memory to work, at most `wanted`, and the bytes that each takes beside
-/// `each` of its own.
+/// Number of threads, at most `wanted`, that fit into memory if each needs `each` bytes beside its own overhead.
 pub(crate) fn threads_within(wanted: usize, each: u64) -> usize {
     let available = available();
     let own = match available.limit {
@@ -90,7 +89,7 @@ pub(crate) fn threads_within(wanted: usize, each: u64) -> usize {
         .clamp(1, wanted.max(1))
 }
 
-/// Bytes in words: three digits and a unit.
+/// A size as text: three digits and a unit.
 pub fn in_words(bytes: f64) -> String {
     let units = ["bytes", "kB", "MB", "GB", "TB", "PB"];
     let mut value = bytes;

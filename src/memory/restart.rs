@@ -1,4 +1,5 @@
-//! Allocators that reserve no more address space than they use, where the address space is limited.
+//! Restart of the program with allocators that reserve no address space in advance, for processes with a limited
+//! address space.
 
 #[cfg(target_os = "linux")]
 use super::sources::has_process_limit;
@@ -8,11 +9,11 @@ use super::sources::has_process_limit;
 #[cfg(target_os = "linux")]
 const SETTINGS: [(&str, &str); 2] = [("MALLOC_ARENA_MAX", "1"), ("MIMALLOC_ARENA_RESERVE", "0")];
 
-/// Starts the program again, in its place, with allocators that reserve nothing ahead, where its
-/// address space or data are limited: what they reserve counts against these limits, so that threads
-/// could not be started although memory is left. Allocators read their settings at the start only.
+/// Restarts the program in the same process with allocators that reserve nothing in advance, if its address space or
+/// data are limited: reserved addresses count against these limits and can prevent thread starts although memory is
+/// available. Allocators read their settings only at the start.
 ///
-/// Does nothing where there is no limit, or the settings were given.
+/// Does nothing without a limit, or if the settings were given.
 pub fn restart_with_plain_allocators() {
     #[cfg(target_os = "linux")]
     {
@@ -29,7 +30,7 @@ pub fn restart_with_plain_allocators() {
         if let Some(name) = arguments.next() {
             command.arg0(name);
         }
-        // It returns only where it fails; then the program goes on as it is.
+        // `exec` returns only on failure; the program then continues unchanged.
         let _ = command.args(arguments).envs(SETTINGS).exec();
     }
 }

@@ -5,10 +5,10 @@ use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What limits the memory of the process.
+/// Limit on the memory of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Limit {
-    /// The memory of the machine that can be had without swapping.
+    /// Memory of the machine that is available without swapping.
     Machine,
     /// The limit on the address space (`RLIMIT_AS`, `ulimit -v`).
     AddressSpace,
@@ -20,7 +20,7 @@ pub enum Limit {
     Assumed,
 }
 
-/// Memory that may be taken, and what limits it; its `Display` states both.
+/// Available memory and its limit; `Display` states both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Available {
     /// Bytes.
@@ -48,7 +48,7 @@ impl fmt::Display for Available {
 }
 
 impl Available {
-    /// The least that any limit leaves, by the files under a root; `None` where there are none.
+    /// The least memory that any limit leaves, by the files under a root; `None` without such files.
     pub(super) fn under(root: &Path) -> Option<Self> {
         let read = |name: &str| fs::read_to_string(root.join(name)).unwrap_or_default();
         let (limits, status) = (read("proc/self/limits"), read("proc/self/status"));
@@ -81,7 +81,7 @@ impl Available {
     }
 }
 
-/// Whether the process has a limit on its address space or data.
+/// True if the process has a limit on its address space or data.
 pub(super) fn has_process_limit(root: &Path) -> bool {
     let limits = fs::read_to_string(root.join("proc/self/limits")).unwrap_or_default();
     let names = ["Max address space", "Max data size"];
@@ -103,7 +103,7 @@ fn soft_limit(text: &str, name: &str) -> Option<u64> {
 
 /// A folder of the memory controller, its mount point, and the version of the interface.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Group {
+struct ControlGroup {
     folder: PathBuf,
     mount: PathBuf,
     version: u8,
@@ -111,7 +111,7 @@ struct Group {
 
 /// The folders of the process's control groups that may limit memory, by `/proc/self/cgroup` and
 /// `/proc/self/mountinfo`.
-fn directories(cgroup: &str, mountinfo: &str) -> Vec<Group> {
+fn directories(cgroup: &str, mountinfo: &str) -> Vec<ControlGroup> {
     let mut groups = Vec::new();
     for line in cgroup.lines() {
         let mut parts = line.splitn(3, ':');
@@ -125,9 +125,9 @@ fn directories(cgroup: &str, mountinfo: &str) -> Vec<Group> {
             _ => continue,
         };
         for (root, mount) in mounts(mountinfo, version) {
-            // A path outside of the mount's root is one of another namespace: its own is the root.
+            // A path outside the mount's root belongs to another namespace, so the root is used.
             let inside = Path::new(path).strip_prefix(&root).unwrap_or(Path::new(""));
-            groups.push(Group {
+            groups.push(ControlGroup {
                 folder: mount.join(inside),
                 mount,
                 version,
@@ -155,7 +155,7 @@ fn mounts(mountinfo: &str, version: u8) -> Vec<(PathBuf, PathBuf)> {
 }
 
 /// The least that a control group and those that contain it leave, bytes.
-fn left(root: &Path, group: &Group) -> Option<u64> {
+fn left(root: &Path, group: &ControlGroup) -> Option<u64> {
     let levels = group.folder.ancestors();
     let levels = levels.take_while(|folder| folder.starts_with(&group.mount));
     let (limit, usage, reclaimable) = match group.version {
@@ -170,7 +170,7 @@ fn left(root: &Path, group: &Group) -> Option<u64> {
         let folder = root.join(folder.strip_prefix("/").unwrap_or(folder));
         let read = |name: &str| fs::read_to_string(folder.join(name)).ok();
         let number = |name: &str| read(name)?.trim().parse::<u64>().ok();
-        // Pages of files that were read count as used, but are given back where memory is needed.
+        // Cached file pages count as used, but the system reclaims them when necessary.
         let stat = read("memory.stat").unwrap_or_default();
         let cached = stat.lines().find_map(|line| {
             let (name, bytes) = line.split_once(' ')?;

@@ -3,7 +3,7 @@
 use super::assumptions::assumptions;
 use super::document::IdentifiabilitySummary;
 use super::findings;
-use super::known::ValidationRecord;
+use super::fit_assessment::ValidationRecord;
 use super::run::FittedModel;
 use crate::finding::Finding;
 use kmcfit_core::internals::assessment::{FunctionSummary, function_summaries};
@@ -22,7 +22,7 @@ impl FittedModel<'_> {
             assumptions: assumptions(problem),
             ..IdentifiabilitySummary::default()
         };
-        let Some(assessment) = &self.known.assessment else {
+        let Some(assessment) = &self.run_assessment.assessment else {
             let text = "a fit of the equation error gives no confidence intervals, and noise biases its estimates; refine \
                         it with `method: gauss-newton` and `initial: data`";
             summary.warnings.push(Finding::new("equation_error", text));
@@ -60,7 +60,7 @@ impl FittedModel<'_> {
         }
         let warnings = plausibility.warnings.iter();
         summary.warnings.extend(warnings.map(findings::warning));
-        let poor = self.known.validation.iter();
+        let poor = self.run_assessment.validation.iter();
         let poor = poor.filter_map(ValidationRecord::poor);
         summary.warnings.extend(poor.map(findings::not_predicted));
         summary
@@ -68,7 +68,7 @@ impl FittedModel<'_> {
 
     pub(super) fn function_summaries(&self) -> BTreeMap<String, FunctionSummary> {
         let (problem, truth) = (&self.model.problem, self.model.truth.as_ref());
-        let assessment = self.known.assessment.as_ref();
+        let assessment = self.run_assessment.assessment.as_ref();
         let summaries = function_summaries(problem, self.fit, assessment, truth);
         let named = problem.functions.iter().zip(summaries);
         named

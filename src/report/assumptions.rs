@@ -1,10 +1,10 @@
-//! What a model says about the device besides its readings, in words.
+//! Assumptions of a model besides its samples, as text.
 
 use kmcfit_core::internals::functions::Basis;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Experiment};
 
-/// What is known: records, fixed functions, bases with few numbers, constraints, smoothness.
+/// Assumptions: records, fixed functions, bases with few parameters, constraints, smoothness.
 pub fn assumptions(problem: &Problem) -> Vec<String> {
     let mut known = vec![records(problem)];
     for function in problem.functions.iter() {

@@ -1,4 +1,4 @@
-//! What the cost J of a problem is, in words and by its kind.
+//! Definition of the cost J of a problem: kind of the misfit, and the formula as text.
 
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{CoefficientKind, Penalty};
@@ -7,7 +7,7 @@ use kmcfit_core::internals::record::Loss;
 use kmcfit_core::internals::solvers::Solver;
 use serde::{Deserialize, Serialize};
 
-/// How the misfit in J is measured.
+/// Kind of the misfit in J.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CostKind {
@@ -17,7 +17,7 @@ pub enum CostKind {
     ChiSquare,
     /// Some records have a sigma and some have none.
     Mixed,
-    /// `integral (m (y'' + b'') + sum_j p_j phi_j(y, y') - f)^2 dt` with the motion from the samples.
+    /// `integral (m (y'' + b'') + sum_j p_j phi_j(y, y') - f)^2 dt` with the response from the samples.
     EquationError,
 }
 
@@ -58,9 +58,8 @@ impl CostKind {
     }
 }
 
-/// The whole of J with all its factors, as [`Problem::evaluate`] computes it, or for
-/// [`Solver::EquationError`] the fit itself: the misfit and every penalty that the problem has, with
-/// its weight.
+/// The formula of J with all factors, as [`Problem::evaluate`] computes it, or for [`Solver::EquationError`] the
+/// objective of the fit: the misfit and every penalty with its weight.
 pub fn cost_definition(problem: &Problem, solver: Solver) -> String {
     let quantities: Vec<CoefficientKind> = problem.functions.iter().map(|f| f.quantity).collect();
     let misfit = CostKind::of(problem, solver).misfit().to_string() + &robust(problem);
@@ -86,7 +85,7 @@ pub fn cost_definition(problem: &Problem, solver: Solver) -> String {
     format!("J = {}", terms.join(" + "))
 }
 
-/// What robust losses put in the place of squares.
+/// The robust losses, as text.
 fn robust(problem: &Problem) -> String {
     let mut said: Vec<String> = Vec::new();
     for channel in problem.channels() {

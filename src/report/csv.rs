@@ -1,4 +1,4 @@
-//! Tables as CSV: a header with units, one row per node or iteration, numbers that read back to the
+//! CSV output: a header with units, one row per node or iteration, numbers with the shortest digits that parse to the
 //! same bits.
 
 use std::ops::Range;
@@ -24,11 +24,11 @@ impl CsvTable {
         self
     }
 
-    /// The file's text. Values that are not finite are left empty.
+    /// The text of the file. Fields of values that are not finite are empty.
     pub fn to_csv(&self) -> String {
         let rows = self.columns.iter().map(Vec::len).max().unwrap_or(0);
         let mut text = self.headers.join(",");
-        // At once: a text that grows leaves its smaller selves behind in memory that costs time to get.
+        // One reservation avoids repeated reallocation of a growing text.
         text.reserve(DIGITS * rows * self.columns.len());
         text.push('\n');
         for row in 0..rows {
@@ -46,14 +46,13 @@ impl CsvTable {
     }
 }
 
-/// Room for a number and its comma.
+/// Longest number with its comma, bytes.
 const DIGITS: usize = 21;
 
-/// What Ryu writes without an exponent though it is shorter with one.
+/// Range of numbers that Ryu writes without an exponent although they are shorter with one.
 const LONG: Range<f64> = 1e15..1e16;
 
-/// Appends the shortest decimal that reads back as the same number; with an exponent where that is
-/// shorter to read.
+/// Appends the shortest decimal that parses to the same number, with an exponent if that is shorter.
 fn push_number(text: &mut String, value: f64) {
     if !value.is_finite() {
         return;
@@ -88,7 +87,7 @@ mod tests {
         assert_eq!(bits(&read), bits(&values));
     }
 
-    /// As short as the standard library writes them, which takes longer.
+    /// Numbers are as short as those of the slower standard library.
     #[test]
     fn numbers_have_the_shortest_digits() {
         let mut bits = 1u64;

@@ -7,12 +7,12 @@ use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
 use kmcfit_core::internals::solvers::{PathPoint, WeightPath, WeightRule};
 use kmcfit_core::internals::study::PredictedResponse;
 
-/// Beyond this number of readings the dots are drawn smaller.
+/// Number of samples beyond which the dots are smaller.
 const MANY: usize = 400;
 
-/// A band may reach this many times the range of the curves beyond them.
+/// Largest extent of a band beyond the curves, relative to their range, that the axis includes.
 const WIDE_BAND: f64 = 1.5;
-/// What stays within this share of its size is flat to the eye.
+/// Relative variation below which a curve is treated as constant.
 const FLAT: f64 = 0.1;
 
 /// Lowest and highest finite value.
@@ -24,16 +24,16 @@ fn extent<'a>(values: impl Iterator<Item = &'a f64>) -> Option<(f64, f64)> {
     })
 }
 
-/// How readings are drawn.
+/// Style of samples.
 fn dots(colour: Colour, count: usize) -> Style {
     Style::new(colour).width(if count > MANY { 2.0 } else { 3.5 })
 }
 
-/// One measured channel: what was measured, its unit, the times in s, and the readings.
-pub type Channel<'a> = (&'a str, &'a str, &'a [f64], &'a [f64]);
+/// A measured channel: quantity, unit, times in s, and samples.
+pub type ChannelSamples<'a> = (&'a str, &'a str, &'a [f64], &'a [f64]);
 
-/// The measured motion, one panel for each channel.
-pub fn observation(channels: &[Channel]) -> Figure {
+/// The record, one panel for each channel.
+pub fn observation(channels: &[ChannelSamples]) -> Figure {
     Figure::new(
         "observation",
         "Record",
@@ -45,20 +45,20 @@ pub fn observation(channels: &[Channel]) -> Figure {
     }))
 }
 
-/// A channel's readings and what the model says of them, in the unit of the channel.
+/// Samples and prediction of a channel, in the unit of the channel.
 pub fn channel((label, unit): (&str, &str), t: &[f64], observed: &[f64], model: &[f64]) -> Figure {
-    let readings = Mark::points("readings", t, observed, dots(Colour::Grey, t.len()));
+    let samples = Mark::points("samples", t, observed, dots(Colour::Grey, t.len()));
     let line = Style::new(Colour::Blue).width(1.4);
     Figure::new(
         "channel",
         "Readings and model",
         "Samples of the channel and the fitted response against time.",
     )
-    .panel(Panel::of_time(label, unit).marks([readings, Mark::line("model", t, model, line)]))
+    .panel(Panel::of_time(label, unit).marks([samples, Mark::line("model", t, model, line)]))
 }
 
-/// The residuals of a channel against time, and their autocorrelation beside the band in which that of
-/// white noise lies in 95 of 100 lags.
+/// The residuals of a channel against time, and their autocorrelation with the band that contains 95 % of the lags for
+/// white noise.
 pub fn residuals(
     (label, unit): (&str, &str),
     t: &[f64],
@@ -98,7 +98,7 @@ pub fn convergence(
     // A single iteration is a dot.
     let factor = if iterations.len() == 1 { 3.0 } else { 1.0 };
     let cost = Style::new(Colour::Blue).width(2.2 * factor);
-    // Both solid, told apart by width: dashes vanish where the gradient norm jumps up and down.
+    // Solid lines of different width: dashes are not visible on a strongly varying gradient norm.
     let gradient = Style::new(Colour::Orange).width(0.9 * factor);
     let squares = gradient_norm_squared_ratio;
     let y = Axis::log("relative to the start", "");
@@ -113,17 +113,16 @@ pub fn convergence(
     ]))
 }
 
-/// The motion at one iteration: the iteration, the times in s, and the displacements in m.
+/// The response at one iteration: iteration, times in s, and displacements in m.
 pub type Snapshot<'a> = (usize, &'a [f64], &'a [f64]);
 
-/// The observed displacement and the motion of the fit at some iterations; times in s,
-/// displacements in m.
-pub fn motion(t_obs: &[f64], y_obs: &[f64], snapshots: &[Snapshot]) -> Figure {
+/// The measured displacement and the response of the fit at some iterations; times in s, displacements in m.
+pub fn response(t_obs: &[f64], y_obs: &[f64], snapshots: &[Snapshot]) -> Figure {
     let grey = Style::new(Colour::Grey).width(4.5);
     let last = snapshots.len().saturating_sub(1);
     let lines = snapshots.iter().enumerate();
     let lines = lines.map(|(index, (iteration, t, y))| {
-        // The last one lies on the observation, where only black shows well.
+        // The last one coincides with the record, so it is drawn black.
         let style = match index == last && index > 0 {
             true => Style::new(Colour::Black).dash(Dash::Dashed),
             false => Style::nth(index),
@@ -135,7 +134,7 @@ pub fn motion(t_obs: &[f64], y_obs: &[f64], snapshots: &[Snapshot]) -> Figure {
         .marks(lines);
     Figure::new(
         "motion",
-        "Motion during the fit",
+        "Response during the fit",
         "Measured displacement against time, and the response at some iterations.",
     )
     .panel(panel)
@@ -148,18 +147,18 @@ pub struct FunctionCurve<'a> {
     pub name: &'a str,
     /// Unit, as in `kg`.
     pub unit: &'a str,
-    /// What the fit found.
+    /// Estimate.
     pub found: &'a [f64],
-    /// Lower and upper edge of its uncertainty.
+    /// Lower and upper end of its confidence band.
     pub band: Option<(&'a [f64], &'a [f64])>,
-    /// Where the fit started.
+    /// Start values.
     pub start: Option<&'a [f64]>,
-    /// The true function, where known.
+    /// True function, if known.
     pub truth: Option<&'a [f64]>,
 }
 
 impl<'a> FunctionCurve<'a> {
-    /// A function that was found, with nothing else known.
+    /// A curve of the estimate alone.
     pub fn new(name: &'a str, unit: &'a str, found: &'a [f64]) -> Self {
         Self {
             name,
@@ -171,7 +170,7 @@ impl<'a> FunctionCurve<'a> {
         }
     }
 
-    /// What is shown where the band would make the curves flat lines: the curves with room around them.
+    /// Limits of the axis if the full band would flatten the curves: the range of the curves with a margin.
     fn room(&self) -> Option<(f64, f64)> {
         let (low, high) = self.band?;
         let curves = [Some(self.found), self.start, self.truth];
@@ -253,9 +252,8 @@ pub fn gradient_error(curves: &[GradientCheck]) -> Figure {
     .panels(kinds.iter().map(panel))
 }
 
-/// The ratios of the coefficient functions against the times `t` in s, and the true ones where
-/// known; a ratio without values has no panel. `bands` are the lower and upper ends of their bands,
-/// as many as are known.
+/// The ratios of the coefficient functions against the times `t` in s, and the true ones if known; a ratio without
+/// values has no panel. `bands` are the lower and upper ends of the bands of the first ratios.
 pub fn ratios(
     t: &[f64],
     found: &Ratios,
@@ -287,15 +285,14 @@ pub fn ratios(
     }))
 }
 
-/// The motion from other initial states, one panel each, and the true one where known; times in s,
-/// displacements in m.
-pub fn predictions(t: &[f64], motions: &[PredictedResponse]) -> Figure {
+/// The response to other initial states, one panel each, and the true one if known; times in s, displacements in m.
+pub fn predictions(t: &[f64], responses: &[PredictedResponse]) -> Figure {
     Figure::new(
         "predictions",
         "Predictions",
         "Predicted free response from other initial states against time.",
     )
-    .panels(motions.iter().map(|predicted| {
+    .panels(responses.iter().map(|predicted| {
         let state = &predicted.summary;
         let (y, v) = (state.displacement, state.velocity);
         Panel::of_time("displacement y", "m")
@@ -305,7 +302,7 @@ pub fn predictions(t: &[f64], motions: &[PredictedResponse]) -> Figure {
     }))
 }
 
-/// The path of weights: misfit and roughness against the weight, with what each rule picks.
+/// The weight path: misfit and roughness against the weight, with the choice of each rule.
 pub fn weight_path(path: &WeightPath) -> Figure {
     type Part = fn(&PathPoint) -> f64;
     let parts: [(&str, Colour, Part); 3] = [
@@ -347,7 +344,7 @@ mod tests {
     use super::*;
     use crate::report::chart::svg;
 
-    /// Of a single iteration there is no line: both curves are dots, three times as wide.
+    /// A single iteration is drawn as dots, three times as wide as the lines.
     #[test]
     fn a_single_iteration_shows() {
         let one = svg::render(&convergence(&[1.0], &[1e-3], &[1e-4]));

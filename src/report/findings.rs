@@ -45,7 +45,7 @@ pub fn unidentified(reason: &Unidentified) -> Finding {
     Finding::of(reason, format!("no system identified: {why}"))
 }
 
-/// A validation record, by name, that the fit predicts to so many per cent only.
+/// A validation record that the fit does not predict: name, and fit in per cent.
 pub fn not_predicted((record, percent): (&str, f64)) -> Finding {
     let text = format!(
         "validation record `{record}`: fit {} only; the estimates do not predict it",
@@ -90,7 +90,7 @@ pub fn warning(warning: &FitWarning) -> Finding {
     Finding::of(warning, text)
 }
 
-/// A finding of fits from so many starting points.
+/// A finding of a multistart search with this number of starting points.
 pub fn of_starts(finding: &multistart::MultistartFinding, starts: usize) -> Finding {
     use multistart::MultistartFinding as Starts;
     match finding {

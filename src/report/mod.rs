@@ -1,8 +1,7 @@
-//! What a run leaves behind: tables, figures, and the result document; imported by the cli alone.
+//! Reports of a run: result document, tables, figures, HTML pages and terminal summaries.
 //!
-//! The way from data to picture runs through the files in this order: [`figures`] states what each
-//! standard figure shows, in the data model of [`chart`], which draws it; `page` puts figures and what is said of them into
-//! pages.
+//! [`figures`] builds the standard figures in the data model of [`chart`], which renders them; `page` assembles figures
+//! and text into HTML pages.
 //!
 //! ```
 //! use kmcfit::report::{render, Axis, Colour, Figure, Mark, Panel, Style};
@@ -17,21 +16,21 @@
 
 mod assessment;
 mod assumptions;
+mod channel_view;
 pub mod chart;
-mod columns;
 pub mod compare;
 mod cost;
 mod csv;
 pub mod document;
-mod drawn;
 pub mod figures;
 pub(crate) mod findings;
-mod finished;
-mod known;
-mod measured;
+mod fit_assessment;
+mod fit_figures;
+mod fit_quality;
 mod page;
+mod result_table;
 mod run;
-mod seen;
+mod run_reader;
 pub mod study;
 mod suggestions;
 mod summary;
@@ -41,15 +40,15 @@ mod text;
 mod timings;
 
 pub use chart::{Axis, Colour, Dash, Figure, Mark, Panel, Scale, Style, render};
-pub use columns::Columns;
 pub use compare::Comparison;
 pub use cost::{CostKind, cost_definition};
 pub use csv::CsvTable;
-pub use finished::Run;
+pub use fit_assessment::RunAssessment;
 pub use kmcfit_core::internals::study::{PredictedResponse, predict};
-pub use known::Known;
 pub(crate) use page::shell_quoted;
+pub use result_table::ResultTable;
 pub use run::{FittedModel, fit_claim, json};
+pub use run_reader::Run;
 pub use summary::{prediction_table, summary};
 pub use terminal::charts;
-pub use timings::{Around, PartSummary, TimingsSummary};
+pub use timings::{OverheadTimings, PartSummary, TimingsSummary};

@@ -1,18 +1,18 @@
-//! What a fit leaves behind: tables, figures and the result document.
+//! Output of a fit: the result document, tables, figures and the page.
 
+use super::channel_view::ChannelView;
 use super::cost::{CostKind, cost_definition};
 use super::document::{
     ActiveSummary, AttemptSummary, ChannelSummary, ConstraintSummary, CostSummary, CountsSummary,
     ExperimentSummary, FORMAT, GradientSummary, ModelSummary, OutcomeSummary, PathSummary,
     Prediction, ResultDocument, SlackSummary, WeightSummary,
 };
-use super::known::Known;
-use super::measured;
+use super::fit_assessment::RunAssessment;
+use super::fit_quality;
 use super::page::fit_page;
 use super::render;
-use super::seen::SeenChannel;
 use super::suggestions::suggestions;
-use super::timings::{Around, TimingsSummary};
+use super::timings::{OverheadTimings, TimingsSummary};
 use crate::config::{ChannelNote, Model};
 use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, Stage};
 use kmcfit_core::internals::functions::CoefficientFunction;
@@ -25,27 +25,27 @@ use kmcfit_core::internals::system::{Excitation, Term};
 use std::io;
 use std::time::Duration;
 
-/// A fitted model and what it predicts.
+/// A fitted model with its predictions and assessment.
 #[derive(Debug, Clone, Copy)]
 pub struct FittedModel<'a> {
-    /// What was fitted.
+    /// Model.
     pub model: &'a Model,
-    /// What was found.
+    /// Result of the fit.
     pub fit: &'a Fit,
-    /// The motion of the found device from other initial states.
+    /// Responses of the fitted system to other initial states.
     pub predictions: &'a [Prediction],
-    /// The path on which the weight of the smoothness was chosen, if by a rule.
+    /// Weight path, if a rule chose the weight of a penalty.
     pub weights: Option<&'a WeightPath>,
     /// Assessment of the fit.
-    pub known: &'a Known,
+    pub run_assessment: &'a RunAssessment,
 }
 
 impl FittedModel<'_> {
-    /// Writes tables and, if asked for, figures and the page of `document`: all but the result document
-    /// itself. Returns what the writing took.
+    /// Writes tables and, if requested, figures and the page of `document`, but not the result document itself. Returns
+    /// the time taken to render and to write them.
     ///
     /// # Errors
-    /// What the file system says.
+    /// Errors of the file system.
     pub fn write(
         &self,
         stage: &mut Stage,
@@ -57,7 +57,7 @@ impl FittedModel<'_> {
         write("history.csv", &self.history().to_csv())?;
         write("functions.csv", &self.functions_table().to_csv())?;
         write("trajectory.csv", &self.trajectories().to_csv())?;
-        for (name, table) in self.readings() {
+        for (name, table) in self.samples() {
             write(&name, &table.to_csv())?;
         }
         if with_figures {
@@ -69,7 +69,7 @@ impl FittedModel<'_> {
         Ok(writing)
     }
 
-    /// The page that people keep, of the run and its document: one HTML file that loads nothing.
+    /// The HTML page of the run: one file without external resources.
     pub fn page(&self, document: &ResultDocument) -> String {
         fit_page(self, document)
     }
@@ -106,7 +106,7 @@ impl FittedModel<'_> {
                 qp: fit.counts.qp,
             },
             seconds: fit.elapsed.as_secs_f64(),
-            timings: TimingsSummary::new(fit, &Around::default(), fit.elapsed),
+            timings: TimingsSummary::new(fit, &OverheadTimings::default(), fit.elapsed),
             functions: self.function_summaries(),
             constraints: self.constraint_summary(),
             identifiability: self.identifiability(),
@@ -114,22 +114,22 @@ impl FittedModel<'_> {
             attempts: self.fit.attempts.iter().map(attempt_summary).collect(),
             experiments: self.experiment_summaries(),
             validation: self
-                .known
+                .run_assessment
                 .validation
                 .iter()
-                .map(measured::validation)
+                .map(fit_quality::validation)
                 .collect(),
             nuisance_parameters: match self.is_simulated() {
                 true => {
-                    let covariance = self.known.covariance();
-                    measured::scalars(&model.problem, &fit.best.evaluation, covariance)
+                    let covariance = self.run_assessment.covariance();
+                    fit_quality::scalars(&model.problem, &fit.best.evaluation, covariance)
                 }
                 false => Vec::new(),
             },
-            statistics: (self.known.assessment.as_ref())
+            statistics: (self.run_assessment.assessment.as_ref())
                 .map(|a| a.statistics.clone())
                 .unwrap_or_default(),
-            step_check: self.known.step_check().cloned(),
+            step_check: self.run_assessment.step_check().cloned(),
             automatic: model.automatic.clone(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),
@@ -139,14 +139,14 @@ impl FittedModel<'_> {
         document
     }
 
-    /// Whether the fit compares a simulated motion with the readings, and not the equation of motion.
+    /// True if the fit minimises the misfit of a simulated response; false for the equation error.
     pub(super) fn is_simulated(&self) -> bool {
         self.model.settings.solver != Solver::EquationError
     }
 
     /// The bands of functions and ratios, for models of at most 64 parameters.
     pub(super) fn bands(&self) -> Option<&Bands> {
-        self.known.bands()
+        self.run_assessment.bands()
     }
 
     fn model_summary(&self) -> ModelSummary {
@@ -180,7 +180,7 @@ impl FittedModel<'_> {
         let worst = problem
             .constraints
             .largest_violation(&self.fit.best.parameters);
-        // What pushes where is a matter of points that satisfy the constraints.
+        // Multipliers are meaningful only at points that satisfy the constraints.
         let active = match self.fit.outcome.status {
             Status::Infeasible => Vec::new(),
             _ => active_constraints(problem, &self.fit.best),
@@ -233,7 +233,7 @@ impl FittedModel<'_> {
         })
     }
 
-    /// All functions with what they are and what they are called, those of single experiments last.
+    /// All coefficient functions with their nodal values, those of single experiments last.
     pub(super) fn named_functions(&self) -> Vec<(&CoefficientFunction, Vec<f64>)> {
         let functions = &self.model.problem.functions;
         let values = functions.values(&self.fit.best.parameters);
@@ -252,13 +252,13 @@ impl FittedModel<'_> {
             .map(|(e, (experiment, predictions))| {
                 let channels = 0..predictions.len();
                 let channels: Vec<ChannelSummary> = channels
-                    .map(|i| measured::channel(&self.seen(e, i)))
+                    .map(|i| fit_quality::channel(&self.channel_view(e, i)))
                     .collect();
                 let factor = self.note(e, 0).map_or(1.0, |note| note.unit.factor());
                 ExperimentSummary {
                     name: experiment.name.clone(),
                     driven_by: driven_by(experiment.excitation.as_ref()),
-                    readings: experiment.sample_count(),
+                    samples: experiment.sample_count(),
                     rms_residual: channels
                         .first()
                         .map_or(f64::NAN, |first| factor * first.rms_residual),
@@ -268,7 +268,7 @@ impl FittedModel<'_> {
             .collect()
     }
 
-    /// SI unit of a function: of a rotation if the channels are.
+    /// SI unit of a function, for a rotation if the channels are angles.
     pub(super) fn unit(&self, function: &CoefficientFunction) -> &'static str {
         match self.is_rotation() {
             true => function.quantity.angular_unit(),
@@ -276,15 +276,15 @@ impl FittedModel<'_> {
         }
     }
 
-    /// Whether the channels are those of a rotation.
+    /// True if the channels are angles.
     pub(super) fn is_rotation(&self) -> bool {
         let mut units = self.model.notes.iter().flatten().map(|note| note.unit);
         units.any(|unit| unit.is_angular())
     }
 
-    /// A channel beside what the fit says of it.
-    pub(super) fn seen(&self, experiment: usize, channel: usize) -> SeenChannel<'_> {
-        SeenChannel {
+    /// A channel with its prediction.
+    pub(super) fn channel_view(&self, experiment: usize, channel: usize) -> ChannelView<'_> {
+        ChannelView {
             channel: &self.model.problem.experiments[experiment].channels[channel],
             predicted: &self.fit.best.evaluation.predictions[experiment][channel],
             note: self.note(experiment, channel),
@@ -337,7 +337,7 @@ pub fn fit_claim(model: &Model) -> Claim {
         "weights",
     ];
     let records = 1..=model.problem.experiments.len();
-    let readings = records.map(|number| number.to_string());
+    let samples = records.map(|number| number.to_string());
     Claim::new("fit")
         .files([
             RESULT,
@@ -346,12 +346,12 @@ pub fn fit_claim(model: &Model) -> Claim {
             "trajectory.csv",
             "report.html",
         ])
-        .family("readings", "csv", readings.chain(["validation".to_owned()]))
+        .family("readings", "csv", samples.chain(["validation".to_owned()]))
         .family("figures", "svg", FIGURES)
         .journals(&[FIT_JOURNAL, CHECKPOINT])
 }
 
-/// Pretty JSON with a final newline. Numbers that JSON cannot hold become `null`.
+/// Formatted JSON with a final newline. Numbers that JSON cannot represent become `null`.
 pub fn json<T: serde::Serialize>(document: &T) -> String {
     // The documents are plain structs with text keys, which always serialise.
     let mut text = serde_json::to_string_pretty(document).unwrap_or_default();

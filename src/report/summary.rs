@@ -2,8 +2,8 @@
 
 use super::document::{ChannelSummary, Prediction, ResultDocument};
 use super::suggestions;
-use crate::digits::significant;
 use crate::finding::Finding;
+use crate::number_format::significant;
 use kmcfit_core::internals::assessment::FunctionSummary;
 use kmcfit_core::internals::diagnostics::NORMAL_975;
 use kmcfit_core::internals::functions::CoefficientKind;
@@ -190,13 +190,13 @@ pub(super) fn write_channel(
         channel.rms_residual,
         channel.unit,
         fit_in_words(channel.fit_percent),
-        count(channel.readings, "sample")
+        count(channel.samples, "sample")
     )?;
     if channel.outliers > 0 {
         write!(text, "; {} rejected", count(channel.outliers, "outlier"))?;
     }
     for ignored in &channel.ignored {
-        write!(text, "; {} not used ({})", ignored.readings, ignored.reason)?;
+        write!(text, "; {} not used ({})", ignored.samples, ignored.reason)?;
     }
     writeln!(text)?;
     if let (Some(sigma), true) = (channel.sigma, channel.sigma_estimated) {

@@ -29,7 +29,7 @@ impl FittedModel<'_> {
     }
 
     pub(super) fn functions_table(&self) -> CsvTable {
-        let device = &self.fit.best.evaluation.nodal;
+        let coefficients = &self.fit.best.evaluation.nodal;
         let times = self.model.problem.system.grid.times();
         let mut table = CsvTable::new().column("t_s", times);
         for (function, values) in self.named_functions() {
@@ -41,7 +41,7 @@ impl FittedModel<'_> {
             };
             table = table.column(name, values);
         }
-        let ratios = Ratios::of(device);
+        let ratios = Ratios::of(coefficients);
         table = table
             .column("k_over_m_per_s2", ratios.k_over_m)
             .column("c_over_m_per_s", ratios.c_over_m)
@@ -76,24 +76,24 @@ impl FittedModel<'_> {
             true => ["y_rad", "v_rad_per_s", "observed_y_rad"],
             false => ["y_m", "v_m_per_s", "observed_y_m"],
         };
-        let motions = problem
+        let responses = problem
             .experiments
             .iter()
             .zip(&self.fit.best.evaluation.trajectories);
-        for (i, (experiment, motion)) in motions.enumerate() {
+        for (i, (experiment, response)) in responses.enumerate() {
             let name = |column: &str| match several {
                 true => format!("{column}_{}", i + 1),
                 false => column.to_string(),
             };
-            // A record may end before the grid does.
+            // A record can end before the grid.
             let full = |values: &[f64]| {
                 let mut values = values.to_vec();
                 values.resize(problem.system.grid.nodes(), f64::NAN);
                 values
             };
             table = table
-                .column(name(y), full(&motion.displacement))
-                .column(name(v), full(&motion.velocity));
+                .column(name(y), full(&response.displacement))
+                .column(name(v), full(&response.velocity));
             if let [channel] = experiment.channels.as_slice()
                 && let Some(stride) = channel.stride()
             {
@@ -107,20 +107,20 @@ impl FittedModel<'_> {
         table
     }
 
-    /// The readings of each channel beside what the model says of them, in the unit of the file, and
-    /// the names of the tables; those that took no part in the fit last.
-    pub(super) fn readings(&self) -> Vec<(String, CsvTable)> {
+    /// Tables of the samples and predictions of each channel in the unit of the file, with their names; validation
+    /// records last.
+    pub(super) fn samples(&self) -> Vec<(String, CsvTable)> {
         let fitted = self.channels().into_iter().map(|(e, c)| {
-            let seen = self.seen(e, c);
-            let name = format!("readings/{}-{}.csv", e + 1, seen.channel.kind().name());
-            (name, seen.table())
+            let view = self.channel_view(e, c);
+            let name = format!("readings/{}-{}.csv", e + 1, view.channel.kind().name());
+            (name, view.table())
         });
-        let validation = self.known.validation.iter().enumerate();
+        let validation = self.run_assessment.validation.iter().enumerate();
         let validation = validation.flat_map(|(i, out)| {
-            out.channels().into_iter().map(move |seen| {
-                let kind = seen.channel.kind().name();
+            out.channels().into_iter().map(move |view| {
+                let kind = view.channel.kind().name();
                 let name = format!("readings/validation-{}-{kind}.csv", i + 1);
-                (name, seen.table())
+                (name, view.table())
             })
         });
         fitted.chain(validation).collect()

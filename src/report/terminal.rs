@@ -1,14 +1,14 @@
-//! Charts of letters: readings against fit, and the functions, for a look in the terminal.
+//! Text charts for the terminal: samples with the fitted response, and the coefficient functions.
 
-use super::columns::Columns;
 use super::document::ResultDocument;
+use super::result_table::ResultTable;
 use crate::error::InputError;
 use kmcfit_core::internals::functions::CoefficientKind;
 use std::path::Path;
 
 /// Columns for the numbers beside a chart.
 const MARGIN: usize = 10;
-/// Rows of a chart of readings, and of a function.
+/// Rows of a chart of samples, and of a function.
 const TALL: usize = 10;
 const LOW: usize = 5;
 /// Narrowest and widest chart, in columns.
@@ -28,7 +28,7 @@ pub fn charts(
     for (e, experiment) in document.experiments.iter().enumerate() {
         for channel in &experiment.channels {
             let name = format!("readings/{}-{}.csv", e + 1, channel.kind);
-            let table = Columns::read(&folder.join(name))?;
+            let table = ResultTable::read(&folder.join(name))?;
             let title = format!(
                 "{}: {} in {} (line: fit, o: samples)",
                 experiment.name, channel.kind, channel.unit
@@ -41,7 +41,7 @@ pub fn charts(
             text += &format!("\n{title}\n{}", chart.text());
         }
     }
-    let table = Columns::read(&folder.join("functions.csv"))?;
+    let table = ResultTable::read(&folder.join("functions.csv"))?;
     let times = table.required("t_s")?;
     for (name, function) in document.terms() {
         let Some(quantity) = CoefficientKind::ALL.into_iter().find(|q| q.name() == name) else {
@@ -130,7 +130,7 @@ impl Chart {
         self.dots[y / 4 * self.width + x / 2] |= BITS[y % 4][x % 2];
     }
 
-    /// Points, seen where the line is not.
+    /// Adds points; the line overdraws them.
     fn points(&mut self, times: &[f64], values: &[f64]) {
         for (t, y) in times.iter().zip(values) {
             if let Some([x, y]) = self.dot(*t, *y) {
@@ -143,7 +143,7 @@ impl Chart {
         let mut text = String::new();
         for row in 0..self.height {
             let label = match row {
-                // A constant lies in the middle.
+                // A constant is drawn in the middle.
                 _ if self.values[0] == self.values[1] => match row == self.height / 2 {
                     true => number(self.values[0]),
                     false => String::new(),
@@ -196,13 +196,13 @@ mod tests {
     fn a_wave_with_readings_off_it() {
         let times: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.05).collect();
         let model: Vec<f64> = times.iter().map(|t| 3.0 * t.sin()).collect();
-        let mut readings = model.clone();
-        readings[100] = 2.5;
-        readings[50] = f64::NAN;
+        let mut samples = model.clone();
+        samples[100] = 2.5;
+        samples[50] = f64::NAN;
         let mut chart = Chart::new(60, 6, &times);
-        chart.scale(&[&model, &readings]);
+        chart.scale(&[&model, &samples]);
         chart.line(&times, &model);
-        chart.points(&times, &readings);
+        chart.points(&times, &samples);
         assert_snapshot!(chart.text(), @"
          3 │    ⡠⠔⠋⠉⠉⠓⢦⡀            o         ⡠⠖⠊⠉⠉⠒⠦⣀
            │  ⡴⠊       ⠈⠢⡀                 ⢀⡴⠋       ⠈⠣⡀

@@ -1,7 +1,6 @@
-//! Small helpers for text: widths, superscripts, numbers beside ticks, and what XML allows.
+//! Text helpers: estimated widths, superscripts, tick labels, and escaping for XML.
 
-/// Estimated width of `text` in pixels at a font size; on the wide side, since a generic
-/// sans-serif may turn out wide or narrow.
+/// Estimated width of `text` in pixels at a font size; an upper estimate for common sans-serif fonts.
 pub(super) fn width(text: &str, size: f64) -> f64 {
     text.chars().map(|c| size * em(c)).sum()
 }
@@ -37,12 +36,12 @@ pub(super) fn decade(exponent: i64) -> String {
     format!("10{}", superscript(exponent))
 }
 
-/// A number beside a tick, with as many digits as steps of `step` need; `largest` is the largest
-/// magnitude on the axis, which decides for all ticks alike whether a power of ten is split off.
+/// Label of a tick, with the digits that steps of `step` need. `largest` is the largest magnitude on the axis and
+/// determines the notation of all labels: with or without a power of ten.
 pub(super) fn tick(value: f64, step: f64, largest: f64) -> String {
     let order = magnitude(largest);
     let places = magnitude(step);
-    // Zero comes out of index times step exactly, but may carry a sign.
+    // Removes the sign of zero.
     let value = value + 0.0;
     if (-3..5).contains(&order) {
         return minus(&format!("{value:.*}", digits(-places)));
@@ -69,13 +68,13 @@ fn minus(number: &str) -> String {
     number.replace('-', "−")
 }
 
-/// The font size, at most `size`, at which `text` fits into `room` pixels; never below half.
+/// The font size, at most `size` and at least half of it, at which `text` fits into a width in pixels.
 pub(super) fn fit(text: &str, size: f64, room: f64) -> f64 {
     let share = room / width(text, size).max(1.0);
     size * share.clamp(0.5, 1.0)
 }
 
-/// Leaves out the characters that XML forbids.
+/// Removes the characters that XML forbids.
 pub(super) fn clean(text: &str) -> String {
     let allowed = |c: &char| {
         (!c.is_control() || *c == '\n' || *c == '\t') && !matches!(c, '\u{fffe}' | '\u{ffff}')
@@ -93,7 +92,7 @@ pub(super) fn escape(text: &str) -> String {
         .replace('\'', "&apos;")
 }
 
-/// [`escape`] for a sentence in a page: what stands between backquotes is code.
+/// [`escape`] for a sentence in a page; text between backquotes becomes code.
 pub(super) fn prose(text: &str) -> String {
     let escaped = escape(text);
     let parts: Vec<&str> = escaped.split('`').collect();

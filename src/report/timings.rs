@@ -1,4 +1,4 @@
-//! Where the time of a run went.
+//! Wall-clock time of a run by activity.
 
 use kmcfit_core::internals::simulate::arithmetic;
 use kmcfit_core::internals::solvers::Fit;
@@ -6,13 +6,12 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use std::time::Duration;
 
-/// Wall-clock time of a run by what it was spent on. No time is in two of the parts, and all of them
-/// together are the total.
+/// Wall-clock time of a run by activity. The parts do not overlap, and their sum is the total.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct TimingsSummary {
-    /// What the steppers compute with: `AVX-512`, `AVX2` or `scalar`.
+    /// Vector instructions of the steppers: `AVX-512`, `AVX2` or `scalar`.
     pub arithmetic: String,
-    /// Forward solves of the fit: motions, predictions and costs.
+    /// Forward solves of the fit: responses, predictions and costs.
     pub forward: PartSummary,
     /// Adjoint solves of the fit: gradients.
     pub adjoint: PartSummary,
@@ -20,31 +19,31 @@ pub struct TimingsSummary {
     pub tangent: PartSummary,
     /// Quadratic programs of the fit, by Clarabel.
     pub qp: PartSummary,
-    /// The plain Gauss-Newton step, assembled, factored and solved; the recursion of L-BFGS; the
-    /// equation error without its programs.
+    /// Assembly, factorisation and solution of Gauss-Newton steps; the recursion of L-BFGS; the equation error without
+    /// its quadratic programs.
     pub linear_algebra: PartSummary,
-    /// Starts from the readings, with all that is solved for them.
+    /// Starting points from the samples, with their subproblems.
     pub start: PartSummary,
-    /// Reading data, and writing checkpoints and results; `result.json` itself is written after the clock has stopped.
+    /// Reading of data, and writing of checkpoints and results except `result.json`.
     pub io: PartSummary,
     /// Assessment: errors and bands, statistics, step-size check, validation records, predictions.
     #[serde(default)]
     pub analysis: PartSummary,
-    /// Tables, figures and the page, made to be written.
+    /// Rendering of tables, figures and the page.
     #[serde(default)]
     pub report: PartSummary,
     /// The rest: building the model, bookkeeping.
     pub other: PartSummary,
-    /// From the building of the model to the result.
+    /// From the begin of the model building to the result.
     pub total: PartSummary,
 }
 
-/// One part.
+/// Time of one part.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct PartSummary {
     /// s.
     pub seconds: f64,
-    /// How often it was done, where that is counted.
+    /// Number of calls, if counted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<u64>,
 }
@@ -58,18 +57,18 @@ impl PartSummary {
     }
 }
 
-/// What was done around a fit.
+/// Times of the work around a fit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Around {
+pub struct OverheadTimings {
     /// Reading and writing.
     pub io: Duration,
-    /// What [`TimingsSummary::analysis`] is.
+    /// See [`TimingsSummary::analysis`].
     pub analysis: Duration,
-    /// What [`TimingsSummary::report`] is.
+    /// See [`TimingsSummary::report`].
     pub report: Duration,
 }
 
-impl Around {
+impl OverheadTimings {
     /// The sum of all.
     pub fn sum(&self) -> Duration {
         self.io + self.analysis + self.report
@@ -77,8 +76,8 @@ impl Around {
 }
 
 impl TimingsSummary {
-    /// The time of a run that took `total`.
-    pub fn new(fit: &Fit, around: &Around, total: Duration) -> Self {
+    /// Timings of a run with the total time `total`.
+    pub fn new(fit: &Fit, overhead: &OverheadTimings, total: Duration) -> Self {
         let (counts, times) = (&fit.counts, &fit.timings);
         let counted = |time, count| PartSummary::new(time, Some(count));
         let part = |time| PartSummary::new(time, None);
@@ -90,10 +89,10 @@ impl TimingsSummary {
             qp: counted(times.qp, counts.qp),
             linear_algebra: part(times.linear_algebra),
             start: part(times.start),
-            io: part(around.io + times.keeping),
-            analysis: part(around.analysis),
-            report: part(around.report),
-            other: part(total.saturating_sub(times.sum() + around.sum())),
+            io: part(overhead.io + times.keeping),
+            analysis: part(overhead.analysis),
+            report: part(overhead.report),
+            other: part(total.saturating_sub(times.sum() + overhead.sum())),
             total: part(total),
         }
     }

@@ -13,26 +13,26 @@ use std::path::Path;
 
 const WHAT: &str = "the journal of a study or comparison that was begun by kmcfit";
 
-/// A line: the name of an analysis and its result.
+/// Entry of the journal: the name of an analysis and its result.
 #[derive(Serialize, Deserialize)]
-struct Line {
+struct AnalysisLine {
     analysis: String,
     result: Value,
 }
 
-/// Name of the line that is written once the results are; no analysis has it, and no file.
+/// Name of the entry that is written after the results; neither an analysis nor a file has this name.
 const FINISHED: &str = "results/written";
 
-/// Whether the work of a journal is finished and its results were written.
+/// True if the work of a journal is finished and its results were written.
 pub(super) fn is_finished(path: &Path) -> bool {
     let Ok(text) = JournalText::read(path, WHAT) else {
         return false;
     };
     text.lines()
-        .any(|(line, _): (Line, _)| line.analysis == FINISHED)
+        .any(|(line, _): (AnalysisLine, _)| line.analysis == FINISHED)
 }
 
-/// The finished analyses, on disk as soon as they are.
+/// Journal of finished analyses; each is made durable when it ends.
 #[derive(Debug)]
 pub struct AnalysisJournal {
     file: JournalFile,
@@ -40,10 +40,10 @@ pub struct AnalysisJournal {
 }
 
 impl AnalysisJournal {
-    /// A new journal of this name in a folder, in the place of an older one.
+    /// Creates a journal of this name in a folder; replaces an older one.
     ///
     /// # Errors
-    /// What the file system says.
+    /// Errors of the file system.
     pub fn begin(folder: &Path, name: &str, heading: &Heading) -> io::Result<Self> {
         let work = WorkFolder::create_in(folder)?;
         Ok(Self {
@@ -55,22 +55,22 @@ impl AnalysisJournal {
     /// The heading of the journal of this name in a folder.
     ///
     /// # Errors
-    /// If there is none of this format.
+    /// If there is no journal of this format.
     pub fn heading(folder: &Path, name: &str) -> Result<Heading, InputError> {
         Ok(JournalText::read(&folder.join(name), WHAT)?.heading)
     }
 
-    /// Resumes the journal of this name in a folder, up to the first line that is damaged.
+    /// Resumes the journal of this name in a folder, up to the first damaged line.
     ///
     /// # Errors
-    /// If there is none, or it was begun with other inputs or by another version.
+    /// If there is no journal, or it was begun with other inputs or by another version.
     pub fn resume(folder: &Path, name: &str, heading: &Heading) -> Result<Self, InputError> {
         let path = folder.join(name);
         let text = JournalText::read(&path, WHAT)?;
         heading.check_same(&text.heading, &path)?;
         let mut done = BTreeMap::new();
         let mut end = text.begin;
-        for (Line { analysis, result }, next) in text.lines() {
+        for (AnalysisLine { analysis, result }, next) in text.lines() {
             done.insert(analysis, result);
             end = next;
         }
@@ -80,15 +80,15 @@ impl AnalysisJournal {
         })
     }
 
-    /// Whether there is an analysis of this name.
+    /// True if there is an analysis of this name.
     pub fn has(&self, name: &str) -> bool {
         self.done.contains_key(name)
     }
 
-    /// Marks the work as finished if it `is_done`: its results are written, and may be replaced by those of other inputs.
+    /// Marks the work as finished if `is_done`: its results are written, and results of other inputs may replace them.
     ///
     /// # Errors
-    /// What the file system says.
+    /// Errors of the file system.
     pub fn finish_if(&mut self, is_done: bool) -> io::Result<()> {
         match is_done {
             true => self.analysis(FINISHED, || true, || true).map(drop),
@@ -96,7 +96,7 @@ impl AnalysisJournal {
         }
     }
 
-    /// Forgets an analysis that does not have the expected form, so that it is made again.
+    /// Discards an analysis that cannot be deserialised, so that it is repeated.
     pub fn forget_unless<T: DeserializeOwned>(
         &mut self,
         name: &str,
@@ -109,11 +109,11 @@ impl AnalysisJournal {
         }
     }
 
-    /// The result of an analysis: as it was kept, or computed now and kept; `None` if it is not `whole`
-    /// after it was computed.
+    /// The result of an analysis: read from the journal, or computed and stored; `None` if the computed result is not
+    /// `whole`.
     ///
     /// # Errors
-    /// What the file system says.
+    /// Errors of the file system.
     pub fn analysis<T: Serialize + DeserializeOwned>(
         &mut self,
         name: &str,
@@ -129,14 +129,14 @@ impl AnalysisJournal {
         if !whole() {
             return Ok(None);
         }
-        let line = Line {
+        let line = AnalysisLine {
             analysis: name.to_owned(),
             result: serde_json::to_value(&result).map_err(io::Error::other)?,
         };
         self.file.append(&line)?;
         self.file.sync()?;
-        // The value as it would be read back; one with numbers that JSON does not have is computed again
-        // when the study is resumed.
+        // The value as read back from JSON; a result with numbers that JSON cannot represent is computed again when the
+        // study is resumed.
         Ok(Some(serde_json::from_value(line.result).unwrap_or(result)))
     }
 }

@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all: written under a temporary name, made durable, renamed.
+//! Atomic writing of files: written under a temporary name, made durable, renamed.
 
 use super::system::{self, Writer};
 use super::work_folder::fresh_name;
@@ -6,13 +6,13 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Bytes that are collected before they are written.
+/// Size of the write buffer, bytes.
 const BUFFER: usize = 1 << 16;
 
-/// Writes `contents` to `path`; a reader sees the old file or the new one, never a part.
+/// Writes `contents` to `path` atomically: a reader gets the complete old or the complete new file.
 ///
 /// # Errors
-/// What the file system says; the old file is then unchanged.
+/// Errors of the file system; the old file is then unchanged.
 pub fn write_whole(path: &Path, contents: &str) -> io::Result<()> {
     write_together(&[(path, contents)])
 }
@@ -20,8 +20,8 @@ pub fn write_whole(path: &Path, contents: &str) -> io::Result<()> {
 /// Writes files that belong together: none of them appears before all are durable.
 ///
 /// # Errors
-/// What the file system says. The older files are then in their places, or, where that cannot be restored either,
-/// some of the new ones.
+/// Errors of the file system. The older files are then restored or, if that fails as well, some are replaced by new
+/// ones.
 pub fn write_together(files: &[(&Path, &str)]) -> io::Result<()> {
     let files = files.iter().map(|(path, contents)| {
         system::create_folders(folder_of(path))?;
@@ -44,7 +44,7 @@ pub fn write_together(files: &[(&Path, &str)]) -> io::Result<()> {
         let _ = match (&result, old) {
             (Ok(()), Some(old)) => system::remove_file(old),
             (Err(_), Some(old)) => system::rename(old, path),
-            // Where this is the file that did not come, nothing is there.
+            // Removes a new file that had no predecessor.
             (Err(_), None) => system::remove_file(path),
             (Ok(()), None) => Ok(()),
         };
@@ -53,7 +53,7 @@ pub fn write_together(files: &[(&Path, &str)]) -> io::Result<()> {
     result
 }
 
-/// A second name for the file at `path`, under which it outlives its replacement; `None` where there is no file.
+/// Creates a second name for the file at `path`, which survives its replacement; `None` if there is no file.
 fn second_name(path: &Path) -> io::Result<Option<PathBuf>> {
     if path.symlink_metadata().is_err() {
         return Ok(None);
@@ -63,21 +63,21 @@ fn second_name(path: &Path) -> io::Result<Option<PathBuf>> {
     Ok(Some(old))
 }
 
-/// Creates the file `path`, in the place of an older one, with `contents`, and returns it open for writing at its end.
-/// Its temporary name is in `work_folder`.
+/// Creates the file `path` with `contents`, replacing an older one, and returns it open for appending. Its temporary
+/// name is in `work_folder`.
 ///
 /// # Errors
-/// What the file system says; an older file is then unchanged.
+/// Errors of the file system; an older file is then unchanged.
 pub(super) fn begin_file(work_folder: &Path, path: &Path, contents: &str) -> io::Result<File> {
     let file = Temporary::create_in(work_folder)?;
     system::write_all(&file.file, contents.as_bytes())?;
     file.rename_to(path)
 }
 
-/// Replaces the file `path` by what `write` writes. Its temporary name is in `work_folder`.
+/// Replaces the file `path` by the output of `write`. Its temporary name is in `work_folder`.
 ///
 /// # Errors
-/// What the file system says, or `write`; an older file is then unchanged.
+/// Errors of the file system or of `write`; an older file is then unchanged.
 pub(super) fn replace_with(
     work_folder: &Path,
     path: &Path,
@@ -94,7 +94,7 @@ pub(super) fn replace_with(
     Ok(())
 }
 
-/// A file under a temporary name, which is removed when this is dropped.
+/// A file under a temporary name, removed on drop.
 struct Temporary {
     file: File,
     path: PathBuf,
@@ -127,7 +127,7 @@ impl Drop for Temporary {
     }
 }
 
-/// The folder that a file stands in.
+/// The folder of a file.
 pub(super) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,

@@ -1,11 +1,11 @@
-//! What a command will write into its output folder, stated before its work begins.
+//! Declaration of the files that a command may write into its output folder, made before its work begins.
 
 use std::path::PathBuf;
 
-/// The result document of a fit, without which a folder holds no run.
+/// Name of the result document of a fit.
 pub const RESULT: &str = "result.json";
 
-/// The names that a command may write in an output folder, and the files that it reads.
+/// Names of the files that a command may write in an output folder, and the files that it reads.
 #[derive(Debug, Clone)]
 pub struct Claim {
     pub(super) command: &'static str,
@@ -24,7 +24,7 @@ pub(super) struct Family {
 }
 
 impl Family {
-    /// Whether a file name belongs to the family.
+    /// True if a file name belongs to the family.
     pub fn covers(&self, file_name: &str) -> bool {
         let Some((stem, extension)) = file_name.rsplit_once('.') else {
             return false;
@@ -38,7 +38,7 @@ impl Family {
 }
 
 impl Claim {
-    /// A claim of `command` on no files.
+    /// A claim of `command` without files.
     pub fn new(command: &'static str) -> Self {
         Self {
             command,
@@ -91,7 +91,7 @@ impl Claim {
         self.files.iter().map(String::as_str)
     }
 
-    /// Whether the command may write a file of this relative path.
+    /// True if the command may write a file of this relative path.
     pub fn covers(&self, name: &str) -> bool {
         let in_family = |family: &Family| {
             name.strip_prefix(family.folder)

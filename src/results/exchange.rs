@@ -1,15 +1,15 @@
-//! The exchange of an older run's files for new ones, of which one is whole at every instant.
+//! Atomic exchange of the files of an older run for new ones: at every instant one of the two runs is complete.
 //!
-//! 1. All new files are written into a working folder and made durable ([`Stage`]), with a plan of what replaces
-//!    what. Until here the older run is untouched.
+//! 1. All new files are written into a working folder and made durable ([`Stage`]), with a plan of what replaces what.
+//!    The older run is unchanged so far.
 //! 2. The working folder is renamed to `.kmcfit-exchange`. From this instant the new run is the valid one.
-//! 3. The files move into their places one by one, the replaced ones into the exchange folder. If a move
-//!    fails, the moves before it are undone, and the older run is whole again.
+//! 3. The files move into their places one by one, the replaced ones into the exchange folder. If a move fails, the
+//!    moves before it are undone, which restores the older run.
 //! 4. The exchange folder is removed.
 //!
 //! A process that is killed in step 3 leaves the exchange folder with its plan; the next command that opens the output
-//! folder, to write or to read, completes the exchange ([`complete`]). Files are identified by digest throughout: a
-//! file that neither run wrote is never moved.
+//! folder, to write or to read, completes the exchange ([`complete`]). Files are identified by digest: a file that
+//! neither run wrote is never moved.
 
 use super::atomic::folder_of;
 use super::claim::{Claim, RESULT};
@@ -19,7 +19,7 @@ use super::system;
 use super::work_folder::{EXCHANGE, WorkFolder, is_marked};
 use crate::digest::digest;
 use crate::error::InputError;
-use crate::input::read_text;
+use crate::text_io::read_text;
 use kmcfit_core::internals::threads;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -27,23 +27,23 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// In a working folder: the new files, those that they replaced, and the plan.
+/// Names in a working folder: new files, replaced files, and the plan.
 const NEW: &str = "new";
 const OLD: &str = "old";
 const PLAN: &str = "plan.json";
-/// Longest plan that is read, bytes: as long as the longest manifest.
+/// Longest plan, bytes: as long as the longest manifest.
 const LONGEST_PLAN: u64 = 1 << 24;
-/// Files that are made durable at once: each takes a thread and is open until then. A disk makes many durable in little
-/// more time than one.
+/// Number of files that are made durable at the same time: each needs a thread and a file descriptor. A disk makes many
+/// files durable in little more time than one.
 const AT_ONCE: usize = 16;
 
-/// Results on their way: written to a working folder, and put into their places together.
+/// Results in a working folder, moved into the output folder together.
 #[derive(Debug)]
 pub struct Stage<'a> {
     folder: &'a Path,
     claim: &'a Claim,
     work: WorkFolder,
-    /// In the order in which they were added.
+    /// Names of the files, in the order of addition.
     names: Vec<String>,
     records: BTreeMap<String, FileRecord>,
     unsynced: Vec<File>,
@@ -61,10 +61,10 @@ impl<'a> Stage<'a> {
         })
     }
 
-    /// Adds a file. It appears with the others when they are committed.
+    /// Adds a file, which appears with the others on commit.
     ///
     /// # Errors
-    /// What the file system says.
+    /// Errors of the file system.
     pub fn write(&mut self, name: &str, contents: &str) -> io::Result<()> {
         debug_assert!(self.claim.covers(name), "{name} was not claimed");
         self.add(name, contents)?;
@@ -86,12 +86,12 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Makes the files durable that were added since the last time.
+    /// Makes the files durable that were added since the last call.
     fn sync(&mut self) -> io::Result<()> {
         let files = std::mem::take(&mut self.unsynced);
         std::thread::scope(|scope| {
             let syncs = files.iter().map(|file| {
-                // Without a thread to spare it only takes longer.
+                // Without a free thread the file is synchronised here.
                 threads::spawn_scoped(scope, || system::sync(file)).map_err(|_| system::sync(file))
             });
             let syncs: Vec<_> = syncs.collect();
@@ -103,12 +103,12 @@ impl<'a> Stage<'a> {
         })
     }
 
-    /// Puts the files into their places, in the order in which they were added, those of an older run of the same
-    /// command aside, and writes the manifest.
+    /// Moves the files into the output folder in the order of addition, moves those of an older run of the same command
+    /// aside, and writes the manifest.
     ///
     /// # Errors
-    /// What the file system says, or that a file in a new one's place is not the program's own. The older files
-    /// are then in their places, or the error says where the new ones are.
+    /// Errors of the file system, or a file in the way that kmcfit did not write. The older files are then in place, or
+    /// the error names the folder of the new ones.
     pub fn commit(mut self) -> io::Result<()> {
         let refused = |error: InputError| io::Error::other(error.to_string());
         let before = Manifest::read(self.folder).map_err(refused)?;
@@ -130,14 +130,14 @@ impl<'a> Stage<'a> {
         run(self.folder, &exchange, &plan)
     }
 
-    /// What replaces what, checked against what stands in the folder now.
+    /// The plan of the exchange, checked against the files in the folder.
     fn plan(&self, before: Option<&Manifest>, manifest: &Manifest) -> io::Result<Plan> {
         let mut put = Vec::new();
         for name in &self.names {
             let path = self.folder.join(name);
             let known = before.and_then(|before| before.files.get(name));
             let known = match name == MANIFEST {
-                // It was read and found sound.
+                // The manifest was read and verified.
                 true if before.is_some() => Some(FileRecord::of(&std::fs::read(&path)?)),
                 _ => known.cloned(),
             };
@@ -156,7 +156,7 @@ impl<'a> Stage<'a> {
                 replaces: known.filter(|_| state == Some(FileState::Unchanged)),
             });
         }
-        // The result document comes after what it speaks of.
+        // The result document follows the files that it describes.
         put.sort_by_key(|put| (put.name == MANIFEST, put.name == RESULT));
         let old = before.map(|before| &before.files).into_iter().flatten();
         let remove = old.filter(|(name, _)| !manifest.files.contains_key(*name));
@@ -172,7 +172,7 @@ fn in_the_way(path: &Path) -> io::Error {
     ))
 }
 
-/// What an exchange does.
+/// Plan of an exchange.
 #[derive(Debug, Serialize, Deserialize)]
 struct Plan {
     put: Vec<Put>,
@@ -190,7 +190,7 @@ struct Put {
 }
 
 impl Put {
-    /// Whether a file stands at `place` which is not the replaced one.
+    /// True if the file at `place` is not the replaced one.
     fn is_done(&self, place: &Path) -> bool {
         let is_old = |old: &FileRecord| old.state(place) == FileState::Unchanged;
         let has_old = self.replaces.as_ref().is_some_and(is_old);
@@ -222,7 +222,7 @@ impl Plan {
         folders.collect::<BTreeSet<_>>().into_iter()
     }
 
-    /// The first new file that stands neither in the exchange folder `new` with its contents nor in its place.
+    /// The first new file that is neither in the exchange folder `new` nor in its place with its recorded contents.
     fn damaged(&self, folder: &Path, new: &Path) -> Option<&str> {
         let is_damaged = |put: &&Put| match put.record.state(&new.join(&put.name)) {
             FileState::Unchanged => false,
@@ -262,7 +262,7 @@ fn run(folder: &Path, exchange: &Path, plan: &Plan) -> io::Result<()> {
     let Err(error) = result else {
         plan.folders()
             .for_each(|name| system::sync_folder(&folder.join(name)));
-        // What is left of the exchange folder is removed now, or by the next run.
+        // The next run removes the exchange folder if this fails.
         let _ = WorkFolder::reclaim(exchange);
         return Ok(());
     };
@@ -281,16 +281,16 @@ fn run(folder: &Path, exchange: &Path, plan: &Plan) -> io::Result<()> {
     })
 }
 
-/// A file that was moved.
+/// A completed move.
 struct Move {
     name: String,
-    /// Whether a new file came.
+    /// True if a new file was put in place.
     came: bool,
-    /// Whether an old one went.
+    /// True if an old file was moved aside.
     went: bool,
 }
 
-/// The places between which files move.
+/// Folders between which files move.
 struct Moves<'a> {
     folder: &'a Path,
     new: PathBuf,
@@ -298,7 +298,7 @@ struct Moves<'a> {
 }
 
 impl Moves<'_> {
-    /// Puts a new file into its place; nothing if that was done before.
+    /// Moves a new file into its place; `None` if that was done before.
     fn put(&self, put: &Put) -> io::Result<Option<Move>> {
         let (new, place) = (self.new.join(&put.name), self.folder.join(&put.name));
         if new.symlink_metadata().is_err() {
@@ -329,16 +329,16 @@ impl Moves<'_> {
         }))
     }
 
-    /// Gives an old file a second name, so that its own stays taken until the new file replaces it in one step; or,
-    /// where the file system has no such links, moves it away.
+    /// Gives an old file a second name, so that the new file replaces it in one step; moves it away if the file system
+    /// has no hard links.
     fn set_aside(&self, place: &Path, old: &Path) -> io::Result<()> {
         system::create_folders(folder_of(old))?;
-        // Left by an exchange that was cut short, with the same contents.
+        // Left by an interrupted exchange, with the same contents.
         system::remove_file(old)?;
         system::hard_link(place, old).or_else(|_| system::rename(place, old))
     }
 
-    /// Removes a file of the older run; one that was changed is no longer the program's own and stays.
+    /// Removes a file of the older run, unless it was changed since.
     fn remove(&self, name: &str, record: &FileRecord) -> io::Result<Option<Move>> {
         let (place, old) = (self.folder.join(name), self.old.join(name));
         if record.state(&place) != FileState::Unchanged {
@@ -377,8 +377,7 @@ impl Moves<'_> {
     }
 }
 
-/// Completes an exchange that was cut short in a folder which is only read. While another run holds the folder,
-/// completing it is that run's work.
+/// Completes an interrupted exchange in a folder that is read. A run that has locked the folder completes it itself.
 ///
 /// # Errors
 /// If it cannot be completed.

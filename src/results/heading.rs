@@ -1,4 +1,4 @@
-//! The first line of a journal: which command with which inputs the work belongs to.
+//! Heading of a journal, its first line: the command and its inputs with digests.
 
 use crate::config::ModelFile;
 use crate::digest::{digest, digest_of_file};
@@ -10,23 +10,23 @@ use std::path::{Path, PathBuf};
 /// Version of the format of journals.
 const FORMAT: u32 = 2;
 
-/// Which work a journal holds. It is resumed by the same version of kmcfit with the same inputs only.
+/// Identity of the work in a journal. Only the same version of kmcfit with the same inputs resumes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Heading {
     /// Version of the format.
     pub format: u32,
-    /// Version of kmcfit: another one may compute other bits.
+    /// Version of kmcfit; results of other versions can differ in the last bits.
     pub version: String,
     /// The command: `fit`, `study` or `compare`.
     pub command: String,
-    /// Model files and folders of runs, as they were given.
+    /// Model files and folders of runs, as given on the command line.
     pub inputs: Vec<PathBuf>,
-    /// Values that were given beside the model (`--set`).
+    /// Overrides (`--set`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub overrides: Vec<String>,
-    /// Whether figures are drawn.
+    /// True if figures are drawn.
     pub figures: bool,
-    /// Least time between two checkpoints, s, where it was given.
+    /// Least time between two checkpoints, s, if given.
     pub checkpoint: Option<f64>,
     /// The inputs and the files that they read.
     pub sources: Vec<SourceFile>,
@@ -37,7 +37,7 @@ pub struct Heading {
 pub struct SourceFile {
     /// The file.
     pub file: PathBuf,
-    /// Its SHA-256 digest, or why there is none.
+    /// Its SHA-256 digest, or the reason for its absence.
     pub sha256: String,
 }
 
@@ -104,7 +104,7 @@ impl Heading {
         }
     }
 
-    /// Refuses to resume work that was begun with something else than this.
+    /// Refuses to resume work that was begun with other inputs, settings or another version.
     ///
     /// # Errors
     /// If version, values or files differ.
@@ -149,7 +149,7 @@ impl Heading {
         }
     }
 
-    /// Whether another heading names the same inputs, in the same order.
+    /// True if another heading names the same inputs, in the same order.
     pub(super) fn has_inputs_of(&self, other: &Self) -> bool {
         let place = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
         self.inputs

@@ -1,16 +1,16 @@
 //! The format of all journals: text files to which lines are appended while a command works.
 //!
 //! A line is a JSON value, a tab, and 16 hexadecimal digits: the chained checksum, the first 8 bytes of
-//! `SHA-256(previous checksum || JSON)`. The first line holds the [`Heading`]. A line whose checksum is wrong was cut off,
-//! edited, moved or taken from another journal: it ends what is read, and the work that it and the lines
-//! after it stand for is done again.
+//! `SHA-256(previous checksum || JSON)`. The first line holds the [`Heading`]. A line with a wrong checksum was
+//! truncated, edited, moved or taken from another journal: reading stops before it, and the work of this and all
+//! following lines is repeated.
 
 use super::atomic::begin_file;
 use super::heading::Heading;
 use super::system::{self, Writer};
 use super::work_folder::WorkFolder;
 use crate::error::InputError;
-use crate::input::{open, read_bytes};
+use crate::text_io::{open, read_bytes};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
@@ -26,28 +26,28 @@ pub const CHECKPOINT: &str = "fit.checkpoint";
 pub const STUDY_JOURNAL: &str = "study.journal";
 /// Name of the journal of a comparison.
 pub const COMPARE_JOURNAL: &str = "compare.journal";
-/// The journals and checkpoints that can stand in an output folder.
+/// All journals and checkpoints of output folders.
 pub(super) const NAMES: [&str; 4] = [FIT_JOURNAL, CHECKPOINT, STUDY_JOURNAL, COMPARE_JOURNAL];
-/// Longest journal that is read, bytes: what the program wrote it must read, so memory alone limits it.
+/// Longest journal, bytes: limited by memory alone, since every written journal must be readable.
 const LONGEST: u64 = u64::MAX;
-/// Longest first line of a journal, bytes: the files of 2000 records have paths and digests in it.
+/// Longest first line of a journal, bytes: room for the paths and digests of 2000 records.
 const LONGEST_HEADING: u64 = 1 << 24;
-/// Bytes that are collected before they are written.
+/// Size of the write buffer, bytes.
 const BUFFER: usize = 1 << 16;
 /// Digits of a checksum at the end of a line, with the tab before them.
 const TAIL: usize = 17;
 
-/// A place between two lines: the bytes before it, and the checksum of the line that ends there.
+/// Position between two lines: the number of bytes before it, and the checksum of the line that ends there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Mark {
+pub(super) struct JournalPosition {
     pub bytes: u64,
     chain: u64,
 }
 
 /// The checksum of a line from that of the line before and its JSON.
-struct Chain(Sha256);
+struct ChainedChecksum(Sha256);
 
-impl Chain {
+impl ChainedChecksum {
     fn after(previous: u64) -> Self {
         Self(Sha256::new().chain_update(previous.to_be_bytes()))
     }
@@ -60,19 +60,19 @@ impl Chain {
     }
 }
 
-/// Appends a line to a text; the place behind it.
+/// Appends a line to a text; returns the position after it.
 pub(super) fn push_line(
     text: &mut Vec<u8>,
-    mark: Mark,
+    mark: JournalPosition,
     entry: &impl Serialize,
-) -> io::Result<Mark> {
+) -> io::Result<JournalPosition> {
     write_line(text, mark, entry)
 }
 
-/// A writer that takes the checksum of what passes.
+/// A writer that computes the checksum of its output.
 struct Summing<W> {
     inner: W,
-    chain: Chain,
+    chain: ChainedChecksum,
     bytes: u64,
 }
 
@@ -89,11 +89,15 @@ impl<W: Write> Write for Summing<W> {
     }
 }
 
-/// Writes a line piece by piece: as a text a long one would take a multiple of the memory of a fit.
-pub(super) fn write_line(out: impl Write, mark: Mark, entry: &impl Serialize) -> io::Result<Mark> {
+/// Writes a line as a stream: in memory a long one would take a multiple of the memory of a fit.
+pub(super) fn write_line(
+    out: impl Write,
+    mark: JournalPosition,
+    entry: &impl Serialize,
+) -> io::Result<JournalPosition> {
     let mut summing = Summing {
         inner: out,
-        chain: Chain::after(mark.chain),
+        chain: ChainedChecksum::after(mark.chain),
         bytes: 0,
     };
     serde_json::to_writer(&mut summing, entry)?;
@@ -105,39 +109,39 @@ pub(super) fn write_line(out: impl Write, mark: Mark, entry: &impl Serialize) ->
     let chain = chain.finish();
     inner.write_all(format!("\t{chain:016x}\n").as_bytes())?;
     inner.flush()?;
-    Ok(Mark {
+    Ok(JournalPosition {
         bytes: mark.bytes + bytes + TAIL as u64 + 1,
         chain,
     })
 }
 
-/// The JSON of a line whose checksum is right, and the place behind it; `None` for any other line.
-fn checked(line: &[u8], mark: Mark) -> Option<(&[u8], Mark)> {
+/// The JSON of a line with a correct checksum, and the position after it; `None` for any other line.
+fn checked(line: &[u8], mark: JournalPosition) -> Option<(&[u8], JournalPosition)> {
     let text = line.strip_suffix(b"\n")?;
     let (json, tail) = text.split_at_checked(text.len().checked_sub(TAIL)?)?;
     let digits = std::str::from_utf8(tail.strip_prefix(b"\t")?).ok()?;
-    let mut chain = Chain::after(mark.chain);
+    let mut chain = ChainedChecksum::after(mark.chain);
     chain.0.update(json);
     let chain = chain.finish();
-    let mark = Mark {
+    let mark = JournalPosition {
         bytes: mark.bytes + line.len() as u64,
         chain,
     };
-    // As text: other spellings of the same number were not written by the program.
+    // Compared as text: the program writes a number in one form only.
     (format!("{chain:016x}") == digits).then_some((json, mark))
 }
 
-/// The heading of a journal or checkpoint; `None` for a file without the heading of a journal and its checksum, which
-/// kmcfit did not write.
+/// The heading of a journal or checkpoint; `None` for a file that kmcfit did not write, without a heading and its
+/// checksum.
 pub(super) fn heading_of(path: &Path) -> Option<Heading> {
     let (file, _) = open(path, "a journal").ok()?;
     let line = first_line(file).ok()?;
-    let (json, _) = checked(&line, Mark::default())?;
+    let (json, _) = checked(&line, JournalPosition::default())?;
     let heading: Heading = serde_json::from_slice(json).ok()?;
     (!path.is_symlink()).then_some(heading)
 }
 
-/// The first line of a file, as far as a heading may be long.
+/// The first line of a file, up to the longest heading.
 fn first_line(file: File) -> io::Result<Vec<u8>> {
     let mut line = Vec::new();
     let file = BufReader::new(file);
@@ -145,26 +149,26 @@ fn first_line(file: File) -> io::Result<Vec<u8>> {
     Ok(line)
 }
 
-/// A journal at work. Lines are appended and never changed.
+/// An open journal. Lines are appended and never changed.
 #[derive(Debug)]
 pub(super) struct JournalFile {
     file: File,
-    /// The end of what was written.
-    pub end: Mark,
+    /// End of the written lines.
+    pub end: JournalPosition,
 }
 
 impl JournalFile {
-    /// A new journal, in the place of an older one.
+    /// Creates a journal; replaces an older one.
     pub fn begin(work: &WorkFolder, path: &Path, heading: &Heading) -> io::Result<Self> {
         let mut text = Vec::new();
-        let end = push_line(&mut text, Mark::default(), heading)?;
+        let end = push_line(&mut text, JournalPosition::default(), heading)?;
         let text = String::from_utf8(text).map_err(io::Error::other)?;
         let file = begin_file(work.path(), path, &text)?;
         Ok(Self { file, end })
     }
 
-    /// A journal that was read as far as `end`; the rest is dropped.
-    pub fn resume(path: &Path, end: Mark) -> Result<Self, InputError> {
+    /// Opens a journal for appending at `end`; discards the rest.
+    pub fn resume(path: &Path, end: JournalPosition) -> Result<Self, InputError> {
         let resumed = system::open_to_append(path).and_then(|file| {
             let mut journal = Self { file, end };
             journal.truncate(end)?;
@@ -175,15 +179,15 @@ impl JournalFile {
         })
     }
 
-    /// Drops what stands behind a place.
-    pub fn truncate(&mut self, end: Mark) -> io::Result<()> {
+    /// Truncates the file at a position.
+    pub fn truncate(&mut self, end: JournalPosition) -> io::Result<()> {
         system::truncate(&self.file, end.bytes)?;
         self.end = end;
         Ok(())
     }
 
-    /// Appends lines that were made by [`push_line`] behind the end.
-    pub fn append_text(&mut self, text: &[u8], end: Mark) -> io::Result<()> {
+    /// Appends lines made by [`push_line`].
+    pub fn append_text(&mut self, text: &[u8], end: JournalPosition) -> io::Result<()> {
         system::write_all(&self.file, text)?;
         self.end = end;
         Ok(())
@@ -196,23 +200,23 @@ impl JournalFile {
         Ok(())
     }
 
-    /// Makes what was written durable.
+    /// Makes the written lines durable.
     pub fn sync(&self) -> io::Result<()> {
         system::sync(&self.file)
     }
 }
 
-/// A journal that was read.
+/// A journal in memory.
 pub(super) struct JournalText {
     bytes: Vec<u8>,
     /// The first line.
     pub heading: Heading,
     /// The end of the first line.
-    pub begin: Mark,
+    pub begin: JournalPosition,
 }
 
 impl JournalText {
-    /// Reads a journal or checkpoint; `what` says what it should be.
+    /// Reads a journal or checkpoint; `what` describes it in messages.
     ///
     /// # Errors
     /// If there is none of this format.
@@ -220,17 +224,17 @@ impl JournalText {
         if path.is_symlink() {
             return Err(InputError::file(path, "this is a symbolic link").expected(what));
         }
-        // Of a file that is no journal nothing more is read.
+        // A file that is not a journal is not read beyond its first line.
         let (file, _) = open(path, what)?;
         let line = first_line(file)
             .map_err(|error| InputError::file(path, "the file cannot be read").found(error))?;
         let line = line.as_slice();
-        // The version of the format comes first: another one may have another kind of line.
+        // The version of the format is checked first, because the form of the lines depends on it.
         let json = line.split(|b| matches!(b, b'\t' | b'\n')).next();
         let value: serde_json::Value = serde_json::from_slice(json.unwrap_or_default())
             .map_err(|error| no_journal(path, what).found(error))?;
         Heading::check_format(&value, path)?;
-        let (_, begin) = checked(line, Mark::default())
+        let (_, begin) = checked(line, JournalPosition::default())
             .ok_or_else(|| no_journal(path, what).found("a first line with a wrong checksum"))?;
         let heading =
             serde_json::from_value(value).map_err(|error| no_journal(path, what).found(error))?;
@@ -241,8 +245,8 @@ impl JournalText {
         })
     }
 
-    /// The lines behind the heading up to the first that is damaged, each with the place behind it.
-    pub fn lines<T: DeserializeOwned>(&self) -> impl Iterator<Item = (T, Mark)> {
+    /// The lines after the heading up to the first damaged one, each with the position after it.
+    pub fn lines<T: DeserializeOwned>(&self) -> impl Iterator<Item = (T, JournalPosition)> {
         let start = usize::try_from(self.begin.bytes).unwrap_or(usize::MAX);
         let mut rest = self.bytes.get(start..).unwrap_or_default();
         let mut mark = self.begin;
@@ -261,15 +265,14 @@ fn no_journal(path: &Path, what: &str) -> InputError {
     InputError::file(path, "not a journal of kmcfit, or it was edited").expected(what)
 }
 
-/// The lines of a text, each a JSON value, with the checksums that they have behind the heading of a journal: for
-/// tests that change what a journal holds.
+/// A journal text from a heading and lines of JSON, with checksums; for tests that change the contents of a journal.
 #[doc(hidden)]
 pub fn with_checksums(heading: &Heading, lines: &[u8]) -> io::Result<Vec<u8>> {
     let mut text = Vec::new();
-    let mut mark = push_line(&mut text, Mark::default(), heading)?;
+    let mut mark = push_line(&mut text, JournalPosition::default(), heading)?;
     for json in lines.split_inclusive(|b| *b == b'\n') {
         let json = json.strip_suffix(b"\n").unwrap_or(json);
-        let mut chain = Chain::after(mark.chain);
+        let mut chain = ChainedChecksum::after(mark.chain);
         chain.0.update(json);
         mark.chain = chain.finish();
         text.extend(json);

@@ -1,13 +1,13 @@
-//! A lock on an output folder: one run at a time.
+//! Lock on an output folder, held by one run at a time.
 
 use super::system;
 use std::fs::{File, TryLockError};
 use std::path::Path;
 
-/// The file that is locked where a folder cannot be.
+/// File that is locked on systems without locks on folders.
 const LOCK: &str = ".kmcfit.lock";
 
-/// The lock. The operating system releases it when the process ends, so a killed run blocks no other.
+/// The lock. The operating system releases it when the process ends, so a killed run does not block others.
 #[derive(Debug)]
 pub(super) struct Lock {
     held: File,
@@ -26,8 +26,8 @@ impl Drop for Lock {
 pub(super) struct Taken;
 
 impl Lock {
-    /// Locks a folder, or a file in it where the system locks no folders. `None` where the file system
-    /// has no locks: runs are possible there too.
+    /// Locks a folder, or a file in it on systems without locks on folders. `None` on a file system without locks,
+    /// where runs are possible unlocked.
     pub fn take(folder: &Path) -> Result<Option<Self>, Taken> {
         let on_folder = File::open(folder).ok().map(locked);
         match on_folder {
@@ -38,7 +38,7 @@ impl Lock {
     }
 
     fn by_file(path: &Path) -> Result<Option<Self>, Taken> {
-        // A link in its place could lead anywhere.
+        // A link could lead out of the folder.
         let file = match path.is_symlink() {
             true => None,
             false => system::open_lock(path).ok(),

@@ -1,11 +1,11 @@
-//! The manifest of an output folder: which files in it kmcfit wrote, with their digests.
+//! Manifest of an output folder: the files written by kmcfit, with their digests.
 //!
-//! A file may be replaced or removed only if the manifest names it and its contents still have the digest noted
-//! there. A file that was edited since, or that the manifest does not name, belongs to the user.
+//! A file may be replaced or removed only if the manifest names it and its contents still have the recorded digest. A
+//! file that was edited since, or that the manifest does not name, belongs to the user.
 
 use crate::digest::{digest, digest_of_file};
 use crate::error::InputError;
-use crate::input::read_text;
+use crate::text_io::read_text;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Component, Path};
@@ -14,10 +14,10 @@ use std::path::{Component, Path};
 pub const MANIFEST: &str = "kmcfit-manifest.json";
 /// Version of its format.
 const FORMAT: u32 = 1;
-/// Longest manifest that is read, bytes: an entry takes some 150, and a run of 2000 records has 10,000 files.
+/// Longest manifest, bytes: an entry takes some 150, and a run of 2000 records has 10,000 files.
 const LONGEST: u64 = 1 << 24;
 
-/// The files of a folder that one command of kmcfit wrote.
+/// Files of a folder that one command of kmcfit wrote.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Manifest {
     format: u32,
@@ -25,13 +25,13 @@ pub struct Manifest {
     pub version: String,
     /// The command that wrote them: `fit`, `study`, ...
     pub command: String,
-    /// Paths relative to the folder, with `/` between their parts, and what each held.
+    /// Records of the files by path relative to the folder, with `/` as separator.
     pub files: BTreeMap<String, FileRecord>,
     /// Digest of all the above.
     checksum: String,
 }
 
-/// What a file held when it was written.
+/// Length and digest of a file when it was written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FileRecord {
     /// Its length.
@@ -55,19 +55,19 @@ const CHANGED: &str = "this file was changed since kmcfit wrote it";
 /// A file whose length or contents cannot be read.
 const UNREADABLE: &str = "this file cannot be read to check that kmcfit wrote it";
 
-/// What stands where the manifest names a file.
+/// State of a file named by the manifest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileState {
     /// Nothing.
     Missing,
-    /// The file with the contents that were recorded.
+    /// The file with the recorded contents.
     Unchanged,
     /// Something else, as a message describes it.
     Other(&'static str),
 }
 
 impl FileRecord {
-    /// What stands at `path`, compared with this record.
+    /// Compares the file at `path` with this record.
     pub fn state(&self, path: &Path) -> FileState {
         match path.symlink_metadata() {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => FileState::Missing,
@@ -110,7 +110,7 @@ impl Manifest {
     /// The manifest in a folder; `None` where there is none.
     ///
     /// # Errors
-    /// If something else stands in its place: then nothing in the folder is known to be the program's own.
+    /// If the file is not a valid manifest; then no file of the folder is attributed to kmcfit.
     pub fn read(folder: &Path) -> Result<Option<Self>, InputError> {
         let path = folder.join(MANIFEST);
         let unknown = |problem: &str| {
@@ -151,7 +151,7 @@ impl Manifest {
     }
 }
 
-/// Whether a relative path has plain parts only, so that it cannot lead out of its folder.
+/// True for a relative path of plain names, which cannot lead out of its folder.
 pub(super) fn stays_inside(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     !name.is_empty() && parts.all(|part| matches!(part, Component::Normal(_)))

@@ -1,7 +1,7 @@
-//! Results on disk: output folders, atomic files, journals.
+//! Results on disk: output folders, atomic writing, manifests, journals.
 //!
-//! Files appear whole or not at all, a run replaces an older one as a whole, and only files that the program can prove
-//! to have written are ever replaced or removed. All changes to the file system pass `system`.
+//! Files and runs are replaced atomically, and only files that the manifest attributes to kmcfit by digest are replaced
+//! or removed. All changes to the file system are made in `system`.
 
 mod analysis_journal;
 mod atomic;

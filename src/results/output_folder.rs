@@ -1,4 +1,4 @@
-//! Output folders: checked before the work begins, written as a whole at its end.
+//! Output folders: checked and locked before the work of a command begins, written atomically at its end.
 
 use super::analysis_journal;
 use super::claim::Claim;
@@ -14,31 +14,31 @@ use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A folder for the results of one command, locked against other runs as long as this lives.
+/// A folder for the results of one command, locked against other runs until drop.
 ///
-/// The folder may hold files of the user, which stay as they are, and the results of an older run of the same
-/// command, which the new results replace ([`Stage::commit`]).
+/// The folder may hold files of the user, which are not changed, and the results of an older run of the same command,
+/// which the new results replace ([`Stage::commit`]).
 #[derive(Debug)]
 pub struct OutputFolder {
     path: PathBuf,
     claim: Claim,
-    /// Whether this run created it.
+    /// True if this run created it.
     is_new: bool,
     _lock: Option<Lock>,
 }
 
 impl Drop for OutputFolder {
-    /// A folder that was created for nothing goes.
+    /// Removes a folder that this run created and left empty.
     fn drop(&mut self) {
         if self.is_new {
-            // Refused where anything stands in it.
+            // The system refuses to remove a folder with contents.
             let _ = system::remove_folder(&self.path);
         }
     }
 }
 
 impl OutputFolder {
-    /// Creates the folder if need be, locks it, completes an exchange that was cut short, and checks that the files of
+    /// Creates the folder if necessary, locks it, completes an interrupted exchange, and checks that the files of
     /// `claim` can be written.
     ///
     /// # Errors
@@ -57,7 +57,7 @@ impl OutputFolder {
             match e.kind() {
                 // The text names the file in the way.
                 io::ErrorKind::Other => error.found(e),
-                // The system's text for a file system that is kept by the kernel, as /proc is.
+                // Error of virtual file systems such as /proc.
                 io::ErrorKind::NotFound => {
                     error.found(format!("{} takes no new folders", existing(path).display()))
                 }
@@ -86,7 +86,8 @@ impl OutputFolder {
         Ok(folder)
     }
 
-    /// [`OutputFolder::prepare`] for a folder inside this one. A link in its place is refused: it could lead out.
+    /// [`OutputFolder::prepare`] for a folder inside this one. A symbolic link is refused, because it could lead out of
+    /// the folder.
     ///
     /// # Errors
     /// As for [`OutputFolder::prepare`].
@@ -98,12 +99,12 @@ impl OutputFolder {
         }
     }
 
-    /// Where it is.
+    /// Its path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The folders that exist already and into which results are put.
+    /// Existing folders that results are written into.
     fn folders(&self, manifest: Option<&Manifest>) -> BTreeSet<PathBuf> {
         let old = manifest
             .into_iter()
@@ -120,10 +121,10 @@ impl OutputFolder {
         folders.filter(|folder| folder.is_dir()).collect()
     }
 
-    /// Whether beginning the work of `heading` discards unfinished work of the same command on the same inputs.
+    /// True if starting the work of `heading` discards unfinished work of the same command on the same inputs.
     ///
     /// # Errors
-    /// If the unfinished work has other inputs: it is not discarded.
+    /// If the unfinished work has other inputs; it is kept.
     pub fn discards(&self, heading: &Heading) -> Result<bool, InputError> {
         let mut is_discarded = false;
         for name in journal::NAMES {
@@ -131,7 +132,7 @@ impl OutputFolder {
             let Some(before) = journal::heading_of(&path) else {
                 continue;
             };
-            // Studies and comparisons keep their journals beside their results.
+            // The journals of studies and comparisons are kept beside their results.
             if analysis_journal::is_finished(&path) {
                 continue;
             }
@@ -157,12 +158,12 @@ impl OutputFolder {
     /// Begins to write results.
     ///
     /// # Errors
-    /// What the file system says.
+    /// Errors of the file system.
     pub fn stage(&self) -> io::Result<Stage<'_>> {
         Stage::begin(&self.path, &self.claim)
     }
 
-    /// A folder holds the results of one command.
+    /// Refuses a folder with the results of another command.
     fn check_command(&self, manifest: Option<&Manifest>) -> Result<(), InputError> {
         match manifest {
             Some(manifest) if manifest.command != self.claim.command => Err(InputError::argument(
@@ -182,7 +183,7 @@ impl OutputFolder {
         }
     }
 
-    /// Whether a relative path is one that the command may write or remove.
+    /// True if the command may write or remove a file of this relative path.
     fn is_claimed(&self, name: &str, manifest: Option<&Manifest>) -> bool {
         self.claim.covers(name)
             || name == MANIFEST
@@ -190,7 +191,7 @@ impl OutputFolder {
             || manifest.is_some_and(|manifest| manifest.files.contains_key(name))
     }
 
-    /// No input may be replaced.
+    /// Refuses to replace an input.
     fn check_inputs(&self, manifest: Option<&Manifest>) -> Result<(), InputError> {
         let Ok(folder) = self.path.canonicalize() else {
             return Ok(());
@@ -215,7 +216,7 @@ impl OutputFolder {
         Ok(())
     }
 
-    /// Every file that may be written is missing so far, or the program's own.
+    /// Refuses to replace a file that kmcfit did not write.
     fn check_places(&self, manifest: Option<&Manifest>) -> Result<(), InputError> {
         if let Some(manifest) = manifest {
             for (name, record) in &manifest.files {
@@ -249,7 +250,7 @@ impl OutputFolder {
         Ok(())
     }
 
-    /// The folders above a relative path are folders, or missing.
+    /// Refuses a relative path whose parents are not folders.
     fn check_parent(&self, name: &str) -> Result<(), InputError> {
         for (end, _) in name.match_indices('/') {
             let folder = self.path.join(&name[..end]);
@@ -275,7 +276,7 @@ impl OutputFolder {
         }
     }
 
-    /// A journal may be begun anew where an older one of the same command stands.
+    /// Refuses to replace a file that is not a journal of the same command.
     fn check_journals(&self) -> Result<(), InputError> {
         for name in journal::NAMES {
             let path = self.path.join(name);

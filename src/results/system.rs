@@ -1,6 +1,6 @@
-//! The operations on files that change something: the only place that calls the file system to write.
+//! All operations that change the file system.
 //!
-//! Each passes [`faults::check`], so that the tests can make any of them fail.
+//! Each calls [`faults::check`], so that tests can make any of them fail.
 
 #![allow(clippy::disallowed_methods)]
 
@@ -9,7 +9,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Creates a file to append to that must not exist yet; a link in its place counts as existing.
+/// Creates a file for appending; fails if the file or a link of this name exists.
 pub fn create_new(path: &Path) -> io::Result<File> {
     faults::check(Operation::Create)?;
     let mut options = OpenOptions::new();
@@ -22,14 +22,14 @@ pub fn open_to_append(path: &Path) -> io::Result<File> {
     OpenOptions::new().append(true).open(path)
 }
 
-/// Opens a file that serves as a lock, which is created if need be.
+/// Opens a lock file; creates it if necessary.
 pub fn open_lock(path: &Path) -> io::Result<File> {
     faults::check(Operation::Create)?;
     let mut options = OpenOptions::new();
     options.write(true).create(true).truncate(false).open(path)
 }
 
-/// Writes all bytes. An injected fault writes the first half of them, as a disk does that fills up.
+/// Writes all bytes. An injected fault writes the first half, like a full disk.
 pub fn write_all(mut file: &File, bytes: &[u8]) -> io::Result<()> {
     if let Err(fault) = faults::check(Operation::Write) {
         let _ = file.write_all(&bytes[..bytes.len() / 2]);
@@ -38,7 +38,7 @@ pub fn write_all(mut file: &File, bytes: &[u8]) -> io::Result<()> {
     file.write_all(bytes)
 }
 
-/// A file as a writer whose writes are those of [`write_all`].
+/// A file as a writer that calls [`write_all`].
 pub struct Writer<'a>(pub &'a File);
 
 impl Write for Writer<'_> {
@@ -58,8 +58,8 @@ pub fn sync(file: &File) -> io::Result<()> {
     file.sync_data()
 }
 
-/// Makes the names in a folder durable, where the system has such an operation. A file system that cannot do so
-/// still holds the names, so its refusal is no failure.
+/// Makes the names in a folder durable, if the system supports it. Refusals are ignored, because the names exist
+/// regardless.
 pub fn sync_folder(folder: &Path) {
     #[cfg(unix)]
     let _ = faults::check(Operation::Sync)
@@ -87,7 +87,7 @@ pub fn hard_link(from: &Path, to: &Path) -> io::Result<()> {
     fs::hard_link(from, to)
 }
 
-/// Removes a file; one that does not exist is no error.
+/// Removes a file; a missing file is not an error.
 pub fn remove_file(path: &Path) -> io::Result<()> {
     faults::check(Operation::Remove)?;
     match fs::remove_file(path) {
@@ -102,19 +102,19 @@ pub fn remove_folder(path: &Path) -> io::Result<()> {
     fs::remove_dir(path)
 }
 
-/// Removes a folder with all that is in it; links in it are removed, not followed.
+/// Removes a folder with its contents; links are removed, not followed.
 pub fn remove_tree(path: &Path) -> io::Result<()> {
     faults::check(Operation::Remove)?;
     fs::remove_dir_all(path)
 }
 
-/// Creates one folder that must not exist yet.
+/// Creates one folder; fails if it exists.
 pub fn create_folder(path: &Path) -> io::Result<()> {
     faults::check(Operation::Create)?;
     fs::create_dir(path)
 }
 
-/// Creates a folder and those above it; where a file stands in the place of one, the error names it.
+/// Creates a folder and its parents; the error names a file in the way.
 pub fn create_folders(folder: &Path) -> io::Result<()> {
     if folder.is_dir() {
         return Ok(());

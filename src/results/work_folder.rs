@@ -1,9 +1,8 @@
-//! Working folders: where files are prepared before they appear in an output folder.
+//! Working folders, in which files are prepared before they appear in an output folder.
 //!
-//! A working folder stands inside the output folder, on the same file system, so that finished files move out of
-//! it by renaming. Its name begins with `.kmcfit-` and it holds a marker, by which a later run recognises and
-//! removes what a killed run left behind. A folder of such a name without the marker belongs to somebody else and
-//! is left as it is.
+//! A working folder is inside the output folder, on the same file system, so that finished files are moved by renaming.
+//! Its name begins with `.kmcfit-` and it contains a marker file, by which a later run recognises and removes the
+//! working folder of a killed run. A folder of such a name without the marker is not changed.
 
 use super::system;
 use std::io;
@@ -12,21 +11,21 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Beginning of the names of working folders and of temporary files.
 const PREFIX: &str = ".kmcfit-";
-/// Name of the folder of an exchange at work: a working folder that is more than a leftover.
+/// Name of the working folder of a running or interrupted exchange.
 pub(super) const EXCHANGE: &str = ".kmcfit-exchange";
 /// Name of the marker in a working folder, and its content.
 const MARKER: &str = "kmcfit-working-folder";
 const MARKER_TEXT: &str =
     "Working folder of kmcfit, left by a run that was killed. The next run removes it.\n";
 
-/// A new name with the prefix that this process has not used before.
+/// A name with the prefix, new in this process.
 pub(super) fn fresh_name() -> String {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
     format!("{PREFIX}{}-{count}", std::process::id())
 }
 
-/// Whether a name has the form of [`fresh_name`].
+/// True for a name of the form of [`fresh_name`].
 fn is_fresh_name(name: &str) -> bool {
     let numbers = name
         .strip_prefix(PREFIX)
@@ -35,7 +34,7 @@ fn is_fresh_name(name: &str) -> bool {
     numbers.is_some_and(|(process, count)| is_number(process) && is_number(count))
 }
 
-/// A folder that is removed with its contents when this is dropped.
+/// A folder that is removed with its contents on drop.
 #[derive(Debug)]
 pub(super) struct WorkFolder {
     path: PathBuf,
@@ -51,7 +50,7 @@ impl WorkFolder {
             let path = parent.join(fresh_name());
             match system::create_folder(&path) {
                 Ok(()) => break path,
-                // Left by an earlier process of the same number.
+                // Left by an earlier process with the same process ID.
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),
             }
@@ -66,7 +65,7 @@ impl WorkFolder {
         &self.path
     }
 
-    /// Gives the folder its final name, after which it is no longer removed.
+    /// Gives the folder its final name; it is then kept.
     ///
     /// # Errors
     /// If it cannot be renamed.
@@ -76,7 +75,7 @@ impl WorkFolder {
         Ok(())
     }
 
-    /// Takes over a folder with a marker that stands at `path`: it becomes a working folder again.
+    /// Renames a folder with a marker at `path` to a new working folder.
     ///
     /// # Errors
     /// If it cannot be renamed.
@@ -90,13 +89,13 @@ impl WorkFolder {
 impl Drop for WorkFolder {
     fn drop(&mut self) {
         if !self.path.as_os_str().is_empty() {
-            // What cannot be removed now is removed by the next run.
+            // The next run removes the folder if this fails.
             let _ = remove(&self.path);
         }
     }
 }
 
-/// Removes a working folder, its marker last: if the process is killed here, the next run recognises the rest.
+/// Removes a working folder, its marker last, so that the next run recognises a partly removed folder.
 fn remove(folder: &Path) -> io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
@@ -110,7 +109,7 @@ fn remove(folder: &Path) -> io::Result<()> {
     system::remove_folder(folder)
 }
 
-/// Removes the working folders that killed runs left in a folder. Failures are ignored: leftovers do no harm.
+/// Removes the working folders of killed runs in a folder. Failures are ignored.
 pub(super) fn remove_leftovers(parent: &Path) {
     let entries = std::fs::read_dir(parent).into_iter().flatten().flatten();
     for entry in entries {
@@ -122,44 +121,44 @@ pub(super) fn remove_leftovers(parent: &Path) {
         }
         let path = entry.path();
         let _ = match contents(&path) {
-            Contents::Nothing => system::remove_folder(&path),
-            Contents::Marked => remove(&path),
-            Contents::Foreign => Ok(()),
+            FolderContents::Nothing => system::remove_folder(&path),
+            FolderContents::Marked => remove(&path),
+            FolderContents::Foreign => Ok(()),
         };
     }
 }
 
-enum Contents {
+enum FolderContents {
     /// The process was killed before it wrote the marker.
     Nothing,
     Marked,
     Foreign,
 }
 
-fn contents(folder: &Path) -> Contents {
+fn contents(folder: &Path) -> FolderContents {
     let Ok(entries) = std::fs::read_dir(folder) else {
-        return Contents::Foreign;
+        return FolderContents::Foreign;
     };
     let count = entries.count();
     if count == 0 {
-        return Contents::Nothing;
+        return FolderContents::Nothing;
     }
     let marker = folder.join(MARKER);
     let text = match marker.is_symlink() {
-        true => return Contents::Foreign,
+        true => return FolderContents::Foreign,
         false => std::fs::read_to_string(&marker),
     };
     match text {
-        Ok(text) if text == MARKER_TEXT => Contents::Marked,
-        // Killed while it wrote the marker.
-        Ok(text) if count == 1 && MARKER_TEXT.starts_with(&text) => Contents::Marked,
-        _ => Contents::Foreign,
+        Ok(text) if text == MARKER_TEXT => FolderContents::Marked,
+        // The process was killed while it wrote the marker.
+        Ok(text) if count == 1 && MARKER_TEXT.starts_with(&text) => FolderContents::Marked,
+        _ => FolderContents::Foreign,
     }
 }
 
-/// Whether a folder holds the marker of a working folder.
+/// True for a folder with the marker of a working folder.
 pub(super) fn is_marked(folder: &Path) -> bool {
-    matches!(contents(folder), Contents::Marked)
+    matches!(contents(folder), FolderContents::Marked)
 }
 
 #[cfg(test)]

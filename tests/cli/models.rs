@@ -497,7 +497,7 @@ fn accelerometer() {
     }
     let channel = &result["experiments"][0]["channels"][0];
     assert_eq!(channel["unit"], "g");
-    assert_eq!(channel["ignored"][0]["readings"], 3);
+    assert_eq!(channel["ignored"][0]["samples"], 3);
     // 1198 readings know their standard deviation to 2 %; three of that.
     let sigma = channel["sigma"].as_f64().expect("a number");
     assert!((sigma - 0.01).abs() < 6e-4, "{sigma}");

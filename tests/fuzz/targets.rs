@@ -3,16 +3,16 @@
 //! over mutations of it; `fuzz/` drives the same functions.
 
 use kmcfit::Run;
-use kmcfit::config::scalar::{Count, Nodes};
+use kmcfit::config::values::{Count, Nodes};
 use kmcfit::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
 use kmcfit::error::InputError;
-use kmcfit::observations::{ColumnName, Table, TableFormat, times};
 use kmcfit::report::study::StudyDocument;
-use kmcfit::report::{FittedModel, Known, fit_claim, json, predict};
+use kmcfit::report::{FittedModel, RunAssessment, fit_claim, json, predict};
 use kmcfit::results::{
     AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, RESULT,
     STUDY_JOURNAL, with_checksums,
 };
+use kmcfit::tables::{ColumnName, Table, TableFormat, times};
 use kmcfit_core::internals::solvers::{Fit, Observer, fit_with_noise_watched};
 use kmcfit_core::internals::system::State;
 use serde::Serialize;
@@ -141,13 +141,13 @@ fn finish(workshop: &Workshop) {
     let (heading, model) = &workshop.fits[0];
     let mut journal = FitJournal::begin(&workshop.path("fit"), heading).expect("room");
     let fit = fitted(model, &mut journal);
-    let known = Known::of(model, &fit);
+    let run_assessment = RunAssessment::of(model, &fit);
     let finished = FittedModel {
         model,
         fit: &fit,
         predictions: &[],
         weights: None,
-        known: &known,
+        run_assessment: &run_assessment,
     };
     let folder = OutputFolder::prepare(&workshop.path("run"), fit_claim(model)).expect("a folder");
     let mut stage = folder.stage().expect("room");
@@ -346,7 +346,7 @@ fn columns(table: &Table) {
         assert_eq!(table.find(&ColumnName::Number(index + 1)), Ok(index));
         table.unit(index);
         let _ = table.check_stated_unit(index);
-        if let Ok(readings) = table.readings(index) {
+        if let Ok(readings) = table.samples(index) {
             assert_eq!(readings.len(), table.rows());
         }
     }
@@ -380,7 +380,7 @@ pub fn run(bytes: &[u8]) -> Verdict {
                 displacement: 1.0,
                 velocity: 0.0,
             };
-            let _ = predict(&run.system, &run.device, run.truth.as_ref(), &[state]);
+            let _ = predict(&run.system, &run.coefficients, run.truth.as_ref(), &[state]);
             run.band("mass");
             Verdict::Accepted
         }

@@ -1,8 +1,8 @@
 //! No input makes the readers panic.
 
 use kmcfit::config::ModelFile;
-use kmcfit::config::locate::{key_path, locate};
-use kmcfit::observations::{ColumnName, Table, TableFormat, times};
+use kmcfit::config::key_positions::{key_path, locate};
+use kmcfit::tables::{ColumnName, Table, TableFormat, times};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -133,7 +133,7 @@ fn read_table_with(bytes: &[u8], format: &TableFormat) {
         for index in 0..table.width() {
             assert_eq!(table.find(&ColumnName::Number(index + 1)), Ok(index));
             table.unit(index);
-            if let Ok(readings) = table.readings(index) {
+            if let Ok(readings) = table.samples(index) {
                 assert_eq!(readings.len(), table.rows());
             }
         }

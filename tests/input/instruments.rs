@@ -1,6 +1,6 @@
 //! Tables as instruments and spreadsheets write them.
 
-use kmcfit::observations::{ColumnName, Encoding, Table, TableFormat, times};
+use kmcfit::tables::{ColumnName, Encoding, Table, TableFormat, times};
 
 const ANY: TableFormat = TableFormat {
     delimiter: None,
@@ -158,7 +158,7 @@ fn files_without_names_have_numbered_columns() {
         assert_eq!(table.width(), 2, "{text}");
         assert_eq!(table.values(0).unwrap(), [0.0, 0.5], "{text}");
         let index = table.find(&ColumnName::Number(2)).unwrap();
-        assert_eq!(table.readings(index).unwrap(), [1.0, 2.0], "{text}");
+        assert_eq!(table.samples(index).unwrap(), [1.0, 2.0], "{text}");
         assert_eq!(table.label(1), "2", "{text}");
         assert_eq!(times::equally_spaced_at(&table, 0).unwrap(), 0.5, "{text}");
     }
@@ -200,11 +200,11 @@ fn encodings_are_read() {
 #[test]
 fn missing_readings_are_not_numbers() {
     let table = table("t;y\n0;1,5\n1;\n2;NaN\n3;NA\n4;n/a\n5;-\n6;null\n7;#N/A\n8;2,5\n");
-    let readings = table.readings(1).unwrap();
+    let readings = table.samples(1).unwrap();
     assert_eq!((readings[0], readings[8]), (1.5, 2.5));
     assert!(readings[1..8].iter().all(|y| y.is_nan()));
     assert!(table.values(1).is_err());
-    assert_eq!(table.values(0).unwrap(), table.readings(0).unwrap());
+    assert_eq!(table.values(0).unwrap(), table.samples(0).unwrap());
 }
 
 #[test]
@@ -321,7 +321,7 @@ fn rows_without_readings_are_no_names() {
         let table = table(text);
         assert_eq!(table.headers(), ["t", "y"]);
         assert_eq!(table.lines(), [2, 3, 4]);
-        assert!(table.readings(1).unwrap()[0].is_nan());
+        assert!(table.samples(1).unwrap()[0].is_nan());
     }
 }
 

@@ -1,7 +1,7 @@
 //! Messages about tables as instruments write them.
 
 use insta::assert_snapshot;
-use kmcfit::observations::{ColumnName, Table, TableFormat};
+use kmcfit::tables::{ColumnName, Table, TableFormat};
 
 fn parsed(text: &str) -> Table {
     Table::parse("t.csv", text.as_bytes()).unwrap()
@@ -13,7 +13,7 @@ fn with(text: &str, format: &TableFormat) -> String {
 }
 
 fn readings(text: &str, index: usize) -> String {
-    parsed(text).readings(index).unwrap_err().to_string()
+    parsed(text).samples(index).unwrap_err().to_string()
 }
 
 #[test]

@@ -5,7 +5,7 @@ mod arbitrary;
 mod constraint_messages;
 mod instruments;
 mod instruments_errors;
-mod keys;
+mod key_documentation;
 mod model;
 mod model_errors;
 #[path = "../../crates/kmcfit-core/tests/common/properties.rs"]

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use kmcfit::config::ModelFile;
-use kmcfit::config::scalar::{
-    ColumnId, Count, Knots, Nodes, Number, NumberOrColumn, NumberOrEstimate, ScalarOr, Sigma,
-    Start, Weight,
-};
 use kmcfit::config::spec::{
     Basis, FitMethod, Gradient, InitialSpec, PenaltyKind, PenaltySpec, StepMethod, WeightRule,
+};
+use kmcfit::config::values::{
+    ColumnId, Count, KnotSpec, Nodes, Number, NumberOrColumn, NumberOrEstimate, ScalarOr, Sigma,
+    StartSpec, Weight,
 };
 
 pub const FULL: &str = "\
@@ -80,8 +80,8 @@ fn every_key_is_read() {
 
     let functions = spec.functions;
     assert_eq!(functions.mass.basis, Some(Basis::Nodal));
-    assert_eq!(functions.mass.start, Some(Start::Number(Number(2.0))));
-    let Some(Start::Column(start)) = functions.damping.start else {
+    assert_eq!(functions.mass.start, Some(StartSpec::Number(Number(2.0))));
+    let Some(StartSpec::Column(start)) = functions.damping.start else {
         panic!("a column")
     };
     assert_eq!(
@@ -124,9 +124,9 @@ fn shapes_limits_and_penalties_are_read() {
 
     let mass = functions.mass;
     assert_eq!(mass.basis, Some(Basis::PiecewiseLinear));
-    assert_eq!(mass.knots, Some(Knots::Count(Count(11))));
+    assert_eq!(mass.knots, Some(KnotSpec::Count(Count(11))));
     let list = vec![Number(1.0), Number(2.5)];
-    assert_eq!(mass.start, Some(Start::List(list)));
+    assert_eq!(mass.start, Some(StartSpec::List(list)));
     assert_eq!(mass.min, Some(NumberOrColumn::Number(Number(0.1))));
     let Some(NumberOrColumn::Column(max)) = mass.max else {
         panic!("a column")
@@ -136,7 +136,7 @@ fn shapes_limits_and_penalties_are_read() {
     let damping = functions.damping;
     assert_eq!(damping.basis, Some(Basis::BSpline));
     let times = [0.0, 1.5, 3.0].map(Number).to_vec();
-    assert_eq!(damping.knots, Some(Knots::Times(times)));
+    assert_eq!(damping.knots, Some(KnotSpec::Times(times)));
     let tikhonov = |order, weight, reference| PenaltySpec {
         kind: PenaltyKind::Tikhonov,
         order: Some(Count(order)),

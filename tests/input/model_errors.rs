@@ -555,13 +555,13 @@ fn what_the_yaml_crate_does_not_cope_with() {
         "displacement: &a 1, velocity: &a 2",
     );
     let read = ModelFile::parse("m.yaml", twice.clone()).unwrap();
-    let kmcfit::config::scalar::ScalarOr::Map(state) = &read.spec.experiments[0].initial else {
+    let kmcfit::config::values::ScalarOr::Map(state) = &read.spec.experiments[0].initial else {
         panic!("a state")
     };
-    let two = kmcfit::config::scalar::NumberOrEstimate::Number(kmcfit::config::Number(2.0));
+    let two = kmcfit::config::values::NumberOrEstimate::Number(kmcfit::config::Number(2.0));
     assert_eq!(
         state.velocity,
-        kmcfit::config::scalar::ScalarOr::Scalar(two)
+        kmcfit::config::values::ScalarOr::Scalar(two)
     );
     assert_snapshot!(message(&format!("{twice}predict:\n  - {{displacement: &b 7, velocity: *a}}\n")), @"
     m.yaml:3:45: duplicate anchor

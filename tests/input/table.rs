@@ -1,7 +1,7 @@
 //! Tables that are understood.
 
-use kmcfit::error::Place;
-use kmcfit::observations::{Table, times};
+use kmcfit::error::Location;
+use kmcfit::tables::{Table, times};
 
 fn table(text: &str) -> Table {
     Table::parse("t.csv", text.as_bytes()).unwrap()
@@ -65,7 +65,7 @@ fn text_is_allowed_where_nobody_asks() {
 #[test]
 fn places_count_rows_from_one() {
     let table = table("t\n0\n# no\n1\n");
-    let Place::Row { row, line, .. } = table.place(1, None) else {
+    let Location::Row { row, line, .. } = table.place(1, None) else {
         panic!("a row")
     };
     assert_eq!((row, line), (2, 4));

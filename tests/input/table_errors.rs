@@ -2,7 +2,7 @@
 
 use insta::assert_snapshot;
 use kmcfit::error::InputError;
-use kmcfit::observations::{Table, times};
+use kmcfit::tables::{Table, times};
 
 /// The message about a text as a whole.
 fn message(text: impl AsRef<[u8]>) -> String {

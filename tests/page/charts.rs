@@ -187,7 +187,7 @@ fn a_drag_zooms_and_a_double_click_resets() {
     browser.mouse("mouseMoved", at, json!({}));
     let reading = browser.text("document.querySelector('#figure-channel .reading').textContent");
     assert!(
-        reading.contains("readings") && reading.contains("model"),
+        reading.contains("samples") && reading.contains("model"),
         "{reading}"
     );
     assert!(browser.number("document.querySelectorAll('#figure-channel .cross').length") == 1.0);

@@ -1,4 +1,4 @@
-//! `constraints` of a model file as statements of the builder.
+//! Constraints of a model file, as constraints of the builder.
 
 mod statement;
 
@@ -7,7 +7,7 @@ use crate::error::InputError;
 use kmcfit_core::internals::builder::Builder;
 use kmcfit_core::internals::system::Grid;
 
-/// Adds the constraints of the model to the builder; the bounds of a function stand in its specification.
+/// Adds the constraints of the model to the builder. Bounds of a function are part of its specification.
 pub(super) fn add(
     file: &ModelFile,
     grid: &Grid,

@@ -1,4 +1,5 @@
-//! How to fit.
+//! Settings of a fit from the key `fit`: method, stopping tests, start strategy; refuses combinations that a method
+//! does not support.
 
 use crate::config::spec::{FitMethod, StopSpec};
 use crate::config::{ModelFile, Number};
@@ -38,13 +39,13 @@ pub(super) fn build(
     })
 }
 
-/// The method asked for, or the default.
+/// The method of the model file, or the default.
 fn method(file: &ModelFile) -> FitMethod {
     let method = file.spec.fit.as_ref().and_then(|f| f.method);
     method.unwrap_or(FitMethod::GaussNewton)
 }
 
-/// Refuses what is about the steps of a search where there are none.
+/// Refuses settings of steps for a method without steps.
 fn takes_steps(file: &ModelFile, solver: Solver) -> Result<(), InputError> {
     let Some(fit) = file.spec.fit.as_ref() else {
         return Ok(());
@@ -89,7 +90,7 @@ pub(super) fn solver(file: &ModelFile) -> Result<Solver, InputError> {
     }
 }
 
-/// Refuses constraints with the methods that know none.
+/// Refuses constraints for a method that does not support them.
 fn can_constrain(file: &ModelFile, problem: &Problem, solver: Solver) -> Result<(), InputError> {
     let constraints = &problem.constraints;
     let rows = constraints.groups.iter().map(|group| &group.name);
@@ -103,7 +104,7 @@ fn can_constrain(file: &ModelFile, problem: &Problem, solver: Solver) -> Result<
     }
 }
 
-/// Refuses total variation and a search for the weight with the methods that know neither.
+/// Refuses total variation and a rule for the weight for methods that support neither.
 fn can_regularise(
     file: &ModelFile,
     problem: &Problem,
@@ -129,8 +130,8 @@ fn can_regularise(
 
 fn gradient(file: &ModelFile, problem: &Problem) -> Result<GradientKind, InputError> {
     let asked = file.spec.fit.as_ref().and_then(|f| f.gradient);
-    let has_readings = problem.experiments.iter().any(|e| !e.channels.is_empty());
-    if asked == Some(GradientKind::Continuous) && has_readings && !problem.supports_continuous() {
+    let has_samples = problem.experiments.iter().any(|e| !e.channels.is_empty());
+    if asked == Some(GradientKind::Continuous) && has_samples && !problem.supports_continuous() {
         return Err(file
             .error_at(
                 "fit.gradient",
@@ -184,11 +185,11 @@ fn stopping(file: &ModelFile, stop: &StopSpec) -> Result<Stopping, InputError> {
         gradient_ratio: positive("gradient_ratio", &stop.gradient_ratio)?,
         tolerance: positive("tolerance", &stop.tolerance)?,
         step: positive("step", &stop.step)?,
-        // A limit beyond what a Duration holds is no limit.
+        // A limit beyond the range of Duration has no effect.
         limit: seconds.and_then(|s| Duration::try_from_secs_f64(s).ok()),
         program_iterations: Stopping::default().program_iterations,
     };
-    // Exactly so many iterations are only asked for by naming them.
+    // A given number of iterations without a tolerance runs exactly that many.
     let tolerance = match (given.has_test(), &stop.iterations) {
         (false, None) => Stopping::default().tolerance,
         _ => given.tolerance,

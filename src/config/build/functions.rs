@@ -1,11 +1,11 @@
-//! Functions of a model file as specifications of the builder; and the truth.
+//! Coefficient functions of a model file as specifications of the builder, and the true coefficients.
 
-use super::on_grid::{Wanted, column_on_grid};
+use super::on_grid::{NodalColumnRequest, column_on_grid};
 use crate::config::ModelFile;
-use crate::config::scalar::{Count, Knots, Number, NumberOrColumn, Start, Text, Weight};
 use crate::config::spec::{
     self as config, Basis, ColumnSpec, FunctionSpec, PenaltyKind, WeightRule,
 };
+use crate::config::values::{Count, KnotSpec, Number, NumberOrColumn, StartSpec, Text, Weight};
 use crate::error::InputError;
 use kmcfit_core::internals::builder::{
     self, BasisSpec, CoefficientSpec, PenaltySpec, PenaltyWeight,
@@ -15,7 +15,7 @@ use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::solvers;
 use kmcfit_core::internals::system::{Grid, NodalCoefficients};
 
-/// The part of a map with a key for each function, required or not.
+/// The function of a kind in a map with one key for each function.
 macro_rules! by_kind {
     ($map:expr, $kind:expr) => {
         match $kind {
@@ -30,10 +30,10 @@ macro_rules! by_kind {
     };
 }
 
-/// A function as the model gives it: its kind and what is said about it.
+/// A coefficient function of the model file: kind and settings.
 pub(super) type Given<'a> = (CoefficientKind, &'a FunctionSpec);
 
-/// The functions that all experiments share, mass first.
+/// The functions common to all experiments, mass first.
 pub(super) fn shared(file: &ModelFile) -> Vec<Given<'_>> {
     let kinds = CoefficientKind::ALL.into_iter();
     kinds
@@ -41,7 +41,7 @@ pub(super) fn shared(file: &ModelFile) -> Vec<Given<'_>> {
         .collect()
 }
 
-/// The functions that experiment `i` has for itself.
+/// The functions of experiment `i` alone.
 pub(super) fn own(file: &ModelFile, i: usize) -> Vec<Given<'_>> {
     let kinds = CoefficientKind::ALL.into_iter();
     let own = file.spec.experiments[i].functions.as_ref();
@@ -107,7 +107,7 @@ pub(super) fn specification(
     })
 }
 
-/// The key that a kind of basis has besides its name.
+/// The additional key of a basis.
 fn own_key(kind: Basis) -> Option<&'static str> {
     match kind {
         Basis::Nodal | Basis::Constant => None,
@@ -156,8 +156,8 @@ fn basis(
             .expected(expected)
     };
     let knots = || match &spec.knots {
-        Some(Knots::Count(count)) => Ok(builder::Knots::Count(count.0)),
-        Some(Knots::Times(times)) => Ok(builder::Knots::Times(numbers(times))),
+        Some(KnotSpec::Count(count)) => Ok(builder::Knots::Count(count.0)),
+        Some(KnotSpec::Times(times)) => Ok(builder::Knots::Times(numbers(times))),
         None => Err(missing(
             "knots",
             "`knots`: an integer (so many, equally spaced), or a list of times in s",
@@ -192,16 +192,16 @@ fn start(
     grid: &Grid,
     key: &str,
     kind: Basis,
-    given: &Start,
+    given: &StartSpec,
 ) -> Result<builder::Start, InputError> {
     match given {
-        Start::Number(value) => Ok(builder::Start::Constant(value.0)),
-        Start::List(_) if kind == Basis::BSpline => Err(file
+        StartSpec::Number(value) => Ok(builder::Start::Constant(value.0)),
+        StartSpec::List(_) if kind == Basis::BSpline => Err(file
             .error_at(key, "a start of the basis `b-spline` cannot be a list")
             .found("a list")
             .expected("a finite number, or a column: {data: file.csv, column: name}")),
-        Start::List(values) => Ok(builder::Start::Parameters(numbers(values))),
-        Start::Column(c) => Ok(builder::Start::Nodal(column(file, grid, key, c)?)),
+        StartSpec::List(values) => Ok(builder::Start::Parameters(numbers(values))),
+        StartSpec::Column(c) => Ok(builder::Start::Nodal(column(file, grid, key, c)?)),
     }
 }
 
@@ -237,7 +237,7 @@ fn penalty(
     })
 }
 
-/// A penalty on total variation, which has a weight and nothing else.
+/// A penalty on total variation; refuses keys other than the weight.
 fn total_variation(
     file: &ModelFile,
     key: &str,
@@ -268,7 +268,7 @@ fn total_variation(
     }
 }
 
-/// A number at all times, or a column that `key` names, read at the nodes.
+/// A constant, or a column named by `key`, interpolated at the nodes.
 pub(super) fn history(
     file: &ModelFile,
     grid: &Grid,
@@ -284,7 +284,7 @@ pub(super) fn history(
     }
 }
 
-/// Values at the nodes: the same number, or a column that `key` names.
+/// Values at the nodes: a constant, or a column named by `key`.
 pub(super) fn values(
     file: &ModelFile,
     grid: &Grid,
@@ -297,14 +297,14 @@ pub(super) fn values(
     }
 }
 
-/// The nodal values of a column that `key` names.
+/// Nodal values of a column named by `key`.
 fn column(
     file: &ModelFile,
     grid: &Grid,
     key: &str,
     given: &ColumnSpec,
 ) -> Result<Vec<f64>, InputError> {
-    let wanted = Wanted {
+    let wanted = NodalColumnRequest {
         data: &given.data.0,
         data_key: &format!("{key}.data"),
         column: &given.column.0,
@@ -324,7 +324,7 @@ pub(super) fn truth(
     let column = |(kind, _): Given| {
         let named: Option<&Text> = (spec.columns.as_ref()).and_then(|c| by_kind!(c, kind));
         let name = named.map_or(kind.column(), |name| name.0.as_str());
-        let wanted = Wanted {
+        let wanted = NodalColumnRequest {
             data: &spec.data.0,
             data_key: "truth.data",
             column: name,

@@ -1,24 +1,24 @@
-//! The time grid: from the model, or one node per reading.
+//! The time grid: given by the model file, one node per sample, or an automatic number of nodes.
 
 mod auto;
 mod per_node;
 
 use super::BuildMode;
-use super::experiments::{RawChannel, Record};
+use super::experiments::{RawChannel, RawRecord};
 use crate::config::ModelFile;
-use crate::config::scalar::{Count, Nodes};
-use crate::error::{InputError, Place};
+use crate::config::values::{Count, Nodes};
+use crate::error::{InputError, Location};
 use crate::finding::Finding;
 use crate::memory;
 use kmcfit_core::internals::system::{Grid, Method};
 
-/// Most nodes that are chosen for the user: the same on every machine.
+/// Most nodes of an automatic choice: the same on every machine.
 const MOST_CHOSEN: usize = 10_000_000;
 
 pub(super) fn build(
     file: &ModelFile,
     purpose: BuildMode,
-    records: &[Option<Record>],
+    records: &[Option<RawRecord>],
     notes: &mut Vec<Finding>,
 ) -> Result<Grid, InputError> {
     let asked = file.spec.grid.as_ref().and_then(|g| g.nodes.as_ref());
@@ -36,7 +36,7 @@ pub(super) fn build(
                 .expected("`nodes`, because there is no record"));
         }
         Some(Nodes::Auto) => auto::nodes(method(file), records, duration, MOST_CHOSEN, notes),
-        None => match node_per_reading(records) {
+        None => match node_per_sample(records) {
             Some(nodes) => nodes,
             None => auto::nodes(method(file), records, duration, MOST_CHOSEN, notes),
         },
@@ -56,17 +56,17 @@ pub(super) fn build(
 
 fn about_nodes(file: &ModelFile, purpose: BuildMode, problem: &str) -> InputError {
     match purpose.nodes() {
-        Some(_) => InputError::new(Place::Argument("--nodes".into()), problem),
+        Some(_) => InputError::new(Location::Argument("--nodes".into()), problem),
         None => file.error_at("grid.nodes", problem),
     }
 }
 
-/// Memory that a run of the model on so many nodes may need, bytes.
+/// Upper estimate of the memory of a run with this number of nodes, bytes.
 pub(super) fn memory_of(file: &ModelFile, purpose: BuildMode, nodes: usize) -> f64 {
     nodes as f64 * per_node::per_node(file, purpose) as f64 + memory::BASE as f64
 }
 
-/// Refuses a grid that the machine has no memory for, before any is taken.
+/// Refuses a grid that exceeds the available memory, before allocation.
 fn fits_into_memory(file: &ModelFile, purpose: BuildMode, nodes: usize) -> Result<(), InputError> {
     let needed = memory_of(file, purpose, nodes);
     let Err(available) = memory::check(needed as u64) else {
@@ -88,8 +88,8 @@ fn fits_into_memory(file: &ModelFile, purpose: BuildMode, nodes: usize) -> Resul
     )))
 }
 
-/// One node per reading, where all channels of all records have the same equally spaced times.
-fn node_per_reading(records: &[Option<Record>]) -> Option<usize> {
+/// Number of nodes for one node per sample, if all channels of all records have the same equally spaced times.
+fn node_per_sample(records: &[Option<RawRecord>]) -> Option<usize> {
     let mut channels = records.iter().flatten().flat_map(|r| &r.channels);
     let first = channels.next()?;
     let spacing = first.spacing?;
@@ -103,8 +103,8 @@ fn node_per_reading(records: &[Option<Record>]) -> Option<usize> {
     (usable && channels.all(same)).then_some(first.times.len())
 }
 
-/// First time and length of the records; the length from the model without.
-fn span(file: &ModelFile, records: &[Option<Record>]) -> Result<(f64, f64), InputError> {
+/// First time and length of the records, s; without samples the length given by the model.
+fn span(file: &ModelFile, records: &[Option<RawRecord>]) -> Result<(f64, f64), InputError> {
     let asked = file.spec.grid.as_ref().and_then(|g| g.duration.as_ref());
     if let Some(duration) = asked
         && duration.0 <= 0.0
@@ -122,9 +122,11 @@ fn span(file: &ModelFile, records: &[Option<Record>]) -> Result<(f64, f64), Inpu
         })?;
         return Ok((0.0, duration.0));
     };
-    let start = measured().map(Record::start).fold(f64::INFINITY, f64::min);
+    let start = measured()
+        .map(RawRecord::start)
+        .fold(f64::INFINITY, f64::min);
     let end = measured()
-        .map(Record::end)
+        .map(RawRecord::end)
         .fold(f64::NEG_INFINITY, f64::max);
     let duration = end - start;
     if let Some(asked) = asked

@@ -12,9 +12,9 @@ pub use experiments::{ChannelNote, HoldOut};
 pub use kmcfit_core::internals::builder::WeightSearch;
 pub use study::{Candidate, Equivalent, StudyPlan, StudyTarget};
 
-use super::locate::{key_path, locate};
-use super::{ModelFile, Source};
-use crate::error::{InputError, Place};
+use super::key_positions::{key_path, locate};
+use super::{ModelFile, ModelSource};
+use crate::error::{InputError, Location};
 use crate::finding::Finding;
 use crate::memory;
 use kmcfit_core::internals::builder::{BuildError, Builder, Contradiction, listed};
@@ -56,7 +56,7 @@ pub struct Model {
     /// Automatic choices, such as the number of nodes.
     pub automatic: Vec<Finding>,
     /// Source files.
-    pub source: Source,
+    pub source: ModelSource,
     /// Time taken to build it.
     pub preparation: Preparation,
 }
@@ -100,7 +100,7 @@ impl BuildMode {
 fn asked_for(file: &ModelFile, key: impl Into<String>) -> impl Fn(InputError) -> InputError {
     let key = key.into();
     move |error| match &error.place {
-        Place::File(path) => {
+        Location::File(path) => {
             let problem = format!("{}: {}", path.display(), error.problem);
             let here = file.error_at(&key, problem);
             InputError {
@@ -120,7 +120,7 @@ fn builder(
     purpose: BuildMode,
     grid: &Grid,
     solver: Solver,
-    records: Vec<Option<experiments::Record>>,
+    records: Vec<Option<experiments::RawRecord>>,
 ) -> Result<(Builder, Vec<Vec<ChannelNote>>), InputError> {
     let shared = functions::shared(file).into_iter();
     let shared = shared.map(|(kind, given)| {
@@ -174,7 +174,7 @@ fn contradicted(file: &ModelFile, contradiction: &Contradiction, problem: &str) 
     let mut rows = Vec::new();
     for (name, key) in &contradiction.constraints {
         let place = key.as_ref().map(|key| (key, file.error_at(key, "").place));
-        let Some((key, Place::Line { line, .. })) = place else {
+        let Some((key, Location::Line { line, .. })) = place else {
             rows.push(format!("`{name}`"));
             continue;
         };
@@ -209,7 +209,7 @@ pub fn build(file: &ModelFile, purpose: BuildMode) -> Result<Model, InputError> 
     let searches = built.weight_search.is_some();
     let settings = fit::build(file, &built.problem, solver, searches)?;
     let given_start = built.problem.functions.start();
-    // A simulation is of the functions as they are given.
+    // A simulation uses the functions as given.
     if !matches!(purpose, BuildMode::Simulate { .. }) {
         built.move_start().map_err(about)?;
     }
@@ -226,7 +226,7 @@ pub fn build(file: &ModelFile, purpose: BuildMode) -> Result<Model, InputError> 
     };
     let memory = grid::memory_of(file, purpose, grid.nodes()) as u64;
     let study = study::build(file, &built.problem)?;
-    let source = timed(&mut reading, || Source::of(file));
+    let source = timed(&mut reading, || ModelSource::of(file));
     Ok(Model {
         file: file.path.clone(),
         study,
@@ -283,8 +283,7 @@ impl Model {
         })
     }
 
-    /// The threads, of so many that are wanted, that have the memory to fit the model at the same time:
-    /// at least one.
+    /// Number of threads, at most `wanted` and at least one, whose simultaneous fits fit into memory.
     pub fn threads_within_memory(&self, wanted: usize) -> usize {
         memory::threads_within(wanted, self.memory)
     }

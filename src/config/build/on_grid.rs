@@ -1,29 +1,29 @@
-//! A function given as a CSV column, read at the nodes.
+//! Coefficient functions given as CSV columns, interpolated at the nodes.
 
 use super::asked_for;
 use crate::config::ModelFile;
 use crate::error::InputError;
-use crate::observations::{Table, increasing};
-use crate::units::Kind;
+use crate::tables::{Table, increasing};
+use crate::units::Quantity;
 use kmcfit_core::internals::system::Grid;
 
 /// Column of times in files of functions.
 const TIME_COLUMN: &str = "t_s";
-/// How near a row must be to a node, in steps, to be taken as it stands.
+/// Distance between a row and a node, in steps, up to which no interpolation is needed.
 const SAME_TIME: f64 = 1e-6;
 
-/// Which column of which file, and the keys of the model that say so.
-pub(super) struct Wanted<'a> {
+/// A requested column: file, name, and their keys in the model file.
+pub(super) struct NodalColumnRequest<'a> {
     pub data: &'a str,
     pub data_key: &'a str,
     pub column: &'a str,
     pub column_key: &'a str,
 }
 
-/// A column at the nodes: as it stands where its rows are the nodes, linear in between otherwise.
+/// A column at the nodes: unchanged if its rows are the nodes, else interpolated linearly.
 pub(super) fn column_on_grid(
     file: &ModelFile,
-    wanted: &Wanted<'_>,
+    wanted: &NodalColumnRequest<'_>,
     grid: &Grid,
 ) -> Result<Vec<f64>, InputError> {
     let about_data = asked_for(file, wanted.data_key);
@@ -58,10 +58,10 @@ pub(super) fn column_on_grid(
         .collect())
 }
 
-/// Refuses times that the file states in another unit than its name does: s.
+/// Refuses times whose stated unit is not s.
 fn check_seconds(table: &Table) -> Result<(), InputError> {
     let index = table.find(&TIME_COLUMN.into())?;
-    let unit = table.stated_unit(index).explicit(Kind::Time);
+    let unit = table.stated_unit(index).explicit(Quantity::Time);
     match unit.filter(|unit| unit.factor() != 1.0) {
         None => Ok(()),
         Some(unit) => Err(

@@ -1,15 +1,15 @@
-//! What `study` looks into.
+//! Settings of the key `study`.
 
 use super::experiments;
 use super::functions::values;
 use crate::config::ModelFile;
-use crate::config::scalar::Number;
 use crate::config::spec::{
     CandidateSpec, EquivalentSpec, FunctionName, NoiseName, ProfileSpec, StudySpec,
 };
+use crate::config::values::Number;
 use crate::error::InputError;
-use crate::input::{one_of, quote};
-use crate::near::did_you_mean;
+use crate::spelling::did_you_mean;
+use crate::text_io::{one_of, quote};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{
     Channel, ChannelKind, Experiment, Input, Waveform, Weighting,
@@ -24,66 +24,66 @@ pub struct StudyPlan {
     pub confidence: f64,
     /// Seed of everything random.
     pub seed: u64,
-    /// Numbers whose profile is drawn.
+    /// Quantities with a profile likelihood.
     pub profiles: Vec<StudyTarget>,
-    /// Times at which the widest extremes are sought, s.
+    /// Times of the extremes, s.
     pub extremes: Vec<f64>,
-    /// Largest J of a device in the extremes; `None` for what the confidence allows.
+    /// Largest cost J of the extremes; `None` for the limit from the confidence level.
     pub misfit_limit: Option<f64>,
-    /// Number of starts of the search for other optima; 0 for none.
+    /// Number of starting points of the multistart search; 0 for none.
     pub starts: usize,
-    /// Factor by which the starts may lie off the start values.
+    /// Largest factor between starting points and start values.
     pub spread: f64,
-    /// Optima whose ratios and motions agree to this are one.
+    /// Relative difference of ratios and responses up to which two optima count as one.
     pub merge_tolerance: f64,
     /// Number of replicates of the bootstrap; 0 for none.
     pub replicates: usize,
-    /// Whether their noise is drawn from the residuals.
+    /// True if the noise of the replicates is drawn from the residuals.
     pub residual_noise: bool,
-    /// Masses, and dampings to be near to, of devices that are to have the fit's motion.
+    /// Requested equivalent systems, which have the response of the fit.
     pub equivalent_systems: Vec<Equivalent>,
-    /// Whether each function is held against a constant.
+    /// True for a constancy test of each function.
     pub constancy_test: bool,
-    /// Experiments that might be made next.
+    /// Candidate experiments for the experiment design.
     pub candidates: Vec<Candidate>,
-    /// Wall-clock limit of one fit on the way.
+    /// Wall-clock limit of one refit.
     pub limit: Option<Duration>,
 }
 
-/// A number that a study asks about.
+/// Target of a profile.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StudyTarget {
-    /// A function of the list at a time.
+    /// Value of a function at a time.
     Value {
         /// Index of the function.
         function: usize,
         /// Time, s.
         time: f64,
     },
-    /// The mean of a function of the list.
+    /// Mean of a function over the record.
     Mean {
         /// Index of the function.
         function: usize,
     },
-    /// A scalar.
+    /// A nuisance parameter.
     Scalar {
-        /// Index of the scalar.
+        /// Index of the parameter.
         index: usize,
     },
 }
 
-/// A device that is to have the motion of the fit.
+/// A requested equivalent system.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Equivalent {
     /// Name for reports.
     pub name: String,
     /// Its mass at the nodes, kg.
     pub mass: Vec<f64>,
-    /// Damping that it should be near to, N s/m at the nodes; `None` for that of the fit.
+    /// Reference damping at the nodes, N s/m; `None` for that of the fit.
     pub damping: Option<Vec<f64>>,
 }
 
-/// An experiment that might be made: its readings are zeros, only their noise counts.
+/// A candidate experiment; only the noise of its samples is used, their values are zero.
 #[derive(Debug, Clone)]
 pub struct Candidate {
     /// Name for reports.
@@ -96,14 +96,14 @@ const CONFIDENCE: f64 = 0.95;
 const SEED: u64 = 1;
 const SPREAD: f64 = 3.0;
 const WIDEST_SPREAD: f64 = 1e6;
-/// More starts or replicates than these would run for days.
+/// Most starting points or replicates; more would run for days.
 const MOST_STARTS: usize = 100_000;
 const MOST_REPLICATES: usize = 1_000_000;
-/// Ends of an interval of 95 % need more than twenty values beyond which to lie.
+/// Fewest replicates for the ends of a 95 % interval.
 const FEWEST_REPLICATES: usize = 40;
-/// Ratios and motions that differ by less are those of one optimum.
+/// Default of `merge_tolerance`.
 const SAME: f64 = 1e-3;
-/// Number of times of the extremes, unless the model names them.
+/// Default number of times of the extremes.
 const EXTREME_TIMES: usize = 5;
 
 pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, InputError> {
@@ -160,7 +160,7 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
     })
 }
 
-/// Refuses a limit, counts and times that cannot be used.
+/// Refuses an invalid limit, count or time.
 fn check(file: &ModelFile, spec: &StudySpec) -> Result<(), InputError> {
     if let Some(level) = spec.misfit_limit.filter(|l| l.0 <= 0.0) {
         return Err(file
@@ -329,7 +329,7 @@ fn target(
     }
 }
 
-/// The index of a function of the main device that is fitted.
+/// The index of a fitted function common to all experiments.
 fn function(
     file: &ModelFile,
     problem: &Problem,

@@ -4,8 +4,8 @@ use crate::config::map::keys;
 
 use super::{OwnFunctionsSpec, RangeSpec};
 use crate::config::choice::choice;
-use crate::config::scalar::{ColumnId, Count, Estimate, Number, NumberOrEstimate, ScalarOr};
-use crate::config::scalar::{Sigma, Text};
+use crate::config::values::{ColumnId, Count, Estimate, Number, NumberOrEstimate, ScalarOr};
+use crate::config::values::{Sigma, Text};
 
 keys! {
     /// An experiment: one record and its input.
@@ -13,7 +13,7 @@ keys! {
         /// Name for reports.
         name: Option<Text>, example "free decay", default "experiment 1, experiment 2, …";
         /// Data file, relative to the model file; a simulation needs none.
-        data: Option<Text>, example "readings.csv";
+        data: Option<Text>, example "record.csv";
         /// Format of the data file, where automatic detection fails.
         format: Option<FileFormatSpec>,
             example "{delimiter: semicolon, decimal: comma}",

@@ -4,7 +4,7 @@ use crate::config::map::keys;
 
 use super::{ForceSpec, FunctionName, StateSpec};
 use crate::config::choice::choice;
-use crate::config::scalar::{Count, Number, NumberOrColumn, OneOrList, Text};
+use crate::config::values::{Count, Number, NumberOrColumn, OneOrList, Text};
 
 keys! {
     /// Analyses of `kmcfit study`.

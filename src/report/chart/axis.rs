@@ -1,6 +1,6 @@
 //! Ranges and ticks of an axis.
 //!
-//! Ranges live in the space in which the axis is even: the value itself, or its decimal logarithm.
+//! Ranges are in the coordinate in which the axis is uniform: the value itself, or its decimal logarithm.
 
 use super::figure::{Axis, Scale};
 use crate::report::text;
@@ -9,17 +9,17 @@ use crate::report::text;
 const LARGEST: f64 = 1e300;
 /// Magnitudes below this count as zero on linear axes, so that no step loses its digits.
 const SMALLEST: f64 = 1e-290;
-/// Spans below this share of the magnitude are rounding, and drawn as a constant.
+/// Spans below this share of the magnitude are rounding errors and are drawn as a constant.
 const FLAT: f64 = 1e-9;
 /// Blank share of a linear range above and below its data.
 const PAD: f64 = 0.05;
 /// Axes over more decades have no ticks between them.
 const MINOR_DECADES: f64 = 7.0;
 
-/// Lowest and highest value in even space.
+/// Lowest and highest value in the uniform coordinate.
 pub(super) type Range = (f64, f64);
 
-/// The value in even space; not a number where it cannot be drawn.
+/// The value in the uniform coordinate; NaN if it cannot be drawn.
 pub(super) fn even(scale: Scale, value: f64) -> f64 {
     match scale {
         _ if value.is_nan() || value.abs() > LARGEST => f64::NAN,
@@ -30,7 +30,7 @@ pub(super) fn even(scale: Scale, value: f64) -> f64 {
     }
 }
 
-/// The smallest range that holds all drawable values, if there are any.
+/// The smallest range that contains all drawable values, if any.
 pub(super) fn extent(scale: Scale, values: &[f64]) -> Option<Range> {
     let drawable = values
         .iter()
@@ -39,12 +39,12 @@ pub(super) fn extent(scale: Scale, values: &[f64]) -> Option<Range> {
     drawable.fold(None, |range, v| Some(union(range, (v, v))))
 }
 
-/// The smallest range that holds both.
+/// The smallest range that contains both.
 pub(super) fn union(one: Option<Range>, other: Range) -> Range {
     one.map_or(other, |one| (one.0.min(other.0), one.1.max(other.1)))
 }
 
-/// The range to draw for data of this extent; `pad` leaves some room around linear data.
+/// The range of an axis for data of this extent; `pad` adds a margin to linear data.
 pub(super) fn range(axis: &Axis, extent: Option<Range>, pad: bool) -> Range {
     if let Some(limits) = limits(axis) {
         return limits;
@@ -62,7 +62,7 @@ fn limits(axis: &Axis) -> Option<Range> {
     (high - low > FLAT * low.abs().max(high.abs())).then_some((low, high))
 }
 
-/// The whole decades around a logarithmic extent; the slack keeps 10⁻⁴ from asking for 10⁻⁵.
+/// The whole decades around a logarithmic extent; a small tolerance keeps rounding errors from adding a decade.
 fn decades(low: f64, high: f64) -> Range {
     let (low, high) = ((low + FLAT).floor(), (high - FLAT).ceil());
     if high > low {
@@ -82,7 +82,7 @@ fn linear(low: f64, high: f64, pad: f64) -> Range {
     (low - room, high + room)
 }
 
-/// A tick: where it is, as a share of the axis from its low end, and what is written beside it.
+/// A tick: position as a share of the axis from its low end, and label.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Tick {
     pub share: f64,
@@ -116,7 +116,7 @@ impl Ruler {
         ruler
     }
 
-    /// A horizontal ruler of `length` pixels whose labels keep clear of each other.
+    /// A horizontal ruler of `length` pixels without overlapping labels.
     pub fn across(scale: Scale, range: Range, length: f64, size: f64) -> Self {
         let most = ((length / 45.0) as usize).clamp(2, 8);
         (2..=most)
@@ -126,7 +126,7 @@ impl Ruler {
             .unwrap_or_else(|| Self::new(scale, range, 2))
     }
 
-    /// Where a value lies, as a share of the axis; not a number where it cannot be drawn.
+    /// Position of a value as a share of the axis; NaN if it cannot be drawn.
     pub fn share(&self, value: f64) -> f64 {
         self.place(even(self.scale, value))
     }
@@ -156,7 +156,7 @@ impl Ruler {
         }
     }
 
-    /// Ticks at decades; where too few are in sight, at round values instead.
+    /// Ticks at decades, or at round values if the range has too few decades.
     fn log_ticks(&mut self, most: usize) {
         let (low, high) = self.range;
         let (first, last) = ((low - FLAT).ceil() as i64, (high + FLAT).floor() as i64);
@@ -189,7 +189,7 @@ impl Ruler {
         }
     }
 
-    /// Less than two decades in sight: linear ticks at their logarithmic places.
+    /// Ticks at linear steps on a logarithmic axis of less than two decades.
     fn round_values(&mut self, most: usize) {
         let (low, high) = (10f64.powf(self.range.0), 10f64.powf(self.range.1));
         let plain = Ruler::new(Scale::Linear, (low, high), most);

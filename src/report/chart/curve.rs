@@ -1,8 +1,8 @@
 //! Curves in pixels: gaps, thinning and clipping.
 
-use super::shape::{Frame, Point};
+use super::drawing::{Frame, Point};
 
-/// Splits at points that cannot be drawn.
+/// Splits a curve at points that cannot be drawn.
 pub(super) fn runs(points: impl Iterator<Item = Point>) -> Vec<Vec<Point>> {
     let mut runs = vec![Vec::new()];
     for point in points {
@@ -18,8 +18,8 @@ pub(super) fn runs(points: impl Iterator<Item = Point>) -> Vec<Vec<Point>> {
     runs
 }
 
-/// Keeps, of the points that follow each other in one pixel column, the first, the lowest, the
-/// highest and the last: what is left covers the same pixels.
+/// Keeps the first, lowest, highest and last of the consecutive points in one pixel column; the thinned curve covers
+/// the same pixels.
 pub(super) fn thin(run: &[Point]) -> Vec<Point> {
     let mut kept = Vec::new();
     for column in run.chunk_by(|a, b| a.0.floor() == b.0.floor()) {
@@ -47,7 +47,7 @@ fn keep_extremes(column: &[Point], kept: &mut Vec<Point>) {
     }
 }
 
-/// The pieces of a path inside a frame.
+/// The parts of a path inside a frame.
 pub(super) fn clip(path: &[Point], frame: &Frame) -> Vec<Vec<Point>> {
     let mut pieces: Vec<Vec<Point>> = Vec::new();
     for pair in path.windows(2) {
@@ -95,7 +95,7 @@ pub(super) fn clamp(point: Point, frame: &Frame) -> Point {
     )
 }
 
-/// Whether a point lies in a frame, its edge included.
+/// True for a point in a frame, edges included.
 pub(super) fn inside(point: Point, frame: &Frame) -> bool {
     clamp(point, frame) == point
 }

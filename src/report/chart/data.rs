@@ -1,19 +1,19 @@
-//! The numbers of a figure for the script of the page.
+//! Serialisation of a figure for the script of a page.
 
 use super::figure::Figure;
-use super::mark::{Kind, Mark};
+use super::plot_mark::{Mark, MarkKind};
 use super::thin::kept;
 use crate::report::text::clean;
 use serde::Serialize;
 
-/// A figure as text that may stand in a script element.
+/// A figure as text for a script element.
 pub(in crate::report) struct Data {
     pub json: String,
-    /// Whether points were left out that could be seen when zoomed.
+    /// True if thinning removed points that would be visible when zoomed.
     pub thinned: bool,
 }
 
-/// The numbers of a figure; the chart begins without the curves of the labels `off`.
+/// Serialises a figure; curves with the labels `off` are initially hidden.
 pub(in crate::report) fn data(figure: &Figure, off: &[&str]) -> Data {
     #[derive(Serialize)]
     struct Chart<'a> {
@@ -25,12 +25,15 @@ pub(in crate::report) fn data(figure: &Figure, off: &[&str]) -> Data {
     let mut thinned = false;
     for panel in &mut figure.panels {
         for mark in &mut panel.marks {
-            if !matches!(mark.kind, Kind::Line | Kind::Points | Kind::Band) {
+            if !matches!(
+                mark.kind,
+                MarkKind::Line | MarkKind::Points | MarkKind::Band
+            ) {
                 continue;
             }
             let mut ys = vec![(mark.y.as_slice(), panel.y.scale)];
-            ys.extend((mark.kind == Kind::Band).then_some((&mark.high[..], panel.y.scale)));
-            let joined = mark.kind != Kind::Points;
+            ys.extend((mark.kind == MarkKind::Band).then_some((&mark.high[..], panel.y.scale)));
+            let joined = mark.kind != MarkKind::Points;
             let (points, is_thinned) = kept((&mark.x, panel.x.scale), &ys, joined);
             thinned |= is_thinned;
             let Mark { x, y, high, .. } = mark;
@@ -48,7 +51,7 @@ pub(in crate::report) fn data(figure: &Figure, off: &[&str]) -> Data {
     }
 }
 
-/// JSON without the letters that could end a script or begin markup; in JSON they only stand in texts.
+/// Escapes the characters of JSON that could end a script or begin markup; they occur only in strings.
 fn inert(json: &str) -> String {
     clean(json)
         .replace('<', "\\u003c")

@@ -1,9 +1,9 @@
-//! The data model of a figure: panels and axes, with nothing of the drawing in it.
+//! The data model of a figure: panels, axes and marks, independent of the renderer.
 //!
-//! Values that cannot be drawn (not finite, or not positive on a logarithmic axis) leave gaps.
-//! Where `x` and `y` differ in length, the shorter one counts.
+//! Values that cannot be drawn (not finite, or not positive on a logarithmic axis) leave gaps. If `x` and `y` differ in
+//! length, the excess values are ignored.
 
-use super::mark::Mark;
+use super::plot_mark::Mark;
 use serde::{Serialize, Serializer};
 
 /// One figure: a grid of panels with a common legend above them.
@@ -12,10 +12,10 @@ pub struct Figure {
     /// File stem, as in `convergence` for `convergence.svg`.
     #[serde(skip)]
     pub name: String,
-    /// Title; part of the file, not of the picture, because captions belong to the text around it.
+    /// Title in the metadata of the file; it is not drawn, because captions belong to the surrounding text.
     #[serde(skip)]
     pub title: String,
-    /// What the picture shows, for readers who cannot see it.
+    /// Description for screen readers.
     #[serde(skip)]
     pub description: String,
     /// The panels, row by row.
@@ -40,7 +40,7 @@ impl Figure {
         }
     }
 
-    /// Sets how many panels stand side by side.
+    /// Sets the number of panels in one row.
     #[must_use]
     pub fn columns(mut self, columns: usize) -> Self {
         self.columns = columns.max(1);
@@ -70,7 +70,7 @@ pub struct Panel {
     pub x: Axis,
     /// Vertical axis. Equal axes in one row share their range and labels.
     pub y: Axis,
-    /// What is drawn.
+    /// Marks, from back to front.
     pub marks: Vec<Mark>,
 }
 
@@ -103,7 +103,7 @@ impl Panel {
         self.marks([mark])
     }
 
-    /// Adds marks, or the one that there may be.
+    /// Adds marks; an `Option` adds at most one.
     #[must_use]
     pub fn marks(mut self, marks: impl IntoIterator<Item = Mark>) -> Self {
         self.marks.extend(marks);
@@ -111,12 +111,12 @@ impl Panel {
     }
 }
 
-/// How values map to lengths.
+/// Scale of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scale {
-    /// In proportion to the value.
+    /// Length proportional to the value.
     Linear,
-    /// In proportion to its logarithm; values at or below zero leave gaps.
+    /// Length proportional to the logarithm; values at or below zero leave gaps.
     Log,
 }
 
@@ -125,7 +125,7 @@ fn is_log<S: Serializer>(scale: &Scale, serializer: S) -> Result<S::Ok, S::Error
     serializer.serialize_bool(*scale == Scale::Log)
 }
 
-/// An axis: what it shows, in which unit, and how far.
+/// An axis: quantity, unit, scale and range.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Axis {
     /// Quantity and symbol, as in `time t`.
@@ -135,7 +135,7 @@ pub struct Axis {
     /// Linear or logarithmic.
     #[serde(rename = "log", serialize_with = "is_log")]
     pub scale: Scale,
-    /// Lowest and highest value shown, in the unit of the axis; otherwise as the data need.
+    /// Lowest and highest value shown, in the unit of the axis; `None` for the range of the data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limits: Option<(f64, f64)>,
 }
@@ -159,8 +159,8 @@ impl Axis {
         }
     }
 
-    /// Sets the lowest and the highest value shown, unless they make no range (not finite, not increasing, not positive on a
-    /// logarithmic axis).
+    /// Sets the lowest and the highest value shown; ignores invalid limits (not finite, not increasing, not positive on
+    /// a logarithmic axis).
     #[must_use]
     pub fn limits(mut self, low: f64, high: f64) -> Self {
         let is_range = low.is_finite() && high.is_finite() && low < high;

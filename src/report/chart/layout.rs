@@ -1,21 +1,21 @@
-//! Places the panels and the legend on the sheet.
+//! Layout of the panels and the legend of a figure.
 
 use super::axis::{self, Range, Ruler};
+use super::drawing::{Frame, Sheet};
 use super::figure::{Axis, Figure, Panel, Scale};
 use super::legend;
 use super::panel::{Placed, SIZE, label_height, label_width};
-use super::shape::{Frame, Sheet};
 
 /// Width of a figure in pixels: 180 mm, two columns of a journal.
 const WIDTH: f64 = 680.0;
 /// Blank edge around everything.
 const EDGE: f64 = 8.0;
-/// Room right of the last column, for a tick label that reaches beyond its axis.
+/// Margin right of the last column, for a tick label that extends beyond its axis.
 const RIGHT: f64 = 10.0;
 /// Gap between neighbouring columns and rows, beside their labels.
 const COLUMN_GAP: f64 = 24.0;
 const ROW_GAP: f64 = 7.0;
-/// Axes keep this width, however many columns there are.
+/// Least width of the axes.
 const NARROWEST: f64 = 60.0;
 const TITLE: f64 = 1.6 * SIZE;
 /// Height of the axes in pixels: alone, side by side, and in a stack.
@@ -25,7 +25,7 @@ const STACKED: f64 = 165.0;
 
 /// Draws a figure.
 pub(super) fn sheet(figure: &Figure) -> Sheet {
-    let grid = Grid::new(figure);
+    let grid = PanelGrid::new(figure);
     let rulers: Vec<Ruler> = (0..figure.panels.len()).map(|i| grid.y_ruler(i)).collect();
     let columns = grid.columns(&rulers);
     let left = columns.first().map_or(EDGE, |column| column.left);
@@ -52,8 +52,8 @@ pub(super) fn sheet(figure: &Figure) -> Sheet {
 }
 
 /// A column of panels, in pixels.
-struct Column {
-    /// Room for the labels left of the axes.
+struct PanelColumn {
+    /// Width of the labels left of the axes.
     labels: f64,
     /// Left edge of the axes.
     left: f64,
@@ -62,14 +62,14 @@ struct Column {
 }
 
 /// The panels in rows and columns, with their ranges.
-struct Grid<'a> {
+struct PanelGrid<'a> {
     panels: &'a [Panel],
     columns: usize,
     x: Vec<Option<Range>>,
     y: Vec<Option<Range>>,
 }
 
-impl<'a> Grid<'a> {
+impl<'a> PanelGrid<'a> {
     fn new(figure: &'a Figure) -> Self {
         let panels = figure.panels.as_slice();
         let extents = |of: &dyn Fn(&'a Panel) -> (Scale, Vec<f64>)| {
@@ -133,19 +133,19 @@ impl<'a> Grid<'a> {
         Ruler::new(self.panels[index].y.scale, self.y_range(index), most)
     }
 
-    /// Whether the panel below carries the labels of this one's horizontal axis.
+    /// True if the panel below has the labels of this one's horizontal axis.
     fn x_labels(&self, index: usize) -> bool {
         let below = self.panels.get(index + self.columns);
         below.is_none_or(|below| below.x != self.panels[index].x)
     }
 
-    /// Whether the panel to the left carries the labels of this one's vertical axis.
+    /// True if the panel to the left has the labels of this one's vertical axis.
     fn y_labels(&self, index: usize) -> bool {
         index.is_multiple_of(self.columns) || self.panels[index - 1].y != self.panels[index].y
     }
 
     /// The columns of the grid; their axes are equally wide.
-    fn columns(&self, rulers: &[Ruler]) -> Vec<Column> {
+    fn columns(&self, rulers: &[Ruler]) -> Vec<PanelColumn> {
         let mut labels = vec![0.0_f64; self.columns];
         for (index, ruler) in rulers.iter().enumerate() {
             let label = &mut labels[index % self.columns];
@@ -158,7 +158,7 @@ impl<'a> Grid<'a> {
         let mut columns = Vec::new();
         for labels in labels {
             left += labels;
-            columns.push(Column {
+            columns.push(PanelColumn {
                 labels,
                 left,
                 width,
@@ -179,7 +179,7 @@ impl<'a> Grid<'a> {
         label_height(labels) + if last { 0.0 } else { ROW_GAP }
     }
 
-    fn place(&self, index: usize, column: &Column, top: f64, y: Ruler) -> Placed<'a> {
+    fn place(&self, index: usize, column: &PanelColumn, top: f64, y: Ruler) -> Placed<'a> {
         let panel = &self.panels[index];
         Placed {
             panel,

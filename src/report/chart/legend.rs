@@ -1,9 +1,9 @@
-//! The legend: one line or more above the panels, where it covers no data.
+//! The legend: one or more lines above the panels.
 
+use super::drawing::{Anchor, Frame, Point, Primitive, Stroke, Words};
 use super::figure::Figure;
-use super::mark::{Kind, Mark};
 use super::panel::{BAND_OPACITY, SIZE, SPAN};
-use super::shape::{Anchor, Frame, Point, Shape, Stroke, Words};
+use super::plot_mark::{Mark, MarkKind};
 use crate::report::text;
 
 /// Length of the sample beside a label.
@@ -12,7 +12,7 @@ const SAMPLE_GAP: f64 = 6.0;
 const ENTRY_GAP: f64 = 18.0;
 const ROW: f64 = 18.0;
 
-/// The marks in the legend: labelled, and each label with the same look once.
+/// The marks in the legend: labelled marks, equal labels with equal style once.
 pub(super) fn entries(figure: &Figure) -> Vec<&Mark> {
     let mut entries: Vec<&Mark> = Vec::new();
     let marks = figure.panels.iter().flat_map(|panel| &panel.marks);
@@ -24,13 +24,13 @@ pub(super) fn entries(figure: &Figure) -> Vec<&Mark> {
     entries
 }
 
-/// Whether two marks have the same label and the same sample.
+/// True for two marks with the same label and the same sample.
 fn alike(one: &Mark, other: &Mark) -> bool {
     one.label == other.label && sample(one, (0.0, 0.0)) == sample(other, (0.0, 0.0))
 }
 
 /// Draws the legend from `left`, `top` on, within a width; returns the shapes and their height.
-pub(super) fn draw(entries: &[&Mark], left: f64, top: f64, width: f64) -> (Vec<Shape>, f64) {
+pub(super) fn draw(entries: &[&Mark], left: f64, top: f64, width: f64) -> (Vec<Primitive>, f64) {
     let places = places(entries, width);
     let mut shapes = Vec::new();
     for (mark, (x, row)) in entries.iter().zip(&places) {
@@ -40,13 +40,13 @@ pub(super) fn draw(entries: &[&Mark], left: f64, top: f64, width: f64) -> (Vec<S
         let at = (x + SAMPLE + SAMPLE_GAP, y);
         let size = text::fit(&mark.label, SIZE, room);
         let words = Words::new(at, mark.label.as_str(), size, Anchor::Start);
-        shapes.push(Shape::Text(words));
+        shapes.push(Primitive::Text(words));
     }
     let rows = places.last().map_or(0, |(_, row)| row + 1);
     (shapes, rows as f64 * ROW)
 }
 
-/// Horizontal place and row of each entry: side by side if that fits, or else in even columns.
+/// Horizontal position and row of each entry: side by side if they fit, else in equal columns.
 fn places(entries: &[&Mark], width: f64) -> Vec<(f64, usize)> {
     let need = |mark: &&Mark| SAMPLE + SAMPLE_GAP + text::width(&mark.label, SIZE) + ENTRY_GAP;
     let needs: Vec<f64> = entries.iter().map(need).collect();
@@ -67,8 +67,8 @@ fn places(entries: &[&Mark], width: f64) -> Vec<(f64, usize)> {
     (0..entries.len()).map(place).collect()
 }
 
-/// A short piece of a mark, its left end in the middle of the row at `at`.
-fn sample(mark: &Mark, (x, y): Point) -> Vec<Shape> {
+/// A sample of a mark, with its left end at a point at mid-height of the row.
+fn sample(mark: &Mark, (x, y): Point) -> Vec<Primitive> {
     let line = vec![(x, y), (x + SAMPLE, y)];
     let block = |ink| {
         let (left, top) = (x, y - 0.4 * SIZE);
@@ -78,16 +78,19 @@ fn sample(mark: &Mark, (x, y): Point) -> Vec<Shape> {
             width: SAMPLE,
             height: 0.8 * SIZE,
         };
-        vec![Shape::Area(frame.corners(), ink)]
+        vec![Primitive::Area(frame.corners(), ink)]
     };
     let stroke = Stroke::of(&mark.style);
     match mark.kind {
-        Kind::Line | Kind::Across | Kind::Upright => vec![Shape::Path(line, stroke)],
-        Kind::Points => {
-            let dot = |share| Shape::Dot((x + share * SAMPLE, y), stroke.width / 2.0, stroke.ink);
+        MarkKind::Line | MarkKind::Across | MarkKind::Upright => {
+            vec![Primitive::Path(line, stroke)]
+        }
+        MarkKind::Points => {
+            let dot =
+                |share| Primitive::Dot((x + share * SAMPLE, y), stroke.width / 2.0, stroke.ink);
             vec![dot(0.2), dot(0.5), dot(0.8)]
         }
-        Kind::Band => block(stroke.ink.opacity(BAND_OPACITY)),
-        Kind::Span => block(SPAN),
+        MarkKind::Band => block(stroke.ink.opacity(BAND_OPACITY)),
+        MarkKind::Span => block(SPAN),
     }
 }

@@ -6,18 +6,18 @@
 mod axis;
 mod curve;
 mod data;
+mod drawing;
 pub mod figure;
 mod layout;
 mod legend;
-pub mod mark;
 mod numbers;
 mod panel;
-mod shape;
+pub mod plot_mark;
 pub mod svg;
 mod thin;
 
 pub(super) use data::data;
 pub use figure::{Axis, Figure, Panel, Scale};
-pub use mark::{Colour, Dash, Mark, Style};
+pub use plot_mark::{Colour, Dash, Mark, Style};
 pub use svg::render;
 pub(super) use svg::sample;

@@ -1,11 +1,11 @@
-//! Numbers as the script of a page reads them: with the digits that can be seen.
+//! Serialisation of numbers for the script of a page, rounded to the digits that a chart resolves.
 
 use serde::{Serialize, Serializer};
 
-/// Significant digits of what can be read off, beyond those that all values of a curve have in common.
+/// Significant digits beyond those that all values of a curve have in common.
 const DIGITS: i32 = 6;
 
-/// Horizontal places.
+/// Abscissae of a curve.
 #[derive(PartialEq, Serialize)]
 #[serde(untagged)]
 enum Abscissae {
@@ -14,7 +14,7 @@ enum Abscissae {
 }
 
 impl Abscissae {
-    /// Places that are equally spaced to a millionth of a step are written by their ends.
+    /// Abscissae that are equally spaced to a millionth of a step are stored as their ends.
     fn new(x: &[f64]) -> Self {
         let (Some(from), Some(to)) = (x.first().copied(), x.last().copied()) else {
             return Self::Each(Vec::new());
@@ -29,18 +29,17 @@ impl Abscissae {
     }
 }
 
-/// Serialises horizontal places.
+/// Serialises abscissae.
 pub(super) fn places<S: Serializer>(x: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
     Abscissae::new(x).serialize(serializer)
 }
 
-/// Serialises values with the digits that can be read off.
+/// Serialises rounded values.
 pub(super) fn rounded<S: Serializer>(values: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
     digits(values).serialize(serializer)
 }
 
-/// As many digits as tell values apart that differ by a millionth of their range; what is not finite
-/// is left open.
+/// Rounds values to a millionth of their range; values that are not finite become `None`.
 fn digits(values: &[f64]) -> Vec<Option<f64>> {
     let finite = || values.iter().copied().filter(|v| v.is_finite());
     let (low, high) = finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {

@@ -1,10 +1,10 @@
-//! Draws one panel: grid, marks, axes.
+//! Rendering of one panel: grid, marks, axes.
 
 use super::axis::Ruler;
 use super::curve;
+use super::drawing::{Anchor, Frame, Ink, Point, Primitive, Stroke, Words};
 use super::figure::Panel;
-use super::mark::{Kind, Mark, Style};
-use super::shape::{Anchor, Frame, Ink, Point, Shape, Stroke, Words};
+use super::plot_mark::{Mark, MarkKind, Style};
 use crate::report::text;
 
 /// Font size of labels and ticks, in pixels.
@@ -14,7 +14,7 @@ const TICK: f64 = 4.5;
 const MINOR_TICK: f64 = 2.5;
 /// Gap between ticks, their labels and the axis label.
 const GAP: f64 = 5.0;
-/// Dots beyond this number cover each other, and are drawn as one thick thinned line.
+/// Most points drawn as dots; more overlap and are drawn as a thick thinned line.
 const MOST_DOTS: usize = 2000;
 
 const AXIS: Ink = Ink::solid((51, 51, 51));
@@ -22,17 +22,17 @@ const GRID: Ink = Ink::solid((228, 228, 228));
 pub(super) const SPAN: Ink = Ink::solid((238, 238, 238));
 pub(super) const BAND_OPACITY: f64 = 0.25;
 
-/// A panel in its place.
+/// A panel with its frame and rulers.
 pub(super) struct Placed<'a> {
     pub panel: &'a Panel,
     pub frame: Frame,
     pub x: Ruler,
     pub y: Ruler,
-    /// Whether tick labels and axis label are written, or left to the neighbour below.
+    /// True if tick labels and axis label are drawn; false if the panel below has them.
     pub x_labels: bool,
-    /// The same for the vertical axis and the neighbour to the left.
+    /// The same for the vertical axis and the panel to the left.
     pub y_labels: bool,
-    /// Room for the labels left of the frame, common to a column so that its axis labels align.
+    /// Width of the labels left of the frame, common to a column so that its axis labels align.
     pub label_width: f64,
 }
 
@@ -55,8 +55,8 @@ pub(super) fn label_width(ruler: &Ruler, labels: bool) -> f64 {
 }
 
 impl Placed<'_> {
-    /// Everything in the panel, from back to front.
-    pub fn shapes(&self) -> Vec<Shape> {
+    /// All primitives of the panel, from back to front.
+    pub fn shapes(&self) -> Vec<Primitive> {
         let mut shapes = Vec::new();
         self.spans(&mut shapes);
         self.grid(&mut shapes);
@@ -84,9 +84,9 @@ impl Placed<'_> {
         x.iter().zip(y).map(|(&x, &y)| self.pixel(x, y))
     }
 
-    /// Spans lie behind the grid, whatever their order among the marks.
-    fn spans(&self, shapes: &mut Vec<Shape>) {
-        for mark in (self.panel.marks.iter()).filter(|mark| mark.kind == Kind::Span) {
+    /// Draws spans; they are behind the grid regardless of their order among the marks.
+    fn spans(&self, shapes: &mut Vec<Primitive>) {
+        for mark in (self.panel.marks.iter()).filter(|mark| mark.kind == MarkKind::Span) {
             let [from, to] = [0, 1].map(|end| self.x.share(mark.x[end]));
             if from.is_nan() || to.is_nan() {
                 continue;
@@ -97,11 +97,11 @@ impl Placed<'_> {
                 width: self.x_pixel(from.max(to).clamp(0.0, 1.0)) - left,
                 ..self.frame
             };
-            shapes.push(Shape::Area(area.corners(), SPAN));
+            shapes.push(Primitive::Area(area.corners(), SPAN));
         }
     }
 
-    fn grid(&self, shapes: &mut Vec<Shape>) {
+    fn grid(&self, shapes: &mut Vec<Primitive>) {
         let stroke = Stroke::solid(GRID, 0.7);
         for tick in &self.x.major {
             shapes.push(self.rule_at_x(tick.share, stroke));
@@ -111,58 +111,58 @@ impl Placed<'_> {
         }
     }
 
-    fn rule_at_x(&self, share: f64, stroke: Stroke) -> Shape {
+    fn rule_at_x(&self, share: f64, stroke: Stroke) -> Primitive {
         let x = self.x_pixel(share);
-        Shape::Path(vec![(x, self.frame.bottom()), (x, self.frame.top)], stroke)
+        Primitive::Path(vec![(x, self.frame.bottom()), (x, self.frame.top)], stroke)
     }
 
-    fn rule_at_y(&self, share: f64, stroke: Stroke) -> Shape {
+    fn rule_at_y(&self, share: f64, stroke: Stroke) -> Primitive {
         let y = self.y_pixel(share);
-        Shape::Path(vec![(self.frame.left, y), (self.frame.right(), y)], stroke)
+        Primitive::Path(vec![(self.frame.left, y), (self.frame.right(), y)], stroke)
     }
 
-    fn mark(&self, mark: &Mark, shapes: &mut Vec<Shape>) {
+    fn mark(&self, mark: &Mark, shapes: &mut Vec<Primitive>) {
         let stroke = Stroke::of(&mark.style);
         let is_inside = |share: &f64| (0.0..=1.0).contains(share);
         match mark.kind {
-            Kind::Points if mark.x.len().min(mark.y.len()) <= MOST_DOTS => {
+            MarkKind::Points if mark.x.len().min(mark.y.len()) <= MOST_DOTS => {
                 let dots = self.pixels(&mark.x, &mark.y);
                 dots.for_each(|dot| self.dot(dot, &mark.style, shapes));
             }
-            Kind::Line | Kind::Points => self.line(mark, shapes),
-            Kind::Band => self.band(mark, shapes),
-            Kind::Span => {}
-            Kind::Across => {
+            MarkKind::Line | MarkKind::Points => self.line(mark, shapes),
+            MarkKind::Band => self.band(mark, shapes),
+            MarkKind::Span => {}
+            MarkKind::Across => {
                 let share = mark.y.iter().map(|y| self.y.share(*y)).find(is_inside);
                 shapes.extend(share.map(|share| self.rule_at_y(share, stroke)));
             }
-            Kind::Upright => {
+            MarkKind::Upright => {
                 let share = mark.x.iter().map(|x| self.x.share(*x)).find(is_inside);
                 shapes.extend(share.map(|share| self.rule_at_x(share, stroke)));
             }
         }
     }
 
-    fn line(&self, Mark { x, y, style, .. }: &Mark, shapes: &mut Vec<Shape>) {
+    fn line(&self, Mark { x, y, style, .. }: &Mark, shapes: &mut Vec<Primitive>) {
         for run in curve::runs(self.pixels(x, y)) {
-            // A reading between two gaps has no segment to show it.
+            // A point between two gaps has no line segment and is drawn as a dot.
             if let [alone] = run[..] {
                 self.dot(alone, &style.width(2.0 * style.width), shapes);
             }
             for piece in curve::clip(&curve::thin(&run), &self.frame) {
-                shapes.push(Shape::Path(piece, Stroke::of(style)));
+                shapes.push(Primitive::Path(piece, Stroke::of(style)));
             }
         }
     }
 
-    fn dot(&self, point: Point, style: &Style, shapes: &mut Vec<Shape>) {
+    fn dot(&self, point: Point, style: &Style, shapes: &mut Vec<Primitive>) {
         if curve::inside(point, &self.frame) {
             let stroke = Stroke::of(style);
-            shapes.push(Shape::Dot(point, stroke.width / 2.0, stroke.ink));
+            shapes.push(Primitive::Dot(point, stroke.width / 2.0, stroke.ink));
         }
     }
 
-    fn band(&self, mark: &Mark, shapes: &mut Vec<Shape>) {
+    fn band(&self, mark: &Mark, shapes: &mut Vec<Primitive>) {
         let ink = Ink::of(mark.style.colour).opacity(BAND_OPACITY);
         let low = self.pixels(&mark.x, &mark.y);
         let edges: Vec<_> = low.zip(self.pixels(&mark.x, &mark.high)).collect();
@@ -175,24 +175,24 @@ impl Placed<'_> {
                     .map(|point| curve::clamp(point, &self.frame))
             };
             let outline = edge(|edge| edge.0).chain(edge(|edge| edge.1).rev());
-            shapes.push(Shape::Area(outline.collect(), ink));
+            shapes.push(Primitive::Area(outline.collect(), ink));
         }
     }
 
-    fn axes(&self, shapes: &mut Vec<Shape>) {
+    fn axes(&self, shapes: &mut Vec<Primitive>) {
         let stroke = Stroke::solid(AXIS, 0.8);
         let mut outline = self.frame.corners();
         outline.push(outline[0]);
-        shapes.push(Shape::Path(outline, stroke));
+        shapes.push(Primitive::Path(outline, stroke));
         let Frame { left, .. } = self.frame;
         let bottom = self.frame.bottom();
         let x_tick = |share: f64, length: f64| {
             let x = self.x_pixel(share);
-            Shape::Path(vec![(x, bottom), (x, bottom + length)], stroke)
+            Primitive::Path(vec![(x, bottom), (x, bottom + length)], stroke)
         };
         let y_tick = |share: f64, length: f64| {
             let y = self.y_pixel(share);
-            Shape::Path(vec![(left, y), (left - length, y)], stroke)
+            Primitive::Path(vec![(left, y), (left - length, y)], stroke)
         };
         for tick in &self.x.major {
             shapes.push(x_tick(tick.share, TICK));
@@ -215,8 +215,8 @@ impl Placed<'_> {
         shapes.extend(self.y.minor.iter().map(|share| y_tick(*share, MINOR_TICK)));
     }
 
-    /// Axis labels and heading; smaller where they would run into a neighbour.
-    fn titles(&self, shapes: &mut Vec<Shape>) {
+    /// Axis labels and heading, reduced in size where they would overlap a neighbour.
+    fn titles(&self, shapes: &mut Vec<Primitive>) {
         let Frame {
             left,
             top,
@@ -235,7 +235,7 @@ impl Placed<'_> {
             let size = text::fit(&caption, SIZE, height);
             let at = (left - self.label_width + SIZE / 2.0, top + height / 2.0);
             let caption = Words::new(at, caption, size, Anchor::Middle);
-            shapes.push(Shape::Text(Words {
+            shapes.push(Primitive::Text(Words {
                 upward: true,
                 ..caption
             }));
@@ -243,13 +243,13 @@ impl Placed<'_> {
         let size = text::fit(&self.panel.title, SIZE, 0.9 * width);
         let at = (left, top - 0.5 * SIZE - GAP);
         let title = Words::new(at, self.panel.title.as_str(), size, Anchor::Start);
-        shapes.push(Shape::Text(Words {
+        shapes.push(Primitive::Text(Words {
             bold: true,
             ..title
         }));
     }
 }
 
-fn words(at: Point, text: &str, size: f64, anchor: Anchor) -> Shape {
-    Shape::Text(Words::new(at, text, size, anchor))
+fn words(at: Point, text: &str, size: f64, anchor: Anchor) -> Primitive {
+    Primitive::Text(Words::new(at, text, size, anchor))
 }

@@ -1,15 +1,15 @@
-//! Writes a figure as SVG.
+//! Rendering of a figure as SVG.
 //!
-//! The drawing is ten times as large as the picture: a unit is a tenth of a pixel, `viewBox` scales it back, and all places
-//! are whole numbers. Neighbouring shapes of one look stand in a group that has the look.
+//! Coordinates are integers in tenths of a pixel; `viewBox` scales them. Consecutive primitives of equal style form a
+//! group that has the style.
 
+use super::drawing::{Anchor, Ink, Point, Primitive, Words};
 use super::figure::Figure;
 use super::layout;
-use super::mark::{Dash, Style};
-use super::shape::{Anchor, Ink, Point, Shape, Words};
+use super::plot_mark::{Dash, Style};
 use crate::report::text::escape;
 
-/// Units of the drawing in one pixel of the picture.
+/// Units per pixel.
 const UNITS: f64 = 10.0;
 
 /// The figure as an SVG document: white background, generic sans-serif, no scripts, no links.
@@ -36,12 +36,12 @@ pub fn render(figure: &Figure) -> String {
     svg + "</svg>\n"
 }
 
-/// The attributes of the group to which a shape belongs: its dash pattern, and the colour of dots,
-/// which would be most of the file if each dot said it again.
-fn common(shape: &Shape) -> String {
+/// The attributes of the group of a primitive: dash pattern, and colour of dots. Repeated for each dot they would
+/// dominate the size of the file.
+fn common(shape: &Primitive) -> String {
     match shape {
-        Shape::Path(_, stroke) => pattern(stroke.dash),
-        Shape::Dot(_, _, ink) => format!(" fill=\"{}\"", hex(ink)),
+        Primitive::Path(_, stroke) => pattern(stroke.dash),
+        Primitive::Dot(_, _, ink) => format!(" fill=\"{}\"", hex(ink)),
         _ => String::new(),
     }
 }
@@ -54,30 +54,30 @@ fn pattern(dash: Dash) -> String {
     }
 }
 
-fn draw(shape: &Shape) -> String {
+fn draw(shape: &Primitive) -> String {
     match shape {
-        Shape::Path(points, stroke) => format!(
+        Primitive::Path(points, stroke) => format!(
             "<polyline fill=\"none\"{} stroke=\"{}\" stroke-width=\"{}\" points=\"{}\"/>\n",
             opacity(&stroke.ink),
             hex(&stroke.ink),
             units(stroke.width),
             places(points)
         ),
-        Shape::Area(points, ink) => format!(
+        Primitive::Area(points, ink) => format!(
             "<polygon{} fill=\"{}\" points=\"{}\"/>\n",
             opacity(ink),
             hex(ink),
             places(points)
         ),
-        Shape::Dot((x, y), radius, ink) => format!(
+        Primitive::Dot((x, y), radius, ink) => format!(
             "<circle cx=\"{}\" cy=\"{}\" r=\"{}\"{}/>\n",
             units(*x),
             units(*y),
             units(*radius).max(1),
             opacity(ink)
         ),
-        Shape::Text(words) if words.text.is_empty() => String::new(),
-        Shape::Text(words) => text(words),
+        Primitive::Text(words) if words.text.is_empty() => String::new(),
+        Primitive::Text(words) => text(words),
     }
 }
 
@@ -127,7 +127,7 @@ fn opacity(ink: &Ink) -> String {
     }
 }
 
-/// A short line in a style as a small drawing for the text of a page, where it stands for a run.
+/// A short line in a style as an inline SVG: the symbol of a run in the text of a page.
 pub(in crate::report) fn sample(style: &Style) -> String {
     format!(
         "<svg aria-hidden=\"true\" viewBox=\"0 0 400 100\"><path d=\"M0 50H400\" fill=\"none\" \

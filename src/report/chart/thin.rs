@@ -1,18 +1,18 @@
-//! Fewer points for the same picture: a page of a long record stays small.
+//! Thinning of curves, which bounds the size of pages of long records without visible change.
 
 use super::axis::{even, extent};
 use super::figure::Scale;
 
-/// So many points of a curve are kept as they are.
+/// Longest curve that is not thinned, points.
 const FEW: usize = 4000;
-/// Columns of a longer one, in each of which its first, lowest, highest and last point are kept: more
-/// than a chart has pixels.
+/// Columns of a longer curve, in each of which its first, lowest, highest and last point are kept: more than the pixels
+/// of a chart.
 const COLUMNS: f64 = 700.0;
-/// Points that lie on a straight line to this share of the curve's range are left out.
+/// Tolerance, relative to the range of the curve, within which points on a straight line are removed.
 const STRAIGHT: f64 = 1e-6;
 
-/// The points to be kept of curves `ys` over one `x`, and whether that leaves out any that can be seen
-/// when zoomed. `joined` says that the points are joined by lines.
+/// Indices of the kept points of curves `ys` over one `x`, and true if removed points would be visible when zoomed.
+/// `joined`: the points are joined by lines.
 pub(super) fn kept(x: (&[f64], Scale), ys: &[(&[f64], Scale)], joined: bool) -> (Vec<usize>, bool) {
     let count = (ys.iter().map(|(y, _)| y.len())).fold(x.0.len(), usize::min);
     let all: Vec<usize> = (0..count).collect();
@@ -25,14 +25,14 @@ pub(super) fn kept(x: (&[f64], Scale), ys: &[(&[f64], Scale)], joined: bool) -> 
         true => corners(x, (y, *scale), &points),
         false => points.clone(),
     };
-    // Curves over the same points share them, so that leaving out a few gains nothing.
+    // Curves over the same points share their abscissae, so removing few points saves nothing.
     match straight.len() < points.len() / 2 {
         true => (straight, thinned),
         false => (points, thinned),
     }
 }
 
-/// In each column the first, the last, and the lowest and highest of every curve.
+/// Per column the first and last point, and the lowest and highest of every curve.
 fn columns((x, scale): (&[f64], Scale), ys: &[(&[f64], Scale)], points: &[usize]) -> Vec<usize> {
     let (low, high) = extent(scale, x).unwrap_or((0.0, 1.0));
     let column = |i: usize| (COLUMNS * (even(scale, x[i]) - low) / (high - low)).floor();
@@ -59,8 +59,7 @@ fn columns((x, scale): (&[f64], Scale), ys: &[(&[f64], Scale)], points: &[usize]
     kept
 }
 
-/// The ends of the straight pieces of a curve: all points between them lie within [`STRAIGHT`] of the
-/// lines that join these.
+/// The ends of the straight segments of a curve: all points between them are within [`STRAIGHT`] of the segments.
 fn corners(x: (&[f64], Scale), y: (&[f64], Scale), points: &[usize]) -> Vec<usize> {
     let Some((low, high)) = extent(y.1, y.0) else {
         return points.to_vec();
@@ -132,7 +131,7 @@ mod tests {
         let of = |y: &[f64]| kept((&x, LINEAR), &[(y, LINEAR)], true).0;
         assert_eq!(of(&bent), [0, 400, 1000]);
         assert_eq!(of(&vec![2.0; 1001]), [0, 1000]);
-        // What is left out lies on the lines that are left.
+        // Removed points are on the remaining segments.
         let curved: Vec<f64> = x.iter().map(|x| (1e-3 * x).sin()).collect();
         let corners = of(&curved);
         assert!(corners.len() < 500, "{}", corners.len());

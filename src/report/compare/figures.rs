@@ -14,7 +14,7 @@ pub(super) fn style(index: usize) -> Style {
     // Black and grey, the last two, are left to the truth.
     let colour = Colour::nth(index % (Colour::ALL.len() - 2));
     let dash = Dash::nth(index + index / 12);
-    // Dots need more ink to be seen.
+    // Dots are drawn larger than lines are wide.
     let width = if dash == Dash::Dotted { 2.2 } else { 1.6 };
     Style::new(colour).dash(dash).width(width)
 }
@@ -34,7 +34,7 @@ pub(super) fn all(comparison: &Comparison) -> Vec<Figure> {
     figures
 }
 
-/// A curve of each device: its caption, its unit, its values.
+/// A curve of each system: caption, unit, values.
 type Curve = (
     &'static str,
     &'static str,
@@ -103,7 +103,10 @@ fn list(measures: &[Measures], of: impl Fn(&Measures) -> Option<String>) -> Stri
 fn overlay(figure: Figure, runs: &[ComparedRun], curves: &[Curve]) -> Figure {
     let truths = truths(runs);
     figure.panels(curves.iter().map(|(label, unit, of)| {
-        let found: Vec<Vec<f64>> = runs.iter().map(|run| of(&run.finished.device)).collect();
+        let found: Vec<Vec<f64>> = runs
+            .iter()
+            .map(|run| of(&run.finished.coefficients))
+            .collect();
         let real: Vec<Vec<f64>> = truths.iter().map(|(_, _, truth)| of(truth)).collect();
         let mut panel = Panel::of_time(*label, *unit);
         if let Some((low, high)) = without_spikes(&real, &found) {
@@ -119,17 +122,16 @@ fn overlay(figure: Figure, runs: &[ComparedRun], curves: &[Curve]) -> Figure {
     }))
 }
 
-/// Share of the nodes at either end of the values of a run that may be spikes.
+/// Share of the nodes, at either end of the sorted values of a run, that can be spikes.
 const SPIKES: f64 = 0.03;
-/// Spikes that take more than this many times the room of everything else are cut off: what the
-/// figure is for would be a flat line.
+/// Spikes that extend the range by more than this factor are cut off, because they would flatten the curves.
 const ROOM: f64 = 3.0;
 
-/// What stays within this share of its size is flat to the eye.
+/// Relative variation below which a curve is treated as constant.
 const FLAT: f64 = 0.1;
 
-/// The range to be shown where a few nodes of some runs would hide everything else; all of `real`
-/// is in it. `None` where everything can be shown.
+/// Range of the axis that excludes the spikes of some runs but includes all of `real`; `None` if no spikes need to be
+/// cut off.
 fn without_spikes(real: &[Vec<f64>], found: &[Vec<f64>]) -> Option<(f64, f64)> {
     let empty = (f64::INFINITY, f64::NEG_INFINITY);
     let union = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
@@ -137,7 +139,7 @@ fn without_spikes(real: &[Vec<f64>], found: &[Vec<f64>]) -> Option<(f64, f64)> {
     let truth = real.iter().map(|f| span(f, 0.0)).fold(empty, union);
     let (all, most) = (union(truth, spans(0.0)), union(truth, spans(SPIKES)));
     let room = most.1 - most.0;
-    // Where the rest is constant, its own size is its room.
+    // For constant values their magnitude is the reference.
     let room = room.max(FLAT * most.0.abs().max(most.1.abs()));
     let pad = 0.25 * room;
     let hidden = all.1 - all.0 > ROOM * room && room > 0.0;
@@ -156,7 +158,7 @@ fn span(f: &[f64], skip: f64) -> (f64, f64) {
     }
 }
 
-/// Which runs leave the range, and how far they go.
+/// Runs with values outside the range, and these values.
 fn reaches(
     runs: &[ComparedRun],
     found: &[Vec<f64>],
@@ -174,7 +176,7 @@ fn reaches(
     all.join(", ")
 }
 
-/// The true devices, each once, with its label and the run whose grid it is on.
+/// The true systems, each once, with label and the run that has its grid.
 fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &NodalCoefficients)> {
     let mut found: Vec<(&ComparedRun, &NodalCoefficients)> = Vec::new();
     let grid = |run: &'_ ComparedRun| run.finished.system.grid;
@@ -200,12 +202,12 @@ fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &NodalCoefficients
         .collect()
 }
 
-/// The residuals of the measured motions, one panel for each name of an experiment.
+/// The residuals of the records, one panel for each name of an experiment.
 fn residuals(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
     let mut names: Vec<&str> = Vec::new();
-    for motion in runs.iter().flat_map(|run| &run.motions) {
-        if !names.contains(&motion.experiment.as_str()) {
-            names.push(&motion.experiment);
+    for response in runs.iter().flat_map(|run| &run.responses) {
+        if !names.contains(&response.experiment.as_str()) {
+            names.push(&response.experiment);
         }
     }
     let misfits = list(measures, |m| Some(format!("J/J0 {:.1e}", m.cost_ratio)));
@@ -218,9 +220,9 @@ fn residuals(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
         let title = if names.len() > 1 { *name } else { "" };
         let zero = Mark::horizontal("", 0.0, Style::new(Colour::Grey).width(0.8));
         let runs = runs.iter().enumerate().flat_map(|(i, run)| {
-            let motions = run.motions.iter().filter(|m| m.experiment == *name);
+            let responses = run.responses.iter().filter(|m| m.experiment == *name);
             let style = style(i).width(1.2);
-            motions.map(move |m| Mark::line(&run.name, &m.times, &m.residual, style))
+            responses.map(move |m| Mark::line(&run.name, &m.times, &m.residual, style))
         });
         let panel = Panel::of_time("y − y_obs", "m").title(title);
         panel.mark(zero).marks(runs)

@@ -22,10 +22,10 @@ pub struct Measures {
     pub reason: String,
     /// Summary in one line.
     pub verdict: String,
-    /// Whether the response is fitted.
+    /// True if the response is fitted.
     #[serde(skip)]
     pub is_matched: bool,
-    /// Whether `k/m` and `c/m` agree with the true system; `null` where it is not known.
+    /// True if `k/m` and `c/m` agree with the true system; `null` if it is not known.
     pub is_true_system: Option<bool>,
     /// Solver.
     pub method: String,
@@ -37,11 +37,11 @@ pub struct Measures {
     pub misfit: f64,
     /// `m^2 s`; `1` for a chi-square; `N^2 s` for the equation error; of a rotation `rad^2 s` and `N^2 m^2 s`.
     pub misfit_unit: &'static str,
-    /// Smallest fit of a channel, per cent; `null` where no channel has one.
+    /// Smallest fit of a channel, per cent; `null` if no channel has one.
     pub worst_fit: Option<f64>,
-    /// Whether the displacement is an angle: then kg, N and m stand for kg m², N m and rad.
+    /// True if the displacement is an angle; kg, N and m then denote kg m², N m and rad.
     pub is_rotation: bool,
-    /// Whether `J/J0` is meaningful: not if sigma was estimated.
+    /// True if `J/J0` is meaningful: not if sigma was estimated.
     pub has_ratio: bool,
     /// `J/J0`.
     pub cost_ratio: f64,
@@ -49,7 +49,7 @@ pub struct Measures {
     pub iterations: u64,
     /// Wall-clock time, s.
     pub seconds: f64,
-    /// Errors relative to the true system, where it is known.
+    /// Errors relative to the true system, if known.
     pub errors: Option<TruthErrors>,
     /// Smallest mass at a node, kg.
     pub smallest_mass: f64,
@@ -73,9 +73,10 @@ impl Measures {
     /// Quantities of a run.
     pub fn of(run: &ComparedRun) -> Self {
         let document = &run.finished.document;
-        let device = &run.finished.device;
+        let coefficients = &run.finished.coefficients;
         let response = ResponseFit::of(run);
-        let errors = (run.finished.truth.as_ref()).map(|truth| TruthErrors::of(device, truth));
+        let errors =
+            (run.finished.truth.as_ref()).map(|truth| TruthErrors::of(coefficients, truth));
         Self {
             name: run.name.clone(),
             title: document.title.clone(),
@@ -103,10 +104,10 @@ impl Measures {
                 + document.weights.as_ref().map_or(0, |w| w.iterations()),
             seconds: document.seconds,
             errors,
-            smallest_mass: smallest(&device.mass),
-            smallest_damping: smallest(&device.coefficients[0]),
+            smallest_mass: smallest(&coefficients.mass),
+            smallest_damping: smallest(&coefficients.coefficients[0]),
             max_violation: run.max_violation,
-            roughness: Roughness::of(device, run.finished.system.grid.step()),
+            roughness: Roughness::of(coefficients, run.finished.system.grid.step()),
             predictions: document.predictions.clone(),
             assumptions: document.identifiability.assumptions.clone(),
             identifiability: document.identifiability.warnings.clone(),

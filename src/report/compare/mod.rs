@@ -13,7 +13,7 @@ mod text;
 mod verdict;
 
 pub use measures::Measures;
-pub use run::{ComparedRun, MatchedMotion};
+pub use run::{ComparedRun, MatchedResponse};
 
 use super::render;
 use crate::results::{Claim, OutputFolder};

@@ -1,7 +1,7 @@
 //! A compared run, read from its folder.
 
 use crate::error::InputError;
-use crate::report::{Columns, Run};
+use crate::report::{ResultTable, Run};
 use std::path::Path;
 
 /// A finished run with the data of its figures.
@@ -18,12 +18,12 @@ pub struct ComparedRun {
     /// `J/J0` after each iteration.
     pub cost_ratio: Vec<f64>,
     /// Fitted responses.
-    pub motions: Vec<MatchedMotion>,
+    pub responses: Vec<MatchedResponse>,
 }
 
 /// A measured response and its residuals.
 #[derive(Debug, Clone, PartialEq)]
-pub struct MatchedMotion {
+pub struct MatchedResponse {
     /// Name of the experiment.
     pub experiment: String,
     /// Times of the samples, s.
@@ -53,7 +53,7 @@ impl ComparedRun {
                 .map(|r| r.iteration as f64)
                 .collect(),
             cost_ratio: finished.history.iter().map(|r| r.cost_ratio).collect(),
-            motions: motions(&finished.trajectory, names),
+            responses: responses(&finished.trajectory, names),
             finished,
         })
     }
@@ -64,9 +64,12 @@ impl ComparedRun {
     }
 }
 
-/// The motions that have readings: `y_m` and `observed_y_m`, or with the number of the experiment
-/// where there are several. `names` are those of the experiments with readings, in order.
-fn motions(trajectory: &Columns, mut names: impl Iterator<Item = String>) -> Vec<MatchedMotion> {
+/// The responses that have samples: `y_m` and `observed_y_m`, or with the number of the experiment
+/// where there are several. `names` are those of the experiments with samples, in order.
+fn responses(
+    trajectory: &ResultTable,
+    mut names: impl Iterator<Item = String>,
+) -> Vec<MatchedResponse> {
     let numbered = (1..=trajectory.headers().len()).map(|i| format!("_{i}"));
     let suffixes = std::iter::once(String::new()).chain(numbered);
     let Some(times) = trajectory.column("t_s") else {
@@ -79,7 +82,7 @@ fn motions(trajectory: &Columns, mut names: impl Iterator<Item = String>) -> Vec
             let read = |i: &usize| observed[*i].is_finite() && found[*i].is_finite();
             let kept: Vec<usize> = (0..observed.len()).filter(read).collect();
             let at = |f: &dyn Fn(usize) -> f64| kept.iter().map(|&i| f(i)).collect();
-            Some(MatchedMotion {
+            Some(MatchedResponse {
                 experiment: names.next().unwrap_or_else(|| "motion".into()),
                 times: at(&|i| times[i]),
                 observed: at(&|i| observed[i]),

@@ -14,7 +14,7 @@ pub(super) enum ResponseFit {
     /// Fit of the worst channel, per cent. Sigma was estimated, so chi-square carries no information.
     Fit(f64),
     /// Chi-square of so many samples.
-    ChiSquare { misfit: f64, readings: f64 },
+    ChiSquare { misfit: f64, samples: f64 },
     /// `J/J0` of the equation error; no response was simulated.
     Equation(f64),
     /// Root-mean-square residual over root-mean-square sample, and `J/J0`.
@@ -37,7 +37,7 @@ impl ResponseFit {
         match document.model.cost_kind {
             CostKind::ChiSquare => Self::ChiSquare {
                 misfit: document.cost.misfit,
-                readings: document.experiments.iter().map(|e| e.readings as f64).sum(),
+                samples: document.experiments.iter().map(|e| e.samples as f64).sum(),
             },
             CostKind::EquationError => Self::Equation(ratio),
             CostKind::Integral | CostKind::Mixed => Self::Residual {
@@ -52,10 +52,7 @@ impl ResponseFit {
     pub fn is_matched(&self) -> bool {
         match *self {
             Self::Fit(percent) => percent >= FITTED,
-            Self::ChiSquare {
-                misfit,
-                readings: n,
-            } => misfit <= n + 2.0 * (2.0 * n).sqrt(),
+            Self::ChiSquare { misfit, samples: n } => misfit <= n + 2.0 * (2.0 * n).sqrt(),
             Self::Equation(_) => false,
             Self::Residual { share, .. } => share <= MATCHED,
         }
@@ -72,9 +69,9 @@ impl fmt::Display for ResponseFit {
             Self::Fit(percent) => {
                 write!(f, "{verb} (fit {percent:.1} %, sigma estimated)")
             }
-            Self::ChiSquare { misfit, readings } => write!(
+            Self::ChiSquare { misfit, samples } => write!(
                 f,
-                "{verb} within the noise (chi-square {misfit:.0} for {readings} samples)"
+                "{verb} within the noise (chi-square {misfit:.0} for {samples} samples)"
             ),
             Self::Equation(ratio) => {
                 write!(
@@ -132,12 +129,12 @@ pub(super) fn verdict(response: &ResponseFit, errors: Option<&TruthErrors>) -> S
 /// Root-mean-square residual over root-mean-square sample, the largest of all records.
 fn residual_share(run: &ComparedRun) -> f64 {
     let squares = |f: &[f64]| f.iter().map(|x| x * x).sum::<f64>();
-    let shares = run.motions.iter().map(|motion| {
-        let left = squares(&motion.residual);
+    let shares = run.responses.iter().map(|response| {
+        let left = squares(&response.residual);
         if left == 0.0 {
             0.0
         } else {
-            (left / squares(&motion.observed)).sqrt()
+            (left / squares(&response.observed)).sqrt()
         }
     });
     shares.fold(0.0, f64::max)

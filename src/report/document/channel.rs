@@ -1,4 +1,4 @@
-//! Parts of the document about channels and scalars.
+//! Channels, nuisance parameters and validation records in the result document.
 
 use kmcfit_core::internals::assessment::ResidualPattern;
 use kmcfit_core::internals::solvers::number_or_nan;
@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 pub struct ChannelSummary {
     /// `displacement`, `velocity` or `acceleration`.
     pub kind: String,
-    /// Unit of the numbers here: that of the file.
+    /// Unit of the values, that of the file.
     pub unit: String,
-    /// Number of readings that are used.
-    pub readings: usize,
-    /// Readings that are not used.
+    /// Number of used samples.
+    pub samples: usize,
+    /// Unused samples.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ignored: Vec<IgnoredSummary>,
     /// Number of samples rejected as outliers under a robust loss ([`kmcfit_core::internals::diagnostics::far_off`]);
@@ -23,31 +23,31 @@ pub struct ChannelSummary {
     /// Root-mean-square residual.
     #[serde(deserialize_with = "number_or_nan")]
     pub rms_residual: f64,
-    /// `100 (1 - |residual| / |reading - mean|)`.
+    /// `100 (1 - |residual| / |sample - mean|)`.
     #[serde(deserialize_with = "number_or_nan")]
     pub fit_percent: f64,
-    /// Standard deviation of a reading, where there is one for all.
+    /// Standard deviation of a sample; `null` if it differs between samples.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma: Option<f64>,
-    /// Whether that was estimated.
+    /// True if sigma was estimated.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub sigma_estimated: bool,
-    /// Whether the loss is a robust one.
+    /// True for a robust loss.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub robust: bool,
-    /// What the residuals have that is neither noise nor motion, if there is anything of the kind.
+    /// Pattern in the residuals beside noise and response, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pattern: Option<ResidualPattern>,
-    /// What the channel adds to J.
+    /// Contribution to J.
     #[serde(deserialize_with = "number_or_nan")]
     pub cost: f64,
-    /// Whether the residuals look white, in words.
+    /// Result of the test of whiteness, as text.
     pub whiteness: String,
-    /// p-value of the Ljung-Box test of whiteness; `null` where it could not be made.
+    /// p-value of the Ljung-Box test of whiteness; `null` if the test is not possible.
     pub whiteness_p_value: Option<f64>,
     /// Autocorrelation of the residuals at lags 0, 1, ...
     pub autocorrelation: Vec<f64>,
-    /// That of white noise lies below this in 95 of 100 lags.
+    /// Bound on the autocorrelation of white noise, exceeded at 5 % of the lags.
     #[serde(deserialize_with = "number_or_nan")]
     pub autocorrelation_band: f64,
 }
@@ -57,41 +57,41 @@ fn is_zero(count: &usize) -> bool {
     *count == 0
 }
 
-/// Readings that are not used, and why.
+/// Unused samples and the reason.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct IgnoredSummary {
-    /// How many.
-    pub readings: usize,
-    /// Why.
+    /// Number of samples.
+    pub samples: usize,
+    /// Reason.
     pub reason: String,
 }
 
-/// A number that was fitted beside the functions.
+/// A nuisance parameter: an estimated initial value or sensor parameter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NuisanceParameter {
     /// Name.
     pub name: String,
     /// SI unit.
     pub unit: String,
-    /// Value found.
+    /// Estimate.
     #[serde(deserialize_with = "number_or_nan")]
     pub value: f64,
-    /// Standard error from the linearised fit, without constraints, penalties and priors; `null`
-    /// where the readings do not determine all parameters.
+    /// Standard error from the linearised fit, without constraints, penalties and priors; `null` if the samples do not
+    /// determine all parameters.
     pub standard_error: Option<f64>,
 }
 
-/// An experiment that took no part in the fit.
+/// A validation record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ValidationSummary {
     /// Name.
     pub name: String,
     /// Fit of each channel.
     pub channels: Vec<ChannelSummary>,
-    /// What was found from its own readings: its initial state, its sensors.
+    /// Parameters estimated from its own samples: initial state, sensors.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub nuisance_parameters: Vec<NuisanceParameter>,
-    /// Why there is no prediction, if there is none.
+    /// Reason for a missing prediction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! `result.json`: the document that a run leaves behind. Its keys are stable.
+//! The result document of a run, `result.json`. Its keys are stable.
 
 mod channel;
 mod search;
@@ -29,26 +29,26 @@ pub struct ResultDocument {
     pub title: String,
     /// Version of kmcfit.
     pub version: String,
-    /// What was run.
+    /// Model, grid and method.
     pub model: ModelSummary,
-    /// How it ended.
+    /// Status and reason of the end.
     pub outcome: OutcomeSummary,
     /// The cost and its parts.
     pub cost: CostSummary,
     /// The gradient at the start and at the end.
     pub gradient: GradientSummary,
-    /// How far the best point is from the first-order condition of a minimum under the constraints; absent where the fit did not
-    /// come to an end, where J is zero, and where the linearised problem could not be solved.
+    /// Residual of the first-order condition of a constrained minimum at the best point; absent for an unfinished fit,
+    /// for J = 0, and if the linearised problem could not be solved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub optimality: Option<Optimality>,
     /// Work done; one count is one pass over all experiments.
     pub counts: CountsSummary,
     /// Wall-clock time of the fit, s. Two runs of one model differ in this and in `timings` only.
     pub seconds: f64,
-    /// Where the time of the whole run went.
+    /// Wall-clock time of the whole run by activity.
     #[serde(default)]
     pub timings: TimingsSummary,
-    /// The functions found, by name.
+    /// Estimated functions, by name.
     pub functions: BTreeMap<String, FunctionSummary>,
     /// The constraints at the best point.
     #[serde(default)]
@@ -90,13 +90,13 @@ pub struct ResultDocument {
     pub suggestions: Vec<Finding>,
 }
 
-/// What was run.
+/// Model, grid and method of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ModelSummary {
-    /// The model file, as it was given.
+    /// Path of the model file, as given.
     #[serde(default)]
     pub file: String,
-    /// What was given beside it, in the place of its own values (`--set`).
+    /// Overrides (`--set`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub overrides: Vec<String>,
     /// Number of nodes.
@@ -111,36 +111,35 @@ pub struct ModelSummary {
     pub stepper: String,
     /// Solver.
     pub method: String,
-    /// Which adjoint gave the gradient.
+    /// Adjoint of the gradient: discrete or continuous.
     pub gradient: String,
     /// Number of free parameters.
     pub parameters: usize,
     /// The force terms, by the names of their functions.
     #[serde(default = "linear_terms")]
     pub terms: Vec<String>,
-    /// Width of Coulomb friction, m/s, where there is any.
+    /// Width of Coulomb friction, m/s, if the model has friction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction_width: Option<f64>,
-    /// How the misfit in J is measured: `integral`, `chi-square`, `mixed` or
-    /// `equation-error`.
+    /// Kind of the misfit in J: `integral`, `chi-square`, `mixed` or `equation-error`.
     pub cost_kind: CostKind,
-    /// The whole of J in one sentence, with all its factors.
+    /// Formula of J with all factors, as a sentence.
     pub cost_definition: String,
 }
 
 impl ModelSummary {
-    /// The grid of the run; `None` if the numbers make no grid.
+    /// The grid of the run; `None` if the values are invalid.
     pub fn grid(&self) -> Option<Grid> {
         Grid::new(self.start, self.duration, self.nodes)
     }
 }
 
-/// How the run ended.
+/// End of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OutcomeSummary {
-    /// In one word.
+    /// Status.
     pub status: Status,
-    /// In one sentence.
+    /// Reason, as a sentence.
     pub reason: String,
 }
 
@@ -156,7 +155,7 @@ pub struct CostSummary {
     /// `final / initial`.
     #[serde(deserialize_with = "number_or_nan")]
     pub ratio: f64,
-    /// Part of `final` from the readings.
+    /// Part of `final` from the samples.
     #[serde(deserialize_with = "number_or_nan")]
     pub misfit: f64,
     /// Part of `final` from the regularisation.
@@ -178,8 +177,7 @@ pub struct GradientSummary {
 /// Work done.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CountsSummary {
-    /// Iterations of the fit that is reported, one row of `history.csv` each; those along a path of
-    /// weights are counted there.
+    /// Iterations of the reported fit, one row of `history.csv` each, without those of other fits along a weight path.
     pub iterations: u64,
     /// Forward solves.
     pub forward: u64,
@@ -191,13 +189,13 @@ pub struct CountsSummary {
     pub qp: u64,
 }
 
-/// The terms of results from before there were others.
+/// Terms of result documents without the field `terms`.
 fn linear_terms() -> Vec<String> {
     vec!["damping".into(), "stiffness".into()]
 }
 
 impl ResultDocument {
-    /// The channels of the experiments that were fitted.
+    /// The channels of the fitted experiments.
     pub(super) fn channels(&self) -> impl Iterator<Item = &ChannelSummary> {
         self.experiments.iter().flat_map(|e| &e.channels)
     }
@@ -226,30 +224,29 @@ impl ResultDocument {
         self.terms().chain(own)
     }
 
-    /// Whether the fit compares a simulated motion with the readings, and not the equation of motion.
+    /// True if the fit minimises the misfit of a simulated response; false for the equation error.
     pub(super) fn is_simulated(&self) -> bool {
         self.model.cost_kind != CostKind::EquationError
     }
 
-    /// Whether the standard deviation of the readings of a channel was estimated by a first fit, so that the last one has
-    /// another cost.
+    /// True if a previous fit estimated the standard deviation of a channel, which changes the cost of the last one.
     pub(super) fn estimates_sigma(&self) -> bool {
         self.channels().any(|c| c.sigma_estimated)
     }
 
-    /// Whether `J/J0` says how much better the optimum is than the start: where the standard deviation of the readings
-    /// is estimated, J is taken with that of the optimum.
+    /// True if `J/J0` compares the optimum with the start: not with an estimated sigma, since J then uses that of the
+    /// optimum.
     pub(super) fn has_ratio(&self) -> bool {
         !self.estimates_sigma()
     }
 
-    /// The fit of the channel that is matched worst, per cent.
+    /// Smallest fit of a channel, per cent.
     pub(super) fn worst_fit(&self) -> Option<f64> {
         let fits = self.channels().map(|c| c.fit_percent);
         fits.filter(|x| x.is_finite()).reduce(f64::min)
     }
 
-    /// Whether the motion is a rotation, in rad: then the mass is a moment of inertia.
+    /// True if the displacement is an angle in rad; the mass is then a moment of inertia.
     pub fn is_rotation(&self) -> bool {
         let mass = self.functions.get(CoefficientKind::Mass.name());
         mass.is_some_and(|mass| mass.unit == CoefficientKind::Mass.angular_unit())
@@ -261,11 +258,11 @@ impl ResultDocument {
 pub struct ExperimentSummary {
     /// Name.
     pub name: String,
-    /// What drives it: `force`, `base` or both; empty for a free motion.
+    /// Excitation: `force`, `base` or both; empty for a free response.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub driven_by: Vec<String>,
-    /// Number of readings of all channels.
-    pub readings: usize,
+    /// Number of samples of all channels.
+    pub samples: usize,
     /// Root-mean-square residual of the first channel, in its SI unit.
     #[serde(deserialize_with = "number_or_nan")]
     pub rms_residual: f64,
@@ -333,7 +330,7 @@ pub struct SlackSummary {
     pub penalty: f64,
 }
 
-/// What a run leaves behind that could not begin: its outcome and nothing else.
+/// Result document of a run that failed before the fit: its outcome alone.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FailureDocument {
     /// [`FORMAT`].
@@ -342,12 +339,12 @@ pub struct FailureDocument {
     pub title: String,
     /// Version of kmcfit.
     pub version: String,
-    /// Status `failed`, and why.
+    /// Status `failed` and the reason.
     pub outcome: OutcomeSummary,
 }
 
 impl FailureDocument {
-    /// The document of a run that failed for this reason.
+    /// The document of a failed run.
     pub fn new(title: &str, reason: &str) -> Self {
         Self {
             format: FORMAT,

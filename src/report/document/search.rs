@@ -1,41 +1,41 @@
-//! The way of a fit to its optimum: attempts from several starting points, the path of a weight.
+//! Attempts from several starting points, and the weight path, in the result document.
 
 use kmcfit_core::internals::solvers::Status;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// One attempt of the start ladder.
+/// A fit from one starting point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AttemptSummary {
-    /// Where it started.
+    /// Starting point.
     pub start: String,
-    /// J at its start; absent if the start had no motion.
+    /// J at its start; absent if the start has no response.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initial_cost: Option<f64>,
-    /// J at its end; absent if the start had no motion.
+    /// J at its end; absent if the start has no response.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost: Option<f64>,
-    /// Iterations it took.
+    /// Number of iterations.
     pub iterations: u64,
-    /// How it ended.
+    /// Status at its end.
     pub status: Status,
 }
 
-/// How the weight of the smoothness was chosen.
+/// Choice of the weight of a penalty by a rule.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WeightSummary {
-    /// The rule asked for.
+    /// The rule of the model file.
     pub rule: String,
     /// The weight used.
     pub weight: f64,
-    /// What each rule picks on the path; absent where it picks none.
+    /// Weight that each rule chooses on the path; absent for a rule without a choice.
     pub picks: BTreeMap<String, f64>,
     /// Seed of the random vectors behind the degrees of freedom.
     pub seed: u64,
-    /// What the user should know about the choice.
+    /// Remark on the choice.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
-    /// The fits along the path, by falling weight.
+    /// Fits along the path, in order of decreasing weight.
     pub path: Vec<PathSummary>,
 }
 
@@ -51,14 +51,14 @@ impl WeightSummary {
 pub struct PathSummary {
     /// Weight.
     pub weight: f64,
-    /// Iterations of this fit, all its starts together.
+    /// Iterations of this fit, summed over its starting points.
     #[serde(default)]
     pub iterations: u64,
-    /// Misfit of the readings.
+    /// Misfit.
     pub misfit: f64,
     /// `sum |L theta - target|^2` of the penalties on the path.
     pub roughness: f64,
-    /// Effective number of parameters that the data determine; absent where it is not known.
+    /// Effective number of parameters that the data determine; absent if not computed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<f64>,
 }

@@ -2,7 +2,7 @@
 //! that reproduce the run.
 
 use super::table::{list, paragraph};
-use super::{figures, figures_without, help, opening, page as shell, repeat, settings};
+use super::{figures, figures_without, help, overview, page as shell, reproducibility, settings};
 use crate::report::FittedModel;
 use crate::report::chart::Figure;
 use crate::report::document::ResultDocument;
@@ -46,8 +46,12 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
             predictions(document),
         ),
         ("settings", "Settings", settings::settings(run, document)),
-        ("repeat", "Reproduce", repeat::repeat(run, document)),
-        ("cite", "How to cite", repeat::cite()),
+        (
+            "repeat",
+            "Reproduce",
+            reproducibility::reproducibility(run, document),
+        ),
+        ("cite", "How to cite", reproducibility::cite()),
     ]
     .into_iter()
     .filter(|(_, _, body)| !body.is_empty())
@@ -63,7 +67,7 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
     });
     let body = format!(
         "{}<nav aria-label=\"Contents\">\n{}</nav>\n{}{}",
-        opening::opening(document),
+        overview::overview(document),
         links.collect::<String>(),
         help(),
         parts.collect::<String>()
@@ -75,11 +79,11 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
 fn data_and_fit(run: &FittedModel, document: &ResultDocument) -> String {
     let mut drawn = Vec::new();
     for (experiment, channel) in run.channels() {
-        let pair = run.seen(experiment, channel).figures();
+        let pair = run.channel_view(experiment, channel).figures();
         drawn.extend(pair.map(|figure| run.titled(figure, experiment, channel)));
     }
     drawn.extend(run.validation_figures());
-    opening::records(document)
+    overview::records(document)
         + &list(&lines(|text| write_statistics(text, document)))
         + &figures(&drawn)
 }
@@ -95,10 +99,10 @@ fn convergence(run: &FittedModel, document: &ResultDocument) -> String {
         let Some(channel) = channel.filter(|_| !run.fit.snapshots.is_empty()) else {
             continue;
         };
-        let motion = run.motion(i, channel.times(), channel.observed());
-        drawn.push(run.titled(motion, i, 0));
+        let response = run.response(i, channel.times(), channel.observed());
+        drawn.push(run.titled(response, i, 0));
     }
-    let work = paragraph(&opening::work(document));
+    let work = paragraph(&overview::work(document));
     work + &list(&lines(|text| write_attempts(text, document))) + &figures(&drawn)
 }
 
@@ -139,7 +143,7 @@ fn identifiability(run: &FittedModel, document: &ResultDocument) -> String {
         text += &paragraph(
             "Likelihood profiles, equivalent systems and the most informative next experiment:",
         );
-        text += &repeat::command("study", document);
+        text += &reproducibility::command("study", document);
     }
     text
 }

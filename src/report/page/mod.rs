@@ -1,18 +1,17 @@
-//! A page in one file: nothing to load, light and dark, for screens of any width and for paper. What
-//! is written is well-formed XML as well. Without scripts each figure is a drawing; with them it is a
-//! chart that can be zoomed and read off.
+//! HTML pages: one file without external resources, in light and dark, for screens of any width and for print; also
+//! well-formed XML. Without scripts each figure is an SVG drawing, with them an interactive chart.
 //!
-//! The page forbids itself everything but its own style sheet and script, which it names by their
-//! SHA-256: a title or a name that were taken for a script by mistake could not run.
+//! A content security policy permits only the style sheet and script of the page, by their SHA-256 digests, so that no
+//! text of a model can run as a script.
 
 mod fit;
-mod opening;
-mod repeat;
+mod overview;
+mod reproducibility;
 mod settings;
 mod table;
 
 pub(super) use fit::page as fit_page;
-pub(crate) use repeat::quoted as shell_quoted;
+pub(crate) use reproducibility::quoted as shell_quoted;
 pub(super) use table::list;
 
 use super::chart::{Figure, data, render};
@@ -22,22 +21,22 @@ use sha2::{Digest, Sha256};
 
 const STYLE: &str = include_str!("page.css");
 
-/// In the order in which they need each other.
+/// In order of dependence.
 const SCRIPTS: [&str; 6] = [
     include_str!("script/scale.js"),
     include_str!("script/draw.js"),
-    include_str!("script/hands.js"),
+    include_str!("script/interaction.js"),
     include_str!("script/chart.js"),
     include_str!("script/panel.js"),
     include_str!("script/start.js"),
 ];
 
-/// How a chart is used; every chart refers to it.
+/// Instructions for charts, referenced by every chart.
 const KEYS: &str = "Hover over a chart to show values; drag to zoom. Click, then use the wheel to zoom in time, with Shift \
      in the value. Keys: arrows, Home and End move the cursor, with Shift in larger steps; + and - zoom; Escape or a \
      double click resets the view. The legend entries show and hide curves.";
 
-/// A page: its title and what follows the heading, which must be escaped already.
+/// A page from its title and its body, which must be escaped.
 pub(super) fn page(title: &str, body: &str) -> String {
     let title = escape(title);
     let (style, script) = (format!("\n{STYLE}"), script());
@@ -58,8 +57,7 @@ pub(super) fn page(title: &str, body: &str) -> String {
     )
 }
 
-/// The script of every page. In HTML the marks around it are comments, in XML they say that what is
-/// between them is text.
+/// The script of every page. The marks around it are comments in HTML and delimit character data in XML.
 fn script() -> String {
     format!(
         "//<![CDATA[\n(() => {{\n\"use strict\";\n{}}})();\n//]]>",
@@ -71,8 +69,8 @@ fn hash(text: &str) -> String {
     format!("sha256-{}", BASE64.encode(&Sha256::digest(text)))
 }
 
-/// A figure with its caption: a drawing, and its numbers for the chart. Title and description of the
-/// figure are its text for readers who cannot see it.
+/// A figure with its caption: a drawing, and its numbers for the chart. Title and description of the figure are its
+/// text for screen readers.
 fn figure(figure: &Figure, off: &[&str]) -> String {
     let drawn = data(figure, off);
     let thinned = match drawn.thinned {
@@ -94,7 +92,7 @@ fn figure(figure: &Figure, off: &[&str]) -> String {
     )
 }
 
-/// How the charts below are used, where they can be.
+/// Instructions for the charts, shown only with scripts.
 pub(super) fn help() -> String {
     format!("<p class=\"soft screen\">{}</p>\n", escape(KEYS))
 }
@@ -104,13 +102,12 @@ pub(super) fn figures(figures: &[Figure]) -> String {
     figures_without(&[], figures)
 }
 
-/// Figures whose charts show the curves of these labels only when asked to: what is far away would make
-/// everything else flat.
+/// Figures whose curves with the labels `off` are initially hidden, because their range would flatten the others.
 fn figures_without(off: &[&str], figures: &[Figure]) -> String {
     figures.iter().map(|f| figure(f, off)).collect()
 }
 
-/// A drawing as part of a page, where it needs no name space.
+/// An SVG drawing for inclusion in HTML, without a name space.
 fn inline(svg: &str) -> String {
     svg.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1)
         .trim_end()

@@ -30,7 +30,7 @@ fn row(cells: &[String]) -> String {
     text + "</tr>\n"
 }
 
-/// Names and what they stand for, where the texts may be long.
+/// Names and their descriptions as a list.
 pub(super) fn pairs(rows: &[(&str, String)]) -> String {
     let row = |(name, value): &(&str, String)| {
         format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value))
@@ -39,7 +39,7 @@ pub(super) fn pairs(rows: &[(&str, String)]) -> String {
     format!("<dl class=\"pairs\">\n{rows}</dl>\n")
 }
 
-/// Sentences as a list; nothing where there are none.
+/// Sentences as a list; empty without sentences.
 pub(in crate::report) fn list(sentences: &[String]) -> String {
     if sentences.is_empty() {
         return String::new();

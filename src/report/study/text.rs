@@ -4,8 +4,8 @@ use super::{
     BandsRecord, BootstrapRecord, ExtremeSearch, ExtremesRecord, PredictionRecord,
     SensitivityRecord, StudyDocument,
 };
-use crate::digits::significant;
 use crate::finding::Finding;
+use crate::number_format::significant;
 
 /// Most extremes that are listed because their search did not converge.
 const MOST_LISTED: usize = 6;

@@ -45,7 +45,7 @@ pub enum Suggestion {
     Pattern {
         /// Kind of the channel.
         channel: String,
-        /// Whether its sigma is given.
+        /// True if its sigma is given.
         #[serde(skip)]
         has_sigma: bool,
         /// The pattern.
@@ -64,7 +64,7 @@ pub enum Suggestion {
         channel: String,
         /// Its fit, per cent.
         fit: f64,
-        /// Whether the residuals pass the test of whiteness.
+        /// True if the residuals pass the test of whiteness.
         is_white: bool,
     },
     /// A change of the input, the start or the functions for a record that is not fitted.
@@ -73,7 +73,7 @@ pub enum Suggestion {
         channel: Option<(String, String)>,
         /// Fit, per cent.
         fit: f64,
-        /// Whether the start from the record was not tried.
+        /// True if the start from the record was not tried.
         start_from_data: bool,
         /// The likeliest cause.
         #[serde(skip)]
@@ -99,7 +99,7 @@ pub enum Suggestion {
         parameters: usize,
         /// Upper bound of the number of identifiable parameter combinations.
         rank_bound: usize,
-        /// Whether fewer parameters or a penalty are an option.
+        /// True if fewer parameters or a penalty are an option.
         can_be_simpler: bool,
     },
     /// A study.
@@ -111,9 +111,9 @@ pub enum Suggestion {
 pub enum Suspect {
     /// The input (force or base motion), and the initial state unless it is estimated.
     Input {
-        /// Whether the input is a base motion.
+        /// True for a base motion.
         is_base: bool,
-        /// Whether the initial state is given.
+        /// True if the initial state is given.
         start_is_given: bool,
     },
     /// An unknown force.
@@ -122,7 +122,7 @@ pub enum Suspect {
     Functions,
 }
 
-/// Suggestions as they stand in the document, the most urgent first; at most three.
+/// The suggestions of a document, most urgent first; at most three.
 pub fn suggestions(document: &ResultDocument) -> Vec<Finding> {
     let list = typed(document);
     list.iter().map(Finding::stated).collect()
@@ -166,8 +166,8 @@ fn about_constants(document: &ResultDocument) -> Option<Suggestion> {
     })
 }
 
-/// Whether the Gauss-Newton method reached the iteration limit with a poor fit, which suggests a wrong model rather than
-/// too few iterations.
+/// True if the Gauss-Newton method reached the iteration limit with a poor fit, which suggests a wrong model rather
+/// than too few iterations.
 fn wanders(document: &ResultDocument) -> bool {
     document.outcome.status == Status::MaxIterations
         && document.model.method == Solver::GaussNewton.name()
@@ -223,7 +223,7 @@ fn absent(document: &ResultDocument) -> Vec<&'static str> {
     terms.into_iter().filter(|term| !has(term)).collect()
 }
 
-/// Whether every function is constant.
+/// True if every function is constant.
 fn changes_nothing(document: &ResultDocument) -> bool {
     document.functions.values().all(|f| f.min == f.max)
 }
@@ -300,7 +300,7 @@ fn about_ending(document: &ResultDocument) -> Option<Suggestion> {
 /// A percentage; one far below zero in powers of ten.
 pub(super) fn percent(share: f64, digits: usize) -> String {
     match share > -1000.0 {
-        // Rounding to zero keeps no sign.
+        // Zero has no sign.
         true if share.abs() < 0.5 * 0.1f64.powi(digits as i32) => format!("{:.digits$} %", 0.0),
         true => format!("{share:.digits$} %"),
         false => format!("{share:.0e} %"),

@@ -1,7 +1,7 @@
 //! Texts of the suggestions.
 
 use super::{Suggestion, Suspect, percent};
-use crate::digits::significant;
+use crate::number_format::significant;
 use kmcfit_core::internals::assessment::ResidualPattern;
 use kmcfit_core::internals::solvers::Solver;
 use std::fmt;
@@ -150,13 +150,10 @@ fn write_pattern(
     pattern: &ResidualPattern,
 ) -> fmt::Result {
     match pattern {
-        ResidualPattern::Outliers {
-            samples: readings,
-            first,
-        } => {
-            match readings {
+        ResidualPattern::Outliers { samples, first } => {
+            match samples {
                 1 => write!(f, "{channel}: one outlier, at {first} s")?,
-                _ => write!(f, "{channel}: {readings} outliers, the first at {first} s")?,
+                _ => write!(f, "{channel}: {samples} outliers, the first at {first} s")?,
             }
             let sigma = match has_sigma {
                 true => "",

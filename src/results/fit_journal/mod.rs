@@ -1,82 +1,84 @@
 //! The journal of a fit: one line per iteration and per finished search, and a checkpoint beside it.
 //!
-//! Lines of iterations are collected for some milliseconds before they are written, so a fit that is killed loses at
-//! most the last of them. The checkpoint holds the state of the running search; it is replaced as a whole every
-//! now and then. Both are removed when the results are written. [`CheckpointStore`] defines what they hold and how a fit is
-//! resumed from it. Times are taken from a monotonic clock.
+//! Entries of iterations are buffered for some milliseconds, so a killed fit loses at most the last of them. The
+//! checkpoint holds the state of the current solver run; it is replaced atomically at intervals of at least one second.
+//! Both are removed when the results are written. [`CheckpointStore`] defines what they hold and how a fit is resumed
+//! from it. Times are taken from a monotonic clock.
 
 mod read;
 
 use super::atomic::replace_with;
 use super::heading::Heading;
-use super::journal::{CHECKPOINT, FIT_JOURNAL, JournalFile, Mark, push_line, write_line};
+use super::journal::{
+    CHECKPOINT, FIT_JOURNAL, JournalFile, JournalPosition, push_line, write_line,
+};
 use super::system;
 use super::work_folder::WorkFolder;
 use crate::error::InputError;
 use kmcfit_core::internals::solvers::{
     CheckpointStore, CheckpointUnit, ExactF64s, IterationRecord, SolverState,
 };
-use read::{Contents, Reader};
+use read::{JournalContents, JournalReader};
 use serde::{Deserialize, Serialize};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Least time between two checkpoints: what a killed fit loses at most, about.
+/// Least time between two checkpoints: about the largest loss of a killed fit.
 const EVERY: Duration = Duration::from_secs(1);
-/// Checkpoints take at most one part in so many of the time of a fit.
+/// Checkpoints take at most `1/SHARE` of the time of a fit.
 const SHARE: u32 = 50;
-/// What the first takes for each parameter, about: L-BFGS remembers dozens of numbers of each.
+/// Estimated time of the first checkpoint for each parameter: L-BFGS stores dozens of numbers of each.
 const A_PARAMETER: Duration = Duration::from_micros(4);
 
-/// Lines of iterations wait so long for more: a thousand quick iterations would else take as long to write
-/// down as a tenth of what they are.
+/// Longest time for which entries of iterations are buffered; unbuffered writing would take 10 % of the time of quick
+/// iterations.
 const GATHER: Duration = Duration::from_millis(5);
 
-/// A line: the number of the unit that it is about, and what is said of it.
+/// Line of the journal: number of the unit, and entry.
 #[derive(Serialize, Deserialize)]
-struct Line<E>(u64, E);
+struct JournalLine<E>(u64, E);
 
-/// What a line says.
+/// Entry of a line.
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Entry {
-    /// An iteration of the search.
+    /// An iteration of a solver run.
     Row(IterationRecord),
-    /// The search has ended.
+    /// Final state of a solver run.
     End(Box<SolverState>),
-    /// Numbers that were computed.
+    /// Computed numbers.
     Piece(ExactF64s),
-    /// It ended without a result.
+    /// End without a result.
     Nothing,
 }
 
-/// A journal at work.
+/// The open journal of a running fit.
 #[derive(Debug)]
 pub struct FitJournal {
     folder: PathBuf,
     heading: Heading,
     file: JournalFile,
     work: WorkFolder,
-    /// Lines that wait to be written, where they end, and when others were last written.
+    /// Buffered lines, their end, and the time of the last write.
     waiting: Vec<u8>,
-    waiting_end: Mark,
+    waiting_end: JournalPosition,
     written: Instant,
-    /// What an earlier run of the same fit left.
-    before: Contents,
-    /// The unit that is at work, from 1.
+    /// Contents of the journal of an earlier run of the same fit.
+    before: JournalContents,
+    /// Number of the current unit, from 1.
     unit: u64,
-    /// Whether it had ended before.
+    /// True if the earlier run completed it.
     is_recalled: bool,
     pace: Pace,
     trouble: Option<io::Error>,
 }
 
-/// When checkpoints are due.
+/// Schedule of the checkpoints.
 #[derive(Debug)]
 struct Pace {
     every: Duration,
-    /// Whether somebody asked for this pace whatever it costs.
+    /// True for an interval given by the user.
     is_given: bool,
     last: Instant,
     took: Duration,
@@ -107,10 +109,10 @@ impl Pace {
 }
 
 impl FitJournal {
-    /// A new journal in a folder, in the place of an older one.
+    /// Creates a journal in a folder; replaces an older one.
     ///
     /// # Errors
-    /// What the file system says.
+    /// Errors of the file system.
     pub fn begin(folder: &Path, heading: &Heading) -> io::Result<Self> {
         Self::clear(folder)?;
         let work = WorkFolder::create_in(folder)?;
@@ -119,7 +121,7 @@ impl FitJournal {
             folder,
             heading,
             (file, work),
-            Contents::default(),
+            JournalContents::default(),
         ))
     }
 
@@ -129,18 +131,18 @@ impl FitJournal {
     /// If it is not the journal of a fit of this format.
     pub fn heading(folder: &Path) -> Result<Option<Heading>, InputError> {
         match folder.join(FIT_JOURNAL).exists() {
-            true => Reader::open(folder).map(|reader| Some(reader.text.heading)),
+            true => JournalReader::open(folder).map(|reader| Some(reader.text.heading)),
             false => Ok(None),
         }
     }
 
-    /// Resumes the journal in a folder, up to the first line that is damaged.
+    /// Resumes the journal in a folder, up to the first damaged line.
     ///
     /// # Errors
-    /// If there is none, or it was begun with another model, other data or by another version.
+    /// If there is no journal, or it was begun with another model, other data or by another version.
     pub fn resume(folder: &Path, heading: &Heading) -> Result<Self, InputError> {
         let path = folder.join(FIT_JOURNAL);
-        let reader = Reader::open(folder)?;
+        let reader = JournalReader::open(folder)?;
         heading.check_same(&reader.text.heading, &path)?;
         let (before, end) = reader.contents();
         let work = WorkFolder::create_in(folder).map_err(|error| {
@@ -159,7 +161,7 @@ impl FitJournal {
         folder: &Path,
         heading: &Heading,
         (file, work): (JournalFile, WorkFolder),
-        before: Contents,
+        before: JournalContents,
     ) -> Self {
         Self {
             folder: folder.to_path_buf(),
@@ -177,10 +179,10 @@ impl FitJournal {
         }
     }
 
-    /// Removes journal and checkpoint of a fit that has come to its end.
+    /// Removes journal and checkpoint of a finished fit.
     ///
     /// # Errors
-    /// What the file system says.
+    /// Errors of the file system.
     pub fn clear(folder: &Path) -> io::Result<()> {
         for name in [CHECKPOINT, FIT_JOURNAL] {
             system::remove_file(&folder.join(name))?;
@@ -188,7 +190,7 @@ impl FitJournal {
         Ok(())
     }
 
-    /// Why the journal could not be written to, if it could not: the fit goes on without it.
+    /// The error of a failed write, if any; the fit continues without the journal.
     pub fn trouble(&self) -> Option<&io::Error> {
         self.trouble.as_ref()
     }
@@ -197,7 +199,7 @@ impl FitJournal {
         if self.trouble.is_some() || self.is_recalled {
             return;
         }
-        let line = Line(self.unit, entry);
+        let line = JournalLine(self.unit, entry);
         if !matches!(line.1, Entry::Row(_)) {
             self.write();
             if self.trouble.is_none() {
@@ -215,7 +217,7 @@ impl FitJournal {
         }
     }
 
-    /// Writes the lines that wait.
+    /// Writes the buffered lines.
     fn write(&mut self) {
         if self.trouble.is_none() && !self.waiting.is_empty() {
             let written = self.file.append_text(&self.waiting, self.waiting_end);
@@ -225,9 +227,9 @@ impl FitJournal {
         self.written = Instant::now();
     }
 
-    /// Drops what an earlier run left behind a place.
-    fn cut(&mut self, end: Mark) {
-        self.before = Contents::default();
+    /// Discards the contents of an earlier run after a position.
+    fn cut(&mut self, end: JournalPosition) {
+        self.before = JournalContents::default();
         self.write();
         match self.file.truncate(end) {
             Ok(()) => self.waiting_end = end,
@@ -236,12 +238,12 @@ impl FitJournal {
     }
 
     fn checkpoint(&mut self, standing: SolverState) -> io::Result<()> {
-        // The iterations before it must not be lost when it is not.
+        // The iterations before a checkpoint are written first.
         self.write();
         self.file.sync()?;
         let path = self.folder.join(CHECKPOINT);
         replace_with(self.work.path(), &path, |out| {
-            let begin = write_line(&mut *out, Mark::default(), &self.heading)?;
+            let begin = write_line(&mut *out, JournalPosition::default(), &self.heading)?;
             write_line(out, begin, &(self.unit, standing))?;
             Ok(())
         })
@@ -271,7 +273,7 @@ impl CheckpointStore for FitJournal {
                 Some(kept)
             }
             None => {
-                // It was at work: it goes on from its checkpoint, or begins again.
+                // An unfinished unit continues from its checkpoint, or starts over.
                 let standing = self.before.standing.take().filter(|(u, _)| *u == self.unit);
                 let (length, kept) = unit.at_work(standing.map(|(_, standing)| standing));
                 let begin = self.before.begin;

@@ -1,8 +1,8 @@
-//! Reading the journal and checkpoint of a fit that did not come to its end.
+//! Reading the journal and checkpoint of an unfinished fit.
 
-use super::{Entry, Line};
+use super::{Entry, JournalLine};
 use crate::error::InputError;
-use crate::results::journal::{CHECKPOINT, FIT_JOURNAL, JournalText, Mark};
+use crate::results::journal::{CHECKPOINT, FIT_JOURNAL, JournalPosition, JournalText};
 use kmcfit_core::internals::solvers::{CheckpointUnit, IterationRecord, SolverState};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,36 +10,36 @@ use std::path::{Path, PathBuf};
 const WHAT: &str = "the journal of a fit that was begun by `kmcfit fit`";
 
 /// A journal that was read.
-pub(super) struct Reader {
+pub(super) struct JournalReader {
     folder: PathBuf,
     pub text: JournalText,
 }
 
-/// What a journal and its checkpoint hold.
+/// Contents of a journal and its checkpoint.
 #[derive(Debug, Default)]
-pub(super) struct Contents {
-    pub units: BTreeMap<u64, Unit>,
-    /// Where the running search stood, and which unit it was.
+pub(super) struct JournalContents {
+    pub units: BTreeMap<u64, JournalUnit>,
+    /// Number of the unfinished unit and its state.
     pub standing: Option<(u64, SolverState)>,
-    /// Where the unit that is at work begins.
-    pub begin: Mark,
-    /// The end of what was recalled; `None` when all of it was.
-    pub end: Option<Mark>,
+    /// Begin of the unfinished unit.
+    pub begin: JournalPosition,
+    /// End of the recalled part; `None` for all of it.
+    pub end: Option<JournalPosition>,
 }
 
-/// What a journal holds of one unit.
+/// Entries of one unit.
 #[derive(Debug)]
-pub(super) struct Unit {
-    pub begin: Mark,
-    pub end: Mark,
-    /// What it came to, if it ended.
+pub(super) struct JournalUnit {
+    pub begin: JournalPosition,
+    pub end: JournalPosition,
+    /// Result, if it ended.
     pub kept: Option<CheckpointUnit>,
-    /// The iterations, and where the line of each ends.
-    rows: Vec<(IterationRecord, Mark)>,
+    /// Iterations, each with the end of its line.
+    rows: Vec<(IterationRecord, JournalPosition)>,
 }
 
-impl Unit {
-    fn new(begin: Mark) -> Self {
+impl JournalUnit {
+    fn new(begin: JournalPosition) -> Self {
         Self {
             begin,
             end: begin,
@@ -48,8 +48,8 @@ impl Unit {
         }
     }
 
-    /// Takes a line; whether it can follow those before it.
-    fn take(&mut self, entry: Entry, end: Mark) -> bool {
+    /// Adds an entry; false if it cannot follow the previous ones.
+    fn take(&mut self, entry: Entry, end: JournalPosition) -> bool {
         if self.kept.is_some() {
             return false;
         }
@@ -72,8 +72,11 @@ impl Unit {
         true
     }
 
-    /// How a unit that had not ended goes on, and the end of what is of use for it.
-    pub fn at_work(mut self, standing: Option<SolverState>) -> (Mark, Option<CheckpointUnit>) {
+    /// End of the usable entries of an unfinished unit, and the state to continue from.
+    pub fn at_work(
+        mut self,
+        standing: Option<SolverState>,
+    ) -> (JournalPosition, Option<CheckpointUnit>) {
         let usable = standing.and_then(|standing| {
             let iterations = usize::try_from(standing.iterations).ok()?;
             let (_, end) = *self.rows.get(iterations.checked_sub(1)?)?;
@@ -90,7 +93,7 @@ impl Unit {
     }
 }
 
-impl Reader {
+impl JournalReader {
     /// Reads the journal in a folder.
     pub fn open(folder: &Path) -> Result<Self, InputError> {
         Ok(Self {
@@ -99,33 +102,33 @@ impl Reader {
         })
     }
 
-    /// What it holds up to the first line that is damaged or does not follow from those before, where that line begins,
-    /// and the checkpoint if it is of this fit.
-    pub fn contents(&self) -> (Contents, Mark) {
+    /// Contents up to the first line that is damaged or cannot follow the previous ones, with the checkpoint if it
+    /// belongs to this fit; and the begin of that line.
+    pub fn contents(&self) -> (JournalContents, JournalPosition) {
         let mut end = self.text.begin;
-        let mut units: BTreeMap<u64, Unit> = BTreeMap::new();
-        for (Line(unit, entry), next) in self.text.lines() {
+        let mut units: BTreeMap<u64, JournalUnit> = BTreeMap::new();
+        for (JournalLine(unit, entry), next) in self.text.lines() {
             let last = units.last_key_value().map_or(0, |(unit, _)| *unit);
             let is_next = unit == last + 1 && units.get(&last).is_none_or(|u| u.kept.is_some());
             if !(is_next || unit == last && last > 0) {
                 break;
             }
-            let known = units.entry(unit).or_insert_with(|| Unit::new(end));
+            let known = units.entry(unit).or_insert_with(|| JournalUnit::new(end));
             if !known.take(entry, next) {
                 break;
             }
             end = next;
         }
-        let contents = Contents {
+        let contents = JournalContents {
             units,
             standing: self.standing(),
-            begin: Mark::default(),
+            begin: JournalPosition::default(),
             end: Some(self.text.begin),
         };
         (contents, end)
     }
 
-    /// The checkpoint, if it is of this fit and undamaged.
+    /// The checkpoint, if undamaged and of this fit.
     fn standing(&self) -> Option<(u64, SolverState)> {
         let checkpoint = JournalText::read(&self.folder.join(CHECKPOINT), WHAT).ok()?;
         let is_of_this_fit = checkpoint.heading == self.text.heading;

@@ -1,20 +1,20 @@
-//! From one map of `constraints` to what it demands.
+//! Conversion of one map of `constraints` into constraints of the builder.
 
 use crate::config::ModelFile;
 use crate::config::build::functions::history;
-use crate::config::scalar::{Number, NumberOrColumn};
 use crate::config::spec::{ConstraintSpec, RangeSpec};
+use crate::config::values::{Number, NumberOrColumn};
 use crate::error::InputError;
 use kmcfit_core::internals::constraints::{Constraint, Shape, TimeHistory};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::system::Grid;
 
-/// How far outside the record a time may be, in steps, to be taken for its end.
+/// Distance of a time outside the record, in steps, up to which it counts as the end of the record.
 const SAME_TIME: f64 = 1e-6;
 
-/// What a constraint can say, by its key.
+/// Kind of a constraint, by its key.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Kind {
+enum ConstraintKey {
     Bounds,
     Slope,
     Shape,
@@ -27,33 +27,33 @@ enum Kind {
     DampingRatio,
 }
 
-impl Kind {
-    /// All kinds with the keys that they are written with.
-    const ALL: [(Kind, &'static str); 10] = [
-        (Kind::Bounds, "`min` or `max`"),
-        (Kind::Slope, "`slope`"),
-        (Kind::Shape, "`shape`"),
-        (Kind::Values, "`at` and `value`"),
-        (Kind::Mean, "`mean`"),
-        (Kind::Integral, "`integral`"),
-        (Kind::Equal, "`equal`"),
-        (Kind::Passive, "`passive`"),
-        (Kind::Frequency, "`frequency`"),
-        (Kind::DampingRatio, "`damping_ratio`"),
+impl ConstraintKey {
+    /// All kinds with their keys.
+    const ALL: [(ConstraintKey, &'static str); 10] = [
+        (ConstraintKey::Bounds, "`min` or `max`"),
+        (ConstraintKey::Slope, "`slope`"),
+        (ConstraintKey::Shape, "`shape`"),
+        (ConstraintKey::Values, "`at` and `value`"),
+        (ConstraintKey::Mean, "`mean`"),
+        (ConstraintKey::Integral, "`integral`"),
+        (ConstraintKey::Equal, "`equal`"),
+        (ConstraintKey::Passive, "`passive`"),
+        (ConstraintKey::Frequency, "`frequency`"),
+        (ConstraintKey::DampingRatio, "`damping_ratio`"),
     ];
 
     fn is_given(self, spec: &ConstraintSpec) -> bool {
         match self {
-            Kind::Bounds => spec.min.is_some() || spec.max.is_some(),
-            Kind::Slope => spec.slope.is_some(),
-            Kind::Shape => spec.shape.is_some(),
-            Kind::Values => spec.at.is_some() || spec.value.is_some(),
-            Kind::Mean => spec.mean.is_some(),
-            Kind::Integral => spec.integral.is_some(),
-            Kind::Equal => spec.equal.is_some(),
-            Kind::Passive => spec.passive.is_some(),
-            Kind::Frequency => spec.frequency.is_some(),
-            Kind::DampingRatio => spec.damping_ratio.is_some(),
+            ConstraintKey::Bounds => spec.min.is_some() || spec.max.is_some(),
+            ConstraintKey::Slope => spec.slope.is_some(),
+            ConstraintKey::Shape => spec.shape.is_some(),
+            ConstraintKey::Values => spec.at.is_some() || spec.value.is_some(),
+            ConstraintKey::Mean => spec.mean.is_some(),
+            ConstraintKey::Integral => spec.integral.is_some(),
+            ConstraintKey::Equal => spec.equal.is_some(),
+            ConstraintKey::Passive => spec.passive.is_some(),
+            ConstraintKey::Frequency => spec.frequency.is_some(),
+            ConstraintKey::DampingRatio => spec.damping_ratio.is_some(),
         }
     }
 
@@ -65,27 +65,30 @@ impl Kind {
     fn is_about_one_function(self) -> bool {
         !matches!(
             self,
-            Kind::Equal | Kind::Passive | Kind::Frequency | Kind::DampingRatio
+            ConstraintKey::Equal
+                | ConstraintKey::Passive
+                | ConstraintKey::Frequency
+                | ConstraintKey::DampingRatio
         )
     }
 }
 
-/// One map at a key.
-struct Reader<'a> {
+/// One map of `constraints` and its key.
+struct ConstraintReader<'a> {
     file: &'a ModelFile,
     grid: &'a Grid,
     key: &'a str,
     spec: &'a ConstraintSpec,
 }
 
-/// What the map at `key` demands, each with the key that says so.
+/// The constraints of the map at `key`, each with the key that states it.
 pub(super) fn read(
     file: &ModelFile,
     grid: &Grid,
     key: &str,
     spec: &ConstraintSpec,
 ) -> Result<Vec<(String, Constraint)>, InputError> {
-    let reader = Reader {
+    let reader = ConstraintReader {
         file,
         grid,
         key,
@@ -93,16 +96,16 @@ pub(super) fn read(
     };
     let kind = reader.kind()?;
     reader.belongs_together(kind)?;
-    if kind == Kind::Values {
+    if kind == ConstraintKey::Values {
         return reader.fixed_values();
     }
-    if kind == Kind::Shape {
+    if kind == ConstraintKey::Shape {
         return reader.shapes();
     }
     Ok(vec![(key.to_owned(), reader.statement(kind)?)])
 }
 
-impl Reader<'_> {
+impl ConstraintReader<'_> {
     fn error(&self, below: &str, problem: impl Into<String>) -> InputError {
         self.file.error_at(&self.below(below), problem)
     }
@@ -114,15 +117,15 @@ impl Reader<'_> {
         }
     }
 
-    /// The one thing that the map says.
-    fn kind(&self) -> Result<Kind, InputError> {
-        let given: Vec<Kind> = (Kind::ALL.iter().map(|(kind, _)| *kind))
+    /// The kind of the map: exactly one of its keys must be given.
+    fn kind(&self) -> Result<ConstraintKey, InputError> {
+        let given: Vec<ConstraintKey> = (ConstraintKey::ALL.iter().map(|(kind, _)| *kind))
             .filter(|kind| kind.is_given(self.spec))
             .collect();
         match given.as_slice() {
             [kind] => Ok(*kind),
             [] => {
-                let all: Vec<&str> = Kind::ALL.iter().map(|(_, name)| *name).collect();
+                let all: Vec<&str> = ConstraintKey::ALL.iter().map(|(_, name)| *name).collect();
                 Err(self
                     .error("", "empty constraint")
                     .expected(format!("one of: {}", all.join(", "))))
@@ -134,7 +137,7 @@ impl Reader<'_> {
         }
     }
 
-    fn belongs_together(&self, kind: Kind) -> Result<(), InputError> {
+    fn belongs_together(&self, kind: ConstraintKey) -> Result<(), InputError> {
         match (kind.is_about_one_function(), self.spec.function) {
             (true, None) => {
                 return Err(self
@@ -151,7 +154,7 @@ impl Reader<'_> {
             _ => {}
         }
         match self.spec.ratio {
-            Some(_) if kind != Kind::Equal => Err(self
+            Some(_) if kind != ConstraintKey::Equal => Err(self
                 .error("ratio", "only `equal` has a ratio")
                 .found(format!("`ratio` beside {}", kind.name()))
                 .expected("no `ratio`")),
@@ -164,41 +167,41 @@ impl Reader<'_> {
     }
 
     fn of(&self) -> CoefficientKind {
-        // Kinds without a function do not ask.
+        // Kinds without a function do not use it.
         self.spec.function.unwrap_or(CoefficientKind::Mass)
     }
 
-    fn statement(&self, kind: Kind) -> Result<Constraint, InputError> {
+    fn statement(&self, kind: ConstraintKey) -> Result<Constraint, InputError> {
         let spec = self.spec;
         let of = self.of();
         let number = |given: Option<Number>| given.map_or(0.0, |n| n.0);
         Ok(match kind {
-            Kind::Bounds => Constraint::Bounds {
+            ConstraintKey::Bounds => Constraint::Bounds {
                 of,
                 min: self.bound("min", spec.min.as_ref())?,
                 max: self.bound("max", spec.max.as_ref())?,
             },
-            Kind::Slope => {
+            ConstraintKey::Slope => {
                 let (min, max) = self.range("slope", spec.slope.as_ref())?;
                 Constraint::Slope { of, min, max }
             }
-            Kind::Mean => Constraint::Mean {
+            ConstraintKey::Mean => Constraint::Mean {
                 of,
                 value: number(spec.mean),
             },
-            Kind::Integral => Constraint::Integral {
+            ConstraintKey::Integral => Constraint::Integral {
                 of,
                 value: number(spec.integral),
             },
-            Kind::Equal => self.equal()?,
-            Kind::Frequency => {
+            ConstraintKey::Equal => self.equal()?,
+            ConstraintKey::Frequency => {
                 let (min, max) = self.range("frequency", spec.frequency.as_ref())?;
                 self.positive("frequency.min", min)?;
                 self.positive("frequency.max", max)?;
                 Constraint::Frequency { min, max }
             }
-            Kind::DampingRatio => self.damping_ratio()?,
-            Kind::Passive | Kind::Shape | Kind::Values => {
+            ConstraintKey::DampingRatio => self.damping_ratio()?,
+            ConstraintKey::Passive | ConstraintKey::Shape | ConstraintKey::Values => {
                 if spec.passive == Some(false) {
                     return Err(self
                         .error("passive", "this demands nothing")

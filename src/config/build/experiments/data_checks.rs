@@ -1,10 +1,10 @@
 //! Data checks of a record.
 
 use super::warning::DataWarning;
-use super::{RawChannel, Record, is_equation_error};
+use super::{RawChannel, RawRecord, is_equation_error};
 use crate::config::ModelFile;
-use crate::config::scalar::{NumberOrEstimate, ScalarOr};
 use crate::config::spec::{ExperimentSpec, InitialSpec};
+use crate::config::values::{NumberOrEstimate, ScalarOr};
 use crate::finding::Finding;
 use kmcfit_core::internals::diagnostics::{far_off, spread, without_line};
 use kmcfit_core::internals::record::ChannelKind;
@@ -34,7 +34,7 @@ const FEWEST_PERIODS: f64 = 3.0;
 const FEWEST_IN_A_PERIOD: f64 = 4.0;
 
 /// Warnings about the record of experiment `i`.
-pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &Record) -> Vec<Finding> {
+pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord) -> Vec<Finding> {
     let mut warnings = sizes(spec, record);
     warnings.extend(signs(spec, record));
     warnings.extend(record.channels.iter().filter_map(range));
@@ -49,7 +49,7 @@ pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &Record) ->
 }
 
 /// Channels of one response, or a sample and the given state, that disagree by a [`SUSPICIOUS`] factor.
-fn sizes(spec: &ExperimentSpec, record: &Record) -> Vec<DataWarning> {
+fn sizes(spec: &ExperimentSpec, record: &RawRecord) -> Vec<DataWarning> {
     let mut found = Vec::new();
     let mut add = |ratio: f64, quantity: String| {
         let near = |f: f64| ratio / f < NEAR && f / ratio < NEAR;
@@ -93,7 +93,7 @@ fn sizes(spec: &ExperimentSpec, record: &Record) -> Vec<DataWarning> {
 }
 
 /// Pairs of channels of one response with opposite signs.
-fn signs(spec: &ExperimentSpec, record: &Record) -> Vec<DataWarning> {
+fn signs(spec: &ExperimentSpec, record: &RawRecord) -> Vec<DataWarning> {
     let channels = &record.channels;
     let pairs = (channels.iter().enumerate())
         .flat_map(|(place, high)| channels[..place].iter().map(move |low| (low, high)));
@@ -160,7 +160,7 @@ fn together(low: &RawChannel, high: &RawChannel) -> Option<f64> {
 }
 
 /// A free record that begins at rest, before the release or the impact.
-fn stillness(spec: &ExperimentSpec, record: &Record) -> Option<DataWarning> {
+fn stillness(spec: &ExperimentSpec, record: &RawRecord) -> Option<DataWarning> {
     if !record.excitation.is_empty() || spec.force.is_some() || spec.base.is_some() {
         return None;
     }

@@ -1,23 +1,23 @@
-//! Force and motion of the base.
+//! Excitation of an experiment: force and base motion.
 
-use super::source::{self, Wanted};
+use super::column_samples::{self, ColumnRequest};
 use crate::config::ModelFile;
-use crate::config::scalar::Number;
 use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec};
+use crate::config::values::Number;
 use crate::error::InputError;
 use crate::finding::Finding;
-use crate::units::Kind;
+use crate::units::Quantity;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
 
-/// What drives an experiment, as the model gives it.
+/// Excitation of an experiment, as samples or shapes.
 #[derive(Default)]
 pub struct RawExcitation {
     drive: Input,
 }
 
 impl RawExcitation {
-    /// Whether nothing drives it.
+    /// True for a free response.
     pub fn is_empty(&self) -> bool {
         self.drive.force.is_none() && self.drive.base.is_none()
     }
@@ -27,7 +27,7 @@ impl RawExcitation {
         self.drive
     }
 
-    /// Spacing of the samples, where they are equally spaced, s.
+    /// Sampling interval of equally spaced samples, s.
     pub fn spacing(&self) -> Option<f64> {
         let force = match &self.drive.force {
             Some(Waveform::Samples(signal)) => Some(signal),
@@ -48,7 +48,7 @@ impl RawExcitation {
     }
 }
 
-/// Reads what drives experiment `i`.
+/// Reads the excitation of experiment `i`.
 pub fn read(
     file: &ModelFile,
     i: usize,
@@ -70,10 +70,10 @@ pub fn read(
                     .expected("one of the two"));
             }
             let interpolation = force.as_ref().and_then(|f| f.interpolation);
-            let wanted = Wanted {
+            let wanted = ColumnRequest {
                 experiment: i,
                 name: "force",
-                kind: Kind::Force,
+                kind: Quantity::Force,
                 column,
                 unit: units.and_then(|u| u.force.as_ref()),
                 beside: None,
@@ -117,10 +117,10 @@ fn base(
                 .found("`base_acceleration` and `base_displacement`")
                 .expected("one of the two"));
         }
-        (Some(column), None) => (column, Kind::Acceleration),
-        (None, Some(column)) => (column, Kind::Displacement),
+        (Some(column), None) => (column, Quantity::Acceleration),
+        (None, Some(column)) => (column, Quantity::Displacement),
     };
-    let wanted = |name, unit, kind| Wanted {
+    let wanted = |name, unit, kind| ColumnRequest {
         experiment: i,
         name,
         kind,
@@ -128,7 +128,7 @@ fn base(
         unit,
         beside: None,
     };
-    if kind == Kind::Acceleration {
+    if kind == Quantity::Acceleration {
         let unit = units.and_then(|u| u.base_acceleration.as_ref());
         let wanted = wanted("base_acceleration", unit, kind);
         let meant = interpolation.unwrap_or_default();
@@ -154,20 +154,20 @@ fn base(
     Ok(Some(BaseMotion::Displacement(signal)))
 }
 
-/// A column as a signal; it must have no gaps, as what drives a motion acts at all times.
+/// A column as a signal. Refuses missing samples, because an excitation acts at all times.
 fn signal(
     file: &ModelFile,
     spec: &ExperimentSpec,
-    wanted: &Wanted,
+    wanted: &ColumnRequest,
     interpolation: Interpolation,
     warnings: &mut Vec<Finding>,
 ) -> Result<Signal, InputError> {
-    // What drives the motion is needed a little beyond the window of the readings.
+    // Interpolation needs samples of the excitation slightly beyond the window of the response.
     let unbounded = ExperimentSpec {
         window: None,
         ..spec.clone()
     };
-    let source = source::read(file, &unbounded, wanted, warnings)?;
+    let source = column_samples::read(file, &unbounded, wanted, warnings)?;
     let key = format!("experiments[{}].columns.{}", wanted.experiment, wanted.name);
     let missing = source.values.iter().filter(|v| v.is_nan()).count();
     if missing > 0 {
@@ -189,7 +189,7 @@ fn signal(
     })
 }
 
-/// A force without samples.
+/// A force given by its shape instead of samples.
 pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<ExcitationShape, InputError> {
     let key = format!("{key}.force");
     let Some(shape) = spec.shape else {
@@ -225,7 +225,7 @@ pub fn shape(file: &ModelFile, key: &str, spec: &ForceSpec) -> Result<Excitation
     })
 }
 
-/// Refuses keys that a shape does not have, the absence of those that it needs, and values that make none.
+/// Refuses unknown and missing keys of a shape, and invalid values.
 fn shape_keys(
     file: &ModelFile,
     key: &str,

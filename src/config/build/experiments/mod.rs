@@ -1,19 +1,19 @@
-//! Experiments: readings, forces and initial states from files, put on the grid.
+//! Experiments of a model file: channels, excitation and initial state, read from files and placed on the grid.
 
 mod channel;
+mod column_samples;
 mod data_checks;
 mod excitation;
-mod source;
 mod unit;
 mod warning;
 
 use super::{BuildMode, functions};
 use crate::config::ModelFile;
-use crate::config::scalar::{Estimate, NumberOrEstimate, ScalarOr};
 use crate::config::spec::{EstimateValue, ExperimentSpec, FitMethod, InitialSpec, SensorSpec};
+use crate::config::values::{Estimate, NumberOrEstimate, ScalarOr};
 use crate::error::InputError;
 use crate::finding::Finding;
-use crate::observations::resample;
+use crate::tables::resample;
 use crate::units::Unit;
 pub(super) use channel::RawChannel;
 use excitation::RawExcitation;
@@ -24,14 +24,14 @@ use kmcfit_core::internals::system::Grid;
 
 pub(super) use excitation::shape;
 
-/// What stands in the files of one experiment, at the times of its readings.
-pub(super) struct Record {
+/// Data of one experiment before it is placed on the grid, at the times of its samples.
+pub(super) struct RawRecord {
     pub channels: Vec<RawChannel>,
     excitation: RawExcitation,
 }
 
-impl Record {
-    /// First time of its rows, s: also of those without a reading.
+impl RawRecord {
+    /// First time of its rows, missing samples included, s.
     pub fn start(&self) -> f64 {
         let first = self.channels.iter().map(|c| c.span[0]);
         first.fold(f64::INFINITY, f64::min)
@@ -43,7 +43,7 @@ impl Record {
         last.fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Spacing of the samples of force or base, where they are equally spaced, s.
+    /// Sampling interval of force or base motion, if equally spaced, s.
     pub fn drive_spacing(&self) -> Option<f64> {
         self.excitation.spacing()
     }
@@ -55,47 +55,47 @@ impl Record {
     }
 }
 
-/// What a report says about one channel.
+/// Notes for reports on one channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelNote {
-    /// What is measured.
+    /// Measured quantity.
     pub kind: ChannelKind,
-    /// Unit of the file, which reports use as well.
+    /// Unit of the file and of reports.
     pub unit: Unit,
-    /// Readings that are not used: how many, and why.
+    /// Unused samples: number and reason.
     pub ignored: Vec<(usize, String)>,
-    /// How the file was found to be written, in words.
+    /// Detected format of the file, as text.
     pub format: String,
 }
 
-/// An experiment that is kept out of the fit.
+/// A validation record: an experiment that is not used in the fit.
 #[derive(Debug, Clone)]
 pub struct HoldOut {
-    /// The experiment; what it leaves open are the scalars beside it.
+    /// The experiment; `scalars` are its estimated values.
     pub experiment: Experiment,
-    /// Numbers of its own that are found from it with the functions held.
+    /// Parameters of this record alone, estimated from it with the functions fixed.
     pub scalars: Vec<ScalarParameter>,
-    /// What a report says about its channels.
+    /// Notes for reports on its channels.
     pub notes: Vec<ChannelNote>,
 }
 
-/// Whether the fit compares the equation of motion, and not a motion, with the readings.
+/// True if the fit minimises the equation error instead of the misfit of a simulated response.
 fn is_equation_error(file: &ModelFile) -> bool {
     let method = file.spec.fit.as_ref().and_then(|f| f.method);
     method.map(FitMethod::name) == Some("equation-error")
 }
 
-/// Whether an experiment is kept out of the fit.
+/// True for a validation record.
 pub(super) fn is_held_out(spec: &ExperimentSpec) -> bool {
     spec.validation == Some(true)
 }
 
-/// Reads the files of all experiments; `None` where there is none to be read.
+/// Reads the files of all experiments; `None` for an experiment without files.
 pub(super) fn read(
     file: &ModelFile,
     purpose: BuildMode,
     warnings: &mut Vec<Finding>,
-) -> Result<Vec<Option<Record>>, InputError> {
+) -> Result<Vec<Option<RawRecord>>, InputError> {
     let specs = &file.spec.experiments;
     if specs.iter().all(is_held_out) {
         return Err(file
@@ -104,14 +104,14 @@ pub(super) fn read(
             .expected("at least one experiment without"));
     }
     if matches!(purpose, BuildMode::Simulate { .. }) {
-        // The duration may still have to come from the readings.
+        // Without `duration` the length of the grid follows from the samples.
         let has_duration = (file.spec.grid.as_ref()).is_some_and(|g| g.duration.is_some());
         let all_have_data = specs.iter().all(|e| e.data.is_some());
         if has_duration || !all_have_data {
             let records = specs.iter().enumerate().map(|(i, spec)| {
                 let excitation = excitation::read(file, i, spec, warnings)?;
                 let channels = Vec::new();
-                Ok((!excitation.is_empty()).then_some(Record {
+                Ok((!excitation.is_empty()).then_some(RawRecord {
                     channels,
                     excitation,
                 }))
@@ -130,9 +130,9 @@ fn read_one(
     i: usize,
     spec: &ExperimentSpec,
     warnings: &mut Vec<Finding>,
-) -> Result<Record, InputError> {
+) -> Result<RawRecord, InputError> {
     let channels = channel::read(file, i, spec, warnings)?;
-    let record = Record {
+    let record = RawRecord {
         channels,
         excitation: excitation::read(file, i, spec, warnings)?,
     };
@@ -140,13 +140,13 @@ fn read_one(
     Ok(record)
 }
 
-/// The specification of experiment `i` with what its files have, and what a report says of its channels.
+/// The specification of experiment `i` with its data, and the notes on its channels.
 pub(super) fn specification(
     file: &ModelFile,
     purpose: BuildMode,
     grid: &Grid,
     i: usize,
-    record: Option<Record>,
+    record: Option<RawRecord>,
 ) -> Result<(builder::Record, Vec<ChannelNote>), InputError> {
     let spec = &file.spec.experiments[i];
     let estimate = ScalarOr::Scalar(NumberOrEstimate::Estimate);
@@ -167,7 +167,7 @@ pub(super) fn specification(
     if let Some(mut record) = record {
         found = found.input(record.excitation.into_input());
         if let (BuildMode::Check { .. }, [only]) = (purpose, record.channels.as_mut_slice()) {
-            reading_per_node(only, grid);
+            sample_per_node(only, grid);
         }
         for raw in record.channels {
             notes.push(raw.note());
@@ -177,7 +177,7 @@ pub(super) fn specification(
     Ok((found, notes))
 }
 
-/// A number of the model that is known or estimated.
+/// A number that is fixed or estimated.
 fn scalar(given: &EstimateValue) -> ScalarSpec {
     match given {
         ScalarOr::Scalar(NumberOrEstimate::Number(number)) => ScalarSpec::Known(number.0),
@@ -213,9 +213,9 @@ fn channel(spec: &ExperimentSpec, raw: RawChannel) -> ChannelSpec {
     }
 }
 
-/// A check is about the gradient: readings of the plain integral cost are taken at every node, so
-/// that the continuous adjoint can be checked on any grid.
-fn reading_per_node(raw: &mut RawChannel, grid: &Grid) {
+/// Interpolates the samples of an integral cost at every node, so that a gradient check of the continuous adjoint is
+/// possible on any grid.
+fn sample_per_node(raw: &mut RawChannel, grid: &Grid) {
     let plain = raw.kind == ChannelKind::Displacement && raw.filter.is_empty();
     let integral = matches!(raw.weighting, Some(Weighting::Integral { .. }) | None);
     if plain && integral && raw.spacing.is_some() && raw.times.len() != grid.nodes() {
@@ -227,7 +227,7 @@ fn reading_per_node(raw: &mut RawChannel, grid: &Grid) {
     }
 }
 
-/// Names of channels in a row.
+/// Names of channels, separated by commas.
 fn names(kinds: &[ChannelKind]) -> String {
     listed(kinds.iter().map(|kind| kind.name()))
 }

@@ -2,11 +2,11 @@
 
 use super::warning::DataWarning;
 use crate::config::ModelFile;
-use crate::config::scalar::Text;
+use crate::config::values::Text;
 use crate::error::InputError;
 use crate::finding::Finding;
-use crate::observations::Table;
-use crate::units::{Kind, Unit};
+use crate::tables::Table;
+use crate::units::{Quantity, Unit};
 
 /// A column of a table, its keys in the model file and its kind of quantity.
 pub(super) struct QuantityColumn<'a> {
@@ -15,8 +15,8 @@ pub(super) struct QuantityColumn<'a> {
     pub experiment: &'a str,
     /// Name of the channel: a key of `columns` and `units`.
     pub name: &'a str,
-    pub kind: Kind,
-    /// Unit that the model gives.
+    pub kind: Quantity,
+    /// Unit given in the model file.
     pub given: Option<&'a Text>,
     pub table: &'a Table,
     pub index: usize,

@@ -1,7 +1,7 @@
 //! Warnings about the data of an experiment.
 
-use crate::digits::significant;
 use crate::finding::Finding;
+use crate::number_format::significant;
 use serde::Serialize;
 use thiserror::Error;
 

@@ -6,9 +6,9 @@
 //! shortened so that samples of force and base fall on nodes. For records without a spectrum (too few or equal samples)
 //! the step is the sampling interval.
 
-use crate::config::build::experiments::Record;
-use crate::digits::significant;
+use crate::config::build::experiments::RawRecord;
 use crate::finding::Finding;
+use crate::number_format::significant;
 use kmcfit_core::internals::signal::Spectrum;
 use kmcfit_core::internals::system::Method;
 use std::f64::consts::TAU;
@@ -23,24 +23,24 @@ const ALL_ENERGY: f64 = 0.999;
 const STEPS_PER_PERIOD: f64 = 10.0;
 /// A response has decayed if the later half of its samples has less than this share of the energy of the earlier half.
 const AT_REST: f64 = 0.01;
-/// Fewest samples that are halved.
+/// Fewest samples for a comparison of halves.
 const FEWEST_LIVELY: usize = 128;
 /// Most nodes per sample: more only slow down the fit of a coarse record.
-const MOST_PER_READING: usize = 64;
+const MOST_PER_SAMPLE: usize = 64;
 
 /// Number of nodes over `duration` s; a finding in `notes` states the choice.
 pub fn nodes(
     method: Method,
-    records: &[Option<Record>],
+    records: &[Option<RawRecord>],
     duration: f64,
     most: usize,
     notes: &mut Vec<Finding>,
 ) -> usize {
     let mut longest = f64::INFINITY;
     let mut fastest = 0.0f64;
-    let mut readings = 2;
+    let mut samples = 2;
     for channel in records.iter().flatten().flat_map(|r| &r.channels) {
-        readings = readings.max(channel.times.len());
+        samples = samples.max(channel.times.len());
         let spectrum = Spectrum::of(lively(&channel.values), channel.median_spacing);
         let spectrum = spectrum.map(|s| s.without_noise());
         let frequency = spectrum.as_ref().map(|s| s.energy_quantile(ENERGY));
@@ -57,9 +57,12 @@ pub fn nodes(
             .min((ACCURACY * constant / (omega * duration)).powf(1.0 / order) / omega)
             .min(1.0 / (STEPS_PER_PERIOD * spectrum.energy_quantile(ALL_ENERGY)));
     }
-    let shortest = duration / (most.min(MOST_PER_READING * readings) - 1) as f64;
+    let shortest = duration / (most.min(MOST_PER_SAMPLE * samples) - 1) as f64;
     let mut step = longest.clamp(shortest, duration / 8.0);
-    let drives = records.iter().flatten().filter_map(Record::drive_spacing);
+    let drives = records
+        .iter()
+        .flatten()
+        .filter_map(RawRecord::drive_spacing);
     if let Some(spacing) = drives.reduce(f64::min) {
         // Samples on nodes: no step crosses a kink of the force.
         step = spacing / (spacing / step).ceil();

@@ -1,38 +1,37 @@
-//! Whether a grid fits into memory, before any of it is taken.
+//! Upper estimate of the memory of a run per node, bytes, from method, records and functions.
 //!
-//! The bytes per node were measured as the growth of a run's memory with the number of nodes, for
-//! every method, with one to three records and functions, and rounded up: most runs need half as much.
+//! The constants are the measured growth of a run's memory with the number of nodes, for every method and one to three
+//! records and functions, rounded up; most runs need half of the estimate.
 
 use crate::config::ModelFile;
 use crate::config::build::BuildMode;
 use crate::config::build::fit::DEFAULT_MEMORY;
 use crate::config::build::functions::{self, Given};
-use crate::config::scalar::Knots;
 use crate::config::spec::{Basis, FitMethod};
+use crate::config::values::KnotSpec;
 use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 
 /// Bytes per node of every run: times, tables and figures.
 const RUN: usize = 200;
-/// For each record: its motion, excitation and readings.
+/// For each record: response, excitation and samples.
 const RECORD: usize = 400;
 /// For each function: its values, design and table.
 const FUNCTION: usize = 100;
-/// The same of a simulation, which keeps one motion and writes one table.
+/// For each record of a simulation, which keeps one response and writes one table.
 const SIMULATION: usize = 100;
-/// For each pair that L-BFGS remembers and each function that is free at every node: two numbers and their
-/// duals, and the same once more while a checkpoint is written.
+/// For each pair of L-BFGS and each nodal function: two numbers and their duals, doubled while a checkpoint is written.
 const PAIR: usize = 72;
-/// Gauss-Newton with few parameters, and for each record: start from the readings, Jacobian.
+/// Gauss-Newton with few parameters, for each record: start from the samples, Jacobian.
 const FEW: usize = 1000;
 const FEW_RECORD: usize = 300;
-/// Gauss-Newton with many, for each record and each function that is free at every node: the states
-/// are unknowns, and the factors of their equations are sparse.
+/// Gauss-Newton with many parameters, for each record and each nodal function: the states are unknowns with sparse
+/// factors.
 const MANY_RECORD: usize = 3500;
 const MANY_FUNCTION: usize = 1500;
-/// So many times that where quadratic programs may be needed: an interior-point method keeps more.
+/// Factor on [`MANY_RECORD`] for fits that may need quadratic programs by an interior-point method.
 const PROGRAMS: usize = 2;
 
-/// Bytes per node that a run of the model may need.
+/// Upper estimate of the memory of a run, bytes per node.
 pub fn per_node(file: &ModelFile, purpose: BuildMode) -> usize {
     let spec = &file.spec;
     let (records, functions) = (spec.experiments.len(), functions::all(file));
@@ -72,18 +71,18 @@ pub fn per_node(file: &ModelFile, purpose: BuildMode) -> usize {
     own.saturating_add(common)
 }
 
-/// How many values of a function are sought.
+/// Number of parameters of a function.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum FreeValues {
     Few(usize),
-    /// One at every node, or so many that they are handled alike.
+    /// One for each node, or a similar number.
     PerNode,
 }
 
 fn free_values((_, spec): &Given) -> FreeValues {
     let knots = match &spec.knots {
-        Some(Knots::Count(count)) => count.0,
-        Some(Knots::Times(times)) => times.len(),
+        Some(KnotSpec::Count(count)) => count.0,
+        Some(KnotSpec::Times(times)) => times.len(),
         None => 0,
     };
     let count = match spec.basis {
@@ -102,7 +101,7 @@ fn free_values((_, spec): &Given) -> FreeValues {
     }
 }
 
-/// Whether inequalities or total variation may take a quadratic program.
+/// True if inequalities or total variation may need a quadratic program.
 fn has_programs(file: &ModelFile, functions: &[Given]) -> bool {
     let limited =
         |(_, spec): &Given| spec.min.is_some() || spec.max.is_some() || spec.has_total_variation();

@@ -1,4 +1,4 @@
-// A chart: panels over shared horizontal axes, a legend that switches curves, buttons, a reading.
+// A chart: panels over shared horizontal axes, a legend that toggles curves, buttons, and the values at the pointer.
 
 /** Horizontal axes by what they show: charts of the same time zoom and read together. */
 const axes = new Map();
@@ -22,7 +22,7 @@ const refresh = (axis) => {
 const setRange = (axis, low, high) => {
   const [least, most] = axis.full;
   const room = most - least;
-  // Closer than a billionth of the whole, or than rounding allows, nothing can be told apart.
+  // Least range: a billionth of the full range, or the rounding error.
   const closest = Math.max(1e-9 * room, 1e-12 * Math.max(Math.abs(least), Math.abs(most)));
   const span = Math.min(room, Math.max(high - low, closest));
   const first = Math.min(Math.max(low, least), most - span);

@@ -37,7 +37,7 @@ const walk = (mark, ys, view, each, gap) => {
 const linePath = (mark, ys, view) => {
   let [path, pen, alone] = ["", "M", ""];
   const end = () => {
-    // A reading between two gaps has no segment to show it: a dot does.
+    // A sample between two gaps has no line segment and is drawn as a dot.
     path += alone;
     [pen, alone] = ["M", ""];
   };

@@ -7,7 +7,7 @@ class Panel {
     Object.assign(this, { chart, name, title: data.title, x: data.x, y: data.y, yRange: null });
     this.marks = data.marks.map((mark) => this.prepared(mark));
     const own = data.x.limits ? data.x.limits.map((v) => even(data.x.log, v)) : this.xExtent();
-    // Charts over the same time go together; other axes belong to their chart.
+    // Charts over the same time axis zoom together.
     const span = (own ?? []).map((end) => end.toPrecision(4)).join(" ");
     const owner = data.x.label.startsWith("time") ? span : name.split("-")[0];
     this.axis = axisOf([caption(data.x), data.x.log, owner].join("|"), data.x.log);
@@ -73,7 +73,7 @@ class Panel {
       yTicks: ticksOf(this.y.log, y, Math.max(2, Math.floor(frame.height / 40))),
       px: (value) => xAt(even(this.x.log, value)),
       py: (value) => yAt(even(this.y.log, value)),
-      // Far outside the frame a path needs no more than to be outside.
+      // Points far outside the frame are moved closer to it.
       near: (pixel) => Math.min(Math.max(pixel, -5000), 5000),
       placeAt: (pixel) => x[0] + ((pixel - frame.left) / frame.width) * (x[1] - x[0]),
       heightAt: (pixel) => y[0] + ((bottom - pixel) / frame.height) * (y[1] - y[0]),

@@ -1,8 +1,8 @@
-// Values to places and back, ticks, and numbers as people write them.
+// Conversion between values and positions, ticks, and number formats.
 
 /** The value in the space in which an axis is even; NaN where it cannot be drawn. */
 const even = (log, value) => {
-  // Beyond this no difference of two values is sure to be a number.
+  // Beyond this the difference of two values can overflow.
   if (value === null || !(1e300 >= Math.abs(value))) return NaN;
   if (!log) return value;
   return value > 0 ? Math.log10(value) : NaN;
@@ -86,7 +86,7 @@ const ticksOf = (log, range, most) => {
     const values = linearTicks([10 ** range[0], 10 ** range[1]], most);
     return values.filter((t) => t.place > 0).map((t) => ({ ...t, place: Math.log10(t.place) }));
   }
-  // Where few decades are in sight, round values between them help.
+  // A range of few decades has ticks at round values between them.
   const between = 2 >= last - first ? [1, 2, 5] : [1];
   const stride = Math.floor((last - first) / most) + 1;
   const ticks = [];

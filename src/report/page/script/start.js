@@ -1,4 +1,4 @@
-// Every figure of the page becomes a chart; without this script its drawing stays.
+// Replaces the drawing of every figure by a chart.
 
 /** Equally spaced values are written by their ends. */
 const spread = (xs) => (Array.isArray(xs) ? xs : Array.from({ length: xs.count }, (_, i) => xs.from + i * xs.step));

@@ -1,17 +1,17 @@
-//! Channels: readings from columns, with their noise, loss, sensor and filter.
+//! Channels of an experiment: samples from a column, with noise, loss, sensor and filter.
 
 mod noise;
 mod sampling;
 
-use super::source::{self, Wanted};
+use super::column_samples::{self, ColumnRequest};
 use super::warning::DataWarning;
 use super::{ChannelNote, names};
 use crate::config::ModelFile;
-use crate::config::scalar::{ColumnId, ScalarOr, Sigma, Text};
 use crate::config::spec::{ColumnRef, ExperimentSpec, LossName, LossSpec, SensorSpec};
+use crate::config::values::{ColumnId, ScalarOr, Sigma, Text};
 use crate::error::InputError;
 use crate::finding::Finding;
-use crate::units::{Kind, Unit};
+use crate::units::{Quantity, Unit};
 use kmcfit_core::internals::record::{ChannelKind, Loss, Weighting};
 use kmcfit_core::internals::signal::SecondOrder;
 use kmcfit_core::internals::signal::{even_spacing, median_spacing};
@@ -22,19 +22,19 @@ use sampling::{band, decimate, nearly_equal};
 /// Default name of the column of the displacement, for files without `columns`.
 const DISPLACEMENT_COLUMN: &str = "y_m";
 
-/// One channel before it is put on the grid.
+/// A channel before it is placed on the grid.
 pub struct RawChannel {
-    /// What is measured.
+    /// Measured quantity.
     pub kind: ChannelKind,
-    /// s.
+    /// Times, s.
     pub times: Vec<f64>,
-    /// SI.
+    /// Samples, SI.
     pub values: Vec<f64>,
-    /// Spacing of the readings where it is equal and none is missing, s.
+    /// Sampling interval of equally spaced samples without gaps, s.
     pub spacing: Option<f64>,
-    /// First and last time of the rows, with a reading or without, s.
+    /// First and last time of the rows, missing samples included, s.
     pub span: [f64; 2],
-    /// Whether most readings were left out, so that they no longer tell how fine the steps must be.
+    /// True after decimation: the sampling interval then no longer bounds the step.
     pub decimated: bool,
     /// s.
     pub median_spacing: f64,
@@ -49,12 +49,12 @@ pub struct RawChannel {
 }
 
 impl RawChannel {
-    /// Whether its residuals count by their squares.
+    /// True for a quadratic loss.
     pub fn is_squared(&self) -> bool {
         self.loss == Loss::Squares
     }
 
-    /// What a report says about it.
+    /// Notes for reports.
     pub fn note(&self) -> ChannelNote {
         ChannelNote {
             kind: self.kind,
@@ -65,7 +65,7 @@ impl RawChannel {
     }
 }
 
-/// What the model says about one kind of channel.
+/// Settings of the model file for one channel.
 struct Spec<'a> {
     kind: ChannelKind,
     column: Option<&'a ColumnRef>,
@@ -95,7 +95,7 @@ fn spec_of(spec: &ExperimentSpec, kind: ChannelKind) -> Spec<'_> {
     }
 }
 
-/// What the model says of the sensor of a channel.
+/// Settings of the sensor of a channel in the model file.
 pub fn sensor_of(spec: &ExperimentSpec, kind: ChannelKind) -> Option<&SensorSpec> {
     spec_of(spec, kind).sensor
 }
@@ -126,7 +126,7 @@ pub fn read(
     Ok(channels)
 }
 
-/// Whether `columns` names what drives the motion or nothing but the time.
+/// True if `columns` names an excitation, or the time only.
 fn named_something_else(spec: &ExperimentSpec) -> bool {
     let columns = spec.columns.as_ref();
     columns.is_some_and(|c| {
@@ -147,7 +147,7 @@ fn no_channel(file: &ModelFile, i: usize, spec: &ExperimentSpec) -> InputError {
     }
 }
 
-/// Refuses a sigma, a loss or a sensor of a channel that is not read.
+/// Refuses a sigma, a loss or a sensor of a channel without a column.
 fn without_column(
     file: &ModelFile,
     i: usize,
@@ -191,19 +191,19 @@ fn read_one(
         Some(Sigma::Column(name)) => Some((name.as_str(), sigma_key.as_str())),
         _ => None,
     };
-    let wanted = Wanted {
+    let wanted = ColumnRequest {
         experiment: i,
         name: kind.name(),
         kind: match kind {
-            ChannelKind::Displacement => Kind::Displacement,
-            ChannelKind::Velocity => Kind::Velocity,
-            ChannelKind::Acceleration => Kind::Acceleration,
+            ChannelKind::Displacement => Quantity::Displacement,
+            ChannelKind::Velocity => Quantity::Velocity,
+            ChannelKind::Acceleration => Quantity::Acceleration,
         },
         column,
         unit: of_kind.unit,
         beside: sigma_column,
     };
-    let mut source = source::read(file, spec, &wanted, warnings)?;
+    let mut source = column_samples::read(file, spec, &wanted, warnings)?;
     let mut ignored = Vec::new();
     if source.outside > 0 {
         ignored.push((source.outside, "outside the window".to_owned()));
@@ -244,11 +244,11 @@ fn read_one(
     })
 }
 
-/// The rows with a reading; there must be enough of them.
+/// The rows without a missing sample. Refuses too few of them.
 fn present(
     file: &ModelFile,
     column: &str,
-    source: &source::Source,
+    source: &column_samples::ColumnSamples,
 ) -> Result<Vec<usize>, InputError> {
     let rows = 0..source.values.len();
     let present: Vec<usize> = rows.filter(|&r| !source.values[r].is_nan()).collect();
@@ -260,8 +260,8 @@ fn present(
                 .found(format!("{missing} rows without a number in `{label}`"))
                 .expected("at least one sample"));
         }
-        1 => "1 reading".to_owned(),
-        count if count < Grid::FEWEST_NODES => format!("{count} readings"),
+        1 => "1 sample".to_owned(),
+        count if count < Grid::FEWEST_NODES => format!("{count} samples"),
         _ => return Ok(present),
     };
     Err(file

@@ -1,9 +1,9 @@
-//! The standard deviation of readings, and the loss of their residuals.
+//! Standard deviation of the samples, and loss of the residuals.
 
 use super::Spec;
 use crate::config::ModelFile;
-use crate::config::scalar::{ScalarOr, Sigma};
 use crate::config::spec::LossName;
+use crate::config::values::{ScalarOr, Sigma};
 use crate::error::InputError;
 use kmcfit_core::internals::record::{Loss, Weighting};
 
@@ -11,7 +11,7 @@ use kmcfit_core::internals::record::{Loss, Weighting};
 const HUBER: f64 = 1.345;
 /// Degrees of freedom of Student's t.
 const STUDENT: f64 = 4.0;
-/// First guess of a sigma that is estimated, as a share of the readings' size.
+/// Start value of an estimated sigma relative to the size of the samples.
 const FIRST_SIGMA: f64 = 0.05;
 
 pub(super) fn weighting(
@@ -35,7 +35,7 @@ pub(super) fn weighting(
                     .error_at(key, "a standard deviation must be positive")
                     .found(match sigmas[row].is_nan() {
                         true => format!("an empty field in `{name}` for sample {}", row + 1),
-                        false => format!("{} in `{name}` beside reading {}", sigmas[row], row + 1),
+                        false => format!("{} in `{name}` beside sample {}", sigmas[row], row + 1),
                     })
                     .expected("a number greater than 0 for every sample")),
                 None => Ok(Some(Weighting::Sigmas(sigmas))),

@@ -1,6 +1,6 @@
-//! Times of readings, and what is kept of them: fewer, or a band of frequencies.
+//! Sampling of a channel: equal spacing, decimation, and the band-pass filter.
 
-use super::super::source;
+use super::super::column_samples;
 use crate::config::ModelFile;
 use crate::config::spec::ExperimentSpec;
 use crate::error::InputError;
@@ -9,22 +9,22 @@ use kmcfit_core::internals::signal::{even_spacing, median_spacing};
 
 /// Order of the filter of a band, run forward and backward.
 const BAND_ORDER: usize = 2;
-/// Spacings that differ by less than this share look like rounded times.
+/// Relative difference of spacings below which times count as rounded.
 const ROUNDED: f64 = 0.05;
 
-/// Whether all spacings are within some per cent of their median.
+/// True if all spacings are within 5 % of their median.
 pub(super) fn nearly_equal(times: &[f64]) -> bool {
     let median = median_spacing(times);
     let off = |w: &[f64]| (w[1] - w[0] - median).abs() > ROUNDED * median;
     !times.windows(2).any(off)
 }
 
-/// Keeps every `factor`-th reading after a low-pass filter.
+/// Keeps every `factor`-th sample after a low-pass filter.
 pub(super) fn decimate(
     file: &ModelFile,
     key: &str,
     factor: usize,
-    source: &mut source::Source,
+    source: &mut column_samples::ColumnSamples,
     ignored: &mut Vec<(usize, String)>,
 ) -> Result<(), InputError> {
     let at = format!("{key}.decimate");
@@ -40,7 +40,7 @@ pub(super) fn decimate(
             .error_at(&at, "decimation needs equally spaced samples without gaps")
             .found(match whole {
                 true => "times that are not equally spaced",
-                false => "missing readings",
+                false => "missing samples",
             })
             .expected("no `decimate`, or a window without gaps"));
     }
@@ -74,7 +74,7 @@ pub(super) fn band(
             .error_at(&at, "filtering needs equally spaced samples without gaps")
             .found(match missing {
                 0 => "times that are not equally spaced".to_owned(),
-                count => format!("{count} missing readings"),
+                count => format!("{count} missing samples"),
             })
             .expected("no `band`, or a window without gaps"));
     };

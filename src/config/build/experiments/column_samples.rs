@@ -1,0 +1,302 @@
+//! Reading of a column of a file: times, and values in SI units within the time window.
+
+use super::unit::QuantityColumn;
+use crate::config::ModelFile;
+use crate::config::build::asked_for;
+use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, SourceSpec};
+use crate::config::values::{ColumnId, ScalarOr, Text};
+use crate::error::InputError;
+use crate::finding::Finding;
+use crate::tables::{ColumnName, SAMPLE_RATES, Table, TableFormat, increasing_at};
+use crate::units::{Quantity, Unit};
+
+/// Default name of the column of times.
+const TIME_COLUMN: &str = "t_s";
+
+/// Samples of a column in SI units within the time window; NaN for a missing sample.
+pub struct ColumnSamples {
+    /// Times, s, increasing.
+    pub times: Vec<f64>,
+    /// Values, SI.
+    pub values: Vec<f64>,
+    /// Unit of the values in the file.
+    pub unit: Unit,
+    /// Values of a second column of the same file at the same times, SI.
+    pub beside: Option<Vec<f64>>,
+    /// Rows outside the window.
+    pub outside: usize,
+    /// Name of the column in the file.
+    pub label: String,
+    /// Detected format of the file, as text.
+    pub format: String,
+}
+
+/// A requested column, with its keys in the model file.
+pub struct ColumnRequest<'a> {
+    /// Number of the experiment.
+    pub experiment: usize,
+    /// Name of the channel: a key of `columns` and `units`.
+    pub name: &'a str,
+    /// Measured quantity.
+    pub kind: Quantity,
+    /// The column.
+    pub column: &'a ColumnRef,
+    /// Unit given in the model file.
+    pub unit: Option<&'a Text>,
+    /// Another column of the same file, in the same unit, and its key.
+    pub beside: Option<(&'a str, &'a str)>,
+}
+
+fn column_name(id: &ColumnId) -> ColumnName {
+    match id {
+        ColumnId::Name(name) => ColumnName::Name(name.clone()),
+        ColumnId::Number(number) => ColumnName::Number(*number),
+    }
+}
+
+/// Reads the requested column.
+pub fn read(
+    file: &ModelFile,
+    spec: &ExperimentSpec,
+    wanted: &ColumnRequest,
+    warnings: &mut Vec<Finding>,
+) -> Result<ColumnSamples, InputError> {
+    let experiment = format!("experiments[{}]", wanted.experiment);
+    let column_key = format!("{experiment}.columns.{}", wanted.name);
+    let (id, own) = match wanted.column {
+        ScalarOr::Scalar(id) => (id, None),
+        ScalarOr::Map(source) => (&source.column, Some(source)),
+    };
+    let table = table(file, spec, &experiment, &column_key, own)?;
+    let column_key = match own {
+        Some(_) => format!("{column_key}.column"),
+        None => column_key,
+    };
+    let index = (table.find(&column_name(id))).map_err(asked_for(file, &column_key))?;
+    let column = |index| QuantityColumn {
+        file,
+        experiment: &experiment,
+        name: wanted.name,
+        kind: wanted.kind,
+        given: wanted.unit,
+        table: &table,
+        index,
+    };
+    let unit = column(index).unit(warnings)?;
+    let factor = unit.factor();
+    let times = times(file, spec, &experiment, own, &table, warnings)?;
+    let values = table.samples(index).map_err(asked_for(file, &column_key))?;
+    let beside = match wanted.beside {
+        Some((name, key)) => {
+            let found = table
+                .find(&ColumnName::from(name))
+                .map_err(asked_for(file, key))?;
+            column(found).same_as(unit, key, warnings);
+            Some(table.samples(found).map_err(asked_for(file, key))?)
+        }
+        None => None,
+    };
+    let label = table.label(index);
+    if label == times.label {
+        return Err(file
+            .error_at(
+                &format!("{experiment}.columns"),
+                format!(
+                    "time and {} are the same column",
+                    wanted.name.replace('_', " ")
+                ),
+            )
+            .found(format!("`{label}`"))
+            .expected("two columns"));
+    }
+    let inside = inside(file, &experiment, spec, &times.values)?;
+    let zero = spec.time_zero.map_or(0.0, |t| t.0);
+    Ok(ColumnSamples {
+        times: inside.iter().map(|&r| times.values[r] - zero).collect(),
+        values: inside.iter().map(|&r| factor * values[r]).collect(),
+        beside: beside.map(|b| inside.iter().map(|&r| factor * b[r]).collect()),
+        outside: times.values.len() - inside.len(),
+        unit,
+        label,
+        format: table.format().to_string(),
+    })
+}
+
+/// The file of a column: its own, or that of the experiment.
+fn table(
+    file: &ModelFile,
+    spec: &ExperimentSpec,
+    experiment: &str,
+    column_key: &str,
+    own: Option<&SourceSpec>,
+) -> Result<Table, InputError> {
+    let own = own.and_then(|s| s.data.as_ref());
+    let key = format!("{}.data", own.map_or(experiment, |_| column_key));
+    let data = own.or(spec.data.as_ref()).ok_or_else(|| {
+        file.error_at(experiment, "this experiment has no data")
+            .expected("`data`, a CSV file with the samples")
+    })?;
+    Table::read_with(file.resolve(&data.0), &format(spec))
+        .map_err(|error| about_format(file, experiment, error))
+        .map_err(asked_for(file, &key))
+}
+
+/// The rows in the window.
+fn inside(
+    file: &ModelFile,
+    experiment: &str,
+    spec: &ExperimentSpec,
+    times: &[f64],
+) -> Result<Vec<usize>, InputError> {
+    let [from, to] = window(file, experiment, spec)?;
+    let is_inside = |r: &usize| (from..=to).contains(&times[*r]);
+    let inside: Vec<usize> = (0..times.len()).filter(is_inside).collect();
+    match inside.is_empty() {
+        false => Ok(inside),
+        true => Err(file
+            .error_at(
+                &format!("{experiment}.window"),
+                "no sample lies in the window",
+            )
+            .found(format!("{from} s to {to} s"))
+            .expected(format!(
+                "a part of {} s to {} s",
+                times[0],
+                times[times.len() - 1]
+            ))),
+    }
+}
+
+/// Table format of the files of an experiment, as far as the model gives it.
+fn format(spec: &ExperimentSpec) -> TableFormat {
+    let Some(given) = &spec.format else {
+        return TableFormat::default();
+    };
+    TableFormat {
+        delimiter: given.delimiter.map(|d| match d {
+            Delimiter::Comma => ',',
+            Delimiter::Semicolon => ';',
+            Delimiter::Tab => '\t',
+        }),
+        decimal: given.decimal.map(|d| match d {
+            DecimalSign::Point => '.',
+            DecimalSign::Comma => ',',
+        }),
+        skip: given.skip.map(|count| count.0),
+        header: given.header,
+        units_row: given.units_row,
+    }
+}
+
+/// Moves an error about an argument of the format to its key.
+fn about_format(file: &ModelFile, experiment: &str, error: InputError) -> InputError {
+    match &error.place {
+        crate::error::Location::Argument(name) => {
+            let key = format!("{experiment}.format.{name}");
+            file.error_about(&key, error)
+        }
+        _ => error,
+    }
+}
+
+struct Times {
+    values: Vec<f64>,
+    label: String,
+}
+
+/// The times of all rows, in s.
+fn times(
+    file: &ModelFile,
+    spec: &ExperimentSpec,
+    experiment: &str,
+    own: Option<&SourceSpec>,
+    table: &Table,
+    warnings: &mut Vec<Finding>,
+) -> Result<Times, InputError> {
+    let own_rate = own.and_then(|s| s.sample_rate);
+    let own_column = own.and_then(|s| s.time.as_ref());
+    let shared_column = spec.columns.as_ref().and_then(|c| c.time.as_ref());
+    let rate = match (own_rate, own_column) {
+        (Some(rate), None) => Some(rate),
+        (None, Some(_)) => None,
+        (Some(_), Some(_)) => return Err(two_times(file, experiment)),
+        (None, None) => match (spec.sample_rate, shared_column) {
+            (Some(_), Some(_)) => return Err(two_times(file, experiment)),
+            (rate, _) => rate,
+        },
+    };
+    if let Some(rate) = rate {
+        if !SAMPLE_RATES.contains(&rate.0) {
+            return Err(file
+                .error_at(
+                    &format!("{experiment}.sample_rate"),
+                    "invalid sampling rate",
+                )
+                .found(format!("{:?}", rate.0))
+                .expected(rates()));
+        }
+        let values = (0..table.rows()).map(|i| i as f64 / rate.0).collect();
+        let label = String::new();
+        return Ok(Times { values, label });
+    }
+    let default = ColumnId::Name(TIME_COLUMN.to_owned());
+    let id = own_column.or(shared_column).unwrap_or(&default);
+    let key = format!("{experiment}.columns.time");
+    let index = table.find(&column_name(id)).map_err(|error| {
+        let error = asked_for(file, &key)(error);
+        match own_column.or(shared_column) {
+            None => error.hint("name it with `columns: {time: …}`, or give `sample_rate: …`"),
+            Some(_) => error,
+        }
+    })?;
+    let column = QuantityColumn {
+        file,
+        experiment,
+        name: "time",
+        kind: Quantity::Time,
+        given: spec.units.as_ref().and_then(|u| u.time.as_ref()),
+        table,
+        index,
+    };
+    let unit = column.unit(warnings)?;
+    let values = increasing_at(table, index).map_err(asked_for(file, &key))?;
+    Ok(Times {
+        values: values.iter().map(|t| t * unit.factor()).collect(),
+        label: table.label(index),
+    })
+}
+
+/// The sampling rates that are accepted, for messages.
+fn rates() -> String {
+    let (least, most) = (SAMPLE_RATES.start(), SAMPLE_RATES.end());
+    format!("samples per second, a number from {least:e} to {most:e}")
+}
+
+fn two_times(file: &ModelFile, experiment: &str) -> InputError {
+    file.error_at(
+        &format!("{experiment}.sample_rate"),
+        "both a sampling rate and a column of times are given",
+    )
+    .found("`sample_rate` beside a column of times")
+    .expected("one of the two")
+}
+
+/// First and last time of the window, on the time axis of the file.
+fn window(
+    file: &ModelFile,
+    experiment: &str,
+    spec: &ExperimentSpec,
+) -> Result<[f64; 2], InputError> {
+    let Some(window) = &spec.window else {
+        return Ok([f64::NEG_INFINITY, f64::INFINITY]);
+    };
+    let from = window.min.map_or(f64::NEG_INFINITY, |t| t.0);
+    let to = window.max.map_or(f64::INFINITY, |t| t.0);
+    if from >= to {
+        return Err(file
+            .error_at(&format!("{experiment}.window"), "the window is empty")
+            .found(format!("{from} s to {to} s"))
+            .expected("`min` less than `max`"));
+    }
+    Ok([from, to])
+}

@@ -1,0 +1,155 @@
+//! `kmcfit explain`: documentation of a key as text.
+
+use super::{Found, MODEL, ValueType, all};
+use crate::error::{InputError, Location};
+use crate::spelling::did_you_mean;
+use crate::text_io::quote;
+use std::fmt::Write;
+
+/// Most further paths of a key that are listed.
+const MOST_PLACES: usize = 4;
+
+/// Documentation of the keys with a name or a path: `tolerance`, `fit.stop`, `experiments[0].sigma`. Without a name, a list
+/// of the top-level keys.
+///
+/// # Errors
+/// If no such key.
+pub fn explain(name: Option<&str>) -> Result<String, InputError> {
+    let Some(name) = name else {
+        let mut text =
+            String::from("Keys of a model file (`kmcfit explain KEY` explains one):\n\n");
+        list(&mut text, MODEL.keys.iter().map(|key| (key.name, key.text)));
+        return Ok(text);
+    };
+    let wanted = without_positions(name);
+    let keys = all();
+    let is_meant = |path: &String| *path == wanted || path.ends_with(&format!(".{wanted}"));
+    let mut exact: Vec<&Found> = (keys.iter())
+        .filter(|f| f.paths.contains(&wanted))
+        .collect();
+    if exact.is_empty() {
+        exact = (keys.iter())
+            .filter(|f| f.paths.iter().any(is_meant))
+            .collect();
+    }
+    if exact.is_empty() {
+        return Err(unknown(name, &wanted, &keys));
+    }
+    let texts: Vec<String> = exact.into_iter().map(|f| entry(f, &wanted)).collect();
+    Ok(texts.join("\n"))
+}
+
+/// A path without positions in lists: `experiments[0].sigma` and `experiments.0.sigma` are
+/// `experiments.sigma`.
+fn without_positions(path: &str) -> String {
+    let part = |part: &str| {
+        let key = part.split('[').next().unwrap_or_default().trim();
+        (!key.is_empty() && !key.bytes().all(|b| b.is_ascii_digit())).then(|| key.to_owned())
+    };
+    let parts: Vec<String> = path.split('.').filter_map(part).collect();
+    parts.join(".")
+}
+
+fn unknown(name: &str, wanted: &str, keys: &[Found]) -> InputError {
+    let error = InputError::new(Location::Argument("KEY".into()), "no such key")
+        .found(quote(name))
+        .expected("a key of a model file; `kmcfit explain` lists the top-level keys");
+    let last = wanted.rsplit('.').next().unwrap_or_default();
+    let paths = || keys.iter().flat_map(|f| f.paths.iter().map(String::as_str));
+    let names = || keys.iter().map(|f| f.key.name);
+    match did_you_mean(wanted, paths()).or_else(|| did_you_mean(last, names())) {
+        Some(hint) => error.hint(hint),
+        None => error,
+    }
+}
+
+fn entry(found: &Found, wanted: &str) -> String {
+    let key = found.key;
+    let mut paths: Vec<&str> = found.paths.iter().map(String::as_str).collect();
+    // The requested path first, then the shortest.
+    paths.sort_by_key(|path| (*path != wanted, path.matches('.').count()));
+    let mut text = format!("{}\n  {}\n", paths[0], key.text);
+    let mut row = |name: &str, value: &str| {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "  {name:<8} {value}");
+    };
+    row("type", &kind(key.kind));
+    if let Some(unit) = key.unit {
+        row("unit", unit);
+    }
+    match (key.required, key.default) {
+        (true, _) => row("default", "none (required)"),
+        (false, Some(default)) => row("default", default),
+        (false, None) => {}
+    }
+    row("example", &format!("{}: {}", key.name, key.example));
+    let others = &paths[1..];
+    if !others.is_empty() {
+        let shown = &others[..others.len().min(MOST_PLACES)];
+        let more = match others.len() - shown.len() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        row("also", &(shown.join(", ") + &more));
+    }
+    for words in choices(key.kind) {
+        text.push('\n');
+        list(&mut text, words.iter().copied());
+    }
+    let mut listed: Vec<&str> = Vec::new();
+    for group in key.kind.groups() {
+        // A map, or a list of such maps.
+        if listed.contains(&group.name) {
+            continue;
+        }
+        listed.push(group.name);
+        let _ = write!(text, "\n  {}\n", group.text);
+        list(&mut text, group.keys.iter().map(|key| (key.name, key.text)));
+    }
+    text
+}
+
+/// Names and their texts in two columns.
+fn list<'a>(text: &mut String, entries: impl Iterator<Item = (&'a str, &'a str)> + Clone) {
+    let width = entries.clone().map(|(name, _)| name.len()).max();
+    let width = width.unwrap_or_default();
+    for (name, meaning) in entries {
+        let _ = writeln!(text, "  {name:<width$}  {meaning}");
+    }
+}
+
+/// Choices of a type.
+fn choices(kind: ValueType) -> Vec<&'static [(&'static str, &'static str)]> {
+    match kind {
+        ValueType::Choice(words) => vec![words],
+        ValueType::AnyOf(kinds) => {
+            let mut all: Vec<_> = kinds.iter().flat_map(|kind| choices(*kind)).collect();
+            all.dedup();
+            all
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// A type as text.
+fn kind(kind: ValueType) -> String {
+    match kind {
+        ValueType::Format => "the number 1".into(),
+        ValueType::Number => "a number".into(),
+        ValueType::Count => "an integer, 0 or more".into(),
+        ValueType::Text => "text".into(),
+        ValueType::Bool => "true or false".into(),
+        ValueType::Column => "a column, by name or by number from 1".into(),
+        ValueType::Word(word) => format!("`{word}`"),
+        ValueType::Choice(_) => "one of the values below".into(),
+        ValueType::Map(_) => "a map with the keys below".into(),
+        ValueType::List(ValueType::Map(_)) => "a list of maps with the keys below".into(),
+        ValueType::List(ValueType::Number) => "a list of numbers".into(),
+        ValueType::List(ValueType::Text) => "a list of texts".into(),
+        ValueType::List(_) => "a list of the values below".into(),
+        ValueType::AnyOf(kinds) => {
+            let kinds: Vec<String> = kinds.iter().map(|k| self::kind(*k)).collect();
+            kinds.join(", or ")
+        }
+    }
+}

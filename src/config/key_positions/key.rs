@@ -1,0 +1,58 @@
+//! Visitor of one key of a map.
+
+use crate::config::reader::{Scalar, scalar_visits};
+use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use std::cell::Cell;
+use std::fmt;
+
+/// Compares a key with the wanted one; optionally stops reading there.
+pub(super) struct KeySeed<'a> {
+    pub wanted: Option<&'a str>,
+    /// Flag to set before reading stops at the wanted key; `None` to continue past it.
+    pub stop: Option<&'a Cell<bool>>,
+}
+
+/// The error that stops reading at the goal; sets `hit` to distinguish it from errors of syntax.
+pub(super) fn stop<E: Error>(hit: &Cell<bool>) -> E {
+    hit.set(true);
+    E::custom("found")
+}
+
+impl<'de> DeserializeSeed<'de> for KeySeed<'_> {
+    type Value = bool;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<bool, D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl KeySeed<'_> {
+    /// A key that is not a text never matches.
+    fn scalar<E: Error>(self, key: Scalar<'_>) -> Result<bool, E> {
+        let same = matches!(key, Scalar::Text(key) if self.wanted == Some(key));
+        match self.stop.filter(|_| same) {
+            Some(hit) => Err(stop(hit)),
+            None => Ok(same),
+        }
+    }
+}
+
+impl<'de> Visitor<'de> for KeySeed<'_> {
+    type Value = bool;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a key")
+    }
+
+    scalar_visits!(bool);
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<bool, A::Error> {
+        while list.next_element::<IgnoredAny>()?.is_some() {}
+        Ok(false)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<bool, A::Error> {
+        while map.next_entry::<IgnoredAny, IgnoredAny>()?.is_some() {}
+        Ok(false)
+    }
+}

@@ -1,0 +1,304 @@
+//! A commented model file for a table of samples, as `kmcfit init` writes it.
+//!
+//! Columns are assigned by units, then by names; the start value of the stiffness follows from the dominant frequency.
+//! Quantities that the table does not determine (the mass in a free decay) get a placeholder and a comment.
+
+mod columns;
+mod record_summary;
+
+use crate::error::InputError;
+use crate::memory;
+use crate::number_format::significant;
+use crate::tables::Table;
+use columns::{ColumnAssignment, Role};
+use record_summary::RecordSummary;
+use std::path::Path;
+
+/// Start value of the damping ratio: that of a lightly damped structure.
+const DAMPING_RATIO: f64 = 0.02;
+/// Periods of the response per knot of the stiffness: fewer do not determine a value.
+const PERIODS_PER_KNOT: f64 = 2.0;
+/// Most knots: enough for the course of the stiffness.
+const MOST_KNOTS: f64 = 11.0;
+
+/// Relative difference below which two sampling rates are equal.
+const SAME_RATE: f64 = 0.01;
+
+/// Memory for each row beside the table, bytes: times, samples and spectrum. Measured: 150 bytes per row in total for a
+/// million rows of two columns.
+const PER_ROW: u64 = 200;
+
+/// A model file and the findings that it is based on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scaffold {
+    /// The text of the model file.
+    pub text: String,
+    /// Findings on the table, one sentence each.
+    pub found: Vec<String>,
+}
+
+/// A model file for the table at `csv`, under the name `data`. `sample_rate` is the sampling rate in Hz of a table
+/// without a column of times.
+///
+/// # Errors
+/// When the table cannot be read, has no times or no measured response, or a column cannot be converted to samples.
+pub fn scaffold(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Scaffold, InputError> {
+    let table = Table::read(csv)?;
+    memory::check_file(csv, table.rows() as u64 * PER_ROW)?;
+    let columns = ColumnAssignment::of(&table, sample_rate)?;
+    let record = RecordSummary::of(&table, &columns, sample_rate)?;
+    let mut found = vec![format!(
+        "{} samples over {} s, {}",
+        record.samples,
+        short(record.duration),
+        record.spacing_in_words()
+    )];
+    if let Some(begins) = record.begins {
+        found.insert(
+            0,
+            format!("at rest before {begins} s: excluded by `window`"),
+        );
+    }
+    found.extend(columns.in_words(&table));
+    if let Some((count, first)) = record.far_off {
+        let lie = match count {
+            1 => "1 sample lies".to_owned(),
+            _ => format!("{count} samples lie"),
+        };
+        found.push(format!(
+            "{lie} far off ({}): empty fields are better; the model has a robust loss",
+            significant(first / record.channel.1, 4)
+        ));
+    }
+    if let (Some(given), Some((index, rate))) = (sample_rate, columns::rate(&table))
+        && (rate / given - 1.0).abs() > SAME_RATE
+    {
+        found.push(format!(
+            "`--sample-rate {given}` is used, although `{}` has {} Hz",
+            table.label(index),
+            significant(rate, 4)
+        ));
+    }
+    found.push(match record.frequency {
+        Some(frequency) => format!(
+            "dominant frequency {} Hz: {} in the record",
+            short(frequency),
+            match record.periods().round() {
+                1.0 => "1 period".to_owned(),
+                periods => format!("{periods} periods"),
+            }
+        ),
+        None => "no dominant frequency was found".into(),
+    });
+    Ok(Scaffold {
+        text: text(&table, data, &columns, &record, sample_rate),
+        found,
+    })
+}
+
+fn text(
+    table: &Table,
+    data: &str,
+    columns: &ColumnAssignment,
+    record: &RecordSummary,
+    sample_rate: Option<f64>,
+) -> String {
+    let name = Path::new(data)
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy();
+    let mut text = format!(
+        "# yaml-language-server: $schema=kmcfit.schema.json\n\
+         # Model file written by `kmcfit init`. Check it with `kmcfit check`, fit it with `kmcfit fit`;\n\
+         # `kmcfit explain KEY` explains a key.\n\
+         format: 1\n\
+         title: {}\n\
+         experiments:\n  \
+           - name: record 1\n    \
+             data: {}\n",
+        quoted(&name),
+        quoted(data)
+    );
+    for (key, value, comment) in keys(table, columns, record, sample_rate) {
+        if let Some(value) = value {
+            text += &commented(&format!("{key}: {value}"), &comment);
+        }
+    }
+    text + &functions(columns, record)
+        + &commented(
+            "# truth: {data: truth.csv}",
+            "the true functions, where they are known",
+        )
+        + &commented(
+            "fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1e-8}}",
+            "",
+        )
+}
+
+/// The keys of the record and the grid, each with its value and a comment.
+fn keys(
+    table: &Table,
+    columns: &ColumnAssignment,
+    record: &RecordSummary,
+    sample_rate: Option<f64>,
+) -> Vec<(&'static str, Option<String>, String)> {
+    let sigmas: Vec<String> = (columns.channels())
+        .map(|role| format!("{}: estimate", role.key()))
+        .collect();
+    let has_base = columns.has(Role::BaseAcceleration) || columns.has(Role::BaseDisplacement);
+    let between = format!("{{interpolation: {}}}", record.between);
+    let or = "between samples: or hold, linear, cubic";
+    let (sensors, why) = sensors(columns, record);
+    let robust = format!("{{{}: huber}}", record.channel.0.key());
+    let keys = [
+        (
+            "    columns",
+            Some(columns.named(table)),
+            "by name or by number from 1",
+        ),
+        ("    sample_rate", sample_rate.map(|r| r.to_string()), "Hz"),
+        ("    units", columns.units(), "converted to SI"),
+        (
+            "    window",
+            record.begins.map(|begins| format!("{{min: {begins}}}")),
+            "s; at rest before (not yet released or struck)",
+        ),
+        (
+            "    force",
+            columns.has(Role::Force).then(|| between.clone()),
+            or,
+        ),
+        ("    base", has_base.then_some(between), or),
+        (
+            "    sigma",
+            Some(format!("{{{}}}", sigmas.join(", "))),
+            "standard deviation of a sample, SI; give a number if it is known",
+        ),
+        (
+            "    loss",
+            record.far_off.map(|_| robust),
+            "robust against outliers; or `squares`",
+        ),
+        (
+            "    sensors",
+            (!sensors.is_empty()).then(|| format!("{{{}}}", sensors.join(", "))),
+            &why.join("; "),
+        ),
+        (
+            "    initial",
+            Some("estimate".into()),
+            "or {displacement: …, velocity: …} in m and m/s",
+        ),
+        (
+            "grid",
+            Some("{nodes: auto}".into()),
+            "chosen from the spectrum of the record",
+        ),
+    ];
+    let owned = keys.map(|(key, value, comment)| (key, value, comment.to_owned()));
+    owned.into()
+}
+
+/// Sensors with estimated parameters, and the reasons.
+fn sensors(
+    columns: &ColumnAssignment,
+    record: &RecordSummary,
+) -> (Vec<&'static str>, Vec<&'static str>) {
+    let mut sensors = Vec::new();
+    if columns.has(Role::Acceleration) {
+        sensors.push((
+            "acceleration: {offset: estimate}",
+            "accelerometers have one; leave it out if yours has none",
+        ));
+    }
+    // A static force can cause the offset of a displacement.
+    if columns.has(Role::Displacement) && !columns.has(Role::Force) {
+        if record.drifts {
+            sensors.push((
+                "displacement: {offset: estimate, drift: estimate}",
+                "the record oscillates about a sloping line",
+            ));
+        } else if record.is_off_centre {
+            sensors.push((
+                "displacement: {offset: estimate}",
+                "the record oscillates about a value other than zero",
+            ));
+        }
+    }
+    sensors.into_iter().unzip()
+}
+
+/// The coefficient functions, with start values that give the dominant frequency.
+fn functions(columns: &ColumnAssignment, record: &RecordSummary) -> String {
+    let omega = std::f64::consts::TAU * record.frequency.unwrap_or(1.0);
+    let driven = columns.has(Role::Force);
+    let mass = match driven {
+        true => record.mass(omega).unwrap_or(1.0),
+        false => 1.0,
+    };
+    let mut text = String::from("functions:\n");
+    text += &match driven {
+        true => commented(
+            &format!("  mass:      {{basis: constant, start: {}}}", short(mass)),
+            "kg; the force shows it",
+        ),
+        false => commented(
+            "  mass:      {fixed: 1.0}",
+            "kg; WRITE YOURS: without a force only k/m and c/m show",
+        ),
+    };
+    let damping = 2.0 * DAMPING_RATIO * mass * omega;
+    text += &commented(
+        &format!(
+            "  damping:   {{basis: constant, start: {}}}",
+            short(damping)
+        ),
+        "N s/m; starts at 2 % of critical",
+    );
+    let stiffness = short(mass * omega * omega);
+    let knots = (record.periods() / PERIODS_PER_KNOT)
+        .floor()
+        .min(MOST_KNOTS);
+    text += &match knots >= 2.0 {
+        true => commented(
+            &format!(
+                "  stiffness: {{basis: piecewise-linear, knots: {knots}, start: {stiffness}}}"
+            ),
+            "N/m; free to change; basis: constant if it does not",
+        ),
+        false => commented(
+            &format!("  stiffness: {{basis: constant, start: {stiffness}}}"),
+            "N/m; the record is short for one that changes",
+        ),
+    };
+    text
+}
+
+/// A line followed by a comment, aligned where the line is short enough.
+fn commented(line: &str, comment: &str) -> String {
+    match comment {
+        "" => format!("{line}\n"),
+        _ => format!("{line:<48}  # {comment}\n"),
+    }
+}
+
+/// Four significant digits.
+fn short(x: f64) -> String {
+    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
+    format!("{rounded:?}").trim_end_matches(".0").to_owned()
+}
+
+/// A text quoted for YAML where necessary, also inside a list or map.
+fn quoted(text: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "_/.- ".contains(c);
+    let begins = text.starts_with(char::is_alphabetic) || text.starts_with("../");
+    let word = matches!(
+        text.to_ascii_lowercase().as_str(),
+        "true" | "false" | "null" | "yes" | "no" | "on" | "off" | "estimate"
+    );
+    let plain = begins && !word && text.chars().all(is_plain) && !text.ends_with(' ');
+    match plain {
+        true => text.to_owned(),
+        false => serde_json::Value::from(text).to_string(),
+    }
+}

@@ -1,0 +1,78 @@
+//! A channel with its prediction: figures and table in the unit of the file.
+
+use super::chart::Figure;
+use super::csv::CsvTable;
+use super::figures;
+use crate::config::ChannelNote;
+use kmcfit_core::internals::assessment::diagnostics;
+use kmcfit_core::internals::record::Channel;
+
+/// A channel, its prediction, and its notes for reports.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ChannelView<'a> {
+    pub channel: &'a Channel,
+    pub predicted: &'a [f64],
+    pub note: Option<&'a ChannelNote>,
+}
+
+impl ChannelView<'_> {
+    /// Factor from the unit of the file to SI.
+    pub fn factor(&self) -> f64 {
+        self.note.map_or(1.0, |n| n.unit.factor())
+    }
+
+    /// Unit in which reports give the channel.
+    pub fn unit(&self) -> &str {
+        self.note
+            .map_or(self.channel.kind().unit(), |n| n.unit.symbol())
+    }
+
+    fn scaled(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
+        let factor = self.factor();
+        values.map(|v| v / factor).collect()
+    }
+
+    fn observed(&self) -> Vec<f64> {
+        self.scaled(self.channel.observed().iter().copied())
+    }
+
+    fn model(&self) -> Vec<f64> {
+        self.scaled(self.predicted.iter().copied())
+    }
+
+    fn residuals(&self) -> Vec<f64> {
+        self.scaled(self.channel.residuals(self.predicted))
+    }
+
+    fn label(&self) -> String {
+        let kind = self.channel.kind();
+        format!("{} {}", kind.name(), kind.symbol())
+    }
+
+    /// Figure of the samples.
+    pub fn observation(&self) -> Figure {
+        let (label, unit) = (self.label(), self.unit());
+        figures::observation(&[(&label, unit, self.channel.times(), &self.observed())])
+    }
+
+    /// Figures of the samples with the prediction, and of the residuals.
+    pub fn figures(&self) -> [Figure; 2] {
+        let (label, unit) = (self.label(), self.unit());
+        let label = (label.as_str(), unit);
+        let times = self.channel.times();
+        let diagnostics = diagnostics(self.channel, self.predicted);
+        [
+            figures::channel(label, times, &self.observed(), &self.model()),
+            figures::residuals(label, times, &self.residuals(), &diagnostics),
+        ]
+    }
+
+    /// Table of samples and prediction, in the unit of the file.
+    pub fn table(&self) -> CsvTable {
+        CsvTable::new()
+            .column("t_s", self.channel.times().to_vec())
+            .column("reading", self.observed())
+            .column("model", self.model())
+            .column("residual", self.residuals())
+    }
+}

@@ -1,0 +1,214 @@
+//! Marks of a panel (curves, dots, bands, spans, reference lines) and their style.
+
+use super::numbers::{places, rounded};
+use serde::Serialize;
+
+/// The colours of Okabe and Ito, distinguishable with any colour vision, and a grey.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+#[allow(missing_docs)]
+pub enum Colour {
+    Black,
+    Blue,
+    Vermillion,
+    Green,
+    Purple,
+    Orange,
+    Sky,
+    Grey,
+}
+
+impl Colour {
+    /// All colours, in the order in which series take them.
+    pub const ALL: [Colour; 8] = [
+        Colour::Blue,
+        Colour::Vermillion,
+        Colour::Green,
+        Colour::Purple,
+        Colour::Orange,
+        Colour::Sky,
+        Colour::Black,
+        Colour::Grey,
+    ];
+
+    /// The colour of series `index`, from 0; starts again after the last.
+    pub fn nth(index: usize) -> Self {
+        Self::ALL[index % Self::ALL.len()]
+    }
+}
+
+/// Dash pattern of a line, so that series differ in grey print as well.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Dash {
+    Solid,
+    Dashed,
+    Dotted,
+    DashDot,
+}
+
+impl Dash {
+    /// The pattern of series `index`, from 0; starts again after the last.
+    pub fn nth(index: usize) -> Self {
+        [Self::Solid, Self::Dashed, Self::DashDot, Self::Dotted][index % 4]
+    }
+
+    /// Lengths of dashes and gaps in tenths of a pixel.
+    pub(super) fn lengths(self) -> &'static [u16] {
+        match self {
+            Dash::Solid => &[],
+            Dash::Dashed => &[60, 32],
+            Dash::Dotted => &[16, 22],
+            Dash::DashDot => &[70, 26, 16, 26],
+        }
+    }
+}
+
+impl Serialize for Dash {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let lengths = self.lengths().iter();
+        let pixels: Vec<String> = lengths
+            .map(|l| (f64::from(*l) / 10.0).to_string())
+            .collect();
+        serializer.serialize_str(&pixels.join(" "))
+    }
+}
+
+/// Style of a line or of points; for points `width` is the diameter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Style {
+    /// Colour.
+    pub colour: Colour,
+    /// Dash pattern; points ignore it.
+    pub dash: Dash,
+    /// Width in pixels, from 0.1 to 20; a figure is 680 pixels (180 mm) wide.
+    pub width: f64,
+}
+
+impl Style {
+    /// A solid line, 1.5 pixels wide.
+    pub fn new(colour: Colour) -> Self {
+        Self {
+            colour,
+            dash: Dash::Solid,
+            width: 1.5,
+        }
+    }
+
+    /// The style of series `index`, from 0: its colour and dash pattern.
+    pub fn nth(index: usize) -> Self {
+        Self::new(Colour::nth(index)).dash(Dash::nth(index))
+    }
+
+    /// Sets the dash pattern.
+    #[must_use]
+    pub fn dash(mut self, dash: Dash) -> Self {
+        self.dash = dash;
+        self
+    }
+
+    /// Sets the width in pixels.
+    #[must_use]
+    pub fn width(mut self, width: f64) -> Self {
+        self.width = width.clamp(0.1, 20.0);
+        self
+    }
+}
+
+/// Kind of a mark.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MarkKind {
+    /// A curve through the points in their order.
+    Line,
+    /// A dot at each point.
+    Points,
+    /// The area between two curves over the same x.
+    Band,
+    /// A shaded interval of x over the full height.
+    Span,
+    /// A line across the panel at one y.
+    Across,
+    /// A line from bottom to top at one x.
+    Upright,
+}
+
+/// A mark in a panel. A mark with a label appears in the legend; equal labels with equal style, in any panel, appear
+/// there once.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Mark {
+    /// Kind.
+    pub kind: MarkKind,
+    /// The label for the legend; empty for none.
+    pub label: String,
+    /// Style; spans ignore it.
+    #[serde(flatten)]
+    pub style: Style,
+    /// x values; empty for a horizontal line.
+    #[serde(serialize_with = "places")]
+    pub x: Vec<f64>,
+    /// y values, for a band those of its lower edge; empty for a span or a vertical line.
+    #[serde(serialize_with = "rounded")]
+    pub y: Vec<f64>,
+    /// The upper edge of a band.
+    #[serde(serialize_with = "rounded")]
+    pub high: Vec<f64>,
+}
+
+impl Mark {
+    fn new(kind: MarkKind, label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
+        Self {
+            kind,
+            label: label.into(),
+            style,
+            x: x.to_vec(),
+            y: y.to_vec(),
+            high: Vec::new(),
+        }
+    }
+
+    /// A curve.
+    pub fn line(label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
+        Self::new(MarkKind::Line, label, x, y, style)
+    }
+
+    /// Dots.
+    pub fn points(label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
+        Self::new(MarkKind::Points, label, x, y, style.dash(Dash::Solid))
+    }
+
+    /// The area between `low` and `high`.
+    pub fn band(
+        label: impl Into<String>,
+        x: &[f64],
+        low: &[f64],
+        high: &[f64],
+        colour: Colour,
+    ) -> Self {
+        Self {
+            high: high.to_vec(),
+            ..Self::new(MarkKind::Band, label, x, low, Style::new(colour))
+        }
+    }
+
+    /// A shaded interval of x.
+    pub fn span(label: impl Into<String>, from: f64, to: f64) -> Self {
+        Self::new(
+            MarkKind::Span,
+            label,
+            &[from, to],
+            &[],
+            Style::new(Colour::Grey),
+        )
+    }
+
+    /// A line at one y.
+    pub fn horizontal(label: impl Into<String>, y: f64, style: Style) -> Self {
+        Self::new(MarkKind::Across, label, &[], &[y], style)
+    }
+
+    /// A line at one x.
+    pub fn vertical(label: impl Into<String>, x: f64, style: Style) -> Self {
+        Self::new(MarkKind::Upright, label, &[x], &[], style)
+    }
+}

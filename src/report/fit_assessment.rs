@@ -1,0 +1,99 @@
+//! Assessment of a fit and of the validation records: statistics, step-size check, bands, predictions.
+
+use super::channel_view::ChannelView;
+use crate::config::{HoldOut, Model};
+use kmcfit_core::internals::assessment::{FitAssessment, POOR, StepCheck, diagnostics};
+use kmcfit_core::internals::identifiability::Bands;
+use kmcfit_core::internals::objective::Evaluation;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::simulate::SimulationError;
+use kmcfit_core::internals::solvers::{Fit, Solver, predict_validation};
+use nalgebra::DMatrix;
+
+/// Assessment of a fit, computed once for all its documents.
+#[derive(Debug, Clone)]
+pub struct RunAssessment {
+    /// `None` for the equation error, which simulates no response.
+    pub(super) assessment: Option<FitAssessment>,
+    /// Validation records.
+    pub(super) validation: Vec<ValidationRecord>,
+}
+
+impl RunAssessment {
+    /// Assesses a fit.
+    pub fn of(model: &Model, fit: &Fit) -> Self {
+        let is_simulated = model.settings.solver != Solver::EquationError;
+        let validation = model.validation.iter();
+        Self {
+            assessment: is_simulated.then(|| FitAssessment::of(&model.problem, fit)),
+            validation: validation
+                .map(|out| ValidationRecord::of(model, fit, out))
+                .collect(),
+        }
+    }
+
+    /// Covariance of the parameters, if standard errors are meaningful.
+    pub(super) fn covariance(&self) -> Option<&DMatrix<f64>> {
+        self.assessment.as_ref()?.covariance.as_ref()
+    }
+
+    /// Bands of functions and ratios, if standard errors are meaningful.
+    pub(super) fn bands(&self) -> Option<&Bands> {
+        self.assessment.as_ref()?.bands.as_ref()
+    }
+
+    /// The step-size check, if there is a response on the finer grid.
+    pub(super) fn step_check(&self) -> Option<&StepCheck> {
+        self.assessment.as_ref()?.step_check.as_ref().ok()?.as_ref()
+    }
+}
+
+/// A validation record and its prediction by the fitted system.
+#[derive(Debug, Clone)]
+pub(super) struct ValidationRecord {
+    /// The record.
+    pub out: HoldOut,
+    /// The problem of this record alone, with the functions fixed, and its evaluation at the optimum of the record's
+    /// own parameters.
+    pub found: Result<(Problem, Evaluation), SimulationError>,
+}
+
+impl ValidationRecord {
+    fn of(model: &Model, fit: &Fit, out: &HoldOut) -> Self {
+        Self {
+            out: out.clone(),
+            found: predict_validation(
+                &model.problem,
+                &fit.best.evaluation,
+                &out.experiment,
+                &out.scalars,
+                &model.settings,
+            ),
+        }
+    }
+
+    /// Its name and the fit of its worst channel, per cent, if the fitted system does not predict it.
+    pub fn poor(&self) -> Option<(&str, f64)> {
+        let channels = self.channels();
+        let fits = channels.iter();
+        let fits = fits.map(|c| diagnostics(c.channel, c.predicted).fit_percent);
+        let worst = fits.reduce(f64::min).filter(|worst| *worst < POOR)?;
+        Some((&self.out.experiment.name, worst))
+    }
+
+    /// Its channels; empty without a response.
+    pub fn channels(&self) -> Vec<ChannelView<'_>> {
+        let Ok((problem, evaluation)) = &self.found else {
+            return Vec::new();
+        };
+        let predictions = evaluation.predictions.iter().flatten();
+        let channels = problem.channels().zip(predictions).enumerate();
+        channels
+            .map(|(i, (channel, predicted))| ChannelView {
+                channel,
+                predicted,
+                note: self.out.notes.get(i),
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,158 @@
+//! The figures of a fit.
+
+use super::FittedModel;
+use super::chart::Figure;
+use super::figures::{self, FunctionCurve};
+use kmcfit_core::internals::functions::{CoefficientFunction, Ratios};
+use kmcfit_core::internals::solvers::IterationRecord;
+
+impl FittedModel<'_> {
+    /// The figures of a fit.
+    pub fn figures(&self) -> Vec<Figure> {
+        let mut figures: Vec<Figure> = self.weights.map(figures::weight_path).into_iter().collect();
+        figures.extend([
+            self.convergence(),
+            self.functions_figure(),
+            self.ratios_figure(),
+        ]);
+        for (experiment, channel) in self.channels() {
+            let mut list = self.channel_figures(experiment, channel);
+            let suffix = self.suffix(experiment, channel);
+            list.iter_mut().for_each(|figure| figure.name += &suffix);
+            figures.extend(list);
+        }
+        figures.extend(self.validation_figures());
+        figures
+    }
+
+    /// Indices of the experiments and their channels.
+    pub(super) fn channels(&self) -> Vec<(usize, usize)> {
+        let experiments = self.model.problem.experiments.iter().enumerate();
+        experiments
+            .flat_map(|(e, experiment)| (0..experiment.channels.len()).map(move |c| (e, c)))
+            .collect()
+    }
+
+    /// Adds experiment and channel to the name and title of a figure, if there are several channels.
+    pub(super) fn titled(&self, mut figure: Figure, experiment: usize, channel: usize) -> Figure {
+        figure.name += &self.suffix(experiment, channel);
+        if self.channels().len() > 1 {
+            let record = &self.model.problem.experiments[experiment];
+            let kind = record.channels[channel].kind().name();
+            figure.title = format!("{}: {}, {kind}", figure.title, record.name);
+        }
+        figure
+    }
+
+    /// Suffix for the names of the figures of one channel.
+    fn suffix(&self, experiment: usize, channel: usize) -> String {
+        let experiments = &self.model.problem.experiments;
+        let number = match experiments.len() {
+            1 => String::new(),
+            _ => format!("-{}", experiment + 1),
+        };
+        match channel {
+            0 => number,
+            _ => format!(
+                "{number}-{}",
+                experiments[experiment].channels[channel].kind().name()
+            ),
+        }
+    }
+
+    /// The figures of one channel: samples, samples with the response, residuals.
+    fn channel_figures(&self, experiment: usize, index: usize) -> [Figure; 3] {
+        let view = self.channel_view(experiment, index);
+        let [beside, residuals] = view.figures();
+        let channel = view.channel;
+        let beside = match channel.stride() {
+            Some(_) if view.factor() == 1.0 => {
+                self.response(experiment, channel.times(), channel.observed())
+            }
+            _ => beside,
+        };
+        [view.observation(), beside, residuals]
+    }
+
+    /// Validation records with their predictions and residuals.
+    pub(super) fn validation_figures(&self) -> Vec<Figure> {
+        let mut figures = Vec::new();
+        for (i, held) in self.run_assessment.validation.iter().enumerate() {
+            for view in held.channels() {
+                let kind = view.channel.kind().name();
+                for mut figure in view.figures() {
+                    figure.name += &format!("-validation-{}-{kind}", i + 1);
+                    figure.title = format!(
+                        "{}: {} (validation), {kind}",
+                        figure.title, held.out.experiment.name
+                    );
+                    figures.push(figure);
+                }
+            }
+        }
+        figures
+    }
+
+    pub(super) fn convergence(&self) -> Figure {
+        let column =
+            |f: fn(&IterationRecord) -> f64| self.fit.history.iter().map(f).collect::<Vec<_>>();
+        figures::convergence(
+            &column(|r| r.iteration as f64),
+            &column(|r| r.cost_ratio),
+            &column(|r| r.gradient_norm_squared_ratio),
+        )
+    }
+
+    pub(super) fn response(&self, experiment: usize, times: &[f64], observed: &[f64]) -> Figure {
+        let grid_times = self.model.problem.system.grid.times();
+        let nodes = self.model.problem.experiments[experiment].nodes;
+        let grid_times = &grid_times[..nodes];
+        let mut snapshots: Vec<(usize, &[f64], &[f64])> = (self.fit.snapshots.iter())
+            .map(|s| {
+                let response = &s.trajectories[experiment];
+                (
+                    s.iteration as usize,
+                    grid_times,
+                    response.displacement.as_slice(),
+                )
+            })
+            .collect();
+        let last = self.fit.history.len();
+        if snapshots.last().is_none_or(|s| s.0 != last) {
+            let response = &self.fit.best.evaluation.trajectories[experiment];
+            snapshots.push((last, grid_times, &response.displacement));
+        }
+        figures::response(times, observed, &snapshots)
+    }
+
+    pub(super) fn functions_figure(&self) -> Figure {
+        let problem = &self.model.problem;
+        let starts = problem.functions.values(&problem.start());
+        let list = self.named_functions();
+        let name = |f: &CoefficientFunction| format!("{} {}", f.name(), f.quantity.symbol());
+        let names: Vec<String> = list.iter().map(|(f, _)| name(f)).collect();
+        let times = problem.system.grid.times();
+        let bands = self
+            .bands()
+            .map_or(Vec::new(), |b| b.curves(&b.functions, &times));
+        let curves: Vec<FunctionCurve> = (list.iter().enumerate())
+            .map(|(i, (function, found))| FunctionCurve {
+                band: bands.get(i).map(|[low, high]| (&low[..], &high[..])),
+                start: Some(&starts[i]),
+                truth: self.true_function(i),
+                ..FunctionCurve::new(&names[i], self.unit(function), found)
+            })
+            .collect();
+        figures::functions(&times, &curves)
+    }
+
+    pub(super) fn ratios_figure(&self) -> Figure {
+        let found = Ratios::of(&self.fit.best.evaluation.nodal);
+        let truth = self.model.truth.as_ref().map(Ratios::of);
+        let times = self.model.problem.system.grid.times();
+        let bands = self
+            .bands()
+            .map_or(Vec::new(), |b| b.curves(&b.ratios, &times));
+        figures::ratios(&times, &found, truth.as_ref(), &bands)
+    }
+}

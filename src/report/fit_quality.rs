@@ -1,0 +1,85 @@
+//! Fit quality in the result document: channels, nuisance parameters, validation records.
+
+use super::channel_view::ChannelView;
+use super::document::{ChannelSummary, IgnoredSummary, NuisanceParameter, ValidationSummary};
+use super::fit_assessment::ValidationRecord;
+use kmcfit_core::internals::assessment::{diagnostics, outliers, pattern};
+use kmcfit_core::internals::objective::Evaluation;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{Loss, Weighting};
+use nalgebra::DMatrix;
+
+/// One channel with its predictions.
+pub fn channel(view: &ChannelView) -> ChannelSummary {
+    let (channel, note, predicted) = (view.channel, view.note, view.predicted);
+    let factor = view.factor();
+    let diagnostics = diagnostics(channel, predicted);
+    let sigma = match channel.weighting() {
+        Weighting::Sigma(sigma) | Weighting::Estimated { sigma } => Some(sigma / factor),
+        Weighting::Sigmas(_) | Weighting::Integral { .. } | Weighting::Trapezoid(_) => None,
+    };
+    let residuals: Vec<f64> = channel.residuals(predicted).collect();
+    ChannelSummary {
+        kind: channel.kind().name().into(),
+        unit: view.unit().into(),
+        samples: channel.len(),
+        ignored: note.map_or(Vec::new(), |n| {
+            let ignored = n.ignored.iter().map(|(samples, reason)| IgnoredSummary {
+                samples: *samples,
+                reason: reason.clone(),
+            });
+            ignored.collect()
+        }),
+        outliers: outliers(channel, &residuals).len(),
+        rms_residual: diagnostics.rms / factor,
+        fit_percent: diagnostics.fit_percent,
+        sigma,
+        sigma_estimated: matches!(channel.weighting(), Weighting::Estimated { .. }),
+        robust: channel.loss() != Loss::Squares,
+        pattern: pattern(channel, predicted),
+        cost: channel.cost(predicted),
+        whiteness: diagnostics.whiteness.to_string(),
+        whiteness_p_value: (diagnostics.whiteness.p_value.is_finite())
+            .then_some(diagnostics.whiteness.p_value),
+        autocorrelation_band: diagnostics.band,
+        autocorrelation: diagnostics.autocorrelation,
+    }
+}
+
+/// The nuisance parameters of a problem at a point, with standard errors from the covariance if available.
+pub fn scalars(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    covariance: Option<&DMatrix<f64>>,
+) -> Vec<NuisanceParameter> {
+    let range = problem.functions.scalar_range();
+    let list = problem.functions.scalars().iter().zip(range);
+    list.zip(&evaluation.scalars)
+        .map(|((scalar, index), value)| NuisanceParameter {
+            name: scalar.name.clone(),
+            unit: scalar.unit.clone(),
+            value: *value,
+            standard_error: covariance.map(|c| c[(index, index)].sqrt()),
+        })
+        .collect()
+}
+
+/// Summary of a validation record.
+pub(super) fn validation(held: &ValidationRecord) -> ValidationSummary {
+    let channels = held.channels();
+    let summaries = channels.iter().map(channel);
+    let mut summary = ValidationSummary {
+        name: held.out.experiment.name.clone(),
+        channels: summaries.collect(),
+        nuisance_parameters: Vec::new(),
+        failure: None,
+    };
+    match &held.found {
+        Ok((problem, evaluation)) => {
+            let covariance = problem.covariance(evaluation);
+            summary.nuisance_parameters = scalars(problem, evaluation, covariance.as_ref());
+        }
+        Err(breakdown) => summary.failure = Some(breakdown.to_string()),
+    }
+    summary
+}

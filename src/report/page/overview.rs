@@ -1,0 +1,194 @@
+//! First part of the page of a fit: status, main figures, estimates, identifiability, warnings, suggestions; and the
+//! tables of records and work.
+
+use super::table::{list, number, table};
+use crate::finding::Finding;
+use crate::report::document::{ChannelSummary, ResultDocument};
+use crate::report::suggestions;
+use crate::report::summary::{count, iterations};
+use crate::report::text::{escape, prose};
+use kmcfit_core::internals::assessment::FunctionSummary;
+use kmcfit_core::internals::identifiability::ClassificationKind;
+use kmcfit_core::internals::solvers::Status;
+
+/// Everything above the contents.
+pub(super) fn overview(document: &ResultDocument) -> String {
+    let known = &document.identifiability;
+    let mut warnings = Finding::texts(&known.warnings);
+    warnings.extend(Finding::texts(&document.warnings));
+    let lists = [
+        ("Identifiability", Finding::texts(&known.findings)),
+        ("Warnings", warnings),
+        ("Suggestions", Finding::texts(&document.suggestions)),
+        ("Automatic choices", Finding::texts(&document.automatic)),
+    ];
+    let lists = lists.iter().filter(|(_, sentences)| !sentences.is_empty());
+    let lists =
+        lists.map(|(heading, sentences)| format!("<h3>{heading}</h3>\n{}", list(sentences)));
+    state(document) + &facts(document) + &estimates(document) + &lists.collect::<String>()
+}
+
+/// Status as a coloured word, and the reason.
+fn state(document: &ResultDocument) -> String {
+    let outcome = &document.outcome;
+    let colour = match outcome.status {
+        Status::Converged | Status::Completed => "good",
+        Status::Failed | Status::Infeasible => "bad",
+        _ => "warn",
+    };
+    format!(
+        "<p><span class=\"state {colour}\">{}</span> {}</p>\n",
+        outcome.status.name(),
+        prose(&outcome.reason)
+    )
+}
+
+/// Main figures: cost ratio, fit, chi-square, samples, parameters, rank bound.
+fn facts(document: &ResultDocument) -> String {
+    let samples: usize = document.experiments.iter().map(|e| e.samples).sum();
+    let mut facts = Vec::new();
+    if document.has_ratio() {
+        facts.push(("cost ratio J/J0", number(document.cost.ratio)));
+    }
+    if let Some(worst) = document.worst_fit() {
+        let name = match document.channels().count() {
+            1 => "fit",
+            _ => "fit of the worst channel",
+        };
+        facts.push((name, suggestions::percent(worst, 2)));
+    }
+    if let Some(reduced) = document.statistics.reduced_chi_square {
+        facts.push(("chi-square per degree of freedom", number(reduced)));
+    }
+    facts.push(("samples", samples.to_string()));
+    facts.push(("parameters", document.model.parameters.to_string()));
+    let known = &document.identifiability;
+    if known.rank_bound < known.parameters && document.is_simulated() {
+        facts.push((
+            "identifiable parameter combinations",
+            format!("at most {}", known.rank_bound),
+        ));
+    }
+    let fact = |(name, value): &(&str, String)| {
+        format!(
+            "<div><dt>{}</dt><dd>{}</dd></div>\n",
+            escape(name),
+            prose(value)
+        )
+    };
+    let facts: String = facts.iter().map(fact).collect();
+    format!("<dl class=\"facts\">\n{facts}</dl>\n")
+}
+
+/// Table of the functions in the order of the equation of motion, then those of single experiments.
+fn estimates(document: &ResultDocument) -> String {
+    let functions: Vec<(&str, &FunctionSummary)> = document.all_functions().collect();
+    let has_truth = functions.iter().any(|(_, f)| f.truth_max_error.is_some());
+    let has_error = functions.iter().any(|(_, f)| f.standard_error.is_some());
+    let has_verdict = functions.iter().any(|(_, f)| f.verdict.is_some());
+    let mut headings = vec!["function", "smallest", "largest", "unit"];
+    headings.extend(has_error.then_some("standard error"));
+    headings.extend(has_verdict.then_some("identified"));
+    if has_truth {
+        headings.extend(["max error", "rms error"]);
+    }
+    let known = |x: Option<f64>| x.map_or(String::new(), number);
+    let row = |(name, f): &(&str, &FunctionSummary)| {
+        let is_identifiable = f.verdict != Some(ClassificationKind::NotIdentified);
+        let [low, high] = match (is_identifiable, f.negligible) {
+            (false, _) => [String::new(), String::new()],
+            (true, true) => [number(0.0), number(0.0)],
+            (true, false) => [number(f.min), number(f.max)],
+        };
+        let error = f
+            .standard_error
+            .filter(|_| is_identifiable && !f.negligible);
+        let mut cells = vec![name.to_string(), low, high, f.unit.clone()];
+        cells.extend(has_error.then(|| known(error)));
+        cells.extend(has_verdict.then(|| verdict_in_words(f.verdict).to_owned()));
+        if has_truth {
+            cells.extend([known(f.truth_max_error), known(f.truth_rms_error)]);
+        }
+        cells
+    };
+    let rows: Vec<Vec<String>> = functions.iter().map(row).collect();
+    table(&headings, &rows)
+}
+
+/// A classification as an entry of the table.
+fn verdict_in_words(verdict: Option<ClassificationKind>) -> &'static str {
+    match verdict {
+        Some(ClassificationKind::Identified) => "yes",
+        Some(ClassificationKind::OnlyRatio) => "ratio only",
+        Some(ClassificationKind::PartlyIdentified) => "partly",
+        Some(ClassificationKind::NotIdentified) => "no",
+        Some(ClassificationKind::Fixed) => "fixed",
+        None => "",
+    }
+}
+
+/// Table of the fit of each channel, validation records included.
+pub(super) fn records(document: &ResultDocument) -> String {
+    let mut rows = Vec::new();
+    let mut notes = Vec::new();
+    for (name, channel) in document.records() {
+        rows.push(record(&name, channel));
+        let about = format!("{name}, {}", channel.kind);
+        if channel.sigma.is_some() {
+            notes.push(format!("{about}: {}", channel.whiteness));
+        }
+        notes.extend(channel.ignored.iter().map(|ignored| {
+            let samples = count(ignored.samples, "sample");
+            format!("{about}: {samples} not used: {}", ignored.reason)
+        }));
+    }
+    for out in &document.validation {
+        let failure = out.failure.as_ref();
+        notes.extend(failure.map(|f| format!("{}: no response: {f}", out.title())));
+    }
+    let headings = [
+        "record",
+        "channel",
+        "fit",
+        "rms residual",
+        "sigma",
+        "samples",
+    ];
+    table(&headings, &rows) + &list(&notes)
+}
+
+fn record(name: &str, channel: &ChannelSummary) -> Vec<String> {
+    let with_unit = |x: f64| format!("{} {}", number(x), channel.unit);
+    let sigma = channel
+        .sigma
+        .map_or("–".into(), |sigma| match channel.sigma_estimated {
+            true => format!("{}, estimated", with_unit(sigma)),
+            false => with_unit(sigma),
+        });
+    vec![
+        name.into(),
+        channel.kind.clone(),
+        match channel.fit_percent.is_finite() {
+            true => format!("{:.2} %", channel.fit_percent),
+            false => "–".into(),
+        },
+        with_unit(channel.rms_residual),
+        sigma,
+        channel.samples.to_string(),
+    ]
+}
+
+/// Cost and work in one sentence.
+pub(super) fn work(document: &ResultDocument) -> String {
+    let (cost, counts) = (&document.cost, &document.counts);
+    format!(
+        "J fell from {} to {} in {}, with {}, {}, {} and {}.",
+        number(cost.initial),
+        number(cost.r#final),
+        iterations(document),
+        count(counts.forward as usize, "forward solve"),
+        count(counts.adjoint as usize, "adjoint solve"),
+        count(counts.tangent as usize, "tangent solve"),
+        count(counts.qp as usize, "quadratic program"),
+    )
+}

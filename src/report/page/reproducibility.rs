@@ -1,0 +1,96 @@
+//! Reproducibility section of the page of a fit: command, model file and data files with digests; and the citation.
+
+use super::table::{pairs, paragraph, table};
+use crate::config::ModelSource;
+use crate::report::FittedModel;
+use crate::report::document::ResultDocument;
+use crate::report::text::escape;
+use kmcfit_core::internals::simulate::arithmetic;
+
+/// The command, versions, overrides, model file and data files.
+pub(super) fn reproducibility(run: &FittedModel, document: &ResultDocument) -> String {
+    let mut rows = vec![
+        ("program", format!("kmcfit {}", document.version)),
+        (
+            "arithmetic",
+            format!("{} (all give the same bits)", arithmetic()),
+        ),
+    ];
+    rows.extend(
+        document
+            .weights
+            .as_ref()
+            .map(|w| ("seed", format!("{} (choice of the weight)", w.seed))),
+    );
+    let source = &run.model.source;
+    command("fit", document)
+        + &pairs(&rows)
+        + &data(source)
+        + "<h3>The model file</h3>\n"
+        + &block(source.text.trim_end())
+}
+
+/// A command of the program on the model of the run.
+pub(super) fn command(name: &str, document: &ResultDocument) -> String {
+    let mut line = format!("kmcfit {name} {}", quoted(&document.model.file));
+    for change in &document.model.overrides {
+        line += &format!(" --set {}", quoted(change));
+    }
+    block(&line)
+}
+
+fn data(source: &ModelSource) -> String {
+    let row = |file: &crate::config::DataFile| {
+        let (size, digest) = match &file.content {
+            Some((bytes, digest)) => (bytes.to_string(), digest.clone()),
+            None => ("unreadable".into(), String::new()),
+        };
+        vec![file.name.clone(), size, digest]
+    };
+    let rows: Vec<Vec<String>> = source.data.iter().map(row).collect();
+    table(&["data file", "bytes", "SHA-256"], &rows)
+}
+
+/// The program, and the paper whose problem it solves.
+pub(super) fn cite() -> String {
+    let program = format!(
+        "kmcfit, version {}: {}.",
+        env!("CARGO_PKG_VERSION"),
+        env!("CARGO_PKG_DESCRIPTION")
+    );
+    paragraph(&program)
+        + "<p>The problem and the method of its first solution: D. A. Buchta, <cite>Automatically find \
+           spring-mass-damper behavior to match observations using adjoint-based sensitivity: Part I \
+           Linear system</cite>.</p>\n"
+}
+
+/// Preformatted text in a scrolling box.
+fn block(text: &str) -> String {
+    format!("<pre tabindex=\"0\"><code>{}</code></pre>\n", escape(text))
+}
+
+/// A path or an argument quoted for a shell.
+pub fn quoted(path: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+,:@=".contains(c) || !c.is_ascii();
+    match !path.is_empty() && path.chars().all(plain) && !path.starts_with('-') {
+        true => path.to_owned(),
+        false => format!("'{}'", path.replace('\'', "'\\''")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_quoted_where_a_shell_would_take_them_apart() {
+        let paths = ["models/a.yaml", "my model.yaml", "it's.yaml", "$(x)"];
+        let expected = [
+            "models/a.yaml",
+            "'my model.yaml'",
+            "'it'\\''s.yaml'",
+            "'$(x)'",
+        ];
+        assert_eq!(paths.map(quoted), expected);
+    }
+}

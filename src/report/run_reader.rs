@@ -1,0 +1,227 @@
+//! Reading of a finished run from its output folder.
+
+use super::document::{FORMAT, ResultDocument};
+use super::result_table::ResultTable;
+use crate::error::InputError;
+use crate::memory;
+use crate::results;
+use crate::text_io::{JSON, read_text_within};
+use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::internals::solvers::IterationRecord;
+use kmcfit_core::internals::system::{Method, NodalCoefficients, System, Term};
+use serde::Deserialize;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Longest result document, bytes.
+const LONGEST_DOCUMENT: u64 = 1 << 26;
+/// Most nodes of a run that is accepted: a hundred GB of memory for a fit with the fewest unknowns.
+const MOST_NODES: usize = 1 << 28;
+
+/// Memory for each node of a run that is read, used for predictions, compared and drawn, bytes. Measured: 210 to 450
+/// with the eleven columns of a run with true coefficients; the rest is for losses of the allocator.
+const PER_NODE: u64 = 600;
+
+/// A finished run, loaded from the folder that `kmcfit fit` wrote it to.
+///
+/// ```no_run
+/// use kmcfit::Run;
+/// let run = Run::open("runs/paper")?;
+/// println!("{}: J = {:e}", run.document.outcome.status.name(), run.document.cost.r#final);
+/// let mass = &run.coefficients.mass;                            // kg, one value per node
+/// for (t, m) in run.system.grid.times().iter().zip(mass) {
+///     println!("{t} s: {m} kg");
+/// }
+/// if let Some([low, high]) = run.band("mass") {           // 95 %, where they were computed
+///     println!("at the start between {} and {} kg", low[0], high[0]);
+/// }
+/// # Ok::<(), kmcfit::error::InputError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// `result.json`.
+    pub document: ResultDocument,
+    /// The result document as JSON, unknown keys of later versions included.
+    pub value: Value,
+    /// Grid, stepper and terms of the run.
+    pub system: System,
+    /// Estimated nodal coefficients.
+    pub coefficients: NodalCoefficients,
+    /// True nodal coefficients, if the model names them.
+    pub truth: Option<NodalCoefficients>,
+    /// `history.csv`: one row per iteration.
+    pub history: Vec<IterationRecord>,
+    /// `functions.csv`: one row per node; NaN for an empty field.
+    pub functions: ResultTable,
+    /// `trajectory.csv`: one row per node; NaN beyond the end of a record or without a sample.
+    pub trajectory: ResultTable,
+}
+
+impl Run {
+    /// Reads the folder of a finished run.
+    ///
+    /// # Errors
+    /// If there is no complete run of this format in the folder: the error says which file is missing
+    /// or damaged, and where.
+    pub fn open(folder: impl AsRef<Path>) -> Result<Self, InputError> {
+        let folder = folder.as_ref();
+        if !folder.is_dir() {
+            return Err(InputError::file(folder, "no such folder")
+                .expected("the folder of a finished run, as written by `kmcfit fit`"));
+        }
+        results::complete(folder)?;
+        let value = value(folder)?;
+        let document = document(folder, &value)?;
+        let (system, quantities) = system(folder, &document)?;
+        let nodes = system.grid.nodes();
+        memory::check_file(&folder.join("result.json"), nodes as u64 * PER_NODE)?;
+        let functions = ResultTable::read_rows(&folder.join("functions.csv"), nodes, "node")?;
+        let trajectory = ResultTable::read_rows(&folder.join("trajectory.csv"), nodes, "node")?;
+        let has_truth = functions.headers().iter().any(|h| h.starts_with("true_"));
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            coefficients: coefficients(&functions, "", &quantities)?,
+            truth: has_truth
+                .then(|| coefficients(&functions, "true_", &quantities))
+                .transpose()?,
+            history: history(folder, document.counts.iterations)?,
+            document,
+            value,
+            system,
+            functions,
+            trajectory,
+        })
+    }
+
+    /// Lower and upper end of the 95 % band of a function or ratio at the nodes, by its name (`mass`, `k/m`, `damping
+    /// of shaker`), in its unit; `None` if there is none.
+    pub fn band(&self, name: &str) -> Option<[Vec<f64>; 2]> {
+        let name = name.replace([' ', '/', ','], "_");
+        let end = |side: &str| self.functions.column(&format!("{name}_{side}_95"));
+        Some([end("low")?, end("high")?])
+    }
+}
+
+fn system(
+    folder: &Path,
+    document: &ResultDocument,
+) -> Result<(System, Vec<CoefficientKind>), InputError> {
+    let model = &document.model;
+    let unusable = |found: String| {
+        InputError::file(
+            folder.join("result.json"),
+            "the result describes no run that can be used",
+        )
+        .found(found)
+        .expected("a result written by `kmcfit fit`")
+    };
+    let grid = model.grid().filter(|_| model.nodes <= MOST_NODES);
+    let grid = grid.ok_or_else(|| unusable(format!("{} nodes", model.nodes)))?;
+    let mut steppers = [Method::Midpoint, Method::Rk4].into_iter();
+    let method = steppers.find(|m| m.name() == model.stepper);
+    let method = method.ok_or_else(|| unusable(format!("stepper `{}`", model.stepper)))?;
+    let width = model.friction_width.unwrap_or(f64::NAN);
+    let known = |name: &String| CoefficientKind::ALL.into_iter().find(|q| q.name() == name);
+    let quantities: Option<Vec<CoefficientKind>> = model.terms.iter().map(known).collect();
+    let no_terms = || unusable(format!("terms {:?}", model.terms));
+    let quantities = quantities.ok_or_else(no_terms)?;
+    let terms: Vec<Term> = quantities.iter().filter_map(|q| q.term(width)).collect();
+    if !terms.starts_with(&[Term::Damping, Term::Stiffness]) {
+        return Err(no_terms());
+    }
+    let system = System {
+        grid,
+        method,
+        terms,
+    };
+    Ok((system, quantities))
+}
+
+fn value(folder: &Path) -> Result<Value, InputError> {
+    let path = folder.join("result.json");
+    let what = "the result of a finished run";
+    let text = read_text_within(&path, what, LONGEST_DOCUMENT, JSON)?;
+    let value: Value = serde_json::from_str(&text).map_err(|error| {
+        InputError::file(&path, "not a JSON document")
+            .found(error)
+            .expected("a result written by `kmcfit fit`")
+    })?;
+    let format = value.get("format").and_then(Value::as_u64);
+    if format != Some(FORMAT.into()) {
+        return Err(
+            InputError::file(&path, "the result has another format version")
+                .key("format")
+                .found(format.map_or("none".into(), |f| f.to_string()))
+                .expected(FORMAT.to_string()),
+        );
+    }
+    Ok(value)
+}
+
+fn document(folder: &Path, value: &Value) -> Result<ResultDocument, InputError> {
+    let path = folder.join("result.json");
+    if value.get("model").is_none()
+        && let Some(reason) = value.pointer("/outcome/reason").and_then(|r| r.as_str())
+    {
+        // A run that failed before the fit wrote its outcome only.
+        return Err(
+            InputError::file(&path, "this run failed and has no estimates")
+                .found(reason)
+                .expected("the result of a run with estimates"),
+        );
+    }
+    ResultDocument::deserialize(value).map_err(|error| {
+        InputError::file(&path, "the result is not complete")
+            .found(error)
+            .expected("a result written by `kmcfit fit`")
+    })
+}
+
+fn history(folder: &Path, iterations: u64) -> Result<Vec<IterationRecord>, InputError> {
+    let rows = usize::try_from(iterations).unwrap_or(usize::MAX);
+    let table = ResultTable::read_rows(&folder.join("history.csv"), rows, "iteration")?;
+    let column = |name: &str| table.required(name);
+    let ratio = "gradient_norm_squared_ratio";
+    let (cost, cost_ratio, gradient) = (column("cost")?, column("cost_ratio")?, column(ratio)?);
+    let (step, change) = (column("step")?, column("relative_change")?);
+    Ok((0..rows)
+        .map(|i| IterationRecord {
+            iteration: i as u64 + 1,
+            cost: cost[i],
+            cost_ratio: cost_ratio[i],
+            gradient_norm_squared_ratio: gradient[i],
+            step: step[i],
+            relative_change: change[i],
+        })
+        .collect())
+}
+
+/// The mass and the functions of the terms `quantities`; refuses values that are not finite.
+fn coefficients(
+    table: &ResultTable,
+    prefix: &str,
+    quantities: &[CoefficientKind],
+) -> Result<NodalCoefficients, InputError> {
+    let is_rotation = table
+        .column(&format!(
+            "{prefix}{}",
+            CoefficientKind::Mass.angular_column()
+        ))
+        .is_some();
+    let column = |quantity: CoefficientKind| {
+        let name = match is_rotation {
+            true => quantity.angular_column(),
+            false => quantity.column(),
+        };
+        table.finite(&format!("{prefix}{name}"))
+    };
+    Ok(NodalCoefficients {
+        mass: column(CoefficientKind::Mass)?,
+        coefficients: quantities
+            .iter()
+            .map(|q| column(*q))
+            .collect::<Result<_, _>>()?,
+    })
+}

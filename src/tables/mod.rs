@@ -1,0 +1,21 @@
+//! Tables of samples: reading of text files as data loggers write them, checks of their times, and resampling.
+
+mod columns;
+mod detect;
+mod encoding;
+mod field;
+mod format;
+mod resample;
+mod rows;
+mod stated;
+mod table;
+mod table_memory;
+pub mod times;
+
+pub use columns::ColumnName;
+pub use encoding::Encoding;
+pub use format::{Detected, TableFormat};
+pub use resample::resample;
+pub use stated::StatedUnit;
+pub use table::Table;
+pub use times::{SAMPLE_RATES, equally_spaced, equally_spaced_at, increasing, increasing_at};

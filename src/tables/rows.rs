@@ -1,0 +1,163 @@
+//! Iteration over the rows of a text with their line numbers, without comments and blank lines.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use csv::{ReaderBuilder, StringRecord, Trim};
+
+use crate::error::InputError;
+
+/// A text prepared for the csv crate: runs of blanks replaced by tabs, leading lines removed.
+pub struct CsvText<'a> {
+    text: Cow<'a, str>,
+    delimiter: u8,
+    first_line: usize,
+}
+
+impl<'a> CsvText<'a> {
+    /// The text after `skip` lines; a blank as delimiter denotes runs of blanks and tabs.
+    pub fn new(text: &'a str, skip: usize, delimiter: char) -> Self {
+        let rest = after_lines(text, skip);
+        let (text, delimiter) = match delimiter {
+            ' ' => (Cow::Owned(runs_to_tabs(rest)), '\t'),
+            _ => (Cow::Borrowed(rest), delimiter),
+        };
+        Self {
+            text,
+            delimiter: u8::try_from(delimiter).unwrap_or(b','),
+            first_line: skip + 1,
+        }
+    }
+
+    /// Its rows; messages name `path`.
+    pub fn rows(&'a self, path: &'a Path) -> TableRows<'a> {
+        let records = ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .delimiter(self.delimiter)
+            .comment(Some(b'#'))
+            .trim(Trim::All)
+            .from_reader(self.text.as_bytes());
+        TableRows {
+            path,
+            text: &self.text,
+            records,
+            counted: 0,
+            line: self.first_line,
+        }
+    }
+}
+
+/// Replaces line ends `\r` by `\n`: for the csv crate a comment ends at `\n` only.
+pub fn with_newlines(text: String) -> String {
+    match text.contains('\r') && !text.contains('\n') {
+        true => text.replace('\r', "\n"),
+        false => text,
+    }
+}
+
+/// The text after the first `lines` lines.
+fn after_lines(text: &str, lines: usize) -> &str {
+    let Some(last) = lines.checked_sub(1) else {
+        return text;
+    };
+    match text.match_indices('\n').nth(last) {
+        Some((at, _)) => &text[at + 1..],
+        None => "",
+    }
+}
+
+/// Replaces each run of blanks and tabs outside quotes by one tab, and removes those at the ends of lines.
+fn runs_to_tabs(text: &str) -> String {
+    let mut tabbed = String::with_capacity(text.len());
+    let (mut quoted, mut run, mut begun) = (false, false, false);
+    for c in text.chars() {
+        match c {
+            ' ' | '\t' if !quoted => run = true,
+            '\n' | '\r' => {
+                (quoted, run, begun) = (false, false, false);
+                tabbed.push(c);
+            }
+            c => {
+                if run && begun {
+                    tabbed.push('\t');
+                }
+                quoted ^= c == '"';
+                (run, begun) = (false, true);
+                tabbed.push(c);
+            }
+        }
+    }
+    tabbed
+}
+
+/// Rows of a table.
+pub struct TableRows<'a> {
+    path: &'a Path,
+    text: &'a str,
+    records: csv::Reader<&'a [u8]>,
+    counted: usize,
+    line: usize,
+}
+
+impl TableRows<'_> {
+    /// Reads the next row into `record` and returns its line number; `None` at the end.
+    pub fn read(&mut self, record: &mut StringRecord) -> Result<Option<usize>, InputError> {
+        loop {
+            let more = self.records.read_record(record).map_err(|error| {
+                InputError::file(self.path, format!("the file cannot be read: {error}"))
+            })?;
+            if !more {
+                return Ok(None);
+            }
+            let byte = record.position().map_or(0, csv::Position::byte);
+            let line = self.line_from(usize::try_from(byte).unwrap_or(usize::MAX));
+            let first = record.get(0).unwrap_or_default();
+            let blank = record.len() == 1 && first.is_empty();
+            if !blank && !first.starts_with('#') {
+                return Ok(Some(line));
+            }
+        }
+    }
+
+    /// The line of the first field at or after a byte: the csv crate's position of a record is
+    /// before the blank lines and comments that it skips.
+    fn line_from(&mut self, byte: usize) -> usize {
+        let bytes = self.text.as_bytes();
+        let mut comment = false;
+        while let Some(&here) = bytes.get(self.counted) {
+            let at_line_end = matches!(here, b'\n' | b'\r');
+            if self.counted >= byte && !at_line_end && !comment {
+                if here != b'#' {
+                    break;
+                }
+                comment = true;
+            }
+            comment &= !at_line_end;
+            let windows = here == b'\r' && bytes.get(self.counted + 1) == Some(&b'\n');
+            self.line += usize::from(at_line_end && !windows);
+            self.counted += 1;
+        }
+        self.line
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_of_blanks_are_one_tab() {
+        assert_eq!(
+            runs_to_tabs("  t \t y  \r\n\" a b\"   1\n"),
+            "t\ty\r\n\" a b\"\t1\n"
+        );
+    }
+
+    #[test]
+    fn lines_are_skipped() {
+        assert_eq!(after_lines("a\nb\nc", 0), "a\nb\nc");
+        assert_eq!(after_lines("a\nb\nc", 2), "c");
+        assert_eq!(after_lines("a\nb\nc", 3), "");
+    }
+}

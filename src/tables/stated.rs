@@ -1,0 +1,144 @@
+//! Units stated by a table: in its row of units, in brackets after a column's name, and at the end of the name.
+
+use super::Table;
+use super::columns::split_unit;
+use crate::error::InputError;
+use crate::text_io::quote;
+use crate::units::{Quantity, Unit, unbracketed};
+
+/// Unit of one column as stated by a table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StatedUnit<'a> {
+    /// The field in the row of units, without brackets.
+    row: Option<&'a str>,
+    /// The text in brackets or after a slash that follows the name.
+    header: Option<&'a str>,
+    /// The name without this text.
+    name: &'a str,
+}
+
+impl<'a> StatedUnit<'a> {
+    /// The text that states the unit: the field in the row of units, else the text after the name.
+    pub fn text(&self) -> Option<&'a str> {
+        self.row.or(self.header)
+    }
+
+    /// The unit of this quantity in the row of units or after the name.
+    pub fn explicit(&self, kind: Quantity) -> Option<Unit> {
+        let unit = |text: Option<&str>| Unit::recognise(kind, text?);
+        unit(self.row).or_else(|| unit(self.header))
+    }
+
+    /// The unit of this quantity at the end of the name, as in `y_mm` and `a_m_per_s2`.
+    pub fn suffix(&self, kind: Quantity) -> Option<Unit> {
+        self.name.match_indices('_').find_map(|(at, _)| {
+            let end = &self.name[at + 1..];
+            Unit::recognise(kind, &end.replace("_per_", "/").replace('_', " "))
+        })
+    }
+
+    /// True if the row of units and the name state different units for every quantity.
+    fn is_contradiction(&self) -> bool {
+        let (Some(row), Some(header)) = (self.row, self.header) else {
+            return false;
+        };
+        let units = |text| Quantity::ALL.map(|kind| Unit::recognise(kind, text));
+        let (row, header) = (units(row), units(header));
+        let is_unit = |units: &[Option<Unit>]| units.iter().any(Option::is_some);
+        let agree = row.iter().zip(&header).any(|(a, b)| a.is_some() && a == b);
+        is_unit(&row) && is_unit(&header) && !agree
+    }
+}
+
+impl Table {
+    /// The stated unit of a column.
+    pub fn stated_unit(&self, index: usize) -> StatedUnit<'_> {
+        let (name, header) = split_unit(self.headers().get(index).map_or("", String::as_str));
+        let row = self.units_row().get(index).map(|text| unbracketed(text));
+        StatedUnit {
+            // A dash denotes no unit.
+            row: row.filter(|text| !matches!(*text, "" | "-")),
+            header,
+            name,
+        }
+    }
+
+    /// Refuses a column whose name states one unit and whose field in the row of units another.
+    ///
+    /// # Errors
+    /// At the row of units, with both.
+    pub fn check_stated_unit(&self, index: usize) -> Result<(), InputError> {
+        let stated = self.stated_unit(index);
+        if !stated.is_contradiction() {
+            return Ok(());
+        }
+        let line = |line: Option<usize>| line.unwrap_or(1);
+        let problem = format!("two units for the column {}", quote(&self.label(index)));
+        let units_row = line(self.format().units_row);
+        Err(InputError::line(self.path(), units_row, 1, problem)
+            .found(format!(
+                "{} in the row of units (line {}), {} in the column name (line {})",
+                quote(stated.row.unwrap_or_default()),
+                units_row,
+                quote(stated.header.unwrap_or_default()),
+                line(self.format().header)
+            ))
+            .expected("the same unit in both, or in one of them"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(text: &str) -> Table {
+        Table::parse("t.csv", text.as_bytes()).expect("a table")
+    }
+
+    #[test]
+    fn units_are_read_at_the_ends_of_names() {
+        for (name, kind, symbol) in [
+            ("y_mm", Quantity::Displacement, Some("mm")),
+            ("left_y_mm", Quantity::Displacement, Some("mm")),
+            ("t_ms", Quantity::Time, Some("ms")),
+            ("a_m_per_s2", Quantity::Acceleration, Some("m/s²")),
+            ("v_mm_per_s", Quantity::Velocity, Some("mm/s")),
+            ("M_N_m", Quantity::Force, Some("N m")),
+            ("y", Quantity::Displacement, None),
+            ("mm", Quantity::Displacement, None),
+            ("y_raw", Quantity::Displacement, None),
+            ("y_mm", Quantity::Time, None),
+        ] {
+            let table = table(&format!("{name},z\n1,2\n2,3\n"));
+            let unit = table.stated_unit(0).suffix(kind);
+            assert_eq!(unit.map(|u| u.symbol()), symbol, "{name}");
+        }
+    }
+
+    #[test]
+    fn contradictions_are_found() {
+        let is_refused = |header: &str, unit: &str| {
+            let table = table(&format!("t,{header}\ns,{unit}\n0,1\n1,2\n"));
+            assert_eq!(table.units_row().len(), 2, "{header} {unit}");
+            table.check_stated_unit(1).is_err()
+        };
+        for (header, unit) in [
+            ("y [mm]", "m"),
+            ("y (m/s²)", "m"),
+            ("y / mm", "[m]"),
+            ("phi [deg]", "rad"),
+        ] {
+            assert!(is_refused(header, unit), "{header} {unit}");
+        }
+        for (header, unit) in [
+            ("y [mm]", "mm"),
+            ("y (left)", "m"),
+            ("y [mm]", "-"),
+            ("y [mm]", ""),
+            ("y", "m"),
+            ("a [m/s^2]", "m/s²"),
+        ] {
+            assert!(!is_refused(header, unit), "{header} {unit}");
+        }
+    }
+}

@@ -1,0 +1,393 @@
+//! A table of numeric columns, parsed from a text file.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use csv::StringRecord;
+
+use super::detect::{Layout, detect};
+use super::encoding::decode;
+use super::field::{self, Field};
+use super::format::{Detected, TableFormat};
+use super::rows::{CsvText, with_newlines};
+use super::table_memory::TableMemory;
+use crate::error::{InputError, Location};
+use crate::text_io::{LONGEST_TABLE, check_lines, listed, quote, read_bytes, read_bytes_from};
+
+/// Most columns: each takes some hundred bytes beside its fields.
+const MOST_COLUMNS: usize = 10_000;
+
+/// Description of a table, for messages.
+const TABLE: &str = "a CSV file with one row of column names and rows of numbers";
+
+/// A table: columns of equal length.
+///
+/// The plain form is comma-separated, one row of column names first. Other forms are detected, or given by a
+/// [`TableFormat`]: other delimiters, decimal commas, lines of text before the names, a row of units after them, no
+/// names, encodings other than UTF-8.
+///
+/// Lines that begin with `#`, blank lines, spaces around a field and a byte order mark are ignored; the line ends of
+/// any system are accepted. A column that is not used may hold text.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    path: PathBuf,
+    format: Detected,
+    headers: Vec<String>,
+    units: Vec<String>,
+    columns: Vec<ColumnValues>,
+    lines: Vec<usize>,
+}
+
+/// Samples of a column, NaN if missing, up to the first invalid field.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct ColumnValues {
+    samples: Vec<f64>,
+    /// The first field that is not a finite number.
+    unnumbered: Option<InputError>,
+    /// The first field that is neither a finite number nor missing.
+    unreadable: Option<InputError>,
+}
+
+impl Table {
+    /// Reads a table from a file; its format is detected.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such file, it is not text, or [`parse`](Self::parse) fails.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
+        Self::read_with(path, &TableFormat::default())
+    }
+
+    /// Reads a table of a given format from a file.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such file, it is not text, or [`parse_with`](Self::parse_with) fails.
+    pub fn read_with(path: impl AsRef<Path>, format: &TableFormat) -> Result<Self, InputError> {
+        let path = path.as_ref();
+        Self::from_bytes(path, read_bytes(path, TABLE, LONGEST_TABLE)?, format)
+    }
+
+    /// Parses a table; messages name `path`.
+    ///
+    /// ```
+    /// use kmcfit::tables::Table;
+    /// let table = Table::parse("free.csv", "t_s,y_m,note\n0.0,3.3,start\n0.1,3.2,\n".as_bytes())?;
+    /// assert_eq!(table.column("y_m")?, [3.3, 3.2]);
+    /// assert!(table.column("note").is_err());
+    /// # Ok::<(), kmcfit::error::InputError>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// When it is not text, has no rows, rows of different length, or two columns with the same name.
+    pub fn parse(path: impl AsRef<Path>, reader: impl Read) -> Result<Self, InputError> {
+        Self::parse_with(path, reader, &TableFormat::default())
+    }
+
+    /// Parses a table of a given format; messages name `path`.
+    ///
+    /// # Errors
+    ///
+    /// As [`parse`](Self::parse), and when the format has an invalid delimiter or decimal sign.
+    pub fn parse_with(
+        path: impl AsRef<Path>,
+        reader: impl Read,
+        format: &TableFormat,
+    ) -> Result<Self, InputError> {
+        let path = path.as_ref();
+        Self::from_bytes(path, read_bytes_from(path, reader, LONGEST_TABLE)?, format)
+    }
+
+    /// The path, as given.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The detected format.
+    pub fn format(&self) -> &Detected {
+        &self.format
+    }
+
+    /// Names of the columns, in order; empty where the file has none.
+    pub fn headers(&self) -> &[String] {
+        &self.headers
+    }
+
+    /// The texts of the row of units, in order; empty where the file has none.
+    pub fn units_row(&self) -> &[String] {
+        &self.units
+    }
+
+    /// Line in the file of each data row, from 1.
+    pub fn lines(&self) -> &[usize] {
+        &self.lines
+    }
+
+    /// Number of data rows; at least one.
+    pub fn rows(&self) -> usize {
+        self.lines.len()
+    }
+
+    /// Number of columns.
+    pub fn width(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// The values of a column, as [`find`](Self::find) finds it by its name.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such column, or one of its fields is not a finite number.
+    pub fn column(&self, name: &str) -> Result<&[f64], InputError> {
+        self.values(self.find(&name.into())?)
+    }
+
+    /// The values of a column, by its index from 0: a finite number in every row.
+    ///
+    /// # Errors
+    ///
+    /// When one of its fields is not a finite number, or there is no such column.
+    pub fn values(&self, index: usize) -> Result<&[f64], InputError> {
+        let column = self.at(index)?;
+        match &column.unnumbered {
+            None => Ok(&column.samples),
+            Some(error) => Err(error.clone()),
+        }
+    }
+
+    /// The samples of a column, by its index from 0; NaN for a missing sample: a field that is empty, `NaN`, `NA`,
+    /// `N/A`, `#N/A`, `null`, `-` or `--`.
+    ///
+    /// ```
+    /// use kmcfit::tables::Table;
+    /// let table = Table::parse("gaps.csv", "t,y\n0,3.3\n1,\n2,3.1\n".as_bytes())?;
+    /// let samples = table.samples(1)?;
+    /// assert_eq!((samples[0], samples[2]), (3.3, 3.1));
+    /// assert!(samples[1].is_nan());
+    /// # Ok::<(), kmcfit::error::InputError>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// When one of its fields is neither a finite number nor missing, or there is no such column.
+    pub fn samples(&self, index: usize) -> Result<&[f64], InputError> {
+        let column = self.at(index)?;
+        match &column.unreadable {
+            None => Ok(&column.samples),
+            Some(error) => Err(error.clone()),
+        }
+    }
+
+    /// Location of a data row, counted from 0, for errors.
+    pub fn place(&self, row: usize, column: Option<&str>) -> Location {
+        Location::Row {
+            file: self.path.clone(),
+            row: row + 1,
+            line: self.lines.get(row).copied().unwrap_or_default(),
+            column: column.map(str::to_owned),
+        }
+    }
+
+    fn at(&self, index: usize) -> Result<&ColumnValues, InputError> {
+        let index = self.find(&super::ColumnName::Number(index.saturating_add(1)))?;
+        Ok(&self.columns[index])
+    }
+
+    fn from_bytes(path: &Path, bytes: Vec<u8>, format: &TableFormat) -> Result<Self, InputError> {
+        format.check()?;
+        let (text, encoding) = decode(path, bytes)?;
+        let text = with_newlines(text);
+        check_lines(path, &text)?;
+        let layout = detect(path, &text, format);
+        let skipped = format.skip.unwrap_or(0);
+        let mut table = Self {
+            path: path.to_path_buf(),
+            format: Detected {
+                encoding,
+                delimiter: layout.delimiter,
+                decimal: layout.decimal,
+                skipped,
+                header: None,
+                units_row: None,
+            },
+            headers: Vec::new(),
+            units: Vec::new(),
+            columns: Vec::new(),
+            lines: Vec::new(),
+        };
+        let room = TableMemory::of(path, &text);
+        let width = layout.width.unwrap_or(1);
+        room.check(width)?;
+        table.lines = room.list(width)?;
+        let source = CsvText::new(&text, skipped, layout.delimiter);
+        table.fill(&source, &layout, room)?;
+        Ok(table)
+    }
+
+    fn fill(
+        &mut self,
+        source: &CsvText,
+        layout: &Layout,
+        room: TableMemory,
+    ) -> Result<(), InputError> {
+        let path = self.path.clone();
+        let mut rows = source.rows(&path);
+        let mut fields = StringRecord::new();
+        let mut count = 0;
+        while let Some(line) = rows.read(&mut fields)? {
+            let row = Some(count);
+            check_width(&path, line, fields.len())?;
+            if row == layout.header {
+                check_headers(&path, line, &fields, layout.decimal)?;
+                self.headers = fields.iter().map(str::to_owned).collect();
+                self.columns = columns(fields.len(), room)?;
+                self.format.header = Some(line);
+            } else if row == layout.units {
+                self.units = fields.iter().map(str::to_owned).collect();
+                self.format.units_row = Some(line);
+            } else if count >= layout.data {
+                self.push(line, &fields, layout, room)?;
+            }
+            count += 1;
+        }
+        let first = self.lines.first().copied();
+        match (self.format.header.or(first), first) {
+            (None, _) => Err(empty(&path, self.format.skipped)),
+            (_, None) => Err(InputError::file(&path, "the file has no data")
+                .found("a row of column names only")
+                .expected(TABLE)),
+            (Some(head), _) => {
+                self.format.skipped = head - 1;
+                Ok(())
+            }
+        }
+    }
+
+    /// Adds a data row. A field that is not a number makes its column unusable.
+    fn push(
+        &mut self,
+        line: usize,
+        fields: &StringRecord,
+        layout: &Layout,
+        room: TableMemory,
+    ) -> Result<(), InputError> {
+        let row = self.lines.len();
+        self.lines.push(line);
+        if self.columns.is_empty() {
+            let width = layout.width.unwrap_or(fields.len());
+            self.columns = columns(width, room)?;
+        }
+        // Some loggers end every row of data, but not the row of names, with a delimiter.
+        let width = self.columns.len();
+        let ended = layout.width == Some(width + 1) && fields.get(width) == Some("");
+        if fields.len() != width + usize::from(ended) {
+            let place = self.place(row, None);
+            let named = !self.headers.is_empty();
+            return Err(ragged(place, fields, width, named));
+        }
+        for (index, text) in fields.iter().take(width).enumerate() {
+            let column = &self.columns[index];
+            if column.unreadable.is_some() {
+                continue;
+            }
+            let read = field::read(text, layout.decimal);
+            if let Field::Number(value) = read {
+                self.columns[index].samples.push(value);
+                continue;
+            }
+            let place = || self.place(row, Some(&self.label(index)));
+            let unnumbered = column
+                .unnumbered
+                .is_none()
+                .then(|| field::not_a_number(place(), text, layout.decimal));
+            let unreadable = (read != Field::Missing)
+                .then(|| field::not_a_sample(place(), text, layout.decimal));
+            let column = &mut self.columns[index];
+            column.samples.push(f64::NAN);
+            column.unnumbered = column.unnumbered.take().or(unnumbered);
+            column.unreadable = unreadable;
+        }
+        Ok(())
+    }
+}
+
+/// Allocates the columns with capacity for all rows.
+fn columns(width: usize, room: TableMemory) -> Result<Vec<ColumnValues>, InputError> {
+    let column = |_| {
+        Ok(ColumnValues {
+            samples: room.list(width)?,
+            ..ColumnValues::default()
+        })
+    };
+    (0..width).map(column).collect()
+}
+
+/// The error for a file without rows after the skipped lines.
+fn empty(path: &Path, skipped: usize) -> InputError {
+    let error = InputError::file(path, "the file is empty").expected(TABLE);
+    match skipped {
+        0 => error,
+        lines => error.found(format!("nothing after {lines} skipped lines")),
+    }
+}
+
+/// Refuses a row with more than [`MOST_COLUMNS`] fields.
+fn check_width(path: &Path, line: usize, fields: usize) -> Result<(), InputError> {
+    if fields <= MOST_COLUMNS {
+        return Ok(());
+    }
+    Err(
+        InputError::line(path, line, 1, "the table has too many columns")
+            .found(format!("{fields} fields"))
+            .expected(format!("at most {MOST_COLUMNS}")),
+    )
+}
+
+/// Refuses repeated column names, and a row of names that are all numbers.
+fn check_headers(
+    path: &Path,
+    line: usize,
+    headers: &StringRecord,
+    decimal: char,
+) -> Result<(), InputError> {
+    let error = |problem: String| InputError::line(path, line, 1, problem);
+    let is_number = |name| matches!(field::read(name, decimal), Field::Number(_));
+    if headers.iter().all(is_number) {
+        return Err(error("the column names are missing".to_owned())
+            .found(format!("the numbers {}", quote(&listed(headers))))
+            .expected("one row of column names before the data")
+            .hint("a line that begins with `#` is a comment: remove the `#` before the names"));
+    }
+    for (index, name) in headers.iter().enumerate() {
+        let before = headers.iter().take(index).position(|other| other == name);
+        if let (Some(first), false) = (before, name.is_empty()) {
+            return Err(error(format!("two columns have the name {}", quote(name)))
+                .found(format!("columns {} and {}", first + 1, index + 1))
+                .expected("every column name once"));
+        }
+    }
+    Ok(())
+}
+
+/// The error for a row with more or fewer fields than there are columns.
+fn ragged(place: Location, fields: &StringRecord, expected: usize, named: bool) -> InputError {
+    let plural = |n: usize| match n {
+        1 => "1 field".to_owned(),
+        n => format!("{n} fields"),
+    };
+    let problem = match named {
+        true => "the row does not fit the column names",
+        false => "the row does not fit the other rows",
+    };
+    let error = InputError::new(place, problem)
+        .found(plural(fields.len()))
+        .expected(format!("{}, one per column", plural(expected)));
+    if fields.iter().any(|field| field.contains('\n')) {
+        return error.hint("a quote that is opened in this row is not closed in it");
+    }
+    if fields.len() == 2 * expected {
+        return error.hint("write numbers with a decimal point, not a comma");
+    }
+    error
+}

@@ -1,0 +1,62 @@
+//! Upper estimate of the memory of a table, checked against the available memory before allocation.
+
+use crate::error::InputError;
+use crate::memory;
+use std::path::Path;
+
+/// Numbers stored for each row beside its fields: its line, and the times and samples of the record made from the
+/// table. Measured: 107 bytes per row, text included, for a record of a million rows with two columns; one third is
+/// added for losses of the allocator.
+const BESIDE: usize = 14;
+
+/// Bounds on the number of rows of a text.
+#[derive(Debug, Clone, Copy)]
+pub struct TableMemory<'a> {
+    path: &'a Path,
+    lines: usize,
+    bytes: usize,
+}
+
+impl<'a> TableMemory<'a> {
+    /// Bounds for a text; messages name `path`.
+    pub fn of(path: &'a Path, text: &str) -> Self {
+        let ends = text.bytes().filter(|byte| *byte == b'\n');
+        Self {
+            path,
+            lines: 1 + ends.count(),
+            bytes: text.len(),
+        }
+    }
+
+    /// Most rows with `width` fields: each takes at least its delimiters and its line end.
+    fn rows(&self, width: usize) -> usize {
+        self.lines.min(self.bytes / width.max(1) + 1)
+    }
+
+    /// Refuses a table with `width` columns that exceeds the available memory.
+    ///
+    /// # Errors
+    /// With the needed and the available memory.
+    pub fn check(&self, width: usize) -> Result<(), InputError> {
+        let numbers = self.rows(width).saturating_mul(width + BESIDE);
+        let bytes = numbers.saturating_mul(size_of::<f64>());
+        memory::check_file(self.path, bytes as u64)
+    }
+
+    /// An empty list with capacity for one value of each row with `width` fields.
+    ///
+    /// # Errors
+    /// When the allocation fails.
+    pub fn list<T>(&self, width: usize) -> Result<Vec<T>, InputError> {
+        let mut list = Vec::new();
+        let rows = self.rows(width);
+        match list.try_reserve_exact(rows) {
+            Ok(()) => Ok(list),
+            Err(_) => Err(
+                InputError::file(self.path, "the file does not fit into memory")
+                    .found(format!("up to {rows} rows of {width} fields"))
+                    .expected("a shorter file, or more memory"),
+            ),
+        }
+    }
+}
