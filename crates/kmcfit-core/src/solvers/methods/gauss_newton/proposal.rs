@@ -164,8 +164,7 @@ fn of_program(
     // The value of the program is not used: its solution satisfies the steps only to the program's accuracy.
     let model = model_cost(work, sub, point, &parameters);
     let predicted = cost - model;
-    // Also for NaN.
-    if !(predicted >= -least_decrease(work.problem(), cost)) {
+    if predicted < -least_decrease(work.problem(), cost) || predicted.is_nan() {
         return ProposalOutcome::Unsolved(ConicStatus::Stalled);
     }
     ProposalOutcome::Step(Proposal {
