@@ -152,7 +152,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             Builder::new(system()).record(short().velocity(&[0.0, 2.0, 1.0], &values)),
-            "experiments[0].columns.velocity: these samples make no record\n  found: times that do not increase",
+            "experiments[0].columns.velocity: these samples are invalid\n  found: times that do not increase",
         ),
         (
             Builder::new(system()).record(short().displacement(&times, &[1.0, f64::NAN, 0.0])),
@@ -168,7 +168,7 @@ fn what_cannot_be_meant_is_refused() {
                     .displacement(&times, &values)
                     .loss(Loss::Huber { threshold: 1.0 }),
             ),
-            "experiments[0].loss.displacement: a robust loss needs to know which residuals are large",
+            "experiments[0].loss.displacement: a robust loss needs a sigma to identify large residuals",
         ),
         (
             Builder::new(system()).record(short().velocity(&times, &values)),
@@ -256,7 +256,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             mass(one().max(0.0)),
-            "functions.mass.max: this leaves no mass: it must be positive at all times",
+            "functions.mass.max: this excludes a positive mass: the mass must be positive at all times",
         ),
         (
             mass(one().min(f64::NAN)),
@@ -311,7 +311,7 @@ fn what_cannot_be_meant_is_refused() {
         (
             Builder::new(system())
                 .record(record().coefficient(CoefficientKind::CubicStiffness, one())),
-            "experiments[0].functions.cubic_stiffness: the device has no such function",
+            "experiments[0].functions.cubic_stiffness: the system has no such function",
         ),
         (
             Builder::new(system())

@@ -142,7 +142,9 @@ fn a_mass_that_must_pass_zero() {
     assert!(reason.contains("the mass is -"), "{reason}");
     // Nothing is said to push at a point outside.
     assert_eq!(result["constraints"]["active"], serde_json::json!([]));
-    assert!(stdout.contains("infeasible: no start within the constraints has a motion"));
+    assert!(stdout.contains(
+        "infeasible: the simulation fails at all starting points within the constraints"
+    ));
 }
 
 #[test]

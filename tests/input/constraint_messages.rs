@@ -549,7 +549,10 @@ fn a_mass_must_be_left() {
         "integral: -2.0",
     ] {
         let said = message(&format!("[{{function: mass, {held}}}]"));
-        assert!(said.contains("this leaves no mass"), "{held}: {said}");
+        assert!(
+            said.contains("this excludes a positive mass"),
+            "{held}: {said}"
+        );
     }
     assert!(message("[{function: damping, max: -1.0}]").starts_with("no error"));
 }

@@ -40,10 +40,10 @@ pub mod host {
 pub mod identifiability {
     pub use crate::identifiability::{
         Band, BandSettings, Bands, CandidateChannel, CandidateExperiment, Classification,
-        ClassificationKind, FunctionClassification, Gain, Gauge, RankFinding, RankFindingKind,
-        Ranked, ResolvedDirection, Sensitivity, Side, SingularSpectrum, Symmetry, anchors,
-        classify_functions, is_rounding, is_unhindered, rank_experiments, residual_spread,
-        structural_rank,
+        ClassificationKind, FunctionClassification, Gain, RankFinding, RankFindingKind, Ranked,
+        ResolvedDirection, ScalingAmbiguity, Sensitivity, Side, SingularSpectrum, Symmetry,
+        anchors, classify_functions, is_negligible, is_unhindered, rank_experiments,
+        residual_spread, structural_rank,
     };
 }
 pub mod objective {
@@ -55,7 +55,7 @@ pub mod problem {
     pub use crate::problem::{Problem, ProblemError, ProblemParts};
 }
 pub mod qp {
-    pub use crate::qp::{ConicStatus, Kkt, Subproblem, project};
+    pub use crate::qp::{ConicStatus, Kkt, ResponseVariables, StageLayout, Subproblem, project};
 }
 pub mod record {
     pub use crate::record::{

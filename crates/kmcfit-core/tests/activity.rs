@@ -158,7 +158,7 @@ fn resting(c: f64, k: f64, sigma: f64, groups: Vec<RowGroup>) -> Vec<ActiveGroup
 
 /// Multipliers of bounds on single parameters, against those of the program that rows of several
 /// parameters need: with a row that is far away, which changes nothing else. J falls with c below 0.8, and with
-/// k above 1. The point lies as near to its bounds as a program comes, and J is told in any unit.
+/// k above 1. The point lies as near to its bounds as a program comes, for J in any unit.
 #[test]
 fn multipliers_of_bounds_on_one_parameter_are_those_of_a_program() {
     let (c, k) = (0.4, 1.3);
@@ -308,7 +308,7 @@ fn capped_in_units(unit: f64, cap: f64) -> Problem {
 /// A push counts if giving way by one per cent would lower J by more than a millionth, to first order.
 /// The bound m + k gives way by one per cent where c = zeta (m + k) does.
 #[test]
-fn whether_a_push_counts_is_no_matter_of_units() {
+fn the_significance_of_a_multiplier_does_not_depend_on_units() {
     let best = |unit: f64, cap: f64| {
         let problem = capped_in_units(unit, cap);
         let start = problem.functions.start();

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-/// `api.txt` lists what `src/lib.rs` exports: a name is added to both, on purpose.
+/// `api.txt` lists what `src/lib.rs` exports: a new name is added to both.
 #[test]
 fn the_public_names_are_those_of_the_list() {
     let source = include_str!("../src/lib.rs");

@@ -48,7 +48,7 @@ fn table() -> Vec<(Basis, usize, usize)> {
     ]
 }
 
-/// Times that are nobody's knots or nodes, the ends, and every knot and node.
+/// Times other than knots and nodes, the ends, and every knot and node.
 fn times(grid: &Grid) -> Vec<f64> {
     let mut times: Vec<f64> = (0..97)
         .map(|i| -1.5 + 4.0 * (f64::from(i) + 0.37) / 97.3)

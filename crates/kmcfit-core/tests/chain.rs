@@ -83,7 +83,7 @@ proptest! {
         for (z, right) in found.iter().zip(&a).take(given) {
             prop_assert_eq!(*z, right / 2.0);
         }
-        // At a minimum the value hardly depends on where one stands: what is left is its own rounding.
+        // At a minimum the value hardly depends on the point: the rest is its rounding error.
         let (found, expected) = (plain.value(&found), plain.value(&expected));
         prop_assert!((found - expected).abs() <= 1e-12 * (1.0 + expected), "{found} {expected}");
     }
@@ -131,7 +131,7 @@ fn several_right_hand_sides_are_solved_as_each_by_itself() {
 }
 
 #[test]
-fn what_cannot_be_solved_is_not_solved() {
+fn unsolvable_problems_have_no_solution() {
     let numbers = [0.3, -0.7, 0.9, 0.2, -0.4, 0.8, 0.1];
     let mut sub = chain(12, 3, &numbers, &[0]);
     sub.stations = (0..13).collect();
@@ -152,7 +152,7 @@ fn what_cannot_be_solved_is_not_solved() {
 }
 
 #[test]
-fn bounds_that_the_plain_minimum_breaks_are_held() {
+fn bounds_violated_by_the_plain_minimum_become_active() {
     let mut sub = Subproblem::new(3);
     sub.stations = vec![0, 1, 2];
     for (j, target) in [-1.0, 0.5, 3.0].into_iter().enumerate() {

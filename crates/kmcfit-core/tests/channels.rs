@@ -399,7 +399,7 @@ proptest! {
     /// Constants are carried along by a way of their own: against values at the nodes, to which a design takes
     /// their gradient, and against one direction at a time.
     #[test]
-    fn few_parameters_move_what_values_at_the_nodes_do(
+    fn few_parameters_have_the_tangents_of_nodal_values(
         methods in prop_oneof![Just(Method::Midpoint), Just(Method::Rk4)],
         nodes in prop_oneof![4usize..14, 60..70usize],
         seed in any::<u64>(),

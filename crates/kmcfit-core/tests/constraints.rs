@@ -145,7 +145,7 @@ fn tested(basis: &Basis) -> Vec<f64> {
 }
 
 #[test]
-fn rows_say_what_the_functions_do() {
+fn rows_agree_with_the_functions() {
     for basis in bases() {
         let functions = functions([&basis, &Basis::Nodal, &Basis::Constant]);
         let theta = random(functions.parameters(), 1);
@@ -232,7 +232,7 @@ fn one_row_for_every_value_that_can_differ() {
 }
 
 #[test]
-fn what_is_projected_satisfies_the_statement_between_the_nodes() {
+fn projected_functions_satisfy_the_constraint_between_nodes() {
     let limit = |t: f64| 0.2 + 0.3 * (t - 1.0) / 10.0 * ((t - 1.0) * 2.0).sin();
     let moving = Constraint::Bounds {
         of: MASS,
@@ -354,7 +354,7 @@ fn holds(constraints: &Constraints, nodal: [&dyn Fn(f64) -> f64; 3]) -> bool {
 }
 
 #[test]
-fn the_true_device_is_passive_and_a_stiffening_spring_is_not() {
+fn the_true_system_is_passive_and_a_stiffening_spring_is_not() {
     let nodal = functions([&Basis::Nodal; 3]);
     let passive = built(&Constraint::Passive, &nodal);
     let names: Vec<&str> = passive.groups.iter().map(|g| g.name.as_str()).collect();

@@ -318,7 +318,7 @@ fn dry_friction_decays_in_a_line() {
 
 /// What sensors see between nodes has the order of the stepper: the interpolation is not worse.
 #[test]
-fn readings_between_nodes_have_the_order_of_the_stepper() {
+fn samples_between_nodes_have_the_order_of_the_stepper() {
     let w = 2.0;
     // Harmonic force in its steady state from the first node on.
     let impedance = (K - M * w * w).hypot(C * w);

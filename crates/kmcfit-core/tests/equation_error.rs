@@ -171,7 +171,7 @@ fn irregular_velocities_are_integrated() {
 /// Mass, stiffness and samples in other units, and the penalty with them: the samples count as they did,
 /// so the start is the same but for the unit.
 #[test]
-fn the_start_knows_no_unit_of_mass_or_length() {
+fn the_start_does_not_depend_on_units_of_mass_and_length() {
     let plain = problem(Some(0.0), false);
     let observed = plain.experiments[0].channels[0].observed().to_vec();
     let observed = common::synthetic::with_noise(&observed, 0.05, 4);
@@ -212,7 +212,7 @@ fn the_start_knows_no_unit_of_mass_or_length() {
     }
 }
 
-/// How much a penalty smooths is told by the spring's force and the mass's at the start, whatever a
+/// The smoothing by a penalty depends on the spring force and the inertia force at the start, whatever a
 /// damping that is estimated begins with.
 #[test]
 fn the_start_of_a_damping_has_no_part_in_the_smoothing() {

@@ -169,7 +169,7 @@ fn two_free_records_determine_the_ratios() {
 }
 
 #[test]
-fn two_free_records_and_a_forced_one_determine_the_device() {
+fn two_free_records_and_a_forced_one_determine_the_system() {
     let truth = truth(&system(NODES).grid);
     let three = [(STATES[0], false), (STATES[1], false), (STATES[2], true)];
     let found = run(&smooth(problem(NODES, &truth, &three), false));

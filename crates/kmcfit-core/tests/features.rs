@@ -51,15 +51,15 @@ fn line() -> Basis {
 
 /// A function to be found: its basis, the true parameters, and the start.
 #[derive(Clone)]
-struct Sought {
+struct EstimatedFunction {
     quantity: CoefficientKind,
     basis: Basis,
     truth: Vec<f64>,
     start: Vec<f64>,
 }
 
-fn constant(quantity: CoefficientKind, truth: f64, start: f64) -> Sought {
-    Sought {
+fn constant(quantity: CoefficientKind, truth: f64, start: f64) -> EstimatedFunction {
+    EstimatedFunction {
         quantity,
         basis: Basis::Constant,
         truth: vec![truth],
@@ -67,8 +67,8 @@ fn constant(quantity: CoefficientKind, truth: f64, start: f64) -> Sought {
     }
 }
 
-fn lines(quantity: CoefficientKind, truth: [f64; 5], start: f64) -> Sought {
-    Sought {
+fn lines(quantity: CoefficientKind, truth: [f64; 5], start: f64) -> EstimatedFunction {
+    EstimatedFunction {
         quantity,
         basis: line(),
         truth: truth.to_vec(),
@@ -76,7 +76,7 @@ fn lines(quantity: CoefficientKind, truth: [f64; 5], start: f64) -> Sought {
     }
 }
 
-impl Sought {
+impl EstimatedFunction {
     fn function(&self) -> CoefficientFunction {
         CoefficientFunction::free(
             self.quantity,
@@ -92,11 +92,11 @@ impl Sought {
 }
 
 /// Damping and stiffness of the linear system, which most tests look for; the mass is known.
-fn damping() -> Sought {
+fn damping() -> EstimatedFunction {
     constant(CoefficientKind::Damping, 0.25, 0.4)
 }
 
-fn stiffness() -> Sought {
+fn stiffness() -> EstimatedFunction {
     lines(CoefficientKind::Stiffness, [4.0, 4.6, 4.3, 3.7, 4.1], 3.6)
 }
 
@@ -241,10 +241,10 @@ fn scalar(truth: f64, start: f64, prior: Option<f64>) -> (f64, ScalarParameter) 
 struct Case {
     terms: Vec<Term>,
     /// `None` where the mass is known.
-    mass: Option<Sought>,
-    functions: Vec<Sought>,
+    mass: Option<EstimatedFunction>,
+    functions: Vec<EstimatedFunction>,
     /// Functions that replace one of the shared coefficient set in the other systems: which one of its list.
-    own: Vec<(usize, Sought)>,
+    own: Vec<(usize, EstimatedFunction)>,
     scalars: Vec<(f64, ScalarParameter)>,
     records: Vec<Record>,
 }
@@ -276,8 +276,15 @@ impl Case {
     }
 
     fn nodal(&self, which: usize) -> NodalCoefficients {
-        let mass = self.mass.as_ref().map_or_else(known_mass, Sought::values);
-        let mut coefficients: Vec<Vec<f64>> = self.functions.iter().map(Sought::values).collect();
+        let mass = self
+            .mass
+            .as_ref()
+            .map_or_else(known_mass, EstimatedFunction::values);
+        let mut coefficients: Vec<Vec<f64>> = self
+            .functions
+            .iter()
+            .map(EstimatedFunction::values)
+            .collect();
         let mut nodal = NodalCoefficients {
             mass,
             coefficients: std::mem::take(&mut coefficients),
@@ -296,7 +303,7 @@ impl Case {
             None => CoefficientFunction::fixed(CoefficientKind::Mass, known_mass()),
         };
         let mut list = vec![mass];
-        list.extend(self.functions.iter().map(Sought::function));
+        list.extend(self.functions.iter().map(EstimatedFunction::function));
         let main: Vec<usize> = (0..list.len()).collect();
         let mut nodal_sets = vec![main.clone()];
         for (replaced, estimated) in &self.own {
@@ -347,7 +354,7 @@ impl Case {
     fn check(&self, words: &str) {
         let problem = self.problem();
         let truth = self.truth();
-        // The data are in the model class: to rounding, nothing is left at the truth.
+        // The data are in the model class: the residuals at the truth are rounding errors.
         let misfit = problem.evaluate(&truth).unwrap().misfit;
         assert!(
             misfit <= 1e-18 * problem.zero_response_misfit(),
@@ -415,7 +422,7 @@ fn channels_at_times_of_their_own() {
 }
 
 #[test]
-fn readings_with_a_sigma_each_and_robust_losses() {
+fn samples_with_individual_sigmas_and_robust_losses() {
     let times = scattered(150, 8);
     let sigmas = (0..times.len()).map(|i| 1e-3 * (1.0 + (i % 7) as f64));
     let mut sample = Reading::of(ChannelKind::Displacement, times.clone());
@@ -656,7 +663,7 @@ fn all_together() {
 /// that light smoothness charges nothing for it and decides what the samples leave open.
 #[test]
 fn one_value_per_node_with_sensors_states_and_a_filter() {
-    let nodal = |quantity, from: f64, slope: f64, start: f64| Sought {
+    let nodal = |quantity, from: f64, slope: f64, start: f64| EstimatedFunction {
         quantity,
         basis: Basis::Nodal,
         truth: grid().times().iter().map(|t| from + slope * t).collect(),

@@ -20,7 +20,7 @@ const PRIOR: Prior = Prior {
     sigma: 0.5,
 };
 
-/// In what a problem is told.
+/// Units of a problem.
 #[derive(Debug, Clone, Copy)]
 struct Units {
     /// One metre.
@@ -212,7 +212,7 @@ fn a_step_beyond_a_bound_is_clipped_or_is_the_best_in_it() {
 /// With a length in kilometres a step far beyond a bound is a small number; with large sigmas the whole
 /// cost is.
 #[test]
-fn a_step_beyond_a_bound_knows_no_unit() {
+fn a_step_beyond_a_bound_does_not_depend_on_units() {
     let kilometres = Units {
         length: 1e-3,
         ..PLAIN

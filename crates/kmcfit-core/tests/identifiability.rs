@@ -10,9 +10,9 @@ use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty,
 };
 use kmcfit_core::internals::identifiability::{
-    Band, BandSettings, Bands, CandidateChannel, CandidateExperiment, Classification, Gauge,
-    Sensitivity, Side, SingularSpectrum, Symmetry, classify_functions, rank_experiments,
-    structural_rank,
+    Band, BandSettings, Bands, CandidateChannel, CandidateExperiment, Classification,
+    ScalingAmbiguity, Sensitivity, Side, SingularSpectrum, Symmetry, classify_functions,
+    rank_experiments, structural_rank,
 };
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
@@ -107,7 +107,7 @@ fn linear_mass(system: &System, record: Record) -> Problem {
 }
 
 #[test]
-fn the_count_and_the_rank_are_those_of_the_table() {
+fn structural_and_numerical_rank_are_those_of_the_table() {
     let nodes = 200;
     let system = common::system(nodes, Method::Midpoint);
     let nodal = common::paper_system(nodes);
@@ -205,7 +205,7 @@ proptest! {
     /// Systems that vary, by each stepper, under up to four records: the rank never exceeds the count,
     /// and by the midpoint rule it is the count.
     #[test]
-    fn the_count_bounds_the_rank_of_random_devices(
+    fn the_structural_rank_bounds_the_rank_of_random_systems(
         shape in prop::array::uniform3((0.5f64..1.5, -0.3f64..0.3, 0.5f64..2.0)),
         states in prop::collection::vec((-3.0f64..3.0, -3.0f64..3.0, any::<bool>()), 1..=4),
         (from, pause) in (0usize..20, 0usize..10),
@@ -238,7 +238,7 @@ proptest! {
 }
 
 #[test]
-fn a_constant_factor_leaves_motion_and_cost_and_is_named() {
+fn a_constant_factor_leaves_response_and_cost_and_is_named() {
     let system = common::system(200, Method::Midpoint);
     let problem = linear_mass(&system, free(0));
     let theta = problem.start();
@@ -259,14 +259,14 @@ fn a_constant_factor_leaves_motion_and_cost_and_is_named() {
     assert!(off < 1e-13 * 3.3, "{off}");
     assert!(cost < 1e-13, "{cost}");
     let seen = Sensitivity::of(&problem, &a).spectrum();
-    let gauge = Gauge::at(&problem, &theta);
-    assert_eq!(gauge.directions.len(), 1);
-    let named = gauge.unseen(&seen);
+    let ambiguity = ScalingAmbiguity::at(&problem, &theta);
+    assert_eq!(ambiguity.directions.len(), 1);
+    let named = ambiguity.undetermined(&seen);
     assert_eq!(named.len(), 1);
     assert_eq!(named[0].name, "scale of (m, c, k)");
     // Rounding of a Jacobian of some hundred steps.
     assert!(named[0].share > 1.0 - 1e-10, "{}", named[0].share);
-    let other = gauge.share(&seen.best(&problem, 1)[0].change, seen.directions());
+    let other = ambiguity.share(&seen.best(&problem, 1)[0].change, seen.directions());
     assert!(other < 1e-10, "{other}");
 }
 
@@ -276,7 +276,7 @@ fn largest(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[test]
-fn a_factor_over_time_leaves_the_motion_to_the_order_of_the_stepper() {
+fn a_factor_over_time_leaves_the_response_to_the_order_of_the_stepper() {
     for (method, order) in [(Method::Midpoint, 2.0), (Method::Rk4, 2.0)] {
         let off = |nodes: usize| {
             let system = common::system(nodes, method);
@@ -305,30 +305,30 @@ fn a_factor_over_time_leaves_the_motion_to_the_order_of_the_stepper() {
 }
 
 #[test]
-fn what_holds_the_scale_and_what_only_its_constant_factor() {
+fn constraints_and_penalties_determine_the_scale_or_its_constant_factor() {
     let nodes = 60;
     let system = common::system(nodes, Method::Midpoint);
     let nodal = common::paper_system(nodes);
     let both = [free(0), free(1)];
     let open = nodal_problem(&system, &nodal, &both);
-    let gauge = |problem: &Problem| Gauge::at(problem, &problem.start());
-    let found = gauge(&open);
+    let ambiguity = |problem: &Problem| ScalingAmbiguity::at(problem, &problem.start());
+    let found = ambiguity(&open);
     assert_eq!(found.constant().count(), 1);
     assert_eq!(found.over_time().count(), nodes);
-    let named = found.unseen(&spectrum(&open));
+    let named = found.undetermined(&spectrum(&open));
     println!(
         "{} named, least share {:.4}",
         named.len(),
         named.iter().map(|n| n.share).fold(1.0, f64::min)
     );
-    // 62 directions are not seen: the scale at every node, and m, c, k at the last one.
+    // 62 directions are undetermined: the scale at every node, and m, c, k at the last one.
     assert_eq!(named.len(), nodes);
     assert_eq!(named[0].name, "scale of (m, c, k)");
     assert_eq!(named[1].name, "scale over time s(t) of (m, c, k)");
 
     let drive = forced(2, &system.grid, 0);
     let with_force = nodal_problem(&system, &nodal, &[free(0), free(1), drive]);
-    assert!(gauge(&with_force).is_empty());
+    assert!(ambiguity(&with_force).is_empty());
 
     let mut fixed = open.clone();
     let list = vec![
@@ -341,7 +341,7 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
             parts.functions = Parameterization::new(list, nodes, system.grid.step()).unwrap();
         })
         .unwrap();
-    assert!(gauge(&fixed).is_empty());
+    assert!(ambiguity(&fixed).is_empty());
     assert_eq!(structural_rank(&fixed).symmetry, Symmetry::None);
 
     let first = open.functions.ranges()[2].start;
@@ -361,7 +361,7 @@ fn what_holds_the_scale_and_what_only_its_constant_factor() {
                 parts.constraints.groups.push(group);
             })
             .unwrap();
-        let found = gauge(&held);
+        let found = ambiguity(&held);
         assert_eq!(found.constant().count(), 0);
         assert_eq!(found.over_time().count(), nodes - 1);
         let counted = structural_rank(&held);
@@ -465,7 +465,7 @@ fn coverage(problem: &Problem, truth: &NodalCoefficients, sigma: f64) {
             &fit.best.evaluation,
             &settings,
         );
-        assert_eq!(bands.unseen, 0);
+        assert_eq!(bands.undetermined, 0);
         let four = [
             &bands.functions[0],
             &bands.functions[1],
@@ -539,13 +539,13 @@ fn bands_of_functions_on_knots_cover_the_truth() {
 }
 
 #[test]
-fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
+fn undetermined_functions_have_infinite_bands_and_ratios_finite_ones() {
     let system = common::system(200, Method::Midpoint);
     let problem = linear_mass(&system, free(0));
     let theta = problem.start();
     let here = problem.evaluate(&theta).unwrap();
     let bands = Bands::at(&problem, &theta, &here, &BandSettings::default());
-    assert_eq!(bands.unseen, 1);
+    assert_eq!(bands.undetermined, 1);
     for band in &bands.functions {
         assert!(
             band.standard_error.iter().all(|s| *s == f64::INFINITY),
@@ -553,7 +553,7 @@ fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
             band.name
         );
         assert!(
-            band.notes.iter().any(|n| n.starts_with("not seen")),
+            band.notes.iter().any(|n| n.starts_with("not identifiable")),
             "{:?}",
             band.notes
         );
@@ -588,7 +588,7 @@ fn what_is_not_seen_has_an_infinite_band_and_the_ratios_have_their_own() {
         })
         .unwrap();
     let bands = Bands::at(&held, &theta, &here, &BandSettings::default());
-    assert_eq!(bands.unseen, 0);
+    assert_eq!(bands.undetermined, 0);
     assert!(
         bands.functions[0]
             .standard_error
@@ -979,8 +979,8 @@ fn the_scale_by_bases_and_drives() {
         if symmetry != Symmetry::Function {
             assert!(spectrum(&problem).rank() <= expected, "{name}");
         }
-        let gauge = Gauge::at(&problem, &problem.start());
-        assert_eq!(gauge.constant().count(), 1, "{name}");
+        let ambiguity = ScalingAmbiguity::at(&problem, &problem.start());
+        assert_eq!(ambiguity.constant().count(), 1, "{name}");
     }
 
     // A base that moves pushes with m b'': that scales too.
@@ -995,7 +995,9 @@ fn the_scale_by_bases_and_drives() {
         .unwrap();
     assert_eq!(structural_rank(&problem).symmetry, Symmetry::Function);
     assert_eq!(
-        Gauge::at(&problem, &problem.start()).over_time().count(),
+        ScalingAmbiguity::at(&problem, &problem.start())
+            .over_time()
+            .count(),
         nodes
     );
 

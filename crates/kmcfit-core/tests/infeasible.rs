@@ -71,7 +71,7 @@ fn run(problem: &Problem, solver: Solver, program_iterations: u32) -> Fit {
 
 const SOLVERS: [Solver; 2] = [Solver::GaussNewton, Solver::ProjectedGradient];
 
-/// Nothing is lost: the point is finite, and no worse than the start.
+/// The returned point is finite, and its cost is not above the start's.
 fn keeps_the_best_point(problem: &Problem, found: &Fit) {
     let finite = found.best.parameters.iter().all(|p| p.is_finite());
     let cost = found.best.evaluation.cost;
@@ -176,7 +176,7 @@ fn badly_scaled_constraints_cost_no_point() {
 
 /// From a start outside of constraints that contradict each other no step leads anywhere.
 #[test]
-fn contradictory_constraints_are_infeasible_where_nobody_looked_before() {
+fn contradictory_constraints_of_a_problem_make_a_fit_infeasible() {
     for solver in SOLVERS {
         let mut problem = problem(&knots());
         problem = problem

@@ -1,4 +1,4 @@
-//! The last rung of the start ladder: a horizon that grows.
+//! Start strategies: growing horizon, truncated start, continued attempts.
 
 mod common;
 
@@ -67,12 +67,12 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
     let names: Vec<&str> = found
         .attempts
         .iter()
-        .map(|rung| rung.start.name())
+        .map(|attempt| attempt.start.name())
         .collect();
     println!("{:#?}", found.attempts);
     assert_eq!(names, ["start values", "equation error", "growing horizon"]);
     let silence = problem.zero_response_misfit();
-    let costs: Vec<f64> = found.attempts.iter().map(|rung| rung.cost).collect();
+    let costs: Vec<f64> = found.attempts.iter().map(|attempt| attempt.cost).collect();
     // The first two end in minima that leave per cents of the record, the last at the answer.
     assert!(
         costs[0] > 0.05 * silence && costs[1] > 0.05 * silence,
@@ -85,8 +85,12 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
     let error = (found.best.parameters[0] / STIFFNESS - 1.0).abs();
     assert!(error < 1e-8, "{error}");
     // Every search takes a gradient at its start and one after each iteration; those of the three parts
-    // of the record count as well as those of the three rungs.
-    let iterations: u64 = found.attempts.iter().map(|rung| rung.iterations).sum();
+    // of the record count as well as those of the three attempts.
+    let iterations: u64 = found
+        .attempts
+        .iter()
+        .map(|attempt| attempt.iterations)
+        .sum();
     assert!(
         found.counts.adjoint >= iterations + 3 + 3,
         "{:?}",
@@ -158,7 +162,7 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
 }
 
 #[test]
-fn constants_of_a_long_record_are_sought_in_its_beginning_first() {
+fn constants_of_a_long_record_are_first_fitted_to_its_first_steps() {
     let (problem, truth) = long_record(0);
     let settings = FitSettings::default();
     let start = problem.start();
@@ -167,7 +171,7 @@ fn constants_of_a_long_record_are_sought_in_its_beginning_first() {
     let names: Vec<&str> = found
         .attempts
         .iter()
-        .map(|rung| rung.start.name())
+        .map(|attempt| attempt.start.name())
         .collect();
     assert_eq!(names, ["beginning of the record"]);
     // Without noise its beginning tells the constants to the tolerance on it, and one step on all of it the rest.
@@ -192,9 +196,9 @@ fn constants_of_a_long_record_are_sought_in_its_beginning_first() {
     }
 }
 
-/// Nothing moves while the beginning lasts: it says nothing, and the start values are what there is.
+/// A record that starts at rest has no information in its first steps: the fit starts from the start values.
 #[test]
-fn a_silent_beginning_says_nothing() {
+fn a_record_with_a_rest_at_its_start_is_fitted_as_a_whole() {
     let (problem, truth) = long_record(5000);
     let start = problem.start();
     let found = fit(&problem, &start, &FitSettings::default(), &mut |_| {}).unwrap();
@@ -207,7 +211,7 @@ fn a_silent_beginning_says_nothing() {
 /// Parts of a record have no sample at every node of the grid, which the continuous gradient needs: the fits of parts have
 /// the discrete one.
 #[test]
-fn a_fit_by_the_continuous_gradient_climbs_the_whole_ladder() {
+fn a_fit_by_the_continuous_gradient_tries_all_starting_points() {
     let nodes = 401;
     let system = System {
         grid: Grid::new(0.0, 20.0, nodes).unwrap(),

@@ -127,7 +127,7 @@ fn the_sum_of_two_causes_has_the_sum_of_their_effects() {
 }
 
 #[test]
-fn one_factor_of_all_functions_is_not_seen() {
+fn a_common_factor_is_not_identifiable() {
     for_cases(|case| {
         let system = system(501, Method::Midpoint);
         let nodal = case.nodal(&system.grid);
@@ -275,7 +275,7 @@ fn for_some_cases(law: impl Fn(Case)) {
 }
 
 #[test]
-fn millimetres_and_another_clock_find_the_same_device() {
+fn other_units_of_length_and_time_find_the_same_system() {
     for_some_cases(|case| {
         let fit = |per_metre: f64, later: f64| {
             let problem = builder(case, 4).record(record(case, per_metre, later));
@@ -288,7 +288,7 @@ fn millimetres_and_another_clock_find_the_same_device() {
 }
 
 #[test]
-fn the_order_of_records_and_those_without_readings_do_not_matter() {
+fn the_order_of_records_and_records_without_samples_do_not_matter() {
     for_some_cases(|case| {
         let other = Case {
             start: [case.start[1] + 0.5, -case.start[0]],

@@ -104,7 +104,7 @@ fn the_cost_falls_at_every_iteration() {
 }
 
 #[test]
-fn a_start_without_motion_is_an_outcome() {
+fn a_start_that_cannot_be_simulated_is_an_error() {
     let problem = common::paper_problem(100, [2.0, 1.0, 1.0]);
     let mut start = problem.functions.start();
     start[17] = -1.0;

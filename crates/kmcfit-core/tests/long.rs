@@ -168,12 +168,12 @@ fn errors(problem: &Problem, found: &Fit, truth: &NodalCoefficients) -> [f64; 2]
 }
 
 /// From a stiffness three times too large and three times too small: within `limit` of the truth at
-/// all times, and as near as the noise allows. Returns which rungs it took.
+/// all times, and as near as the noise allows. Returns the attempts.
 fn check(basis: &Basis, sample: Reading, limit: f64) -> Vec<&'static str> {
     let mut last = Vec::new();
     for (factor, seed) in [(3.0, 1), (1.0 / 3.0, 2)] {
         let (problem, truth) = problem(basis, sample, factor, seed);
-        // Enough for every rung that gets there: the others need not wander about for longer.
+        // Enough for every successful attempt.
         let mut settings = settings();
         settings.stopping.iterations = 30;
         let found = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();

@@ -134,7 +134,7 @@ fn reaches(basis: &Basis, solver: Solver, constrained: bool, seed: u64) -> bool 
     assert!(problem.constraints.hold(&found.best.parameters, 1e-9));
     let errors = common::errors(&found.best.evaluation.nodal, &truth);
     let reached = errors.iter().all(|e| *e < 1e-3);
-    // Nobody ends anywhere else: who has not arrived is on the way.
+    // No fit ends elsewhere; unfinished fits are on the way.
     let status = found.outcome.status;
     assert!(
         reached || status == Status::MaxIterations,

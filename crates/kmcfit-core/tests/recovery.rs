@@ -208,7 +208,7 @@ fn fisher(problem: &Problem, theta: &[f64], sigma: f64) -> Vec<Vec<f64>> {
 }
 
 #[test]
-fn noise_moves_the_linear_mass_as_the_fisher_information_says() {
+fn the_scatter_of_the_linear_mass_agrees_with_the_fisher_information() {
     const SIGMA: f64 = 0.1;
     let (system, truth, clean) = paper_data(2000);
     let problem = linear_mass(system.clone(), clean, None);
@@ -238,7 +238,7 @@ fn noise_moves_the_linear_mass_as_the_fisher_information_says() {
 /// Positivity alone: an exact fit, and another system. Without a force only k/m and c/m can be
 /// seen, and one record gives one equation per instant for the two.
 #[test]
-fn positivity_alone_does_not_find_the_device() {
+fn positivity_alone_does_not_recover_the_system() {
     let (system, truth, observed) = paper_data(2000);
     let nodes = system.grid.nodes();
     let quantities = [

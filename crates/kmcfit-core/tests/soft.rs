@@ -62,7 +62,7 @@ fn run(problem: &Problem) -> Fit {
 }
 
 #[test]
-fn a_high_price_is_a_hard_constraint() {
+fn a_large_penalty_weight_is_a_hard_constraint() {
     let mut hard = problem();
     hard = hard
         .with(|parts| {
@@ -99,14 +99,14 @@ fn a_high_price_is_a_hard_constraint() {
     println!("{excesses:?}\n{costs:?}\n{distances:?}");
     // The least cost rises with the price, from that without the constraint to that with it.
     let bounds = [free.best.evaluation.cost, hard.best.evaluation.cost];
-    let ladder = [&bounds[..1], &costs, &bounds[1..]].concat();
+    let bracketing = [&bounds[..1], &costs, &bounds[1..]].concat();
     let rounding = 1.0 + 1e-9;
     assert!(
-        ladder.windows(2).all(|w| w[0] <= w[1] * rounding),
-        "{ladder:?}"
+        bracketing.windows(2).all(|w| w[0] <= w[1] * rounding),
+        "{bracketing:?}"
     );
     // A quadratic price: what is broken is the multiplier over twice the price, so it falls as 1/price,
-    // and so does what is left of the cost and of the way to the constrained answer; not before the
+    // and so does the rest of the cost and of the way to the constrained answer; not before the
     // multiplier is the one of the constrained answer.
     assert!(excesses.windows(2).all(|w| w[1] < w[0]), "{excesses:?}");
     let fall = excesses[prices.len() - 2] / excesses[prices.len() - 1];
@@ -126,7 +126,7 @@ fn a_high_price_is_a_hard_constraint() {
 }
 
 #[test]
-fn the_gradient_of_the_price_is_its_derivative() {
+fn the_gradient_of_the_penalty_is_its_derivative() {
     let mut group = RowGroup::new("bands of two functions");
     group.push([(0, 0.7), (1, -1.9)], [-0.5, 0.5], [0.0, 0.0]);
     group.push([(1, 2.5), (2, 0.3)], [1.0, f64::INFINITY], [1.0, 1.0]);
@@ -151,7 +151,7 @@ fn the_gradient_of_the_price_is_its_derivative() {
 /// `2 m >= 1.4` breaks by twice as much as `m >= 0.7`, so at a quarter of the price it is the same
 /// constraint, on every step of the way.
 #[test]
-fn a_row_in_other_units_is_the_same_at_its_price() {
+fn a_soft_row_does_not_depend_on_units() {
     let found = |factor: f64| {
         let mut group = RowGroup::new("mass >= 0.7");
         for j in 0..6 {

@@ -362,7 +362,7 @@ fn a_covariance_is_formed_of_up_to_64_parameters() {
 /// A free response tells the ratios to the mass alone; and as many samples as functions leave nothing to
 /// judge these by.
 #[test]
-fn what_the_readings_do_not_see_has_no_covariance() {
+fn undetermined_parameters_have_no_covariance() {
     let mut setup = Setup::free(ChannelKind::Displacement);
     let covariance = |setup: &Setup, samples: usize| {
         let mut problem = setup.problem(setup.clean(), 0.1);
@@ -438,7 +438,7 @@ fn the_sigma_is_the_sample_standard_deviation() {
     let squares: f64 = residuals.map(|r| (r - mean).powi(2)).sum();
     let expected = (squares / (n - 1.0)).sqrt();
     let sigma = sigma_of(&with_sigma);
-    // The samples are simulated twice, to rounding.
+    // The samples are simulated twice, to machine precision.
     assert!((fit.best.parameters[0] - mean).abs() < 1e-9);
     assert!((sigma / expected - 1.0).abs() < 1e-9, "{sigma} {expected}");
     // The sigma changes nothing about the mean: it is found in the first round and confirmed by the
@@ -495,7 +495,7 @@ fn sigmas_of_two_channels_rest_with_their_weighted_mean() {
     assert_eq!(fit.initial_cost, cost);
 }
 
-/// With a robust loss the sigma is told by the median of the residuals, half of which are below 0.6745 sigma
+/// With a robust loss the sigma follows from the median of the residuals, half of which are below 0.6745 sigma
 /// where they are Gaussian.
 #[test]
 fn a_robust_sigma_is_that_of_the_median() {
@@ -520,7 +520,7 @@ fn a_robust_sigma_is_that_of_the_median() {
 
 /// Samples without noise: their sigma is the last digit of a sample, and not zero.
 #[test]
-fn readings_that_are_fitted_exactly_have_a_sigma() {
+fn samples_that_are_fitted_exactly_have_a_sigma() {
     let mut setup = Setup::free(ChannelKind::Displacement);
     setup.start = vec![None; 3];
     let silent = with_an_offset(vec![0.0; NODES], &setup);
@@ -535,7 +535,7 @@ fn readings_that_are_fitted_exactly_have_a_sigma() {
 
 /// Samples that are all zero, of what is at rest, have no scale: the sigma stays as it was.
 #[test]
-fn readings_of_nothing_keep_their_sigma() {
+fn zero_samples_keep_their_sigma() {
     let mut setup = Setup::free(ChannelKind::Displacement);
     setup.start = vec![None; 3];
     let mut problem = with_an_offset(vec![0.0; NODES], &setup);
@@ -573,7 +573,7 @@ fn standard_errors_and_bands_agree() {
     setup.start[0] = Some(1.1);
     let (covariance, bands) = both(&setup);
     let covariance = covariance.expect("a force gives the mass");
-    assert_eq!(bands.unseen, 0);
+    assert_eq!(bands.undetermined, 0);
     for (j, band) in bands.functions.iter().enumerate() {
         let ratio = band.standard_error[0] / covariance[(j, j)].sqrt();
         assert!((ratio - 1.0).abs() < 1e-9, "{j}: {ratio}");
@@ -589,7 +589,11 @@ fn standard_errors_and_bands_agree() {
             .collect();
         setup.excitation = Some(Excitation::force_at_nodes(&force));
         let (covariance, bands) = both(&setup);
-        assert_eq!(covariance.is_none(), bands.unseen > 0, "1e-{exponent}");
+        assert_eq!(
+            covariance.is_none(),
+            bands.undetermined > 0,
+            "1e-{exponent}"
+        );
         for (j, band) in bands.functions.iter().enumerate() {
             let error = covariance
                 .as_ref()
@@ -607,7 +611,7 @@ fn standard_errors_and_bands_agree() {
     setup.start[0] = Some(1.1);
     let (covariance, bands) = both(&setup);
     assert!(covariance.is_none());
-    assert_eq!(bands.unseen, 1);
+    assert_eq!(bands.undetermined, 1);
     for band in &bands.functions {
         assert!(band.standard_error.iter().all(|e| e.is_infinite()));
     }

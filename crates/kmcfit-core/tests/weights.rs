@@ -69,7 +69,7 @@ fn path(problem: &Problem, rule: WeightRule) -> (WeightPath, Vec<f64>) {
 
 /// Chi-square of the noise and the largest weight below it: a straight mass is what the penalty
 /// favours, so the smooth fit must find it well.
-fn the_paper_s_device_in_the_noise(nodes: usize, bounded: bool, seeds: RangeInclusive<u64>) {
+fn paper_system_with_noise(nodes: usize, bounded: bool, seeds: RangeInclusive<u64>) {
     let truth = common::paper_system(nodes);
     for seed in seeds {
         let problem = nodal_problem(&truth, nodes, bounded, seed);
@@ -85,18 +85,18 @@ fn the_paper_s_device_in_the_noise(nodes: usize, bounded: bool, seeds: RangeIncl
 }
 
 #[test]
-fn the_weight_by_discrepancy_finds_the_paper_s_device_in_the_noise() {
-    the_paper_s_device_in_the_noise(2000, true, 1..=2);
+fn the_discrepancy_principle_recovers_the_paper_s_system_from_noise() {
+    paper_system_with_noise(2000, true, 1..=2);
 }
 
 /// Half the samples and no bounds: no program is solved, so twenty seeds take seconds each.
 #[test]
-fn the_weight_by_discrepancy_finds_the_device_without_bounds_for_twenty_seeds() {
-    the_paper_s_device_in_the_noise(1000, false, 1..=20);
+fn the_discrepancy_principle_recovers_the_system_without_bounds_for_twenty_seeds() {
+    paper_system_with_noise(1000, false, 1..=20);
 }
 
 /// m = 1 - 0.25 (1 - cos(pi t/T)) has curvature, so the penalty does not favour it.
-fn curved_device(nodes: usize) -> NodalCoefficients {
+fn curved_system(nodes: usize) -> NodalCoefficients {
     let mass = (0..nodes).map(|i| {
         let phase = std::f64::consts::PI * i as f64 / (nodes - 1) as f64;
         1.0 - 0.25 * (1.0 - phase.cos())
@@ -109,7 +109,7 @@ fn curved_device(nodes: usize) -> NodalCoefficients {
 
 /// Largest error of the mass at every rule's pick over the best on the path; by seed.
 fn ratios_to_the_best(nodes: usize, order_of_mass: usize, seeds: u64) -> Vec<[f64; 3]> {
-    let truth = curved_device(nodes);
+    let truth = curved_system(nodes);
     let each = (1..=seeds).map(|seed| {
         let mut problem = nodal_problem(&truth, nodes, false, seed);
         let rows = Basis::Nodal.roughness(&problem.system.grid, order_of_mass);

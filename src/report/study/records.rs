@@ -8,7 +8,7 @@ use kmcfit_core::internals::assessment::Plausibility;
 use kmcfit_core::internals::diagnostics::{chi_square_one, normal_half_width};
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::identifiability::{
-    self, Band, BandSettings, Bands, CandidateChannel, Gauge, Sensitivity, anchors,
+    self, Band, BandSettings, Bands, CandidateChannel, ScalingAmbiguity, Sensitivity, anchors,
     classify_functions, rank_experiments, residual_spread,
 };
 use kmcfit_core::internals::objective::Evaluation;
@@ -63,7 +63,7 @@ fn finite_numbers(values: &[f64]) -> Numbers {
 /// Sensitivity of the samples to the parameters.
 pub fn sensitivity(at: Optimum) -> SensitivityRecord {
     let spectrum = Sensitivity::of(at.problem, at.evaluation).spectrum();
-    let unseen = Gauge::at(at.problem, at.theta).unseen(&spectrum);
+    let unseen = ScalingAmbiguity::at(at.problem, at.theta).undetermined(&spectrum);
     let unseen = unseen.into_iter().take(NAMED);
     let records = |list: Vec<identifiability::ResolvedDirection>| {
         let record = |seen: identifiability::ResolvedDirection| DirectionRecord {

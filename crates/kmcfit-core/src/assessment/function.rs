@@ -3,7 +3,7 @@
 use super::{FitAssessment, constant_probability, standard_error};
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction};
-use crate::identifiability::{ClassificationKind, is_rounding, is_unhindered};
+use crate::identifiability::{ClassificationKind, is_negligible, is_unhindered};
 use crate::problem::Problem;
 use crate::solvers::{Fit, Status, number_or_nan};
 use crate::system::NodalCoefficients;
@@ -82,7 +82,7 @@ pub fn function_summaries(
             unit: function.quantity.unit().into(),
             min: values.iter().copied().fold(f64::INFINITY, f64::min),
             max: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-            negligible: largest > 0.0 && is_rounding(largest, sizes[i]),
+            negligible: largest > 0.0 && is_negligible(largest, sizes[i]),
             verdict: judged.map(|j| j.verdict.kind()),
             identified_range: judged.and_then(|j| j.identified_range),
             powers: match &function.basis {

@@ -79,7 +79,7 @@ pub struct Bands {
     /// Estimated standard deviation of samples without sigma, in their unit.
     pub sigma: Option<f64>,
     /// Number of undetermined directions.
-    pub unseen: usize,
+    pub undetermined: usize,
     /// Notes on all bands.
     pub notes: Vec<String>,
 }
@@ -139,18 +139,18 @@ impl Bands {
             maker.band(function.name(), unit, at_nodes, linear, Some(f))
         });
         let functions = functions.collect();
-        let unseen = loose.unseen.ncols();
+        let undetermined = loose.undetermined.ncols();
         let mut notes = notes(problem, &information, &active);
-        if unseen > 0 {
+        if undetermined > 0 {
             notes.push(format!(
-                "parameter combinations that are not identifiable: {unseen}; the bands of the functions they change are infinite"
+                "parameter combinations that are not identifiable: {undetermined}; the bands of the functions they change are infinite"
             ));
         }
         Self {
             functions,
             ratios: maker.ratios(&values, &linearised),
             sigma: tight.variance.map(f64::sqrt),
-            unseen,
+            undetermined,
             notes,
             times: maker.times,
         }
@@ -229,7 +229,7 @@ impl Maker<'_> {
         };
         LinearisedCurve {
             roots: self.factors.map(|factor| image(&factor.root)),
-            hidden: self.factors.map(|factor| image(&factor.unseen)),
+            hidden: self.factors.map(|factor| image(&factor.undetermined)),
             sizes: self.nodes.iter().map(size).collect(),
         }
     }

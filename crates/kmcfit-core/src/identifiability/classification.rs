@@ -101,7 +101,7 @@ impl FunctionClassification {
 const ROUNDING: f64 = 1e-12;
 
 /// True where `value` is zero to machine precision, relative to `size`.
-pub fn is_rounding(value: f64, size: f64) -> bool {
+pub fn is_negligible(value: f64, size: f64) -> bool {
     value.abs() <= ROUNDING * size
 }
 
@@ -112,7 +112,7 @@ fn identified(name: &str, band: &Band, size: f64) -> String {
     let half = NORMAL_975 * seen().fold(0.0f64, |most, i| most.max(band.standard_error[i]));
     let own = seen().fold(0.0f64, |most, i| most.max(band.values[i].abs()));
     let unit = &band.unit;
-    if is_rounding(half.max(own), size) {
+    if is_negligible(half.max(own), size) {
         return format!("{name} is zero to machine precision");
     }
     if half >= own {
@@ -126,7 +126,7 @@ fn identified(name: &str, band: &Band, size: f64) -> String {
         );
     }
     let share = match () {
-        () if is_rounding(share, 1.0) => {
+        () if is_negligible(share, 1.0) => {
             return format!("{name} is identified to machine precision");
         }
         () if share < 1e-4 => format!("{:.0e} %", 100.0 * share),

@@ -27,7 +27,7 @@ pub(super) struct Factor {
     /// `F`, directions x rank.
     pub root: DMatrix<f64>,
     /// Orthonormal basis of the undetermined directions, as columns.
-    pub unseen: DMatrix<f64>,
+    pub undetermined: DMatrix<f64>,
     /// Estimated variance of samples without sigma, in the square of their unit; `None` if all samples have one.
     pub variance: Option<f64>,
 }
@@ -98,14 +98,14 @@ impl Information {
             })
             .collect();
         let all = self.rows();
-        let (inverse_root, unseen) = match rows.is_empty() {
+        let (inverse_root, undetermined) = match rows.is_empty() {
             true => split(&Factorisation::complete(&all)),
             false => {
                 let held = DMatrix::from_fn(rows.len(), n, |i, k| rows[i][k]);
                 let held = Factorisation::complete(&held);
                 let free = held.undetermined();
-                let (root, unseen) = split(&Factorisation::complete(&(all * free)));
-                (free * root, free * unseen)
+                let (root, undetermined) = split(&Factorisation::complete(&(all * free)));
+                (free * root, free * undetermined)
             }
         };
         let mut answers = &self.measured * &inverse_root;
@@ -129,7 +129,7 @@ impl Information {
         };
         Factor {
             root,
-            unseen,
+            undetermined,
             variance,
         }
     }
@@ -159,8 +159,8 @@ impl Information {
 
 /// Root of the inverse, and basis of the undetermined combinations.
 fn split(factorisation: &Factorisation) -> (DMatrix<f64>, DMatrix<f64>) {
-    let unseen = factorisation.undetermined().into_owned();
-    (factorisation.inverse_root(), unseen)
+    let undetermined = factorisation.undetermined().into_owned();
+    (factorisation.inverse_root(), undetermined)
 }
 
 impl Problem {

@@ -13,7 +13,7 @@
 
 use super::covariance::{Information, stacked};
 use super::factorisation::Factorisation;
-use super::gauge::Gauge;
+use super::scaling_ambiguity::ScalingAmbiguity;
 use super::sensitivity::Sensitivity;
 use crate::diagnostics::rms;
 use crate::objective::Evaluation;
@@ -121,29 +121,29 @@ pub fn rank_experiments(
         false => now.clone(),
     };
     let known = Factorisation::of(&rows);
-    let seen = known.rank;
+    let determined = known.rank;
     let rank_now = match penalties {
         true => Factorisation::of(now).rank,
-        false => seen,
+        false => determined,
     };
-    let gauge = Gauge::at(problem, theta);
+    let ambiguity = ScalingAmbiguity::at(problem, theta);
     let gain = |candidate: &CandidateExperiment| -> Result<Gain, String> {
         let experiment = simulated(problem, candidate)?;
         let added = jacobian(problem, theta, experiment.clone(), &information)?;
         let rank = Factorisation::of(&stacked(now, &added)).rank;
-        let before = &known.singular_values[..seen];
+        let before = &known.singular_values[..determined];
         let old = DMatrix::from_diagonal(&DVector::from_column_slice(before));
         let both = stacked(&old, &(&added * known.determined()));
         let after = Factorisation::of(&both).singular_values;
         let inverse = |values: &[f64]| values.iter().map(|s| 1.0 / (s * s)).sum::<f64>();
-        let shrinks = |ratio: f64| if seen == 0 { 1.0 } else { ratio };
+        let shrinks = |ratio: f64| if determined == 0 { 1.0 } else { ratio };
         let logs = before.iter().zip(&after).map(|(s, t)| s.ln() - t.ln());
         Ok(Gain {
             new_directions: rank.saturating_sub(rank_now),
             rank,
-            sees_scale: (!gauge.is_empty())
-                .then(|| fixes_scale(problem, theta, experiment, &gauge)),
-            volume: shrinks((logs.sum::<f64>() / seen as f64).exp()),
+            sees_scale: (!ambiguity.is_empty())
+                .then(|| fixes_scale(problem, theta, experiment, &ambiguity)),
+            volume: shrinks((logs.sum::<f64>() / determined as f64).exp()),
             average: shrinks((inverse(&after) / inverse(before)).sqrt()),
             worst: match (before.last(), after.last()) {
                 (Some(s), Some(t)) => s / t,
@@ -168,10 +168,15 @@ pub fn rank_experiments(
 }
 
 /// True if one more record reduces the scaling ambiguity.
-fn fixes_scale(problem: &Problem, theta: &[f64], record: Experiment, gauge: &Gauge) -> bool {
+fn fixes_scale(
+    problem: &Problem,
+    theta: &[f64],
+    record: Experiment,
+    ambiguity: &ScalingAmbiguity,
+) -> bool {
     let mut with = problem.clone();
     with.parts_mut().experiments.push(record);
-    Gauge::at(&with, theta).directions.len() < gauge.directions.len()
+    ScalingAmbiguity::at(&with, theta).directions.len() < ambiguity.directions.len()
 }
 
 /// The candidate as an experiment; `Err` holds the reason for an invalid one.

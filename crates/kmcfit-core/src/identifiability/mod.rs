@@ -2,7 +2,7 @@
 //!
 //! * [`structural_rank()`]: upper bound of the number of identifiable parameter combinations, without a simulation;
 //! * [`Sensitivity`] and [`SingularSpectrum`]: singular values of the weighted Jacobian;
-//! * [`Gauge`]: scaling ambiguity, directions that leave the response unchanged;
+//! * [`ScalingAmbiguity`]: scaling ambiguity, directions that leave the response unchanged;
 //! * [`Bands`]: confidence bands of functions and ratios; [`classify_functions`]: their classification;
 //! * [`anchors()`]: instants at which a response determines one ratio;
 //! * [`rank_experiments`]: experiment design.
@@ -18,11 +18,11 @@ mod covariance;
 mod directions;
 mod experiments;
 mod factorisation;
-mod gauge;
+mod scaling_ambiguity;
 mod sensitivity;
 mod spans;
 mod structural_rank;
-pub use classification::is_rounding;
+pub use classification::is_negligible;
 
 use crate::problem::Problem;
 
@@ -41,6 +41,6 @@ pub use experiments::{
     CandidateChannel, CandidateExperiment, Gain, Ranked, rank_experiments, residual_spread,
 };
 pub(crate) use factorisation::Factorisation;
-pub use gauge::Gauge;
+pub use scaling_ambiguity::ScalingAmbiguity;
 pub use sensitivity::{ResolvedDirection, Sensitivity, SingularSpectrum};
 pub use structural_rank::{RankFinding, RankFindingKind, Symmetry, structural_rank};

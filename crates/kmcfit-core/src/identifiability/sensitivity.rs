@@ -150,7 +150,7 @@ impl SingularSpectrum {
     }
 
     /// Number of undetermined directions.
-    pub fn unseen(&self) -> usize {
+    pub fn undetermined(&self) -> usize {
         self.of() - self.rank()
     }
 
@@ -161,12 +161,12 @@ impl SingularSpectrum {
 
     /// Component of `z` in the undetermined directions.
     pub fn unseen_part(&self, z: &DMatrix<f64>) -> DMatrix<f64> {
-        let seen = self.factorisation.determined();
+        let determined = self.factorisation.determined();
         let mut rest = z.clone();
         // A second pass removes the rounding errors of the first.
         for _ in 0..2 {
-            let inside = seen.tr_mul(&rest);
-            rest -= seen * inside;
+            let inside = determined.tr_mul(&rest);
+            rest -= determined * inside;
         }
         rest
     }

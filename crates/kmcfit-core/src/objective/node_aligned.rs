@@ -44,7 +44,7 @@ impl Channel {
         arithmetic: A,
         view: SimulatedRecord,
         i: usize,
-        seen: &mut Accelerations,
+        observed: &mut Accelerations,
     ) {
         let nodes = NodalObservations {
             system: view.system,
@@ -52,7 +52,7 @@ impl Channel {
             states: view.response,
         };
         let around = self.around_eight(arithmetic, view.excitation, i);
-        nodes.accelerations(arithmetic, i, around, seen);
+        nodes.accelerations(arithmetic, i, around, observed);
     }
 }
 
@@ -71,11 +71,11 @@ impl Kernel for Predict<'_> {
         let Self { channel, view, out } = self;
         let [gain, offset, drift] = channel.sensor().values(view.scalars);
         let factor = Eight::splat(arithmetic, gain);
-        let mut seen = Accelerations::NOTHING;
+        let mut observed = Accelerations::NOTHING;
         for from in (0..channel.len()).step_by(LANES) {
             let count = LANES.min(channel.len() - from);
-            channel.accelerations(arithmetic, view, from, &mut seen);
-            let mut value = Eight::load(arithmetic, &seen.value);
+            channel.accelerations(arithmetic, view, from, &mut observed);
+            let mut value = Eight::load(arithmetic, &observed.value);
             if !channel.base().is_empty() {
                 value += padded_loads::eight(arithmetic, channel.base(), from);
             }
@@ -120,14 +120,14 @@ impl Kernel for AddTranspose<'_, '_> {
         let sensor = channel.sensor();
         let seeks = sensor.indices().iter().any(Option::is_some);
         let factor = Eight::splat(arithmetic, gain);
-        let mut seen = Accelerations::NOTHING;
+        let mut observed = Accelerations::NOTHING;
         let mut sums = [[0.0; LANES]; FUNCTIONS];
         for (from, slopes) in (0..).step_by(LANES).zip(slopes.chunks(LANES)) {
-            channel.accelerations(arithmetic, view, from, &mut seen);
+            channel.accelerations(arithmetic, view, from, &mut observed);
             let mut row = [0.0; LANES];
             row[..slopes.len()].copy_from_slice(slopes);
             let push = factor * Eight::load(arithmetic, &row);
-            let [by_y, by_v] = &seen.states;
+            let [by_y, by_v] = &observed.states;
             let nodes = from..from + slopes.len();
             add_products(
                 arithmetic,
@@ -138,13 +138,13 @@ impl Kernel for AddTranspose<'_, '_> {
             add_products(arithmetic, push, by_v, &mut source.velocity[nodes.clone()]);
             match direct {
                 CoefficientGradient::AtNodes(nodal) => {
-                    for (values, by) in nodal.functions_mut().zip(&seen.functions) {
+                    for (values, by) in nodal.functions_mut().zip(&observed.functions) {
                         add_products(arithmetic, push, by, &mut values[nodes.clone()]);
                     }
                 }
                 // Lanes without a sample have zero slope.
                 CoefficientGradient::Summed(_) => {
-                    for (sums, by) in sums.iter_mut().zip(&seen.functions) {
+                    for (sums, by) in sums.iter_mut().zip(&observed.functions) {
                         add_products(arithmetic, push, by, sums);
                     }
                 }
@@ -152,7 +152,7 @@ impl Kernel for AddTranspose<'_, '_> {
             if seeks {
                 for (l, slope) in slopes.iter().enumerate() {
                     let i = from + l;
-                    let factors = [seen.value[l] + channel.base_at(i), 1.0, channel.age(i)];
+                    let factors = [observed.value[l] + channel.base_at(i), 1.0, channel.age(i)];
                     sensor.add_gradient(factors, *slope, scalars);
                 }
             }

@@ -28,7 +28,7 @@ impl Channel {
     }
 
     /// Value of [`Channel::sensed`].
-    fn seen(&self, view: SimulatedRecord, i: usize) -> f64 {
+    fn observed_value(&self, view: SimulatedRecord, i: usize) -> f64 {
         match (
             self.kind(),
             self.places()[i].as_node(),
@@ -58,10 +58,11 @@ impl Channel {
             out.reserve_exact(self.len());
             simd::run(Predict { channel, view, out });
         } else if self.sensor() == Sensor::default() {
-            out.extend((0..self.len()).map(|i| self.seen(view, i)));
+            out.extend((0..self.len()).map(|i| self.observed_value(view, i)));
         } else {
             let [gain, offset, drift] = self.sensor().values(view.scalars);
-            let model = |i: usize| gain * self.seen(view, i) + offset + drift * self.age(i);
+            let model =
+                |i: usize| gain * self.observed_value(view, i) + offset + drift * self.age(i);
             out.extend((0..self.len()).map(model));
         }
         if !self.filter().is_empty() {

@@ -1,4 +1,4 @@
-//! Subproblems by Clarabel.
+//! Solution of subproblems by the interior-point solver Clarabel.
 
 use super::{PrimalDual, Subproblem};
 use crate::constraints::Rows;
@@ -8,10 +8,10 @@ use clarabel::solver::{
     SupportedConeT, ZeroConeT,
 };
 
-/// One row of Clarabel's `A x + s = b`, and where its multiplier goes.
+/// Origin of a row of Clarabel's `A x + s = b`, for the assignment of its multiplier.
 #[derive(Clone, Copy)]
 enum Origin {
-    /// The definition of a residual, whose multiplier is the residual.
+    /// Definition of a residual, whose multiplier is the residual.
     Residual,
     Equality(usize),
     Inequality(usize),
@@ -20,7 +20,7 @@ enum Origin {
     Cone(usize, usize),
 }
 
-/// Rows, cones and multiplier targets in Clarabel's form; every linear row scaled to size 1.
+/// Rows, cones and origins in Clarabel's form; every linear row is scaled to size 1.
 struct Conic {
     rows: Rows,
     cones: Vec<SupportedConeT<f64>>,
@@ -45,32 +45,31 @@ impl Conic {
     }
 }
 
-/// How one run of Clarabel ended: its own word, to be judged.
+/// Result of one run of Clarabel, to be checked.
 pub enum Ending {
-    /// A point with multipliers, whatever it is worth.
+    /// A point with multipliers, of unknown quality.
     Point(PrimalDual),
-    /// Multipliers that are said to show that no point satisfies the rows.
+    /// Multipliers of a claimed proof of infeasibility.
     Contradiction(PrimalDual),
-    /// Nothing.
+    /// No result.
     Nothing,
 }
 
 /// Settings of one run of Clarabel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Shift of the diagonal of Clarabel's systems.
+    /// Regularisation of the diagonal of Clarabel's systems.
     pub regularisation: f64,
-    /// Most iterations.
+    /// Iteration limit.
     pub iterations: u32,
 }
 
 impl Subproblem {
     /// One run of Clarabel.
     ///
-    /// The residuals are variables of their own, so `F^T F` is never formed; rows are scaled to size
-    /// 1 and infinite bounds are left out.
+    /// Residuals are variables, so that `F^T F` is not formed; rows are scaled to size 1, and infinite bounds are omitted.
     pub fn run_clarabel(&self, chosen: Settings) -> Ending {
-        // The cost at zero becomes 1: the tolerances mean the same for every problem.
+        // Scaled to a cost of 1 at zero, so that the tolerances have the same meaning for every problem.
         let at_zero = self.value(&vec![0.0; self.variables]) - self.constant;
         let scale = if at_zero > 0.0 && at_zero.is_finite() {
             1.0 / at_zero
@@ -113,7 +112,7 @@ impl Subproblem {
         }
     }
 
-    /// The Hessian's diagonal: `d` for the variables, 1 for the residuals, 0 for the bounds of the
+    /// Diagonal of the Hessian: `d` for the variables, 1 for the residuals, 0 for the bounds of the
     /// absolute values. The cost is halved and scaled: `1/2 |rho|^2 + scale/2 (sum d z^2 +
     /// sum w t)` with `rho = sqrt(scale) (F z - f)`.
     fn quadratic(&self, scale: f64) -> CscMatrix<f64> {

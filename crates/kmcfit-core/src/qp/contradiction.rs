@@ -1,32 +1,32 @@
-//! Proof that no point satisfies the rows of a program.
+//! Proofs of infeasibility of a program (Farkas' lemma), checked in floating-point arithmetic.
 
 use super::clarabel::{Ending, Settings};
 use super::{PrimalDual, Subproblem};
 use crate::constraints::{Cone, Rows, TOLERANCE};
 
-/// A proof holds for all points within so many natural sizes of the variables: a residual of the combination is
-/// a slope along which points far out satisfy it.
+/// Distance, in natural sizes of the variables, up to which a proof must exclude feasible points: a nonzero slope of the combination
+/// admits points far out.
 const REACH: f64 = 1e3;
-/// Multipliers below one of these shares of the largest one are taken for what an interior-point method leaves of zero. A proof
-/// without them is as good, if it is one.
+/// Shares of the largest multiplier below which multipliers are taken as zeros of an interior-point method. A valid proof without them
+/// is as good.
 const SMALL: [f64; 4] = [0.0, 1e-10, 1e-7, 1e-4];
-/// Error of a sum of products, relative to the sum of their sizes; as in the residuals of the optimality conditions.
+/// Error of a sum of products, relative to the sum of their absolute values; as in the residuals of the optimality conditions.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-/// Regularisations that are tried for the least violations.
+/// Regularisations for the program of least violations.
 const VIOLATION_ATTEMPTS: [f64; 2] = [1e-8, 1e-12];
 
-/// Most corrections of the active set of the least violations. More than in a polish: many rows are violated at the start of
-/// this search, and it runs only for programs that were refused.
+/// Largest number of corrections of the active set of the least violations; larger than in a polish, because many rows are violated at
+/// the start.
 const VIOLATION_ROUNDS: usize = 24;
 
-/// `sum_i y_i (row_i z) <= bound` for every feasible point, as a linear function of the variables.
+/// Combination `sum_i y_i (row_i z) <= bound` of the rows, valid for every feasible point.
 struct Combination {
     slope: Vec<f64>,
-    /// Sums of the sizes of the slope's terms.
+    /// Sums of the absolute values of the slope's terms.
     terms: Vec<f64>,
     bound: f64,
-    /// Sum of the sizes of the bound's terms.
+    /// Sum of the absolute values of the bound's terms.
     bounds: f64,
 }
 
@@ -42,13 +42,12 @@ impl Combination {
 }
 
 impl Subproblem {
-    /// Whether the multipliers of `candidate` prove that no point satisfies the rows (Farkas' lemma).
+    /// True if the multipliers of `candidate` prove that no point satisfies the rows (Farkas' lemma).
     ///
-    /// Every feasible point satisfies the sum of all rows, each times its multiplier, `v z <= b`. Where `v` is zero
-    /// and `b` negative there is none. In floating point `v` is not zero: then `|z_j| >= R U_j` for some variable,
-    /// with `R = -b / sum_j |v_j| U_j`, in the natural sizes `U_j` in which the terms of a variable are as large as those of
-    /// `b`. A proof has `R` of at least 1000, and a `b` that is
-    /// negative even if every row is violated by what constraints may be violated by.
+    /// Every feasible point satisfies the combination of all rows with their multipliers, `v z <= b`. With `v = 0` and `b < 0` there is no
+    /// such point. In floating-point arithmetic `v` is not exactly zero; then `|z_j| >= R U_j` for some variable, with
+    /// `R = -b / sum_j |v_j| U_j`, in natural sizes `U_j` for which the terms of a variable are as large as those of `b`. A proof has `R` of at
+    /// least 1000, and a `b` that is negative even if every row is violated within the tolerance of constraints.
     pub fn is_contradiction(&self, candidate: &PrimalDual) -> bool {
         let mut candidate = candidate.clone();
         candidate.project_multipliers(self);
@@ -97,8 +96,8 @@ impl Subproblem {
         -bound > TOLERANCE * bounds && -bound >= REACH * reached
     }
 
-    /// Sets the multipliers to zero that are rounding beside the largest one, each times the size of its row: rows that have no
-    /// part in the contradiction only add slopes.
+    /// Sets multipliers to zero whose product with the size of their row is small relative to the largest; rows without a part in the
+    /// contradiction only add slopes.
     fn leave_out_small(&self, candidate: &mut PrimalDual, small: f64) {
         let weigh = |rows: &Rows, multipliers: &[f64]| {
             let each = multipliers.iter().enumerate();
@@ -125,12 +124,11 @@ impl Subproblem {
         }
     }
 
-    /// Whether the least squares of violations of the rows prove that no point satisfies them: they are found by a program that
-    /// has one more variable for each row, and their multipliers are the proof where its minimum is not zero. The rows should be of
-    /// one size.
+    /// True if the least squares of the violations prove infeasibility: a program with one more variable per row, whose multipliers are the
+    /// proof if its minimum is positive. The rows should have similar sizes.
     pub(super) fn has_violations(&self, iterations: u32) -> bool {
         let sub = self.least_violations();
-        // From a point without any multiplier the active set of a few rows is found as well.
+        // Started from zero multipliers, from which the active set of a few rows is found as well.
         let from = VIOLATION_ATTEMPTS.iter().map(|&regularisation| {
             let settings = Settings {
                 regularisation,
@@ -154,7 +152,7 @@ impl Subproblem {
         })
     }
 
-    /// `sum s^2` under all rows, each with a variable `s` added.
+    /// Program `sum s^2` under all rows, each with an added variable `s`.
     fn least_violations(&self) -> Self {
         let rows = self.equalities.len() + self.inequalities.len() + self.cones.len();
         let mut sub = Self::new(self.variables + rows);
@@ -202,15 +200,15 @@ mod tests {
     }
 
     #[test]
-    fn only_a_proof_is_one() {
+    fn only_valid_multipliers_are_a_proof() {
         let contradictory = rows(1.5);
         assert!(proof(&contradictory, [-1.0, -1.0, 1.0]));
         assert!(proof(&contradictory, [-1e-9, -1e-9, 1e-9]));
-        // A sum with a slope, one of the wrong sign, and none at all.
+        // A combination with a slope, one of the wrong sign, and zero multipliers.
         assert!(!proof(&contradictory, [-1.0, -0.9, 1.0]));
         assert!(!proof(&contradictory, [1.0, 1.0, -1.0]));
         assert!(!proof(&contradictory, [0.0; 3]));
-        // The same sum where there are points, and where the bounds cross by less than constraints may be violated by.
+        // The same combination for a feasible program, and for bounds that cross within the tolerance of constraints.
         assert!(!proof(&rows(2.5), [-1.0, -1.0, 1.0]));
         assert!(!proof(&rows(2.0 - 1e-10), [-1.0, -1.0, 1.0]));
     }

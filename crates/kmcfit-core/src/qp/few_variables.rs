@@ -3,12 +3,11 @@
 use super::Subproblem;
 use crate::simd::tall_qr::{PIECE, RowBlock, Triangle};
 
-/// A column that keeps less than this share of its length depends on those before it.
+/// Share of its length below which the rest of a column depends on the previous columns.
 const INDEPENDENT: f64 = 1e-14;
 
-/// The minimiser of `|F z - f|^2 + sum d z^2` under `E z = e` for one `f`, by reflecting all rows into a triangle; `None`
-/// if the variables stand at several stations, if an equality speaks of more than one variable, or if the
-/// minimum is not unique.
+/// Minimiser of `|F z - f|^2 + sum d z^2` subject to `E z = e` for one `f`, by reflecting all rows into a triangle; `None` if the variables
+/// have an elimination order of several places, if an equality has more than one variable, or if the minimum is not unique.
 pub fn minimise(sub: &Subproblem, target: &[f64]) -> Option<Vec<f64>> {
     let at_once = sub.stations.len() == sub.variables && sub.stations.iter().all(|s| *s == 0);
     at_once.then_some(())?;
@@ -30,7 +29,7 @@ pub fn minimise(sub: &Subproblem, target: &[f64]) -> Option<Vec<f64>> {
         places[*j] = Some(place);
     }
 
-    // The largest rows first: then those that are much smaller keep their digits.
+    // Largest rows first, which preserves the digits of much smaller ones.
     let count = sub.residuals.len();
     let size = |i: &usize| -> f64 {
         match free.get(i.wrapping_sub(count)) {

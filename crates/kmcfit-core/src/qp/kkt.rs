@@ -1,52 +1,46 @@
-//! Residuals of the optimality conditions: the judgement of every solution of a program.
+//! Residuals of the optimality conditions, by which every solution of a program is accepted or rejected.
 //!
-//! A status word of a solver says how its own iterates met its own tests, in its own scaling. Here the
-//! conditions of Karush, Kuhn and Tucker are computed from the program's data, each in a unit in which
-//! it means the same whatever the units of rows, variables and cost are.
+//! The status of a solver refers to its own iterates, tests and scaling. Here the Karush–Kuhn–Tucker conditions are computed from the data
+//! of the program, each in a unit that is independent of the units of rows, variables and cost.
 
 use super::sum::{Sum, add, distances};
 use super::{PrimalDual, Subproblem};
 use crate::constraints::{Rows, TOLERANCE};
 
-/// Error of a sum of a few products, relative to the sum of their sizes: each product and each partial sum is rounded.
+/// Error of a sum of a few products, relative to the sum of their absolute values.
 pub(super) const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Residuals of the optimality conditions at a point with multipliers. Multipliers have the right signs: they
-/// are projected onto their cones before, so that wrong ones count as a residual of the gradient.
+/// Residuals of the optimality conditions at a point with multipliers. Multipliers are first projected onto their cones, so that wrong
+/// signs count as a residual of the gradient.
 ///
-/// The first three are shares of the cost: together they bound by how much the point's cost differs from the
-/// minimum, so far as the minimum is no farther away than the natural size of each variable. The
-/// reference is the larger of the cost at the point and at zero, `S` for half of it, but no less than the
-/// rounding of the residuals makes sense of. The natural size `X_j` of a
-/// variable is the larger of `|z_j|` and the change that costs as much as `S` by the residuals in which the variable
-/// stands and its proximal term, `sqrt(2 S / (|F_j|^2 + d_j))`; where it has none of these, what it takes to
-/// match the other terms of a row.
+/// The first three are shares of the cost: their sum bounds the difference of the point's cost from the minimum, if the minimum is within the
+/// natural size of each variable. The reference `S` is half of the larger of the cost at the point and at zero, with a lower bound set by the
+/// rounding error of the residuals. The natural size `X_j` of a variable is the larger of `|z_j|` and the change that costs `S` by its residuals
+/// and its proximal term, `sqrt(2 S / (|F_j|^2 + d_j))`; without either, the change that matches the other terms of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kkt {
-    /// `sqrt(sum_j (r_j X_j)^2) / S` of the gradient `r` of the Lagrangian: the decrease that it
-    /// promises where `sum_j (delta_j / X_j)^2 <= 1`; or `sum_j r_j^2 / (2 d_j) / S`, more than which proximal terms do not
-    /// allow, if that is smaller. Where the Newton step is known, the decrease that it promises
-    /// ([`Subproblem::kkt_with_decrease`]).
+    /// Stationarity `sqrt(sum_j (r_j X_j)^2) / S` of the gradient `r` of the Lagrangian: the predicted decrease for
+    /// `sum_j (delta_j / X_j)^2 <= 1`; or `sum_j r_j^2 / (2 d_j) / S`, the bound by the proximal terms, if smaller.
+    /// With a known Newton step, its predicted decrease ([`Subproblem::kkt_with_decrease`]).
     pub stationarity: f64,
-    /// `sum |multiplier| distance / S`: of each row from the bound at which its multiplier says that it is, of cones their
-    /// inner product, of absolute values `w |T z - t| / 2` less the multiplier's part.
+    /// Complementarity `sum |multiplier| distance / S`: for rows the distance from the bound of the multiplier's sign, for cones the inner
+    /// product, for absolute values `w |T z - t| / 2` less the multiplier's part.
     pub complementarity: f64,
-    /// `sum |multiplier| violation / S`: what the violations are worth.
+    /// Cost of the violations, `sum |multiplier| violation / S`.
     pub violation_cost: f64,
-    /// Largest violation of a row, relative to the larger of its bound and `sum_j |a_j| X_j`; of a cone relative to the larger of
-    /// its parts.
+    /// Largest violation of a row, relative to the larger of its bound and `sum_j |a_j| X_j`; of a cone relative to the larger of its parts.
     pub feasibility: f64,
 }
 
 impl Kkt {
-    /// Largest sum of the shares of the cost of a solution. The least decrease that a fit distinguishes from none is
-    /// 1e-9 of the cost: a third of it, which is three times the gap at which the interior-point method ends.
+    /// Largest sum of the shares of the cost for a solution: a third of 1e-9, the smallest significant decrease of a fit, and three times the
+    /// gap at which the interior-point method ends.
     pub const COST: f64 = 3e-10;
-    /// Largest violation of a solution, ten times what constraints may be violated by: a step is moved into its bounds and judged
-    /// there once more, and what violations of the linearised equation of motion are worth is a share of the cost.
+    /// Largest violation for a solution, ten times the tolerance of constraints: a step is clipped to its bounds and checked again, and the
+    /// cost of violations of the linearised equation of motion is included in the share of the cost.
     pub const VIOLATION: f64 = 10.0 * TOLERANCE;
-    /// Both for a solution of reduced accuracy, which gives a step to be tried or a point to start from but is no minimum:
-    /// a step is taken if it lowers the cost by a twentieth of its prediction, which four digits show.
+    /// Both limits for a solution of reduced accuracy, usable as a trial step or a starting point but not as a minimum: a step is accepted with
+    /// a twentieth of its predicted decrease, for which four digits suffice.
     pub const REDUCED: f64 = 1e-4;
 
     /// Sum of the shares of the cost.
@@ -54,35 +48,35 @@ impl Kkt {
         self.stationarity + self.complementarity + self.violation_cost
     }
 
-    /// Whether the residuals are those of a solution.
+    /// True for the residuals of a solution.
     pub fn is_solution(&self) -> bool {
         // False for NaN.
         self.cost() <= Self::COST && self.feasibility <= Self::VIOLATION
     }
 
-    /// Whether the residuals are those of a solution of reduced accuracy.
+    /// True for the residuals of a solution of reduced accuracy.
     pub fn is_reduced(&self) -> bool {
         self.cost() <= Self::REDUCED && self.feasibility <= Self::REDUCED
     }
 
-    /// Whether these residuals are smaller than `other`; also if the others are no numbers.
+    /// True if these residuals are smaller than `other`, or `other` has NaN.
     pub fn is_better_than(&self, other: &Self) -> bool {
         self.size() < other.size() || (other.size().is_nan() && !self.size().is_nan())
     }
 
-    /// The residuals relative to what they may be for a solution: at most 1 for one.
+    /// Residuals relative to the limits of a solution; at most 1 for a solution.
     pub fn size(&self) -> f64 {
         (self.cost() / Self::COST).max(self.feasibility / Self::VIOLATION)
     }
 }
 
-/// `sum_j |a_ij| x_j`.
+/// Sum `sum_j |a_ij| x_j`.
 fn terms(rows: &Rows, i: usize, x: &[f64]) -> f64 {
     rows.row(i).map(|(j, a)| (a * x[j]).abs()).sum()
 }
 
 impl Subproblem {
-    /// The residuals of the optimality conditions at `candidate`.
+    /// Residuals of the optimality conditions at `candidate`.
     pub fn kkt(&self, candidate: &PrimalDual) -> Kkt {
         let mut candidate = candidate.clone();
         candidate.project_multipliers(self);
@@ -115,12 +109,12 @@ impl Subproblem {
         let near: f64 = near
             .map(|(r, d)| if *r == 0.0 { 0.0 } else { r * r / (2.0 * d) })
             .sum();
-        // Not f64::min, which prefers a number to NaN.
+        // Not f64::min, which ignores NaN.
         let stationarity = if near < within { near } else { within };
         let mut rows = RowResiduals::default();
         self.add_rows(&candidate, &natural, &mut rows);
         self.add_cones(&candidate, &mut rows);
-        // Half the cost is nowhere positive where it is zero at the point and at zero: then so are the shares.
+        // With zero cost at the point and at zero, the shares are zero.
         let share = |x: f64| if x == 0.0 { 0.0 } else { x / scale };
         Kkt {
             stationarity: share(stationarity),
@@ -130,8 +124,8 @@ impl Subproblem {
         }
     }
 
-    /// [`Subproblem::kkt`] where a Newton step of half the cost with the active rows is known to lower it by `decrease` and no
-    /// more: `1/2 r' H^-1 r` of the gradient `r`, which takes the curvature along each direction, and not of each variable alone.
+    /// [`Subproblem::kkt`] with the known decrease of half the cost by a Newton step on the active rows, `decrease = 1/2 r' H^-1 r` for the
+    /// gradient `r`, which uses the curvature along each direction instead of that of each variable.
     pub(super) fn kkt_with_decrease(&self, candidate: &PrimalDual, decrease: f64) -> Kkt {
         let mut kkt = self.kkt(candidate);
         let at_zero = self.value(&vec![0.0; self.variables]) - self.constant;
@@ -142,8 +136,8 @@ impl Subproblem {
         kkt
     }
 
-    /// Reference of the shares: half the largest of the cost at `z`, `at_zero`, and the cost of which the rounding of the residuals is
-    /// a share of [`Kkt::COST`]. Where residuals cancel to nothing, the minimum is determined no better.
+    /// Reference of the shares: half of the largest of the cost at `z`, `at_zero`, and the cost for which the rounding error of the residuals
+    /// equals [`Kkt::COST`], because cancelling residuals do not determine the minimum more accurately.
     fn cost_scale(&self, z: &[f64], joined: &[f64], at_zero: f64) -> f64 {
         let sizes = z
             .iter()
@@ -160,8 +154,7 @@ impl Subproblem {
         0.5 * cost.max(known)
     }
 
-    /// The change of each variable that is as large as the other terms or the bounds of a row, of the row in which that is
-    /// smallest; infinite if there is none.
+    /// Change of each variable that equals the other terms or the bounds of a row, the smallest over the rows; infinite without rows.
     fn joined_sizes(&self, z: &[f64]) -> Vec<f64> {
         let mut joined = vec![f64::INFINITY; self.variables];
         let mut join = |rows: &Rows, i: usize, bound: f64| {
@@ -186,7 +179,7 @@ impl Subproblem {
         joined
     }
 
-    /// `max(|z_j|, sqrt(2 scale / (|F_j|^2 + d_j)))`; of variables without curvature the size by which rows join them.
+    /// Natural sizes `max(|z_j|, sqrt(2 scale / (|F_j|^2 + d_j)))`; for variables without curvature those by [`Subproblem::joined_sizes`].
     fn natural_scales(&self, z: &[f64], joined: &[f64], scale: f64) -> Vec<f64> {
         let mut curvature = self.proximal.clone();
         for i in 0..self.residuals.len() {
@@ -259,7 +252,7 @@ impl Subproblem {
     }
 }
 
-/// A bound's size; 0 if there is none.
+/// Absolute value of a bound; 0 if infinite.
 fn finite(bound: f64) -> f64 {
     if bound.is_finite() { bound.abs() } else { 0.0 }
 }
@@ -325,12 +318,12 @@ mod tests {
         // Outside by 0.5 of a terms' size of 2.
         let outside = at(&sub, 1.5, 0.5);
         assert_eq!((outside.violation_cost, outside.feasibility), (0.125, 0.25));
-        // A multiplier of the wrong sign is none.
+        // A multiplier of the wrong sign is projected to zero.
         assert_eq!(at(&sub, 2.0, -1.0).stationarity, 0.0);
         assert!(!at(&sub, f64::NAN, 0.0).is_solution());
     }
 
-    /// A proximal term bounds the decrease that a slope promises: `r^2 / (2 d)`.
+    /// A proximal term bounds the predicted decrease by `r^2 / (2 d)`.
     #[test]
     fn proximal_terms() {
         let mut sub = bounded();
@@ -342,7 +335,7 @@ mod tests {
         );
     }
 
-    /// Residuals say the same whatever the units of variables, rows and cost are.
+    /// Residuals are independent of the units of variables, rows and cost.
     #[test]
     fn units_do_not_matter() {
         let expected = at(&bounded(), 0.5, 0.7);
@@ -397,7 +390,7 @@ mod tests {
         assert!(sub.kkt(&candidate).complementarity > 0.1);
     }
 
-    /// `(z_1 - 2)^2 + (z_2 - 1)^2` with `z_2 = 0` twice: multipliers whose rounding is larger than the gradient prove nothing.
+    /// `(z_1 - 2)^2 + (z_2 - 1)^2` with `z_2 = 0` twice: multipliers whose rounding error exceeds the gradient do not hide it.
     #[test]
     fn a_gradient_does_not_vanish_in_the_rounding_of_multipliers_that_cancel() {
         let mut sub = Subproblem::new(2);

@@ -1,18 +1,18 @@
-//! One sparse symmetric factorisation with refinement: the linear algebra of the plain step.
+//! Sparse symmetric LDL factorisation with iterative refinement, for the plain step.
 
 use clarabel::algebra::CscMatrix;
 use clarabel::qdldl::{QDLDLFactorisation, QDLDLSettingsBuilder};
 
-/// Diagonal shift that makes the equilibrated matrix quasi-definite. Refinement takes it out again.
+/// Diagonal regularisation that makes the equilibrated matrix quasi-definite; refinement removes its effect.
 const SHIFT: f64 = 1e-9;
-/// Refinement ends when the residual is this small relative to the right-hand side.
+/// Residual, relative to the right-hand side, at which refinement ends.
 const RESIDUAL: f64 = 1e-13;
-/// Most refinement steps; each gains several digits, so more would not help.
+/// Largest number of refinement steps; each gains several digits.
 const REFINEMENTS: usize = 20;
 /// Rounds of equilibration.
 const EQUILIBRATIONS: usize = 6;
 
-/// A symmetric matrix by its upper triangle, and the sign that each pivot must have.
+/// A symmetric matrix, by its upper triangle, with the required signs of its pivots.
 pub struct Symmetric {
     entries: Vec<(usize, usize, f64)>,
     signs: Vec<i8>,
@@ -32,8 +32,7 @@ impl Symmetric {
         self.entries.push((i.min(j), i.max(j), value));
     }
 
-    /// The solutions of `A x = b` for several right-hand sides, each with the size of its residual
-    /// relative to `b`; `None` if the matrix cannot be factored.
+    /// Solutions of `A x = b` for several right-hand sides, each with its residual relative to `b`; `None` if the factorisation fails.
     pub fn solve(mut self, sides: &[Vec<f64>]) -> Option<Vec<(Vec<f64>, f64)>> {
         let n = self.signs.len();
         let scale = self.equilibrate();
@@ -55,8 +54,7 @@ impl Symmetric {
         sides.iter().map(solution).collect()
     }
 
-    /// The solution of `A x = b` as a correction of `start`, with the smallest residual that refinement reaches; `None` if
-    /// the matrix cannot be factored.
+    /// Solution of `A x = b` as a correction of `start`, with the smallest residual of the refinement; `None` if the factorisation fails.
     pub fn solve_from(self, start: &[f64], b: &[f64]) -> Option<Vec<f64>> {
         let side = self.residual(start, b);
         let (correction, _) = self.solve(&[side])?.pop()?;
@@ -64,10 +62,10 @@ impl Symmetric {
         Some(sums.map(|(x, d)| x + d).collect())
     }
 
-    /// Scales rows and columns alike until their largest entries are near 1; returns the scales.
+    /// Scales rows and columns symmetrically until their largest entries are near 1; returns the scales.
     ///
-    /// Many scalings do that. The one that is reached starts from the diagonal: pivots there keep their size beside the
-    /// shift, as large entries in their rows would not let them.
+    /// Such scalings are not unique. This one starts from the diagonal, so that pivots keep their size relative to the regularisation, also with
+    /// large entries in their rows.
     fn equilibrate(&mut self) -> Vec<f64> {
         let mut total = vec![1.0; self.signs.len()];
         self.rescale(&mut total, &self.scales_from_diagonal());
@@ -86,7 +84,7 @@ impl Symmetric {
         total
     }
 
-    /// 1 for negative pivots that are not zero, then for every row what brings its largest entry in the columns that have a scale to 1.
+    /// Initial scales: 1 for nonzero negative pivots, then for each row the factor that scales its largest entry in scaled columns to 1.
     fn scales_from_diagonal(&self) -> Vec<f64> {
         let mut scales: Vec<Option<f64>> = vec![None; self.signs.len()];
         for &(i, j, a) in &self.entries {
@@ -138,7 +136,7 @@ impl Symmetric {
             let trial: Vec<f64> = x.iter().zip(&step).map(|(x, s)| x + s).collect();
             let next = self.residual(&trial, b);
             let size = size(&next) / reference;
-            // Also false for NaN.
+            // False for NaN.
             if size < left {
                 (x, residual, left) = (trial, next, size);
             } else {
@@ -163,7 +161,7 @@ impl Symmetric {
     }
 }
 
-/// Compressed columns of the upper triangle; entries at one place add up.
+/// Compressed columns of the upper triangle; repeated entries are added.
 fn upper_triangle(n: usize, entries: &[(usize, usize, f64)]) -> CscMatrix<f64> {
     let (mut rows, mut columns, mut values) = (
         Vec::with_capacity(entries.len()),

@@ -1,8 +1,8 @@
 //! Convex subproblems; the only module that uses Clarabel.
 //!
-//! Every subproblem is a least-squares problem in residual form with linear and second-order-cone
-//! constraints ([`Subproblem`]). [`Subproblem::solve_plain`] solves it without its inequalities by
-//! one elimination, at once or along time, or one sparse factorisation; [`Subproblem::solve`] solves all of it by Clarabel.
+//! Each subproblem is a least-squares problem in residual form with linear and second-order-cone constraints ([`Subproblem`]).
+//! [`Subproblem::solve_plain`] solves it without its inequalities, by one elimination or one sparse factorisation;
+//! [`Subproblem::solve`] solves the full problem by Clarabel.
 
 mod chain;
 mod clarabel;

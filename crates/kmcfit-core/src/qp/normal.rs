@@ -1,17 +1,17 @@
-//! A program in units in which its coefficients are near 1.
+//! Scaling of a program to coefficients near 1.
 
 use super::kkt::ROUNDING;
 use super::{PrimalDual, Subproblem};
 use crate::constraints::{Cone, Rows, TOLERANCE};
 
-/// Rounds of scaling by square roots: each halves the exponents that are left, and after twelve those of
-/// the largest and smallest numbers are below 1.
+/// Rounds of scaling by square roots: each halves the remaining exponents; after twelve, those of the largest and smallest floating-point
+/// numbers are below 1.
 const ROUNDS: usize = 12;
 
-/// A program with the variables `z_j / units_j`, every row and cone multiplied by a factor of its own, and half the cost by
-/// another. All factors are powers of two, which change no digit.
+/// A program scaled by variables `z_j / units_j`, a factor for every row and cone, and a factor for half the cost. All factors are powers of
+/// two, which change no digit.
 pub struct Normalised {
-    /// The program.
+    /// Scaled program.
     pub sub: Subproblem,
     units: Vec<f64>,
     equalities: Vec<f64>,
@@ -22,14 +22,14 @@ pub struct Normalised {
 }
 
 impl Normalised {
-    /// In units in which the largest coefficients of every row and every column are near 1 (Ruiz), and so is the cost at zero.
+    /// Scales `original` so that the largest coefficients of every row and column (Ruiz), and the cost at zero, are near 1.
     pub fn new(original: &Subproblem) -> Self {
         let units = units(original);
         let scaled = original.in_units(&units);
         let at_zero = scaled.value(&vec![0.0; scaled.variables]) - scaled.constant;
         let near = scaled.proximal.iter().fold(0.0f64, |m, d| m.max(*d));
         let size = if at_zero > 0.0 { at_zero } else { near };
-        // Its root is a power of two as well.
+        // The square root is a power of two as well.
         let root = match size > 0.0 && size.is_finite() {
             true => power_of_two(1.0 / size.sqrt()),
             false => 1.0,
@@ -72,9 +72,9 @@ impl Normalised {
         }
     }
 
-    /// Whether a point of the original is near enough for its rows and its cost to be computed as accurately as constraints hold
-    /// ([`TOLERANCE`]): farther out along a direction without cost, the rounding of the terms of a row exceeds that share of the largest bound,
-    /// and residuals relative to those terms are small at any point.
+    /// True if a point of the original program is near enough for its rows and cost to be computed with the accuracy of constraints
+    /// ([`TOLERANCE`]): farther out along a direction without cost, the rounding errors of a row's terms exceed that share of the largest bound, and
+    /// residuals relative to the terms are small at any point.
     pub fn resolves(&self, z: &[f64]) -> bool {
         let rows = [
             &self.sub.equalities,
@@ -88,7 +88,7 @@ impl Normalised {
         sizes.all(|size| ROUNDING * size <= TOLERANCE * largest)
     }
 
-    /// A point of the program as one of the original.
+    /// A point of the scaled program in the original variables.
     pub fn original(&self, point: &PrimalDual) -> PrimalDual {
         let multipliers = |values: &[f64], factors: &[f64]| -> Vec<f64> {
             let pairs = values.iter().zip(factors);
@@ -110,12 +110,12 @@ fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a * b).collect()
 }
 
-/// The power of two nearest to a positive number, on the scale of exponents.
+/// Power of two nearest to a positive number, in the logarithm.
 fn power_of_two(x: f64) -> f64 {
     x.log2().round().exp2()
 }
 
-/// The factor that brings a row of this size near 1.
+/// Factor that scales a row of this size to near 1.
 fn row_factor(size: f64) -> f64 {
     if size > 0.0 && size.is_finite() {
         power_of_two(1.0 / size)
@@ -124,7 +124,7 @@ fn row_factor(size: f64) -> f64 {
     }
 }
 
-/// Every row and its right-hand side times its factor.
+/// Every row and its right-hand side times a factor.
 fn times(rows: &Rows, factors: &[f64]) -> Rows {
     let mut scaled = Rows::new();
     for (i, factor) in factors.iter().enumerate() {
@@ -134,7 +134,7 @@ fn times(rows: &Rows, factors: &[f64]) -> Rows {
     scaled
 }
 
-/// The units of the variables: rows of residuals are scaled one by one here, as their variables in a program are.
+/// Units of the variables; rows of residuals are scaled individually, as their variables in a program are.
 fn units(sub: &Subproblem) -> Vec<f64> {
     let cones = sub.cones.iter().map(|cone| &cone.rows);
     let rows = [
@@ -168,7 +168,7 @@ fn units(sub: &Subproblem) -> Vec<f64> {
         }
     }
     for (unit, d) in units.iter_mut().zip(&sub.proximal) {
-        // A variable that no row joins is measured by its proximal term.
+        // A variable in no row is scaled by its proximal term.
         if *unit == 1.0 && *d > 0.0 {
             *unit = 1.0 / d.sqrt();
         }
@@ -181,9 +181,9 @@ fn units(sub: &Subproblem) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// `z_1 - z_2 = 1` in other units of the variables: far out along the line the terms of the row round more than it may be violated by.
+    /// `z_1 - z_2 = 1` in other units of the variables: far out along the line, the rounding error of the row's terms exceeds its tolerance.
     #[test]
-    fn points_whose_rows_are_only_rounding_are_not_resolved() {
+    fn points_dominated_by_rounding_errors_are_not_resolved() {
         let units = [2f64.powi(20), 2f64.powi(-20)];
         let mut sub = Subproblem::new(2);
         sub.equalities

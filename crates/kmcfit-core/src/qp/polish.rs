@@ -1,27 +1,25 @@
-//! Repair of a nearly optimal point: the program with its active rows held as equalities, which is linear.
+//! Polish of a nearly optimal point: the program with its active rows as equalities, which is linear.
 //!
-//! An interior-point method approaches its bounds and never reaches them, and where its systems are
-//! ill-conditioned it stops before it is near. Which rows are active shows long before that. With them held, one
-//! sparse factorisation finds the minimum to machine precision; multipliers of the wrong sign and rows that are violated
-//! then correct the active set.
+//! An interior-point method approaches its bounds without reaching them, and stops early where its systems are ill-conditioned. The active rows
+//! are recognisable before that. With these rows as equalities, one sparse factorisation gives the minimum to machine precision; multipliers of
+//! the wrong sign and violated rows then correct the active set.
 
 use super::{Kkt, PrimalDual, Subproblem};
 use crate::constraints::{Rows, TOLERANCE};
 
-/// Most corrections of the active set: of hundreds of rows few change after two, and sets that cycle
-/// do not end.
+/// Largest number of corrections of the active set: after two, few of hundreds of rows change, and cycling sets do not end.
 const ROUNDS: usize = 12;
-/// Corrections in a row that bring no better point: two, since a wrong row is let go only after it was held.
+/// Largest number of consecutive corrections without a better point; two, because a wrong row is removed only after it was added.
 const IN_VAIN: usize = 2;
 
-/// Where a row or an absolute value is held.
+/// State of a row or an absolute value in the active set.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Held {
     /// Between its bounds.
     Free,
-    /// At its lower bound; an absolute value is that of a negative number.
+    /// At its lower bound; for an absolute value, of a negative number.
     Lower,
-    /// At its upper bound; an absolute value is that of a positive number.
+    /// At its upper bound; for an absolute value, of a positive number.
     Upper,
     /// An absolute value is zero.
     Zero,
@@ -35,17 +33,17 @@ struct ActiveSet {
 }
 
 impl Subproblem {
-    /// Whether [`Subproblem::polish`] applies: the boundary of a cone is curved.
+    /// True if [`Subproblem::polish`] applies: without cones, whose boundary is curved.
     pub fn can_be_polished(&self) -> bool {
         self.cones.is_empty()
     }
 
-    /// The best of `from` and the minima under the active sets that follow from it, with its residuals.
+    /// Best of `from` and the minima under the active sets that follow from it, with its residuals.
     pub fn polish(&self, from: PrimalDual) -> (PrimalDual, Kkt) {
         self.polish_within(from, ROUNDS, IN_VAIN)
     }
 
-    /// [`Subproblem::polish`] with at most `rounds` corrections of the active set, at most `most_in_vain` of them in a row without a
+    /// [`Subproblem::polish`] with at most `rounds` corrections of the active set, of which at most `most_in_vain` consecutive ones without a
     /// better point.
     pub(super) fn polish_within(
         &self,
@@ -55,7 +53,7 @@ impl Subproblem {
     ) -> (PrimalDual, Kkt) {
         let kkt = self.kkt(&from);
         let mut best = (from, kkt);
-        // A solution that is as near to its rows as constraints hold needs no repair.
+        // A solution within the tolerance of constraints needs no polish.
         let is_near = |kkt: &Kkt| kkt.is_solution() && kkt.feasibility <= TOLERANCE;
         if is_near(&kkt) || !self.can_be_polished() || !best.0.is_finite() {
             return best;
@@ -63,7 +61,7 @@ impl Subproblem {
         let mut set = self.active_set(&best.0);
         let mut seen = vec![set.clone()];
         let mut point = best.0.clone();
-        // Multipliers of rows that depend on each other are determined up to multiples: those nearest to zero cancel least.
+        // Multipliers of dependent rows are not unique; those nearest to zero cancel least.
         point.equalities.fill(0.0);
         point.inequalities.fill(0.0);
         let mut in_vain = 0;
@@ -72,7 +70,7 @@ impl Subproblem {
                 break;
             };
             let kkt = self.kkt(&next);
-            // The first that is near enough is the end, even if its multipliers are less accurate.
+            // The first point within the limits ends the search, even if its multipliers are less accurate.
             let is_better = is_near(&kkt) || kkt.is_better_than(&best.1);
             if is_better {
                 best = (next.clone(), kkt);
@@ -82,7 +80,7 @@ impl Subproblem {
                 break;
             }
             let corrected = self.corrected(&set, &next);
-            // Where a system is nearly singular, a correction from the next point is another one.
+            // For a nearly singular system, the correction from another point differs.
             if corrected != set && seen.contains(&corrected) {
                 break;
             }
@@ -93,8 +91,8 @@ impl Subproblem {
         best
     }
 
-    /// The rows whose multipliers are larger than their distances, each in its natural size: the slack of a row
-    /// relative to its terms, what it would cost relative to the cost.
+    /// Rows whose multipliers exceed their distances from the bound, both in natural sizes: the slack relative to the row's terms, its cost relative
+    /// to the cost.
     fn active_set(&self, candidate: &PrimalDual) -> ActiveSet {
         let z = &candidate.z;
         let at_zero = self.value(&vec![0.0; self.variables]) - self.constant;
@@ -146,8 +144,7 @@ impl Subproblem {
         }
     }
 
-    /// The active set after the minimum on `set`: rows whose multipliers have the wrong sign are let go, rows that are violated
-    /// are held.
+    /// Active set after the minimum on `set`: rows with multipliers of the wrong sign are removed, violated rows are added.
     fn corrected(&self, set: &ActiveSet, at: &PrimalDual) -> ActiveSet {
         let values = self.inequalities.multiply(&at.z);
         let row = |(i, held): (usize, &Held)| {
@@ -181,14 +178,13 @@ impl Subproblem {
         }
     }
 
-    /// The minimum with the rows of `set` held as equalities, as a correction of `from`, by one symmetric
-    /// factorisation of
+    /// Minimum with the rows of `set` as equalities, as a correction of `from`, by one symmetric factorisation of
     ///
     /// ```text
     /// [D F' A'; F -I 0; A 0 0] (z, F z - f, multipliers) = (-T' a, f, b)
     /// ```
     ///
-    /// with `a` of the absolute values that are not held at zero.
+    /// with `a` of the absolute values that are not zero.
     fn minimum_on(&self, set: &ActiveSet, from: &PrimalDual) -> Option<PrimalDual> {
         let held = self.held_rows(set);
         let (n, r) = (self.variables, self.residuals.len());
@@ -207,7 +203,7 @@ impl Subproblem {
                 .row(i)
                 .for_each(|(j, a)| side[j] -= multiplier * a);
         }
-        // A correction of the multipliers as well: of those of rows that depend on each other the nearest ones are found.
+        // Multipliers are corrected as well, which gives the nearest ones for dependent rows.
         let mut residuals = self.residuals.multiply(&from.z);
         let right = self.residuals.right();
         residuals.iter_mut().zip(right).for_each(|(r, f)| *r -= f);
@@ -232,7 +228,7 @@ impl Subproblem {
         next.is_finite().then_some(next)
     }
 
-    /// The equalities, the rows held at their bounds and the absolute values held at zero, in this order.
+    /// Equalities, active rows at their bounds, and zero absolute values, in this order.
     fn held_rows(&self, set: &ActiveSet) -> Rows {
         let mut held = self.equalities.clone();
         for (i, at) in set.rows.iter().enumerate() {
@@ -251,7 +247,7 @@ impl Subproblem {
     }
 }
 
-/// The multipliers of the rows that [`Subproblem::held_rows`] are.
+/// Multipliers of the rows of [`Subproblem::held_rows`].
 fn held_multipliers(set: &ActiveSet, at: &PrimalDual) -> Vec<f64> {
     let held = |(m, at): (&f64, &Held)| (*at != Held::Free).then_some(*m);
     let zero = |(m, at): (&f64, &Held)| (*at == Held::Zero).then_some(*m);

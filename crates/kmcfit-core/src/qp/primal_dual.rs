@@ -1,4 +1,4 @@
-//! A point of a subproblem with multipliers of all its rows.
+//! Primal-dual points: variables of a subproblem with multipliers of all its rows.
 
 use super::Subproblem;
 
@@ -10,20 +10,20 @@ use super::Subproblem;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrimalDual {
-    /// The variables.
+    /// Variables.
     pub z: Vec<f64>,
-    /// `g`, positive at an upper bound, negative at a lower one.
+    /// Multipliers `g` of the inequalities, positive at an upper bound, negative at a lower one.
     pub inequalities: Vec<f64>,
-    /// `e`.
+    /// Multipliers `e` of the equalities.
     pub equalities: Vec<f64>,
-    /// `a`, between `-w/2` and `w/2`.
+    /// Multipliers `a` of the absolute values, between `-w/2` and `w/2`.
     pub absolute: Vec<f64>,
-    /// `c_k`, each in the second-order cone.
+    /// Multipliers `c_k` of the cones, each in the second-order cone.
     pub cones: Vec<Vec<f64>>,
 }
 
 impl PrimalDual {
-    /// Zero, with multipliers of zero.
+    /// Zero variables and multipliers.
     pub fn zero(sub: &Subproblem) -> Self {
         Self {
             z: vec![0.0; sub.variables],
@@ -34,7 +34,7 @@ impl PrimalDual {
         }
     }
 
-    /// Whether all numbers are finite.
+    /// True if all numbers are finite.
     pub fn is_finite(&self) -> bool {
         let cones = self.cones.iter().flatten();
         let rows = self.inequalities.iter().chain(&self.equalities);
@@ -42,8 +42,8 @@ impl PrimalDual {
         self.z.iter().chain(rows).all(|x| x.is_finite())
     }
 
-    /// Moves the multipliers to the nearest ones with the right signs: none at an infinite bound, those of
-    /// absolute values within half their weights, those of cones within the cone.
+    /// Projects the multipliers onto those with valid signs: zero at an infinite bound, within half the weight for absolute values, within the cone
+    /// for cones.
     pub fn project_multipliers(&mut self, sub: &Subproblem) {
         let bounds = sub.inequalities.right().iter().zip(&sub.upper);
         for (g, (lower, upper)) in self.inequalities.iter_mut().zip(bounds) {
@@ -59,7 +59,7 @@ impl PrimalDual {
     }
 }
 
-/// Moves `x` to the nearest point with `|x_1..| <= x_0`.
+/// Projects `x` onto the cone `|x_1..| <= x_0`.
 fn project_onto_cone(x: &mut [f64]) {
     let Some((bound, parts)) = x.split_first_mut() else {
         return;
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn multipliers_of_the_wrong_sign_are_none() {
+    fn multipliers_of_the_wrong_sign_are_projected_to_zero() {
         let mut sub = Subproblem::new(1);
         sub.bound([(0, 1.0)], 0.0, f64::INFINITY);
         sub.bound([(0, 1.0)], f64::NEG_INFINITY, 1.0);

@@ -1,20 +1,20 @@
-//! The constraints of a problem as rows of a subproblem, and the projection onto them.
+//! Constraints of a problem as rows of a subproblem, and the projection onto them.
 
 use super::{ConicStatus, Solution, Subproblem};
 use crate::constraints::{Cone, Constraints, RowGroup, Rows};
 
-/// Where each row group's rows went, so that multipliers find their way back.
+/// Row of a subproblem that represents a row of a group, for the assignment of its multiplier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RowPlace {
-    /// An equality, by its index.
+    /// Index of an equality.
     Equality(usize),
-    /// An inequality, by its index.
+    /// Index of an inequality.
     Inequality(usize),
 }
 
 impl Subproblem {
-    /// Adds `constraints` for the step from `theta`: the first variables of the subproblem are the
-    /// change of the parameters. Returns where each group's rows are.
+    /// Adds `constraints` for the step from `theta`; the first variables of the subproblem are the changes of the parameters. Returns the place of
+    /// each group's rows.
     pub fn constrain(&mut self, constraints: &Constraints, theta: &[f64]) -> Vec<Vec<RowPlace>> {
         let places = (constraints.groups.iter())
             .map(|group| self.constrain_group(group, theta))
@@ -58,12 +58,12 @@ impl Solution {
     }
 }
 
-/// The point of the constraint set nearest to `theta`, and the multipliers of all rows.
+/// Point of the constraint set nearest to `theta`, with the multipliers of all rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Projection {
-    /// How the quadratic program ended.
+    /// Status of the quadratic program.
     pub status: ConicStatus,
-    /// The nearest point.
+    /// Nearest point.
     pub theta: Vec<f64>,
     /// Multipliers by group and row, of `1/2 |theta' - theta|^2` in the metric.
     pub multipliers: Vec<Vec<f64>>,
@@ -75,7 +75,7 @@ pub fn project(constraints: &Constraints, theta: &[f64], metric: &[f64]) -> Proj
     project_within(Subproblem::ITERATIONS, constraints, theta, metric)
 }
 
-/// [`project`] in at most so many iterations of the quadratic program.
+/// [`project`] with an iteration limit of the quadratic program.
 pub fn project_within(
     iterations: u32,
     constraints: &Constraints,

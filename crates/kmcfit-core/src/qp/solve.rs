@@ -1,31 +1,30 @@
-//! The whole program: attempts, each judged by the residuals of the optimality conditions.
+//! Solution of a program: attempts with different settings, each checked by the residuals of the optimality conditions.
 
 use super::clarabel::{Ending, Settings};
 use super::normal::Normalised;
 use super::{Kkt, PrimalDual, Subproblem};
 use crate::constraints::{Rows, TOLERANCE};
 
-/// How a program ended, by kmcfit's own judgement of the point.
+/// Status of a program, from the residuals of its point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum ConicStatus {
-    /// The residuals of the optimality conditions are those of a solution ([`Kkt::is_solution`]).
+    /// Solved: the residuals are within the limits ([`Kkt::is_solution`]).
     Solved,
-    /// They are those of a solution of reduced accuracy ([`Kkt::is_reduced`]): a step to be tried, a point to start from,
-    /// but no minimum.
+    /// Solved to reduced accuracy ([`Kkt::is_reduced`]): usable as a trial step or a starting point, but not as a minimum.
     Almost,
-    /// No point satisfies the constraints, as a combination of them proves.
+    /// A combination of the constraints proves that no point satisfies them.
     Infeasible,
-    /// Refused: no attempt led to a solution, and nothing proves that there is none.
+    /// No attempt gave a solution or a proof of infeasibility.
     Stalled,
 }
 
 impl ConicStatus {
-    /// Whether there is a point that can be used, if not as a minimum.
+    /// True if there is a usable point.
     pub fn is_point(self) -> bool {
         matches!(self, ConicStatus::Solved | ConicStatus::Almost)
     }
 
-    /// One sentence.
+    /// Status as a sentence.
     pub fn sentence(self) -> &'static str {
         match self {
             ConicStatus::Solved => "the quadratic program was solved",
@@ -38,46 +37,45 @@ impl ConicStatus {
     }
 }
 
-/// The end of a program.
+/// Result of a program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
-    /// How it ended.
+    /// Status.
     pub status: ConicStatus,
-    /// The variables: of the best point of all attempts.
+    /// Variables of the best point of all attempts.
     pub z: Vec<f64>,
-    /// Multipliers of the inequality rows, positive where the upper bound pushes, negative where the
-    /// lower one does: `gradient of (cost/2) + G^T multipliers + ... = 0`.
+    /// Multipliers of the inequality rows, positive at the upper bound, negative at the lower one:
+    /// `gradient of (cost/2) + G^T multipliers + ... = 0`.
     pub multipliers: Vec<f64>,
     /// Multipliers of the equality rows, same convention.
     pub equality_multipliers: Vec<f64>,
-    /// For each cone the multiplier of its bound, the first part: not negative, and what half the
-    /// cost would lose per unit by which the bound gave way.
+    /// First component of each cone's multiplier: not negative, the decrease of half the cost per unit by which the bound of the cone is relaxed.
     pub cone_multipliers: Vec<f64>,
-    /// The residuals of the optimality conditions; `None` where there is no finite point.
+    /// Residuals of the optimality conditions; `None` without a finite point.
     pub kkt: Option<Kkt>,
     /// Runs of the interior-point solver.
     pub attempts: u32,
 }
 
-/// One way to run the interior-point method.
+/// Settings of one run of the interior-point method.
 struct Attempt {
-    /// Shift of the diagonal of its systems.
+    /// Regularisation of the diagonal of its systems.
     regularisation: f64,
     units: Units,
 }
 
-/// In which units the program is given to it.
+/// Units of the program.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Units {
-    /// Its own.
+    /// Original units.
     Own,
-    /// Those of [`Normalised`].
+    /// Scaled by [`Normalised`].
     Normalised,
 }
 
-/// All ways, in the order in which they are tried. No shift suits all programs: large ones drown the small coefficients of heavily
-/// weighted residuals, small ones leave nearly singular systems as they are. The first is the one that solves most
-/// programs of the shipped models; the normalised ones are for rows and variables whose units are decades apart.
+/// Settings in the order of the attempts. No regularisation suits all programs: a large one exceeds the small coefficients of heavily weighted
+/// residuals, a small one leaves nearly singular systems. The first solves most programs of the shipped models; the normalised ones are for
+/// rows and variables of very different units.
 const ATTEMPTS: [Attempt; 5] = [
     Attempt {
         regularisation: 1e-14,
@@ -114,56 +112,48 @@ impl Normalised {
 }
 
 impl Subproblem {
-    /// Most iterations of Clarabel, unless told otherwise: it takes ten to thirty, and what is not
-    /// solved after a hundred does not get solved.
+    /// Default iteration limit of Clarabel, which needs ten to thirty; programs not solved after a hundred iterations do not converge.
     pub const ITERATIONS: u32 = 100;
 
-    /// The minimiser under all constraints.
+    /// Minimiser under all constraints.
     pub fn solve(&self) -> Solution {
         self.solve_within(Self::ITERATIONS)
     }
 
-    /// A step for a search that verifies every step by other means: the first point of reduced accuracy
-    /// ([`Kkt::is_reduced`]) ends the attempts.
+    /// Solution for a trial step, which is verified by a simulation: the first point of reduced accuracy ([`Kkt::is_reduced`]) ends the attempts.
     pub fn solve_for_step(&self) -> Solution {
         self.solve_until(Self::ITERATIONS, Kkt::is_reduced)
     }
 
-    /// [`Subproblem::solve`] with at most so many iterations of each attempt; with none it is refused.
+    /// [`Subproblem::solve`] with at most `iterations` iterations per attempt; with zero iterations the program is stalled.
     ///
-    /// A status word of the interior-point solver decides nothing: its point is repaired where its active set tells how
-    /// and judged by its residuals, its proof of infeasibility is checked. What is refused is tried again with another
-    /// regularisation.
+    /// The status of the interior-point solver is not used: its point is polished on its active set and accepted by its residuals, its proof of
+    /// infeasibility is checked. A rejected result is followed by an attempt with other settings.
     pub fn solve_within(&self, iterations: u32) -> Solution {
         self.solve_until(iterations, Kkt::is_solution)
     }
 
-    /// A step of a fit: a point that satisfies the constraints and brings the cost down to the minimum but for
-    /// [`Subproblem::STEP_GAP`] of the decrease, or the minimum itself; and by how much the cost may exceed the minimum.
-    pub fn solve_step(&self, iterations: u32) -> (Solution, f64) {
-        if iterations > 0
-            && self.is_finite()
-            && let Some(found) = self.minimise_on_stages(iterations, Self::STEP_GAP)
-        {
-            let kkt = self.kkt_with_decrease(&found.point, found.decrease);
-            let excess = match kkt.is_solution() {
-                true => 0.0,
-                false => 2.0 * (found.gap + found.decrease),
-            };
-            let decrease = self.value(&vec![0.0; self.variables]) - self.value(&found.point.z);
-            if excess <= 2.0 * Self::STEP_GAP * decrease {
-                let found = Some((found.point, kkt));
-                return (self.solution(ConicStatus::Solved, found, 1), excess);
-            }
+    /// A step of a fit on the stages of [`Subproblem::layout`]: a point that satisfies the constraints and brings the cost down
+    /// to the minimum but for [`Subproblem::STEP_GAP`] of the decrease, or the minimum itself; and by how much the cost may exceed
+    /// the minimum, zero for the minimum itself. `None` where there is none.
+    pub fn step_on_stages(&self, iterations: u32) -> Option<(Solution, f64)> {
+        let is_usable = iterations > 0 && self.layout.is_some() && self.is_finite();
+        is_usable.then_some(())?;
+        let found = self.minimise_on_stages(iterations, Self::STEP_GAP)?;
+        let decrease = self.value(&vec![0.0; self.variables]) - self.value(&found.point.z);
+        let excess = 2.0 * (found.gap + found.decrease);
+        if excess <= 2.0 * Self::STEP_GAP * decrease {
+            return Some((self.unjudged(found.point), excess));
         }
-        (self.solve_within(iterations), 0.0)
+        let kkt = self.kkt_with_decrease(&found.point, found.decrease);
+        let found = kkt.is_solution().then_some(Some((found.point, kkt)))?;
+        Some((self.solution(ConicStatus::Solved, found, 1), 0.0))
     }
 
-    /// Share of the decrease of the cost that a step may fall short by: the next linearisation brings it, like the error of
-    /// this one.
+    /// Largest excess of the cost of a step over the minimum, as a share of the decrease; the next linearisation removes it.
     const STEP_GAP: f64 = 5e-3;
 
-    /// Attempts until the residuals of a point are small enough.
+    /// Attempts until the residuals of a point are within limits.
     fn solve_until(&self, iterations: u32, is_enough: impl Fn(&Kkt) -> bool) -> Solution {
         if iterations == 0 || !self.is_finite() {
             return self.refused(None, 0);
@@ -177,7 +167,7 @@ impl Subproblem {
                 return self.solution(ConicStatus::Solved, Some((found.point, kkt)), 1);
             }
         }
-        // Where it costs nothing to stay there is no unit of the cost for an interior-point method to go by.
+        // With zero cost at zero, the interior-point method has no unit of the cost.
         let zero = PrimalDual::zero(self);
         let kkt = self.kkt(&zero);
         if kkt.is_solution() {
@@ -234,7 +224,7 @@ impl Subproblem {
         self.refused(best, attempts)
     }
 
-    /// The point moved into its bounds and polished.
+    /// Point clipped to its bounds and polished.
     fn repaired(&self, mut point: PrimalDual) -> PrimalDual {
         self.clip(&mut point.z);
         self.polish(point).0
@@ -271,14 +261,27 @@ impl Subproblem {
         }
     }
 
-    /// Moves every variable that a row bounds or fixes alone into its bounds: an interior-point method leaves it outside by its
-    /// accuracy, which for a variable of no other size is no small share of it.
+    /// A point whose cost is known to be near enough to the minimum.
+    fn unjudged(&self, point: PrimalDual) -> Solution {
+        Solution {
+            status: ConicStatus::Solved,
+            multipliers: point.inequalities,
+            equality_multipliers: point.equalities,
+            cone_multipliers: Vec::new(),
+            z: point.z,
+            kkt: None,
+            attempts: 1,
+        }
+    }
+
+    /// Clips every variable to the bounds of single-variable rows: an interior-point method violates them by its accuracy, which may be a large
+    /// share of a small variable.
     pub(super) fn clip(&self, z: &mut [f64]) {
         let mut clip = |rows: &Rows, i: usize, upper: f64| {
             let mut entries = rows.row(i).filter(|(_, a)| *a != 0.0);
             if let (Some((j, a)), None) = (entries.next(), entries.next()) {
                 let (one, other) = (rows.right()[i] / a, upper / a);
-                // Not clamp(), which panics on bounds that cross.
+                // Not clamp(), which panics for bounds that cross.
                 z[j] = z[j].max(one.min(other)).min(one.max(other));
             }
         };
@@ -290,8 +293,7 @@ impl Subproblem {
         }
     }
 
-    /// Whether a row by itself has no solution: its bounds cross by more than constraints may be violated by, or it has no entries
-    /// and excludes zero.
+    /// True if a single row has no solution: its bounds cross beyond the tolerance of constraints, or it has no entries and excludes zero.
     fn has_impossible_row(&self) -> bool {
         let is_impossible = |rows: &Rows, i: usize, lower: f64, upper: f64| {
             let crosses = lower > upper && lower - upper > TOLERANCE * (lower.abs() + upper.abs());
@@ -306,7 +308,7 @@ impl Subproblem {
         .any(|(i, (l, u))| is_impossible(&self.inequalities, i, *l, *u))
     }
 
-    /// Whether all coefficients are finite; bounds may be infinite on their own side.
+    /// True if all coefficients are finite; bounds may be infinite on their own side.
     fn is_finite(&self) -> bool {
         let rows = [&self.residuals, &self.absolute, &self.equalities];
         let cones = self.cones.iter().map(|cone| &cone.rows);

@@ -1,16 +1,15 @@
-//! The convex subproblem and its plain solution.
+//! Definition of convex subproblems, and their solution without inequalities.
 
 use super::ldl::Symmetric;
 use super::{StageLayout, chain, few_variables};
 use crate::constraints::{Cone, Rows};
 
-/// Minimise `constant + |F z - f|^2 + sum_j d_j z_j^2 + sum_i w_i |(T z - t)_i|` subject to `E z = e`, `l <= G z <= u` and second-order
-/// cones.
+/// Minimise `constant + |F z - f|^2 + sum_j d_j z_j^2 + sum_i w_i |(T z - t)_i|` subject to `E z = e`, `l <= G z <= u` and second-order cones.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Subproblem {
     /// Number of variables.
     pub variables: usize,
-    /// What the cost has besides, whatever `z` is.
+    /// Constant part of the cost.
     pub constant: f64,
     /// `F` and `f`.
     pub residuals: Rows,
@@ -22,21 +21,21 @@ pub struct Subproblem {
     pub absolute_weights: Vec<f64>,
     /// `E` and `e`.
     pub equalities: Rows,
-    /// `G` and `l`; minus infinity where there is no lower bound.
+    /// `G` and `l`; minus infinity for no lower bound.
     pub inequalities: Rows,
-    /// `u`; infinity where there is no upper bound.
+    /// `u`; infinity for no upper bound.
     pub upper: Vec<f64>,
     /// Second-order cones.
     pub cones: Vec<Cone>,
-    /// Where the variables stand along a chain, time mostly, in which rows join near ones only; empty
-    /// if no such order is known, or not of all variables.
+    /// Elimination order: place of each variable along a chain, mostly time, in which rows couple neighbours only; empty if unknown for some
+    /// variable.
     pub stations: Vec<u32>,
-    /// Which variables belong to which node of a time grid, where that is known of all.
+    /// Assignment of the variables to the nodes of a time grid, if known for all.
     pub layout: Option<StageLayout>,
 }
 
 impl Subproblem {
-    /// An empty problem in `variables` variables.
+    /// An empty problem with `variables` variables.
     pub fn new(variables: usize) -> Self {
         Self {
             variables,
@@ -65,7 +64,7 @@ impl Subproblem {
         self.upper.push(upper);
     }
 
-    /// More variables: their indices. They have no proximal term.
+    /// Adds variables without a proximal term and returns their indices.
     pub fn add_variables(&mut self, count: usize) -> Vec<usize> {
         let indices = self.variables..self.variables + count;
         self.variables += count;
@@ -73,7 +72,7 @@ impl Subproblem {
         indices.collect()
     }
 
-    /// `constant + |F z - f|^2 + sum d z^2 + sum w |T z - t|`.
+    /// Cost `constant + |F z - f|^2 + sum d z^2 + sum w |T z - t|`.
     pub fn value(&self, z: &[f64]) -> f64 {
         let tz = self.absolute.multiply(z);
         let jumps = tz
@@ -88,12 +87,11 @@ impl Subproblem {
         self.constant + jumps + squares + near.map(|(d, z)| d * z * z).sum::<f64>()
     }
 
-    /// The minimiser without the inequalities and cones; `None` if it cannot be found to
-    /// [`Subproblem::PLAIN_RESIDUAL`] or the cost has absolute values.
+    /// Minimiser without inequalities and cones; `None` if it is not found to [`Subproblem::PLAIN_RESIDUAL`] or the cost has absolute values.
     ///
-    /// Variables with [`Subproblem::stations`] are eliminated along them, or at once where there is only one. For others, or where that fails,
-    /// solves the optimality conditions with the residuals `rho = F z - f` kept as unknowns,
-    /// `[D F' E'; F -I 0; E 0 0] (z, rho, lambda) = (0, f, e)`, so that `F^T F` is never formed.
+    /// Variables with an elimination order ([`Subproblem::stations`]) are eliminated along it, or together if it has one place. Otherwise, or if
+    /// that fails, solves the optimality conditions with the residuals `rho = F z - f` as unknowns,
+    /// `[D F' E'; F -I 0; E 0 0] (z, rho, lambda) = (0, f, e)`, which avoids `F^T F`.
     pub fn solve_plain(&self) -> Option<Vec<f64>> {
         if !self.absolute.is_empty() {
             return None;
@@ -102,8 +100,7 @@ impl Subproblem {
             .pop()
     }
 
-    /// [`Subproblem::solve_plain`] for several right-hand sides `f` of the residuals, by one
-    /// factorisation; absolute values are left out.
+    /// [`Subproblem::solve_plain`] for several right-hand sides `f` of the residuals, by one factorisation; absolute values are ignored.
     pub fn solve_plain_for(&self, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         if let [target] = targets
             && let Some(z) = few_variables::minimise(self, target)
@@ -123,7 +120,7 @@ impl Subproblem {
         Some(variables.collect())
     }
 
-    /// `(z, rho, lambda)` of the optimality conditions for each `f`.
+    /// Solutions `(z, rho, lambda)` of the optimality conditions for each `f`.
     fn solve_conditions(&self, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         let matrix = self.kkt_matrix(&self.equalities);
         let zeros = vec![0.0; self.variables];
@@ -134,7 +131,7 @@ impl Subproblem {
         solutions.map(exact).collect()
     }
 
-    /// `[D F' A'; F -I 0; A 0 0]` with the rows `A`.
+    /// KKT matrix `[D F' A'; F -I 0; A 0 0]` with the rows `A`.
     pub(super) fn kkt_matrix(&self, rows: &Rows) -> Symmetric {
         let (n, r) = (self.variables, self.residuals.len());
         let mut matrix = Symmetric::new([vec![1i8; n], vec![-1; r + rows.len()]].concat());
@@ -151,10 +148,9 @@ impl Subproblem {
         matrix
     }
 
-    /// A plain minimum that satisfies the inequalities to `tolerance`, with those held as equalities that
-    /// `z`, a plain minimum itself, or one of the minima on the way breaks. None of them is let go again, so it
-    /// need not be the minimum under the inequalities. `None` if a few rounds do not get there, or
-    /// there are cones.
+    /// Plain minimum that satisfies the inequalities to `tolerance`, with those as equalities that `z`, a plain minimum, or a later minimum
+    /// violates. Equalities are not removed again, so it need not be the minimum under the inequalities. `None` if a few rounds do not suffice, or
+    /// with cones.
     pub fn solve_held(&self, mut z: Vec<f64>, tolerance: f64) -> Option<Vec<f64>> {
         if !self.cones.is_empty() {
             return None;
@@ -181,10 +177,10 @@ impl Subproblem {
         None
     }
 
-    /// Most rounds of [`Subproblem::solve_held`]: what is not inside by then is left to a program.
+    /// Largest number of rounds of [`Subproblem::solve_held`], after which a quadratic program is solved.
     const HOLDING_ROUNDS: usize = 10;
 
-    /// The same problem in the variables `z_j / units_j`.
+    /// The problem in the variables `z_j / units_j`.
     #[must_use]
     pub fn in_units(&self, units: &[f64]) -> Self {
         let mut scaled = self.clone();
@@ -207,7 +203,7 @@ impl Subproblem {
         self.equalities.clear_right();
     }
 
-    /// Whether all inequalities and cones hold at `z`, to `tolerance` relative to each row's size.
+    /// True if all inequalities and cones hold at `z`, to `tolerance` relative to each row's size.
     pub fn holds(&self, z: &[f64], tolerance: f64) -> bool {
         let values = self.inequalities.multiply(z);
         let rows = values.iter().enumerate().all(|(i, value)| {
@@ -217,17 +213,22 @@ impl Subproblem {
         rows && self.cones.iter().all(|cone| cone.violation(z) <= tolerance)
     }
 
-    /// Whether an inequality is active at zero, to `tolerance` relative to the row's size.
-    pub fn is_active_at_zero(&self, tolerance: f64) -> bool {
+    /// Whether an inequality is active at zero: its bound is nearer than `share` of the largest distance of a bound, each
+    /// in units of the row's largest coefficient.
+    pub fn is_active_at_zero(&self, share: f64) -> bool {
         let bounds = self.inequalities.right().iter().zip(&self.upper);
-        let mut rows = bounds.enumerate();
-        rows.any(|(i, (lower, upper))| {
-            lower.abs().min(upper.abs()) <= tolerance * self.inequalities.scale(i)
-        })
+        let distances = bounds
+            .enumerate()
+            .map(|(i, (lower, upper))| lower.abs().min(upper.abs()) / self.inequalities.scale(i));
+        let (least, most) = distances
+            .filter(|distance| distance.is_finite())
+            .fold((f64::INFINITY, 0.0f64), |(least, most), d| {
+                (least.min(d), most.max(d))
+            });
+        least <= share * most
     }
 
-    /// Largest residual of the optimality conditions, relative to their right-hand side, with which
-    /// a plain solution is used: a step this exact converges as an exact one does until the last
-    /// digits.
+    /// Largest residual of the optimality conditions, relative to their right-hand side, of a usable plain solution: the iterations converge like
+    /// those with exact steps until the last digits.
     pub const PLAIN_RESIDUAL: f64 = 1e-6;
 }

@@ -4,8 +4,8 @@ use crate::constraints::Rows;
 
 /// A sum of products in twice the working precision (Ogita, Rump and Oishi 2005, Algorithm 5.3).
 ///
-/// Rows that depend on each other can have multipliers of any size that cancel. In working precision a gradient would vanish in
-/// the rounding of such multipliers, and any point would seem stationary.
+/// Dependent rows can have multipliers of any size that cancel. In working precision their rounding errors would hide the gradient, and any
+/// point would appear stationary.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Sum {
     value: f64,
@@ -23,7 +23,7 @@ impl Sum {
         self.value = sum;
     }
 
-    /// The sum, rounded once.
+    /// Sum, rounded once.
     pub(super) fn total(&self) -> f64 {
         self.value + self.error
     }
@@ -39,8 +39,8 @@ pub(super) fn add(gradient: &mut [Sum], rows: &Rows, factors: &[f64]) {
     }
 }
 
-/// `sum_j a_ij z_j - b_i` of every row, for finite right-hand sides `b`. Far out along a direction without cost the terms cancel, and plain
-/// rounding would hide what is left of them.
+/// Distances `sum_j a_ij z_j - b_i` of every row, for finite right-hand sides `b`. Far out along a direction without cost the terms cancel, and
+/// rounding errors of the working precision would hide the distance.
 pub(super) fn distances(rows: &Rows, z: &[f64]) -> Vec<f64> {
     let distance = |(i, right): (usize, &f64)| {
         let mut sum = Sum::default();

@@ -11,7 +11,7 @@ use crate::system::{Excitation, Method, NodalCoefficients, State, System, System
 /// Purpose of a simulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
-    /// Bit-identity with [`reference`](mod@super::reference). The paper's run is sensitive to rounding: its history depends on every bit.
+    /// Bit-identity with [`reference`](mod@super::reference). The history of the paper's run depends on every bit.
     Reproduction,
     /// Machine precision at the highest speed.
     Estimation,

@@ -128,9 +128,7 @@ pub fn cramer_rao(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
     let scale = information.diagonal().map(|x| 1.0 / x.sqrt());
     let scale = DMatrix::from_diagonal(&scale);
     let scaled = &scale * information * &scale;
-    let inverse = scaled
-        .try_inverse()
-        .expect("parameters that can be told apart");
+    let inverse = scaled.try_inverse().expect("independent parameters");
     &scale * inverse * &scale
 }
 

@@ -16,7 +16,7 @@ fn optimum(problem: &Problem) -> Vec<f64> {
 /// 2000 replicates know a standard deviation to 1/sqrt(4000), 1.6 %; ten per cent is six of those,
 /// and leaves room for the model's curvature.
 #[test]
-fn the_refits_spread_as_the_covariance_says() {
+fn the_scatter_of_the_refits_agrees_with_the_covariance() {
     let problem = regular(7);
     let best = optimum(&problem);
     let check = |problem: &Problem, noise: ReplicateNoise| {

@@ -45,7 +45,7 @@ fn a_stiffness_that_varies_is_found() {
     println!("{}", found.sentence());
     assert!(found.varies() && found.bic > 0.0, "{found:?}");
     assert!(found.sentence().contains("varies"));
-    // Smoothed, and with a sigma that nobody states.
+    // Smoothed, and without a stated sigma.
     let mut problem = knots(&|t| 2.0 + 0.3 * (0.6 * t).sin(), 11, 0.05, 2);
     let grid = problem.system.grid;
     let knots = (0..11).map(|i| i as f64).collect();

@@ -95,7 +95,7 @@ fn error(nodes: usize, seed: u64) -> (f64, NodalCoefficients, TargetResponse) {
 /// The midpoint rule is of order two: half the step, a quarter of the error, from 3 to 5.5 for the
 /// higher orders that are left at these steps.
 #[test]
-fn random_masses_have_the_motion_to_the_order_of_the_stepper() {
+fn random_masses_have_the_response_to_the_order_of_the_stepper() {
     for seed in 0..4 {
         let (coarse, ..) = error(401, seed);
         let (fine, nodal, response) = error(801, seed);
@@ -142,7 +142,7 @@ fn the_true_mass_and_damping_bring_the_true_stiffness() {
 
 /// A mass that grows fast asks for negative damping at the crossings: with c >= 0 there is none.
 #[test]
-fn what_no_device_can_do_is_said() {
+fn impossible_responses_are_infeasible() {
     let response = response(401);
     let mass: Vec<f64> = response
         .grid

@@ -78,7 +78,7 @@ fn the_extremes_are_the_ends_of_the_profile() {
     }
 }
 
-/// A robust loss, with samples that are far off: still the same question.
+/// A robust loss with outliers.
 #[test]
 fn with_a_robust_loss_the_extremes_are_the_ends_of_the_profile() {
     let problem = regular(3);
@@ -125,10 +125,10 @@ fn positive() -> Problem {
     problem
 }
 
-/// 200 nodes, the misfit of the paper's own optimum, 0.0114 m^2 s: the tubes, started at the true
+/// 200 nodes, the misfit of the paper's own optimum, 0.0114 m^2 s: the extremes, started at the true
 /// system alone, hold the paper's optimum too.
 #[test]
-fn the_tube_of_the_paper_s_data_holds_the_truth_and_the_paper_s_optimum() {
+fn extremes_of_the_paper_s_data_contain_the_truth_and_the_paper_s_optimum() {
     let problem = positive();
     let nodal = paper_system(NODES);
     let truth = [
@@ -187,9 +187,9 @@ fn the_tube_of_the_paper_s_data_holds_the_truth_and_the_paper_s_optimum() {
     }
 }
 
-/// k/m, which free response shows, has a bounded tube where k and m have none.
+/// A free response determines k/m: its extremes are bounded, those of k and m are not.
 #[test]
-fn ratios_have_tubes_of_their_own() {
+fn ratios_have_extremes_of_their_own() {
     let problem = regular(3);
     let system = problem.system.clone();
     let n = system.grid.nodes();
@@ -223,10 +223,10 @@ fn ratios_have_tubes_of_their_own() {
     assert!((bands[0].high.value - high).abs() < tolerance);
 }
 
-/// With the scale fixed by k(0) = 1 and smooth functions the tubes have ends, and a smaller budget
+/// With the scale fixed by k(0) = 1 and smooth functions the extremes are bounded, and a smaller limit
 /// makes them narrower.
 #[test]
-fn roughness_budgets_bound_the_tubes() {
+fn roughness_limits_bound_the_extremes() {
     let mut problem = positive();
     let k0 = problem.functions.ranges()[2].start;
     crate::problems::bound(&mut problem, "k(0) = 1", k0, [1.0, 1.0]);

@@ -83,7 +83,7 @@ fn the_aliases_of_a_period_are_found_and_counted() {
     assert_eq!(exact, 3);
     let costs = found.costs();
     assert!(costs.windows(2).all(|w| w[0] <= w[1]));
-    // A ridge of thousands lies between two of them; an optimum and itself share a valley.
+    // A ridge of thousands lies between two of them; an optimum is connected with itself.
     let best = |i: usize| {
         found.runs[clusters[i].members[0]]
             .found
@@ -112,7 +112,7 @@ fn the_threads_change_no_bit() {
 
 /// Starts with a negative mass have no response: they are records, and the others are fitted.
 #[test]
-fn starts_without_a_motion_are_kept_with_their_reason() {
+fn starts_that_cannot_be_simulated_are_listed_with_their_reason() {
     let system = system(6.0, 301);
     let values = samples(&system, &nodal(301, [1.0, 0.1, 2.0]), None, 5, 0.01, 1);
     let list = constants(301, [Some(1.0), Some(0.1), None], [0.0, 0.0, 2.0]);
@@ -128,9 +128,9 @@ fn starts_without_a_motion_are_kept_with_their_reason() {
     assert!(failed.reason.contains("mass"), "{}", failed.reason);
 }
 
-/// Free response: two systems of which one is twice the other fit alike, and the gauge joins them.
+/// Free response: two systems of which one is twice the other fit alike, and the scaling path connects them.
 #[test]
-fn a_device_and_its_multiple_share_the_valley_of_the_gauge() {
+fn a_system_and_its_multiple_are_connected_by_the_scaling_path() {
     let problem = crate::common::paper_problem(200, [2.0, 1.0, 1.0]);
     let n = 200;
     let truth: Vec<f64> = {
@@ -142,10 +142,10 @@ fn a_device_and_its_multiple_share_the_valley_of_the_gauge() {
         .map(|j| truth[j] * (1.0 + (j % n) as f64 / n as f64))
         .collect();
     let paths = between(&problem, &truth, &other, 20);
-    let gauge = paths.gauge.as_ref().unwrap();
-    let most = gauge.iter().fold(0.0f64, |m, c| m.max(*c));
+    let scaling = paths.scaling.as_ref().unwrap();
+    let most = scaling.iter().fold(0.0f64, |m, c| m.max(*c));
     println!(
-        "gauge {most:.2e}, straight {:.2e}",
+        "scaling {most:.2e}, straight {:.2e}",
         paths.straight.iter().fold(0.0f64, |m, c| m.max(*c))
     );
     assert!(paths.one_valley(1e-6), "{paths:?}");

@@ -13,7 +13,7 @@ use kmcfit_core::internals::system::{Excitation, State};
 /// extreme systems, which are at the ends of the same ellipse, is a little narrower than the band
 /// where the response depends on both numbers, and never wider.
 #[test]
-fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
+fn the_band_of_a_prediction_agrees_with_refits() {
     let problem = regular(3);
     let settings = crate::common::synthetic::settings();
     let best = fit_from(&problem, &problem.start(), &settings)
@@ -30,7 +30,7 @@ fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
     let run = PredictionCase {
         excitation: Some(Excitation::force_at_nodes(&force)),
         ..PredictionCase::free(
-            "unseen",
+            "another state",
             State {
                 displacement: -0.5,
                 velocity: 2.0,
@@ -106,7 +106,7 @@ fn the_band_of_an_unseen_run_is_that_of_refitted_devices() {
 /// On the paper's data the extreme systems at its misfit move alike from nearly the same state, and
 /// apart from another one.
 #[test]
-fn devices_that_fit_alike_predict_apart() {
+fn systems_of_equal_fit_differ_in_prediction() {
     let nodes = 200;
     let mut problem = common::paper_problem(nodes, [2.0, 1.0, 1.0]);
     let grid = problem.system.grid;

@@ -5,7 +5,7 @@ const [, , modulePath, recordPath, expectedText] = process.argv;
 const module = new WebAssembly.Module(readFileSync(modulePath));
 
 // The clocks of the solver libraries ask the browser for its clock through wasm-bindgen: handles of objects are any
-// number, and the clock stands still. Every other import is an error.
+// number, and the clock is constant. Every other import is an error.
 const answers = [
   [/is_undefined|is_null/, () => 0],
   [/_now_/, () => 0.0],

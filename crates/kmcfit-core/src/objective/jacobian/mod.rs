@@ -21,7 +21,7 @@ impl Problem {
     pub fn predictions_jacobian(&self, evaluation: &Evaluation) -> DMatrix<f64> {
         let mut jacobian = DMatrix::zeros(self.sample_count(), self.parameters());
         let order = self.places();
-        self.each_piece(evaluation, &order, |piece| {
+        self.each_row_block(evaluation, &order, |piece| {
             for (place, j) in order.iter().enumerate().take(piece.begun()) {
                 let mut column = jacobian.column_mut(*j);
                 let rows = piece.first..piece.first + piece.count;
@@ -63,9 +63,9 @@ impl Problem {
         order
     }
 
-    /// True if the row blocks of [`Problem::each_piece`] form the complete Jacobian: no sensor parameter is estimated, and no
+    /// True if the row blocks of [`Problem::each_row_block`] form the complete Jacobian: no sensor parameter is estimated, and no
     /// channel is filtered.
-    pub(crate) fn comes_in_pieces(&self) -> bool {
+    pub(crate) fn is_computed_by_blocks(&self) -> bool {
         let is_plain = |channel: &Channel| {
             channel.filter().is_empty() && channel.sensor().indices().iter().all(Option::is_none)
         };
@@ -75,7 +75,7 @@ impl Problem {
     /// Passes the rows of the Jacobian to `take` in blocks, with columns in `order` ([`Problem::places`]) and without the
     /// contributions of sensors and filters; `take` returns a block to fill next. Rows of one channel come in order, those of
     /// several channels alternate.
-    pub(crate) fn each_piece(
+    pub(crate) fn each_row_block(
         &self,
         evaluation: &Evaluation,
         order: &[usize],
@@ -101,10 +101,10 @@ impl Problem {
         (steps >= LONG_RECORD_STEPS).then(|| steps / 2 / TILE * TILE)
     }
 
-    /// [`Problem::each_piece`] for the samples within some steps of the only record, starting with a tile; returns the
+    /// [`Problem::each_row_block`] for the samples within some steps of the only record, starting with a tile; returns the
     /// derivatives of displacement and velocity at their end. Steps after the first treat their initial state as two further
     /// columns, behind the others.
-    pub(crate) fn each_piece_of_part(
+    pub(crate) fn each_row_block_of_part(
         &self,
         evaluation: &Evaluation,
         order: &[usize],
@@ -291,7 +291,7 @@ mod tests {
                 let expected = problem.jacobian_by_columns(&evaluation);
                 let order = problem.places();
                 let mut found = DMatrix::zeros(expected.nrows(), expected.ncols());
-                problem.each_piece(&evaluation, &order, |mut piece| {
+                problem.each_row_block(&evaluation, &order, |mut piece| {
                     for (place, j) in order.iter().enumerate() {
                         if place < piece.begun() {
                             let rows = piece.first..piece.first + piece.count;

@@ -44,7 +44,7 @@ struct SampleBatch {
     /// True for samples that do not depend on the right node.
     at_left: [bool; LANES],
     /// Derivatives of accelerations at nodes.
-    seen: Accelerations,
+    observed: Accelerations,
 }
 
 impl SampleBatch {
@@ -54,7 +54,7 @@ impl SampleBatch {
         states: [[0.0; 4]; LANES],
         functions: [[[0.0; FUNCTIONS]; 2]; LANES],
         at_left: [false; LANES],
-        seen: Accelerations::NOTHING,
+        observed: Accelerations::NOTHING,
     };
 
     fn set(&mut self, l: usize, sensed: &Observation) {
@@ -125,7 +125,7 @@ impl<'a> JacobianRows<'a> {
             }
         }
         if self.kind == ObservationKind::Accelerations && batch.count > 0 {
-            (self.channel).accelerations(arithmetic, self.view, self.next, &mut batch.seen);
+            (self.channel).accelerations(arithmetic, self.view, self.next, &mut batch.observed);
         }
     }
 }
@@ -229,7 +229,8 @@ impl BatchSensitivity<'_> {
     ) {
         for change in self.tangents.changes(g) {
             if let Some(ConstantPerturbation { lane, value }) = change.steady {
-                let slopes = Eight::load(arithmetic, &self.batch.seen.functions[change.function]);
+                let slopes =
+                    Eight::load(arithmetic, &self.batch.observed.functions[change.function]);
                 answers[lane] += slopes * Eight::splat(arithmetic, value);
             }
         }
@@ -244,9 +245,9 @@ impl BatchSensitivity<'_> {
         l: usize,
         varies: bool,
     ) -> Eight<A> {
-        let (node, seen) = (self.batch.nodes[l], &self.batch.seen);
+        let (node, observed) = (self.batch.nodes[l], &self.batch.observed);
         let mut answer = Eight::splat(arithmetic, 0.0);
-        for (by, tangent) in seen.states.iter().zip(&self.tangents.states(g)[node]) {
+        for (by, tangent) in observed.states.iter().zip(&self.tangents.states(g)[node]) {
             answer += Eight::splat(arithmetic, by[l]) * Eight::load(arithmetic, tangent);
         }
         if varies {
@@ -255,7 +256,7 @@ impl BatchSensitivity<'_> {
                 .changes(g)
                 .filter(FunctionPerturbation::varies)
             {
-                let slope = Eight::splat(arithmetic, seen.functions[change.function][l]);
+                let slope = Eight::splat(arithmetic, observed.functions[change.function][l]);
                 answer += slope * Eight::load(arithmetic, &change.rows[node]);
             }
         }

@@ -1,34 +1,33 @@
-//! The dense rows in which variables are eliminated, block after block.
+//! Frontal matrix: the dense rows in which variables are eliminated, block after block.
 
 use super::frontal_rows::{FrontalRows, add_multiple};
 use super::triangular_rows::TriangularRows;
 use std::mem::swap;
 use std::ops::Range;
 
-/// An equality, scaled to 1, must hold a variable that it takes out at least so strongly.
+/// Smallest coefficient, in an equality scaled to 1, of a variable that the equality eliminates.
 const FIRM: f64 = 1e-8;
-/// Smaller entries of scaled equalities are the rounding of zeros.
+/// Entries of scaled equalities below this are rounding errors.
 const ZERO: f64 = 1e-13;
-/// A column that keeps less than this share of its largest entry depends on those before it.
+/// Share of its largest entry below which the rest of a column depends on the previous columns.
 const INDEPENDENT: f64 = 1e-14;
 
-/// The rows that speak of one block of variables; each has an entry for every column and then one for
-/// every right-hand side.
+/// Rows with entries in one block of variables; each has an entry for every column, followed by one for every right-hand side.
 pub struct Front {
     sides: usize,
-    /// Places of the variables; the first `own` are eliminated here, the others rise.
+    /// Places of the variables; the first `own` are eliminated here, the others pass to the next front.
     columns: Vec<u32>,
     own: usize,
-    /// Equalities, and residuals.
+    /// Equalities and residuals.
     ties: FrontalRows,
     rows: FrontalRows,
-    /// The first row that is left to the next front.
+    /// First row that passes to the next front.
     left: usize,
     before: Before,
-    /// Of each variable the last block that met it, counted from 1, and its column there.
+    /// Last block of each variable, counted from 1, and its column there.
     met: Vec<u32>,
     column: Vec<u32>,
-    /// And the largest entry that it has had in a residual.
+    /// Largest entry of each variable in a residual so far.
     size: Vec<f64>,
     block: u32,
     taken: Vec<bool>,
@@ -36,7 +35,7 @@ pub struct Front {
     sums: Vec<f64>,
 }
 
-/// The front before; what is left of it begins at column `own` and row `left`.
+/// The previous front; its remaining part starts at column `own` and row `left`.
 #[derive(Default)]
 struct Before {
     columns: Vec<u32>,
@@ -47,7 +46,7 @@ struct Before {
 }
 
 impl Front {
-    /// The front before the first block, for so many variables and right-hand sides.
+    /// The front before the first block.
     pub fn new(variables: usize, sides: usize) -> Self {
         Self {
             sides,
@@ -85,7 +84,7 @@ impl Front {
         }
     }
 
-    /// Tells of a variable of the rows to come.
+    /// Registers a variable of the following rows.
     pub fn meet(&mut self, place: u32) {
         if self.met[place as usize] != self.block {
             self.met[place as usize] = self.block;
@@ -93,7 +92,7 @@ impl Front {
         }
     }
 
-    /// All variables have been met: takes over what the front before left.
+    /// Takes over the remaining rows of the previous front, once all variables are registered.
     pub fn settle(&mut self) {
         self.columns[self.own..].sort_unstable();
         for (k, place) in self.columns.iter().enumerate() {
@@ -148,8 +147,8 @@ impl Front {
         row[n..].iter_mut().zip(right).for_each(|(b, f)| *b = f);
     }
 
-    /// Eliminates the block's own variables into `factor`; `None` if the rows do not determine them or
-    /// the equalities contradict each other.
+    /// Eliminates the block's own variables into `factor`; `None` if the rows do not determine them or the equalities contradict each
+    /// other.
     pub fn eliminate(&mut self, factor: &mut TriangularRows) -> Option<()> {
         self.taken.clear();
         self.taken.resize(self.own, false);
@@ -173,14 +172,14 @@ impl Front {
                 left = top;
             }
         }
-        // What is below speaks of no variable.
+        // The rows below have no entries in the variable.
         self.rows.truncate(top);
         self.left = left;
         Some(())
     }
 
-    /// The equality and the column of an own variable to eliminate by it; none if no equality speaks of
-    /// an own variable any more. `None` if one does so too weakly.
+    /// Equality and column with the largest coefficient of an own variable; `Some(None)` if no equality has an own variable. `None` if
+    /// the coefficient is too small.
     fn firmest_tie(&self) -> Option<Option<(usize, usize)>> {
         let mut firmest = (ZERO, None);
         for i in 0..self.ties.len() {
@@ -213,8 +212,8 @@ impl Front {
         self.taken[column] = true;
     }
 
-    /// Clears what rounding left of the own variables in the equalities, and drops those that say
-    /// nothing; `None` if one says that zero is something else.
+    /// Clears rounding errors of own variables in the equalities and removes empty ones; `None` if an empty equality has a nonzero
+    /// right-hand side.
     fn check_ties(&mut self) -> Option<()> {
         let n = self.columns.len();
         let mut kept = 0;
@@ -222,7 +221,7 @@ impl Front {
             let row = self.ties.row_mut(i);
             let zero = |a: &f64| a.abs() <= ZERO;
             if !row[..self.own].iter().all(zero) {
-                // Not a number: all others have been eliminated.
+                // NaN counts as nonzero.
                 return None;
             }
             row[..self.own].fill(0.0);
@@ -237,7 +236,7 @@ impl Front {
         Some(())
     }
 
-    /// Collects `column` of the rows from `top` on in row `top`; false if there is nothing of it.
+    /// Reduces `column` of the rows from `top` on to row `top`; false if the column is zero.
     fn triangulate(&mut self, column: usize, top: usize) -> bool {
         let size = &mut self.size[self.columns[column] as usize];
         self.active.clear();
@@ -248,7 +247,7 @@ impl Front {
                 if a > largest {
                     (largest, first) = (a, self.active.len());
                 }
-                // What is not a number spreads to the solution, which is then refused.
+                // NaN spreads to the solution, which is then rejected.
                 nan |= a.is_nan();
                 self.active.push(i);
             }
@@ -258,7 +257,7 @@ impl Front {
         }
         *size = size.max(largest);
         if self.active.len() > 1 {
-            // From the largest entry rows of unlike sizes lose least.
+            // The largest entry as pivot loses fewest digits with rows of different magnitudes.
             self.active.swap(0, first);
             self.rows.reflect(&self.active, column, &mut self.sums);
         }

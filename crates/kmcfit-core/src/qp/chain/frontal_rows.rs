@@ -1,4 +1,4 @@
-//! The dense rows of a front.
+//! Dense rows of a front.
 
 use crate::simd::{self, Arithmetic, Kernel};
 
@@ -11,7 +11,7 @@ pub struct FrontalRows {
 }
 
 impl FrontalRows {
-    /// No rows, of `length` numbers each.
+    /// Removes all rows and sets their length.
     pub fn clear(&mut self, length: usize) {
         self.length = length;
         self.truncate(0);
@@ -43,11 +43,11 @@ impl FrontalRows {
     }
 
     pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
-        // chunks_exact_mut does not take zero, the length before the first row.
+        // chunks_exact_mut does not accept zero, the length before the first row.
         self.values.chunks_exact_mut(self.length.max(1))
     }
 
-    /// All rows but the last one, and that; there must be one.
+    /// All rows but the last, and the last; there must be one.
     pub fn split_last(&mut self) -> (impl Iterator<Item = &mut [f64]>, &[f64]) {
         let last = (self.count - 1) * self.length;
         let (rest, last) = self.values.split_at_mut(last);
@@ -62,8 +62,7 @@ impl FrontalRows {
         }
     }
 
-    /// Reflects the rows `active`, of which the first becomes the only one with an entry in `column`
-    /// and of which none has an entry before it.
+    /// Reflects the rows `active`, so that only the first has an entry in `column`; none has an entry before it.
     pub fn reflect(&mut self, active: &[usize], column: usize, sums: &mut Vec<f64>) {
         simd::run(Reflect {
             rows: self,
@@ -84,7 +83,7 @@ struct Reflect<'a> {
 impl Kernel for Reflect<'_> {
     type Output = ();
 
-    /// Plain loops over the entries of a row, which the compiler puts into lanes: no sum is reordered.
+    /// Loops over the entries of a row, vectorised by the compiler without reordering sums.
     #[inline(always)]
     fn run<A: Arithmetic>(self, _: A) {
         let Self {

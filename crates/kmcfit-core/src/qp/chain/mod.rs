@@ -1,11 +1,10 @@
-//! Least squares under equalities by orthogonal elimination along a chain of stations.
+//! Least squares with equalities by orthogonal elimination along time.
 //!
-//! The variables of a problem in time stand in a row, and each of its rows joins a few that stand near
-//! each other. Eliminating them from the last station to the first needs only a small dense front: the
-//! rows that still speak of eliminated variables, and what they say of those further down. An
-//! equality takes out the variable in which it is largest; Householder reflections take out the
-//! others. So neither `F^T F` nor a shift costs digits, however unlike the rows are in size, and time and
-//! memory grow with the length of the chain alone.
+//! The variables of a problem in time are ordered, and each row couples a few neighbouring ones. Elimination from the last variable
+//! to the first needs only a small dense front: the rows with entries in the variables being eliminated, and the rows that remain of
+//! them. An equality eliminates its variable with the largest coefficient; Householder reflections eliminate the others. Neither
+//! `F^T F` nor a regularisation costs digits, whatever the magnitudes of the rows, and time and memory are proportional to the
+//! number of variables.
 
 mod front;
 mod frontal_rows;
@@ -16,11 +15,11 @@ use crate::constraints::Rows;
 use front::Front;
 use triangular_rows::TriangularRows;
 
-/// Most variables in a front; wider ones are left to the sparse factorisation, which knows no order.
+/// Largest number of variables in a front; wider problems are left to the sparse factorisation.
 const WIDEST: usize = 48;
 
-/// The minimisers of `|F z - f|^2 + sum d z^2` under `E z = e` for each `f`; `None` if the order of the
-/// variables is unknown or makes fronts too wide, or if the minimum is not unique.
+/// Minimisers of `|F z - f|^2 + sum d z^2` subject to `E z = e` for each `f`; `None` without an elimination order, with too wide
+/// fronts, or if the minimum is not unique.
 pub fn minimise(sub: &Subproblem, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     let chain = Chain::of(sub)?;
     let mut factor = TriangularRows::new(sub.variables, targets.len());
@@ -33,7 +32,7 @@ pub fn minimise(sub: &Subproblem, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>>
     solutions.collect()
 }
 
-/// The elimination order: variables are numbered by their places in it.
+/// Elimination order; variables are numbered by their places in it.
 struct Chain<'a> {
     sub: &'a Subproblem,
     /// Place of each variable.
@@ -114,7 +113,7 @@ impl<'a> Chain<'a> {
         self.firsts.len() - 1
     }
 
-    /// Fills the `front` of `block`: with its rows and what is left of the one before.
+    /// Assembles the `front` of `block` from its rows and those remaining from the previous front.
     fn assemble(&self, block: usize, front: &mut Front, targets: &[Vec<f64>]) {
         let sub = self.sub;
         let place = |(j, a): (usize, f64)| (self.places[j], a);
@@ -151,7 +150,7 @@ impl<'a> Chain<'a> {
         &self.variables[self.firsts[block] as usize..self.firsts[block + 1] as usize]
     }
 
-    /// Values by variable from values by place.
+    /// Values by variable, from values by place.
     fn in_order(&self, by_place: &[f64]) -> Option<Vec<f64>> {
         let values = self.places.iter().map(|place| by_place[*place as usize]);
         let values: Vec<f64> = values.collect();
@@ -159,7 +158,7 @@ impl<'a> Chain<'a> {
     }
 }
 
-/// Most variables that are in a front at once, if each enters in one block and leaves in its own.
+/// Largest number of variables in a front, if each enters in one block and is eliminated in its own.
 fn widest(blocks: usize, entered: &[u32], own: &[u32]) -> usize {
     let mut change = vec![0i64; blocks + 1];
     for (from, to) in entered.iter().zip(own) {

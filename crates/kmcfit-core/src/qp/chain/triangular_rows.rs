@@ -1,6 +1,6 @@
-//! The triangular factor: one row for each variable, in the order of elimination.
+//! Triangular factor: one row per variable, in the order of elimination.
 
-/// Rows that give a variable from those that are eliminated later.
+/// Rows that determine a variable from those eliminated later.
 pub struct TriangularRows {
     variables: usize,
     sides: usize,
@@ -13,7 +13,7 @@ pub struct TriangularRows {
 }
 
 impl TriangularRows {
-    /// No rows yet, for so many variables and right-hand sides.
+    /// An empty factor for `variables` variables and `sides` right-hand sides.
     pub fn new(variables: usize, sides: usize) -> Self {
         Self {
             variables,
@@ -27,8 +27,8 @@ impl TriangularRows {
         }
     }
 
-    /// Adds the `row` that gives the variable in its `pivot`-th column; `columns` are the places of all,
-    /// and the right-hand sides follow them.
+    /// Appends the `row` that determines the variable in column `pivot`; `columns` are the places of all columns, followed by the
+    /// right-hand sides.
     pub fn push(&mut self, pivot: usize, columns: &[u32], row: &[f64]) {
         self.places.push(columns[pivot]);
         self.pivots.push(row[pivot]);
@@ -42,7 +42,7 @@ impl TriangularRows {
         self.right.extend_from_slice(&row[columns.len()..]);
     }
 
-    /// The variables by place for one right-hand side, from the last to the first.
+    /// Back substitution for one right-hand side; variables by place.
     pub fn substitute(&self, side: usize) -> Vec<f64> {
         let mut z = vec![0.0; self.variables];
         for i in (0..self.places.len()).rev() {

@@ -25,13 +25,13 @@ const TO_THE_BOUND: f64 = 0.99;
 /// A step below this share of the Newton step makes no progress.
 const NO_STEP: f64 = 1e-8;
 /// Iterations within which the gap halves: fewer at the limit of the arithmetic only.
-const PATIENCE: u32 = 8;
+const PATIENCE: u32 = 5;
 /// Least slack at the start, relative to the largest.
 const LEAST_SLACK: f64 = 1e-3;
 /// The gap at a start at active rows, relative to the decrease by a step that holds them.
 const WARM_GAP: f64 = 0.3;
-/// Least slack there, relative to the largest coefficient of the row.
-const LEAST_DISTANCE: f64 = 1e-6;
+/// Distance within which a row counts as active there, relative to the largest one in units of the rows.
+const NEAR: f64 = 1e-4;
 
 /// A solution in the coordinates of the stages.
 pub(super) struct StageSolution<const W: usize> {
@@ -192,15 +192,17 @@ impl<'a, const X: usize, const W: usize> Iterate<'a, X, W> {
         estimates: &[f64],
         cost: f64,
     ) -> Option<bool> {
-        let near = |k: usize| TOLERANCE * self.program.scales[k];
+        let scales = &self.program.scales;
+        let relative = distances.iter().zip(scales).map(|(d, scale)| d / scale);
+        let near = NEAR * relative.fold(0.0, f64::max);
         let count = distances.len() as f64;
         let least = GAP * cost / count;
         let mut is_any = false;
         for (k, (distance, estimate)) in distances.iter().zip(estimates).enumerate() {
-            if *distance < -near(k) {
+            if *distance < -TOLERANCE * scales[k] {
                 return Some(false);
             }
-            let is_active = *distance <= near(k) && *estimate > 0.0;
+            let is_active = *distance <= near * scales[k] && *estimate > 0.0;
             is_any |= is_active;
             self.factors[k] = if is_active { *estimate } else { 0.0 };
             self.weights[k] = self.factors[k] * self.factors[k] / least;
@@ -210,13 +212,18 @@ impl<'a, const X: usize, const W: usize> Iterate<'a, X, W> {
         }
         self.factorise()?;
         self.newton_step()?;
-        let mean = (WARM_GAP * self.promised_decrease() / count).max(10.0 * least);
+        // Of this point with the estimates: what rows that push would bring if it moved to their bounds.
+        let pairs = distances.iter().zip(estimates);
+        let gap = pairs
+            .map(|(distance, m)| distance.max(0.0) * m)
+            .sum::<f64>();
+        let mean = (WARM_GAP * self.promised_decrease().max(gap) / count).max(10.0 * least);
         for (k, (distance, estimate)) in distances.iter().zip(estimates).enumerate() {
             // On the central path: near the bound by the multiplier, elsewhere by the distance.
             let is_near = *estimate > 0.0 && mean / estimate > *distance;
             self.slacks[k] = match is_near {
                 true => mean / estimate,
-                false => distance.max(self.program.scales[k] * LEAST_DISTANCE),
+                false => distance.max(near * scales[k]),
             };
             self.multipliers[k] = mean / self.slacks[k];
         }

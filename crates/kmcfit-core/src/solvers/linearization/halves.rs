@@ -12,7 +12,7 @@ use std::ops::Range;
 
 /// Step at which a record is divided: the middle of a long record with few parameters; `None` otherwise.
 pub(in crate::solvers) fn halfway(problem: &Problem) -> Option<usize> {
-    let is_narrow = problem.parameters() <= NARROW && Reduced::comes_in_pieces(problem);
+    let is_narrow = problem.parameters() <= NARROW && Reduced::is_computed_by_blocks(problem);
     problem.middle().filter(|_| is_narrow)
 }
 
@@ -56,7 +56,7 @@ impl Half {
         let experiment = &problem.experiments[0];
         let mut triangle = Triangle::new(columns);
         let mut residuals = Residuals::with_capacity(PIECE);
-        let states = problem.each_piece_of_part(evaluation, &order, steps, |mut piece| {
+        let states = problem.each_row_block_of_part(evaluation, &order, steps, |mut piece| {
             // All rows of a block belong to one channel.
             let mut first = piece.first;
             let mut of = experiment.channels.iter().zip(&evaluation.predictions[0]);

@@ -102,7 +102,7 @@ fn reduce(problem: &Problem, evaluation: &Evaluation, timings: &mut Timings) -> 
         Some(halfway) => timed(&mut timings.tangent, || {
             in_halves(problem, evaluation, halfway, || ()).0
         }),
-        None => Reduced::piece_by_piece(problem, evaluation, timings),
+        None => Reduced::block_by_block(problem, evaluation, timings),
     }
 }
 
@@ -120,7 +120,7 @@ fn samples(
     timings: &mut Timings,
 ) -> Subproblem {
     if problem.parameters() <= FEW_PARAMETERS {
-        if Reduced::comes_in_pieces(problem) {
+        if Reduced::is_computed_by_blocks(problem) {
             let mut own = None;
             let reduced = known.unwrap_or_else(|| own.insert(reduce(problem, evaluation, timings)));
             // Otherwise the order of operations differs.

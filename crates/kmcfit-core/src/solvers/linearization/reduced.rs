@@ -24,13 +24,13 @@ pub(crate) struct Reduced {
 }
 
 impl Reduced {
-    /// True if the Jacobian of a problem can be reduced block by block ([`Problem::each_piece`]) with a benefit.
-    pub fn comes_in_pieces(problem: &Problem) -> bool {
-        problem.comes_in_pieces() && problem.sample_count() > problem.parameters()
+    /// True if the Jacobian of a problem can be reduced block by block ([`Problem::each_row_block`]) with a benefit.
+    pub fn is_computed_by_blocks(problem: &Problem) -> bool {
+        problem.is_computed_by_blocks() && problem.sample_count() > problem.parameters()
     }
 
     /// Reduction at an evaluated point, in one pass.
-    pub(super) fn piece_by_piece(
+    pub(super) fn block_by_block(
         problem: &Problem,
         evaluation: &Evaluation,
         timings: &mut Timings,
@@ -40,7 +40,7 @@ impl Reduced {
         let Residuals { roots, weighted } = Residuals::at(problem, evaluation);
         let mut triangle = Triangle::new(order.len());
         let mut reducing = Duration::ZERO;
-        problem.each_piece(evaluation, &order, |mut piece| {
+        problem.each_row_block(evaluation, &order, |mut piece| {
             let rows = piece.first..piece.first + piece.count;
             let (roots, right) = (&roots[rows.clone()], &weighted[rows]);
             let mut add = || triangle.add_weighted(&mut piece, roots, right);

@@ -61,7 +61,7 @@ pub fn subproblem(
     sub
 }
 
-/// The nodes at which the unknowns act; `None` if a function has neither one value per node nor a single one.
+/// Assignment of the unknowns to nodes; `None` if a function is neither nodal nor constant.
 fn layout(problem: &Problem) -> Option<StageLayout> {
     let functions = &problem.functions;
     let mut layout = StageLayout {

@@ -90,7 +90,7 @@ fn halves_of_a_long_record_agree_with_the_whole() {
         let evaluation = problem.evaluate(&theta).expect("a motion");
         let second = Half::second(&problem, &evaluation, halfway);
         let joined = Half::first(&problem, &evaluation, halfway).join(&second);
-        let whole = Reduced::piece_by_piece(&problem, &evaluation, &mut Timings::default());
+        let whole = Reduced::block_by_block(&problem, &evaluation, &mut Timings::default());
         let solution = |reduced: &Reduced| reduced.solution().expect("independent columns");
         for (joined, whole) in solution(&joined).iter().zip(solution(&whole)) {
             let off = (joined - whole).abs();

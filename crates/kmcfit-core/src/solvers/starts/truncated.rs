@@ -38,7 +38,7 @@ pub(in crate::solvers) fn truncated_steps(problem: &Problem) -> Option<usize> {
     let suits = problem.system.grid.nodes() > LONG_RECORD_STEPS
         && problem.penalties.is_empty()
         && problem.variations.is_empty()
-        && problem.comes_in_pieces()
+        && problem.is_computed_by_blocks()
         && problem.functions.iter().all(is_constant)
         && parameters > 0;
     let has_samples = |steps: &usize| {

@@ -11,7 +11,7 @@ pub struct Paths {
     /// Costs along the path of the scaling ambiguity: the mass is `m_a^(1-s) m_b^s` and the ratios to the mass vary linearly,
     /// so that only the common factor varies between systems with equal ratios. `None` where the bases do not contain the
     /// path, for example where a function is fixed.
-    pub gauge: Option<Vec<f64>>,
+    pub scaling: Option<Vec<f64>>,
 }
 
 impl Paths {
@@ -22,7 +22,7 @@ impl Paths {
             let ends = path[0].max(path[path.len() - 1]);
             path.iter().all(|cost| *cost <= ends + rise)
         };
-        low(&self.straight) || self.gauge.as_ref().is_some_and(low)
+        low(&self.straight) || self.scaling.as_ref().is_some_and(low)
     }
 }
 
@@ -36,18 +36,18 @@ pub fn between(problem: &Problem, a: &[f64], b: &[f64], points: usize) -> Paths 
         pairs.map(|(a, b)| (1.0 - s) * a + s * b).collect()
     };
     let straight = shares.iter().map(|s| cost(&mix(*s))).collect();
-    let gauge: Option<Vec<Vec<f64>>> = shares
+    let scaling: Option<Vec<Vec<f64>>> = shares
         .iter()
-        .map(|s| along_gauge(problem, a, b, *s, mix(*s)))
+        .map(|s| along_scaling(problem, a, b, *s, mix(*s)))
         .collect();
     Paths {
         straight,
-        gauge: gauge.map(|path| path.iter().map(|theta| cost(theta)).collect()),
+        scaling: scaling.map(|path| path.iter().map(|theta| cost(theta)).collect()),
     }
 }
 
 /// Point `s` of the scaling path; functions of single experiments and scalars vary linearly.
-fn along_gauge(
+fn along_scaling(
     problem: &Problem,
     a: &[f64],
     b: &[f64],

@@ -307,9 +307,9 @@ impl Measurements {
         let one = |(experiment, measured): (&Experiment, &Option<Measured>)| {
             let corner = measured.as_ref()?.corner? / std::f64::consts::TAU;
             Some(format!(
-                "{}: the acceleration is integrated above {corner:.3} Hz alone, so forces that are \
-                 not proportional to the response are seen with an error, and a constant offset is not \
-                 seen",
+                "{}: the acceleration is integrated above {corner:.3} Hz alone, so forces that \
+                 are not proportional to the response are biased, and a static force is not \
+                 identifiable",
                 experiment.name
             ))
         };

@@ -3,7 +3,7 @@
 use crate::constraints;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::qp::{ConicStatus, Subproblem};
+use crate::qp::{ConicStatus, Solution, Subproblem};
 use crate::record::Loss;
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::iterate::Iterate;
@@ -14,6 +14,11 @@ use crate::solvers::timings::timed;
 
 /// Share of the plain step's predicted decrease from which a clipped step is used.
 const CLIPPED: f64 = 0.9;
+/// Distance of an active bound, relative to the largest distance of a bound.
+const ACTIVE: f64 = 1e-4;
+/// J above this share of the misfit of zero response is that of noise or of another model: residuals of a thousandth of the
+/// measurements.
+const NOISE: f64 = 1e-6;
 /// Share of J below which a predicted decrease is within the accuracy of a quadratic program.
 const PROGRAM_ACCURACY: f64 = 1e-9;
 /// Relative change of the functions below which a step is a rounding error.
@@ -90,10 +95,18 @@ pub(super) fn propose(
             is_solved: true,
         })
     };
-    // Where bounds are active they mostly stay so, and the stages take no longer than one plain step.
-    let is_plain_likely = sub.layout.is_none() || !sub.is_active_at_zero(constraints::TOLERANCE);
-    let plain = is_plain_likely.then(|| work.algebra(|| sub.solve_plain()));
-    let plain = plain.flatten().map(|z| (cost - sub.value(&z), z));
+    let iterations = work.program_iterations;
+    // Where noise pushes against bounds they mostly stay active, and the stages take no longer than one plain step.
+    let is_pushed = cost > NOISE * work.problem().zero_response_misfit();
+    if is_pushed
+        && sub.is_active_at_zero(ACTIVE)
+        && let Some((solution, excess)) = work.program(|| sub.step_on_stages(iterations))
+        && let Some(proposal) = of_program(work, sub, point, &solution, excess)
+    {
+        return ProposalOutcome::Step(proposal);
+    }
+    let plain = work.algebra(|| sub.solve_plain());
+    let plain = plain.map(|z| (cost - sub.value(&z), z));
     if let Some((best, z)) = plain.filter(|(best, _)| is_sound(best)) {
         if sub.holds(&z, 0.1 * constraints::TOLERANCE)
             && let Some(parameters) = moved(&z)
@@ -119,21 +132,36 @@ pub(super) fn propose(
             }
         }
     }
-    let iterations = work.program_iterations;
-    let (solution, excess) = work.program(|| sub.solve_step(iterations));
+    let (solution, excess) = work.program(|| match sub.step_on_stages(iterations) {
+        Some(step) => step,
+        None => (sub.solve_within(iterations), 0.0),
+    });
     if !solution.status.is_point() {
         return ProposalOutcome::Unsolved(solution.status);
     }
-    let Some(parameters) = moved(&solution.z) else {
-        return ProposalOutcome::Unsolved(ConicStatus::Stalled);
-    };
-    // The value of the program is not used: its solution satisfies the steps only to the program's accuracy.
+    match of_program(work, sub, point, &solution, excess) {
+        Some(proposal) => ProposalOutcome::Step(proposal),
+        None => ProposalOutcome::Unsolved(ConicStatus::Stalled),
+    }
+}
+
+/// The step to the solution of a program that may exceed its minimum by `excess`; `None` if it is outside the constraint set or
+/// predicts a higher cost.
+fn of_program(
+    work: &mut CountedEvaluator,
+    sub: &Subproblem,
+    point: &Iterate,
+    solution: &Solution,
+    excess: f64,
+) -> Option<Proposal> {
+    let (constraints, cost) = (&work.problem().constraints, point.evaluation.cost);
+    let parameters = constraints.moved(&point.parameters, &solution.z);
+    let is_inside = constraints.hold(&parameters, constraints::TOLERANCE);
+    is_inside.then_some(())?;
+    // Not the program's own value: its solution satisfies the steps only to its accuracy.
     let model = model_cost(work, sub, point, &parameters);
     let predicted = cost - model;
-    if !is_sound(&predicted) {
-        return ProposalOutcome::Unsolved(ConicStatus::Stalled);
-    }
-    ProposalOutcome::Step(Proposal {
+    (predicted >= -least_decrease(work.problem(), cost)).then(|| Proposal {
         parameters,
         predicted,
         uncertainty: match (solution.status, &solution.kkt) {

@@ -23,7 +23,7 @@ const MOST_FACTORS: usize = 200;
 
 /// One scaling direction.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GaugeDirection {
+pub struct ScalingDirection {
     /// `scale of (m, c, k)`, or `scale over time s(t) of (m, c, k)`.
     pub name: String,
     /// True for a factor constant in time.
@@ -36,10 +36,10 @@ pub struct GaugeDirection {
 
 /// All scaling directions at a point.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Gauge {
+pub struct ScalingAmbiguity {
     /// For each group of functions with a common scale: the constant factor first, where it is free, then a basis of the
     /// factors over time, whose span contains the constant one.
-    pub directions: Vec<GaugeDirection>,
+    pub directions: Vec<ScalingDirection>,
 }
 
 /// An undetermined direction that is mostly a scaling.
@@ -53,7 +53,7 @@ pub struct Named {
     pub change: Vec<f64>,
 }
 
-impl Gauge {
+impl ScalingAmbiguity {
     /// Scaling directions at the parameters `theta`.
     pub fn at(problem: &Problem, theta: &[f64]) -> Self {
         let values = problem.functions.values(theta);
@@ -64,7 +64,7 @@ impl Gauge {
                 continue;
             };
             let nodes = problem.functions.nodes();
-            let make = |factor: &[f64], constant: bool| GaugeDirection {
+            let make = |factor: &[f64], constant: bool| ScalingDirection {
                 name: match constant {
                     true => format!("scale of {symbols}"),
                     false => format!("scale over time s(t) of {symbols}"),
@@ -97,12 +97,12 @@ impl Gauge {
     }
 
     /// Constant factors.
-    pub fn constant(&self) -> impl Iterator<Item = &GaugeDirection> {
+    pub fn constant(&self) -> impl Iterator<Item = &ScalingDirection> {
         self.directions.iter().filter(|d| d.constant)
     }
 
     /// Factors over time; empty where only constant factors are free.
-    pub fn over_time(&self) -> impl Iterator<Item = &GaugeDirection> {
+    pub fn over_time(&self) -> impl Iterator<Item = &ScalingDirection> {
         self.directions.iter().filter(|d| !d.constant)
     }
 
@@ -119,8 +119,8 @@ impl Gauge {
     }
 
     /// Undetermined directions that are mostly scalings: constant factors first, then factors over time, orthogonal to them.
-    /// The remaining directions of [`SingularSpectrum::unseen`] have other causes.
-    pub fn unseen(&self, spectrum: &SingularSpectrum) -> Vec<Named> {
+    /// The remaining directions of [`SingularSpectrum::undetermined`] have other causes.
+    pub fn undetermined(&self, spectrum: &SingularSpectrum) -> Vec<Named> {
         let directions = spectrum.directions();
         let mut named = Vec::new();
         let constant = basis_of(self.constant(), directions);
@@ -145,7 +145,7 @@ impl Gauge {
 }
 
 fn basis_of<'a>(
-    list: impl Iterator<Item = &'a GaugeDirection>,
+    list: impl Iterator<Item = &'a ScalingDirection>,
     directions: &Directions,
 ) -> DMatrix<f64> {
     let columns: Vec<DVector<f64>> = list
@@ -184,7 +184,7 @@ fn unseen_in(spectrum: &SingularSpectrum, basis: &DMatrix<f64>, name: Option<&st
 }
 
 /// Combinations of `directions` that satisfy all equality constraints.
-fn obeying(problem: &Problem, directions: Vec<GaugeDirection>) -> Vec<GaugeDirection> {
+fn obeying(problem: &Problem, directions: Vec<ScalingDirection>) -> Vec<ScalingDirection> {
     let Some(first) = directions.first() else {
         return directions;
     };
@@ -193,7 +193,7 @@ fn obeying(problem: &Problem, directions: Vec<GaugeDirection>) -> Vec<GaugeDirec
         for i in 0..group.rows.len() {
             let [lower, upper] = group.bounds(i);
             if lower == upper {
-                let answer = |d: &GaugeDirection| -> f64 {
+                let answer = |d: &ScalingDirection| -> f64 {
                     group.rows.row(i).map(|(j, a)| a * d.change[j]).sum()
                 };
                 let answers: Vec<f64> = directions.iter().map(answer).collect();
@@ -213,7 +213,7 @@ fn obeying(problem: &Problem, directions: Vec<GaugeDirection>) -> Vec<GaugeDirec
     }
     let matrix = DMatrix::from_fn(rows.len(), directions.len(), |i, j| rows[i][j]);
     let kept = null_space(&matrix, HOLDS);
-    let combined = |of: &dyn Fn(&GaugeDirection) -> &Vec<f64>| {
+    let combined = |of: &dyn Fn(&ScalingDirection) -> &Vec<f64>| {
         let columns: Vec<DVector<f64>> = (directions.iter())
             .map(|d| DVector::from_column_slice(of(d)))
             .collect();
@@ -221,7 +221,7 @@ fn obeying(problem: &Problem, directions: Vec<GaugeDirection>) -> Vec<GaugeDirec
     };
     let (factors, changes) = (combined(&|d| &d.factor), combined(&|d| &d.change));
     let pairs = factors.column_iter().zip(changes.column_iter());
-    let each = pairs.map(|(factor, change)| GaugeDirection {
+    let each = pairs.map(|(factor, change)| ScalingDirection {
         name: first.name.clone(),
         constant: first.constant,
         factor: factor.as_slice().to_vec(),
