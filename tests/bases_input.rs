@@ -234,7 +234,7 @@ fn knots() {
       expected: knots further apart than the step of 0.5 s
     ");
     assert_snapshot!(knots("[0, 0.4, 0.6, 0.9, 1.1, 1.2, 10]"), @"
-    m.yaml:5:52: functions.mass.knots: the nodes cannot tell the functions of this basis apart
+    m.yaml:5:52: functions.mass.knots: the functions of this basis are linearly dependent at the nodes
       found: 7 parameters on 21 nodes
       expected: fewer knots, or more nodes
     ");

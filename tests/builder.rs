@@ -144,7 +144,7 @@ fn what_cannot_be_meant_is_refused() {
         (Builder::new(system()), "experiments: there are no records"),
         (
             Builder::new(system()).record(short()),
-            "experiments[0]: this experiment has no data",
+            "experiments[0]: this experiment has no samples",
         ),
         (
             Builder::new(system()).record(short().displacement(&times, &values[..2])),

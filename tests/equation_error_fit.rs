@@ -500,7 +500,7 @@ fn readings_without_a_motion() {
         })
         .unwrap();
     let remarks = Measurements::of(&offset).unwrap().remarks(&offset);
-    assert_snapshot!(remarks[0], @"shaken: the acceleration is integrated above 1.015 Hz alone, so forces that are not proportional to the motion are seen with an error, and a constant offset is not seen");
+    assert_snapshot!(remarks[0], @"shaken: the acceleration is integrated above 1.015 Hz alone, so forces that are not proportional to the response are biased, and a static force is not identifiable");
     let excitation = Excitation {
         force: Some(random_function(&self::system().grid, 1)),
         base: None,
@@ -516,7 +516,7 @@ fn readings_without_a_motion() {
         .with_channel(channel);
     let functions = Parameterization::new(constants(None), NODES, system.grid.step()).unwrap();
     let problem = Problem::new(system, functions, vec![experiment]).unwrap();
-    assert_snapshot!(Measurements::of(&problem).err().unwrap(), @"driven: its force or base cannot be filtered as its motion is, which is integrated from other channels than one of equally spaced accelerations");
+    assert_snapshot!(Measurements::of(&problem).err().unwrap(), @"driven: its force or base cannot be filtered like its response, which is integrated from channels other than one of equally spaced accelerations");
 }
 
 fn read(model: &str, reading: fn(f64) -> f64, count: usize) -> Result<Model, String> {
@@ -575,11 +575,11 @@ fn model_files() {
             parts.penalties[0].weight = 2.0;
         })
         .unwrap();
-    assert_snapshot!(cost_definition(&unweighted, solver), @"J = integral (m (y'' + b'') + sum p_j phi_j(y, y') - f)^2 dt over the samples, with y, y' and y'' from the record, without a simulation (N^2 s) + 2.0 * integral (dk/dt)^2 dt");
+    assert_snapshot!(cost_definition(&unweighted, solver), @"J = integral (m (y'' + b'') + sum p_j phi_j(y, y') - f)^2 dt over the samples, with y, y' and y'' from the samples and not from a simulation (N^2 s) + 2.0 * integral (dk/dt)^2 dt");
 
     let said = |text: &str| read(text, f64::cos, 401).map(|_| ()).unwrap_err();
     assert_snapshot!(said(&model(period, "{method: gauss-newton}")), @"
-    m.yaml:8:83: functions.stiffness.penalty.weight: the rule `period` is a rule of the method `equation-error` alone
+    m.yaml:8:83: functions.stiffness.penalty.weight: the rule `period` applies to the method `equation-error` only
       found: `gauss-newton`
       expected: `l-curve`, `gcv`, `discrepancy`, a number, or `fit.method: equation-error`
     ");
@@ -588,14 +588,14 @@ fn model_files() {
         said(&model(smooth, &format!("{{method: equation-error{more}}}")))
     };
     assert_snapshot!(equation_error("{kind: tikhonov, order: 0, weight: period}", ""), @"
-    m.yaml:8:72: functions.stiffness.penalty.order: the rule `period` is about a derivative
+    m.yaml:8:72: functions.stiffness.penalty.order: the rule `period` requires a penalty on a derivative
       found: 0
       expected: order 1 or 2, or a number for the weight
     ");
     assert_snapshot!(equation_error("{kind: tikhonov, order: 1, weight: gcv}", ""), @"
-    m.yaml:8:83: functions.stiffness.penalty.weight: the method `equation-error` knows no search for the weight
+    m.yaml:8:83: functions.stiffness.penalty.weight: the method `equation-error` has no search for the weight
       found: `gcv`
-      expected: `period`, which follows from the motion, or a number
+      expected: `period`, which follows from the response, or a number
     ");
     assert_snapshot!(equation_error(number, ", stop: {iterations: 3}"), @"
     m.yaml:9:37: fit.stop: the method `equation-error` solves one convex problem and takes no steps
@@ -615,14 +615,14 @@ fn model_files() {
     ");
     let text = model(number, "{method: equation-error}");
     assert_snapshot!(read(&text, f64::cos, 5).map(|_| ()).unwrap_err(), @"
-    m.yaml:3:5: experiments[0]: the method `equation-error` cannot tell the motion from these readings
-      found: too few samples
-      expected: readings from which displacement, velocity and acceleration follow
+    m.yaml:3:5: experiments[0]: the method `equation-error` cannot derive the response from these samples
+      found: there are too few samples
+      expected: samples from which displacement, velocity and acceleration follow
     ");
     assert_snapshot!(read(&text, |_| 0.0, 401).map(|_| ()).unwrap_err(), @"
-    m.yaml:3:5: experiments[0]: the method `equation-error` cannot tell the motion from these readings
+    m.yaml:3:5: experiments[0]: the method `equation-error` cannot derive the response from these samples
       found: nothing moves
-      expected: readings from which displacement, velocity and acceleration follow
+      expected: samples from which displacement, velocity and acceleration follow
     ");
 }
 

@@ -1,7 +1,7 @@
 //! The standard figures as SVG documents: well-formed, stable, small, and safe with any data.
 
 use kmcfit::report::figures::{
-    FunctionCurve, convergence, functions, gradient_error, response, observation, ratios,
+    FunctionCurve, convergence, functions, gradient_error, observation, ratios, response,
 };
 use kmcfit::report::{Axis, Colour, Figure, Mark, Panel, Style, render};
 use kmcfit_core::internals::functions::Ratios;

@@ -17,7 +17,7 @@ pub const SPACING_TOLERANCE: f64 = 1e-6;
 /// from overflow and underflow.
 pub const SAMPLE_RATES: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
 
-/// Deviation of a spacing, relative to the step, below which it is attributed to rounding.
+/// Deviation of a spacing, relative to the step, below which it counts as a rounding error.
 const ROUNDED: f64 = 0.05;
 
 /// The times in a column, strictly increasing.

@@ -227,7 +227,7 @@ fn penalties_and_rules() {
       expected: `sigma` in every experiment, or `l-curve` or `gcv`, which do without
     ");
     assert_snapshot!(said(&with("penalty: [{kind: tikhonov, order: 2, weight: gcv}, {kind: tikhonov, order: 1, weight: l-curve}]")), @"
-    m.yaml:9:123: functions.damping.penalty[1].weight: there is one rule for all weights that are chosen
+    m.yaml:9:123: functions.damping.penalty[1].weight: all weights chosen by a rule must have the same rule
       found: `l-curve` beside `gcv`
       expected: the same rule, or a number
     ");
@@ -242,19 +242,19 @@ fn contradictions_name_their_lines() {
     m.yaml:14:5: constraints[2]: these constraints contradict each other
       found: `mass >= 1` (line 12) and `mean of mass = 0.5` (line 14)
       expected: constraints that some functions satisfy together
-      hint: leaving out any one of them resolves it
+      hint: removing any one of them resolves it
     ");
     assert_snapshot!(message("[{function: damping, at: [1, 1], value: [1, 2]}]"), @"
     m.yaml:11:43: constraints[0].at[1]: these constraints contradict each other
       found: `damping(1) = 1` (line 11) and `damping(1) = 2` (line 11)
       expected: constraints that some functions satisfy together
-      hint: leaving out any one of them resolves it
+      hint: removing any one of them resolves it
     ");
     assert_snapshot!(message("[{function: damping, at: 1, value: 1}, {function: damping, at: 1.00000001, value: 2}]"), @"
     m.yaml:11:77: constraints[1].at: these constraints contradict each other
       found: `damping(1) = 1` (line 11) and `damping(1.00000001) = 2` (line 11)
       expected: constraints that some functions satisfy together
-      hint: leaving out any one of them resolves it
+      hint: removing any one of them resolves it
     ");
     // Soft constraints contradict nobody.
     assert_snapshot!(message("[{function: damping, at: 1, value: 1}, {function: damping, at: 1, value: 2, soft: 1}]"), @"no error []");
@@ -287,7 +287,7 @@ fn fixed_functions() {
     let rising = text("[{passive: true}]").replace("fixed: 1", "fixed: {data: c.csv, column: c}");
     assert_snapshot!(said(&rising), @"
     m.yaml:11:15: constraints[0]: no fit can satisfy this constraint
-      found: `passive: k' <= 0` is broken at 0 s by what is given
+      found: fixed functions violate `passive: k' <= 0` at 0 s
       expected: functions with more freedom, or another constraint
     ");
 }
@@ -523,7 +523,7 @@ fn what_the_record_cannot_feel() {
         Finding::texts(&model.warnings)
     };
     let nothing = free("[{function: stiffness, shape: non-increasing}]");
-    assert_snapshot!(nothing.join("\n"), @"constraints[0].shape: a monotone stiffness says nothing about the system here. Without a force the response shows only k/m and c/m, and any s(t) may multiply all three functions; fix a function, bound the functions on both sides, or smooth them");
+    assert_snapshot!(nothing.join("\n"), @"constraints[0].shape: a monotone stiffness carries no information here. Without a force the response determines only k/m and c/m, and any s(t) may multiply all three functions; fix a function, bound the functions on both sides, or add a penalty");
     assert_eq!(free("[{passive: true}]").len(), 1);
     assert_eq!(
         free("[{function: mass, min: 1, max: 3}, {passive: true}]"),
@@ -537,7 +537,7 @@ fn what_the_record_cannot_feel() {
 fn what_always_holds() {
     let constant =
         text("[{function: damping, shape: convex}]").replace("basis: nodal", "basis: constant");
-    assert_snapshot!(said(&constant), @r#"no error ["constraints[0].shape says nothing: it holds for all functions"]"#);
+    assert_snapshot!(said(&constant), @r#"no error ["constraints[0].shape has no effect: it holds for all functions"]"#);
 }
 
 #[test]

@@ -39,11 +39,11 @@ pub mod host {
 }
 pub mod identifiability {
     pub use crate::identifiability::{
-        Band, BandSettings, Bands, CandidateChannel, CandidateExperiment, Classification,
+        Band, BandSettings, BandSide, Bands, CandidateChannel, CandidateExperiment, Classification,
         ClassificationKind, FunctionClassification, Gain, RankFinding, RankFindingKind, Ranked,
-        ResolvedDirection, ScalingAmbiguity, Sensitivity, Side, SingularSpectrum, Symmetry,
-        anchors, classify_functions, is_negligible, is_unhindered, rank_experiments,
-        residual_spread, structural_rank,
+        ResolvedDirection, ScalingAmbiguity, Sensitivity, SingularSpectrum, Symmetry, anchors,
+        classify_functions, is_negligible, is_unhindered, rank_experiments, residual_spread,
+        structural_rank,
     };
 }
 pub mod objective {

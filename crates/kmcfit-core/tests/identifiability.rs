@@ -10,8 +10,8 @@ use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty,
 };
 use kmcfit_core::internals::identifiability::{
-    Band, BandSettings, Bands, CandidateChannel, CandidateExperiment, Classification,
-    ScalingAmbiguity, Sensitivity, Side, SingularSpectrum, Symmetry, classify_functions,
+    Band, BandSettings, BandSide, Bands, CandidateChannel, CandidateExperiment, Classification,
+    ScalingAmbiguity, Sensitivity, SingularSpectrum, Symmetry, classify_functions,
     rank_experiments, structural_rank,
 };
 use kmcfit_core::internals::problem::Problem;
@@ -596,7 +596,10 @@ fn undetermined_functions_have_infinite_bands_and_ratios_finite_ones() {
             .all(|s| s.is_finite())
     );
     assert!(
-        bands.functions[2].sides.iter().all(|s| *s == Side::Neither)
+        bands.functions[2]
+            .sides
+            .iter()
+            .all(|s| *s == BandSide::Neither)
             || bands.functions[2].standard_error.iter().all(|s| *s < 1e-12)
     );
     let words = classify_functions(&held, &here, &bands);
@@ -630,7 +633,7 @@ fn a_bound_that_is_active_makes_the_band_one_sided() {
         .unwrap();
     let bands = Bands::at(&problem, &theta, &here, &BandSettings::default());
     let damping = &bands.functions[1];
-    assert!(damping.sides.iter().all(|s| *s == Side::Above));
+    assert!(damping.sides.iter().all(|s| *s == BandSide::Above));
     assert!(
         damping.notes[0].starts_with("one-sided"),
         "{:?}",
@@ -755,7 +758,7 @@ fn the_next_experiment_is_the_one_that_sees_something_new() {
         .map(|r| r.gain.as_ref().unwrap_err())
         .collect();
     assert_eq!(reasons.len(), 3);
-    assert!(reasons[0].contains("measures nothing"), "{reasons:?}");
+    assert!(reasons[0].contains("has no channels"), "{reasons:?}");
     assert!(reasons[1].contains("covers 1 of 59 steps"), "{reasons:?}");
 
     let second = ranked(

@@ -4,7 +4,7 @@ use crate::diagnostics::NORMAL_975;
 
 /// Sides of the value on which a band extends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
+pub enum BandSide {
     /// Both.
     Both,
     /// Only above: a lower bound is active.
@@ -28,7 +28,7 @@ pub struct Band {
     /// Standard errors; infinite where the value is not identifiable.
     pub standard_error: Vec<f64>,
     /// Sides of each value on which the band extends.
-    pub sides: Vec<Side>,
+    pub sides: Vec<BandSide>,
     /// Half-width, in standard errors, of the simultaneous 95 % band, which contains the curve at all times;
     /// `None` if not simulated.
     pub simultaneous: Option<f64>,
@@ -41,10 +41,10 @@ impl Band {
     pub fn ends(&self, i: usize, factor: f64) -> [f64; 2] {
         let (value, width) = (self.values[i], factor * self.standard_error[i]);
         match self.sides[i] {
-            Side::Both => [value - width, value + width],
-            Side::Above => [value, value + width],
-            Side::Below => [value - width, value],
-            Side::Neither => [value, value],
+            BandSide::Both => [value - width, value + width],
+            BandSide::Above => [value, value + width],
+            BandSide::Below => [value - width, value],
+            BandSide::Neither => [value, value],
         }
     }
 

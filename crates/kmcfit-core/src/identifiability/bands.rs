@@ -16,8 +16,8 @@
 //! function, its band is infinite.
 
 use super::active::{ActiveRow, active_rows};
-use super::band::{Band, Side};
-use super::covariance::{Factor, Information};
+use super::band::{Band, BandSide};
+use super::covariance::{CovarianceRoot, Information};
 use super::directions::Directions;
 use super::sensitivity::Sensitivity;
 use super::spans::{span_words, spans};
@@ -193,7 +193,7 @@ struct Maker<'a> {
     problem: &'a Problem,
     nodes: Vec<usize>,
     times: Vec<f64>,
-    factors: [&'a Factor; 2],
+    factors: [&'a CovarianceRoot; 2],
     directions: &'a Directions,
     active: &'a [ActiveRow],
     settings: &'a BandSettings,
@@ -254,14 +254,14 @@ impl Maker<'_> {
         for (i, value) in values.iter().enumerate() {
             let (tight, loose) = (error(0, i), error(1, i));
             let (standard_error, side) = if !value.is_finite() || tight.is_nan() {
-                (f64::INFINITY, Side::Both)
+                (f64::INFINITY, BandSide::Both)
             } else if loose == 0.0 {
-                (0.0, Side::Neither)
+                (0.0, BandSide::Neither)
             } else if tight <= HELD * loose {
-                let side = function.map_or(Side::Both, |f| self.side(f, self.nodes[i]));
+                let side = function.map_or(BandSide::Both, |f| self.side(f, self.nodes[i]));
                 (loose, side)
             } else {
-                (tight, Side::Both)
+                (tight, BandSide::Both)
             };
             errors.push(standard_error);
             sides.push(side);
@@ -278,7 +278,7 @@ impl Maker<'_> {
             values[i].is_finite() && errors[i].is_infinite()
         });
         note("one-sided, because a bound is active,", &|i| {
-            matches!(sides[i], Side::Above | Side::Below)
+            matches!(sides[i], BandSide::Above | BandSide::Below)
         });
         Band {
             simultaneous: self.simultaneous(linear, &errors, &sides),
@@ -292,7 +292,7 @@ impl Maker<'_> {
     }
 
     /// Sides on which function `f` may change at node `i`, where the active rows leave it no freedom.
-    fn side(&self, f: usize, i: usize) -> Side {
+    fn side(&self, f: usize, i: usize) -> BandSide {
         let slope = self.slope(f, i);
         let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
         for row in self.active.iter().filter(|r| !r.equality) {
@@ -301,14 +301,14 @@ impl Maker<'_> {
             let cosine = dot / (norm(&inwards) * norm(&slope)).max(f64::MIN_POSITIVE);
             if cosine.abs() > 1.0 - HELD {
                 return if cosine > 0.0 {
-                    Side::Above
+                    BandSide::Above
                 } else {
-                    Side::Below
+                    BandSide::Below
                 };
             }
         }
         // Several rows together fix the value.
-        Side::Both
+        BandSide::Both
     }
 
     /// Factor of the simultaneous band: the 95 % quantile of `max |z_i|` over the nodes.
@@ -316,13 +316,13 @@ impl Maker<'_> {
         &self,
         linear: &LinearisedCurve,
         errors: &[f64],
-        sides: &[Side],
+        sides: &[BandSide],
     ) -> Option<f64> {
         if self.settings.draws == 0 {
             return None;
         }
         let usable =
-            |i: &usize| errors[*i].is_finite() && errors[*i] > 0.0 && sides[*i] == Side::Both;
+            |i: &usize| errors[*i].is_finite() && errors[*i] > 0.0 && sides[*i] == BandSide::Both;
         let usable: Vec<usize> = (0..errors.len()).filter(usable).collect();
         if usable.is_empty() {
             return None;

@@ -23,7 +23,7 @@ pub(super) struct Information {
 
 /// Covariance root, `Cov = F F^T` on determined directions and zero on the others.
 #[derive(Clone)]
-pub(super) struct Factor {
+pub(super) struct CovarianceRoot {
     /// `F`, directions x rank.
     pub root: DMatrix<f64>,
     /// Orthonormal basis of the undetermined directions, as columns.
@@ -84,7 +84,7 @@ impl Information {
 
     /// Covariance with the rows `held` fixed: `H^+ M H^+` in the null space of these rows, with `H = J^T W J + R` and
     /// `M = J^T W J` (`W` multiplied by the estimated variance for samples without sigma).
-    pub fn factor(&self, held: &[&ActiveRow]) -> Factor {
+    pub fn factor(&self, held: &[&ActiveRow]) -> CovarianceRoot {
         let directions = &self.sensitivity.directions;
         let n = directions.len();
         let rows: Vec<Vec<f64>> = held
@@ -127,7 +127,7 @@ impl Information {
             true => &inverse_root * answers.qr().r().transpose(),
             false => &inverse_root * answers.transpose(),
         };
-        Factor {
+        CovarianceRoot {
             root,
             undetermined,
             variance,

@@ -32,7 +32,7 @@ pub fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
 }
 
 pub use anchors::anchors;
-pub use band::{Band, Side};
+pub use band::{Band, BandSide};
 pub use bands::{BandSettings, Bands};
 pub use classification::{
     Classification, ClassificationKind, FunctionClassification, classify_functions,

@@ -44,7 +44,7 @@ fn a_stiffness_that_varies_is_found() {
     let found = asked(&knots(&|t| 2.0 + 0.3 * (0.6 * t).sin(), 6, 0.05, 1));
     println!("{}", found.sentence());
     assert!(found.varies() && found.bic > 0.0, "{found:?}");
-    assert!(found.sentence().contains("varies"));
+    assert!(found.sentence().contains("rejects a constant"));
     // Smoothed, and without a stated sigma.
     let mut problem = knots(&|t| 2.0 + 0.3 * (0.6 * t).sin(), 11, 0.05, 2);
     let grid = problem.system.grid;

@@ -200,7 +200,7 @@ fn a_better_optimum_on_the_way_is_reported() {
     println!("{}", found.sentence());
     let better = found.better_optimum.as_ref().expect("2.25 or 22.88");
     assert!(problem.evaluate(better).unwrap().cost < found.optimum_cost - 100.0);
-    assert!(found.sentence().contains("better optimum"));
+    assert!(found.sentence().contains("better minimum"));
 }
 
 /// One value of m at each of 101 nodes, smoothed: the profile of one of them holds the truth, and the

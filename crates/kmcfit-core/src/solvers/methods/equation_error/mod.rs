@@ -26,7 +26,7 @@ use measured::Measured;
 /// equation leaves undetermined.
 const PULL: f64 = 1e-9;
 
-/// Use of a minimum.
+/// Tolerances of the minimisation, by the use of its result.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Accuracy {
     /// Starting point of a fit.
