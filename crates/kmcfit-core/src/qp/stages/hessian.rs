@@ -54,6 +54,10 @@ impl<A: Arithmetic, const X: usize, const W: usize> CostToGo<A, X, W> {
     /// responses, `P F = (E' P)' + P G`: the sums of rows of `E' P` are transposed, as those of columns would need
     /// moves between lanes.
     #[inline(always)]
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "blocks of several arrays at once"
+    )]
     pub fn before(
         arithmetic: A,
         cost: &[[f64; X]; X],
@@ -199,6 +203,10 @@ impl<A: Arithmetic, const X: usize, const W: usize> CostToGo<A, X, W> {
 
     /// Eliminates control `c`, the last that is left; its pivot row over the pivot.
     #[inline(always)]
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "blocks of several arrays at once"
+    )]
     pub fn eliminate(&mut self, arithmetic: A, c: usize, inverse: f64) -> [f64; W] {
         let mut gain = [0.0; W];
         let scale = Eight::splat(arithmetic, inverse);

@@ -104,6 +104,7 @@ pub(super) fn propose(
     // Where noise pushes against bounds they mostly stay active, and the stages take no longer than one plain step.
     let is_pushed = cost > NOISE * work.problem().zero_response_misfit();
     if is_pushed
+        && sub.layout.is_some()
         && sub.is_active_at_zero(ACTIVE)
         && let Some((solution, excess)) = work.program(|| sub.step_on_stages(iterations))
         && let step @ ProposalOutcome::Step(_) = of_program(work, sub, point, &solution, excess)
