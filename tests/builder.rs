@@ -172,7 +172,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             Builder::new(system()).record(short().velocity(&times, &values)),
-            "experiments[0]: readings of the velocity need a sigma",
+            "experiments[0]: samples of the velocity need a sigma",
         ),
         (
             Builder::new(system()).record(short().displacement(&times[..2], &values[..2])),
