@@ -33,7 +33,7 @@ import figures
 ROOT = Path(__file__).resolve().parent.parent
 WORK = ROOT / "target" / "race"
 SHARED = Path(os.environ.get("KMCFIT_SHARED", ROOT.parent / "shared"))
-ROWS = ["evaluation", "million", "paper", "lbfgs", "smooth", "scaling", "knots", "starts", "duffing", "start-up", "contention"]
+ROWS = ["evaluation", "million", "paper", "lbfgs", "smooth", "scaling", "knots", "starts", "duffing", "start-up", "contention", "noisy"]
 DURATION = 25.0
 SCALING = [2000, 8000, 40_000, 200_000]
 KNOTS = [4, 8, 16, 32, 64, 128, 256, 512, 1024]
@@ -583,6 +583,18 @@ def contention(race, row):
     row.notes += [f"{name}: free {spread(free[name])}; pinned {spread(one[name])}" for name in models]
 
 
+def noisy(race, row):
+    """The path of weights of noisy.yaml: per weight the peer's cold or warm start, whichever is faster."""
+    peer = peer_file("casadi_noisy_path.py")
+    times, fits = {name: [] for name in THREADS}, []
+    for _ in race.rounds():
+        for name, one in THREADS.items():
+            out = python_peer(peer, ["numpy", "casadi"], ROOT / "data" / "noisy.csv", one_thread=one)
+            times[name] += found(r"path ([\d.]+)s", out)
+        fits.append(race.fit(ROOT / "models" / "noisy.yaml", "noisy"))
+    compare_fits(row, times, fits, 10)
+
+
 def table(race):
     """The rows of the issue: what, peer, target, and the function that fills them."""
     return [
@@ -597,6 +609,7 @@ def table(race):
         (Row("duffing", "forced, nonlinear, 65,000 samples, two sensors", "SciPy and Numba", "1/10"), duffing),
         (Row("start-up", "start-up", "", "--help 10 ms; fit of 100 readings 30 ms"), start_up),
         (Row("contention", "fits with one of two cores busy", "pinned to the other core", "1.1 times"), contention),
+        (Row("noisy", "noise, bounds, a path of nine weights, 2000 nodes", "CasADi and IPOPT", "1/10"), noisy),
     ]
 
 

@@ -214,6 +214,7 @@ fn the_run_hangs_on_its_rounding() {
         initial: kmcfit_core::internals::solvers::Initial::Functions,
         gradient: GradientKind::Continuous,
         stopping: Stopping::exactly(1000),
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     };
     let found = fit(&problem, &problem.functions.start(), &settings, &mut |_| {})

@@ -34,6 +34,7 @@ fn settings() -> FitSettings {
         initial: Initial::Functions,
         gradient: GradientKind::Discrete,
         stopping: Stopping::default(),
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     }
 }

@@ -73,6 +73,7 @@ fn settings(stopping: Stopping) -> FitSettings {
         initial: Initial::Functions,
         gradient: GradientKind::Continuous,
         stopping,
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     }
 }

@@ -177,6 +177,7 @@ pub fn duffing(samples: usize) -> (Problem, FitSettings) {
         initial: Initial::Functions,
         gradient: GradientKind::Discrete,
         stopping: Stopping::default(),
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     };
     (

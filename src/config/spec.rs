@@ -294,6 +294,8 @@ keys! {
         initial: Option<InitialName>, example "data", default "functions";
         /// Gradient of the cost.
         gradient: Option<Gradient>, example "continuous", default "discrete";
+        /// Solver of the quadratic programs of constrained steps (gauss-newton and projected-gradient).
+        qp: Option<QpName>, example "clarabel", default "auto";
         /// Number of step pairs that L-BFGS stores.
         memory: Option<Count>, example "20", default "20";
         /// Stopping tests; the first one met ends the fit.
@@ -336,6 +338,16 @@ choice! {
         Discrete = "discrete",
         /// Discretised adjoint differential equation (continuous adjoint).
         Continuous = "continuous",
+    }
+}
+
+choice! {
+    /// Solver of quadratic programs.
+    pub type QpName = kmcfit_core::QpSolver {
+        /// Clipping, elimination or an interior-point method along time where they apply, Clarabel otherwise.
+        Auto = "auto",
+        /// Clarabel for every constrained step.
+        Clarabel = "clarabel",
     }
 }
 

@@ -449,7 +449,7 @@ fn readings_files() {
       |
     6 |     columns: {time: t_s, displacement: y_m}
       |                                        ^^^
-      found: 2 readings
+      found: 2 samples
       expected: at least 3
     ");
     assert_snapshot!(with_readings("t_s,y_m\n0,1\n"), @"
@@ -457,7 +457,7 @@ fn readings_files() {
       |
     6 |     columns: {time: t_s, displacement: y_m}
       |                                        ^^^
-      found: 1 reading
+      found: 1 sample
       expected: at least 3
     ");
     assert_snapshot!(changed("displacement: y_m", "displacement: y_mm"), @"

@@ -529,7 +529,7 @@ fn a_robust_fit_is_judged_by_the_readings_that_count() {
     bench.write("record.csv", &table_of(reading));
     let said = bench.run_to(0, &["init", "record.csv"]);
     let far =
-        "5 readings lie far off (-9999): empty fields are better; the model has a robust loss\n";
+        "5 samples lie far off (-9999): empty fields are better; the model has a robust loss\n";
     assert!(said.contains(far), "{said}");
     assert!(said.contains("dominant frequency 0.31"), "{said}");
     let robust = bench.read("record.yaml");

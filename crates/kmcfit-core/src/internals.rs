@@ -55,7 +55,7 @@ pub mod problem {
     pub use crate::problem::{Problem, ProblemError, ProblemParts};
 }
 pub mod qp {
-    pub use crate::qp::{ConicStatus, Kkt, Subproblem, project};
+    pub use crate::qp::{ConicStatus, Kkt, ResponseVariables, StageLayout, Subproblem, project};
 }
 pub mod record {
     pub use crate::record::{
@@ -84,10 +84,10 @@ pub mod solvers {
     pub use crate::solvers::{
         ActiveGroup, Attempt, CheckpointStore, CheckpointUnit, ExactF64s, Fit, FitSettings,
         Initial, IterationEvent, IterationRecord, Measurements, Observer, Optimality, PathPoint,
-        Solver, SolverState, StartProjection, StartStrategy, Status, Stopping, WeightPath,
-        WeightRule, active_constraints, choose_weight, choose_weight_watched, equation_error,
-        estimate_states, fit, fit_from, fit_with_noise, fit_with_noise_watched, no_response,
-        number_or_nan, predict_validation, timed,
+        QpSolver, Solver, SolverState, StartProjection, StartStrategy, Status, Stopping,
+        WeightPath, WeightRule, active_constraints, choose_weight, choose_weight_watched,
+        equation_error, estimate_states, fit, fit_from, fit_with_noise, fit_with_noise_watched,
+        no_response, number_or_nan, predict_validation, timed,
     };
 }
 pub mod study {

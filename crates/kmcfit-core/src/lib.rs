@@ -95,7 +95,7 @@ pub use objective::{Evaluation, Gradient, GradientError, GradientKind};
 pub use simulate::{Cause, SimulationError, Trajectory};
 // Fits.
 pub use solvers::{
-    Attempt, Fit, FitSettings, Initial, Optimality, Outcome, Reason, SolveCounts, Solver,
+    Attempt, Fit, FitSettings, Initial, Optimality, Outcome, QpSolver, Reason, SolveCounts, Solver,
     StartStrategy, Status, Stopping, Timings, WeightPath, WeightRule, choose_weight, fit,
 };
 // Inference.

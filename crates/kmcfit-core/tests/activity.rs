@@ -42,6 +42,7 @@ fn settings() -> FitSettings {
             tolerance: Some(1e-12),
             ..Stopping::exactly(30)
         },
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     }
 }

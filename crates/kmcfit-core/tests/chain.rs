@@ -176,6 +176,7 @@ fn tens_of_thousands_of_values_take_no_more_work_than_thousands() {
             initial: Initial::Data,
             gradient: GradientKind::Discrete,
             stopping: Stopping::default(),
+            qp: kmcfit_core::QpSolver::Auto,
             interrupt: None,
         };
         let found = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();

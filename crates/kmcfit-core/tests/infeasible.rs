@@ -63,6 +63,7 @@ fn run(problem: &Problem, solver: Solver, program_iterations: u32) -> Fit {
             program_iterations,
             ..Stopping::exactly(100)
         },
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     };
     let start = problem.functions.start();

@@ -66,6 +66,7 @@ fn stiffness(problem: &Problem) -> Vec<f64> {
             tolerance: Some(1e-8),
             ..Stopping::exactly(60)
         },
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     };
     let found = fit(problem, &problem.functions.start(), &settings, &mut |_| {}).unwrap();

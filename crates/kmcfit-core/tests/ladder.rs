@@ -60,6 +60,7 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
             tolerance: Some(1e-12),
             ..Stopping::exactly(100)
         },
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     };
     let start = problem.functions.start();
@@ -241,6 +242,7 @@ fn a_fit_by_the_continuous_gradient_tries_all_starting_points() {
             tolerance: Some(1e-10),
             ..Stopping::exactly(20)
         },
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     };
     let found = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();

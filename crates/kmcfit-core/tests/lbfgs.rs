@@ -13,6 +13,7 @@ fn settings(stopping: Stopping) -> FitSettings {
         initial: Initial::Functions,
         gradient: GradientKind::Discrete,
         stopping,
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     }
 }

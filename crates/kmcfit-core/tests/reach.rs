@@ -121,6 +121,7 @@ fn reaches(basis: &Basis, solver: Solver, constrained: bool, seed: u64) -> bool 
             tolerance: Some(1e-12),
             ..Stopping::exactly(ITERATIONS)
         },
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     };
     let start = match problem.feasible_start(&problem.functions.start()) {

@@ -20,6 +20,7 @@ fn settings(initial: Initial) -> FitSettings {
             tolerance: Some(1e-12),
             ..Stopping::exactly(100)
         },
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     }
 }

@@ -48,6 +48,7 @@ fn run(problem: &Problem) -> Fit {
             tolerance: Some(1e-13),
             ..Stopping::exactly(200)
         },
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     };
     let start = problem.functions.start();

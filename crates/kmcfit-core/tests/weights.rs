@@ -42,6 +42,7 @@ fn settings() -> FitSettings {
             tolerance: Some(1e-5),
             ..Stopping::exactly(40)
         },
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     }
 }

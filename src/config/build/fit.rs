@@ -6,7 +6,7 @@ use crate::config::{ModelFile, Number};
 use crate::error::InputError;
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Stopping};
+use kmcfit_core::internals::solvers::{FitSettings, Initial, QpSolver, Solver, Stopping};
 use std::time::Duration;
 
 /// Pairs kept by L-BFGS: on the paper's problem 20 take 13 % fewer iterations than 10, 40 only
@@ -34,6 +34,7 @@ pub(super) fn build(
         initial: initial.unwrap_or(Initial::Functions),
         gradient,
         stopping,
+        qp: qp(file, solver)?,
         interrupt: None,
     })
 }
@@ -140,6 +141,23 @@ fn gradient(file: &ModelFile, problem: &Problem) -> Result<GradientKind, InputEr
             .expected("`discrete`"));
     }
     Ok(asked.unwrap_or(GradientKind::Discrete))
+}
+
+/// The solver of quadratic programs; refused for methods without them.
+fn qp(file: &ModelFile, solver: Solver) -> Result<QpSolver, InputError> {
+    let Some(qp) = file.spec.fit.as_ref().and_then(|f| f.qp) else {
+        return Ok(QpSolver::Auto);
+    };
+    match solver {
+        Solver::GaussNewton | Solver::ProjectedGradient => Ok(qp),
+        _ => Err(file
+            .error_at(
+                "fit.qp",
+                "this method solves no quadratic programs for its steps",
+            )
+            .found(format!("`{}`", solver.name()))
+            .expected("no `qp`, or `method: gauss-newton` or `projected-gradient`")),
+    }
 }
 
 fn memory(file: &ModelFile) -> Result<Option<usize>, InputError> {

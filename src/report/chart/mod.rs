@@ -1,6 +1,6 @@
 //! Charts: the data model of a figure, and its two renderers.
 //!
-//! [`figure`] and [`mark`] describe what a figure shows. `layout`, `panel`, `legend`, `axis` and `curve` turn it into plain
+//! [`figure`] and [`plot_mark`] describe what a figure shows. `layout`, `panel`, `legend`, `axis` and `curve` turn it into plain
 //! shapes in pixels, which [`svg`] writes; `data` writes the same description as numbers for the script of a page.
 
 mod axis;

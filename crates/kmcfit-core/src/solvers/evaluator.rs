@@ -2,7 +2,7 @@
 
 use super::iterate::Iterate;
 use super::linearization::{Linearization, halfway, in_halves};
-use super::settings::{FitSettings, Solver};
+use super::settings::{FitSettings, QpSolver, Solver};
 use super::solve_counts::{ADJOINT, FORWARD, QP, TANGENT};
 use super::timings::{Timings, timed};
 use crate::objective::{Evaluation, Gradient, GradientKind};
@@ -20,6 +20,8 @@ pub(crate) struct CountedEvaluator<'a, 'p> {
     halfway: Option<usize>,
     /// Iteration limit of a quadratic program.
     pub program_iterations: u32,
+    /// Solver of the programs.
+    pub qp: QpSolver,
     /// Time by kind of work.
     pub timings: Timings,
 }
@@ -46,6 +48,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
                 false => Purpose::Estimation,
             },
             program_iterations: settings.stopping.program_iterations,
+            qp: settings.qp,
             timings: Timings::default(),
         }
     }

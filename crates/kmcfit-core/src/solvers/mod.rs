@@ -42,7 +42,7 @@ pub use no_response::no_response;
 pub use noise_estimation::{fit_with_noise, fit_with_noise_watched};
 pub use optimality::Optimality;
 pub use reason::Reason;
-pub use settings::{FitSettings, Initial, Solver, StartStrategy};
+pub use settings::{FitSettings, Initial, QpSolver, Solver, StartStrategy};
 pub use solve_counts::SolveCounts;
 pub use start_projection::StartProjection;
 pub use start_strategy::fit;

@@ -90,6 +90,27 @@ impl StartStrategy {
     }
 }
 
+/// Solver of the quadratic programs of steps under constraints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum QpSolver {
+    /// Clipping and eliminations where they give the step; along time an interior-point method on stages; Clarabel
+    /// otherwise.
+    #[default]
+    Auto,
+    /// Clarabel for every step of Gauss–Newton and of the projected gradient under constraints.
+    Clarabel,
+}
+
+impl QpSolver {
+    /// Name in a model file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Clarabel => "clarabel",
+        }
+    }
+}
+
 /// Settings of a fit.
 #[derive(Debug, Clone)]
 pub struct FitSettings {
@@ -99,6 +120,8 @@ pub struct FitSettings {
     pub initial: Initial,
     /// Adjoint for gradients.
     pub gradient: GradientKind,
+    /// Solver of the quadratic programs.
+    pub qp: QpSolver,
     /// Stopping tests and limits.
     pub stopping: Stopping,
     /// Flag set by the application (Ctrl-C) to end the fit after the current iteration.
@@ -112,6 +135,7 @@ impl Default for FitSettings {
             solver: Solver::GaussNewton,
             initial: Initial::Functions,
             gradient: GradientKind::Discrete,
+            qp: QpSolver::Auto,
             stopping: Stopping::default(),
             interrupt: None,
         }

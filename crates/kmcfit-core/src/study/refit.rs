@@ -21,6 +21,7 @@ pub fn settings() -> FitSettings {
             tolerance: Some(TOLERANCE),
             ..Stopping::exactly(ITERATIONS)
         },
+        qp: crate::solvers::QpSolver::Auto,
         interrupt: None,
     }
 }

@@ -91,6 +91,7 @@ pub fn settings() -> FitSettings {
             tolerance: Some(1e-12),
             ..Stopping::exactly(100)
         },
+        qp: kmcfit_core::QpSolver::Auto,
         interrupt: None,
     }
 }

@@ -1,10 +1,12 @@
 //! Convex subproblems along time, by an interior-point method whose Newton steps are Riccati recursions.
 
+mod hessian;
 mod interior_point;
 mod layout;
 mod riccati;
 mod rows;
 mod transcription;
+mod transitions;
 
 pub use layout::{ResponseVariables, StageLayout};
 

@@ -1,8 +1,8 @@
 //! A subproblem as a control problem along time.
 
 use super::layout::{Place, StageLayout};
-use super::riccati::{NONE, Transitions};
 use super::rows::{LooseRow, StageRows};
+use super::transitions::{NONE, Transitions};
 use crate::constraints::{Rows, TOLERANCE};
 use crate::qp::Subproblem;
 
@@ -302,8 +302,7 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
                 }
                 continue;
             }
-            // Also where one is not a number.
-            if !(lower < upper) {
+            if lower >= upper || lower.is_nan() || upper.is_nan() {
                 return None;
             }
             if upper.is_finite() {

@@ -12,6 +12,7 @@ use crate::solvers::checkpoint::{ExactF64s, MethodState};
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::iterate::Iterate;
 use crate::solvers::reason::Reason;
+use crate::solvers::settings::QpSolver;
 
 /// Sufficient decrease along the feasible direction.
 const DECREASE: f64 = 1e-4;
@@ -121,12 +122,13 @@ impl ProjectedGradient {
         let mut target: Vec<f64> = (point.parameters.iter().zip(steps))
             .map(|(p, (g, m))| p - self.length * g / m)
             .collect();
-        if constraints.are_simple() {
+        let wants_clarabel = work.qp == QpSolver::Clarabel && !constraints.is_empty();
+        if constraints.are_simple() && !wants_clarabel {
             // In a diagonal metric the projection is clipping.
             constraints.clip(&mut target);
             return Ok(target);
         }
-        if constraints.hold(&target, 0.0) {
+        if constraints.hold(&target, 0.0) && !wants_clarabel {
             return Ok(target);
         }
         let iterations = work.program_iterations;

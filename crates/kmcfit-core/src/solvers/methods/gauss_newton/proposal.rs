@@ -10,6 +10,7 @@ use crate::solvers::iterate::Iterate;
 use crate::solvers::linearization::robust_surplus;
 use crate::solvers::optimality::response_rounding;
 use crate::solvers::reason::Reason;
+use crate::solvers::settings::QpSolver;
 use crate::solvers::timings::timed;
 
 /// Share of the plain step's predicted decrease from which a clipped step is used.
@@ -96,14 +97,18 @@ pub(super) fn propose(
         })
     };
     let iterations = work.program_iterations;
+    if work.qp == QpSolver::Clarabel && !constraints.is_empty() {
+        let solution = work.program(|| sub.solve_within(iterations));
+        return of_program(work, sub, point, &solution, 0.0);
+    }
     // Where noise pushes against bounds they mostly stay active, and the stages take no longer than one plain step.
     let is_pushed = cost > NOISE * work.problem().zero_response_misfit();
     if is_pushed
         && sub.is_active_at_zero(ACTIVE)
         && let Some((solution, excess)) = work.program(|| sub.step_on_stages(iterations))
-        && let Some(proposal) = of_program(work, sub, point, &solution, excess)
+        && let step @ ProposalOutcome::Step(_) = of_program(work, sub, point, &solution, excess)
     {
-        return ProposalOutcome::Step(proposal);
+        return step;
     }
     let plain = work.algebra(|| sub.solve_plain());
     let plain = plain.map(|z| (cost - sub.value(&z), z));
@@ -136,16 +141,10 @@ pub(super) fn propose(
         Some(step) => step,
         None => (sub.solve_within(iterations), 0.0),
     });
-    if !solution.status.is_point() {
-        return ProposalOutcome::Unsolved(solution.status);
-    }
-    match of_program(work, sub, point, &solution, excess) {
-        Some(proposal) => ProposalOutcome::Step(proposal),
-        None => ProposalOutcome::Unsolved(ConicStatus::Stalled),
-    }
+    of_program(work, sub, point, &solution, excess)
 }
 
-/// The step to the solution of a program that may exceed its minimum by `excess`; `None` if it is outside the constraint set or
+/// Step to the solution of a program whose cost may exceed the minimum by `excess`; unsolved if it violates the constraints or
 /// predicts a higher cost.
 fn of_program(
     work: &mut CountedEvaluator,
@@ -153,15 +152,22 @@ fn of_program(
     point: &Iterate,
     solution: &Solution,
     excess: f64,
-) -> Option<Proposal> {
+) -> ProposalOutcome {
+    if !solution.status.is_point() {
+        return ProposalOutcome::Unsolved(solution.status);
+    }
     let (constraints, cost) = (&work.problem().constraints, point.evaluation.cost);
     let parameters = constraints.moved(&point.parameters, &solution.z);
-    let is_inside = constraints.hold(&parameters, constraints::TOLERANCE);
-    is_inside.then_some(())?;
-    // Not the program's own value: its solution satisfies the steps only to its accuracy.
+    if !constraints.hold(&parameters, constraints::TOLERANCE) {
+        return ProposalOutcome::Unsolved(ConicStatus::Stalled);
+    }
+    // The value of the program is not used: its solution satisfies the steps only to the program's accuracy.
     let model = model_cost(work, sub, point, &parameters);
     let predicted = cost - model;
-    (predicted >= -least_decrease(work.problem(), cost)).then(|| Proposal {
+    if predicted < -least_decrease(work.problem(), cost) || predicted.is_nan() {
+        return ProposalOutcome::Unsolved(ConicStatus::Stalled);
+    }
+    ProposalOutcome::Step(Proposal {
         parameters,
         predicted,
         uncertainty: match (solution.status, &solution.kkt) {

@@ -1,0 +1,75 @@
+//! How the state of a stage follows from the coordinates of the stage before.
+
+/// No coordinate.
+pub(super) const NONE: usize = usize::MAX;
+
+/// The transitions `F_i`: rows of the responses, which differ from stage to stage; every other state keeps its value
+/// and adds that of another coordinate, its next difference.
+#[derive(Debug, Clone)]
+pub(super) struct Transitions<const W: usize> {
+    /// Number of response components, the first states.
+    pub responses: usize,
+    /// Rows of the responses, `responses` for each step.
+    pub steps: Vec<[f64; W]>,
+    /// For each state that is no response the coordinate that it adds; [`NONE`] for a constant. States that do not occur are
+    /// beyond the end.
+    pub next: Vec<usize>,
+}
+
+impl<const W: usize> Transitions<W> {
+    /// States in use.
+    pub fn states(&self) -> usize {
+        self.responses + self.next.len()
+    }
+
+    #[inline(always)]
+    pub fn step(&self, i: usize) -> &[[f64; W]] {
+        &self.steps[i * self.responses..(i + 1) * self.responses]
+    }
+
+    /// `F_i xi`.
+    #[inline(always)]
+    pub fn forward<const X: usize>(&self, i: usize, xi: &[f64; W]) -> [f64; X] {
+        let mut x = [0.0; X];
+        for (x, row) in x.iter_mut().zip(self.step(i)) {
+            *x = dot(row, xi);
+        }
+        for (k, next) in self.next.iter().enumerate() {
+            let state = self.responses + k;
+            x[state] = match *next {
+                NONE => xi[state],
+                next => xi[state] + xi[next],
+            };
+        }
+        x
+    }
+
+    /// Adds `F_i' p`.
+    #[inline(always)]
+    pub fn backward<const X: usize>(&self, i: usize, p: &[f64; X], out: &mut [f64; W]) {
+        for (p, row) in p.iter().zip(self.step(i)) {
+            for (out, a) in out.iter_mut().zip(row) {
+                *out += p * a;
+            }
+        }
+        for (k, next) in self.next.iter().enumerate() {
+            let state = self.responses + k;
+            out[state] += p[state];
+            if *next != NONE {
+                out[*next] += p[state];
+            }
+        }
+    }
+}
+
+/// The product of two vectors, in four sums side by side.
+#[inline(always)]
+pub(super) fn dot<const W: usize>(a: &[f64; W], b: &[f64; W]) -> f64 {
+    let mut sums = [0.0; 4];
+    for (a, b) in a.chunks_exact(4).zip(b.chunks_exact(4)) {
+        for k in 0..4 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    (sums[0] + sums[2]) + (sums[1] + sums[3])
+}
