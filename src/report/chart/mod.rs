@@ -1,7 +1,7 @@
 //! Charts: the data model of a figure, and its two renderers.
 //!
-//! [`figure`] and [`plot_mark`] describe what a figure shows. `layout`, `panel`, `legend`, `axis` and `curve` turn it into plain
-//! shapes in pixels, which [`svg`] writes; `data` writes the same description as numbers for the script of a page.
+//! [`figure`] and [`plot_mark`] describe the contents of a figure. `layout`, `panel`, `legend`, `axis` and `curve` turn it
+//! into primitives in pixels, which [`svg`] writes; `data` serialises the same description for the script of a page.
 
 mod axis;
 mod curve;
