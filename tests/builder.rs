@@ -172,11 +172,11 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             Builder::new(system()).record(short().velocity(&times, &values)),
-            "experiments[0]: readings of the velocity need a sigma",
+            "experiments[0]: samples of the velocity need a sigma",
         ),
         (
             Builder::new(system()).record(short().displacement(&times[..2], &values[..2])),
-            "grid.nodes: invalid number of nodes\n  found: 2",
+            "grid.nodes: this number of nodes cannot be used\n  found: 2",
         ),
         (
             Builder::new(system()).record(short().displacement(&[0.0, 0.1, 2.0], &values)),
@@ -188,7 +188,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             Builder::new(system()).record(record().validation()),
-            "experiments: every experiment is a validation record",
+            "experiments: all experiments are validation records",
         ),
         (
             Builder::new(system()).record(record().force(&times, &values)),
@@ -231,7 +231,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             mass(one()).nodes(usize::MAX),
-            "grid.nodes: invalid number of nodes\n  found: 18446744073709551615",
+            "grid.nodes: this number of nodes cannot be used\n  found: 18446744073709551615",
         ),
         (
             mass(CoefficientSpec::estimated(
