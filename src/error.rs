@@ -63,7 +63,7 @@ impl fmt::Display for Location {
 /// An error of input: location, problem, value found, value expected, hint.
 ///
 /// ```
-/// use kmcfit::error::{InputError, Place};
+/// use kmcfit::error::{InputError, Location};
 /// let error = InputError::new(Location::Argument("--nodes".into()), "a grid needs at least 3 nodes")
 ///     .found("2")
 ///     .expected("3 or more");

@@ -76,7 +76,7 @@ enum Dimension {
 /// A unit of one kind of channel: `value in SI = factor * value`.
 ///
 /// ```
-/// use kmcfit::units::{Kind, Unit};
+/// use kmcfit::units::{Quantity, Unit};
 /// let unit = Unit::parse(Quantity::Acceleration, "[g]")?;
 /// assert_eq!((unit.symbol(), unit.factor()), ("g", 9.80665));
 /// assert_eq!(Unit::parse(Quantity::Acceleration, "m/s^2")?.symbol(), "m/s²");

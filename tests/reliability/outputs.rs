@@ -251,7 +251,7 @@ fn other_things_in_the_place_of_the_folder_are_named() {
         ("link/run", "a link"),
         ("link", "a link"),
         ("file", "a file"),
-        ("/dev/null", "a device"),
+        ("/dev/null", "a special file"),
         #[cfg(target_os = "linux")]
         ("/proc/kmcfit", "/proc takes no new folders"),
     ] {
