@@ -10,7 +10,7 @@ use super::yaml_errors;
 use crate::error::InputError;
 use crate::text_io::read_text;
 
-/// What a model file should be, in messages.
+/// Expected contents of a model file, for messages.
 const MODEL_FILE: &str = "a model file (YAML)";
 
 /// Most experiments. Each reads its own files, so a short text could need more memory than is available.

@@ -8,7 +8,7 @@ use serde_yaml::{Mapping, Value};
 use std::fmt;
 use std::path::Path;
 
-/// What the value of an override may be, in messages.
+/// Expected value of an override, for messages.
 const VALUE: &str = "a value as in a model file: 50, constant, {order: 2, weight: 0.1}, …";
 
 /// An override: a key of the model file and its new value.

@@ -17,7 +17,7 @@ use kmcfit_core::internals::record::{
 use kmcfit_core::internals::system::State;
 use std::time::Duration;
 
-/// What `study` looks into.
+/// Settings of the analyses of `study`.
 #[derive(Debug, Clone)]
 pub struct StudyPlan {
     /// Confidence of bands and intervals, between 0 and 1.

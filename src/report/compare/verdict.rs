@@ -47,7 +47,7 @@ impl ResponseFit {
         }
     }
 
-    /// Whether the response counts as fitted; a chi-square by the discrepancy rule: at most its mean plus twice its standard
+    /// True if the response counts as fitted: a chi-square by the discrepancy rule: at most its mean plus twice its standard
     /// deviation.
     pub fn is_matched(&self) -> bool {
         match *self {

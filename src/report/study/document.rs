@@ -35,7 +35,7 @@ pub struct StudyDocument {
     pub profiles: Vec<ProfileRecord>,
     /// Data-consistent extremes of functions and ratios.
     pub extremes: Vec<ExtremesRecord>,
-    /// Whether penalties limit the roughness of the extremes.
+    /// True if penalties limit the roughness of the extremes.
     pub roughness_limited: bool,
     /// Equivalent systems: other coefficients with the same response.
     pub equivalent_systems: Vec<EquivalentSystemRecord>,

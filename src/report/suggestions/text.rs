@@ -40,17 +40,7 @@ impl fmt::Display for Suggestion {
                 channel,
                 fit,
                 is_white,
-            } => {
-                let noise = match is_white {
-                    true => "white",
-                    false => "nearly white",
-                };
-                let fit = percent(*fit, 0);
-                write!(
-                    f,
-                    "{channel}: fit {fit}, but the residuals are {noise}: measurement noise limits the fit, not the model"
-                )
-            }
+            } => write_noise_limited(f, channel, *fit, *is_white),
             Suggestion::Mismatch {
                 channel,
                 fit,
@@ -91,6 +81,24 @@ impl fmt::Display for Suggestion {
             ),
         }
     }
+}
+
+/// A fit that is limited by the noise of a channel.
+fn write_noise_limited(
+    f: &mut fmt::Formatter<'_>,
+    channel: &str,
+    fit: f64,
+    is_white: bool,
+) -> fmt::Result {
+    let noise = match is_white {
+        true => "white",
+        false => "nearly white",
+    };
+    let fit = percent(fit, 0);
+    write!(
+        f,
+        "{channel}: fit {fit}, but the residuals are {noise}: measurement noise limits the fit, not the model"
+    )
 }
 
 /// The channel and its poor fit.

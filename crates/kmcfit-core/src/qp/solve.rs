@@ -58,7 +58,7 @@ pub struct Solution {
 }
 
 /// Settings of one run of the interior-point method.
-struct Attempt {
+struct ClarabelAttempt {
     /// Regularisation of the diagonal of its systems.
     regularisation: f64,
     units: Units,
@@ -76,24 +76,24 @@ enum Units {
 /// Settings in the order of the attempts. No regularisation suits all programs: a large one exceeds the small coefficients of heavily weighted
 /// residuals, a small one leaves nearly singular systems. The first solves most programs of the shipped models; the normalised ones are for
 /// rows and variables of very different units.
-const ATTEMPTS: [Attempt; 5] = [
-    Attempt {
+const ATTEMPTS: [ClarabelAttempt; 5] = [
+    ClarabelAttempt {
         regularisation: 1e-14,
         units: Units::Own,
     },
-    Attempt {
+    ClarabelAttempt {
         regularisation: 1e-8,
         units: Units::Own,
     },
-    Attempt {
+    ClarabelAttempt {
         regularisation: 1e-8,
         units: Units::Normalised,
     },
-    Attempt {
+    ClarabelAttempt {
         regularisation: 1e-12,
         units: Units::Normalised,
     },
-    Attempt {
+    ClarabelAttempt {
         regularisation: 1e-10,
         units: Units::Own,
     },

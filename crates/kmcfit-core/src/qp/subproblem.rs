@@ -213,7 +213,7 @@ impl Subproblem {
         rows && self.cones.iter().all(|cone| cone.violation(z) <= tolerance)
     }
 
-    /// Whether an inequality is active at zero: its bound is nearer than `share` of the largest distance of a bound, each
+    /// True if an inequality is active at zero: its bound is nearer than `share` of the largest distance of a bound, each
     /// in units of the row's largest coefficient.
     pub fn is_active_at_zero(&self, share: f64) -> bool {
         let bounds = self.inequalities.right().iter().zip(&self.upper);

@@ -1,6 +1,6 @@
 //! Rows and cones of constraints on the coefficient functions.
 //!
-//! Where every function in a constraint is linear between its knots, the constraint is imposed at the ends of all pieces and
+//! A constraint on functions that are linear between their knots is imposed at the ends of all pieces and
 //! holds **at all times**: `nodal`, `constant`, `piecewise-constant` and `piecewise-linear` functions, lines, slopes of
 //! parabolas, and curvatures of cubic splines. Values and slopes of other polynomials and of splines are constrained at every
 //! node, where the equation of motion uses them, but **not between nodes**.

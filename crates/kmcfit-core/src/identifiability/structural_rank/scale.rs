@@ -112,42 +112,12 @@ impl CommonScale {
             Symmetry::ConstantFactor if held => Symmetry::None,
             other => other,
         };
-        let sentence = match left {
-            Symmetry::None => format!(
-                "{where_free}: the records do not determine the scale of {symbols}; {} it",
-                match (reference, held, smooth.is_some()) {
-                    (true, ..) => "a reference determines",
-                    (_, true, true) => "a constraint on a value or mean and a penalty determine",
-                    (_, true, false) => "a constraint on a value or mean determines",
-                    _ => "a penalty and the force at other times determine",
-                }
-            ),
-            Symmetry::ConstantFactor => format!(
-                "{where_free}: {symbols} are determined only up to a common constant factor; fix a function, constrain a \
-                 value or mean, or add a record with a measured force"
-            ),
-            Symmetry::NearlyFunction => format!(
-                "{where_free}: {symbols} are determined only up to a common factor{}, and with bases of many knots a slowly \
-                 varying factor s(t) is hardly identifiable; fix a function, add a penalty, or add a record with a \
-                 measured force",
-                match held {
-                    true => " whose mean a constraint determines",
-                    false => "",
-                }
-            ),
-            Symmetry::Function => format!(
-                "{where_free}: {symbols} are determined only up to a common factor s(t){}; fix a function, add a penalty, or \
-                 add a record with a measured force {}",
-                match held {
-                    true => " (a constraint on a value or mean determines only a constant factor)",
-                    false => "",
-                },
-                match partly {
-                    true => "at these times",
-                    false => "at all times",
-                }
-            ),
-        };
+        let sentence = scale_sentence(
+            left,
+            &symbols,
+            &where_free,
+            [reference, held, smooth.is_some(), partly],
+        );
         let kind = match left {
             Symmetry::None => RankFindingKind::ScaleConstrained,
             Symmetry::ConstantFactor => RankFindingKind::ConstantScaleFree,
@@ -245,4 +215,50 @@ fn smoothness(problem: &Problem, component: &Component) -> Option<usize> {
         .filter(|v| v.weight > 0.0 && mine(&v.function))
         .map(|_| 1);
     penalties.chain(variations).min()
+}
+
+/// The sentence about the scale that is left, by whether there is a reference, a constraint that determines a constant factor, a
+/// penalty, and a force at other times.
+fn scale_sentence(
+    left: Symmetry,
+    symbols: &str,
+    where_free: &str,
+    [reference, held, smooth, partly]: [bool; 4],
+) -> String {
+    match left {
+        Symmetry::None => format!(
+            "{where_free}: the records do not determine the scale of {symbols}; {} it",
+            match (reference, held, smooth) {
+                (true, ..) => "a reference determines",
+                (_, true, true) => "a constraint on a value or mean and a penalty determine",
+                (_, true, false) => "a constraint on a value or mean determines",
+                _ => "a penalty and the force at other times determine",
+            }
+        ),
+        Symmetry::ConstantFactor => format!(
+            "{where_free}: {symbols} are determined only up to a common constant factor; fix a function, constrain a \
+                 value or mean, or add a record with a measured force"
+        ),
+        Symmetry::NearlyFunction => format!(
+            "{where_free}: {symbols} are determined only up to a common factor{}, and with bases of many knots a slowly \
+                 varying factor s(t) is hardly identifiable; fix a function, add a penalty, or add a record with a \
+                 measured force",
+            match held {
+                true => " whose mean a constraint determines",
+                false => "",
+            }
+        ),
+        Symmetry::Function => format!(
+            "{where_free}: {symbols} are determined only up to a common factor s(t){}; fix a function, add a penalty, or \
+                 add a record with a measured force {}",
+            match held {
+                true => " (a constraint on a value or mean determines only a constant factor)",
+                false => "",
+            },
+            match partly {
+                true => "at these times",
+                false => "at all times",
+            }
+        ),
+    }
 }

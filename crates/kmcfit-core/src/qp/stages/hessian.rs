@@ -134,25 +134,37 @@ impl<A: Arithmetic, const X: usize, const W: usize> CostToGo<A, X, W> {
                 }
             }
         }
+        h.add_corner(&of_controls, transitions, steps, controls);
+        h
+    }
+
+    /// Adds `F_i' P F_i` of the controls among themselves, from the columns of `P F_i` in the controls.
+    #[inline(always)]
+    fn add_corner(
+        &mut self,
+        columns: &[[Eight<A>; BLOCKS]; CONTROLS],
+        transitions: &Transitions<W>,
+        steps: &[[f64; W]],
+        controls: usize,
+    ) {
         for c in 0..controls {
             let mut column = [0.0; X];
             for b in 0..Self::USED {
-                column[b * LANES..(b + 1) * LANES]
-                    .copy_from_slice(&of_controls[c % CONTROLS][b].row());
+                column[b * LANES..(b + 1) * LANES].copy_from_slice(&columns[c % CONTROLS][b].row());
             }
             for (k, next) in transitions.next.iter().enumerate() {
                 if *next != NONE && *next >= X {
-                    h.corner[(*next - X) % CONTROLS][c % CONTROLS] += column[(responses + k) % X];
+                    self.corner[(*next - X) % CONTROLS][c % CONTROLS] +=
+                        column[(transitions.responses + k) % X];
                 }
             }
             for (q, step) in steps.iter().enumerate() {
                 for other in 0..controls {
-                    h.corner[other % CONTROLS][c % CONTROLS] +=
+                    self.corner[other % CONTROLS][c % CONTROLS] +=
                         step[(X + other) % W] * column[q % X];
                 }
             }
         }
-        h
     }
 
     /// Adds `weight a a'`; a row with a single entry to the diagonal.

@@ -38,14 +38,14 @@ pub(super) struct StageSolution<const W: usize> {
     pub xi: Vec<[f64; W]>,
     /// Multipliers of the constraint rows, for half the cost; zero where none is active.
     pub multipliers: Vec<f64>,
-    /// By how much a Newton step would lower half the Lagrangian, with the curvature of the active rows.
+    /// Decrease of half the Lagrangian by a Newton step with the curvature of the active rows.
     pub decrease: f64,
-    /// `s' lambda`: by how much half the cost may exceed the minimum beside that.
+    /// `s' lambda`: bound of the further excess of half the cost over the minimum.
     pub gap: f64,
 }
 
 /// The iterate of the method.
-struct Iterate<'a, const X: usize, const W: usize> {
+struct InteriorPoint<'a, const X: usize, const W: usize> {
     program: &'a StageProgram<X, W>,
     factor: Factor<X, W>,
     xi: Vec<[f64; W]>,
@@ -56,7 +56,7 @@ struct Iterate<'a, const X: usize, const W: usize> {
     violations: Vec<f64>,
     /// Gradient of half the cost.
     slope: Vec<[f64; W]>,
-    /// That with the terms of the constraint rows.
+    /// Gradient with the terms of the constraint rows.
     gradient: Vec<[f64; W]>,
     step: Vec<[f64; W]>,
     slack_step: Vec<f64>,
@@ -74,7 +74,7 @@ pub(super) fn minimise<const X: usize, const W: usize>(
     iterations: u32,
     share: f64,
 ) -> Option<StageSolution<W>> {
-    let mut iterate = Iterate::new(program);
+    let mut iterate = InteriorPoint::new(program);
     let start = iterate.update_slope();
     let distances = iterate.distances();
     let mut cost = start;
@@ -112,7 +112,7 @@ pub(super) fn minimise<const X: usize, const W: usize>(
     }
 }
 
-impl<'a, const X: usize, const W: usize> Iterate<'a, X, W> {
+impl<'a, const X: usize, const W: usize> InteriorPoint<'a, X, W> {
     /// The known first states and zero controls.
     fn new(program: &'a StageProgram<X, W>) -> Self {
         let rows = program.constraints.len();
@@ -163,7 +163,7 @@ impl<'a, const X: usize, const W: usize> Iterate<'a, X, W> {
         pairs.map(|(s, m)| s * m).sum()
     }
 
-    /// Whether all rows hold.
+    /// True if all rows are satisfied.
     fn is_inside(&self) -> bool {
         let pairs = self.violations.iter().zip(&self.slacks);
         let mut rows = pairs.zip(&self.program.scales);

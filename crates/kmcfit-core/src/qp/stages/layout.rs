@@ -28,7 +28,7 @@ pub struct ResponseVariables {
     pub initial: [Option<usize>; 2],
 }
 
-/// Where a variable acts.
+/// Role and node of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Place {
     /// History `f` at a node.

@@ -17,9 +17,9 @@ use transcription::{Sizes, StageProgram};
 /// A point from the stages.
 pub(super) struct StagePoint {
     pub point: PrimalDual,
-    /// By how much a Newton step would lower half the cost.
+    /// Decrease of half the cost by a Newton step.
     pub decrease: f64,
-    /// By how much half the cost may exceed the minimum beside that.
+    /// Bound of the further excess of half the cost over the minimum.
     pub gap: f64,
 }
 

@@ -27,7 +27,7 @@ pub(super) struct Factor<const X: usize, const W: usize> {
     inverses: Vec<f64>,
     /// `P_0`.
     pub first: [[f64; X]; X],
-    /// Of the last solution: the controls for zero states.
+    /// Controls of the last solution at zero states.
     offsets: Vec<f64>,
 }
 

@@ -72,13 +72,13 @@ pub(super) struct Side {
 pub(super) struct StageProgram<const X: usize, const W: usize> {
     pub stages: usize,
     pub transitions: Transitions<W>,
-    /// What each step of a response adds beside `F_i xi_i`.
+    /// Offsets `f_i` of the steps of the responses.
     pub offsets: Vec<f64>,
     /// `1/2 sum (a' xi - right)^2` is half the cost.
     pub residuals: StageRows,
     /// `a' xi <= right`.
     pub constraints: StageRows,
-    /// Of each constraint row.
+    /// Row of the subproblem and side of each constraint row.
     pub sides: Vec<Side>,
     /// Largest coefficient of each constraint row in the variables.
     pub scales: Vec<f64>,
@@ -90,7 +90,7 @@ pub(super) struct StageProgram<const X: usize, const W: usize> {
     orders: Vec<usize>,
     /// The first constant.
     constants: usize,
-    /// Of each step of a response component its equality.
+    /// Equality of each step of a response component.
     equalities: Vec<usize>,
     /// Equalities that fix a first state.
     fixing: Vec<(usize, usize)>,

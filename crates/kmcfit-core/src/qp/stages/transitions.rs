@@ -1,4 +1,4 @@
-//! How the state of a stage follows from the coordinates of the stage before.
+//! Transitions `x_{i+1} = F_i xi_i` from the coordinates of a stage to the state of the next one.
 
 /// No coordinate.
 pub(super) const NONE: usize = usize::MAX;

@@ -86,7 +86,7 @@ pub struct Extreme {
     pub parameters: Vec<f64>,
     /// Misfit from a new simulation, at most the limit.
     pub misfit: f64,
-    /// How the search ended.
+    /// End of the search.
     pub ended: ExtremeStatus,
     /// Convex programs solved.
     pub programs: usize,

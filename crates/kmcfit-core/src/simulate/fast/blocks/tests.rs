@@ -258,7 +258,7 @@ fn mass_is_required_beyond_the_end_of_a_record() {
     assert_eq!(found, expected);
 }
 
-/// Where the response equals the samples, the derivative of a block's cost is a difference of nearly equal numbers. The
+/// At samples equal to the response the derivative of a block's cost is a difference of nearly equal numbers. The
 /// cancellation error is below the effect of rounding errors of the response on the residuals: the gradients of two
 /// responses that differ by rounding differ more.
 #[test]

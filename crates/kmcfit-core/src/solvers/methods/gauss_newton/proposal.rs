@@ -31,7 +31,7 @@ pub(super) struct Proposal {
     pub predicted: f64,
     /// Bound of the further decrease of the subproblem; 0 where it is solved to full accuracy.
     pub uncertainty: f64,
-    /// Whether the subproblem was solved as accurately as was wanted.
+    /// True if the subproblem was solved to the accuracy of a step.
     pub is_solved: bool,
 }
 
