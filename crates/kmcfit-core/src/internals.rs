@@ -94,7 +94,8 @@ pub mod study {
     pub use crate::study::{
         Choice, EquivalentSystem, Linear, PredictedResponse, PredictionSummary, Profile,
         ProfileSettings, Target, bootstrap, constancy_test, equivalent_coefficients,
-        equivalent_systems, extremes, multistart, predict, prediction, profile, profiles,
+        equivalent_systems, extremes, multistart, predict, prediction, profile, profile_likelihood,
+        profiles,
     };
 }
 pub mod system {

@@ -21,7 +21,7 @@ use kmcfit_core::internals::study::constancy_test::{
 };
 use kmcfit_core::internals::study::extremes::{Extreme, ExtremeStatus, MisfitLimit, envelopes};
 use kmcfit_core::internals::study::multistart::{self, Multistart, Ranges};
-use kmcfit_core::internals::study::profile::{Interval, ProfileSettings};
+use kmcfit_core::internals::study::profile_likelihood::{Interval, ProfileSettings};
 use kmcfit_core::internals::study::{
     Choice, EquivalentSystem, Linear, equivalent_systems, prediction, profile,
 };

@@ -22,11 +22,11 @@ mod functional;
 pub mod multistart;
 mod parallel;
 pub mod prediction;
-pub mod profile;
+pub mod profile_likelihood;
 mod refit;
 mod simulate;
 
 pub use equivalent_systems::{Choice, EquivalentSystem, equivalent_systems};
 pub use free_response::{PredictedResponse, PredictionSummary, predict};
 pub use functional::{Linear, Target};
-pub use profile::{Profile, ProfileSettings, profile, profiles};
+pub use profile_likelihood::{Profile, ProfileSettings, profile, profiles};

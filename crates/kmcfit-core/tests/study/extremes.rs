@@ -8,7 +8,7 @@ use kmcfit_core::internals::solvers::fit_from;
 use kmcfit_core::internals::study::extremes::{
     ExtremeStatus, MisfitLimit, extreme, extreme_pairs, ratios_at, values_at,
 };
-use kmcfit_core::internals::study::profile::QUANTILE_95;
+use kmcfit_core::internals::study::profile_likelihood::QUANTILE_95;
 use kmcfit_core::internals::study::{Linear, ProfileSettings, Target, profile};
 
 fn optimum(problem: &Problem) -> (Vec<f64>, f64) {

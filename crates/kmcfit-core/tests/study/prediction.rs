@@ -5,7 +5,7 @@ use kmcfit_core::internals::solvers::fit_from;
 use kmcfit_core::internals::study::bootstrap::{ReplicateNoise, bootstrap};
 use kmcfit_core::internals::study::extremes::{MisfitLimit, extreme_pairs, ratios_at};
 use kmcfit_core::internals::study::prediction::{PredictionCase, predict};
-use kmcfit_core::internals::study::profile::QUANTILE_95;
+use kmcfit_core::internals::study::profile_likelihood::QUANTILE_95;
 use kmcfit_core::internals::study::{Linear, Target};
 use kmcfit_core::internals::system::{Excitation, State};
 

@@ -10,7 +10,7 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Sensor, Weighting};
 use kmcfit_core::internals::solvers::{fit, fit_from};
 use kmcfit_core::internals::study::extremes::{MisfitLimit, extreme_pairs};
-use kmcfit_core::internals::study::profile::{End, Interval, QUANTILE_95};
+use kmcfit_core::internals::study::profile_likelihood::{End, Interval, QUANTILE_95};
 use kmcfit_core::internals::study::{Linear, Profile, ProfileSettings, Target, profile, profiles};
 use kmcfit_core::internals::system::{Excitation, Method};
 
