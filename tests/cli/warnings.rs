@@ -357,7 +357,10 @@ fn a_force_of_the_wrong_sign_is_thought_of() {
     assert!(right.contains("stiffness is identified"), "{right}");
     assert!(!right.contains("check sign"), "{right}");
     let wrong = fitted(&rows[1], "initial: estimate");
-    assert!(wrong.contains("of the force"), "{wrong}");
+    assert!(
+        wrong.contains("check sign") && wrong.contains("of the force"),
+        "{wrong}"
+    );
     assert!(!wrong.contains("initial: estimate"), "{wrong}");
     let wrong = fitted(&rows[1], "initial: {displacement: 0, velocity: 0}");
     assert!(

@@ -92,15 +92,13 @@ fn program(random: &mut ChaCha8Rng) -> Subproblem {
 fn bounded_programs_have_the_minimum_that_clarabel_finds() {
     let seed = std::env::var("KMCFIT_QP_SEED");
     let seed: u64 = seed.map_or(1, |seed| seed.parse().expect("a whole number"));
-    let (mut bounded, mut refused) = (0, 0);
+    let mut bounded = 0;
     for case in 0..PROGRAMS {
         let mut random = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003) + case);
         let sub = program(&mut random);
         let name = format!("seed {seed}, program {case}");
-        let Some((step, excess)) = sub.step_on_stages(Subproblem::ITERATIONS) else {
-            refused += 1;
-            continue;
-        };
+        let step = sub.step_on_stages(Subproblem::ITERATIONS);
+        let (step, excess) = step.unwrap_or_else(|| panic!("{name}: not solved on stages"));
         let on_stages = sub.solve();
         let other = Subproblem {
             layout: None,
@@ -136,6 +134,4 @@ fn bounded_programs_have_the_minimum_that_clarabel_finds() {
     }
     // The other programs have their minimum inside.
     assert!(bounded > 300, "{bounded} bounded programs");
-    // Where the last Newton steps are lost in rounding, Clarabel takes over: 11 of the programs of seed 1.
-    assert!(refused <= 25, "{refused} refused");
 }

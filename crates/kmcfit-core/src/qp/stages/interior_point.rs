@@ -24,8 +24,8 @@ const GAP: f64 = 1e-12;
 const TO_THE_BOUND: f64 = 0.99;
 /// A step below this share of the Newton step makes no progress.
 const NO_STEP: f64 = 1e-8;
-/// Iterations within which the gap halves: fewer at the limit of the arithmetic only.
-const PATIENCE: u32 = 5;
+/// Iterations without halving the gap after which a search from the active rows ends, and one from the middle of the bounds.
+const PATIENCE: [u32; 2] = [5, 25];
 /// Least slack at the start, relative to the largest.
 const LEAST_SLACK: f64 = 1e-3;
 /// The gap at a start at active rows, relative to the decrease by a step that holds them.
@@ -49,7 +49,7 @@ struct InteriorPoint<'a, const X: usize, const W: usize> {
     program: &'a StageProgram<X, W>,
     factor: Factor<X, W>,
     xi: Vec<[f64; W]>,
-    /// Positive.
+    /// Slacks of the constraint rows, positive.
     slacks: Vec<f64>,
     multipliers: Vec<f64>,
     /// `A xi + s - b`.
@@ -67,8 +67,33 @@ struct InteriorPoint<'a, const X: usize, const W: usize> {
 }
 
 /// Minimises, in at most so many iterations, to a gap of [`GAP`] of the cost or, inside the bounds, of `share` of the decrease
-/// since the start; `None` if a Newton step fails. `estimates` are multipliers of the constraint rows at the start.
+/// since the start; `None` if a Newton step fails. `estimates` are multipliers of the constraint rows at the start. A search from
+/// the active rows that does not converge is repeated from the middle of the bounds.
 pub(super) fn minimise<const X: usize, const W: usize>(
+    program: &StageProgram<X, W>,
+    estimates: &[f64],
+    iterations: u32,
+    share: f64,
+) -> Option<StageSolution<W>> {
+    from_active_rows(program, estimates, iterations, share).or_else(|| {
+        let mut iterate = InteriorPoint::new(program);
+        let start = iterate.update_slope();
+        let distances = iterate.distances();
+        iterate.factorise()?;
+        iterate.newton_step()?;
+        iterate.move_by(1.0);
+        let cost = iterate.update_slope();
+        let at_minimum = iterate.distances();
+        if at_minimum.iter().any(|distance| *distance < 0.0) {
+            iterate.start_inside(&distances, &at_minimum, start - cost);
+            iterate.converge(start, cost, [iterations, PATIENCE[1]], share)?;
+        }
+        iterate.solution()
+    })
+}
+
+/// Minimises from the active rows; `None` if there are none or the search does not converge.
+fn from_active_rows<const X: usize, const W: usize>(
     program: &StageProgram<X, W>,
     estimates: &[f64],
     iterations: u32,
@@ -77,39 +102,9 @@ pub(super) fn minimise<const X: usize, const W: usize>(
     let mut iterate = InteriorPoint::new(program);
     let start = iterate.update_slope();
     let distances = iterate.distances();
-    let mut cost = start;
-    if !iterate.start_at_active_rows(&distances, estimates, cost)? {
-        iterate.weights.fill(0.0);
-        iterate.factors.fill(0.0);
-        iterate.factorise()?;
-        iterate.newton_step()?;
-        iterate.move_by(1.0);
-        cost = iterate.update_slope();
-        let at_minimum = iterate.distances();
-        if at_minimum.iter().all(|distance| *distance >= 0.0) {
-            return iterate.solution();
-        }
-        iterate.start_inside(&distances, &at_minimum, start - cost);
-    }
-    let (mut least, mut since) = (f64::INFINITY, 0);
-    for _ in 0..iterations {
-        let gap = iterate.gap();
-        let is_close = gap <= share * (start - cost) && iterate.is_inside();
-        if gap <= GAP * cost || is_close {
-            return iterate.solution();
-        }
-        since = if gap <= 0.5 * least { 0 } else { since + 1 };
-        least = least.min(gap);
-        if since > PATIENCE || !gap.is_finite() || iterate.predictor_corrector()? <= NO_STEP {
-            break;
-        }
-        cost = iterate.update_slope();
-    }
-    // Few multipliers may be near the estimates: from the middle of the bounds once more.
-    match estimates.is_empty() {
-        true => iterate.solution(),
-        false => minimise(program, &[], iterations, share),
-    }
+    let is_converged = iterate.start_at_active_rows(&distances, estimates, start)?
+        && iterate.converge(start, start, [iterations, PATIENCE[0]], share)?;
+    is_converged.then(|| iterate.solution())?
 }
 
 impl<'a, const X: usize, const W: usize> InteriorPoint<'a, X, W> {
@@ -135,7 +130,32 @@ impl<'a, const X: usize, const W: usize> InteriorPoint<'a, X, W> {
         }
     }
 
-    /// Computes the gradient of half the cost; that.
+    /// Iterates from half the cost `cost`, `start` at zero; true at the gap that was asked for. `None` if a Newton step fails.
+    fn converge(
+        &mut self,
+        start: f64,
+        mut cost: f64,
+        [iterations, patience]: [u32; 2],
+        share: f64,
+    ) -> Option<bool> {
+        let (mut least, mut since) = (f64::INFINITY, 0);
+        for _ in 0..iterations {
+            let gap = self.gap();
+            let is_close = gap <= share * (start - cost) && self.is_inside();
+            if gap <= GAP * cost || is_close {
+                return Some(true);
+            }
+            since = if gap <= 0.5 * least { 0 } else { since + 1 };
+            least = least.min(gap);
+            if since > patience || !gap.is_finite() || self.predictor_corrector()? <= NO_STEP {
+                break;
+            }
+            cost = self.update_slope();
+        }
+        Some(false)
+    }
+
+    /// Updates the gradient of half the cost, and returns half the cost.
     fn update_slope(&mut self) -> f64 {
         let rows = &self.program.residuals;
         let mut sum = 0.0;
@@ -212,7 +232,7 @@ impl<'a, const X: usize, const W: usize> InteriorPoint<'a, X, W> {
         }
         self.factorise()?;
         self.newton_step()?;
-        // Of this point with the estimates: what rows that push would bring if it moved to their bounds.
+        // Complementarity of this point with the estimates.
         let pairs = distances.iter().zip(estimates);
         let gap = pairs
             .map(|(distance, m)| distance.max(0.0) * m)
@@ -301,14 +321,11 @@ impl<'a, const X: usize, const W: usize> InteriorPoint<'a, X, W> {
         }
         self.factorise()?;
         self.newton_step()?;
-        self.program
-            .constraints
-            .products(&self.step, &mut self.products);
+        self.update_slack_step();
         for k in 0..count {
-            self.slack_step[k] = -self.violations[k] - self.products[k];
             self.multiplier_step[k] = -self.multipliers[k] - self.weights[k] * self.slack_step[k];
         }
-        // How far complementarity would fall: the less, the more the corrector centres.
+        // The smaller the decrease of the gap by the predictor, the larger the target of the corrector.
         let length = self.longest_step(1.0);
         let mut ahead = 0.0;
         for k in 0..count {
@@ -317,17 +334,14 @@ impl<'a, const X: usize, const W: usize> InteriorPoint<'a, X, W> {
         }
         let target = (ahead / gap).powi(3) * gap / count as f64;
         for k in 0..count {
-            // What the step left out of the product of slack and multiplier, and the target.
+            // Second-order term of the product of slack and multiplier.
             let correction = self.slack_step[k] * self.multiplier_step[k];
             self.multiplier_step[k] = (target - correction) / self.slacks[k];
             self.factors[k] += self.multiplier_step[k];
         }
         self.newton_step()?;
-        self.program
-            .constraints
-            .products(&self.step, &mut self.products);
+        self.update_slack_step();
         for k in 0..count {
-            self.slack_step[k] = -self.violations[k] - self.products[k];
             self.multiplier_step[k] -= self.multipliers[k] + self.weights[k] * self.slack_step[k];
         }
         let length = self.longest_step(TO_THE_BOUND);
@@ -338,6 +352,16 @@ impl<'a, const X: usize, const W: usize> InteriorPoint<'a, X, W> {
         }
         self.update_violations();
         Some(length)
+    }
+
+    /// Changes of the slacks by the step of the coordinates: the violations vanish at its full length.
+    fn update_slack_step(&mut self) {
+        let rows = &self.program.constraints;
+        rows.products(&self.step, &mut self.products);
+        let pairs = self.violations.iter().zip(&self.products);
+        for (step, (violation, product)) in self.slack_step.iter_mut().zip(pairs) {
+            *step = -violation - product;
+        }
     }
 
     /// The longest step, at most 1, that goes `share` of the way to the nearest bound.
