@@ -39,14 +39,26 @@ impl RowGroup {
 }
 
 impl Cone {
-    /// Violation of the cone at `z`, relative to the size of its components; not positive inside.
-    pub fn violation(&self, z: &[f64]) -> f64 {
+    /// Values `rows z - right`: the bound, then the components of the norm.
+    pub fn parts(&self, z: &[f64]) -> Vec<f64> {
         let values = self.rows.multiply(z);
-        let parts: Vec<f64> = values
-            .iter()
-            .zip(self.rows.right())
-            .map(|(v, r)| v - r)
-            .collect();
+        let pairs = values.iter().zip(self.rows.right());
+        pairs.map(|(value, right)| value - right).collect()
+    }
+
+    /// Scale of the cone: the largest size of a right-hand side, or sum of the sizes of a row's terms. At the apex, where all parts
+    /// vanish, their rounding errors are relative to it.
+    pub fn scale(&self, z: &[f64]) -> f64 {
+        let row = |i: usize| {
+            let terms: f64 = self.rows.row(i).map(|(j, a)| (a * z[j]).abs()).sum();
+            terms.max(self.rows.right()[i].abs())
+        };
+        (0..self.rows.len()).map(row).fold(0.0, f64::max)
+    }
+
+    /// Violation of the cone at `z`, relative to its scale; not positive inside.
+    pub fn violation(&self, z: &[f64]) -> f64 {
+        let parts = self.parts(z);
         let Some((bound, parts)) = parts.split_first() else {
             return 0.0;
         };
@@ -54,7 +66,7 @@ impl Cone {
         if (norm - bound).is_nan() {
             return f64::INFINITY;
         }
-        (norm - bound) / norm.max(bound.abs()).max(f64::MIN_POSITIVE)
+        (norm - bound) / self.scale(z).max(f64::MIN_POSITIVE)
     }
 }
 

@@ -28,7 +28,8 @@ pub struct Kkt {
     pub complementarity: f64,
     /// Cost of the violations, `sum |multiplier| violation / S`.
     pub violation_cost: f64,
-    /// Largest violation of a row, relative to the larger of its bound and `sum_j |a_j| X_j`; of a cone relative to the larger of its parts.
+    /// Largest violation of a row, relative to the larger of its bound and `sum_j |a_j| X_j`; of a cone relative to
+    /// the largest of these over its rows.
     pub feasibility: f64,
 }
 
@@ -113,7 +114,7 @@ impl Subproblem {
         let stationarity = if near < within { near } else { within };
         let mut rows = RowResiduals::default();
         self.add_rows(&candidate, &natural, &mut rows);
-        self.add_cones(&candidate, &mut rows);
+        self.add_cones(&candidate, &natural, &mut rows);
         // With zero cost at the point and at zero, the shares are zero.
         let share = |x: f64| if x == 0.0 { 0.0 } else { x / scale };
         Kkt {
@@ -231,20 +232,15 @@ impl Subproblem {
         }
     }
 
-    fn add_cones(&self, candidate: &PrimalDual, sums: &mut RowResiduals) {
+    fn add_cones(&self, candidate: &PrimalDual, natural: &[f64], sums: &mut RowResiduals) {
         for (cone, multipliers) in self.cones.iter().zip(&candidate.cones) {
-            let values = cone.rows.multiply(&candidate.z);
-            let parts: Vec<f64> = values
-                .iter()
-                .zip(cone.rows.right())
-                .map(|(v, r)| v - r)
-                .collect();
+            let parts = cone.parts(&candidate.z);
             let Some((bound, parts)) = parts.split_first() else {
                 continue;
             };
             let norm = parts.iter().map(|p| p * p).sum::<f64>().sqrt();
             let outside = (norm - bound).max(0.0);
-            sums.violate(outside, norm.max(bound.abs()), multipliers[0]);
+            sums.violate(outside, cone.scale(natural), multipliers[0]);
             let products = std::iter::once(bound).chain(parts).zip(multipliers);
             let inner: f64 = products.map(|(s, c)| s * c).sum();
             sums.complementarity += inner.abs();

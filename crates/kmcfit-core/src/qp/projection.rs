@@ -1,6 +1,6 @@
 //! Constraints of a problem as rows of a subproblem, and the projection onto them.
 
-use super::{ConicStatus, Solution, Subproblem};
+use super::{ConicStatus, Solution, StageLayout, Subproblem};
 use crate::constraints::{Cone, Constraints, RowGroup, Rows};
 
 /// Row of a subproblem that represents a row of a group, for the assignment of its multiplier.
@@ -72,17 +72,19 @@ pub struct Projection {
 /// Projects `theta` onto the constraints in the diagonal metric `metric`:
 /// minimises `sum_j metric_j (theta'_j - theta_j)^2`.
 pub fn project(constraints: &Constraints, theta: &[f64], metric: &[f64]) -> Projection {
-    project_within(Subproblem::ITERATIONS, constraints, theta, metric)
+    project_within(Subproblem::ITERATIONS, constraints, theta, metric, None)
 }
 
-/// [`project`] with an iteration limit of the quadratic program.
+/// [`project`] with an iteration limit of the quadratic program, and the parameters in time where they are known.
 pub fn project_within(
     iterations: u32,
     constraints: &Constraints,
     theta: &[f64],
     metric: &[f64],
+    layout: Option<StageLayout>,
 ) -> Projection {
     let mut sub = Subproblem::new(theta.len());
+    sub.layout = layout;
     sub.proximal.copy_from_slice(metric);
     let places = sub.constrain(constraints, theta);
     let solution = sub.solve_within(iterations);

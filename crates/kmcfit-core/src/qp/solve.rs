@@ -140,9 +140,8 @@ impl Subproblem {
         let is_usable = iterations > 0 && self.layout.is_some() && self.is_finite();
         is_usable.then_some(())?;
         let found = self.minimise_on_stages(iterations, Self::STEP_GAP)?;
-        let decrease = self.value(&vec![0.0; self.variables]) - self.value(&found.point.z);
         let excess = 2.0 * (found.gap + found.decrease);
-        if excess <= 2.0 * Self::STEP_GAP * decrease {
+        if excess <= 4.0 * Self::STEP_GAP * found.fall {
             return Some((self.unjudged(found.point), excess));
         }
         let kkt = self.kkt_with_decrease(&found.point, found.decrease);
@@ -267,7 +266,7 @@ impl Subproblem {
             status: ConicStatus::Solved,
             multipliers: point.inequalities,
             equality_multipliers: point.equalities,
-            cone_multipliers: Vec::new(),
+            cone_multipliers: point.cones.iter().map(|cone| cone[0]).collect(),
             z: point.z,
             kkt: None,
             attempts: 1,

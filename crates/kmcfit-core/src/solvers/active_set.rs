@@ -2,7 +2,7 @@
 
 use crate::constraints::{Cone, ConeGroup, RowGroup};
 use crate::problem::Problem;
-use crate::qp::Subproblem;
+use crate::qp::{StageLayout, Subproblem};
 use crate::solvers::iterate::Iterate;
 
 /// Largest distance from the bound of an active row, relative to its scale; larger than the accuracy with which a quadratic
@@ -168,6 +168,7 @@ fn multipliers(problem: &Problem, point: &Iterate) -> Option<Multipliers> {
         .map(|(g, m)| (g / m.sqrt()).abs());
     let scale = steepest.fold(f64::MIN_POSITIVE.sqrt(), f64::max);
     let mut sub = Subproblem::new(metric.len());
+    sub.layout = StageLayout::of(&problem.functions);
     for (j, (m, g)) in metric.iter().zip(gradient).enumerate() {
         let root = m.sqrt();
         sub.residuals.push([(j, root)], -g / (root * scale));

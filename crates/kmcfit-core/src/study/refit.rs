@@ -2,7 +2,7 @@
 
 use crate::objective::GradientKind;
 use crate::problem::Problem;
-use crate::qp::project;
+use crate::qp::{StageLayout, Subproblem, project_within};
 use crate::simd::sum::rms;
 use crate::solvers::{FitSettings, Initial, Solver, Stopping};
 
@@ -67,6 +67,8 @@ pub fn nearest(problem: &Problem, theta: &[f64], sizes: &[f64]) -> Option<Vec<f6
         return holds.then_some(clipped);
     }
     let metric: Vec<f64> = sizes.iter().map(|s| 1.0 / (s * s)).collect();
-    let projection = project(&problem.constraints, theta, &metric);
+    let layout = StageLayout::of(&problem.functions);
+    let iterations = Subproblem::ITERATIONS;
+    let projection = project_within(iterations, &problem.constraints, theta, &metric, layout);
     projection.status.is_point().then_some(projection.theta)
 }

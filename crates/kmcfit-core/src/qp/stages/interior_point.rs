@@ -13,21 +13,24 @@
 //! Source: S. Mehrotra, SIAM J. Optim. 2 (1992) 575-601; C. V. Rao, S. J. Wright, J. B. Rawlings, J. Optim. Theory Appl. 99
 //! (1998) 723-757 for the recursion.
 
+use super::absolute_values::AbsoluteValues;
+use super::barrier::Barrier;
+use super::bounds::Bounds;
+use super::cones::Cones;
 use super::riccati::Factor;
 use super::transcription::StageProgram;
-use crate::constraints::TOLERANCE;
 
 /// Gap between the cost and its lower bound, relative to the cost, at which an iterate is a solution: a three hundredth of
 /// the accuracy that a solution needs ([`crate::qp::Kkt::COST`]).
 const GAP: f64 = 1e-12;
+/// The same with cones: rounding errors of the slacks, relative to their distance from the cone, are those of the multipliers.
+const CONE_GAP: f64 = 3e-11;
 /// Share of the way to the nearest bound that a step takes.
 const TO_THE_BOUND: f64 = 0.99;
 /// A step below this share of the Newton step makes no progress.
 const NO_STEP: f64 = 1e-8;
 /// Iterations without halving the gap after which a search from the active rows ends, and one from the middle of the bounds.
 const PATIENCE: [u32; 2] = [5, 25];
-/// Least slack at the start, relative to the largest.
-const LEAST_SLACK: f64 = 1e-3;
 /// The gap at a start at active rows, relative to the decrease by a step that holds them.
 const WARM_GAP: f64 = 0.3;
 /// Distance within which a row counts as active there, relative to the largest one in units of the rows.
@@ -38,9 +41,15 @@ pub(super) struct StageSolution<const W: usize> {
     pub xi: Vec<[f64; W]>,
     /// Multipliers of the constraint rows, for half the cost; zero where none is active.
     pub multipliers: Vec<f64>,
+    /// Multipliers of the rows of the cones.
+    pub cones: Vec<f64>,
+    /// Multipliers of the absolute values.
+    pub absolute: Vec<f64>,
     /// Decrease of half the Lagrangian by a Newton step with the curvature of the active rows.
     pub decrease: f64,
-    /// `s' lambda`: bound of the further excess of half the cost over the minimum.
+    /// By how much half the cost is below that of zero controls.
+    pub fall: f64,
+    /// Sum of the products of slacks and multipliers: bound of the further excess of half the cost over the minimum.
     pub gap: f64,
 }
 
@@ -48,22 +57,16 @@ pub(super) struct StageSolution<const W: usize> {
 struct InteriorPoint<'a, const X: usize, const W: usize> {
     program: &'a StageProgram<X, W>,
     factor: Factor<X, W>,
+    is_factorised: bool,
     xi: Vec<[f64; W]>,
-    /// Slacks of the constraint rows, positive.
-    slacks: Vec<f64>,
-    multipliers: Vec<f64>,
-    /// `A xi + s - b`.
-    violations: Vec<f64>,
-    /// Gradient of half the cost.
+    bounds: Bounds<'a>,
+    cones: Cones<'a>,
+    absolute: AbsoluteValues<'a>,
+    /// Gradient of half the sum of squares.
     slope: Vec<[f64; W]>,
-    /// Gradient with the terms of the constraint rows.
+    /// Gradient with the terms of the rows.
     gradient: Vec<[f64; W]>,
     step: Vec<[f64; W]>,
-    slack_step: Vec<f64>,
-    multiplier_step: Vec<f64>,
-    products: Vec<f64>,
-    weights: Vec<f64>,
-    factors: Vec<f64>,
 }
 
 /// Minimises, in at most so many iterations, to a gap of [`GAP`] of the cost or, inside the bounds, of `share` of the decrease
@@ -76,19 +79,23 @@ pub(super) fn minimise<const X: usize, const W: usize>(
     share: f64,
 ) -> Option<StageSolution<W>> {
     from_active_rows(program, estimates, iterations, share).or_else(|| {
-        let mut iterate = InteriorPoint::new(program);
-        let start = iterate.update_slope();
-        let distances = iterate.distances();
+        let (mut iterate, start) = InteriorPoint::new(program);
+        let [distances, values] = iterate.distances();
+        iterate.predict_absolute_values();
         iterate.factorise()?;
         iterate.newton_step()?;
         iterate.move_by(1.0);
         let cost = iterate.update_slope();
-        let at_minimum = iterate.distances();
-        if at_minimum.iter().any(|distance| *distance < 0.0) {
-            iterate.start_inside(&distances, &at_minimum, start - cost);
-            iterate.converge(start, cost, [iterations, PATIENCE[1]], share)?;
+        let [at_minimum, values_there] = iterate.distances();
+        if iterate.is_bounded(&at_minimum) {
+            let mean = (start - cost).max(GAP * start) / iterate.degree() as f64;
+            iterate.bounds.start_inside(&distances, &at_minimum, mean);
+            iterate.cones.start(&values, &values_there, mean);
+            iterate.absolute.start(&iterate.xi, mean);
+            iterate.update_violations();
+            iterate.converge(start, cost, [iterations, PATIENCE[1]], share);
         }
-        iterate.solution()
+        Some(iterate.solution(start))
     })
 }
 
@@ -99,63 +106,85 @@ fn from_active_rows<const X: usize, const W: usize>(
     iterations: u32,
     share: f64,
 ) -> Option<StageSolution<W>> {
-    let mut iterate = InteriorPoint::new(program);
-    let start = iterate.update_slope();
-    let distances = iterate.distances();
-    let is_converged = iterate.start_at_active_rows(&distances, estimates, start)?
-        && iterate.converge(start, start, [iterations, PATIENCE[0]], share)?;
-    is_converged.then(|| iterate.solution())?
+    let (mut iterate, start) = InteriorPoint::new(program);
+    iterate.start_at_active_rows(estimates, start)?;
+    let is_converged = iterate.converge(start, start, [iterations, PATIENCE[0]], share);
+    is_converged.then(|| iterate.solution(start))
 }
 
 impl<'a, const X: usize, const W: usize> InteriorPoint<'a, X, W> {
-    /// The known first states and zero controls.
-    fn new(program: &'a StageProgram<X, W>) -> Self {
-        let rows = program.constraints.len();
+    /// The known first states and zero controls, and half the cost there.
+    fn new(program: &'a StageProgram<X, W>) -> (Self, f64) {
         let zeros = vec![[0.0; W]; program.stages];
-        Self {
+        let xi = program.uncontrolled();
+        let mut iterate = Self {
             program,
             factor: Factor::new(program.stages, program.controls()),
-            xi: program.uncontrolled(),
+            is_factorised: false,
+            bounds: Bounds::new(&program.constraints, &program.scales),
+            cones: Cones::new(&program.cones, &program.cone_rows),
+            absolute: AbsoluteValues::new(&program.absolute, &program.absolute_costs),
+            xi,
             slope: zeros.clone(),
             gradient: zeros.clone(),
             step: zeros,
-            slacks: vec![1.0; rows],
-            multipliers: vec![0.0; rows],
-            violations: vec![0.0; rows],
-            slack_step: vec![0.0; rows],
-            multiplier_step: vec![0.0; rows],
-            products: Vec::with_capacity(rows),
-            weights: vec![0.0; rows],
-            factors: vec![0.0; rows],
-        }
+        };
+        let cost = iterate.update_slope();
+        let mean = cost / iterate.degree().max(1) as f64;
+        iterate.absolute.start(&iterate.xi, mean);
+        (iterate, cost)
     }
 
-    /// Iterates from half the cost `cost`, `start` at zero; true at the gap that was asked for. `None` if a Newton step fails.
+    /// Weights and factors of the absolute values with multipliers of zero.
+    fn predict_absolute_values(&mut self) {
+        Barrier::<W>::predict(&mut self.absolute);
+    }
+
+    fn barriers(&self) -> [&dyn Barrier<W>; 3] {
+        [&self.bounds, &self.cones, &self.absolute]
+    }
+
+    fn barriers_mut(&mut self) -> [&mut dyn Barrier<W>; 3] {
+        [&mut self.bounds, &mut self.cones, &mut self.absolute]
+    }
+
+    /// Iterates from half the cost `cost`, `start` at zero; true at the gap that was asked for, false if the iterations end or a Newton
+    /// step fails before.
     fn converge(
         &mut self,
         start: f64,
         mut cost: f64,
         [iterations, patience]: [u32; 2],
         share: f64,
-    ) -> Option<bool> {
+    ) -> bool {
         let (mut least, mut since) = (f64::INFINITY, 0);
+        let relative = match self.program.cone_order.is_empty() {
+            true => GAP,
+            false => CONE_GAP,
+        };
         for _ in 0..iterations {
             let gap = self.gap();
-            let is_close = gap <= share * (start - cost) && self.is_inside();
-            if gap <= GAP * cost || is_close {
-                return Some(true);
+            let rough = share * (start - cost);
+            if gap <= relative * cost
+                || (gap <= rough && self.is_inside() && self.excess() <= rough)
+            {
+                return true;
             }
             since = if gap <= 0.5 * least { 0 } else { since + 1 };
             least = least.min(gap);
-            if since > patience || !gap.is_finite() || self.predictor_corrector()? <= NO_STEP {
+            let length = match since <= patience && gap.is_finite() {
+                true => self.predictor_corrector(),
+                false => None,
+            };
+            if length.is_none_or(|length| length <= NO_STEP) {
                 break;
             }
             cost = self.update_slope();
         }
-        Some(false)
+        false
     }
 
-    /// Updates the gradient of half the cost, and returns half the cost.
+    /// Updates the gradient of half the sum of squares, and returns half the cost.
     fn update_slope(&mut self) -> f64 {
         let rows = &self.program.residuals;
         let mut sum = 0.0;
@@ -167,69 +196,60 @@ impl<'a, const X: usize, const W: usize> InteriorPoint<'a, X, W> {
                 rows.add_multiple(row, residual, slope);
             }
         }
-        0.5 * sum
+        let others = self.barriers().map(|terms| terms.cost(&self.xi));
+        0.5 * sum + others.iter().sum::<f64>()
     }
 
-    /// `b - A xi`.
-    fn distances(&mut self) -> Vec<f64> {
-        let rows = &self.program.constraints;
-        rows.products(&self.xi, &mut self.products);
-        let pairs = rows.right.iter().zip(&self.products);
-        pairs.map(|(right, product)| right - product).collect()
+    /// Distances from the linear bounds, and the components of the cones.
+    fn distances(&mut self) -> [Vec<f64>; 2] {
+        [self.bounds.distances(&self.xi), self.cones.values(&self.xi)]
+    }
+
+    /// True if a bound or cone is violated, given the distances, or there are absolute values.
+    fn is_bounded(&self, distances: &[f64]) -> bool {
+        let is_outside = distances.iter().any(|distance| *distance < 0.0);
+        is_outside || !self.program.absolute_costs.is_empty() || !self.program.cone_order.is_empty()
     }
 
     fn gap(&self) -> f64 {
-        let pairs = self.slacks.iter().zip(&self.multipliers);
-        pairs.map(|(s, m)| s * m).sum()
+        self.barriers().iter().map(|terms| terms.gap()).sum()
     }
 
-    /// True if all rows are satisfied.
+    fn degree(&self) -> usize {
+        self.barriers().iter().map(|terms| terms.degree()).sum()
+    }
+
     fn is_inside(&self) -> bool {
-        let pairs = self.violations.iter().zip(&self.slacks);
-        let mut rows = pairs.zip(&self.program.scales);
-        rows.all(|((violation, slack), scale)| violation - slack <= 0.1 * TOLERANCE * scale)
+        self.barriers().iter().all(|terms| terms.is_satisfied())
     }
 
-    /// Slacks and multipliers inside, from the distances from the bounds at the start and at the minimum without
-    /// constraints, which lowers half the cost by `decrease`.
-    fn start_inside(&mut self, at_start: &[f64], at_minimum: &[f64], decrease: f64) {
-        let mean = decrease / at_start.len() as f64;
-        let pairs = at_start.iter().zip(at_minimum);
-        let sizes: Vec<f64> = pairs.map(|(a, b)| a.abs().max(b.abs())).collect();
-        let largest = sizes.iter().fold(0.0, |most: f64, size| most.max(*size));
-        for (k, size) in sizes.into_iter().enumerate() {
-            self.slacks[k] = size.max(LEAST_SLACK * largest);
-            self.multipliers[k] = mean / self.slacks[k];
+    /// Bound of the excess of half the cost over the minimum, by weak duality: the gap, and the decrease of the Lagrangian to its
+    /// minimum by a Newton step without the curvature of the rows.
+    fn excess(&mut self) -> f64 {
+        self.factorise_without_rows();
+        let decrease = self.lagrangian_decrease();
+        decrease.map_or(f64::INFINITY, |decrease| self.gap() + decrease)
+    }
+
+    /// The decrease that a Newton step on the Lagrangian promises; `None` without factors.
+    fn lagrangian_decrease(&mut self) -> Option<f64> {
+        for terms in self.barriers_mut() {
+            terms.take_multipliers();
         }
-        self.update_violations();
+        self.newton_step()?;
+        Some(self.promised_decrease())
     }
 
-    /// Slacks and multipliers for a start with active rows, by `estimates` of the multipliers; false if no active row has one,
+    /// Slacks and multipliers for a start with active rows, by `estimates` of the multipliers; `None` if no active row has one,
     /// or a row does not hold. The gap follows from the decrease by a step that holds these rows.
-    fn start_at_active_rows(
-        &mut self,
-        distances: &[f64],
-        estimates: &[f64],
-        cost: f64,
-    ) -> Option<bool> {
-        let scales = &self.program.scales;
-        let relative = distances.iter().zip(scales).map(|(d, scale)| d / scale);
-        let near = NEAR * relative.fold(0.0, f64::max);
-        let count = distances.len() as f64;
+    fn start_at_active_rows(&mut self, estimates: &[f64], cost: f64) -> Option<()> {
+        let [distances, values] = self.distances();
+        let near = NEAR * self.bounds.largest(&distances);
+        let count = self.degree() as f64;
         let least = GAP * cost / count;
-        let mut is_any = false;
-        for (k, (distance, estimate)) in distances.iter().zip(estimates).enumerate() {
-            if *distance < -TOLERANCE * scales[k] {
-                return Some(false);
-            }
-            let is_active = *distance <= near * scales[k] && *estimate > 0.0;
-            is_any |= is_active;
-            self.factors[k] = if is_active { *estimate } else { 0.0 };
-            self.weights[k] = self.factors[k] * self.factors[k] / least;
-        }
-        if !is_any {
-            return Some(false);
-        }
+        self.bounds
+            .hold_active(&distances, estimates, near, least)?;
+        self.predict_absolute_values();
         self.factorise()?;
         self.newton_step()?;
         // Complementarity of this point with the estimates.
@@ -238,17 +258,12 @@ impl<'a, const X: usize, const W: usize> InteriorPoint<'a, X, W> {
             .map(|(distance, m)| distance.max(0.0) * m)
             .sum::<f64>();
         let mean = (WARM_GAP * self.promised_decrease().max(gap) / count).max(10.0 * least);
-        for (k, (distance, estimate)) in distances.iter().zip(estimates).enumerate() {
-            // On the central path: near the bound by the multiplier, elsewhere by the distance.
-            let is_near = *estimate > 0.0 && mean / estimate > *distance;
-            self.slacks[k] = match is_near {
-                true => mean / estimate,
-                false => distance.max(near * scales[k]),
-            };
-            self.multipliers[k] = mean / self.slacks[k];
-        }
+        self.bounds
+            .start_at_active_rows(&distances, estimates, near, mean);
+        self.cones.start(&values, &values, mean);
+        self.absolute.start(&self.xi, mean);
         self.update_violations();
-        Some(true)
+        Some(())
     }
 
     /// `-1/2 g' d` of the Newton step `d` and its gradient `g`.
@@ -259,36 +274,39 @@ impl<'a, const X: usize, const W: usize> InteriorPoint<'a, X, W> {
     }
 
     fn update_violations(&mut self) {
-        let rows = &self.program.constraints;
-        rows.products(&self.xi, &mut self.products);
-        for (k, violation) in self.violations.iter_mut().enumerate() {
-            *violation = self.products[k] + self.slacks[k] - rows.right[k];
-        }
+        self.bounds.update_violations(&self.xi);
+        self.cones.update_violations(&self.xi);
     }
 
-    /// Factorises for the weights of the constraint rows.
+    /// Factorises for the weights of the rows.
     fn factorise(&mut self) -> Option<()> {
-        let program = self.program;
-        let is_done = self.factor.factorise(
-            &program.transitions,
-            &program.residuals,
-            &program.constraints,
-            &self.weights,
-        );
-        is_done.then_some(())
+        let weighted = [
+            Barrier::<W>::curvature(&self.bounds),
+            Barrier::<W>::curvature(&self.cones),
+            Barrier::<W>::curvature(&self.absolute),
+        ];
+        let (transitions, residuals) = (&self.program.transitions, &self.program.residuals);
+        self.is_factorised = self.factor.factorise(transitions, residuals, &weighted);
+        self.is_factorised.then_some(())
     }
 
-    /// The Newton step of the coordinates with the factors of the constraint rows in the gradient.
+    /// Factorises without the curvature of the rows.
+    fn factorise_without_rows(&mut self) {
+        let (transitions, residuals) = (&self.program.transitions, &self.program.residuals);
+        self.is_factorised = self.factor.factorise(transitions, residuals, &[]);
+    }
+
+    /// The Newton step of the coordinates with the factors of the rows in the gradient.
     fn newton_step(&mut self) -> Option<()> {
-        let program = self.program;
+        self.is_factorised.then_some(())?;
         self.gradient.copy_from_slice(&self.slope);
-        program
-            .constraints
-            .transpose_add(&self.factors, &mut self.gradient);
-        let slope = self.factor.backward(&program.transitions, &self.gradient);
+        self.bounds.add_to_gradient(&mut self.gradient);
+        self.cones.add_to_gradient(&mut self.gradient);
+        self.absolute.add_to_gradient(&mut self.gradient);
+        let transitions = &self.program.transitions;
+        let slope = self.factor.backward(transitions, &self.gradient);
         let first = self.first_step(&slope)?;
-        self.factor
-            .forward(&program.transitions, first, &mut self.step);
+        self.factor.forward(transitions, first, &mut self.step);
         Some(())
     }
 
@@ -313,71 +331,47 @@ impl<'a, const X: usize, const W: usize> InteriorPoint<'a, X, W> {
 
     /// One iteration; the length of its step.
     fn predictor_corrector(&mut self) -> Option<f64> {
-        let count = self.slacks.len();
         let gap = self.gap();
-        for k in 0..count {
-            self.weights[k] = self.multipliers[k] / self.slacks[k];
-            self.factors[k] = self.weights[k] * self.violations[k];
+        for terms in self.barriers_mut() {
+            terms.predict();
         }
         self.factorise()?;
         self.newton_step()?;
-        self.update_slack_step();
-        for k in 0..count {
-            self.multiplier_step[k] = -self.multipliers[k] - self.weights[k] * self.slack_step[k];
-        }
+        self.update_steps();
         // The smaller the decrease of the gap by the predictor, the larger the target of the corrector.
         let length = self.longest_step(1.0);
-        let mut ahead = 0.0;
-        for k in 0..count {
-            ahead += (self.slacks[k] + length * self.slack_step[k])
-                * (self.multipliers[k] + length * self.multiplier_step[k]);
-        }
-        let target = (ahead / gap).powi(3) * gap / count as f64;
-        for k in 0..count {
-            // Second-order term of the product of slack and multiplier.
-            let correction = self.slack_step[k] * self.multiplier_step[k];
-            self.multiplier_step[k] = (target - correction) / self.slacks[k];
-            self.factors[k] += self.multiplier_step[k];
+        let ahead: f64 = self
+            .barriers()
+            .map(|terms| terms.gap_after(length))
+            .iter()
+            .sum();
+        let target = (ahead / gap).powi(3) * gap / self.degree() as f64;
+        for terms in self.barriers_mut() {
+            terms.correct(target);
         }
         self.newton_step()?;
-        self.update_slack_step();
-        for k in 0..count {
-            self.multiplier_step[k] -= self.multipliers[k] + self.weights[k] * self.slack_step[k];
-        }
+        self.update_steps();
         let length = self.longest_step(TO_THE_BOUND);
+        let ahead = self.barriers().map(|terms| terms.gap_after(length));
+        ahead.iter().sum::<f64>().is_finite().then_some(())?;
         self.move_by(length);
-        for k in 0..count {
-            self.slacks[k] += length * self.slack_step[k];
-            self.multipliers[k] += length * self.multiplier_step[k];
+        for terms in self.barriers_mut() {
+            terms.move_by(length);
         }
         self.update_violations();
         Some(length)
     }
 
-    /// Changes of the slacks by the step of the coordinates: the violations vanish at its full length.
-    fn update_slack_step(&mut self) {
-        let rows = &self.program.constraints;
-        rows.products(&self.step, &mut self.products);
-        let pairs = self.violations.iter().zip(&self.products);
-        for (step, (violation, product)) in self.slack_step.iter_mut().zip(pairs) {
-            *step = -violation - product;
-        }
+    fn update_steps(&mut self) {
+        self.bounds.update_steps(&self.step);
+        self.cones.update_steps(&self.step);
+        self.absolute.update_steps(&self.step);
     }
 
-    /// The longest step, at most 1, that goes `share` of the way to the nearest bound.
+    /// The longest step, at most 1, that goes `share` of the way to the nearest boundary.
     fn longest_step(&self, share: f64) -> f64 {
-        let mut length = 1.0f64;
-        for (values, steps) in [
-            (&self.slacks, &self.slack_step),
-            (&self.multipliers, &self.multiplier_step),
-        ] {
-            for (value, step) in values.iter().zip(steps) {
-                if *step < 0.0 {
-                    length = length.min(-share * value / step);
-                }
-            }
-        }
-        length
+        let each = self.barriers().map(|terms| terms.longest_step(share));
+        each.into_iter().fold(1.0, f64::min)
     }
 
     fn move_by(&mut self, length: f64) {
@@ -385,16 +379,22 @@ impl<'a, const X: usize, const W: usize> InteriorPoint<'a, X, W> {
         pairs.for_each(|(xi, step)| *xi += length * step);
     }
 
-    /// The iterate, with the decrease that the gradient of its Lagrangian promises.
-    fn solution(mut self) -> Option<StageSolution<W>> {
-        self.factors.copy_from_slice(&self.multipliers);
-        self.newton_step()?;
-        let decrease = self.promised_decrease();
-        Some(StageSolution {
+    /// The iterate, with the decrease that the gradient of its Lagrangian promises, and that since `start`.
+    fn solution(mut self, start: f64) -> StageSolution<W> {
+        let fall = start - self.update_slope();
+        if !self.is_factorised {
+            self.factorise_without_rows();
+        }
+        // Unknown where the Hessian cannot be factorised.
+        let decrease = self.lagrangian_decrease().unwrap_or(f64::INFINITY);
+        StageSolution {
             gap: self.gap(),
             xi: self.xi,
-            multipliers: self.multipliers,
+            multipliers: self.bounds.multipliers,
+            cones: self.cones.multipliers,
+            absolute: self.absolute.multipliers,
             decrease: decrease.max(0.0),
-        })
+            fall,
+        }
     }
 }

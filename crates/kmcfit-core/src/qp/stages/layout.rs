@@ -1,5 +1,6 @@
 //! The variables of a subproblem in time.
 
+use crate::functions::{Design, Parameterization};
 use std::ops::Range;
 
 /// Which variables of a subproblem belong to which node of a time grid. With it the subproblem is a linear-quadratic
@@ -50,6 +51,23 @@ impl Place {
 }
 
 impl StageLayout {
+    /// The parameters of `functions`; `None` if a function is neither nodal nor constant.
+    pub fn of(functions: &Parameterization) -> Option<Self> {
+        let mut layout = Self {
+            nodes: functions.nodes(),
+            ..Self::default()
+        };
+        for (function, range) in functions.iter().zip(functions.ranges()) {
+            match function.design {
+                Design::Identity => layout.histories.push(range.clone()),
+                _ if range.len() <= 1 => layout.constants.extend(range.clone()),
+                _ => return None,
+            }
+        }
+        layout.constants.extend(functions.scalar_range());
+        Some(layout)
+    }
+
     /// The place of every variable; `None` unless each of the `variables` has exactly one.
     pub(super) fn places(&self, variables: usize) -> Option<Vec<Place>> {
         let mut places = vec![None; variables];

@@ -1,5 +1,9 @@
 //! Convex subproblems along time, by an interior-point method whose Newton steps are Riccati recursions.
 
+mod absolute_values;
+mod barrier;
+mod bounds;
+mod cones;
 mod hessian;
 mod interior_point;
 mod layout;
@@ -7,6 +11,9 @@ mod riccati;
 mod rows;
 mod transcription;
 mod transitions;
+
+#[cfg(test)]
+mod tests;
 
 pub use layout::{ResponseVariables, StageLayout};
 
@@ -19,6 +26,8 @@ pub(super) struct StagePoint {
     pub point: PrimalDual,
     /// Decrease of half the cost by a Newton step.
     pub decrease: f64,
+    /// By how much half the cost is below that of zero controls.
+    pub fall: f64,
     /// Bound of the further excess of half the cost over the minimum.
     pub gap: f64,
 }
@@ -54,10 +63,19 @@ impl Subproblem {
         for (side, multiplier) in program.sides.iter().zip(&solution.multipliers) {
             point.inequalities[side.row] += side.sign * multiplier;
         }
+        let cones = program.cone_order.iter().zip(program.cone_rows.windows(2));
+        for (cone, rows) in cones {
+            let rows = rows[0] as usize..rows[1] as usize;
+            point.cones[*cone].copy_from_slice(&solution.cones[rows]);
+        }
+        for (row, multiplier) in program.absolute_order.iter().zip(&solution.absolute) {
+            point.absolute[*row] = *multiplier;
+        }
         point.equalities = program.equality_multipliers(self, self.gradient(&point));
         point.is_finite().then_some(StagePoint {
             point,
             decrease: solution.decrease,
+            fall: solution.fall,
             gap: solution.gap,
         })
     }
@@ -95,6 +113,11 @@ impl Subproblem {
             &distances(&self.residuals, &point.z),
         );
         add(&mut gradient, &self.inequalities, &point.inequalities);
+        add(&mut gradient, &self.absolute, &point.absolute);
+        for (cone, multipliers) in self.cones.iter().zip(&point.cones) {
+            let negative: Vec<f64> = multipliers.iter().map(|c| -c).collect();
+            add(&mut gradient, &cone.rows, &negative);
+        }
         gradient.iter().map(Sum::total).collect()
     }
 }

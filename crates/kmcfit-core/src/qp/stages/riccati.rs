@@ -43,21 +43,19 @@ impl<const X: usize, const W: usize> Factor<X, W> {
         }
     }
 
-    /// Factorises for the Hessians `sum a a'` of the residuals plus `sum w a a'` of the constraint rows; false if a
+    /// Factorises for the Hessians `sum a a'` of the residuals plus `sum w a a'` of the rows with weights; false if a
     /// pivot is not positive.
     pub fn factorise(
         &mut self,
         transitions: &Transitions<W>,
         residuals: &StageRows,
-        constraints: &StageRows,
-        weights: &[f64],
+        weighted: &[(&StageRows, &[f64])],
     ) -> bool {
         simd::run(Factorise {
             factor: self,
             transitions,
             residuals,
-            constraints,
-            weights,
+            weighted,
         })
     }
 
@@ -85,8 +83,7 @@ struct Factorise<'a, const X: usize, const W: usize> {
     factor: &'a mut Factor<X, W>,
     transitions: &'a Transitions<W>,
     residuals: &'a StageRows,
-    constraints: &'a StageRows,
-    weights: &'a [f64],
+    weighted: &'a [(&'a StageRows, &'a [f64])],
 }
 
 impl<const X: usize, const W: usize> Kernel for Factorise<'_, X, W> {
@@ -98,8 +95,7 @@ impl<const X: usize, const W: usize> Kernel for Factorise<'_, X, W> {
             factor,
             transitions,
             residuals,
-            constraints,
-            weights,
+            weighted,
         } = self;
         let controls = factor.controls;
         let mut cost = [[0.0; X]; X];
@@ -112,13 +108,10 @@ impl<const X: usize, const W: usize> Kernel for Factorise<'_, X, W> {
             for row in residuals.of_stage(i) {
                 h.add_square(arithmetic, residuals.row(row), 1.0, &mut diagonal);
             }
-            for row in constraints.of_stage(i) {
-                h.add_square(
-                    arithmetic,
-                    constraints.row(row),
-                    weights[row],
-                    &mut diagonal,
-                );
+            for (rows, weights) in weighted {
+                for row in rows.of_stage(i) {
+                    h.add_square(arithmetic, rows.row(row), weights[row], &mut diagonal);
+                }
             }
             h.add_diagonal(arithmetic, &diagonal, controls);
             for c in (0..controls).rev() {

@@ -60,6 +60,19 @@ impl StageRows {
         (&self.columns[range.clone()], &self.values[range])
     }
 
+    /// The same rows with values of zero.
+    pub fn zero(&self) -> Self {
+        Self {
+            values: vec![0.0; self.values.len()],
+            ..self.clone()
+        }
+    }
+
+    /// Values of a row.
+    pub fn values_mut(&mut self, row: usize) -> &mut [f64] {
+        &mut self.values[self.rows[row] as usize..self.rows[row + 1] as usize]
+    }
+
     /// `a' xi` of a row of its stage.
     #[inline(always)]
     pub fn product<const W: usize>(&self, row: usize, xi: &[f64; W]) -> f64 {

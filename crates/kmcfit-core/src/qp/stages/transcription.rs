@@ -3,7 +3,7 @@
 use super::layout::{Place, StageLayout};
 use super::rows::{LooseRow, StageRows};
 use super::transitions::{NONE, Transitions};
-use crate::constraints::{Rows, TOLERANCE};
+use crate::constraints::{Cone, Rows, TOLERANCE};
 use crate::qp::Subproblem;
 
 /// Highest difference of a coefficient in the state.
@@ -20,20 +20,31 @@ pub(super) struct Sizes {
 impl Sizes {
     /// `None` if a row reaches over too many nodes, or an equality is no step of a response.
     pub fn of(sub: &Subproblem, layout: &StageLayout) -> Option<Self> {
-        if layout.nodes < 2 || !sub.absolute.is_empty() || !sub.cones.is_empty() {
+        if layout.nodes < 2 {
             return None;
         }
         let places = layout.places(sub.variables)?;
         let mut orders = vec![1; layout.histories.len()];
-        for rows in [&sub.residuals, &sub.equalities, &sub.inequalities] {
+        let mut reach = |stage: usize, j: usize| {
+            if let Place::History(f, node) = places[j] {
+                orders[f] = orders[f].max(node - stage);
+            }
+        };
+        for rows in [
+            &sub.residuals,
+            &sub.absolute,
+            &sub.equalities,
+            &sub.inequalities,
+        ] {
             for i in 0..rows.len() {
                 let stage = stage_of(rows, i, &places);
-                for (j, _) in rows.row(i) {
-                    if let Place::History(f, node) = places[j] {
-                        orders[f] = orders[f].max(node - stage);
-                    }
-                }
+                rows.row(i).for_each(|(j, _)| reach(stage, j));
             }
+        }
+        for cone in &sub.cones {
+            let stage = stage_of_cone(cone, &places);
+            let rows = (0..cone.rows.len()).flat_map(|i| cone.rows.row(i));
+            rows.for_each(|(j, _)| reach(stage, j));
         }
         if orders.iter().any(|order| *order > HIGHEST_ORDER) {
             return None;
@@ -59,6 +70,14 @@ fn stage_of(rows: &Rows, i: usize, places: &[Place]) -> usize {
     nodes.min().unwrap_or(0)
 }
 
+/// The first node at which a variable of a cone acts.
+fn stage_of_cone(cone: &Cone, places: &[Place]) -> usize {
+    let rows = 0..cone.rows.len();
+    let occupied = rows.filter(|i| cone.rows.row(*i).any(|(_, a)| a != 0.0));
+    let stages = occupied.map(|i| stage_of(&cone.rows, i, places));
+    stages.min().unwrap_or(0)
+}
+
 /// The side of an inequality that a constraint row stands for.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Side {
@@ -82,6 +101,18 @@ pub(super) struct StageProgram<const X: usize, const W: usize> {
     pub sides: Vec<Side>,
     /// Largest coefficient of each constraint row in the variables.
     pub scales: Vec<f64>,
+    /// Rows of the cones `C xi - right`, those of a cone with the same columns.
+    pub cones: StageRows,
+    /// First row of each cone, and the number of rows.
+    pub cone_rows: Vec<u32>,
+    /// Cone of the subproblem for each cone here.
+    pub cone_order: Vec<usize>,
+    /// Absolute values `h |a' xi - right|`.
+    pub absolute: StageRows,
+    /// `h` of each, half its weight.
+    pub absolute_costs: Vec<f64>,
+    /// Row of the subproblem of each.
+    pub absolute_order: Vec<usize>,
     /// Values of the first state that are known.
     pub fixed: [Option<f64>; X],
     places: Vec<Place>,
@@ -132,6 +163,12 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
             constraints: StageRows::default(),
             sides: Vec::new(),
             scales: Vec::new(),
+            cones: StageRows::default(),
+            cone_rows: Vec::new(),
+            cone_order: Vec::new(),
+            absolute: StageRows::default(),
+            absolute_costs: Vec::new(),
+            absolute_order: Vec::new(),
             fixed,
             places: sizes.places,
             values,
@@ -152,6 +189,8 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         }
         program.add_residuals(sub)?;
         program.add_constraints(sub)?;
+        program.add_cones(sub)?;
+        program.add_absolute_values(sub)?;
         Some(program)
     }
 
@@ -240,6 +279,18 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
     /// Row `i` in the coordinates of its stage, and the constant that comes with it.
     fn row(&self, rows: &Rows, i: usize) -> Option<(LooseRow, f64)> {
         let stage = stage_of(rows, i, &self.places);
+        let (xi, constant) = self.row_at(stage, rows, i)?;
+        let entries = xi.iter().enumerate().filter(|(_, a)| **a != 0.0);
+        let row = LooseRow {
+            stage,
+            entries: entries.map(|(j, a)| (j as u8, *a)).collect(),
+            right: 0.0,
+        };
+        Some((row, constant))
+    }
+
+    /// Coefficients of row `i` in the coordinates of a stage, and the constant that comes with it.
+    fn row_at(&self, stage: usize, rows: &Rows, i: usize) -> Option<([f64; W], f64)> {
         let mut xi = [0.0; W];
         let mut constant = 0.0;
         for (j, a) in rows.row(i) {
@@ -247,14 +298,11 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         }
         // Differences of weighted sums leave rounding where a coefficient is zero.
         let largest = xi.iter().fold(0.0f64, |most, a| most.max(a.abs()));
-        let entries = xi.iter().enumerate();
-        let entries = entries.filter(|(_, a)| a.abs() > 4.0 * f64::EPSILON * largest);
-        let row = LooseRow {
-            stage,
-            entries: entries.map(|(j, a)| (j as u8, *a)).collect(),
-            right: 0.0,
-        };
-        Some((row, constant))
+        let rounding = 4.0 * f64::EPSILON * largest;
+        for a in xi.iter_mut().filter(|a| a.abs() <= rounding) {
+            *a = 0.0;
+        }
+        Some((xi, constant))
     }
 
     /// The residuals, the proximal terms, and what holds the differences that act on no node.
@@ -327,6 +375,50 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         self.sides = order.iter().map(|i| sides[*i as usize]).collect();
         let scale = |side: &Side| sub.inequalities.scale(side.row);
         self.scales = self.sides.iter().map(scale).collect();
+        Some(())
+    }
+
+    fn add_cones(&mut self, sub: &Subproblem) -> Option<()> {
+        let stages = sub
+            .cones
+            .iter()
+            .map(|cone| stage_of_cone(cone, &self.places));
+        let stages: Vec<usize> = stages.collect();
+        self.cone_order = (0..sub.cones.len()).collect();
+        self.cone_order.sort_by_key(|k| stages[*k]);
+        let mut loose = Vec::new();
+        self.cone_rows.push(0);
+        for k in &self.cone_order {
+            let (cone, stage) = (&sub.cones[*k].rows, stages[*k]);
+            let rows = (0..cone.len()).map(|i| self.row_at(stage, cone, i));
+            let rows = rows.collect::<Option<Vec<_>>>()?;
+            let is_used = |j: &usize| rows.iter().any(|(xi, _)| xi[*j] != 0.0);
+            let columns: Vec<usize> = (0..W).filter(is_used).collect();
+            for (i, (xi, constant)) in rows.iter().enumerate() {
+                loose.push(LooseRow {
+                    stage,
+                    entries: columns.iter().map(|j| (*j as u8, xi[*j])).collect(),
+                    right: cone.right()[i] - constant,
+                });
+            }
+            self.cone_rows.push(loose.len() as u32);
+        }
+        self.cones = StageRows::in_order(&loose, self.stages).0;
+        Some(())
+    }
+
+    fn add_absolute_values(&mut self, sub: &Subproblem) -> Option<()> {
+        let mut loose = Vec::with_capacity(sub.absolute.len());
+        for i in 0..sub.absolute.len() {
+            let (row, constant) = self.row(&sub.absolute, i)?;
+            let right = sub.absolute.right()[i] - constant;
+            loose.push(LooseRow { right, ..row });
+        }
+        let (rows, order) = StageRows::in_order(&loose, self.stages);
+        self.absolute = rows;
+        self.absolute_order = order.iter().map(|i| *i as usize).collect();
+        let half = |i: &usize| 0.5 * sub.absolute_weights[*i];
+        self.absolute_costs = self.absolute_order.iter().map(half).collect();
         Some(())
     }
 

@@ -2,7 +2,6 @@
 //! with many parameters.
 
 use crate::constraints::Rows;
-use crate::functions::Design;
 use crate::objective::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
 use crate::qp::{ResponseVariables, StageLayout, Subproblem};
@@ -61,42 +60,26 @@ pub fn subproblem(
     sub
 }
 
-/// Assignment of the unknowns to nodes; `None` if a function is neither nodal nor constant.
+/// Assignment of the unknowns to nodes; `None` if a function is neither nodal nor constant, or experiments share an initial state.
 fn layout(problem: &Problem) -> Option<StageLayout> {
     let functions = &problem.functions;
-    let mut layout = StageLayout {
-        nodes: functions.nodes(),
-        ..StageLayout::default()
-    };
-    for (function, range) in functions.iter().zip(functions.ranges()) {
-        match function.design {
-            Design::Identity => layout.histories.push(range.clone()),
-            _ if range.len() <= 1 => layout.constants.extend(range.clone()),
-            _ => return None,
-        }
-    }
+    let mut layout = StageLayout::of(functions)?;
     let first_scalar = functions.scalar_range().start;
-    let mut is_initial = vec![false; functions.scalars().len()];
     let mut first = problem.parameters();
     for experiment in &problem.experiments {
         let initial = experiment.initial_parameters;
-        for index in initial.into_iter().flatten() {
-            if std::mem::replace(&mut is_initial[index], true) {
-                return None;
-            }
+        let initial = initial.map(|index| index.map(|index| first_scalar + index));
+        for variable in initial.into_iter().flatten() {
+            let constants = &mut layout.constants;
+            constants.remove(constants.iter().position(|j| *j == variable)?);
         }
         layout.responses.push(ResponseVariables {
             first,
             nodes: experiment.nodes,
-            initial: initial.map(|index| index.map(|index| first_scalar + index)),
+            initial,
         });
         first += 2 * (experiment.nodes - 1);
     }
-    let others = functions.scalar_range().zip(is_initial);
-    let others = others.filter(|(_, is_initial)| !is_initial);
-    layout
-        .constants
-        .extend(others.map(|(variable, _)| variable));
     Some(layout)
 }
 

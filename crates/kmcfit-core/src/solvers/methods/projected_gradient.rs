@@ -7,7 +7,7 @@
 use super::{Step, StepRule, difference, no_step};
 use crate::constraints::TOLERANCE;
 use crate::problem::Problem;
-use crate::qp::{ConicStatus, project_within};
+use crate::qp::{ConicStatus, StageLayout, project_within};
 use crate::solvers::checkpoint::{ExactF64s, MethodState};
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::iterate::Iterate;
@@ -132,8 +132,12 @@ impl ProjectedGradient {
             return Ok(target);
         }
         let iterations = work.program_iterations;
+        let layout = match wants_clarabel {
+            true => None,
+            false => StageLayout::of(&work.problem().functions),
+        };
         let projection =
-            work.program(|| project_within(iterations, constraints, &target, &self.metric));
+            work.program(|| project_within(iterations, constraints, &target, &self.metric, layout));
         match projection.status {
             ConicStatus::Solved | ConicStatus::Almost
                 if constraints.hold(&projection.theta, TOLERANCE) =>

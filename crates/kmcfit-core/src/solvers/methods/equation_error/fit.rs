@@ -5,7 +5,7 @@ use super::{Accuracy, ConvexMinimum, add_rows, minimise, nodal};
 use crate::host::Instant;
 use crate::objective::{Evaluation, Gradient};
 use crate::problem::Problem;
-use crate::qp::{ConicStatus, Subproblem};
+use crate::qp::{ConicStatus, StageLayout, Subproblem};
 use crate::record::Experiment;
 use crate::solvers::fit::Fit;
 use crate::solvers::history::{IterationRecord, ratio};
@@ -253,6 +253,7 @@ impl<'a> Cost<'a> {
         let problem = self.problem;
         let mut sub = Subproblem::new(problem.parameters());
         sub.stations = problem.functions.first_nodes();
+        sub.layout = StageLayout::of(&problem.functions);
         for (experiment, measured) in self.experiments() {
             let root = measured.weight.sqrt();
             add_rows(problem, experiment, measured, root, start, &mut sub);

@@ -13,7 +13,7 @@ pub use measured::Measurements;
 
 use crate::constraints::{Constraints, RowGroup, TOLERANCE};
 use crate::problem::Problem;
-use crate::qp::{ConicStatus, Kkt, Subproblem};
+use crate::qp::{ConicStatus, Kkt, StageLayout, Subproblem};
 use crate::record::Experiment;
 use crate::solvers::linearization::{add_penalties, add_variations};
 use crate::solvers::state_estimation::Kinematics;
@@ -66,6 +66,7 @@ pub(in crate::solvers) fn from_kinematics(
     let start = &with_initial_states(problem, start, kinematics);
     let mut sub = Subproblem::new(problem.parameters());
     sub.stations = problem.functions.first_nodes();
+    sub.layout = StageLayout::of(&problem.functions);
     let mut experiments = Vec::new();
     for (experiment, states) in problem.experiments.iter().zip(kinematics) {
         experiments.push(states.as_ref().map(|states| {
