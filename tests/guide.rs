@@ -183,8 +183,8 @@ fn next_link(line: &str) -> Option<(&str, &str, &str, &str)> {
 const KEYS: &str = "# Key reference
 
 Every key of a model file: a table for each map, with the type and the allowed values, the unit, the default and the
-meaning. *Range* limits a number. *Needs* names the keys or values without which the key is refused. Numbers are in
-SI units. A key without default is optional unless it is marked as required. [Model files](model_files.md) and
+meaning. *Range* limits a number. *Needs* names the keys or values without which the key is refused or has no effect.
+Numbers are in SI units. A key without default is optional unless it is marked as required. [Model files](model_files.md) and
 [Records](records.md) have examples; `kmcfit explain KEY` prints one entry, `kmcfit schema` the JSON schema.
 
 This page is generated from the source of the reader.
@@ -208,13 +208,15 @@ fn key_reference() -> String {
 fn section(group: &KeyGroup, keys: &[Found]) -> String {
     let holds = |key: &KeyDoc| key.kind.groups().iter().any(|g| g.name == group.name);
     let holders = keys.iter().filter(|found| holds(found.key));
-    let paths: Vec<String> = (holders.flat_map(|found| &found.paths))
+    let mut paths: Vec<String> = (holders.flat_map(|found| &found.paths))
         .map(|path| format!("`{path}`"))
         .collect();
+    paths.sort_by_key(|path| path.matches('.').count());
     let mut text = format!("\n## {}\n\n{}", group.name, group.text);
     match paths.len() {
         0 => {}
-        1..=4 => text += &format!(" Path: {}.", paths.join(", ")),
+        1 => text += &format!(" Path: {}.", paths[0]),
+        2..=4 => text += &format!(" Paths: {}.", paths.join(", ")),
         more => text += &format!(" Paths: {} and {} more.", paths[..3].join(", "), more - 3),
     }
     text += "\n\n| key | value | unit | default | meaning |\n|---|---|---|---|---|\n";
@@ -245,6 +247,7 @@ fn section(group: &KeyGroup, keys: &[Found]) -> String {
     }
     words.sort();
     words.dedup();
+    words.retain(|(word, meaning)| !meaning.trim_end_matches('.').eq_ignore_ascii_case(word));
     if !words.is_empty() {
         text.push('\n');
     }

@@ -24,7 +24,7 @@ keys! {
             unit "s",
             default "five over the record",
             range "within the record";
-        /// Largest J of a system that is consistent with the data.
+        /// Largest misfit (J without penalties) of a system that is consistent with the data.
         misfit_limit: Option<Number>,
             example "2010.0",
             unit "that of J",
