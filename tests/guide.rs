@@ -1,11 +1,13 @@
 //! The pages of `docs/` in the crate's documentation: their equations as MathML, their links inside.
-//! `KMCFIT_GUIDE=write cargo test --test guide` writes `src/guide/` anew.
+//! The reference of the keys, `docs/keys.md`, from the documentation of the keys in the source.
+//! `KMCFIT_GUIDE=write cargo test --test guide` writes `src/guide/` and `docs/keys.md`.
 #![cfg(unix)]
 
 mod common;
 
 use common::pages::page;
 use common::repository;
+use kmcfit::config::key_documentation::{Found, KeyDoc, KeyGroup, MODEL, SEQUENCE, ValueType, all};
 use pulldown_latex::config::DisplayMode;
 use pulldown_latex::{Parser, RenderConfig, Storage, push_mathml};
 use std::fs;
@@ -15,20 +17,26 @@ const PAGES: [&str; 4] = ["tutorial", "choosing", "theory", "equations"];
 
 #[test]
 fn the_guide_is_that_of_the_docs() {
-    let write = std::env::var_os("KMCFIT_GUIDE").is_some_and(|value| value == "write");
     for name in PAGES {
-        let (made, kept) = (
-            rendered(&page(&format!("docs/{name}.md"))),
-            format!("src/guide/{name}.md"),
-        );
-        if write {
-            fs::write(repository(&kept), &made).expect("the guide can be written");
-        }
-        assert!(
-            fs::read_to_string(repository(&kept)).is_ok_and(|kept| kept == made),
-            "{kept} is out of date: KMCFIT_GUIDE=write cargo test --test guide"
-        );
+        let made = rendered(&page(&format!("docs/{name}.md")));
+        is_current(&format!("src/guide/{name}.md"), &made);
     }
+}
+
+#[test]
+fn the_key_reference_is_that_of_the_source() {
+    is_current("docs/keys.md", &key_reference());
+}
+
+/// Compares a generated file with the one in the repository; with `KMCFIT_GUIDE=write` writes it first.
+fn is_current(kept: &str, made: &str) {
+    if std::env::var_os("KMCFIT_GUIDE").is_some_and(|value| value == "write") {
+        fs::write(repository(kept), made).expect("a file in the repository");
+    }
+    assert!(
+        fs::read_to_string(repository(kept)).is_ok_and(|kept| kept == made),
+        "{kept} is out of date: KMCFIT_GUIDE=write cargo test --test guide"
+    );
 }
 
 #[test]
@@ -170,4 +178,105 @@ fn next_link(line: &str) -> Option<(&str, &str, &str, &str)> {
     let begin = line[..middle].rfind('[')?;
     let (target, after) = line[middle + 2..].split_once(')')?;
     Some((&line[..begin], &line[begin + 1..middle], target, after))
+}
+
+const KEYS: &str = "# Key reference
+
+Every key of a model file: a table for each map, with the type and the allowed values, the unit, the default and the
+meaning. *Range* limits a number. *Needs* names the keys or values without which the key is refused or has no effect.
+Numbers are in SI units. A key without default is optional unless it is marked as required. [Model files](model_files.md) and
+[Records](records.md) have examples; `kmcfit explain KEY` prints one entry, `kmcfit schema` the JSON schema.
+
+This page is generated from the source of the reader.
+";
+
+/// The page of all keys: one section for each map.
+fn key_reference() -> String {
+    let keys = all();
+    let mut groups: Vec<&KeyGroup> = vec![MODEL];
+    let nested = keys.iter().flat_map(|found| found.key.kind.groups());
+    for group in nested.chain([SEQUENCE]) {
+        if !groups.iter().any(|known| known.name == group.name) {
+            groups.push(group);
+        }
+    }
+    let sections = groups.into_iter().map(|group| section(group, &keys));
+    KEYS.to_owned() + &sections.collect::<String>()
+}
+
+/// The keys of a map as a table, between the paths at which the map stands and the meaning of its words.
+fn section(group: &KeyGroup, keys: &[Found]) -> String {
+    let holds = |key: &KeyDoc| key.kind.groups().iter().any(|g| g.name == group.name);
+    let holders = keys.iter().filter(|found| holds(found.key));
+    let mut paths: Vec<String> = (holders.flat_map(|found| &found.paths))
+        .map(|path| format!("`{path}`"))
+        .collect();
+    paths.sort_by_key(|path| path.matches('.').count());
+    let mut text = format!("\n## {}\n\n{}", group.name, group.text);
+    match paths.len() {
+        0 => {}
+        1 => text += &format!(" Path: {}.", paths[0]),
+        2..=4 => text += &format!(" Paths: {}.", paths.join(", ")),
+        more => text += &format!(" Paths: {} and {} more.", paths[..3].join(", "), more - 3),
+    }
+    text += "\n\n| key | value | unit | default | meaning |\n|---|---|---|---|---|\n";
+    let mut words: Vec<&(&str, &str)> = Vec::new();
+    for key in group.keys {
+        let name = format!("`{}`", key.name);
+        let default = match key.required {
+            true => "required",
+            false => key.default.unwrap_or_default(),
+        };
+        let facts = [("Range", key.range), ("Needs", key.needs)];
+        let facts = facts.map(|(name, fact)| fact.map(|fact| format!(" *{name}:* {fact}.")));
+        let meaning = key.text.to_owned() + &facts.into_iter().flatten().collect::<String>();
+        let cells = [
+            &name,
+            &value(key.kind, &mut words),
+            key.unit.unwrap_or_default(),
+            default,
+            &meaning,
+        ];
+        for cell in cells {
+            text += "|";
+            if !cell.is_empty() {
+                text += &format!(" {} ", cell.replace('|', "\\|"));
+            }
+        }
+        text += "|\n";
+    }
+    words.sort();
+    words.dedup();
+    words.retain(|(word, meaning)| !meaning.trim_end_matches('.').eq_ignore_ascii_case(word));
+    if !words.is_empty() {
+        text.push('\n');
+    }
+    for (word, meaning) in words {
+        text += &format!("- `{word}`: {meaning}\n");
+    }
+    text
+}
+
+/// A type, with links to the maps; adds its words, each with its meaning.
+fn value(kind: ValueType, words: &mut Vec<&(&str, &str)>) -> String {
+    match kind {
+        ValueType::Format => "1".into(),
+        ValueType::Number => "number".into(),
+        ValueType::Count => "integer".into(),
+        ValueType::Text => "text".into(),
+        ValueType::Bool => "true or false".into(),
+        ValueType::Column => "column: name, or number from 1".into(),
+        ValueType::Word(word) => format!("`{word}`"),
+        ValueType::Choice(choices) => {
+            words.extend(choices);
+            let names = choices.iter().map(|(word, _)| format!("`{word}`"));
+            names.collect::<Vec<_>>().join(", ")
+        }
+        ValueType::Map(group) => format!("map [{0}](#{0})", group.name),
+        ValueType::List(inner) => format!("list of: {}", value(*inner, words)),
+        ValueType::AnyOf(kinds) => {
+            let kinds: Vec<String> = kinds.iter().map(|kind| value(*kind, words)).collect();
+            kinds.join("; or ")
+        }
+    }
 }

@@ -56,6 +56,10 @@ pub struct KeyDoc {
     pub unit: Option<&'static str>,
     /// Default, if it has one.
     pub default: Option<&'static str>,
+    /// Range of its numbers, if it is limited.
+    pub range: Option<&'static str>,
+    /// Keys and values without which it is refused or unused, if any.
+    pub needs: Option<&'static str>,
     /// True for a required key.
     pub required: bool,
 }

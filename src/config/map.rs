@@ -10,7 +10,9 @@ macro_rules! keys {
             $key:ident: $value:ty,
             example $example:literal
             $(, unit $unit:literal)?
-            $(, default $default:literal)?;
+            $(, default $default:literal)?
+            $(, range $range:literal)?
+            $(, needs $needs:literal)?;
         )+}
     ) => {
         $(#[doc = $text])+
@@ -33,6 +35,8 @@ macro_rules! keys {
                         example: $example,
                         unit: $crate::config::map::given(&[$($unit)?]),
                         default: $crate::config::map::given(&[$($default)?]),
+                        range: $crate::config::map::given(&[$($range)?]),
+                        needs: $crate::config::map::given(&[$($needs)?]),
                         required: <$value as $crate::config::reader::Value>::REQUIRED,
                     }),+],
                 };

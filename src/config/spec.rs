@@ -59,11 +59,19 @@ keys! {
     /// Time grid and stepper.
     pub struct GridSpec = "grid", expecting "a map such as {nodes: 2000, method: midpoint}" {
         /// Number of nodes, with the step duration/(nodes - 1); `auto` chooses it from the spectrum of the records.
-        nodes: Option<Nodes>, example "2000", default "one per sample";
+        nodes: Option<Nodes>,
+            example "2000",
+            default "one per sample",
+            range "3 to 1e8";
         /// Time integration method.
         method: Option<StepMethod>, example "midpoint", default "rk4";
         /// Length of the time axis.
-        duration: Option<Number>, example "25.0", unit "s", default "that of the records";
+        duration: Option<Number>,
+            example "25.0",
+            unit "s",
+            default "that of the records",
+            range "greater than 0",
+            needs "a grid without records; with records their span is used";
     }
 }
 
@@ -130,27 +138,58 @@ keys! {
     /// A coefficient function: estimated, with a basis and start values, or fixed.
     pub struct FunctionSpec = "function", expecting "a map such as {basis: nodal, start: 2.0}" {
         /// Basis of an estimated function, which defines its parameters.
-        basis: Option<Basis>, example "piecewise-linear";
+        basis: Option<Basis>,
+            example "piecewise-linear",
+            needs "`start`";
         /// Knots of a piecewise function or spline: their number (equally spaced, ends included) or their times.
-        knots: Option<KnotSpec>, example "11", unit "s, of times";
+        knots: Option<KnotSpec>,
+            example "11",
+            unit "s, of times",
+            range "2 or more, at most the number of nodes; times increase and include both ends of the record",
+            needs "`basis`: piecewise-constant, piecewise-linear or b-spline";
         /// Degree of a polynomial.
-        degree: Option<Count>, example "2";
+        degree: Option<Count>,
+            example "2",
+            needs "`basis: polynomial`";
         /// Start values of the search: one number, one value per node, cell or knot, polynomial coefficients, or a column of
         /// a file.
-        start: Option<StartSpec>, example "2.0", unit "that of the function";
+        start: Option<StartSpec>,
+            example "2.0",
+            unit "that of the function",
+            range "greater than 0 for a mass",
+            needs "`basis`";
         /// Fixed values, in place of `basis`.
-        fixed: Option<NumberOrColumn>, example "1.0", unit "that of the function";
+        fixed: Option<NumberOrColumn>,
+            example "1.0",
+            unit "that of the function",
+            range "greater than 0 for a mass",
+            needs "no `start`";
         /// Lower bound.
-        min: Option<NumberOrColumn>, example "0.05", unit "that of the function", default "none";
+        min: Option<NumberOrColumn>,
+            example "0.05",
+            unit "that of the function",
+            default "none",
+            range "at most `max`",
+            needs "`basis`; method gauss-newton, projected-gradient or equation-error";
         /// Upper bound.
-        max: Option<NumberOrColumn>, example "10.0", unit "that of the function", default "none";
+        max: Option<NumberOrColumn>,
+            example "10.0",
+            unit "that of the function",
+            default "none",
+            range "at least `min`",
+            needs "`basis`; method gauss-newton, projected-gradient or equation-error";
         /// Penalty on the roughness, added to J; or a list of penalties.
         penalty: Option<OneOrList<PenaltySpec>>,
             example "{kind: tikhonov, order: 2, weight: 0.1}",
-            default "none";
+            default "none",
+            needs "`basis`";
         /// For Coulomb friction: velocity over which its sign is smoothed, well below the peak velocity of the
         /// response.
-        width: Option<Number>, example "0.01", unit "m/s";
+        width: Option<Number>,
+            example "0.01",
+            unit "m/s",
+            range "greater than 0",
+            needs "coulomb_friction, which requires it";
     }
 }
 
@@ -177,13 +216,26 @@ keys! {
     /// weight times the total variation, which permits jumps.
     pub struct PenaltySpec = "penalty", expecting "a map such as {kind: tikhonov, order: 2, weight: 0.1}" {
         /// Measure of roughness.
-        kind: PenaltyKind, example "tikhonov";
+        kind: PenaltyKind,
+            example "tikhonov",
+            needs "tv: method gauss-newton or equation-error";
         /// For `tikhonov`: order of the derivative, 0 (difference from `reference`), 1 (slope) or 2 (curvature).
-        order: Option<Count>, example "2";
+        order: Option<Count>,
+            example "2",
+            range "0, 1 or 2",
+            needs "`kind: tikhonov`";
         /// Weight of the penalty in J, or for `tikhonov` the rule that chooses it.
-        weight: Weight, example "0.1", unit "of J per unit of the measure";
+        weight: Weight,
+            example "0.1",
+            unit "of J per unit of the measure",
+            range "0 or more",
+            needs "a rule: `kind: tikhonov` and method gauss-newton; discrepancy also `sigma`; period: order 1 or 2 and method equation-error";
         /// For `tikhonov` of order 0: the reference values.
-        reference: Option<NumberOrColumn>, example "1.0", unit "that of the function", default "0";
+        reference: Option<NumberOrColumn>,
+            example "1.0",
+            unit "that of the function",
+            default "0",
+            needs "`order: 0`";
     }
 }
 
@@ -229,35 +281,79 @@ keys! {
     /// A constraint on coefficient functions.
     pub struct ConstraintSpec (Default) = "constraint", expecting "a map such as {function: mass, shape: non-increasing}" {
         /// Constrained function.
-        function: Option<FunctionName>, example "mass";
+        function: Option<FunctionName>,
+            example "mass",
+            needs "one of min, max, slope, shape, at, mean and integral";
         /// Lower bound at all times.
-        min: Option<NumberOrColumn>, example "0.05", unit "that of the function";
+        min: Option<NumberOrColumn>,
+            example "0.05",
+            unit "that of the function",
+            range "at most `max`",
+            needs "`function`";
         /// Upper bound at all times.
-        max: Option<NumberOrColumn>, example "10.0", unit "that of the function";
+        max: Option<NumberOrColumn>,
+            example "10.0",
+            unit "that of the function",
+            range "at least `min`",
+            needs "`function`";
         /// Lower and upper bound of the slope.
-        slope: Option<RangeSpec>, example "{min: -0.2, max: 0.0}", unit "that of the function per s";
+        slope: Option<RangeSpec>,
+            example "{min: -0.2, max: 0.0}",
+            unit "that of the function per s",
+            range "min at most max",
+            needs "`function`";
         /// Monotonicity or sign of the curvature; or a list of both.
-        shape: Option<OneOrList<ShapeName>>, example "non-increasing";
+        shape: Option<OneOrList<ShapeName>>,
+            example "non-increasing",
+            needs "`function`";
         /// Times at which the value is prescribed.
-        at: Option<OneOrList<Number>>, example "0.0", unit "s";
+        at: Option<OneOrList<Number>>,
+            example "0.0",
+            unit "s",
+            range "within the record",
+            needs "`function`, `value`";
         /// Prescribed values, one for all times or one each.
-        value: Option<OneOrList<Number>>, example "1.0", unit "that of the function";
+        value: Option<OneOrList<Number>>,
+            example "1.0",
+            unit "that of the function",
+            needs "`function`, `at`";
         /// Mean over the record.
-        mean: Option<Number>, example "0.75", unit "that of the function";
+        mean: Option<Number>,
+            example "0.75",
+            unit "that of the function",
+            needs "`function`";
         /// Integral over the record.
-        integral: Option<Number>, example "18.75", unit "that of the function times s";
+        integral: Option<Number>,
+            example "18.75",
+            unit "that of the function times s",
+            needs "`function`";
         /// Two functions; the first equals `ratio` times the second.
-        equal: Option<Vec<FunctionName>>, example "[damping, stiffness]";
+        equal: Option<Vec<FunctionName>>,
+            example "[damping, stiffness]",
+            range "two functions";
         /// Ratio of the two functions of `equal`.
-        ratio: Option<Number>, example "0.1", default "1";
+        ratio: Option<Number>,
+            example "0.1",
+            default "1",
+            range "not 0",
+            needs "`equal`";
         /// Passivity, c - m'/2 >= 0 and k' <= 0: the stored energy never grows.
         passive: Option<bool>, example "true";
         /// Bounds of the natural frequency sqrt(k/m)/2π at every time.
-        frequency: Option<RangeSpec>, example "{min: 0.1, max: 0.3}", unit "Hz";
+        frequency: Option<RangeSpec>,
+            example "{min: 0.1, max: 0.3}",
+            unit "Hz",
+            range "greater than 0";
         /// Upper bound of the damping ratio |c|/(2 sqrt(k m)).
-        damping_ratio: Option<RangeSpec>, example "{max: 0.2}";
+        damping_ratio: Option<RangeSpec>,
+            example "{max: 0.2}",
+            range "`max` alone, greater than 0";
         /// Soft constraint: weight of the mean squared violation in J.
-        soft: Option<Number>, example "10.0", default "hard constraint";
+        soft: Option<Number>,
+            example "10.0",
+            default "hard constraint",
+            range "greater than 0",
+            needs "a constraint other than damping_ratio";
     }
 }
 
@@ -279,9 +375,15 @@ keys! {
     /// A range; either end may be left out.
     pub struct RangeSpec = "range", expecting "a map such as {min: 0.1, max: 0.5}" {
         /// Lower end.
-        min: Option<Number>, example "0.1", default "unbounded";
+        min: Option<Number>,
+            example "0.1",
+            default "unbounded",
+            range "at most `max`";
         /// Upper end.
-        max: Option<Number>, example "0.5", default "unbounded";
+        max: Option<Number>,
+            example "0.5",
+            default "unbounded",
+            range "at least `min`";
     }
 }
 
@@ -289,19 +391,36 @@ keys! {
     /// Method, start and stopping tests of the fit.
     pub struct FitSpec = "fit", expecting "a map such as {method: gauss-newton, initial: data}" {
         /// Fit method.
-        method: Option<FitMethod>, example "lbfgs", default "gauss-newton";
+        method: Option<FitMethod>,
+            example "lbfgs",
+            default "gauss-newton",
+            needs "bounds and constraints: gauss-newton, projected-gradient or equation-error; total variation and rules for a weight: gauss-newton or equation-error";
         /// Starting point.
-        initial: Option<InitialName>, example "data", default "functions";
+        initial: Option<InitialName>,
+            example "data",
+            default "functions",
+            needs "a method other than equation-error";
         /// Gradient of the cost.
-        gradient: Option<Gradient>, example "continuous", default "discrete";
+        gradient: Option<Gradient>,
+            example "continuous",
+            default "discrete",
+            needs "a method other than equation-error; continuous: no `sigma` and a sample at every node";
         /// Solver of the quadratic programs of constrained steps (gauss-newton and projected-gradient).
-        qp: Option<QpName>, example "clarabel", default "auto";
+        qp: Option<QpName>,
+            example "clarabel",
+            default "auto",
+            needs "method gauss-newton or projected-gradient";
         /// Number of step pairs that L-BFGS stores.
-        memory: Option<Count>, example "20", default "20";
+        memory: Option<Count>,
+            example "20",
+            default "20",
+            range "1 or more",
+            needs "`method: lbfgs`";
         /// Stopping tests; the first one met ends the fit.
         stop: Option<StopSpec>,
             example "{iterations: 200, cost_ratio: 1e-4}",
-            default "{iterations: 1000, tolerance: 1e-10}";
+            default "{iterations: 1000, tolerance: 1e-10}",
+            needs "a method other than equation-error";
     }
 }
 
@@ -357,15 +476,29 @@ keys! {
         /// Iteration limit; without another test exactly this number of iterations.
         iterations: Option<Count>, example "200", default "1000";
         /// Limit of J/J0 for convergence (with the gradient's limit, if given).
-        cost_ratio: Option<Number>, example "1e-4", unit "part of the first J";
+        cost_ratio: Option<Number>,
+            example "1e-4",
+            unit "part of the first J",
+            range "greater than 0";
         /// Limit of the squared gradient norm relative to its initial value, for convergence.
-        gradient_ratio: Option<Number>, example "1e-4", unit "part of the first G^2";
+        gradient_ratio: Option<Number>,
+            example "1e-4",
+            unit "part of the first G^2",
+            range "greater than 0";
         /// Relative change of J and of the functions in one iteration, for convergence.
-        tolerance: Option<Number>, example "1e-10", default "1e-10, if no other rule is given";
+        tolerance: Option<Number>,
+            example "1e-10",
+            default "1e-10, if no other rule is given",
+            range "greater than 0";
         /// Relative change of the functions in one iteration, for convergence.
-        step: Option<Number>, example "1e-12";
+        step: Option<Number>,
+            example "1e-12",
+            range "greater than 0";
         /// Time limit.
-        seconds: Option<Number>, example "60", unit "s";
+        seconds: Option<Number>,
+            example "60",
+            unit "s",
+            range "greater than 0";
     }
 }
 

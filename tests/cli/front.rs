@@ -12,12 +12,14 @@ fn keys_are_explained() {
       Relative change of J and of the functions in one iteration, for convergence.
       type     a number
       default  1e-10, if no other rule is given
+      range    greater than 0
       example  tolerance: 1e-10
     ");
     assert_snapshot!(bench.run_to(0, &["explain", "functions.mass.basis"]), @"
     functions.mass.basis
       Basis of an estimated function, which defines its parameters.
       type     one of the values below
+      needs    `start`
       example  basis: piecewise-linear
       also     functions.damping.basis, functions.stiffness.basis, functions.cubic_stiffness.basis, functions.quadratic_damping.basis and 9 more
 

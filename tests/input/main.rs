@@ -6,6 +6,7 @@ mod constraint_messages;
 mod instruments;
 mod instruments_errors;
 mod key_documentation;
+mod key_limits;
 mod model;
 mod model_errors;
 #[path = "../../crates/kmcfit-core/tests/common/properties.rs"]

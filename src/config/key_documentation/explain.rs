@@ -82,6 +82,11 @@ fn entry(found: &Found, wanted: &str) -> String {
         (false, Some(default)) => row("default", default),
         (false, None) => {}
     }
+    for (name, value) in [("range", key.range), ("needs", key.needs)] {
+        if let Some(value) = value {
+            row(name, value);
+        }
+    }
     row("example", &format!("{}: {}", key.name, key.example));
     let others = &paths[1..];
     if !others.is_empty() {

@@ -57,10 +57,16 @@ fn property(key: &KeyDoc) -> Value {
     json!({"description": description(key), "allOf": [kind(key.kind)]})
 }
 
-/// Description of a key, with unit and default.
+/// Description of a key, with unit, default, range and the keys it needs.
 fn description(key: &KeyDoc) -> String {
     let mut text = key.text.to_owned();
-    for (name, value) in [("Unit", key.unit), ("Default", key.default)] {
+    let facts = [
+        ("Unit", key.unit),
+        ("Default", key.default),
+        ("Range", key.range),
+        ("Needs", key.needs),
+    ];
+    for (name, value) in facts {
         if let Some(value) = value {
             text += &format!(" {name}: {value}.");
         }

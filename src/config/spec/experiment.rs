@@ -17,41 +17,77 @@ keys! {
         /// Format of the data file, where automatic detection fails.
         format: Option<FileFormatSpec>,
             example "{delimiter: semicolon, decimal: comma}",
-            default "detected";
+            default "detected",
+            needs "`data`";
         /// Columns of the data file.
         columns: Option<ColumnsSpec>,
             example "{time: t_s, displacement: y_m}",
-            default "{time: t_s, displacement: y_m}";
+            default "{time: t_s, displacement: y_m}",
+            needs "`data`";
         /// Sampling rate, in place of a column of times.
-        sample_rate: Option<Number>, example "1000.0", unit "Hz";
+        sample_rate: Option<Number>,
+            example "1000.0",
+            unit "Hz",
+            range "1e-12 to 1e12",
+            needs "`data`; excludes `columns.time`";
         /// Units of the columns, converted to SI.
-        units: Option<UnitsSpec>, example "{displacement: mm}", default "as stated in the file, else SI";
+        units: Option<UnitsSpec>,
+            example "{displacement: mm}",
+            default "as stated in the file, else SI",
+            needs "`data`";
         /// First and last time used, on the time axis of the file.
-        window: Option<RangeSpec>, example "{min: 0.1, max: 2.9}", unit "s", default "all";
+        window: Option<RangeSpec>,
+            example "{min: 0.1, max: 2.9}",
+            unit "s",
+            default "all",
+            range "min less than max",
+            needs "`data`";
         /// Time of the file that becomes 0.
-        time_zero: Option<Number>, example "0.1", unit "s", default "0";
+        time_zero: Option<Number>,
+            example "0.1",
+            unit "s",
+            default "0",
+            needs "`data`";
         /// Decimation factor; a low-pass filter is applied before.
-        decimate: Option<Count>, example "4", default "1";
+        decimate: Option<Count>,
+            example "4",
+            default "1",
+            range "1 or more",
+            needs "equally spaced samples without gaps";
         /// Frequency band to which samples and simulated response are filtered.
-        band: Option<RangeSpec>, example "{min: 5.0, max: 50.0}", unit "Hz", default "all";
+        band: Option<RangeSpec>,
+            example "{min: 5.0, max: 50.0}",
+            unit "Hz",
+            default "all",
+            range "0 < min < max < half the sampling rate",
+            needs "equally spaced samples without gaps";
         /// Standard deviation of the samples; without it J is the paper's integral.
         sigma: Option<SigmaSpec>, example "{displacement: 0.1}";
-        /// Loss of the residuals; needs `sigma`.
-        loss: Option<LossesSpec>, example "{displacement: huber}", default "squares";
+        /// Loss of the residuals.
+        loss: Option<LossesSpec>,
+            example "{displacement: huber}",
+            default "squares",
+            needs "`sigma`";
         /// Sensor model: sample = gain * response + offset + drift * time.
         sensors: Option<SensorsSpec>, example "{acceleration: {offset: estimate}}", default "gain 1, offset 0";
         /// Force on the mass: interpolation of the column `force`, or a waveform in its place.
         force: Option<ForceSpec>, example "{interpolation: cubic}", default "none, or the column `force`";
         /// Interpolation of the base motion.
-        base: Option<BaseSpec>, example "{interpolation: cubic}";
+        base: Option<BaseSpec>,
+            example "{interpolation: cubic}",
+            needs "`columns.base_acceleration` or `columns.base_displacement`";
         /// Initial state, or `estimate` for displacement and velocity.
         initial: InitialSpec, example "{displacement: 3.3, velocity: 1.0}";
         /// Coefficient functions of this experiment alone.
         functions: Option<OwnFunctionsSpec>,
             example "{damping: {basis: constant, start: 1.0}}",
-            default "none";
+            default "none",
+            needs "the same function in the shared `functions`";
         /// Validation record: predicted and scored, not fitted.
-        validation: Option<bool>, example "true", default "false";
+        validation: Option<bool>,
+            example "true",
+            default "false",
+            needs "another experiment without it; no `functions` of its own";
     }
 }
 
@@ -126,7 +162,11 @@ keys! {
         /// Column of the times.
         time: Option<ColumnId>, example "t_s", default "that of the experiment";
         /// Sampling rate, in place of a column of times.
-        sample_rate: Option<Number>, example "1000.0", unit "Hz";
+        sample_rate: Option<Number>,
+            example "1000.0",
+            unit "Hz",
+            range "1e-12 to 1e12",
+            needs "no `time`";
     }
 }
 
@@ -154,11 +194,23 @@ keys! {
     /// Standard deviation of a sample: a number, a column of the file, or `estimate`.
     pub struct SigmaSpec (Default) = "sigma", expecting "a map such as {displacement: 0.1}" {
         /// Standard deviation of the displacement.
-        displacement: Option<Sigma>, example "0.1", unit "m";
+        displacement: Option<Sigma>,
+            example "0.1",
+            unit "m",
+            range "greater than 0",
+            needs "the channel";
         /// Standard deviation of the velocity.
-        velocity: Option<Sigma>, example "0.1", unit "m/s";
+        velocity: Option<Sigma>,
+            example "0.1",
+            unit "m/s",
+            range "greater than 0",
+            needs "the channel";
         /// Standard deviation of the acceleration.
-        acceleration: Option<Sigma>, example "estimate", unit "m/s^2";
+        acceleration: Option<Sigma>,
+            example "estimate",
+            unit "m/s^2",
+            range "greater than 0",
+            needs "the channel";
     }
 }
 
@@ -182,9 +234,18 @@ keys! {
         /// Kind of loss.
         name: LossName, example "huber";
         /// For `huber`: residual at which the loss becomes linear.
-        threshold: Option<Number>, example "1.345", unit "standard deviations", default "1.345";
+        threshold: Option<Number>,
+            example "1.345",
+            unit "standard deviations",
+            default "1.345",
+            range "greater than 0",
+            needs "`name: huber`";
         /// For `student-t`: degrees of freedom.
-        degrees: Option<Number>, example "4.0", default "4";
+        degrees: Option<Number>,
+            example "4.0",
+            default "4",
+            range "greater than 0",
+            needs "`name: student-t`";
     }
 }
 
@@ -216,13 +277,19 @@ keys! {
     /// Parameters of a sensor.
     pub struct SensorSpec (Default) = "sensor", expecting "a map such as {gain: 1.0, offset: estimate}" {
         /// Gain.
-        gain: Option<EstimateValue>, example "1.0", default "1";
+        gain: Option<EstimateValue>,
+            example "1.0",
+            default "1",
+            range "not 0";
         /// Offset.
         offset: Option<EstimateValue>, example "estimate", unit "SI unit of the channel", default "0";
         /// Drift: rate of change of the offset.
         drift: Option<EstimateValue>, example "estimate", unit "SI unit of the channel per s", default "0";
         /// True for a sensor that measures absolute motion, false for motion relative to the base.
-        absolute: Option<bool>, example "true", default "true for accelerations, false for the others";
+        absolute: Option<bool>,
+            example "true",
+            default "true for accelerations, false for the others",
+            needs "a motion of the base";
     }
 }
 
@@ -245,7 +312,9 @@ keys! {
         /// Mean.
         mean: Number, example "1.0";
         /// Standard deviation.
-        sigma: Number, example "0.1";
+        sigma: Number,
+            example "0.1",
+            range "greater than 0";
     }
 }
 
@@ -253,23 +322,53 @@ keys! {
     /// Force on the mass: a column with its interpolation, or a waveform.
     pub struct ForceSpec (Default) = "force", expecting "a map such as {interpolation: hold} or {shape: sine, amplitude: 2.0, frequency: 1.5}" {
         /// Interpolation of the column `force`.
-        interpolation: Option<InterpolationName>, example "cubic", default "linear";
+        interpolation: Option<InterpolationName>,
+            example "cubic",
+            default "linear",
+            needs "`columns.force`";
         /// Waveform, in place of a column.
-        shape: Option<ForceShape>, example "sine";
+        shape: Option<ForceShape>,
+            example "sine",
+            needs "no `columns.force`; `amplitude`";
         /// Amplitude of the waveform.
-        amplitude: Option<Number>, example "1.0", unit "N";
+        amplitude: Option<Number>,
+            example "1.0",
+            unit "N",
+            needs "`shape`";
         /// Frequency of a sine.
-        frequency: Option<Number>, example "1.5", unit "Hz";
+        frequency: Option<Number>,
+            example "1.5",
+            unit "Hz",
+            range "greater than 0",
+            needs "`shape: sine`";
         /// Phase of a sine at time 0.
-        phase: Option<Number>, example "0.7", unit "rad", default "0";
+        phase: Option<Number>,
+            example "0.7",
+            unit "rad",
+            default "0",
+            needs "`shape: sine`";
         /// Initial frequency of a sweep.
-        from: Option<Number>, example "0.5", unit "Hz";
+        from: Option<Number>,
+            example "0.5",
+            unit "Hz",
+            needs "`shape: sweep`";
         /// Final frequency of a sweep.
-        to: Option<Number>, example "5.0", unit "Hz";
+        to: Option<Number>,
+            example "5.0",
+            unit "Hz",
+            needs "`shape: sweep`";
         /// Start of a step, half-sine or sweep.
-        at: Option<Number>, example "1.0", unit "s", default "0";
+        at: Option<Number>,
+            example "1.0",
+            unit "s",
+            default "0",
+            needs "`shape`: step, half-sine or sweep";
         /// Duration of a half-sine or sweep.
-        duration: Option<Number>, example "0.1", unit "s";
+        duration: Option<Number>,
+            example "0.1",
+            unit "s",
+            range "greater than 0",
+            needs "`shape`: half-sine or sweep";
     }
 }
 
