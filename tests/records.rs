@@ -13,7 +13,7 @@ use tempfile::TempDir;
 const MASS: f64 = 1.5;
 const DAMPING: f64 = 0.6;
 const STIFFNESS: f64 = 240.0;
-/// Steps of the simulation between two readings.
+/// Steps of the simulation between two samples.
 const FINE: usize = 20;
 
 /// Displacements at `rate` from a state at rest at 0.02 m, under force and base acceleration.
@@ -103,7 +103,7 @@ fn nothing(_t: f64) -> f64 {
     0.0
 }
 
-/// Without names, by number, at a rate, from 5 s into the file, with a lost reading.
+/// Without names, by number, at a rate, from 5 s into the file, with a lost sample.
 #[test]
 fn a_window_of_a_file_without_names() {
     let y = motion(200.0, 801, &nothing, &nothing);
@@ -124,7 +124,7 @@ fn a_window_of_a_file_without_names() {
     initial: {displacement: 0.02, velocity: 0.0}
     sigma: {displacement: 1e-6}";
     let (model, run) = fitted(&text, experiment, KNOWN);
-    // The readings are printed in full; what is left is the step of 5 ms, (w h)^4 w T / 120.
+    // The samples are printed in full; what is left is the step of 5 ms, (w h)^4 w T / 120.
     assert!(error(&run) < 1e-5, "{}", error(&run));
     let ignored = &model.notes[0][0].ignored;
     assert_eq!(ignored[0], (1000, "outside the window".to_owned()));
@@ -156,7 +156,7 @@ fn decimation_and_band() {
     assert!(error(&run) < 2e-3, "{}", error(&run));
 }
 
-/// A column of sigmas: half of the readings are worthless and say so.
+/// A column of sigmas: half of the samples are worthless and say so.
 #[test]
 fn sigmas_from_a_column() {
     let y = motion(200.0, 801, &nothing, &nothing);
@@ -337,7 +337,7 @@ fit: {method: lbfgs, gradient: continuous}
     assert!(fine < 1e-3 && fine < 0.3 * coarse, "{coarse} {fine}");
 }
 
-/// The initial state is that of the first row, also where its reading is missing: at 0 s.
+/// The initial state is that of the first row, also where its sample is missing: at 0 s.
 #[test]
 fn readings_that_are_missing_at_the_ends() {
     let y = motion(200.0, 801, &nothing, &nothing);
@@ -356,7 +356,7 @@ fn readings_that_are_missing_at_the_ends() {
     assert!(error(&run) < 1e-5, "{}", error(&run));
 }
 
-/// Few readings that are left by decimation do not make a coarse grid.
+/// Few samples that are left by decimation do not make a coarse grid.
 #[test]
 fn decimation_does_not_coarsen_the_grid() {
     let y = motion(200.0, 801, &nothing, &nothing);

@@ -35,7 +35,7 @@ fn run(model: &Model, journal: Option<&mut FitJournal>, last: u64) -> (Option<We
     };
     let mut watch = Observer::new(&mut observe);
     if let Some(journal) = journal {
-        watch = watch.keeping(journal);
+        watch = watch.with_checkpoints(journal);
     }
     let (problem, start) = (&model.problem, model.problem.start());
     match &model.weight_rule {

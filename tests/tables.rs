@@ -11,7 +11,7 @@ use std::process::Command;
 /// Longest name of a variable in MATLAB.
 const LONGEST_NAME: usize = 63;
 
-/// Runs with several records, lost readings, bands, truth and a record held out.
+/// Runs with several records, lost samples, bands, truth and a record held out.
 const MODELS: [&str; 4] = [
     "paper-forced",
     "linear-mass",
@@ -39,7 +39,7 @@ fn tables_open_without_options() {
 
 /// All CSV files of a run.
 fn tables(out: &Path) -> Vec<PathBuf> {
-    let folders = [out.to_path_buf(), out.join("readings")];
+    let folders = [out.to_path_buf(), out.join("channels")];
     let files = folders
         .iter()
         .flat_map(|f| fs::read_dir(f).expect("a folder"));

@@ -89,7 +89,7 @@ impl TimingsSummary {
             qp: counted(times.qp, counts.qp),
             linear_algebra: part(times.linear_algebra),
             start: part(times.start),
-            io: part(overhead.io + times.keeping),
+            io: part(overhead.io + times.checkpoints),
             analysis: part(overhead.analysis),
             report: part(overhead.report),
             other: part(total.saturating_sub(times.sum() + overhead.sum())),

@@ -39,7 +39,7 @@ pub fn decode(path: &Path, bytes: Vec<u8>) -> Result<(String, Encoding), InputEr
             let (text, broken) = encoding.decode_with_bom_removal(&bytes);
             return match broken {
                 true => Err(InputError::file(path, "the file is not text")
-                    .found("a byte order mark of UTF-16, and then no UTF-16")
+                    .found("a byte order mark of UTF-16, but no UTF-16 text behind it")
                     .hint("save it as UTF-8")),
                 false => Ok((text.into_owned(), Encoding::Utf16)),
             };

@@ -1,4 +1,4 @@
-//! One test for each mistake that was found by using the program.
+//! Regression tests, one for each mistake found in use.
 
 use crate::workbench::{MODEL, Workbench, readings};
 
@@ -106,7 +106,7 @@ fn experiments_have_names_of_their_own_and_columns_two() {
     assert!(stderr.contains("the same column"), "{stderr}");
 }
 
-/// More parameters than the paper's 10^5.
+/// More than 10^5 parameters, the number in the paper.
 #[test]
 fn forty_thousand_nodes_run_the_same_commands() {
     let bench = Workbench::with_shipped_models();

@@ -1,4 +1,4 @@
-//! `kmcfit simulate`: noise that can be made again.
+//! `kmcfit simulate`: responses with reproducible noise.
 
 use crate::workbench::{Workbench, column};
 use serde_json::Value;
@@ -40,7 +40,7 @@ fn the_noise_has_the_standard_deviation_asked_for() {
 #[test]
 fn the_record_tells_how_to_make_it_again() {
     let bench = Workbench::with_shipped_models();
-    // More than a double holds: a seed must not be rounded.
+    // More digits than a double has: a seed must not be rounded.
     noisy(&bench, "9007199254740993", "deep/a.csv");
     let record: Value = serde_json::from_str(&bench.read("deep/a.csv.json")).expect("JSON");
     assert_eq!(record["made_by"], "kmcfit simulate");
@@ -52,7 +52,7 @@ fn the_record_tells_how_to_make_it_again() {
     assert_eq!(record["noise"]["seed"], 9_007_199_254_740_993_u64);
 }
 
-/// On standard output there is no place for a record, so the seed is said beside it.
+/// With the table on standard output there is no provenance file: the seed is reported on standard error.
 #[test]
 fn readings_on_standard_output() {
     let bench = Workbench::with_shipped_models();

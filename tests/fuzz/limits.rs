@@ -147,7 +147,7 @@ fn what_is_no_file() {
     drop(socket);
     symlink("..", &data).expect("room");
     refuse("this is a folder, not a file");
-    // The model itself, and readings that a simulation does not need.
+    // The model itself, and samples that a simulation does not need.
     pipe();
     let said = refused(place, &["fit", "data"]);
     assert!(said.contains("this is a pipe"), "{said}");

@@ -2,7 +2,7 @@
 //! taking more memory than a multiple of the input.
 //!
 //! `tests/fuzz/corpus/` has a folder of inputs for each target: good ones, hand-made bad ones, and one for
-//! each mistake that was found. They are run with the shipped models and readings, and then so many
+//! each mistake that was found. They are run with the shipped models and samples, and then so many
 //! mutations of them; `KMCFIT_FUZZ=100000` asks for as many of each target instead, `KMCFIT_FUZZ_SEED=7`
 //! draws other ones, and `KMCFIT_FUZZ_GROW=1` keeps those in the corpus that led to a message of a new
 //! kind. `.ci/long` does all three.

@@ -52,7 +52,7 @@ pub const TARGETS: [(&str, Target); 8] = [
 const MANY_NODES: usize = 300;
 /// Nodes beyond which no machine has the memory: refused, so left as they are.
 const TOO_MANY_NODES: usize = 1_000_000_000;
-/// Lines that are kept of each file of readings.
+/// Lines that are kept of each file of samples.
 const LINES: usize = 60;
 
 const METHODS: [&str; 4] = [
@@ -62,7 +62,7 @@ const METHODS: [&str; 4] = [
     "steepest-descent",
 ];
 
-/// Names, models and readings that the targets work on.
+/// Names, models and samples that the targets work on.
 struct Workshop {
     folder: TempDir,
     /// A model and what it fits, for each method.
@@ -75,7 +75,7 @@ impl Workshop {
     }
 }
 
-/// The workshop: the shipped readings, cut short, and a finished run.
+/// The workshop: the shipped samples, cut short, and a finished run.
 fn workshop() -> &'static Workshop {
     static WORKSHOP: OnceLock<Workshop> = OnceLock::new();
     WORKSHOP.get_or_init(|| {
@@ -131,7 +131,7 @@ fn small(folder: &Path, method: &str) -> (Heading, Model) {
 fn fitted(model: &Model, journal: &mut FitJournal) -> Fit {
     let start = model.problem.start();
     let mut observe = |_: &_| {};
-    let mut watch = Observer::new(&mut observe).keeping(journal);
+    let mut watch = Observer::new(&mut observe).with_checkpoints(journal);
     let found = fit_with_noise_watched(&model.problem, &start, &model.settings, &mut watch);
     found.expect("a motion").1
 }

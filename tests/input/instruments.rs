@@ -305,7 +305,7 @@ fn instruments_have_their_habits() {
         let table = table(format!("{names}\n0\t1.5\t\n1\t2.5\t\n"));
         assert_eq!(table.column("y").unwrap(), [1.5, 2.5]);
     }
-    // Settings beside the readings.
+    // Settings beside the samples.
     let beside = table("Points,2500,,-0.5,1\nInterval,2e-4,,0.0,2\n,,,0.5,3\n,,,1.0,4\n");
     assert_eq!(beside.values(3).unwrap(), [-0.5, 0.0, 0.5, 1.0]);
     assert!(beside.headers().is_empty());

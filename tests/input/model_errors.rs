@@ -344,10 +344,10 @@ fn choices() {
 #[test]
 fn formats() {
     assert_snapshot!(changed("format: 1", "format: 2"), @"
-    m.yaml:1:9: format: this version of the program cannot read that format
+    m.yaml:1:9: format: this format version is not supported
       found: the integer 2
       expected: 1
-      hint: a newer version of the program may
+      hint: a newer version of kmcfit may read it
     ");
     assert_snapshot!(changed("format: 1", "format: one"), @"
     m.yaml:1:9: format: not a format number

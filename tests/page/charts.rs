@@ -117,7 +117,7 @@ fn keys_zoom_and_read() {
     };
     browser.evaluate(&format!("{}.focus()", plot("functions")));
     browser.key("ArrowRight");
-    let said = browser.text("document.getElementById('chart-reading').textContent");
+    let said = browser.text("document.getElementById('chart-cursor').textContent");
     assert!(said.starts_with("time t 10.2 s; "), "{said}");
     for part in ["found 1.", "truth 1 kg", "95 % band "] {
         assert!(said.contains(part), "{part} in {said}");
@@ -126,7 +126,7 @@ fn keys_zoom_and_read() {
     let zoomed = range(&mut browser, "functions");
     assert!((zoomed[1] - zoomed[0] - 10.0).abs() < 1e-9, "{zoomed:?}");
     browser.key("End");
-    let end = browser.text("document.getElementById('chart-reading').textContent");
+    let end = browser.text("document.getElementById('chart-cursor').textContent");
     assert_ne!(end, said);
     // One step further takes the sight along.
     browser.key("ArrowRight");
@@ -185,7 +185,7 @@ fn a_drag_zooms_and_a_double_click_resets() {
     assert_eq!(browser.evaluate(disabled), json!(true));
     // The pointer reads off: a line and the values at its place.
     browser.mouse("mouseMoved", at, json!({}));
-    let reading = browser.text("document.querySelector('#figure-channel .reading').textContent");
+    let reading = browser.text("document.querySelector('#figure-channel .cursor').textContent");
     assert!(
         reading.contains("samples") && reading.contains("model"),
         "{reading}"

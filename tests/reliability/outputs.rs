@@ -22,10 +22,10 @@ fn refused(bench: &Workbench, arguments: &[&str], about: &str) -> String {
 #[test]
 fn a_project_folder_keeps_its_files() {
     let bench = Workbench::with_small_model();
-    let model = MODEL.replace("data: readings.csv", "data: readings/paper.csv");
+    let model = MODEL.replace("data: readings.csv", "data: channels/paper.csv");
     bench.write("model.yaml", &model);
-    bench.write("readings/paper.csv", &bench.read("readings.csv"));
-    bench.write("readings/other.csv", "t_s,y_m\n0,1\n");
+    bench.write("channels/paper.csv", &bench.read("readings.csv"));
+    bench.write("channels/other.csv", "t_s,y_m\n0,1\n");
     bench.write("figures/my_drawing.svg", "<svg/>");
     let before = tree(&bench.path(""));
     bench.run_to(0, &["fit", "model.yaml", "--out", "."]);
@@ -54,7 +54,7 @@ fn files_in_the_way_are_refused_before_the_fit() {
         "fit.journal",
         "fit.checkpoint",
         "figures/motion.svg",
-        "readings/1-displacement.csv",
+        "channels/1-displacement.csv",
     ] {
         let bench = Workbench::with_small_model();
         bench.write(&format!("run/{name}"), "mine\n");

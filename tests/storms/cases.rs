@@ -43,9 +43,9 @@ impl Device {
 pub struct Case {
     pub name: &'static str,
     pub device: Device,
-    /// Times of the readings, s.
+    /// Times of the samples, s.
     pub times: Vec<f64>,
-    /// What the readings are instead of the displacement there.
+    /// What the samples are instead of the displacement there.
     pub spoil: fn(usize, f64) -> String,
     /// Start of mass and damping.
     pub start: [f64; 2],
@@ -219,7 +219,7 @@ impl Case {
         .replace("grid: {}\n", "")
     }
 
-    /// The table of readings.
+    /// The table of samples.
     pub fn readings(&self) -> String {
         let row = |(i, t): (usize, &f64)| {
             let y = (self.spoil)(i, self.device.at(*t));

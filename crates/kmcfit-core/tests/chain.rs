@@ -42,15 +42,15 @@ proptest! {
         exponents in prop::collection::vec(-1..=1i32, 5),
     ) {
         let plain = chain(length, width, &a, &exponents);
-        let expected = plain.solve_plain().unwrap();
+        let expected = plain.solve_equality_constrained().unwrap();
         let rising: Vec<u32> = (0..length as u32).collect();
         let falling: Vec<u32> = rising.iter().rev().copied().collect();
         let pairs: Vec<u32> = rising.iter().map(|i| i / 2).collect();
-        for mut stations in [rising, falling, pairs] {
-            stations.push(0);
+        for mut elimination_order in [rising, falling, pairs] {
+            elimination_order.push(0);
             let mut sub = plain.clone();
-            sub.stations = stations;
-            let found = sub.solve_plain().unwrap();
+            sub.elimination_order = elimination_order;
+            let found = sub.solve_equality_constrained().unwrap();
             for (found, expected) in found.iter().zip(&expected) {
                 prop_assert!((found - expected).abs() <= 1e-6 * (1.0 + expected.abs()), "{found} {expected}");
             }
@@ -76,10 +76,10 @@ proptest! {
         for (j, right) in a.iter().enumerate().take(given) {
             plain.equalities.push([(j, 2.0)], *right);
         }
-        plain.stations = (0..length as u32).chain([0]).collect();
+        plain.elimination_order = (0..length as u32).chain([0]).collect();
         let mut sub = plain.clone();
-        sub.stations = vec![0; length + 1];
-        let (expected, found) = (plain.solve_plain().unwrap(), sub.solve_plain().unwrap());
+        sub.elimination_order = vec![0; length + 1];
+        let (expected, found) = (plain.solve_equality_constrained().unwrap(), sub.solve_equality_constrained().unwrap());
         for (z, right) in found.iter().zip(&a).take(given) {
             prop_assert_eq!(*z, right / 2.0);
         }
@@ -100,13 +100,13 @@ fn variables_that_are_not_determined_do_no_harm() {
         // The third column is the sum of the others.
         (three.residuals).push([(0, 1.0), (1, x), (2, 1.0 + x)], x.sin());
     }
-    two.stations = vec![0; 2];
-    three.stations = vec![0; 3];
-    let least = two.value(&two.solve_plain().expect("one minimum"));
-    let found = three.value(&three.solve_plain().expect("a minimum"));
+    two.elimination_order = vec![0; 2];
+    three.elimination_order = vec![0; 3];
+    let least = two.value(&two.solve_equality_constrained().expect("one minimum"));
+    let found = three.value(&three.solve_equality_constrained().expect("a minimum"));
     assert!((found - least).abs() <= 1e-12 * least, "{found} {least}");
     three.residuals.push([(2, 1.0)], 0.5);
-    let z = three.solve_plain().expect("one minimum");
+    let z = three.solve_equality_constrained().expect("one minimum");
     assert!((z[2] - 0.5).abs() <= 1e-14, "{z:?}");
 }
 
@@ -114,7 +114,7 @@ fn variables_that_are_not_determined_do_no_harm() {
 fn several_right_hand_sides_are_solved_as_each_by_itself() {
     let numbers = [0.3, -0.7, 0.9, 0.2, -0.4, 0.8, 0.1];
     let mut sub = chain(12, 3, &numbers, &[0]);
-    sub.stations = (0..13).collect();
+    sub.elimination_order = (0..13).collect();
     let targets: Vec<Vec<f64>> = (0..3)
         .map(|k| {
             (0..sub.residuals.len())
@@ -122,9 +122,9 @@ fn several_right_hand_sides_are_solved_as_each_by_itself() {
                 .collect()
         })
         .collect();
-    let together = sub.solve_plain_for(&targets).unwrap();
+    let together = sub.solve_equality_constrained_for(&targets).unwrap();
     for (target, found) in targets.into_iter().zip(together) {
-        let alone = sub.solve_plain_for(&[target]).unwrap();
+        let alone = sub.solve_equality_constrained_for(&[target]).unwrap();
         // The same operations on each side: the same bits.
         assert_eq!(alone, [found]);
     }
@@ -134,33 +134,33 @@ fn several_right_hand_sides_are_solved_as_each_by_itself() {
 fn unsolvable_problems_have_no_solution() {
     let numbers = [0.3, -0.7, 0.9, 0.2, -0.4, 0.8, 0.1];
     let mut sub = chain(12, 3, &numbers, &[0]);
-    sub.stations = (0..13).collect();
-    assert!(sub.solve_plain().is_some());
+    sub.elimination_order = (0..13).collect();
+    assert!(sub.solve_equality_constrained().is_some());
     // A number that is none, in a residual or in an equality, is not passed over.
     for bad in [f64::NAN, f64::INFINITY] {
         let mut broken = sub.clone();
         broken.residuals.push([(3, bad)], 1.0);
-        assert!(broken.solve_plain().is_none());
+        assert!(broken.solve_equality_constrained().is_none());
         let mut broken = sub.clone();
         broken.equalities.push([(3, bad)], 1.0);
-        assert!(broken.solve_plain().is_none());
+        assert!(broken.solve_equality_constrained().is_none());
     }
     // Contradictory equalities.
     sub.equalities.push([(5, 1.0)], 1.0);
     sub.equalities.push([(5, 1.0)], 2.0);
-    assert!(sub.solve_plain().is_none());
+    assert!(sub.solve_equality_constrained().is_none());
 }
 
 #[test]
 fn bounds_violated_by_the_plain_minimum_become_active() {
     let mut sub = Subproblem::new(3);
-    sub.stations = vec![0, 1, 2];
+    sub.elimination_order = vec![0, 1, 2];
     for (j, target) in [-1.0, 0.5, 3.0].into_iter().enumerate() {
         sub.residuals.push([(j, 1.0)], target);
         sub.bound([(j, 1.0)], 0.0, 2.0);
     }
-    let plain = sub.solve_plain().unwrap();
-    let held = sub.solve_held(plain, 1e-10).unwrap();
+    let plain = sub.solve_equality_constrained().unwrap();
+    let held = sub.solve_active_set(plain, 1e-10).unwrap();
     for (found, expected) in held.iter().zip([0.0, 0.5, 2.0]) {
         assert!((found - expected).abs() < 1e-14, "{held:?}");
     }

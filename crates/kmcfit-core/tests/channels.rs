@@ -53,7 +53,7 @@ const LOSSES: [Loss; 3] = [
 
 /// One channel of a random record.
 #[derive(Debug, Clone)]
-struct Readings {
+struct ChannelSpec {
     kind: ChannelKind,
     /// Step and share of it.
     places: Vec<(usize, f64)>,
@@ -76,7 +76,7 @@ struct Case {
     force: Vec<[f64; 3]>,
     base: Vec<[f64; 3]>,
     initial: [f64; 2],
-    channels: Vec<Readings>,
+    channels: Vec<ChannelSpec>,
 }
 
 fn case(method: Method, nodes: usize, seed: u64) -> Case {
@@ -123,7 +123,7 @@ fn case(method: Method, nodes: usize, seed: u64) -> Case {
             let count = times.len();
             let around = list(2 * count, -2.0, 2.0);
             let sensor = list(3, 0.5, 1.5);
-            Readings {
+            ChannelSpec {
                 kind,
                 places: times.iter().map(place).collect(),
                 values: list(count, -2.0, 2.0),

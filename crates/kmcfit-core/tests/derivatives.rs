@@ -6,7 +6,7 @@ use common::properties::properties;
 use common::reference::{Inputs, response};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::simulate::{
-    Engine, Purpose, Trajectory, continuous_adjoint, reference,
+    Engine, EngineMode, Trajectory, continuous_adjoint, reference,
 };
 use kmcfit_core::internals::system::quadrature::trapezoid_weights;
 use kmcfit_core::internals::system::{
@@ -23,7 +23,7 @@ fn discrete_adjoint(
     response: &Trajectory,
     source: &Trajectory,
 ) -> SystemTangent {
-    let engine = Engine::choose(system, excitation, response.nodes(), Purpose::Estimation);
+    let engine = Engine::choose(system, excitation, response.nodes(), EngineMode::Fastest);
     engine.discrete_adjoint(system, nodal, excitation, response, source)
 }
 

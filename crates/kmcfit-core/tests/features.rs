@@ -120,7 +120,7 @@ fn scattered(count: usize, seed: u64) -> Vec<f64> {
 
 /// How one channel was read.
 #[derive(Clone)]
-struct Reading {
+struct ChannelSpec {
     kind: ChannelKind,
     times: Vec<f64>,
     sigma: Weighting,
@@ -133,7 +133,7 @@ struct Reading {
     loss: Loss,
 }
 
-impl Reading {
+impl ChannelSpec {
     fn of(kind: ChannelKind, times: Vec<f64>) -> Self {
         Self {
             kind,
@@ -200,13 +200,13 @@ struct Record {
     /// The scalars that the initial state is, where it is estimated.
     initial_parameters: [Option<usize>; 2],
     excitation: Option<Excitation>,
-    samples: Vec<Reading>,
+    samples: Vec<ChannelSpec>,
     /// Which system of the case.
     coefficient_set: usize,
 }
 
 impl Record {
-    fn free(samples: Vec<Reading>) -> Self {
+    fn free(samples: Vec<ChannelSpec>) -> Self {
         Self {
             initial: INITIAL,
             initial_parameters: [None; 2],
@@ -216,7 +216,7 @@ impl Record {
         }
     }
 
-    fn driven(excitation: Excitation, samples: Vec<Reading>) -> Self {
+    fn driven(excitation: Excitation, samples: Vec<ChannelSpec>) -> Self {
         Self {
             excitation: Some(excitation),
             ..Self::free(samples)
@@ -407,8 +407,8 @@ fn forced() -> Excitation {
 #[test]
 fn each_kind_of_channel() {
     for kind in ChannelKind::ALL {
-        Case::linear(vec![Record::free(vec![Reading::at_nodes(kind)])]).check(kind.name());
-        let scattered = Reading::of(kind, scattered(160, 3));
+        Case::linear(vec![Record::free(vec![ChannelSpec::at_nodes(kind)])]).check(kind.name());
+        let scattered = ChannelSpec::of(kind, scattered(160, 3));
         Case::linear(vec![Record::free(vec![scattered])])
             .check(&format!("{} between nodes", kind.name()));
     }
@@ -417,7 +417,7 @@ fn each_kind_of_channel() {
 #[test]
 fn channels_at_times_of_their_own() {
     let samples = ChannelKind::ALL.iter().zip(1..);
-    let samples = samples.map(|(kind, seed)| Reading::of(*kind, scattered(70, seed)));
+    let samples = samples.map(|(kind, seed)| ChannelSpec::of(*kind, scattered(70, seed)));
     Case::linear(vec![Record::free(samples.collect())]).check("mixed");
 }
 
@@ -425,7 +425,7 @@ fn channels_at_times_of_their_own() {
 fn samples_with_individual_sigmas_and_robust_losses() {
     let times = scattered(150, 8);
     let sigmas = (0..times.len()).map(|i| 1e-3 * (1.0 + (i % 7) as f64));
-    let mut sample = Reading::of(ChannelKind::Displacement, times.clone());
+    let mut sample = ChannelSpec::of(ChannelKind::Displacement, times.clone());
     sample.sigma = Weighting::Sigmas(sigmas.collect());
     for loss in [
         Loss::Squares,
@@ -444,7 +444,7 @@ fn samples_with_individual_sigmas_and_robust_losses() {
 fn gain_offset_and_drift() {
     for kind in ChannelKind::ALL {
         // The mass is known, so that a force tells what the gain is; a free record could not.
-        let sample = Reading::of(kind, scattered(150, 4)).unknown_sensor([1.3, 0.4, -0.05], 0);
+        let sample = ChannelSpec::of(kind, scattered(150, 4)).unknown_sensor([1.3, 0.4, -0.05], 0);
         let scalars = vec![
             scalar(1.3, 1.0, None),
             scalar(0.4, 0.0, None),
@@ -460,7 +460,7 @@ fn gain_offset_and_drift() {
 fn initial_states_with_and_without_a_prior() {
     for kind in ChannelKind::ALL {
         for prior in [None, Some(0.02)] {
-            let mut record = Record::free(vec![Reading::of(kind, scattered(150, 5))]);
+            let mut record = Record::free(vec![ChannelSpec::of(kind, scattered(150, 5))]);
             record.initial_parameters = [Some(0), Some(1)];
             let scalars = vec![
                 scalar(INITIAL.displacement, 0.8, prior),
@@ -478,7 +478,7 @@ fn a_measured_force_gives_the_mass_too() {
     for kind in ChannelKind::ALL {
         let mut case = Case::linear(vec![Record::driven(
             forced(),
-            vec![Reading::of(kind, scattered(200, 6))],
+            vec![ChannelSpec::of(kind, scattered(200, 6))],
         )]);
         case.mass = Some(constant(CoefficientKind::Mass, 1.2, 1.6));
         case.check(&format!("forced, {}", kind.name()));
@@ -498,7 +498,7 @@ fn base_excitation_with_sensors_on_the_base_and_in_space() {
     };
     for fixed_in_space in [false, true] {
         for kind in [ChannelKind::Displacement, ChannelKind::Acceleration] {
-            let mut sample = Reading::of(kind, times.clone());
+            let mut sample = ChannelSpec::of(kind, times.clone());
             sample.around = (times.iter())
                 .map(|t| InputSample {
                     force: 0.0,
@@ -522,7 +522,7 @@ fn base_excitation_with_sensors_on_the_base_and_in_space() {
 #[test]
 fn several_experiments_share_functions_and_have_some_of_their_own() {
     let times = |seed| scattered(120, seed);
-    let mut second = Record::free(vec![Reading::of(ChannelKind::Velocity, times(12))]);
+    let mut second = Record::free(vec![ChannelSpec::of(ChannelKind::Velocity, times(12))]);
     second.initial = State {
         displacement: -0.4,
         velocity: 2.0,
@@ -532,10 +532,10 @@ fn several_experiments_share_functions_and_have_some_of_their_own() {
     let short = times(13).into_iter().filter(|t| *t < 9.0).collect();
     let third = Record::driven(
         forced(),
-        vec![Reading::of(ChannelKind::Acceleration, short)],
+        vec![ChannelSpec::of(ChannelKind::Acceleration, short)],
     );
     let mut case = Case::linear(vec![
-        Record::free(vec![Reading::of(ChannelKind::Displacement, times(11))]),
+        Record::free(vec![ChannelSpec::of(ChannelKind::Displacement, times(11))]),
         second,
         third,
     ])
@@ -573,7 +573,10 @@ fn each_nonlinear_term() {
         ),
     ];
     for (term, estimated) in others {
-        let samples = vec![Reading::of(ChannelKind::Displacement, scattered(250, 9))];
+        let samples = vec![ChannelSpec::of(
+            ChannelKind::Displacement,
+            scattered(250, 9),
+        )];
         let mut case = Case::linear(vec![Record::driven(forced(), samples)]);
         case.terms.push(term);
         case.functions[1] = constant(CoefficientKind::Stiffness, 4.0, 3.6);
@@ -586,7 +589,7 @@ fn each_nonlinear_term() {
 fn a_band_pass_filter() {
     let rate = 1.0 / grid().step();
     for kind in ChannelKind::ALL {
-        let mut sample = Reading::at_nodes(kind);
+        let mut sample = ChannelSpec::at_nodes(kind);
         sample.filter = band_pass(2, 0.1, 2.0, rate).unwrap();
         sample.sensor = [1.0, 0.7, 0.02];
         Case::linear(vec![Record::free(vec![sample])]).check(&format!("band of {}", kind.name()));
@@ -601,15 +604,15 @@ fn all_together() {
         force: Some(force()),
         base: Some(base()),
     };
-    let displacement = Reading::of(ChannelKind::Displacement, scattered(150, 21))
+    let displacement = ChannelSpec::of(ChannelKind::Displacement, scattered(150, 21))
         .unknown_sensor([0.8, 0.2, 0.03], 2);
-    let mut velocity = Reading::of(ChannelKind::Velocity, scattered(120, 22));
+    let mut velocity = ChannelSpec::of(ChannelKind::Velocity, scattered(120, 22));
     velocity.sigma = Weighting::Sigmas(
         (0..velocity.times.len())
             .map(|i| 1e-3 + 1e-5 * i as f64)
             .collect(),
     );
-    let mut acceleration = Reading::at_nodes(ChannelKind::Acceleration);
+    let mut acceleration = ChannelSpec::at_nodes(ChannelKind::Acceleration);
     acceleration.filter = band_pass(2, 0.1, 2.5, 1.0 / grid().step()).unwrap();
     let mut first = Record::driven(both, vec![displacement, velocity.clone()]);
     first.initial_parameters = [Some(0), Some(1)];
@@ -622,7 +625,7 @@ fn all_together() {
     let short = (0..180).map(|i| grid().time(i)).collect();
     let third = Record::driven(
         forced(),
-        vec![Reading::of(ChannelKind::Displacement, short)],
+        vec![ChannelSpec::of(ChannelKind::Displacement, short)],
     );
     Case {
         terms: vec![
@@ -669,11 +672,11 @@ fn one_value_per_node_with_sensors_states_and_a_filter() {
         truth: grid().times().iter().map(|t| from + slope * t).collect(),
         start: vec![start; NODES],
     };
-    let mut filtered = Reading::at_nodes(ChannelKind::Velocity);
+    let mut filtered = ChannelSpec::at_nodes(ChannelKind::Velocity);
     filtered.filter = band_pass(2, 0.1, 3.0, 1.0 / grid().step()).unwrap();
-    let displacement = Reading::of(ChannelKind::Displacement, scattered(250, 31))
+    let displacement = ChannelSpec::of(ChannelKind::Displacement, scattered(250, 31))
         .unknown_sensor([1.2, 0.3, 0.01], 2);
-    let acceleration = Reading::of(ChannelKind::Acceleration, scattered(200, 32));
+    let acceleration = ChannelSpec::of(ChannelKind::Acceleration, scattered(200, 32));
     let mut first = Record::driven(forced(), vec![displacement, acceleration]);
     first.initial_parameters = [Some(0), Some(1)];
     let mut second = Record::free(vec![filtered]);
@@ -721,11 +724,11 @@ fn all_of_it_from_far_away_on_a_coarse_grid() {
     let late = |i: usize| 0.2 * (1.0 + (1.7 * i as f64).sin());
     let times = (0..NODES - 1).filter(|i| i % 10 != 7);
     let times = times.map(|i| (i as f64 + late(i)) * grid().step());
-    let mut displacement = Reading::of(ChannelKind::Displacement, times.collect())
+    let mut displacement = ChannelSpec::of(ChannelKind::Displacement, times.collect())
         .unknown_sensor([1.0, 0.05, 0.002], 2);
     // A free record could not tell the gain from the initial state.
     displacement.initial_parameters = [None, Some(2), Some(3)];
-    let mut filtered = Reading::at_nodes(ChannelKind::Velocity);
+    let mut filtered = ChannelSpec::at_nodes(ChannelKind::Velocity);
     filtered.filter = band_pass(2, 1.0, 8.0, rate).unwrap();
     let mut first = Record::free(vec![displacement]);
     first.initial_parameters = [Some(0), Some(1)];
@@ -762,7 +765,7 @@ fn all_of_it_from_far_away_on_a_coarse_grid() {
 /// A prior with another mean pulls, by as much as its weight beside that of the samples says.
 #[test]
 fn a_prior_pulls_towards_its_mean() {
-    let mut record = Record::free(vec![Reading::of(
+    let mut record = Record::free(vec![ChannelSpec::of(
         ChannelKind::Displacement,
         scattered(150, 5),
     )]);
@@ -800,7 +803,7 @@ fn a_prior_pulls_towards_its_mean() {
 /// nothing is left of it.
 #[test]
 fn a_part_of_a_filtered_record_is_a_record() {
-    let mut sample = Reading::at_nodes(ChannelKind::Displacement);
+    let mut sample = ChannelSpec::at_nodes(ChannelKind::Displacement);
     sample.filter = band_pass(2, 0.1, 2.0, 1.0 / grid().step()).unwrap();
     let case = Case::linear(vec![Record::free(vec![sample])]);
     let part = case.problem().truncated(0.3);

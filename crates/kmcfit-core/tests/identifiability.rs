@@ -11,7 +11,7 @@ use kmcfit_core::internals::functions::{
 };
 use kmcfit_core::internals::identifiability::{
     Band, BandSettings, BandSide, Bands, CandidateChannel, CandidateExperiment, Classification,
-    ScalingAmbiguity, Sensitivity, SingularSpectrum, Symmetry, classify_functions,
+    ScaleFreedom, ScalingAmbiguity, Sensitivity, SingularSpectrum, classify_functions,
     rank_experiments, structural_rank,
 };
 use kmcfit_core::internals::problem::Problem;
@@ -113,42 +113,47 @@ fn structural_and_numerical_rank_are_those_of_the_table() {
     let nodal = common::paper_system(nodes);
     let grid = system.grid;
     let drive = |i, silent| forced(i, &grid, silent);
-    let table: [(&str, Vec<Record>, usize, Symmetry); 8] = [
-        ("one free", vec![free(0)], 199, Symmetry::Function),
-        ("two free", vec![free(0), free(1)], 398, Symmetry::Function),
+    let table: [(&str, Vec<Record>, usize, ScaleFreedom); 8] = [
+        ("one free", vec![free(0)], 199, ScaleFreedom::Function),
+        (
+            "two free",
+            vec![free(0), free(1)],
+            398,
+            ScaleFreedom::Function,
+        ),
         (
             "three free",
             vec![free(0), free(1), free(2)],
             398,
-            Symmetry::Function,
+            ScaleFreedom::Function,
         ),
-        ("one forced", vec![drive(0, 0)], 199, Symmetry::None),
+        ("one forced", vec![drive(0, 0)], 199, ScaleFreedom::None),
         (
             "two free, one forced",
             vec![free(0), free(1), drive(2, 0)],
             597,
-            Symmetry::None,
+            ScaleFreedom::None,
         ),
         (
             "three forced",
             vec![drive(0, 0), drive(1, 0), drive(2, 0)],
             597,
-            Symmetry::None,
+            ScaleFreedom::None,
         ),
         (
             "f(0) = 0",
             vec![free(0), free(1), drive(2, 1)],
             596,
-            Symmetry::None,
+            ScaleFreedom::None,
         ),
         (
             "f from 5 s",
             vec![free(0), free(1), drive(2, 40)],
             557,
-            Symmetry::Function,
+            ScaleFreedom::Function,
         ),
     ];
-    for (words, records, expected, symmetry) in table {
+    for (words, records, expected, freedom) in table {
         let problem = nodal_problem(&system, &nodal, &records);
         let counted = structural_rank(&problem);
         let seen = spectrum(&problem);
@@ -164,7 +169,7 @@ fn structural_and_numerical_rank_are_those_of_the_table() {
             (expected, 600),
             "{words}"
         );
-        assert_eq!(counted.symmetry, symmetry, "{words}");
+        assert_eq!(counted.scale_freedom, freedom, "{words}");
     }
 }
 
@@ -186,16 +191,16 @@ fn a_force_that_pauses_sees_less_while_it_does() {
 fn a_linear_mass_lacks_one_direction_until_a_force_acts() {
     let system = common::system(200, Method::Midpoint);
     let force = forced(0, &system.grid, 0);
-    for (record, expected, symmetry) in [
-        (free(0), 3, Symmetry::ConstantFactor),
-        (force, 4, Symmetry::None),
+    for (record, expected, freedom) in [
+        (free(0), 3, ScaleFreedom::ConstantFactor),
+        (force, 4, ScaleFreedom::None),
     ] {
         let problem = linear_mass(&system, record);
         let counted = structural_rank(&problem);
         println!("{}", counted.sentences().join("; "));
         assert_eq!((counted.rank_bound, counted.parameters), (expected, 4));
         assert_eq!(spectrum(&problem).rank(), expected);
-        assert_eq!(counted.symmetry, symmetry);
+        assert_eq!(counted.scale_freedom, freedom);
     }
 }
 
@@ -342,7 +347,7 @@ fn constraints_and_penalties_determine_the_scale_or_its_constant_factor() {
         })
         .unwrap();
     assert!(ambiguity(&fixed).is_empty());
-    assert_eq!(structural_rank(&fixed).symmetry, Symmetry::None);
+    assert_eq!(structural_rank(&fixed).scale_freedom, ScaleFreedom::None);
 
     let first = open.functions.ranges()[2].start;
     let mut value = RowGroup::new("k(0) = 1");
@@ -366,7 +371,7 @@ fn constraints_and_penalties_determine_the_scale_or_its_constant_factor() {
         assert_eq!(found.over_time().count(), nodes - 1);
         let counted = structural_rank(&held);
         println!("{}", counted.sentences().join("; "));
-        assert_eq!(counted.symmetry, Symmetry::Function);
+        assert_eq!(counted.scale_freedom, ScaleFreedom::Function);
         let mut smooth = held.clone();
         let rows = Basis::Nodal.roughness(&system.grid, 2);
         smooth = smooth
@@ -374,7 +379,7 @@ fn constraints_and_penalties_determine_the_scale_or_its_constant_factor() {
                 parts.penalties.push(Penalty::new(0, 2, 1.0, rows));
             })
             .unwrap();
-        assert_eq!(structural_rank(&smooth).symmetry, Symmetry::None);
+        assert_eq!(structural_rank(&smooth).scale_freedom, ScaleFreedom::None);
     }
 }
 
@@ -939,7 +944,7 @@ fn the_scale_by_bases_and_drives() {
         knots: knots(count),
     };
     let table = [
-        (all(cells.clone()), 12, Symmetry::Function),
+        (all(cells.clone()), 12, ScaleFreedom::Function),
         // Six cells and four have two halves of the record in common.
         (
             [
@@ -948,22 +953,22 @@ fn the_scale_by_bases_and_drives() {
                 cells,
             ],
             14,
-            Symmetry::Function,
+            ScaleFreedom::Function,
         ),
-        (all(line(9)), 26, Symmetry::NearlyFunction),
-        (all(line(3)), 8, Symmetry::ConstantFactor),
+        (all(line(9)), 26, ScaleFreedom::NearlyFunction),
+        (all(line(3)), 8, ScaleFreedom::ConstantFactor),
         (
             all(Basis::BSpline { knots: knots(9) }),
             32,
-            Symmetry::NearlyFunction,
+            ScaleFreedom::NearlyFunction,
         ),
         (
             [line(9), Basis::Constant, line(9)],
             18,
-            Symmetry::ConstantFactor,
+            ScaleFreedom::ConstantFactor,
         ),
     ];
-    for (bases, expected, symmetry) in table {
+    for (bases, expected, freedom) in table {
         let name = format!("{bases:?}");
         let problem = with(bases, &[free(0), free(1)]);
         let counted = structural_rank(&problem);
@@ -973,13 +978,13 @@ fn the_scale_by_bases_and_drives() {
             counted.sentences().join("; ")
         );
         assert_eq!(
-            (counted.rank_bound, counted.symmetry),
-            (expected, symmetry),
+            (counted.rank_bound, counted.scale_freedom),
+            (expected, freedom),
             "{name}"
         );
         // Values that jump at knots are linear over the step there: the rank is that of the constant
         // factor alone, with singular values that fall with the step.
-        if symmetry != Symmetry::Function {
+        if freedom != ScaleFreedom::Function {
             assert!(spectrum(&problem).rank() <= expected, "{name}");
         }
         let ambiguity = ScalingAmbiguity::at(&problem, &problem.start());
@@ -996,7 +1001,10 @@ fn the_scale_by_bases_and_drives() {
             });
         })
         .unwrap();
-    assert_eq!(structural_rank(&problem).symmetry, Symmetry::Function);
+    assert_eq!(
+        structural_rank(&problem).scale_freedom,
+        ScaleFreedom::Function
+    );
     assert_eq!(
         ScalingAmbiguity::at(&problem, &problem.start())
             .over_time()

@@ -63,14 +63,14 @@ fn truth(grid: &Grid, basis: &Basis) -> NodalCoefficients {
 
 /// What is read, and how often: every so many nodes, on them or not, with so much noise.
 #[derive(Debug, Clone, Copy)]
-struct Reading {
+struct ChannelSpec {
     kind: ChannelKind,
     stride: usize,
     irregular: bool,
     noise: f64,
 }
 
-impl Reading {
+impl ChannelSpec {
     const fn every_node(kind: ChannelKind) -> Self {
         Self {
             kind,
@@ -93,8 +93,13 @@ impl Reading {
 }
 
 /// Mass known, damping constant, stiffness in `basis`; the start is a constant.
-fn problem(basis: &Basis, sample: Reading, factor: f64, seed: u64) -> (Problem, NodalCoefficients) {
-    let Reading { kind, noise, .. } = sample;
+fn problem(
+    basis: &Basis,
+    sample: ChannelSpec,
+    factor: f64,
+    seed: u64,
+) -> (Problem, NodalCoefficients) {
+    let ChannelSpec { kind, noise, .. } = sample;
     let system = system();
     let grid = system.grid;
     let truth = truth(&grid, basis);
@@ -169,7 +174,7 @@ fn errors(problem: &Problem, found: &Fit, truth: &NodalCoefficients) -> [f64; 2]
 
 /// From a stiffness three times too large and three times too small: within `limit` of the truth at
 /// all times, and as near as the noise allows. Returns the attempts.
-fn check(basis: &Basis, sample: Reading, limit: f64) -> Vec<&'static str> {
+fn check(basis: &Basis, sample: ChannelSpec, limit: f64) -> Vec<&'static str> {
     let mut last = Vec::new();
     for (factor, seed) in [(3.0, 1), (1.0 / 3.0, 2)] {
         let (problem, truth) = problem(basis, sample, factor, seed);
@@ -196,13 +201,17 @@ fn check(basis: &Basis, sample: Reading, limit: f64) -> Vec<&'static str> {
 fn displacements_at_every_node_give_the_stiffness_to_a_thousandth() {
     let grid = system().grid;
     for basis in [spline(&grid), line(&grid)] {
-        check(&basis, Reading::every_node(ChannelKind::Displacement), 1e-3);
+        check(
+            &basis,
+            ChannelSpec::every_node(ChannelKind::Displacement),
+            1e-3,
+        );
     }
 }
 
 #[test]
 fn accelerations_alone_give_the_stiffness_to_a_thousandth() {
-    let sample = Reading::every_node(ChannelKind::Acceleration);
+    let sample = ChannelSpec::every_node(ChannelKind::Acceleration);
     check(&spline(&system().grid), sample, 1e-3);
 }
 
@@ -210,9 +219,9 @@ fn accelerations_alone_give_the_stiffness_to_a_thousandth() {
 /// acceleration, and the equation error is wrong by several periods; the response is not.
 #[test]
 fn few_displacements_in_a_period_need_states_and_functions_at_once() {
-    let sample = Reading {
+    let sample = ChannelSpec {
         stride: 3,
-        ..Reading::every_node(ChannelKind::Displacement)
+        ..ChannelSpec::every_node(ChannelKind::Displacement)
     };
     // Four times fewer samples: errors twice as large.
     let last = check(&line(&system().grid), sample, 2e-3);
@@ -222,10 +231,10 @@ fn few_displacements_in_a_period_need_states_and_functions_at_once() {
 /// Between samples, between nodes, without a displacement.
 #[test]
 fn few_irregular_accelerations_need_states_and_functions_at_once() {
-    let sample = Reading {
+    let sample = ChannelSpec {
         stride: 3,
         irregular: true,
-        ..Reading::every_node(ChannelKind::Acceleration)
+        ..ChannelSpec::every_node(ChannelKind::Acceleration)
     };
     let last = check(&spline(&system().grid), sample, 2e-3);
     assert_eq!(last, ["motion of the samples"; 2]);
@@ -234,9 +243,9 @@ fn few_irregular_accelerations_need_states_and_functions_at_once() {
 /// With so much noise that smoothing takes a part of the response with it.
 #[test]
 fn twenty_per_cent_of_noise_give_the_stiffness_to_two_per_cent() {
-    let sample = Reading {
+    let sample = ChannelSpec {
         noise: 0.2,
-        ..Reading::every_node(ChannelKind::Displacement)
+        ..ChannelSpec::every_node(ChannelKind::Displacement)
     };
     let last = check(&spline(&system().grid), sample, 2e-2);
     assert_eq!(last, ["motion of the samples"; 2]);

@@ -55,7 +55,7 @@ fn bounds_from_below_have_negative_multipliers() {
 fn equalities_and_their_multipliers() {
     let mut sub = nearest(&[1.0, 0.0]);
     sub.equalities.push([(0, 2.0), (1, 2.0)], 4.0);
-    let plain = sub.solve_plain().unwrap();
+    let plain = sub.solve_equality_constrained().unwrap();
     let conic = sub.solve();
     for z in [&plain, &conic.z] {
         assert!(close(z, &[1.5, 0.5], 1e-8), "{z:?}");
@@ -84,7 +84,7 @@ fn absolute_values_are_soft_thresholds() {
         let mut sub = nearest(&[a]);
         sub.absolute.push([(0, 1.0)], 0.0);
         sub.absolute_weights.push(w);
-        assert!(sub.solve_plain().is_none());
+        assert!(sub.solve_equality_constrained().is_none());
         let solution = sub.solve();
         assert!(
             close(&solution.z, &[expected], 1e-6),
@@ -159,7 +159,7 @@ fn numbers_that_are_not_finite_do_not_panic() {
         sub.bound([(0, bad), (1, 1.0)], 0.0, f64::INFINITY);
         let solution = sub.solve();
         assert!(solution.z.iter().all(|z| z.is_finite()));
-        let _ = sub.solve_plain();
+        let _ = sub.solve_equality_constrained();
     }
 }
 
@@ -245,7 +245,7 @@ proptest! {
             sub.residuals.push((0..3).map(|j| (j, scale * a[3 * i + j])), scale * b[i]);
         }
         sub.proximal = vec![1e-3 * scale * scale; 3];
-        let (plain, conic) = (sub.solve_plain().unwrap(), sub.solve());
+        let (plain, conic) = (sub.solve_equality_constrained().unwrap(), sub.solve());
         prop_assert!(close(&plain, &conic.z, 1e-5), "{plain:?} {:?}", conic.z);
     }
 }

@@ -98,7 +98,7 @@ fn entry(found: &Found, wanted: &str) -> String {
     }
     let mut listed: Vec<&str> = Vec::new();
     for group in key.kind.groups() {
-        // A map, or a list of such maps.
+        // A map, or a list of them maps.
         if listed.contains(&group.name) {
             continue;
         }

@@ -52,7 +52,7 @@ keys! {
         /// Mean over the record in place of a value.
         mean: Option<bool>, example "true";
         /// Name of a nuisance parameter, in place of a function.
-        scalar: Option<Text>, example "initial velocity";
+        parameter: Option<Text>, example "initial velocity";
     }
 }
 

@@ -35,11 +35,11 @@ pub struct FitAssessment {
     /// Bands of functions and ratios, where standard errors are meaningful.
     pub bands: Option<Bands>,
     /// Classification of functions and ratios by their bands.
-    pub judgements: Vec<FunctionClassification>,
+    pub classifications: Vec<FunctionClassification>,
 }
 
 impl FitAssessment {
-    /// Assesses `fit`; covariance, bands and judgements for up to 64 parameters.
+    /// Assesses `fit`; covariance, bands and classifications for up to 64 parameters.
     pub fn of(problem: &Problem, fit: &Fit) -> Self {
         let best = &fit.best;
         let step_check = step_check(problem, &best.evaluation);
@@ -62,7 +62,7 @@ impl FitAssessment {
             plausibility,
             covariance: None,
             bands: None,
-            judgements: Vec::new(),
+            classifications: Vec::new(),
         };
         if tells_errors && assessment.plausibility.errors_hold {
             let settings = BandSettings {
@@ -70,7 +70,7 @@ impl FitAssessment {
                 ..BandSettings::default()
             };
             let bands = Bands::at(problem, &best.parameters, &best.evaluation, &settings);
-            assessment.judgements = classify_functions(problem, &best.evaluation, &bands);
+            assessment.classifications = classify_functions(problem, &best.evaluation, &bands);
             assessment.bands = Some(bands);
             assessment.covariance = problem.covariance(&best.evaluation);
         }

@@ -34,7 +34,7 @@ const NEGATIVE: f64 = 1e-3;
 /// Share of mass times acceleration below which a force is negligible.
 const IGNORED: f64 = 1e-3;
 /// Periods per sample from which on the frequency is close to that of its first alias: two and a half samples per period.
-const PERIODS_PER_READING: f64 = 0.4;
+const PERIODS_PER_SAMPLE: f64 = 0.4;
 /// Largest deviation of equally spaced samples from their grid, as a share of the spacing.
 const EVEN: f64 = 0.01;
 
@@ -308,7 +308,7 @@ fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
     squares.sort_by(f64::total_cmp);
     // Median over time, because k/m may be arbitrary at the ends of a record.
     let frequency = squares[squares.len() / 2].sqrt() / TAU;
-    (frequency * spacing > PERIODS_PER_READING).then(|| FitWarning::Aliased {
+    (frequency * spacing > PERIODS_PER_SAMPLE).then(|| FitWarning::Aliased {
         per_period: 1.0 / (frequency * spacing),
         frequency,
     })

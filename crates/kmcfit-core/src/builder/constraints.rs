@@ -147,7 +147,7 @@ impl ConstraintSpec {
             return match self.statement {
                 Constraint::DampingRatio { .. } => Err(BuildError::new(
                     key,
-                    "a cap on the damping ratio cannot be soft",
+                    "a bound of the damping ratio cannot be soft",
                 )
                 .found("`soft` beside `damping_ratio`")
                 .expected("no `soft`")),
@@ -178,7 +178,7 @@ impl ConstraintSpec {
         if held > 0.0 {
             return Ok(());
         }
-        let problem = "this excludes a positive mass: the mass must be positive at all times";
+        let problem = "this bound excludes a positive mass: the mass must be positive at all times";
         Err(BuildError::new(&self.key, problem)
             .found(held)
             .expected("a number greater than 0"))

@@ -32,10 +32,10 @@ const MANY_FUNCTION: usize = 1500;
 const PROGRAMS: usize = 2;
 
 /// Upper estimate of the memory of a run, bytes per node.
-pub fn per_node(file: &ModelFile, purpose: BuildMode) -> usize {
+pub fn per_node(file: &ModelFile, mode: BuildMode) -> usize {
     let spec = &file.spec;
     let (records, functions) = (spec.experiments.len(), functions::all(file));
-    if let BuildMode::Simulate { .. } = purpose {
+    if let BuildMode::Simulate { .. } = mode {
         return SIMULATION * (1 + records + functions.len());
     }
     let common = RUN + RECORD * records + FUNCTION * functions.len();

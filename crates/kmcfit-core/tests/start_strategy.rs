@@ -15,14 +15,14 @@ use kmcfit_core::internals::system::{
 
 /// Nodes from one sample to the next.
 const STRIDE: usize = 20;
-const READINGS: usize = 121;
+const SAMPLES: usize = 121;
 const STIFFNESS: f64 = 101.0;
 
 /// 40 periods with three samples each, and only the stiffness to be found. Differences of so few
 /// samples take 15 % off the acceleration, so the equation error has the period wrong by 7 %: a third
 /// of a period after an eighth of the record, three periods at its end. The start values are off by 13 %.
 fn problem() -> Problem {
-    let nodes = STRIDE * (READINGS - 1) + 1;
+    let nodes = STRIDE * (SAMPLES - 1) + 1;
     let system = System {
         grid: Grid::new(0.0, common::DURATION, nodes).unwrap(),
         method: Method::Rk4,
