@@ -208,7 +208,7 @@ fn the_optimum_does_not_predict() {
 
 /// On half as many nodes the paper's run ends at another point.
 #[test]
-fn the_run_hangs_on_its_rounding() {
+fn the_paper_s_run_depends_on_rounding() {
     let problem = common::paper_problem(1000, [2.0, 1.0, 1.0]);
     let settings = FitSettings {
         solver: Solver::SteepestDescent,

@@ -45,7 +45,7 @@ fn same_way(built: &Problem, written: &(Problem, kmcfit_core::internals::solvers
 }
 
 #[test]
-fn a_device_with_limits_penalties_and_demands_is_that_of_its_model_file() {
+fn a_problem_with_bounds_penalties_and_constraints_equals_that_of_its_model_file() {
     let written = from_file(
         "format: 1
 experiments:
@@ -90,7 +90,7 @@ fit: {stop: {iterations: 20, tolerance: 1e-10}}
 }
 
 #[test]
-fn a_forced_record_of_an_accelerometer_is_that_of_its_model_file() {
+fn a_forced_record_of_an_accelerometer_equals_that_of_its_model_file() {
     let written = from_file(
         "format: 1
 experiments:
@@ -131,7 +131,7 @@ fit: {stop: {iterations: 20, tolerance: 1e-10}}
 
 /// An invalid part is rejected with its key, without a panic.
 #[test]
-fn what_cannot_be_meant_is_refused() {
+fn invalid_parts_are_refused_with_their_key() {
     let one = || CoefficientSpec::constant(1.0);
     let system = || [one(), one(), one()];
     let record = paper_record;

@@ -449,7 +449,7 @@ fn constraints_and_soft_constraints() {
 /// Functions whose sizes differ by five orders of magnitude, with many active bounds: the program is solved in units of these
 /// sizes.
 #[test]
-fn bounds_on_functions_of_unlike_size() {
+fn bounds_on_functions_of_different_sizes() {
     let (mut problem, _) = shaken(3, free_at_nodes(NODES));
     let free = run(&problem);
     let mut group = RowGroup::new("damping >= 0");
@@ -475,7 +475,7 @@ fn bounds_on_functions_of_unlike_size() {
 
 /// Records without an equation error end as `failed`, with the start as the result.
 #[test]
-fn readings_without_a_motion() {
+fn records_without_an_equation_error_fail() {
     let grid = Grid::new(0.0, 1.0, 21).unwrap();
     let system = System { grid, ..system() };
     let still = channel(ChannelKind::Acceleration, &grid, vec![1.0; 21]);

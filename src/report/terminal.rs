@@ -193,7 +193,7 @@ mod tests {
     use insta::assert_snapshot;
 
     #[test]
-    fn a_wave_with_readings_off_it() {
+    fn a_wave_with_outlying_samples_is_drawn() {
         let times: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.05).collect();
         let model: Vec<f64> = times.iter().map(|t| 3.0 * t.sin()).collect();
         let mut samples = model.clone();

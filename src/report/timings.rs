@@ -137,7 +137,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_stand_where_there_are_any() {
+    fn counts_are_shown_only_if_not_zero() {
         let part = |seconds, count| PartSummary { seconds, count };
         let timings = TimingsSummary {
             arithmetic: "scalar".into(),

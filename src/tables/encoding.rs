@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn encodings_are_told_apart() {
+    fn encodings_are_detected() {
         let text = "m/s²".to_owned();
         assert_eq!(read("m/s²".as_bytes()), (text.clone(), Encoding::Utf8));
         assert_eq!(
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_text_is_refused() {
+    fn files_that_are_not_text_are_refused() {
         let message = |bytes: &[u8]| {
             let error = decode(Path::new("t.csv"), bytes.to_vec()).unwrap_err();
             error.to_string()

@@ -39,7 +39,7 @@ fn without_gradient_it_only_reads() {
 }
 
 #[test]
-fn what_is_all_fixed_has_no_gradient() {
+fn a_model_with_fixed_functions_has_no_gradient() {
     let bench = Workbench::with_small_model();
     let model = MODEL.replace("basis: nodal, start", "fixed");
     bench.write(

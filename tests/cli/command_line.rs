@@ -111,7 +111,7 @@ fn starters_can_be_fitted() {
 
 /// Errors of clap with too little detail are replaced by those of the program.
 #[test]
-fn arguments_that_are_no_numbers_and_commands_that_are_near() {
+fn invalid_numbers_and_misspelt_commands_have_messages() {
     let bench = Workbench::with_small_model();
     let (code, _, said) = bench.run(&["fti", "model.yaml"]);
     assert_eq!(code, 2);
@@ -136,7 +136,7 @@ fn arguments_that_are_no_numbers_and_commands_that_are_near() {
 }
 
 #[test]
-fn a_starter_says_what_was_found() {
+fn init_prints_the_properties_of_the_record() {
     let bench = Workbench::empty();
     let text = readings(201).replace("t_s,y_m", "Time [ms],Weg_mm");
     bench.write("run 1/my data.csv", &text);
@@ -294,7 +294,7 @@ fn check_and_simulate_take_values_too() {
 }
 
 #[test]
-fn mistakes_in_what_is_set() {
+fn invalid_overrides_have_messages() {
     let bench = Workbench::with_small_model();
     let said = |set: &str| {
         let before = bench.contents();

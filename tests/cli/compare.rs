@@ -345,7 +345,7 @@ fn equal_names() {
 }
 
 #[test]
-fn a_bad_argument_ends_everything_before_it_begins() {
+fn an_invalid_argument_ends_a_comparison_before_its_first_fit() {
     let bench = bench();
     bench.write(
         "bad.yaml",

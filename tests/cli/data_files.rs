@@ -122,7 +122,7 @@ fn every_file_is_described() {
 /// Results and journals are text and contain the path of the model, so the error names the model and not `--out`.
 #[test]
 #[cfg(target_os = "linux")]
-fn a_path_that_is_no_text() {
+fn a_path_that_is_not_utf_8_is_refused() {
     use std::ffi::OsStr;
     use std::os::unix::ffi::OsStrExt;
     let bench = Workbench::with_shipped_models();

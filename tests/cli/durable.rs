@@ -195,7 +195,7 @@ fn a_sequence_whose_fit_is_ended() {
 /// The first Ctrl-C writes the results of the best point, figures included, and `resume` continues the fit.
 #[test]
 #[cfg(unix)]
-fn interrupted_and_gone_on_with() {
+fn an_interrupted_fit_is_resumed() {
     let bench = paper(3000);
     let mut child = started(&bench, &["fit", "models/paper.yaml"]);
     wait_for_line(&bench, "runs/paper/fit.journal", 20);
@@ -226,7 +226,7 @@ fn interrupted_and_gone_on_with() {
 /// changed.
 #[test]
 #[cfg(unix)]
-fn what_was_set_is_set_again() {
+fn resume_applies_the_same_overrides() {
     let bench = paper(1000);
     let set = [
         "--set",

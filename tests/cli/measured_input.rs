@@ -274,7 +274,7 @@ fn several() {
 }
 
 #[test]
-fn doubts() {
+fn data_warnings() {
     let all = [
         warned(&[(
             "initial: {displacement: 1.0, velocity: estimate}",

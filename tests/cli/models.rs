@@ -114,7 +114,7 @@ fn error(result: &Value, function: &str) -> f64 {
 
 /// Models that recover the true system, and the largest error of each function.
 #[test]
-fn models_that_recover_the_device() {
+fn models_that_recover_the_system() {
     let expected = [
         ("linear-mass", 1e-10, 1e-10),
         ("knots", 1e-6, 1e-6),
@@ -515,7 +515,7 @@ fn scalar(result: &Value, name: &str) -> f64 {
 }
 
 #[test]
-fn a_held_out_record_is_predicted_within_its_noise() {
+fn a_validation_record_is_predicted_within_its_noise() {
     let (bench, result) = fitted("hammer-and-shaker", 0);
     let held = &result["validation"][0];
     assert_eq!(held["name"], "hammer 3");

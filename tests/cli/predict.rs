@@ -59,7 +59,7 @@ fn motions_are_written() {
 
 /// A rotation has angular units in all outputs; without a known true system a prediction reports the range of the response.
 #[test]
-fn a_rotation_is_told_in_its_units() {
+fn a_rotation_has_angular_units() {
     let bench = Workbench::with_shipped_models();
     let model = "models/roll-decay.yaml";
     let more = ["--no-report", "--set", "fit.stop.iterations=20"];
@@ -110,7 +110,7 @@ fn a_rotation_is_told_in_its_units() {
 
 /// Samples with the fit, then each function.
 #[test]
-fn the_plot_draws_readings_and_functions() {
+fn the_plot_draws_samples_and_functions() {
     let bench = Workbench::with_small_model();
     let plain = ["fit", "model.yaml", "--no-report", "--out", "run"];
     let without = bench.run_to(0, &plain);

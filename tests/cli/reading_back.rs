@@ -5,7 +5,7 @@ use kmcfit::Run;
 use kmcfit_core::internals::solvers::Status;
 
 #[test]
-fn a_run_is_what_its_files_say() {
+fn a_run_equals_its_files() {
     let (bench, _) = paper_run();
     let run = Run::open(bench.path("runs/paper")).expect("a run");
     let read = |table: &str, name: &str| column(&bench.read(&format!("runs/paper/{table}")), name);

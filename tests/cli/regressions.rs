@@ -20,7 +20,7 @@ fn status(bench: &Workbench, run: &str) -> String {
 }
 
 #[test]
-fn a_prediction_without_motion_does_not_cost_the_fit() {
+fn a_failed_prediction_does_not_end_the_fit() {
     let bench = bench(
         "fit:",
         "predict: [{displacement: 1e308, velocity: 1e308}, {displacement: 1, velocity: 0}]\nfit:",
@@ -72,7 +72,7 @@ fn without_iterations_or_tests_the_default_tolerance_holds() {
 }
 
 #[test]
-fn simulate_does_not_write_over_the_model_s_readings() {
+fn simulate_does_not_write_over_the_samples_of_the_model() {
     let bench = Workbench::with_small_model();
     let before = bench.contents();
     let (code, _, stderr) = bench.run(&["simulate", "model.yaml", "--out", "./readings.csv"]);

@@ -35,7 +35,7 @@ fn bench() -> Workbench {
 }
 
 #[test]
-fn one_command_tells_what_finds_the_device() {
+fn a_sequence_states_which_assumptions_recover_the_system() {
     let bench = bench();
     let files = MODELS.map(|name| format!("models/{name}.yaml"));
     let files: Vec<&str> = files.iter().map(String::as_str).collect();

@@ -54,7 +54,7 @@ fn document(bench: &Workbench, folder: &str) -> Value {
 }
 
 #[test]
-fn a_study_tells_what_the_data_tell() {
+fn a_study_reports_all_its_analyses() {
     let bench = bench();
     let stdout = bench.run_to(0, &["study", "model.yaml"]);
     assert!(stdout.contains("damping is identified"), "{stdout}");
@@ -93,7 +93,7 @@ fn a_study_tells_what_the_data_tell() {
 /// Finished analyses are kept, and a continued study is bit-identical to an uninterrupted one, with any number of
 /// threads.
 #[test]
-fn a_study_goes_on_where_it_was() {
+fn an_interrupted_study_is_resumed() {
     let bench = bench();
     bench.run_to(
         0,

@@ -27,7 +27,7 @@ fit: {{method: gauss-newton}}
 /// From equal samples no model is scaffolded. Steps as long as a period match them with a response at rest, and no system is
 /// identified.
 #[test]
-fn what_stands_still_shows_no_device() {
+fn a_record_at_rest_identifies_no_system() {
     let bench = Workbench::empty();
     let rows: String = (0..12).map(|i| format!("{i},1\n")).collect();
     bench.write("record.csv", &format!("t,y\n{rows}"));
@@ -58,7 +58,7 @@ fn what_stands_still_shows_no_device() {
 
 /// With few samples, two per period, the frequency is at best an alias of others.
 #[test]
-fn a_short_record_at_half_the_sampling_rate_is_not_called_sure() {
+fn a_short_record_near_the_nyquist_frequency_has_no_intervals() {
     let bench = Workbench::empty();
     let rows: String = (0..8).map(|i| format!("{i},{}\n", 1 - i % 2 * 2)).collect();
     bench.write("record.csv", &format!("t_s,y_m\n{rows}"));
@@ -73,7 +73,7 @@ type Spoiler = fn(usize, f64) -> f64;
 
 /// The suggestions for outliers, an offset and a drift remove these.
 #[test]
-fn what_to_try_next_helps() {
+fn suggestions_improve_the_fit() {
     let bench = Workbench::empty();
     let ring_down = |spoilt: Spoiler| {
         let rows = (0..401).map(|i| {
@@ -162,7 +162,7 @@ fn ring_down(seconds: u32, size: f64) -> String {
 /// With residuals a hundred times the given sigma no confidence intervals are reported, in a study neither; the suggestion
 /// concerns sigma.
 #[test]
-fn a_sigma_that_is_too_small_is_seen() {
+fn a_sigma_that_is_too_small_is_reported() {
     let bench = Workbench::empty();
     bench.write("record.csv", &ring_down(20, 1e-2));
     let model = starter("{nodes: 801}", "    sigma: {displacement: 1e-4}\n").replace("39", "3.8");
@@ -190,7 +190,7 @@ fn a_sigma_that_is_too_small_is_seen() {
 
 /// A slightly wrong model leaves autocorrelated residuals, and a warning says that the intervals are too small.
 #[test]
-fn errors_that_are_too_small_are_said_to_be() {
+fn autocorrelated_residuals_are_reported() {
     let bench = Workbench::empty();
     let beat = (0..=400).map(|i| {
         let t = 0.05 * f64::from(i);
@@ -243,7 +243,7 @@ fn a_gap_hides_no_alias() {
 
 /// Squares that overflow give an infinite sigma, with which every system would fit.
 #[test]
-fn readings_without_squares_fail_by_name() {
+fn samples_whose_squares_overflow_fail_with_that_reason() {
     let bench = Workbench::empty();
     let rows: String = (0..40)
         .map(|i| format!("{i},{}e200\n", (i % 5) - 2))
@@ -279,7 +279,7 @@ fn nodes_are_not_chosen_for_noise() {
 
 /// A laser at a stand-off distance: the samples oscillate about an offset.
 #[test]
-fn a_displacement_that_stands_off_gets_an_offset() {
+fn a_displacement_with_an_offset_gets_an_estimated_offset() {
     let bench = Workbench::empty();
     let far = |row: &str| match row.split_once(',') {
         Some((t, y)) => match y.parse::<f64>() {
@@ -323,7 +323,7 @@ fn a_starter_shows_where_times_do_not_increase() {
 
 /// A system with m = 1, c = 0.2, k = 9 from rest under a force that is recorded with the wrong sign.
 #[test]
-fn a_force_of_the_wrong_sign_is_thought_of() {
+fn a_force_of_the_wrong_sign_is_suggested() {
     let bench = Workbench::empty();
     let force = |t: f64| (0.3 * t + 0.05 * t * t).sin();
     let acceleration = |t: f64, y: f64, v: f64| force(t) - 0.2 * v - 9.0 * y;
@@ -372,7 +372,7 @@ fn a_force_of_the_wrong_sign_is_thought_of() {
 /// A function that is identified on part of the record only is reported with its values there; one that is not identified,
 /// without values.
 #[test]
-fn values_are_told_where_they_are_seen() {
+fn values_are_reported_where_they_are_identified() {
     let bench = Workbench::empty();
     let found = |end: u32, knots: u32| {
         // A row without a sample extends the grid.
@@ -405,7 +405,7 @@ fn values_are_told_where_they_are_seen() {
 
 /// On fine grids bands are computed at some of the nodes and interpolated between them; each row has the band of its time.
 #[test]
-fn bands_lie_about_functions_on_many_nodes() {
+fn bands_contain_the_functions_on_many_nodes() {
     let bench = Workbench::empty();
     bench.write("record.csv", &ring_down(20, 1e-2));
     let sigma = "    sigma: {displacement: estimate}\n";
@@ -437,7 +437,7 @@ fn bands_lie_about_functions_on_many_nodes() {
 
 /// A sensor that saturates at 0.5.
 #[test]
-fn readings_at_the_end_of_a_range_are_seen() {
+fn saturated_samples_are_reported() {
     let bench = Workbench::empty();
     let cut = |row: &str| match row.split_once(',') {
         Some((t, y)) => match y.parse::<f64>() {
@@ -468,7 +468,7 @@ fn table_of(readings: impl Fn(u32, f64) -> f64) -> String {
 
 /// A system that is released after four seconds at rest, and one that is struck then.
 #[test]
-fn what_stands_still_first_is_left_out() {
+fn rest_at_the_beginning_is_excluded() {
     let bench = Workbench::empty();
     for (is_held, begins) in [(true, "4.4"), (false, "4.1")] {
         let reading = |i: u32, t: f64| {
@@ -523,7 +523,7 @@ fn what_stands_still_first_is_left_out() {
 /// Sentinel values among the samples, under a quadratic and under a robust loss: the second fit is assessed by the samples that are not
 /// outliers, for a right and a wrong model.
 #[test]
-fn a_robust_fit_is_judged_by_the_readings_that_count() {
+fn a_robust_fit_is_assessed_without_outliers() {
     let bench = Workbench::empty();
     let reading = |i: u32, t: f64| match i % 90 {
         17 => -9999.0,
@@ -579,7 +579,7 @@ fn a_robust_fit_is_judged_by_the_readings_that_count() {
 
 /// Two sensors of one response, of which one may be reversed.
 #[test]
-fn a_sensor_the_wrong_way_round_is_seen() {
+fn a_reversed_sensor_is_reported() {
     let bench = Workbench::empty();
     let table = |sign: f64| {
         let rows = (0..=400).map(|i| {
@@ -634,7 +634,7 @@ fn a_sensor_the_wrong_way_round_is_seen() {
 
 /// Records of noise, of several seeds: a model may explain three per cent of the variance, and no system is identified.
 #[test]
-fn noise_shows_no_device() {
+fn noise_identifies_no_system() {
     let bench = Workbench::empty();
     for seed in 1..5u32 {
         let reading = |i: u32| {
@@ -663,7 +663,7 @@ fn noise_shows_no_device() {
 
 /// An overdamped system with c/m = 30 on steps that resolve its slow mode only: the estimates depend on the step.
 #[test]
-fn steps_that_outweigh_the_residuals_are_doubted() {
+fn steps_with_errors_above_the_residuals_are_reported() {
     let bench = Workbench::empty();
     let rows: String = (0..500)
         .map(|i| {
@@ -692,7 +692,7 @@ fn steps_that_outweigh_the_residuals_are_doubted() {
 
 /// A validation record that is not predicted is in the first lines of the summary; a negative stiffness is reported.
 #[test]
-fn what_is_wrong_is_said_at_once() {
+fn failed_validation_and_negative_stiffness_are_in_the_first_lines() {
     let bench = Workbench::empty();
     bench.write("record.csv", &ring_down(20, 1e-2));
     let rows: String = (0..400)
@@ -853,7 +853,7 @@ fn a_tone_in_the_residuals_is_named() {
 /// An oscillation sustained by an unknown force, with a random phase, is not a ring-down: its displacement is hardly fitted, its
 /// acceleration is.
 #[test]
-fn something_unknown_keeps_it_moving() {
+fn an_unknown_force_is_suggested_for_sustained_oscillations() {
     let bench = Workbench::empty();
     let rows: String = (0..2000)
         .map(|i| {
@@ -893,7 +893,7 @@ fn something_unknown_keeps_it_moving() {
 /// A piecewise-linear stiffness for a system with constant or decreasing stiffness: the p-value agrees with that of the
 /// likelihood ratio of two fits.
 #[test]
-fn whether_a_constant_would_do() {
+fn the_test_of_a_constant_agrees_with_the_likelihood_ratio() {
     let bench = Workbench::empty();
     for (name, falls) in [("constant", 0.0), ("falling", 0.004)] {
         // y" = -(0.1 y' + k(t) y) with steps of 0.001 s, and noise of 0.01.

@@ -1,4 +1,4 @@
-//! Constraints in model files: what they mean, and every message about what they cannot mean.
+//! Constraints in model files: their rows and cones, and the messages about invalid ones.
 
 use insta::assert_snapshot;
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
@@ -66,7 +66,7 @@ fn names(constraints: &str) -> Vec<String> {
 }
 
 #[test]
-fn every_kind_is_understood() {
+fn every_kind_of_constraint_is_accepted() {
     let list = "
   - {function: mass, shape: [non-increasing, convex]}
   - {function: mass, shape: non-decreasing, soft: 3}
@@ -201,7 +201,7 @@ fn penalties_and_rules() {
     };
     assert_eq!((value.function, value.order, value.weight), (1, 0, 2.0));
     assert_eq!((slope.function, slope.order, slope.weight), (1, 1, 3.0));
-    // integral of (1 - 0.1 - 0.1 t^2)^2 from 0 to 2, but for the interpolation of t^2.
+    // integral of (1 - 0.1 - 0.1 t^2)^2 from 0 to 2, up to the interpolation error of t^2.
     let roughness = value.roughness(&[1.0; 21]);
     assert!((roughness - 1.204).abs() < 5e-3, "{roughness}");
     let reference: Vec<f64> = (0..21)
@@ -256,7 +256,7 @@ fn contradictions_name_their_lines() {
       expected: constraints that some functions satisfy together
       hint: removing any one of them resolves it
     ");
-    // Soft constraints contradict nobody.
+    // Soft constraints contradict no other constraint.
     assert_snapshot!(message("[{function: damping, at: 1, value: 1}, {function: damping, at: 1, value: 2, soft: 1}]"), @"no error []");
 }
 
@@ -516,7 +516,7 @@ fn equalities() {
 }
 
 #[test]
-fn what_the_record_cannot_feel() {
+fn constraints_without_information_are_reported() {
     let free = |constraints: &str| {
         let free = text(constraints).replace("{fixed: 1}", "{basis: nodal, start: 1}");
         let model = read(&free).unwrap_or_else(|error| panic!("{error}"));
@@ -534,14 +534,14 @@ fn what_the_record_cannot_feel() {
 }
 
 #[test]
-fn what_always_holds() {
+fn constraints_that_always_hold_are_reported() {
     let constant =
         text("[{function: damping, shape: convex}]").replace("basis: nodal", "basis: constant");
     assert_snapshot!(said(&constant), @r#"no error ["constraints[0].shape has no effect: it holds for all functions"]"#);
 }
 
 #[test]
-fn a_mass_must_be_left() {
+fn constraints_must_permit_a_positive_mass() {
     for held in [
         "max: 0.0",
         "at: 1.0, value: 0.0",

@@ -1,4 +1,4 @@
-//! Every message about a model file that is not understood.
+//! Messages about invalid model files.
 
 use insta::assert_snapshot;
 use kmcfit::config::ModelFile;
@@ -549,7 +549,7 @@ fn broken_yaml() {
 }
 
 #[test]
-fn what_the_yaml_crate_does_not_cope_with() {
+fn limits_of_the_yaml_crate_are_reported() {
     let twice = SHORT.replace(
         "displacement: 3.3, velocity: 1.0",
         "displacement: &a 1, velocity: &a 2",

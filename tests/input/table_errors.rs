@@ -1,4 +1,4 @@
-//! Every message about a table that is not understood.
+//! Messages about invalid tables.
 
 use insta::assert_snapshot;
 use kmcfit::error::InputError;

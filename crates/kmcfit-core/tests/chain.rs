@@ -1,5 +1,5 @@
-//! Subproblems whose variables stand along a chain: the elimination along it against the factorisation
-//! that knows no order, and how little work a fit with tens of thousands of values takes.
+//! Subproblems with an elimination order along a chain: elimination against a factorisation without order, and the work of a fit
+//! with tens of thousands of parameters.
 
 mod common;
 
@@ -11,7 +11,7 @@ use kmcfit_core::internals::qp::Subproblem;
 use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
 use proptest::prelude::*;
 
-/// Rows that join neighbours, a few equalities, and a variable that all rows know.
+/// Rows that couple neighbours, a few equalities, and a variable in all rows.
 fn chain(length: usize, width: usize, a: &[f64], exponents: &[i32]) -> Subproblem {
     let mut sub = Subproblem::new(length + 1);
     let mut numbers = a.iter().cycle().copied();
@@ -61,10 +61,10 @@ proptest! {
 proptest! {
     #![proptest_config(properties(200, 3))]
 
-    /// Variables of one station, some of them given, and rows a million times as large as others: more than
-    /// a piece of them, and fewer.
+    /// Variables with one place in the order, some of them fixed, and rows a million times as large as others: more than one block
+    /// of rows, and fewer.
     #[test]
-    fn all_at_once_is_as_good(
+    fn elimination_of_all_variables_together_gives_the_same_minimum(
         length in 4usize..60,
         width in 1usize..5,
         given in 0usize..3,
@@ -83,15 +83,15 @@ proptest! {
         for (z, right) in found.iter().zip(&a).take(given) {
             prop_assert_eq!(*z, right / 2.0);
         }
-        // At a minimum the value hardly depends on the point: the rest is its rounding error.
+        // At a minimum the cost depends on the point to second order only: the rest is its rounding error.
         let (found, expected) = (plain.value(&found), plain.value(&expected));
         prop_assert!((found - expected).abs() <= 1e-12 * (1.0 + expected), "{found} {expected}");
     }
 }
 
-/// Then another way is taken, which finds one of the many minima.
+/// Linearly dependent columns are eliminated by another method, which finds one of the many minima.
 #[test]
-fn variables_that_are_not_determined_do_no_harm() {
+fn undetermined_variables_do_not_prevent_a_minimum() {
     let mut two = Subproblem::new(2);
     let mut three = Subproblem::new(3);
     for i in 0..5 {
@@ -125,7 +125,7 @@ fn several_right_hand_sides_are_solved_as_each_by_itself() {
     let together = sub.solve_equality_constrained_for(&targets).unwrap();
     for (target, found) in targets.into_iter().zip(together) {
         let alone = sub.solve_equality_constrained_for(&[target]).unwrap();
-        // The same operations on each side: the same bits.
+        // The same operations for each right-hand side: identical bits.
         assert_eq!(alone, [found]);
     }
 }
@@ -136,7 +136,7 @@ fn unsolvable_problems_have_no_solution() {
     let mut sub = chain(12, 3, &numbers, &[0]);
     sub.elimination_order = (0..13).collect();
     assert!(sub.solve_equality_constrained().is_some());
-    // A number that is none, in a residual or in an equality, is not passed over.
+    // NaN in a residual or an equality is not ignored.
     for bad in [f64::NAN, f64::INFINITY] {
         let mut broken = sub.clone();
         broken.residuals.push([(3, bad)], 1.0);
@@ -181,7 +181,7 @@ fn tens_of_thousands_of_values_take_no_more_work_than_thousands() {
         };
         let found = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
         assert_eq!(found.outcome.status, Status::Converged, "{nodes}");
-        // The bound on the damping is touched everywhere and pushed nowhere: no program is needed.
+        // The bound on the damping is reached everywhere with zero multipliers: no program is needed.
         assert_eq!(found.counts.qp, 0, "{nodes}");
         assert!(found.history.len() <= 3, "{nodes}: {}", found.history.len());
         let errors = errors(&found.best.evaluation.nodal, &paper_system(nodes));

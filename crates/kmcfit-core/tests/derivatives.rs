@@ -293,7 +293,7 @@ fn the_continuous_gradient_converges_to_the_discrete_one() {
     }
 }
 
-/// Of a system whose mass and damping at the beginning are neither 1 nor 0, nor at rest.
+/// A system with initial mass other than 1, nonzero damping, and not at rest.
 fn initial_gradients(nodes: usize) -> [State; 2] {
     let system = common::system(nodes, Method::Midpoint);
     let times = system.grid.times();

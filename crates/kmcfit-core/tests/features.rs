@@ -1,5 +1,5 @@
-//! What records, sensors, systems and terms can be, each alone and all together: noise-free records
-//! by an independent evaluation, from which the truth is found again to 1e-8.
+//! Records, sensors, systems and terms, separately and combined: from noise-free records of an independent evaluation the
+//! parameters are recovered to 1e-8.
 
 mod common;
 
@@ -22,8 +22,8 @@ use rand_chacha::ChaCha8Rng;
 /// 63 steps in a period of the system.
 const NODES: usize = 301;
 const DURATION: f64 = 15.0;
-/// Rounding of some hundred steps is 1e-14, and parameters that are well determined move the response by
-/// about as much as they move themselves: 1e-8 leaves room for those that are not.
+/// The rounding error of some hundred steps is 1e-14, and the relative sensitivity of the response to well-determined parameters is about
+/// 1; the tolerance of 1e-8 allows for poorly determined ones.
 const EXACT: f64 = 1e-8;
 const WIDTH: f64 = 0.3;
 const INITIAL: State = State {
@@ -49,7 +49,7 @@ fn line() -> Basis {
     }
 }
 
-/// A function to be found: its basis, the true parameters, and the start.
+/// An estimated function: basis, true parameters and start.
 #[derive(Clone)]
 struct EstimatedFunction {
     quantity: CoefficientKind,
@@ -91,7 +91,7 @@ impl EstimatedFunction {
     }
 }
 
-/// Damping and stiffness of the linear system, which most tests look for; the mass is known.
+/// Damping and stiffness of the linear system, which most tests estimate; the mass is known.
 fn damping() -> EstimatedFunction {
     constant(CoefficientKind::Damping, 0.25, 0.4)
 }
@@ -118,13 +118,13 @@ fn scattered(count: usize, seed: u64) -> Vec<f64> {
     times
 }
 
-/// How one channel was read.
+/// One channel and its sensor.
 #[derive(Clone)]
 struct ChannelSpec {
     kind: ChannelKind,
     times: Vec<f64>,
     sigma: Weighting,
-    /// True gain, offset and drift, and which scalars they are where they are estimated.
+    /// True gain, offset and drift, with the indices of the scalars if they are estimated.
     sensor: [f64; 3],
     initial_parameters: [Option<usize>; 3],
     around: Vec<InputSample>,
@@ -193,15 +193,15 @@ impl ChannelSpec {
     }
 }
 
-/// One record: where it started, what drove it, and what was read.
+/// One record: initial state, input and channels.
 #[derive(Clone)]
 struct Record {
     initial: State,
-    /// The scalars that the initial state is, where it is estimated.
+    /// Indices of the scalars of an estimated initial state.
     initial_parameters: [Option<usize>; 2],
     excitation: Option<Excitation>,
     samples: Vec<ChannelSpec>,
-    /// Which system of the case.
+    /// Index of the coefficient set.
     coefficient_set: usize,
 }
 
@@ -224,7 +224,7 @@ impl Record {
     }
 }
 
-/// A number beside the functions.
+/// A scalar parameter.
 fn scalar(truth: f64, start: f64, prior: Option<f64>) -> (f64, ScalarParameter) {
     let prior = prior.map(|sigma| Prior { mean: truth, sigma });
     let scalar = ScalarParameter {
@@ -237,7 +237,7 @@ fn scalar(truth: f64, start: f64, prior: Option<f64>) -> (f64, ScalarParameter) 
     (truth, scalar)
 }
 
-/// A system, its records, and what is to be found.
+/// A system, its records and its estimated parameters.
 struct Case {
     terms: Vec<Term>,
     /// `None` where the mass is known.
@@ -443,7 +443,7 @@ fn samples_with_individual_sigmas_and_robust_losses() {
 #[test]
 fn gain_offset_and_drift() {
     for kind in ChannelKind::ALL {
-        // The mass is known, so that a force tells what the gain is; a free record could not.
+        // With a known mass a force determines the gain; a free record does not.
         let sample = ChannelSpec::of(kind, scattered(150, 4)).unknown_sensor([1.3, 0.4, -0.05], 0);
         let scalars = vec![
             scalar(1.3, 1.0, None),
@@ -596,7 +596,7 @@ fn a_band_pass_filter() {
     }
 }
 
-/// Everything at once: all terms, a mass, three experiments with states, sensors, filters, sigmas and
+/// All features combined: all terms, a mass, three experiments with states, sensors, filters, sigmas and
 /// a stiffness of their own.
 #[test]
 fn all_together() {
@@ -715,10 +715,10 @@ fn one_value_per_node_with_sensors_states_and_a_filter() {
 }
 
 /// Fifty periods, with six nodes in each, of a system that is three times as stiff as the start says:
-/// differences are too coarse for an equation error. States and functions are corrected at once for
+/// differences are too coarse for an equation error. States and functions are corrected together for
 /// several systems, sensors, unknown states and a filter together.
 #[test]
-fn all_of_it_from_far_away_on_a_coarse_grid() {
+fn all_features_converge_from_a_distant_start_on_a_coarse_grid() {
     let rate = 1.0 / grid().step();
     // Some six irregular samples in a period, every tenth of them missing.
     let late = |i: usize| 0.2 * (1.0 + (1.7 * i as f64).sin());
@@ -726,7 +726,7 @@ fn all_of_it_from_far_away_on_a_coarse_grid() {
     let times = times.map(|i| (i as f64 + late(i)) * grid().step());
     let mut displacement = ChannelSpec::of(ChannelKind::Displacement, times.collect())
         .unknown_sensor([1.0, 0.05, 0.002], 2);
-    // A free record could not tell the gain from the initial state.
+    // In a free record gain and initial state are not identifiable separately.
     displacement.initial_parameters = [None, Some(2), Some(3)];
     let mut filtered = ChannelSpec::at_nodes(ChannelKind::Velocity);
     filtered.filter = band_pass(2, 1.0, 8.0, rate).unwrap();
@@ -762,9 +762,9 @@ fn all_of_it_from_far_away_on_a_coarse_grid() {
     case.check("far away");
 }
 
-/// A prior with another mean pulls, by as much as its weight beside that of the samples says.
+/// A prior with another mean shifts the estimate according to its weight relative to that of the samples.
 #[test]
-fn a_prior_pulls_towards_its_mean() {
+fn a_prior_shifts_the_estimate_towards_its_mean() {
     let mut record = Record::free(vec![ChannelSpec::of(
         ChannelKind::Displacement,
         scattered(150, 5),
@@ -787,7 +787,7 @@ fn a_prior_pulls_towards_its_mean() {
     let truth = case.truth();
     let found = run(&problem).best.parameters;
     let last = truth.len() - 1;
-    // Of a linear problem: the pull is shared as the inverse of the variances.
+    // In a linear problem the weights are the inverse variances.
     let variance = common::synthetic::cramer_rao(&problem, &truth)[(last, last)];
     let expected = truth[last] + 1e-3 * variance / (variance + sigma * sigma);
     // The problem is linear for a change of some 1e-4 but for its square.
@@ -799,8 +799,8 @@ fn a_prior_pulls_towards_its_mean() {
     );
 }
 
-/// The part of a record that a growing horizon looks at is filtered like the whole: at the truth
-/// nothing is left of it.
+/// The part of a record within a growing horizon is filtered like the whole: its residuals at the true parameters are
+/// zero.
 #[test]
 fn a_part_of_a_filtered_record_is_a_record() {
     let mut sample = ChannelSpec::at_nodes(ChannelKind::Displacement);

@@ -1,4 +1,4 @@
-//! What records can show: counts, ranks, gauges, bands, and the next experiment.
+//! Identifiability: structural ranks, numerical ranks, scaling ambiguities, bands, and experiment design.
 
 mod common;
 
@@ -174,7 +174,7 @@ fn structural_and_numerical_rank_are_those_of_the_table() {
 }
 
 #[test]
-fn a_force_that_pauses_sees_less_while_it_does() {
+fn nodes_without_a_force_add_fewer_equations() {
     let nodes = 80;
     let system = common::system(nodes, Method::Midpoint);
     let nodal = common::paper_system(nodes);
@@ -247,7 +247,7 @@ fn a_constant_factor_leaves_response_and_cost_and_is_named() {
     let system = common::system(200, Method::Midpoint);
     let problem = linear_mass(&system, free(0));
     let theta = problem.start();
-    // Off the truth, so that there is a cost.
+    // Away from the truth, so that the cost is not zero.
     let theta: Vec<f64> = theta.iter().map(|x| 1.05 * x - 0.01).collect();
     let scaled: Vec<f64> = theta.iter().map(|x| 1.7 * x).collect();
     let (a, b) = (
@@ -657,7 +657,7 @@ fn a_bound_that_is_active_makes_the_band_one_sided() {
 }
 
 #[test]
-fn without_sigma_the_residuals_say_it() {
+fn without_sigma_the_residuals_determine_it() {
     let nodes = 400;
     let system = common::system(nodes, Method::Rk4);
     let with_sigma = linear_mass(&system, forced(0, &system.grid, 0));
@@ -713,7 +713,7 @@ fn candidate(name: &str, (initial, force): Record) -> CandidateExperiment {
 }
 
 #[test]
-fn the_next_experiment_is_the_one_that_sees_something_new() {
+fn experiments_that_add_identifiable_combinations_rank_first() {
     let nodes = 60;
     let system = common::system(nodes, Method::Midpoint);
     let nodal = common::paper_system(nodes);
@@ -850,8 +850,8 @@ fn a_record_that_ends_early_identifies_only_its_span() {
     assert_eq!(words[2].verdict, Classification::Fixed);
 }
 
-/// Smoothness so heavy that the estimate scatters much less than Cramer and Rao would have it: the
-/// sandwich says by how much.
+/// A penalty so large that the estimate scatters much less than the Cramer-Rao bound: the sandwich covariance predicts the
+/// scatter.
 #[test]
 fn the_sandwich_is_the_scatter_of_smoothed_estimates() {
     let (nodes, sigma, seeds) = (300, 0.05, 200);
@@ -945,7 +945,7 @@ fn the_scale_by_bases_and_drives() {
     };
     let table = [
         (all(cells.clone()), 12, ScaleFreedom::Function),
-        // Six cells and four have two halves of the record in common.
+        // Six cells and four cells share the middle of the record as a knot.
         (
             [
                 cells.clone(),
@@ -991,7 +991,7 @@ fn the_scale_by_bases_and_drives() {
         assert_eq!(ambiguity.constant().count(), 1, "{name}");
     }
 
-    // A base that moves pushes with m b'': that scales too.
+    // The force of a moving base is -m b'', which scales with the mass.
     let mut problem = nodal_problem(&system, &nodal, &[free(0)]);
     problem = problem
         .with(|parts| {
@@ -1012,7 +1012,7 @@ fn the_scale_by_bases_and_drives() {
         nodes
     );
 
-    // Motions of a stiffness that is not linear do not add up: a third free record counts.
+    // Responses of a nonlinear spring cannot be superposed: a third free record adds information.
     let mut cubic = system.clone();
     cubic.terms = vec![Term::Damping, Term::CubicStiffness];
     let records = [free(0), free(1), free(2)];

@@ -1,4 +1,4 @@
-//! The convex subproblems on their own, against answers found another way.
+//! Convex subproblems against solutions by independent methods.
 
 use kmcfit_core::internals::constraints::{Cone, Constraints, RowGroup, Rows};
 use kmcfit_core::internals::qp::{ConicStatus, Subproblem, project};
@@ -134,7 +134,7 @@ fn contradictions_are_infeasible() {
 }
 
 #[test]
-fn every_ending_has_a_sentence_of_its_own() {
+fn every_status_has_a_different_sentence() {
     let all = [
         ConicStatus::Solved,
         ConicStatus::Almost,
@@ -225,8 +225,8 @@ proptest! {
         let constraints = Constraints { groups: vec![group], cones: Vec::new() };
         let projection = project(&constraints, &target, &[1.0; 3]);
         prop_assert_eq!(projection.status, ConicStatus::Solved);
-        // The distance is right to the program's own gap of 1e-8; the point, where a row is only just
-        // active, to the root of that.
+        // The distance is accurate to the duality gap of 1e-8, the point to its square root if a row is weakly
+        // active.
         let distance = |z: &[f64]| z.iter().zip(&target).map(|(z, t)| (z - t).powi(2)).sum::<f64>();
         let (found, least) = (distance(&projection.theta), distance(&expected));
         prop_assert!((found - least).abs() <= 1e-8 * (1.0 + least), "{found} {least}");

@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn size_does_not_matter() {
+    fn autocorrelations_do_not_depend_on_scale() {
         let small: Vec<f64> = white(5, 100).iter().map(|x| x * 1e-250).collect();
         let r = autocorrelation(&small, 5);
         let same = autocorrelation(&white(5, 100), 5);
