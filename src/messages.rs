@@ -421,7 +421,7 @@ fn notices() -> Vec<BuildNotice> {
     samples![
         BuildNotice::NothingToFit => BuildNotice::NothingToFit,
         BuildNotice::AlwaysHolds { .. } => BuildNotice::AlwaysHolds { key: key() },
-        BuildNotice::Unfelt { .. } => BuildNotice::Unfelt { key: key(), what: "a monotone mass" },
+        BuildNotice::Uninformative { .. } => BuildNotice::Uninformative { key: key(), what: "a monotone mass" },
         BuildNotice::NoRoughness { .. } => BuildNotice::NoRoughness {
             key: "functions.mass.penalty".into(), basis: "constant",
         },
@@ -611,7 +611,7 @@ fn classifications() -> Vec<FunctionClassification> {
 
 fn starts() -> Vec<(MultistartFinding, usize)> {
     let all = samples![
-        MultistartFinding::Nowhere => MultistartFinding::Nowhere,
+        MultistartFinding::NoMinimum => MultistartFinding::NoMinimum,
         MultistartFinding::Points { .. } => MultistartFinding::Points { ended: 8, different: 1, lowest: 1999.2 },
         MultistartFinding::Points { .. } => MultistartFinding::Points { ended: 7, different: 3, lowest: 1999.2 },
         MultistartFinding::Connected(_) => MultistartFinding::Connected(true),

@@ -15,10 +15,10 @@ pub fn rank(finding: &RankFinding) -> Finding {
 
 /// The classification of a function or ratio, with the half-width of its band relative to its scale, the identified
 /// ratio, or the spans of time on which it is identified, s.
-pub fn classification(classification: &FunctionClassification) -> Finding {
-    let verdict = &classification.verdict;
-    let finding = Finding::new(verdict.name().replace('-', "_"), &*classification.sentence);
-    let finding = finding.with("function", &classification.name);
+pub fn classification(function: &FunctionClassification) -> Finding {
+    let verdict = &function.verdict;
+    let finding = Finding::new(verdict.name().replace('-', "_"), &*function.sentence);
+    let finding = finding.with("function", &function.name);
     match verdict {
         Classification::Identified { relative } => finding.with("relative_half_width", relative),
         Classification::OnlyRatio(ratio) => finding.with("ratio", ratio),
@@ -94,7 +94,7 @@ pub fn warning(warning: &FitWarning) -> Finding {
 pub fn of_starts(finding: &multistart::MultistartFinding, starts: usize) -> Finding {
     use multistart::MultistartFinding as Starts;
     match finding {
-        Starts::Nowhere => {
+        Starts::NoMinimum => {
             let text = format!("no fit from the {starts} starting points converged to a minimum");
             Finding::new("no_minimum", text)
         }

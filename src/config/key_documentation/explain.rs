@@ -103,7 +103,11 @@ fn entry(found: &Found, wanted: &str) -> String {
             continue;
         }
         listed.push(group.name);
-        let _ = write!(text, "\n  {}\n", group.text);
+        let heading = match group.text == key.text {
+            true => "Keys:",
+            false => group.text,
+        };
+        let _ = write!(text, "\n  {heading}\n");
         list(&mut text, group.keys.iter().map(|key| (key.name, key.text)));
     }
     text

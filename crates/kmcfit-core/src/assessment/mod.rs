@@ -45,13 +45,13 @@ impl FitAssessment {
         let step_check = step_check(problem, &best.evaluation);
         let statistics = statistics(problem, &best.evaluation);
         let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
-        let tells_errors = few && problem.sample_count() > problem.parameters();
+        let reports_errors = few && problem.sample_count() > problem.parameters();
         let mut plausibility = Plausibility::of(
             problem,
             &best.evaluation,
             &step_check,
             &statistics,
-            tells_errors,
+            reports_errors,
         );
         if fit.outcome.status == Status::Failed {
             plausibility.fail();
@@ -64,7 +64,7 @@ impl FitAssessment {
             bands: None,
             classifications: Vec::new(),
         };
-        if tells_errors && assessment.plausibility.errors_hold {
+        if reports_errors && assessment.plausibility.errors_hold {
             let settings = BandSettings {
                 draws: 0,
                 ..BandSettings::default()

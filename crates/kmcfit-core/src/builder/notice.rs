@@ -15,7 +15,7 @@ pub enum BuildNotice {
         key: String,
     },
     /// A constraint without information in free records, which the scaling ambiguity can satisfy.
-    Unfelt {
+    Uninformative {
         /// Key.
         key: String,
         /// Description of the constraint.
@@ -49,7 +49,7 @@ impl fmt::Display for BuildNotice {
             Self::AlwaysHolds { key } => {
                 write!(f, "{key} has no effect: it holds for all functions")
             }
-            Self::Unfelt { key, what } => write!(
+            Self::Uninformative { key, what } => write!(
                 f,
                 "{key}: {what} carries no information here. Without a force the response determines only k/m and c/m: a factor \
                  s(t) of all three functions is undetermined; fix a function, bound the functions on both sides, or add a penalty"

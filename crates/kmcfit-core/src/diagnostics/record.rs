@@ -31,7 +31,7 @@ pub struct ResidualDiagnostics {
     pub fit_percent: f64,
     /// Time between lags (s).
     pub step: f64,
-    /// ScaledProgram autocorrelation of the residuals at lags 0, 1, …
+    /// Normalised autocorrelation of the residuals at lags 0, 1, …
     pub autocorrelation: Vec<f64>,
     /// Half-width of the 95 % band of the autocorrelation of white noise.
     pub band: f64,

@@ -148,9 +148,9 @@ impl Subproblem {
         matrix
     }
 
-    /// Plain minimum that satisfies the inequalities to `tolerance`, with those as equalities that `z`, a plain minimum, or a later minimum
-    /// violates. Equalities are not removed again, so it need not be the minimum under the inequalities. `None` if a few rounds do not suffice, or
-    /// with cones.
+    /// Feasible point from an active-set iteration that only adds rows: inequalities that `z`, the minimum without them, violates beyond
+    /// `tolerance` become equalities, and the minimum is computed again. Rows are not removed, so the point need not be the constrained
+    /// minimum. `None` if a few rounds do not suffice, or with cones.
     pub fn solve_active_set(&self, mut z: Vec<f64>, tolerance: f64) -> Option<Vec<f64>> {
         if !self.cones.is_empty() {
             return None;
@@ -177,7 +177,7 @@ impl Subproblem {
         None
     }
 
-    /// Largest number of rounds of [`Subproblem::solve_active_set`], after which a quadratic program is solved.
+    /// Largest number of rounds of [`Subproblem::solve_active_set`]; after them a quadratic program is solved.
     const HOLDING_ROUNDS: usize = 10;
 
     /// The problem in the variables `z_j / units_j`.

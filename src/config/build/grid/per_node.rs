@@ -123,7 +123,7 @@ mod tests {
         ModelFile::parse("m.yaml", text).expect("a model")
     }
 
-    /// The growth that was measured, in bytes per node, is below what is asked for, and not far.
+    /// The measured growth, in bytes per node, is slightly below the estimate.
     #[test]
     fn the_estimate_is_above_what_was_measured() {
         let nodal = "{basis: nodal, start: 1.0}";

@@ -13,7 +13,7 @@ const RISE: f64 = 0.05;
 #[derive(Debug, Clone, PartialEq)]
 pub enum MultistartFinding {
     /// No starting point converged to a minimum.
-    Nowhere,
+    NoMinimum,
     /// Number of converged starting points and of distinct minima.
     Points {
         /// Converged fits.
@@ -66,7 +66,7 @@ impl Waterfall {
     ) -> Vec<MultistartFinding> {
         let costs = self.costs();
         let Some(lowest) = costs.first().copied() else {
-            return vec![MultistartFinding::Nowhere];
+            return vec![MultistartFinding::NoMinimum];
         };
         let mut findings = vec![MultistartFinding::Points {
             ended: self.order.len(),
