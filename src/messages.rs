@@ -99,6 +99,14 @@ fn messages() {
         "Errors of the library",
         all.iter().map(|e| shown(e)),
     );
+    let formats = formats("src/cli", "say(");
+    section(
+        &mut list,
+        "Notes and warnings of commands, with placeholders",
+        formats,
+    );
+    let formats = formats_of_findings();
+    section(&mut list, "Further findings, with placeholders", formats);
     let mut settings = insta::Settings::clone_current();
     settings.set_snapshot_path("../tests/snapshots");
     settings.set_prepend_module_to_snapshot(true);
@@ -376,6 +384,32 @@ fn fragments(text: &str) -> Vec<String> {
     });
     let whole = parts.map(|part| part.replace('\u{1}', "{").replace('\u{2}', "}"));
     whole.filter(|part| part.trim().len() > 2).collect()
+}
+
+/// Format strings in the calls of a function below a folder, each once.
+fn formats(folder: &str, call: &str) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    for file in sources(folder)
+        .iter()
+        .filter(|file| !file.ends_with("messages.rs"))
+    {
+        let text = read(file);
+        let tested = text.find("#[cfg(test)]").unwrap_or(text.len());
+        let text = &text[..tested];
+        for (at, _) in text.match_indices(call) {
+            let literals = literals(arguments(&text[at + call.len()..]));
+            found.extend(literals.into_iter().filter(|text| text.contains(' ')));
+        }
+    }
+    found
+}
+
+/// Format strings of findings on identifiability and of automatic choices.
+fn formats_of_findings() -> BTreeSet<String> {
+    let mut found = formats("crates/kmcfit-core/src/identifiability", "format!(");
+    found.extend(formats("src/config/build/grid", "format!("));
+    found.extend(formats("src/report", "let text = format!("));
+    found
 }
 
 fn data_warnings() -> Vec<DataWarning> {
