@@ -6,7 +6,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use kmcfit_core::internals::objective::GradientKind;
 use std::hint::black_box;
 
-/// The paper's number of nodes, and one that no cache holds.
+/// The paper's number of nodes, and one that exceeds the caches.
 const NODES: [usize; 2] = [2000, 1_000_000];
 
 fn evaluation(criterion: &mut Criterion) {

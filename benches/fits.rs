@@ -65,7 +65,7 @@ fn fits(criterion: &mut Criterion) {
     });
 }
 
-/// What the program does before a fit.
+/// Work of the program before a fit.
 fn sample(criterion: &mut Criterion) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/knots.yaml");
     criterion.bench_function("read and build a model", |b| {
@@ -76,7 +76,7 @@ fn sample(criterion: &mut Criterion) {
     });
 }
 
-/// The program, from its start to its end.
+/// The whole run of the program.
 fn start_up(criterion: &mut Criterion) {
     criterion.bench_function("kmcfit --help", |b| {
         b.iter(|| {

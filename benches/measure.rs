@@ -1,5 +1,5 @@
-//! Numbers for `benches/race.py` that no time of a benchmark says: what the machine can do at best, the
-//! memory of an evaluation, the throughput of a study. One line of JSON each:
+//! Measurements for `benches/race.py` besides benchmark times: limits of the machine, memory of an evaluation, throughput of a
+//! study. One line of JSON each:
 //!
 //! ```text
 //! measure limit                     ns of a multiply and a multiply-add that wait for each other
@@ -23,7 +23,7 @@ use std::time::Instant;
 const LINKS: u32 = 10_000_000;
 /// Elements of each array of the triad: far more than caches hold.
 const TRIAD: usize = 1 << 25;
-/// Repetitions of what is compared by its best.
+/// Repetitions, of which the fastest counts.
 const REPETITIONS: usize = 7;
 
 fn main() {
@@ -47,8 +47,8 @@ fn number<T: std::str::FromStr>(word: &str) -> T {
     number
 }
 
-/// What no step of a sweep can beat: its states wait for those of the step before through a multiply
-/// and a multiply-add.
+/// Lower bound of the time of a step: its states depend on those of the previous step through a multiply and a
+/// multiply-add.
 fn limit() {
     let best = (0..REPETITIONS)
         .map(|_| {
@@ -78,7 +78,7 @@ fn chain(x: f64, a: f64, b: f64) -> f64 {
     (0..LINKS).fold(x, |x, _| (x * a).mul_add(a, b))
 }
 
-/// `a = b + s c` over arrays that no cache holds; 24 bytes an element are counted.
+/// `a = b + s c` over arrays that exceed the caches; 24 bytes per element are counted.
 fn triad() {
     let (b, c) = (vec![1.0f64; TRIAD], vec![2.0f64; TRIAD]);
     let mut a = vec![0.0f64; TRIAD];

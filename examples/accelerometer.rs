@@ -1,4 +1,4 @@
-// A shaken mass with an accelerometer and a force gauge: mass, damping and stiffness, and how sure.
+// A shaken mass with an accelerometer and a force gauge: mass, damping and stiffness with standard errors.
 
 use kmcfit::tables::Table;
 use kmcfit_core::Interpolation;
@@ -13,7 +13,7 @@ pub fn found() -> Result<[[f64; 2]; 3], Box<dyn Error>> {
     let record = Record::new("shaker")
         .from_state(0.0, 0.0)
         .force(times, table.column("f_N")?)
-        // The sweep is smooth between its samples; lines would be five standard errors off.
+        // The sweep is smooth between its samples; linear interpolation would cause errors of five standard errors.
         .interpolation(Interpolation::Cubic)
         .acceleration(times, table.column("a_m_per_s2")?)
         .sigma(0.02);

@@ -1,11 +1,11 @@
-// A free decay from arrays: which damping and stiffness, if the mass is known?
+// Damping and stiffness of a free decay with known mass, from arrays.
 
 use kmcfit_core::{Builder, CoefficientSpec, Record};
 use std::error::Error;
 
 /// Damping (N s/m) and stiffness (N/m).
 pub fn found() -> Result<[f64; 2], Box<dyn Error>> {
-    // m = 1 kg, c = 2 N s/m, k = 2500 N/m: a ring-down at 8 Hz, here from its closed form.
+    // m = 1 kg, c = 2 N s/m, k = 2500 N/m: a ring-down at 8 Hz, from its closed form.
     let times: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 1e-3).collect();
     let omega = 2499.0f64.sqrt();
     let decay = |t: &f64| 0.01 * (-t).exp() * ((omega * t).cos() + (omega * t).sin() / omega);

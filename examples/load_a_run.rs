@@ -1,11 +1,11 @@
-// Results load back: what `kmcfit fit models/linear-mass.yaml` wrote, and the response from another start.
+// Loads the results of `kmcfit fit models/linear-mass.yaml` and simulates the response from another initial state.
 
 use kmcfit::Run;
 use kmcfit_core::State;
 use std::error::Error;
 use std::path::Path;
 
-/// The ratio J/J0, and the largest displacement (m) of the found system when it is let go at 1 m.
+/// The ratio J/J0, and the largest displacement (m) of the identified system released at 1 m.
 pub fn found(folder: &Path) -> Result<[f64; 2], Box<dyn Error>> {
     let run = Run::open(folder)?;
     let let_go = State {

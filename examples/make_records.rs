@@ -24,7 +24,7 @@ const FINE: usize = 16;
 /// A function of time.
 type Function<'a> = &'a dyn Fn(f64) -> f64;
 
-/// A system, what drives it, and how long it is watched.
+/// A system, its input and the duration of its record.
 struct Run<'a> {
     mass: f64,
     terms: Vec<(Term, Function<'a>)>,
@@ -272,8 +272,8 @@ pub fn roll() -> String {
     text
 }
 
-/// A mass of 1 kg on a spring whose stiffness wanders between about 16,000 and 36,000 N/m, shaken by a force
-/// that nobody measured; acceleration in m/s^2 with noise, and the true natural frequency beside it.
+/// A mass of 1 kg on a spring whose stiffness varies between about 16,000 and 36,000 N/m, shaken by a force
+/// that is not measured; acceleration in m/s^2 with noise, and the true natural frequency beside it.
 pub fn moving_support() -> String {
     let stiffness = |t: f64| {
         let f = 24.0 + 4.0 * libm::sin(TAU * 0.35 * t) + 2.0 * libm::sin(TAU * 0.9 * t + 1.0);
@@ -342,7 +342,7 @@ pub fn table() -> String {
 }
 
 /// A free decay (1 kg, 0.2 N s/m, 25 N/m) photographed at irregular times: a gap, missing samples, one
-/// sample in twenty far off, a sensor that drifts by 2 mm/s; in m with noise of 2 mm.
+/// sample in twenty an outlier, a sensor that drifts by 2 mm/s; in m with noise of 2 mm.
 pub fn camera() -> String {
     let run = Run {
         mass: 1.0,

@@ -3,7 +3,7 @@
 //! Every write, rename, sync, removal and thread start of the program passes [`check`]. In builds with
 //! debug assertions the environment variable `KMCFIT_FAULT` selects the operations that fail, counted from 1
 //! over the whole run: `7` fails the seventh, `7+` the seventh and all later ones, and `7!` aborts the process in place
-//! of the seventh, as a kill does. The operation that failed first is written to the file that `KMCFIT_FAULT_LOG` names, so that a test knows when it has reached the end.
+//! of the seventh, as a kill does. The operation that failed first is written to the file that `KMCFIT_FAULT_LOG` names, so that a test detects the last operation.
 //! In other builds [`check`] does nothing.
 
 use std::io;
@@ -25,20 +25,20 @@ pub(crate) enum Operation {
     Spawn,
 }
 
-/// Fails where a test asked for it.
+/// Fails at the operations that a test selects.
 ///
 /// # Errors
-/// The injected one.
+/// The injected error.
 #[cfg(not(debug_assertions))]
 #[allow(clippy::unnecessary_wraps)]
 pub(crate) fn check(_: Operation) -> io::Result<()> {
     Ok(())
 }
 
-/// Fails where a test asked for it.
+/// Fails at the operations that a test selects.
 ///
 /// # Errors
-/// The injected one.
+/// The injected error.
 #[cfg(debug_assertions)]
 pub(crate) fn check(operation: Operation) -> io::Result<()> {
     use std::sync::LazyLock;

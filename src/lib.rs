@@ -27,6 +27,8 @@ mod faults;
 pub mod finding;
 pub mod guide;
 mod memory;
+#[cfg(test)]
+mod messages;
 mod number_format;
 pub mod report;
 pub mod results;

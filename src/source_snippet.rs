@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn long_lines_are_cut_and_nothing_is_obeyed() {
+    fn long_lines_are_cut_and_control_characters_escaped() {
         let long = format!("{} bad {}", "a".repeat(300), "b".repeat(300));
         let text = at(&long, 1, 302);
         assert!(text.contains("…a") && text.contains("b…"), "{text}");
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_line_of_text_is_not_shown() {
+    fn lines_that_are_not_text_are_not_shown() {
         assert_eq!(at("a\n", 7, 1), "nothing");
         assert_eq!(at("f\0o\0", 1, 1), "nothing");
         let error = InputError::file("no such file", "missing");

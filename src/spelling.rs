@@ -111,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slips_are_found_and_other_words_are_not() {
+    fn misspelt_words_are_matched_and_other_words_are_not() {
         let keys = ["mass", "damping", "stiffness", "steepest-descent", "rk4"];
         for (word, near) in [
             ("mas", Some("mass")),

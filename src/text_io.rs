@@ -9,7 +9,7 @@ use crate::error::InputError;
 use crate::memory;
 use crate::spelling::did_you_mean;
 
-/// Longest piece of somebody's text that is repeated in a message, in characters.
+/// Longest quotation of an input in a message, in characters.
 const LONGEST_QUOTE: usize = 40;
 
 /// Most names that are listed in a message.

@@ -1,5 +1,4 @@
-//! Bases, limits and penalties in model files: what they mean, and every message about what they
-//! cannot mean.
+//! Bases, bounds and penalties in model files: the functions that they define, and the messages about invalid ones.
 
 use insta::assert_snapshot;
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
@@ -107,7 +106,7 @@ fn starts_are_lists_and_columns() {
         &start(&format!("{{basis: nodal, start: [{}]}}", nodal.join(", "))),
         |t| 1.0 + 2.0 * t,
     );
-    // The column is a line: every basis but the constants holds it.
+    // The column is a line, which every basis except the constants represents.
     let line = |t: f64| 1.0 - 0.08 * t;
     for text in [
         "nodal",
@@ -323,7 +322,7 @@ fn degrees() {
       found: the integer -1
       expected: an integer, 0 or more
     ");
-    // The highest degree is possible, if barely.
+    // The highest degree that the grid permits.
     assert_eq!(
         message("{basis: polynomial, start: 1, degree: 20}"),
         "no error"

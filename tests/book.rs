@@ -1,4 +1,5 @@
-//! What the reference pages of the book show is what happens; the tutorial and the page of failures are in `pages.rs`.
+//! The reference pages of the book agree with the program: commands and their output, keys, files and links. The tutorial and the
+//! page on the choice of methods are tested in `pages.rs`.
 #![cfg(unix)]
 
 mod common;
@@ -139,7 +140,7 @@ fn columns_keys_and_words_are_named() {
             .filter(|c| !c.starts_with("true_"))
             .for_each(named);
     }
-    // Absent from this run: nothing is soft, and no rule chose a weight.
+    // Absent from this run: it has no soft constraint and no weight chosen by a rule.
     ["slack", "weights"].into_iter().for_each(named);
     let result: Value = serde_json::from_str(&read("result.json")).expect("JSON");
     let keys = |value: &Value| -> Vec<String> {
@@ -174,7 +175,7 @@ fn columns_keys_and_words_are_named() {
     statuses.iter().for_each(|status| named(status.name()));
 }
 
-/// The table of other initial states holds the predictions of the run, to the digits given.
+/// The table of other initial states agrees with the predictions of the run to the digits shown.
 #[test]
 fn the_optimum_does_not_predict() {
     let clone = &tour().clone;
@@ -205,9 +206,9 @@ fn the_optimum_does_not_predict() {
     }
 }
 
-/// On half as many nodes the paper's run ends elsewhere.
+/// On half as many nodes the paper's run ends at another point.
 #[test]
-fn the_run_hangs_on_its_rounding() {
+fn the_paper_s_run_depends_on_rounding() {
     let problem = common::paper_problem(1000, [2.0, 1.0, 1.0]);
     let settings = FitSettings {
         solver: Solver::SteepestDescent,
@@ -225,7 +226,7 @@ fn the_run_hangs_on_its_rounding() {
     assert!(page("docs/paper.md").contains("| 1000 nodes | 0.2407 | 0.0436, stalled |"));
 }
 
-/// The pages of the book: those that its summary lists.
+/// Pages of the book, from its summary.
 fn pages() -> Vec<String> {
     let names = links(&page("docs/SUMMARY.md"));
     names
@@ -234,7 +235,7 @@ fn pages() -> Vec<String> {
         .collect()
 }
 
-/// The targets of a page's links, those to the network apart.
+/// Targets of the links of a page, without those to the network.
 fn links(text: &str) -> Vec<String> {
     let targets = text
         .split("](")
@@ -258,7 +259,7 @@ fn the_summary_lists_every_page() {
     }
 }
 
-/// The anchor of a heading, as the forges and mdBook make it.
+/// Anchor of a heading, by the rule of GitHub and mdBook.
 fn anchor(heading: &str) -> String {
     let text = heading.trim_start_matches('#').trim().to_lowercase();
     let kept = text
@@ -299,7 +300,7 @@ fn quoted(text: &str) -> impl Iterator<Item = &str> {
     text.split('`').skip(1).step_by(2)
 }
 
-/// Whether a test is there: a path, `module::function`, or a module or function, of the tests of reliability.
+/// True if a test exists in the tests of reliability: a path, `module::function`, a module or a function.
 fn is_test(name: &str) -> bool {
     let folder = repository("tests/reliability");
     let source = |module: &str| fs::read_to_string(folder.join(format!("{module}.rs")));

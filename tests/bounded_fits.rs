@@ -30,7 +30,7 @@ fn noisy(values: &[&str]) -> (WeightPath, Fit) {
     (path, fit)
 }
 
-/// J along the path: a wrong minimum of a quadratic program that is taken for a solution ends a fit above it.
+/// J along the path. A fit that accepts a wrong minimum of a quadratic program ends above it.
 #[test]
 fn the_minima_at_heavy_weights() {
     let (path, fit) = noisy(&[]);

@@ -1,4 +1,4 @@
-//! Problems from Rust: the same as from a model file, and refusals with a place.
+//! Problems built in Rust equal those of a model file; invalid ones are rejected with the key.
 
 use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit::tables::Table;
@@ -34,7 +34,7 @@ fn paper_record() -> Record {
         .displacement(&times, &y)
 }
 
-/// Both problems take the same way, to the last bit.
+/// Fits of both problems are bit-identical.
 fn same_way(built: &Problem, written: &(Problem, kmcfit_core::internals::solvers::FitSettings)) {
     let (written, settings) = written;
     assert_eq!(built.start(), written.start());
@@ -45,7 +45,7 @@ fn same_way(built: &Problem, written: &(Problem, kmcfit_core::internals::solvers
 }
 
 #[test]
-fn a_device_with_limits_penalties_and_demands_is_that_of_its_model_file() {
+fn a_problem_with_bounds_penalties_and_constraints_equals_that_of_its_model_file() {
     let written = from_file(
         "format: 1
 experiments:
@@ -90,7 +90,7 @@ fit: {stop: {iterations: 20, tolerance: 1e-10}}
 }
 
 #[test]
-fn a_forced_record_of_an_accelerometer_is_that_of_its_model_file() {
+fn a_forced_record_of_an_accelerometer_equals_that_of_its_model_file() {
     let written = from_file(
         "format: 1
 experiments:
@@ -129,9 +129,9 @@ fit: {stop: {iterations: 20, tolerance: 1e-10}}
     same_way(&built, &written);
 }
 
-/// What cannot be meant is refused with its part, and nothing panics.
+/// An invalid part is rejected with its key, without a panic.
 #[test]
-fn what_cannot_be_meant_is_refused() {
+fn invalid_parts_are_refused_with_their_key() {
     let one = || CoefficientSpec::constant(1.0);
     let system = || [one(), one(), one()];
     let record = paper_record;
@@ -148,11 +148,11 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             Builder::new(system()).record(short().displacement(&times, &values[..2])),
-            "experiments[0].columns.displacement: there is not one time for each sample\n  found: 2 values at 3 times",
+            "experiments[0].columns.displacement: the numbers of times and samples differ\n  found: 2 values at 3 times",
         ),
         (
             Builder::new(system()).record(short().velocity(&[0.0, 2.0, 1.0], &values)),
-            "experiments[0].columns.velocity: these samples are invalid\n  found: times that do not increase",
+            "experiments[0].columns.velocity: invalid samples\n  found: times that do not increase",
         ),
         (
             Builder::new(system()).record(short().displacement(&times, &[1.0, f64::NAN, 0.0])),
@@ -176,7 +176,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             Builder::new(system()).record(short().displacement(&times[..2], &values[..2])),
-            "grid.nodes: this number of nodes cannot be used\n  found: 2",
+            "grid.nodes: invalid number of nodes\n  found: 2",
         ),
         (
             Builder::new(system()).record(short().displacement(&[0.0, 0.1, 2.0], &values)),
@@ -204,7 +204,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             mass(CoefficientSpec::fixed_at_nodes(vec![1.0; 3])),
-            "functions.mass.fixed: there is not one value per node\n  found: 3 values\n  expected: 2000 values",
+            "functions.mass.fixed: the number of values differs from that of the nodes\n  found: 3 values\n  expected: 2000 values",
         ),
         (
             mass(CoefficientSpec::piecewise_linear(1, 1.0)),
@@ -231,7 +231,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             mass(one()).nodes(usize::MAX),
-            "grid.nodes: this number of nodes cannot be used\n  found: 18446744073709551615",
+            "grid.nodes: invalid number of nodes\n  found: 18446744073709551615",
         ),
         (
             mass(CoefficientSpec::estimated(
@@ -256,7 +256,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             mass(one().max(0.0)),
-            "functions.mass.max: this excludes a positive mass: the mass must be positive at all times",
+            "functions.mass.max: this bound excludes a positive mass: the mass must be positive at all times",
         ),
         (
             mass(one().min(f64::NAN)),
@@ -296,7 +296,7 @@ fn what_cannot_be_meant_is_refused() {
         ),
         (
             mass(one()).penalize(Constraint::DampingRatio { max: 0.1 }, 1.0),
-            "constraints[0].soft: a cap on the damping ratio cannot be soft",
+            "constraints[0].soft: a bound of the damping ratio cannot be soft",
         ),
         (
             Builder::new([CoefficientSpec::fixed(1.0), one(), one()])

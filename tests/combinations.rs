@@ -1,4 +1,4 @@
-//! Every basis with every term, channel and method: a fit with a named outcome, or a refusal that says why.
+//! Every basis with every term, channel and method: each fit ends with a status or is rejected with a reason.
 
 use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit_core::internals::solvers::{Status, fit};
@@ -63,9 +63,9 @@ fn readings() -> String {
     csv
 }
 
-/// A model of one channel with these functions, one a line.
+/// A model of one channel with these functions, one per line.
 fn model(functions: &[String], channel: &str, method: &str) -> String {
-    // The paper's gradient and the equation error know no sigma.
+    // The continuous adjoint and the equation error do not support sigma.
     let sigma = match method {
         "equation-error" | "steepest-descent, gradient: continuous" => String::new(),
         _ => format!("sigma: {{{channel}: 0.01}}"),
@@ -89,7 +89,7 @@ fit: {{method: {method}{stop}}}
     )
 }
 
-/// How the fits of all these functions end with every channel and method: how often in which way.
+/// Number of fits by status, for all these functions with every channel and method.
 fn outcomes(all: impl Iterator<Item = Vec<String>>) -> String {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("data.csv"), readings()).unwrap();
@@ -127,7 +127,7 @@ fn every_combination_ends_by_name() {
     insta::assert_snapshot!(outcomes(all));
 }
 
-/// Every basis for every other function as well: each of them changes while the rest is constant.
+/// Every basis for each of the other functions, while the rest is constant.
 #[test]
 fn every_basis_of_every_function_ends_by_name() {
     let functions = [
@@ -152,7 +152,7 @@ fn every_basis_of_every_function_ends_by_name() {
     insta::assert_snapshot!(outcomes(all));
 }
 
-/// How a model ends; what is found is looked at.
+/// Status of the fit of a model, whose estimates must be finite.
 fn ended(path: &std::path::Path, text: &str, here: &str) -> String {
     let file = ModelFile::parse(path, text).unwrap_or_else(|e| panic!("{here}: {e}"));
     let model = match build(&file, BuildMode::Fit) {
@@ -168,7 +168,7 @@ fn ended(path: &std::path::Path, text: &str, here: &str) -> String {
         best.nodal.functions().flatten().all(|p| p.is_finite()),
         "{here}"
     );
-    // An equation error whose minimum has no mass says so.
+    // A minimum of the equation error without a positive mass is reported.
     let has_mass = best.nodal.mass.iter().all(|m| *m > 0.0);
     let is_infeasible = found.outcome.status == Status::Infeasible;
     assert!(has_mass || is_infeasible, "{here}");

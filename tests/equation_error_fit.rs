@@ -1,4 +1,4 @@
-//! The equation error as a method: records whose excitation nobody knows, and records with one.
+//! The method `equation-error`: records under an unmeasured and under a measured excitation.
 
 mod common;
 
@@ -46,7 +46,7 @@ fn run(problem: &Problem) -> Fit {
 const NODES: usize = 6001;
 const WAVES: usize = 200;
 
-/// A minute at 100 readings per s.
+/// A minute at 100 samples per s.
 fn system() -> System {
     System {
         grid: Grid::new(0.0, 60.0, NODES).unwrap(),
@@ -74,7 +74,7 @@ fn random_function(grid: &Grid, seed: u64) -> StageSamples {
     StageSamples::new((0..grid.nodes() - 1).map(step).collect())
 }
 
-/// What a sensor of `kind` reads at every node of a device at rest in the beginning.
+/// Samples of a sensor of `kind` at every node, of a system initially at rest.
 fn readings(
     system: &System,
     device: &NodalCoefficients,
@@ -138,8 +138,8 @@ fn free_at_nodes(nodes: usize) -> Vec<CoefficientFunction> {
     ]
 }
 
-/// A device of 2 Hz whose stiffness goes up and down by a quarter four times, shaken by a force that
-/// nobody tells the fit, its acceleration, and its stiffness.
+/// A system of 2 Hz whose stiffness oscillates by a quarter in four cycles, under a force that the fit does not have: its
+/// acceleration and stiffness.
 fn shaken(seed: u64, list: Vec<CoefficientFunction>) -> (Problem, Vec<f64>) {
     let system = system();
     let base = (TAU * 2.0_f64).powi(2);
@@ -159,9 +159,9 @@ fn shaken(seed: u64, list: Vec<CoefficientFunction>) -> (Problem, Vec<f64>) {
     (problem_of(system, list, experiment), k)
 }
 
-/// The unknown force stands in the equation as an error of its own: with a damping ratio of 0.5 % it
-/// is about a tenth of the stiffness' force, and one dominant period of averaging leaves per cents of
-/// the frequency, which itself swings by 12 % (8.8 % rms about its mean).
+/// The unknown force is an error of the equation. With a damping ratio of 0.5 % it is about a tenth of the spring force; after
+/// averaging over one dominant period the error of the frequency is a few per cent, while the frequency itself varies by 12 %
+/// (8.8 % rms about its mean).
 #[test]
 fn slow_stiffness_under_an_unknown_force() {
     for seed in 1..=5 {
@@ -218,7 +218,7 @@ fn driven(kind: ChannelKind, excitation: Excitation, mass: Option<f64>) -> Probl
     problem_of(system, constants(mass), experiment)
 }
 
-/// The relations between the readings are of order 4: at 8 Hz and 100 readings per s they are true to
+/// The relations between the samples are of order 4: at 8 Hz and 100 samples per s they are true to
 /// (w h)^4/240 = 3e-4; the ends leave 1e-4.
 #[test]
 fn constants_under_a_known_force() {
@@ -240,7 +240,7 @@ fn constants_under_a_known_force() {
     }
 }
 
-/// The base pushes in proportion to the mass, so only the ratios to it are found.
+/// The force of a moving base is proportional to the mass, so only ratios to the mass are identifiable.
 #[test]
 fn constants_on_a_known_base() {
     for mass in [Some(2.0), None] {
@@ -320,8 +320,8 @@ fit: {{method: equation-error}}
     assert!(rms(&errors) <= 0.70, "{}", rms(&errors));
 }
 
-/// What a fit leaves behind: a cost that adds up, a gradient that vanishes, residuals that are errors of
-/// the equation over the mass, and the measured motion.
+/// The evaluation of a fit: the cost is the sum of its terms, the gradient is zero, the residuals are the errors of the equation divided
+/// by the mass, and the response is the measured one.
 #[test]
 fn the_parts_of_a_fit_belong_together() {
     let (problem, _) = shaken(1, free_at_nodes(NODES));
@@ -361,8 +361,8 @@ fn the_parts_of_a_fit_belong_together() {
     let squares: f64 = residuals.iter().map(|r| step * r * r).sum();
     assert!((squares / evaluation.misfit - 1.0).abs() < 1e-9);
 
-    // The motion is the integral of the acceleration: its second differences are the readings, but
-    // for what lies below the band.
+    // The response is the integral of the acceleration: its second differences equal the samples, except below the
+    // band.
     let y = &evaluation.trajectories[0].displacement;
     let middle = NODES / 2;
     let errors: Vec<f64> = (middle - 500..middle + 500)
@@ -375,7 +375,7 @@ fn the_parts_of_a_fit_belong_together() {
     );
 }
 
-/// Bounds that are met cost a quadratic program; soft ones are part of the same problem.
+/// Active bounds need a quadratic program; soft constraints are part of the same problem.
 #[test]
 fn constraints_and_soft_constraints() {
     let grid = system().grid;
@@ -438,8 +438,7 @@ fn constraints_and_soft_constraints() {
             "{before} {cost}"
         );
         before = cost;
-        // The gradient of J with its price: the minimum is that of all of it, to the accuracy of the
-        // quadratic program.
+        // The gradient of J with the penalty is zero to the accuracy of the quadratic program.
         let left = soft.best.gradient.norm_squared / soft.initial_norm_squared;
         assert!(left < 1e-6, "{weight}: {left}");
     }
@@ -447,10 +446,10 @@ fn constraints_and_soft_constraints() {
     assert!(last > 0.999, "a high price is a bound: {last}");
 }
 
-/// Functions whose sizes are five orders apart, with many bounds met: the program is solved in units of
-/// these sizes.
+/// Functions whose sizes differ by five orders of magnitude, with many active bounds: the program is solved in units of these
+/// sizes.
 #[test]
-fn bounds_on_functions_of_unlike_size() {
+fn bounds_on_functions_of_different_sizes() {
     let (mut problem, _) = shaken(3, free_at_nodes(NODES));
     let free = run(&problem);
     let mut group = RowGroup::new("damping >= 0");
@@ -474,9 +473,9 @@ fn bounds_on_functions_of_unlike_size() {
     assert!(free < bounded && bounded < 1.5 * free, "{free} {bounded}");
 }
 
-/// What nobody can tell ends as `failed`, with the start kept.
+/// Records without an equation error end as `failed`, with the start as the result.
 #[test]
-fn readings_without_a_motion() {
+fn records_without_an_equation_error_fail() {
     let grid = Grid::new(0.0, 1.0, 21).unwrap();
     let system = System { grid, ..system() };
     let still = channel(ChannelKind::Acceleration, &grid, vec![1.0; 21]);
@@ -517,7 +516,7 @@ fn readings_without_a_motion() {
         .with_channel(channel);
     let functions = Parameterization::new(constants(None), NODES, system.grid.step()).unwrap();
     let problem = Problem::new(system, functions, vec![experiment]).unwrap();
-    assert_snapshot!(Measurements::of(&problem).err().unwrap(), @"driven: its force or base cannot be filtered like its response, which is integrated from channels other than one of equally spaced accelerations");
+    assert_snapshot!(Measurements::of(&problem).err().unwrap(), @"driven: the force or base cannot be filtered like the response: this needs a displacement, or equally spaced accelerations alone");
 }
 
 fn read(model: &str, reading: fn(f64) -> f64, count: usize) -> Result<Model, String> {
@@ -617,18 +616,18 @@ fn model_files() {
     let text = model(number, "{method: equation-error}");
     assert_snapshot!(read(&text, f64::cos, 5).map(|_| ()).unwrap_err(), @"
     m.yaml:3:5: experiments[0]: the method `equation-error` cannot derive the response from these samples
-      found: there are too few samples
+      found: too few samples
       expected: samples from which displacement, velocity and acceleration follow
     ");
     assert_snapshot!(read(&text, |_| 0.0, 401).map(|_| ()).unwrap_err(), @"
     m.yaml:3:5: experiments[0]: the method `equation-error` cannot derive the response from these samples
-      found: nothing moves
+      found: all samples are zero
       expected: samples from which displacement, velocity and acceleration follow
     ");
 }
 
 /// y = cos t solves y'' + y = 0, so with k = 1.5 the error is 0.5 cos t: the cost at the start is the
-/// integral of its square over all readings but the two at each end, where no differences are known.
+/// integral of its square over all samples but the two at each end, where no differences are known.
 #[test]
 fn the_cost_is_the_integral_of_the_squared_error() {
     let duration = 20.0;
@@ -654,7 +653,7 @@ fn the_cost_is_the_integral_of_the_squared_error() {
         ];
         let experiment = Experiment::free("harmonic", initial, nodes).with_channel(channel);
         let found = run(&problem_of(system, list, experiment));
-        // Each time stands for one spacing about it.
+        // Each time represents one sampling interval about it.
         let (from, to) = (1.5 * spacing, duration - 1.5 * spacing);
         let integral = |t: f64| 0.25 * (0.5 * t + 0.25 * (2.0 * t).sin());
         let expected = integral(to) - integral(from);
@@ -667,14 +666,14 @@ fn the_cost_is_the_integral_of_the_squared_error() {
     }
 }
 
-/// How many readings at either end stand for themselves.
+/// Number of samples at either end that are not smoothed.
 fn left_out(problem: &Problem) -> [usize; 2] {
     let found = run(problem);
     let predicted = &found.best.evaluation.predictions[0][0];
     let residuals: Vec<f64> = problem.experiments[0].channels[0]
         .residuals(predicted)
         .collect();
-    // What is left out stands for itself.
+    // Omitted samples keep their values.
     let zeros = |r: &mut dyn Iterator<Item = &f64>| r.take_while(|r| **r == 0.0).count();
     [
         zeros(&mut residuals.iter()),
@@ -682,8 +681,8 @@ fn left_out(problem: &Problem) -> [usize; 2] {
     ]
 }
 
-/// The device swings with sqrt(k/m) = 12.2 rad/s. Where a force is known, two periods are left out at
-/// either end; without one, only one reading is.
+/// The natural frequency is sqrt(k/m) = 12.2 rad/s. With a measured force, two periods are omitted at either end; without one,
+/// one sample.
 #[test]
 fn two_periods_are_left_out_beside_a_known_force() {
     let excitation = Excitation {
@@ -706,7 +705,7 @@ fn two_periods_are_left_out_beside_a_known_force() {
     assert_eq!(left_out(&problem), [1, 1]);
 }
 
-/// No more than a quarter at either end, which of three periods is less than two.
+/// At most a quarter is omitted at either end, which is less than two of three periods.
 #[test]
 fn half_of_a_short_record_is_left() {
     let excitation = Excitation {

@@ -1,4 +1,4 @@
-//! The programs in `examples/` find what they say.
+//! The programs in `examples/` compute the values that their comments state.
 
 #[allow(dead_code)]
 mod programs {
@@ -11,15 +11,15 @@ mod programs {
     pub mod load_a_run {
         include!("../examples/load_a_run.rs");
     }
-    pub mod what_is_known {
-        include!("../examples/what_is_known.rs");
+    pub mod prior_information {
+        include!("../examples/prior_information.rs");
     }
-    pub mod what_is_seen {
-        include!("../examples/what_is_seen.rs");
+    pub mod structural_rank {
+        include!("../examples/structural_rank.rs");
     }
 }
 
-use programs::{accelerometer, free_decay, load_a_run, what_is_known, what_is_seen};
+use programs::{accelerometer, free_decay, load_a_run, prior_information, structural_rank};
 
 #[test]
 fn a_free_decay() {
@@ -48,14 +48,14 @@ fn an_accelerometer() {
 const SHAKEN: [f64; 3] = [1.2, 0.9, 480.0];
 
 #[test]
-fn what_is_known_decides() {
-    let error = what_is_known::found().unwrap();
+fn prior_information_determines_the_system() {
+    let error = prior_information::found().unwrap();
     assert!(error < 1e-6, "{error}");
 }
 
 #[test]
-fn what_is_seen_is_counted() {
-    let [(alone, open), (pair, still_open)] = what_is_seen::found().unwrap();
+fn the_structural_rank_is_counted() {
+    let [(alone, open), (pair, still_open)] = structural_rank::found().unwrap();
     assert!(open && !still_open);
     assert!(alone < pair && pair == 33, "{alone} {pair}");
 }
@@ -72,7 +72,7 @@ fn a_run_is_loaded_back() {
     assert!(fit.status.success(), "{fit:?}");
     let [ratio, most] = load_a_run::found(&out).unwrap();
     assert!(ratio < 1e-20, "{ratio}");
-    // Let go at rest, at its largest potential energy: a mass that falls takes energy out.
+    // Released at rest at its largest potential energy; a decreasing mass removes energy.
     assert!((1.0..1.01).contains(&most), "{most}");
     assert!(load_a_run::found(folder.path()).is_err());
 }

@@ -1,4 +1,4 @@
-//! The standard figures as SVG documents: well-formed, stable, small, and safe with any data.
+//! The standard figures as SVG documents: well-formed, reproducible, small, and valid for any data.
 
 use kmcfit::report::figures::{
     FunctionCurve, convergence, functions, gradient_error, observation, ratios, response,
@@ -7,7 +7,7 @@ use kmcfit::report::{Axis, Colour, Figure, Mark, Panel, Style, render};
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
 
-/// All standard figures from one series, used as values of everything.
+/// All standard figures, with one series for all quantities.
 fn standard(t: &[f64], y: &[f64]) -> Vec<Figure> {
     let curve = FunctionCurve {
         band: Some((y, t)),
@@ -46,7 +46,7 @@ fn wave(count: usize) -> (Vec<f64>, Vec<f64>) {
     (t, y)
 }
 
-/// Parses the document, and checks that nothing of it has lost its number.
+/// Parses the document and checks that all its coordinates are finite.
 fn check(svg: &str) {
     let document = roxmltree::Document::parse(svg).expect("well-formed");
     let root = document.root_element();

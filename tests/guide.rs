@@ -1,5 +1,5 @@
-//! The pages of `docs/` in the crate's documentation: their equations as MathML, their links inside.
-//! The reference of the keys, `docs/keys.md`, from the documentation of the keys in the source.
+//! The pages of `docs/` in the documentation of the crate, with equations as MathML and links between its pages, and the reference
+//! of the keys, `docs/keys.md`, from the documentation of the keys in the source.
 //! `KMCFIT_GUIDE=write cargo test --test guide` writes `src/guide/` and `docs/keys.md`.
 #![cfg(unix)]
 
@@ -12,7 +12,7 @@ use pulldown_latex::config::DisplayMode;
 use pulldown_latex::{Parser, RenderConfig, Storage, push_mathml};
 use std::fs;
 
-/// The last is on the front page.
+/// The pages; the last one is included in the front page.
 const PAGES: [&str; 4] = ["tutorial", "choosing", "theory", "equations"];
 
 #[test]
@@ -54,17 +54,17 @@ fn equations_become_mathml() {
     assert!(rendered(text).starts_with(expected));
 }
 
-/// Paragraphs of rustdoc scroll what is too wide for them, and so get a bar where an equation is high.
+/// Style against the scroll bars that rustdoc adds to paragraphs with tall equations.
 const STYLE: &str = "<style>.docblock > p { overflow: visible !important }</style>";
 
-/// A page as the crate's documentation has it.
+/// A page in the form for the documentation of the crate.
 fn rendered(page: &str) -> String {
     let mut text = String::new();
     let mut in_code = false;
     for line in page.lines() {
         let fence = line.starts_with("```");
         if fence {
-            // Plain text: nothing but Rust is run by rustdoc.
+            // Marked as text, because rustdoc runs unmarked blocks as Rust.
             text.push_str(if in_code { "```" } else { "```text" });
             in_code = !in_code;
         } else if in_code {
@@ -78,7 +78,7 @@ fn rendered(page: &str) -> String {
     text
 }
 
-/// A line of prose: what stands between backquotes stays as it is.
+/// A line of prose; code between backquotes is unchanged.
 fn prose(line: &str) -> String {
     if let Some(figure) = figure(line) {
         return figure;
@@ -91,7 +91,7 @@ fn prose(line: &str) -> String {
     links(&parts.collect::<Vec<_>>().join("`"))
 }
 
-/// A figure, `![what it shows](file.svg)` on a line of its own, is drawn in its place.
+/// A figure, `![caption](file.svg)` on a separate line, is embedded.
 fn figure(line: &str) -> Option<String> {
     let (_, file) = line
         .strip_prefix("![")?
@@ -134,7 +134,7 @@ fn mathml(latex: &str, display: bool) -> String {
     plain_to_markdown(&text)
 }
 
-/// Between its tags MathML has signs that mean something else in Markdown.
+/// Escapes characters of MathML that have a meaning in Markdown.
 fn plain_to_markdown(mathml: &str) -> String {
     let mut text = String::new();
     let mut in_tag = false;
@@ -153,7 +153,7 @@ fn plain_to_markdown(mathml: &str) -> String {
     text
 }
 
-/// Links between the pages become links of the documentation; what they say stays of links to other files.
+/// Links between the pages become links of the documentation; of links to other files only the label remains.
 fn links(line: &str) -> String {
     let mut text = String::new();
     let mut rest = line;
@@ -172,7 +172,7 @@ fn links(line: &str) -> String {
     text + rest
 }
 
-/// What is before a link, its label, its target, and what is after it.
+/// Text before a link, its label, its target, and the text after it.
 fn next_link(line: &str) -> Option<(&str, &str, &str, &str)> {
     let middle = line.find("](")?;
     let begin = line[..middle].rfind('[')?;

@@ -1,4 +1,4 @@
-//! Measured records that are not part of the project; skipped, loudly, where they are absent.
+//! Measured records that are not part of the project; without them the tests are skipped with a note.
 
 mod common;
 
@@ -46,7 +46,7 @@ fit: {{method: lbfgs, stop: {{iterations: 200, tolerance: 1e-9}}}}
     assert!((rms - 0.337).abs() < 5e-4, "{rms}");
 }
 
-/// A model of the roll decay: the stiffness is known, the rest is found with the initial state.
+/// A model of the roll decay: the stiffness is known, the other coefficients and the initial state are estimated.
 fn roll_decay(
     functions: &str,
 ) -> Option<(kmcfit::config::Model, kmcfit_core::internals::solvers::Fit)> {
@@ -89,8 +89,8 @@ fn rms_degrees(model: &kmcfit::config::Model, run: &kmcfit_core::internals::solv
 }
 
 /// Published linear and quadratic damping give an equivalent damping of 3.26 N m s at 5 degrees; the
-/// inertia with added mass is 135.75 kg m^2. 0.0254 degrees rms were reached by others, 0.0233 with a
-/// constant offset.
+/// inertia with added mass is 135.75 kg m^2. Published fits have residuals of 0.0254 degrees rms, or 0.0233 with a constant
+/// offset.
 #[test]
 fn the_roll_decay_with_nonlinear_damping() {
     let damping = "  damping: {basis: constant, start: 1.0}
@@ -117,7 +117,7 @@ fn the_roll_decay_with_nonlinear_damping() {
     assert!(rms <= 0.0235, "{rms}");
 }
 
-/// The same decay with a damping that changes in time instead: 4.8 N m s at 10 s, 3.15 at 55 s.
+/// The same decay with a time-varying damping instead: 4.8 N m s at 10 s, 3.15 at 55 s.
 #[test]
 fn the_roll_decay_with_damping_over_time() {
     for knots in [3, 4] {

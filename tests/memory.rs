@@ -1,5 +1,5 @@
-//! Memory limits: whatever the limit is and whatever is asked for, a command either does it or refuses
-//! it in time, with what it needs and what is available; an older run stays as it is.
+//! Memory limits: under any limit a command either completes or is rejected in time, with the memory that it needs and that is
+//! available; an older run is unchanged.
 //!
 //! The limit is that on the address space (`ulimit -v`), which the system enforces on the process alone.
 
@@ -22,7 +22,7 @@ functions:
 fit: {method: lbfgs, stop: {iterations: 3}}
 ";
 
-/// A folder with models small and large, records short and long, and a run of the small model.
+/// A folder with small and large models, short and long records, and a run of the small model.
 struct Bench(TempDir);
 
 impl Bench {
@@ -60,7 +60,7 @@ impl Bench {
         self.write(&format!("{name}.yaml"), &text);
     }
 
-    /// Runs the program with so much address space: its exit code (-1 for a signal), and what it says.
+    /// Runs the program with a limit on its address space: exit code (-1 for a signal) and output.
     fn run(&self, limit: Option<u64>, arguments: &[&str]) -> (i32, String) {
         let mut command = Command::new("sh");
         let shell = match limit {
@@ -99,7 +99,7 @@ fn collect(folder: &Path, files: &mut BTreeMap<String, Vec<u8>>) {
     }
 }
 
-/// Whether the test can be made here; says loudly where it cannot.
+/// True if the test can run on this system; otherwise prints a note.
 fn is_linux() -> bool {
     if cfg!(target_os = "linux") {
         return true;
@@ -108,7 +108,7 @@ fn is_linux() -> bool {
     false
 }
 
-/// The refusal says what is needed and what is available.
+/// The message has the needed and the available memory.
 fn assert_refused(code: i32, said: &str, what: &str) {
     assert_eq!(code, 2, "{what}: {said}");
     let amounts = ["memory", "found: ", "expected: ", "B, which "];
@@ -118,7 +118,7 @@ fn assert_refused(code: i32, said: &str, what: &str) {
 }
 
 #[test]
-fn small_models_are_done_or_refused() {
+fn small_models_are_fitted_or_refused() {
     if !is_linux() {
         return;
     }
@@ -152,7 +152,7 @@ fn small_models_are_done_or_refused() {
             }
         }
     }
-    // A refusal of everything would be no proof: nearly all of them fit into the least limit.
+    // Rejecting every command would be wrong: nearly all of them fit into the smallest limit.
     let all = LIMITS.len() * commands.len();
     assert!(done * 10 >= all * 9, "{done} of {all}");
 }
@@ -245,13 +245,13 @@ fn what_is_accepted_fits() {
         let most: usize = most
             .and_then(|text| text.parse().ok())
             .expect("a number of nodes");
-        // What the process maps differs a little from start to start.
+        // The address space in use varies slightly from start to start.
         let (code, said) = fit(&(most - most / 50).to_string());
         assert!([0, 3].contains(&code), "{method} on {most} nodes: {said}");
     }
 }
 
-/// Tables are read where they fit, and refused before their memory is taken where they do not.
+/// Tables that fit are read; others are rejected before their memory is allocated.
 #[test]
 fn long_records_are_read_or_refused() {
     if !is_linux() {
@@ -282,7 +282,7 @@ fn long_records_are_read_or_refused() {
     assert!(read > 0 && refused > 0, "{read} read, {refused} refused");
 }
 
-/// The tables of a run of a million nodes are read where their values fit.
+/// The tables of a run with a million nodes are read if their values fit.
 #[test]
 fn long_runs_are_read_or_refused() {
     if !is_linux() {

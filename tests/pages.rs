@@ -1,4 +1,4 @@
-//! What the tutorial and the page of failures show is what happens.
+//! The tutorial and the page on the choice of methods show the output of their commands.
 #![cfg(unix)]
 
 mod common;
@@ -34,7 +34,7 @@ fn failures_and_cures_are_as_shown() {
     tour.holds();
 }
 
-/// A page says nothing of a command whose output it hides.
+/// Commands whose output a page does not show need not match.
 #[test]
 fn commands_show_something() {
     for name in ["docs/tutorial.md", "docs/choosing.md"] {

@@ -1,4 +1,4 @@
-//! The paper's run, number by number.
+//! The paper's run: each published and each recomputed number.
 
 mod common;
 
@@ -63,8 +63,8 @@ const HISTORY: [(u64, f64, f64); 49] = [
     (1000, 8.13015527774769e-05, 1.06256344103462e-05),
 ];
 
-/// J/J0 must agree to this: the two programs do the same operations in the same order, so only a
-/// change of the arithmetic can move it, and such a change moves it by far more.
+/// Tolerance of J/J0. Both programs do the same operations in the same order, so only a change of the arithmetic changes J/J0,
+/// and by far more than this.
 const TOLERANCE: f64 = 1e-9;
 
 fn settings(stopping: Stopping) -> FitSettings {
@@ -206,7 +206,7 @@ fn steepest_descent_with_the_discrete_gradient_also_descends() {
     let start = problem.functions.start();
     let [discrete, continuous] = [GradientKind::Discrete, GradientKind::Continuous]
         .map(|kind| fit(&problem, &start, &with(kind), &mut |_| {}).unwrap());
-    // The two gradients differ by 5e-3 at most at N = 2000, so the first steps go the same way.
+    // The two gradients differ by at most 5e-3 at N = 2000, so the first steps agree.
     let ratio = discrete.history[0].cost / continuous.history[0].cost;
     assert!((ratio - 1.0).abs() < 5e-3, "{ratio}");
     assert!(discrete.cost_ratio() < 0.5, "{}", discrete.cost_ratio());

@@ -1,4 +1,4 @@
-//! What the README shows is what happens.
+//! The README shows the output of its commands.
 #![cfg(unix)]
 
 mod common;
@@ -23,7 +23,7 @@ fn the_first_block_is_two_commands() {
     assert_eq!(blocks_in(&readme(), "sh").len(), 1);
 }
 
-/// The page is read in one sitting; the book has the rest.
+/// The README has a limited length; details are in the book.
 #[test]
 fn it_is_short() {
     let lines = readme().lines().count();

@@ -1,4 +1,4 @@
-//! Records as model files bring them, from the YAML to the constants found.
+//! Records in model files, from the YAML text to the estimated constants.
 
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit_core::internals::objective::GradientKind;
@@ -13,7 +13,7 @@ use tempfile::TempDir;
 const MASS: f64 = 1.5;
 const DAMPING: f64 = 0.6;
 const STIFFNESS: f64 = 240.0;
-/// Steps of the simulation between two readings.
+/// Steps of the simulation between two samples.
 const FINE: usize = 20;
 
 /// Displacements at `rate` from a state at rest at 0.02 m, under force and base acceleration.
@@ -34,7 +34,7 @@ fn motion(
         method: Method::Rk4,
         terms: vec![Term::Damping, Term::Stiffness],
     };
-    // The right end of a step belongs to it: a little before a jump at the node.
+    // The right end of a step is evaluated just before a jump at the node.
     let steps = |f: &dyn Fn(f64) -> f64| {
         let step = |i: usize| {
             let (a, b) = (grid.time(i), grid.time(i + 1));
@@ -55,12 +55,12 @@ fn motion(
     motion.displacement.into_iter().step_by(FINE).collect()
 }
 
-/// A model with `experiment` as its only one, mass known or sought; the folder holds `file`.
+/// A model with `experiment` as its only one, mass known or estimated; the folder has `file`.
 fn fitted(text: &str, experiment: &str, mass: &str) -> (Model, Fit) {
     fitted_on(text, experiment, mass, "")
 }
 
-/// [`fitted`] on a grid of its own.
+/// [`fitted`] on another grid.
 fn fitted_on(text: &str, experiment: &str, mass: &str, grid: &str) -> (Model, Fit) {
     let folder = TempDir::new().unwrap();
     std::fs::write(folder.path().join("record.csv"), text).unwrap();
@@ -103,13 +103,13 @@ fn nothing(_t: f64) -> f64 {
     0.0
 }
 
-/// Without names, by number, at a rate, from 5 s into the file, with a lost reading.
+/// Without names, by number, at a rate, from 5 s into the file, with a lost sample.
 #[test]
 fn a_window_of_a_file_without_names() {
     let y = motion(200.0, 801, &nothing, &nothing);
     let mut text = String::new();
     for i in 0..1801 {
-        // Before the release the sensor shows something else.
+        // Before the release the sensor has another value.
         let reading = if i < 1000 { 0.7 } else { 1e3 * y[i - 1000] };
         match i {
             1300 => text += "1\t\n",
@@ -124,7 +124,7 @@ fn a_window_of_a_file_without_names() {
     initial: {displacement: 0.02, velocity: 0.0}
     sigma: {displacement: 1e-6}";
     let (model, run) = fitted(&text, experiment, KNOWN);
-    // The readings are printed in full; what is left is the step of 5 ms, (w h)^4 w T / 120.
+    // The samples are printed with all digits; the error is that of the step of 5 ms, (w h)^4 w T / 120.
     assert!(error(&run) < 1e-5, "{}", error(&run));
     let ignored = &model.notes[0][0].ignored;
     assert_eq!(ignored[0], (1000, "outside the window".to_owned()));
@@ -132,7 +132,7 @@ fn a_window_of_a_file_without_names() {
     assert_eq!(model.problem.sample_count(), 800);
 }
 
-/// A tone far above the motion that would be folded into it.
+/// A tone far above the response, which aliasing would fold into it.
 #[test]
 fn decimation_and_band() {
     let y = motion(1000.0, 4001, &nothing, &nothing);
@@ -143,20 +143,20 @@ fn decimation_and_band() {
     }
     let plain = "    initial: estimate
     sigma: {displacement: estimate}";
-    // 187 Hz at 100 Hz would look like 13 Hz; of the filter's edge at the ends of the record some
-    // 1e-3 of the motion is left.
+    // 187 Hz sampled at 100 Hz aliases to 13 Hz. The edges of the filter leave errors of some 1e-3 of the response at the ends of
+    // the record.
     let decimated = format!("{plain}\n    decimate: 10");
     let (model, run) = fitted(&text, &decimated, KNOWN);
     assert!(error(&run) < 5e-3, "{}", error(&run));
     assert_eq!(model.problem.sample_count(), 401);
-    // The band filters the model alike, edges included, and leaves of the hum only what its sudden
-    // beginning and end have in the band.
+    // The band filters the model in the same way, edges included; of the hum only the transients at its beginning and end are
+    // within the band.
     let band = format!("{plain}\n    band: {{max: 20.0}}");
     let (_, run) = fitted(&text, &band, KNOWN);
     assert!(error(&run) < 2e-3, "{}", error(&run));
 }
 
-/// A column of sigmas: half of the readings are worthless and say so.
+/// A column of sigmas: half of the samples are useless and have a large sigma.
 #[test]
 fn sigmas_from_a_column() {
     let y = motion(200.0, 801, &nothing, &nothing);
@@ -219,7 +219,7 @@ fn shapes_of_forces() {
 /// A force from a digital converter, held between samples: taken as held it is exact, taken as linear
 /// it comes half a sample early.
 #[test]
-fn how_a_force_is_interpolated_matters() {
+fn the_interpolation_of_a_force_affects_the_fit() {
     let rate = 25.0;
     let sample = |k: f64| 5.0 * (TAU * 1.7 * k / rate).sin() + 3.0 * (TAU * 0.9 * k / rate).cos();
     let held = |t: f64| sample((t * rate).floor());
@@ -235,19 +235,19 @@ fn how_a_force_is_interpolated_matters() {
     sigma: {{displacement: 1e-6}}
     initial: {{displacement: 0.02, velocity: 0.0}}"
         );
-        // Sixteen steps between two samples: the stepper has no part in the error.
+        // Sixteen steps between two samples: the error of the stepper is negligible.
         let mass = "{basis: constant, start: 3.0}";
         error(&fitted_on(&text, &experiment, mass, "grid: {nodes: 3201}").1)
     });
-    // What is left of the first is the rounding of a simulation on other steps; a published benchmark
-    // saw a factor of 30 between the two.
+    // The remaining error of the first is the rounding error of a simulation on other steps; a published benchmark reports a factor of
+    // 30 between the two.
     assert!(
         errors[0] < 1e-5 && errors[1] > 30.0 * errors[0],
         "{errors:?}"
     );
 }
 
-/// A base whose displacement was measured, and the mass's displacement in space.
+/// A base whose displacement was measured, and the absolute displacement of the mass.
 #[test]
 fn a_base_that_moves() {
     let base = |t: f64| 0.01 * (TAU * 1.1 * t).sin();
@@ -263,11 +263,11 @@ fn a_base_that_moves() {
     sigma: {displacement: 1e-6}
     initial: {displacement: 0.02, velocity: 0.0}";
     let (_, run) = fitted(&text, experiment, KNOWN);
-    // The spline's second derivative is off by (w h)^2 / 12 = 1e-4 of itself.
+    // The relative error of the spline's second derivative is (w h)^2 / 12 = 1e-4.
     assert!(error(&run) < 2e-4, "{}", error(&run));
 }
 
-/// Records that end at different times, and a grid that nobody chose.
+/// Records that end at different times, on an automatic grid.
 #[test]
 fn the_grid_follows_the_frequency() {
     let y = motion(200.0, 801, &nothing, &nothing);
@@ -286,7 +286,7 @@ fn the_grid_follows_the_frequency() {
         .on_half_step(&run.best.evaluation)
         .unwrap()
         .unwrap();
-    // The phase error that was aimed at, 1e-4 rad, times the amplitude.
+    // The target phase error, 1e-4 rad, times the amplitude.
     assert!(half.changes[0][0] < 1e-4 * 0.02, "{half:?}");
 }
 
@@ -337,9 +337,9 @@ fit: {method: lbfgs, gradient: continuous}
     assert!(fine < 1e-3 && fine < 0.3 * coarse, "{coarse} {fine}");
 }
 
-/// The initial state is that of the first row, also where its reading is missing: at 0 s.
+/// The initial state is that of the first row, also where its sample is missing: at 0 s.
 #[test]
-fn readings_that_are_missing_at_the_ends() {
+fn samples_that_are_missing_at_the_ends() {
     let y = motion(200.0, 801, &nothing, &nothing);
     let mut text = String::from("t_s,y_m\n");
     for (i, y) in y.iter().enumerate() {
@@ -356,7 +356,7 @@ fn readings_that_are_missing_at_the_ends() {
     assert!(error(&run) < 1e-5, "{}", error(&run));
 }
 
-/// Few readings that are left by decimation do not make a coarse grid.
+/// Decimation to few samples does not make the grid coarse.
 #[test]
 fn decimation_does_not_coarsen_the_grid() {
     let y = motion(200.0, 801, &nothing, &nothing);
@@ -368,6 +368,6 @@ fn decimation_does_not_coarsen_the_grid() {
     initial: estimate";
     let (model, run) = fitted(&text, experiment, KNOWN);
     assert!(model.problem.system.grid.nodes() > 200);
-    // The filter's edges leave some 1e-3 of the motion at the ends of the record.
+    // The edges of the filter leave errors of some 1e-3 of the response at the ends of the record.
     assert!(error(&run) < 5e-3, "{}", error(&run));
 }

@@ -1,4 +1,4 @@
-//! A fit that is interrupted and gone on with ends with the bits of one that is not.
+//! An interrupted and resumed fit is bit-identical to an uninterrupted one.
 
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit::results::{FIT_JOURNAL, FitJournal, Heading};
@@ -10,7 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A shipped model with other words in it.
+/// A shipped model with some of its text replaced.
 fn model(name: &str, changes: &[(&str, &str)]) -> (ModelFile, Model) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("models/{name}.yaml"));
     let mut text = std::fs::read_to_string(&path).expect("a shipped model");
@@ -23,7 +23,7 @@ fn model(name: &str, changes: &[(&str, &str)]) -> (ModelFile, Model) {
     (file, model)
 }
 
-/// Fits until iteration `last` of all that are shown.
+/// Fits until the reported iteration `last`.
 fn run(model: &Model, journal: Option<&mut FitJournal>, last: u64) -> (Option<WeightPath>, Fit) {
     let mut settings = model.settings.clone();
     let flag = Arc::new(AtomicBool::new(false));
@@ -35,7 +35,7 @@ fn run(model: &Model, journal: Option<&mut FitJournal>, last: u64) -> (Option<We
     };
     let mut watch = Observer::new(&mut observe);
     if let Some(journal) = journal {
-        watch = watch.keeping(journal);
+        watch = watch.with_checkpoints(journal);
     }
     let (problem, start) = (&model.problem, model.problem.start());
     match &model.weight_rule {
@@ -52,7 +52,7 @@ fn run(model: &Model, journal: Option<&mut FitJournal>, last: u64) -> (Option<We
     }
 }
 
-/// All that a fit leaves but times, with all bits: numbers print so that they read back the same.
+/// The result of a fit without times; numbers are printed with all digits.
 fn told((path, fit): &(Option<WeightPath>, Fit)) -> String {
     format!(
         "{path:?} {:?} {:?} {:?} {:?} {:?} {:?}",
@@ -95,7 +95,7 @@ fn again_and_again(name: &str, changes: &[(&str, &str)], each: u64) {
     assert_eq!(without_times(&healed), without_times(&text), "{name}");
 }
 
-/// The lines of a journal up to where the times are told.
+/// The lines of a journal up to the times.
 fn without_times(text: &[u8]) -> Vec<String> {
     let text = String::from_utf8(text.to_vec()).expect("text");
     let line = |line: &str| match line.split_once("\"timings\"") {
@@ -131,7 +131,7 @@ fn rounds_of_sigmas() {
     again_and_again("accelerometer", &[], 2);
 }
 
-/// Also where each round of sigmas starts from the beginning of the record.
+/// The same with estimated sigmas, each of whose rounds uses the truncated start.
 #[test]
 fn the_beginning_of_a_long_record() {
     let long = [("functions:\n", "grid: {nodes: 40001}\nfunctions:\n")];
@@ -150,10 +150,9 @@ fn a_path_of_weights() {
     again_and_again("noisy", &shorter, 9);
 }
 
-/// What does not come out with the same bits is computed again: a journal can cost time and never
-/// change a result.
+/// A recalled result whose fingerprint differs is computed again: a journal affects the duration and never the result.
 #[test]
-fn a_journal_that_lies() {
+fn an_edited_journal_does_not_change_the_result() {
     let (file, model) = model("knots", &[]);
     let whole = run(&model, None, u64::MAX);
     let place = tempfile::tempdir().expect("a folder");

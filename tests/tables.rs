@@ -11,7 +11,7 @@ use std::process::Command;
 /// Longest name of a variable in MATLAB.
 const LONGEST_NAME: usize = 63;
 
-/// Runs with several records, lost readings, bands, truth and a record held out.
+/// Runs with several records, missing samples, bands, truth and a validation record.
 const MODELS: [&str; 4] = [
     "paper-forced",
     "linear-mass",
@@ -39,7 +39,7 @@ fn tables_open_without_options() {
 
 /// All CSV files of a run.
 fn tables(out: &Path) -> Vec<PathBuf> {
-    let folders = [out.to_path_buf(), out.join("readings")];
+    let folders = [out.to_path_buf(), out.join("channels")];
     let files = folders
         .iter()
         .flat_map(|f| fs::read_dir(f).expect("a folder"));
@@ -49,7 +49,7 @@ fn tables(out: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// One row of distinct names that are variables as they stand, then numbers or nothing, all plain ASCII.
+/// A row of distinct names that are valid variable names, then rows of numbers or empty fields, in ASCII.
 fn opens(table: &Path) {
     let text = fs::read_to_string(table).expect("a table");
     let place = table.display();
@@ -78,13 +78,13 @@ fn is_variable(name: &str) -> bool {
         && name.len() <= LONGEST_NAME
 }
 
-/// Decimal points, no words like `inf`; an exponent at most where the number is tiny or huge.
+/// Numbers with decimal points and without words such as `inf`; exponents only for very small or large numbers.
 fn is_number(field: &str) -> bool {
     let signs = |c: char| c.is_ascii_digit() || "+-.e".contains(c);
     field.chars().all(signs) && field.parse::<f64>().is_ok_and(f64::is_finite)
 }
 
-/// Reads every table with pandas where there is one, else with Python's csv module.
+/// Reads every table with pandas if it is installed, otherwise with the csv module of Python.
 const READER: &str = "
 import csv, pathlib, sys
 try:

@@ -1,4 +1,4 @@
-//! The problems that are timed.
+//! Problems of the benchmarks.
 #![allow(dead_code, reason = "each benchmark needs some of them")]
 
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
@@ -105,7 +105,7 @@ pub fn fit_problem(problem: &Problem, settings: &FitSettings) -> Fit {
     fit(problem, &problem.start(), settings, &mut |_| {}).expect("a motion")
 }
 
-/// A study of `starts` starts of a model, none of which climbs the ladder, as `kmcfit study` makes it.
+/// A multistart study of a model with `starts` starting points and no start strategy, as in `kmcfit study`.
 pub fn many_starts(model: &Model, starts: usize, threads: usize) -> Multistart {
     let level = |parameters: &[f64]| parameters.iter().sum::<f64>() / parameters.len() as f64;
     let start = model.problem.start();
@@ -121,7 +121,7 @@ pub fn many_starts(model: &Model, starts: usize, threads: usize) -> Multistart {
     }
 }
 
-/// A hardening spring under three sines, seen by a displacement and an acceleration sensor with
+/// A hardening spring under three sines, measured by a displacement and an acceleration sensor with
 /// `samples` samples each; mass, damping, stiffness and cubic stiffness are estimated.
 pub fn duffing(samples: usize) -> (Problem, FitSettings) {
     let grid = Grid::new(0.0, 0.001 * (samples - 1) as f64, samples).expect("a grid");

@@ -1,4 +1,4 @@
-//! `kmcfit check`
+//! `kmcfit check`: validates a model and its data, and compares its gradient with finite differences over step sizes and grids.
 
 use super::{CommandError, NOT_CONVERGED, OK, Overrides, announce, inputs, print, say, unwritable};
 use crate::config::{BuildMode, Model, build};

@@ -1,4 +1,4 @@
-//! `kmcfit compare`
+//! `kmcfit compare`: fits models, reads finished runs, and writes their comparison.
 
 use super::fit::{fit_into, note_discarded, open_journal};
 use super::progress::Progress;

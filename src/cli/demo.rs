@@ -1,4 +1,4 @@
-//! `kmcfit demo`
+//! `kmcfit demo`: compares the paper's fit with a constrained one on models and data that are built into the program.
 
 use super::{CommandError, compare, print, unwritable};
 use crate::results::{Claim, OutputFolder};

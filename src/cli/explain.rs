@@ -1,4 +1,4 @@
-//! `kmcfit explain`
+//! `kmcfit explain`: prints the documentation of a key of the model file.
 
 use super::{CommandError, OK, print};
 use crate::config::key_documentation;

@@ -1,4 +1,4 @@
-//! `kmcfit fit`
+//! `kmcfit fit`: fits a model to its records and writes the run.
 
 use super::progress::Progress;
 use super::{
@@ -248,10 +248,10 @@ pub(super) fn search(
     );
     let mut watch = Observer::new(&mut ignore);
     if progress.is_visible() {
-        watch = watch.looking(&mut show);
+        watch = watch.with_events(&mut show);
     }
     if let Some(store) = store {
-        watch = watch.keeping(store);
+        watch = watch.with_checkpoints(store);
     }
     let (problem, settings) = (&model.problem, &model.settings);
     let result = match &model.weight_rule {

@@ -1,4 +1,4 @@
-//! `kmcfit init`
+//! `kmcfit init`: writes a model file for a record.
 
 use super::{CommandError, OK, print, schema, unwritable};
 use crate::config::{ModelFile, scaffold};

@@ -30,7 +30,7 @@ fn register(is_set: &Arc<AtomicBool>) -> io::Result<()> {
         if signal == SIGTERM && is_ignored(SIGTERM) {
             continue;
         }
-        // In this order: the first signal finds the flag down, sets it, and does not end the process.
+        // The order matters: the first signal sets the flag only after the handler that ends the process has found it unset.
         flag::register_conditional_shutdown(signal, code.into(), Arc::clone(is_set))?;
         flag::register(signal, Arc::clone(is_set))?;
         flag::register_usize(
@@ -72,6 +72,6 @@ pub fn say_resumable(folder: &Path, what: &str) {
 /// that kills the process.
 pub fn ignore_file_size_signal() {
     #[cfg(unix)]
-    // Without a handler the process is killed, as it would be anyway.
+    // Without a handler the signal kills the process, as by default.
     let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
 }

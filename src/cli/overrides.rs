@@ -1,4 +1,4 @@
-//! `--set KEY=VALUE`
+//! `--set KEY=VALUE`: overrides of keys of the model file.
 
 use crate::config::{ModelFile, Override};
 use crate::error::InputError;

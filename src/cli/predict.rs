@@ -1,4 +1,4 @@
-//! `kmcfit predict`
+//! `kmcfit predict`: simulates the free response of an identified system from other initial states.
 
 use super::{CommandError, OK, print, unwritable};
 use crate::error::InputError;

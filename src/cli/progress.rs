@@ -99,7 +99,7 @@ mod tests {
     use kmcfit_core::internals::solvers::{IterationRecord, StartStrategy};
 
     #[test]
-    fn the_line_says_what_there_is_to_say() {
+    fn the_progress_line_has_all_available_quantities() {
         let row = IterationRecord {
             iteration: 3,
             cost: 2.0,

@@ -1,4 +1,4 @@
-//! `kmcfit resume`
+//! `kmcfit resume`: continues an interrupted fit, study or comparison from its journal.
 
 use super::fit::{self, Printed};
 use super::{CommandError, INTERRUPTED, compare, exit_code, say, study};

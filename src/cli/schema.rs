@@ -1,4 +1,4 @@
-//! `kmcfit schema`
+//! `kmcfit schema`: prints the JSON schema of model files.
 
 use super::{CommandError, OK, print};
 use crate::config::key_documentation;

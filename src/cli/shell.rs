@@ -1,4 +1,4 @@
-//! `kmcfit completions` and `kmcfit man`
+//! `kmcfit completions` and `kmcfit man`: completion scripts for shells and the manual page.
 
 use super::{CommandError, OK, print};
 use clap::{Command, CommandFactory};

@@ -1,4 +1,4 @@
-//! `kmcfit simulate`
+//! `kmcfit simulate`: simulates a model and writes the response, with noise if asked, as a record.
 
 use super::{CommandError, OK, Overrides, inputs, print, say, unwritable};
 use crate::config::{BuildMode, ModelFile, build};
@@ -49,10 +49,10 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let file = arguments.set.read(&arguments.model)?;
-    let purpose = BuildMode::Simulate {
+    let mode = BuildMode::Simulate {
         nodes: arguments.nodes,
     };
-    let problem = build(&file, purpose)?.problem;
+    let problem = build(&file, mode)?.problem;
     let noise = noise(arguments)?;
     if let Some(out) = &arguments.out {
         check_place(out, &file)?;
@@ -115,7 +115,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     Ok(OK)
 }
 
-/// In the record of every file that this command writes.
+/// Name of the command in the provenance file of each record.
 const MADE_BY: &str = "kmcfit simulate";
 
 /// Refuses to write over an input of the model, or over a file that this command did not write.
@@ -175,7 +175,7 @@ fn is_own(out: &Path, beside: &Path) -> bool {
         })
 }
 
-/// Longest record that is read, bytes: it takes some hundred, and the paths and values that were given.
+/// Longest provenance file that is read, bytes; one has some hundred bytes besides its paths and values.
 const LONGEST_RECORD: u64 = 1 << 20;
 
 /// Path of the provenance file of a table.
@@ -192,7 +192,7 @@ struct Provenance<'a> {
     version: &'static str,
     /// Digest of the table: the proof that this command wrote it.
     sha256: String,
-    /// The model file as it was given.
+    /// Path of the model file as given on the command line.
     model: String,
     /// Overrides.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -206,7 +206,7 @@ struct Provenance<'a> {
     noise: Option<Noise>,
 }
 
-/// Gaussian noise that can be made again.
+/// Reproducible Gaussian noise.
 #[derive(Debug, Serialize)]
 struct Noise {
     /// Standard deviation, m.

@@ -1,4 +1,4 @@
-//! `kmcfit study`
+//! `kmcfit study`: runs the analyses of a fit, or compares a sequence of models.
 
 use super::compare::{open_analyses, run_sequence};
 use super::fit::search;
@@ -337,9 +337,9 @@ impl StudyRun<'_> {
         let flag = Arc::clone(&self.flag);
         let mut interrupted = None;
         let compute = || {
-            let mut keeper = fit_journal(folder, heading, is_resumed);
-            let keeper = keeper.as_mut().map(|k| k as &mut dyn CheckpointStore);
-            let (weighted, _, found) = search(model, &progress, keeper)?;
+            let mut journal = fit_journal(folder, heading, is_resumed);
+            let journal = journal.as_mut().map(|j| j as &mut dyn CheckpointStore);
+            let (weighted, _, found) = search(model, &progress, journal)?;
             let problem = weighted.as_ref().map_or(&model.problem, |m| &m.problem);
             let fit = StudiedFit::of(problem, &found);
             interrupted = Some(fit.clone());

@@ -23,6 +23,8 @@ mod syntax;
 pub mod values;
 mod yaml_errors;
 
+#[cfg(test)]
+pub(crate) use build::DataWarning;
 pub use build::{
     BuildMode, Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation, StudyPlan,
     StudyTarget, WeightSearch, build,

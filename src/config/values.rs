@@ -26,8 +26,8 @@ impl Value for Format {
         match scalar {
             Scalar::Integer(1) => Ok(Self),
             Scalar::Integer(_) => Err(scalar
-                .refused("this version of the program cannot read that format", "1")
-                .suggest(Some("a newer version of the program may".to_owned()))),
+                .refused("this format version is not supported", "1")
+                .suggest(Some("a newer version of kmcfit may read it".to_owned()))),
             other => Err(other.refused("not a format number", "1")),
         }
     }
@@ -424,7 +424,7 @@ impl<T: Value> Value for OneOrList<T> {
             return Err(scalar.refused(problem, "a map, or a list of maps"));
         }
         (T::scalar(scalar).map(Self::One))
-            .map_err(|mistake| mistake.expecting(|one| format!("{one}, or a list of such")))
+            .map_err(|mistake| mistake.expecting(|one| format!("{one}, or a list of them")))
     }
     fn list<'de, A: SeqAccess<'de>>(list: A, report: &Report) -> Result<Self, A::Error> {
         report.elements(list).map(Self::List)

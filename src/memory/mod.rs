@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_machine_has_is_refused() {
+    fn sizes_beyond_any_memory_are_refused() {
         assert_eq!(check(SMALL - 1), Ok(()));
         let available = check(u64::MAX).expect_err("too much");
         assert!(available.bytes < u64::MAX);

@@ -35,10 +35,10 @@ impl FittedModel<'_> {
             summary.warnings.push(findings::unidentified(reason));
             return summary;
         }
-        let judgements = &assessment.judgements;
+        let classifications = &assessment.classifications;
         // Constraints and penalties may determine what the records do not.
-        let all_identified =
-            !judgements.is_empty() && !judgements.iter().any(FunctionClassification::is_open);
+        let all_identified = !classifications.is_empty()
+            && !classifications.iter().any(FunctionClassification::is_open);
         if count.rank_bound < count.parameters && !all_identified {
             let finding = Finding::new("rank_bound", count.headline());
             let finding = finding.with("rank_bound", count.rank_bound);
@@ -53,9 +53,12 @@ impl FittedModel<'_> {
         for finding in &count.findings {
             add(finding.is_warning(), findings::rank(finding));
         }
-        for judgement in judgements {
-            if judgement.verdict != Classification::Fixed {
-                add(judgement.is_open(), findings::classification(judgement));
+        for classification in classifications {
+            if classification.verdict != Classification::Fixed {
+                add(
+                    classification.is_open(),
+                    findings::classification(classification),
+                );
             }
         }
         let warnings = plausibility.warnings.iter();

@@ -71,8 +71,8 @@ impl ChannelView<'_> {
     pub fn table(&self) -> CsvTable {
         CsvTable::new()
             .column("t_s", self.channel.times().to_vec())
-            .column("reading", self.observed())
-            .column("model", self.model())
+            .column("measured", self.observed())
+            .column("predicted", self.model())
             .column("residual", self.residuals())
     }
 }

@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_is_empty() {
+    fn values_that_are_not_finite_are_empty() {
         let text = CsvTable::new()
             .column("a", vec![f64::NAN])
             .column("b", vec![1.0])

@@ -51,7 +51,7 @@ pub fn channel((label, unit): (&str, &str), t: &[f64], observed: &[f64], model: 
     let line = Style::new(Colour::Blue).width(1.4);
     Figure::new(
         "channel",
-        "Readings and model",
+        "Samples and model",
         "Samples of the channel and the fitted response against time.",
     )
     .panel(Panel::of_time(label, unit).marks([samples, Mark::line("model", t, model, line)]))

@@ -15,10 +15,10 @@ pub fn rank(finding: &RankFinding) -> Finding {
 
 /// The classification of a function or ratio, with the half-width of its band relative to its scale, the identified
 /// ratio, or the spans of time on which it is identified, s.
-pub fn classification(judgement: &FunctionClassification) -> Finding {
-    let verdict = &judgement.verdict;
-    let finding = Finding::new(verdict.name().replace('-', "_"), &*judgement.sentence);
-    let finding = finding.with("function", &judgement.name);
+pub fn classification(function: &FunctionClassification) -> Finding {
+    let verdict = &function.verdict;
+    let finding = Finding::new(verdict.name().replace('-', "_"), &*function.sentence);
+    let finding = finding.with("function", &function.name);
     match verdict {
         Classification::Identified { relative } => finding.with("relative_half_width", relative),
         Classification::OnlyRatio(ratio) => finding.with("ratio", ratio),
@@ -32,7 +32,7 @@ pub fn unidentified(reason: &Unidentified) -> Finding {
     let why = match reason {
         Unidentified::Failed => "the fit failed".to_owned(),
         Unidentified::NoResponseOnHalfStep { error } => {
-            format!("with half the step there is no response: {error}")
+            format!("the simulation with half the step fails: {error}")
         }
         Unidentified::StepDependent => {
             "halving the step changes the response by more than 10 % of its peak".into()
@@ -40,7 +40,7 @@ pub fn unidentified(reason: &Unidentified) -> Finding {
         Unidentified::Unrelated => {
             "the residuals exceed twice the variation of every channel".into()
         }
-        Unidentified::Noise => "white noise would be fitted equally well".into(),
+        Unidentified::Noise => "the model would fit white noise equally well".into(),
     };
     Finding::of(reason, format!("no system identified: {why}"))
 }
@@ -48,7 +48,7 @@ pub fn unidentified(reason: &Unidentified) -> Finding {
 /// A validation record that the fit does not predict: name, and fit in per cent.
 pub fn not_predicted((record, percent): (&str, f64)) -> Finding {
     let text = format!(
-        "validation record `{record}`: fit {} only; the estimates do not predict it",
+        "validation record `{record}`: fit of {} only: the identified system does not predict this record",
         super::suggestions::percent(percent, 0)
     );
     let finding = Finding::new("validation_not_predicted", text);
@@ -78,13 +78,13 @@ pub fn warning(warning: &FitWarning) -> Finding {
             frequency,
         } => format!(
             "aliasing: with {per_period:.1} samples per period at {frequency:.3} Hz, systems of other natural frequencies \
-             fit equally well; sample faster or at uneven times"
+             fit equally well; use a higher sampling rate or unequal intervals"
         ),
         FitWarning::Negative { function } => {
             format!("the {function} is negative at most times: the system is not passive")
         }
         FitWarning::NegligibleForce { experiment } => format!(
-            "the force of {experiment} is negligible relative to the inertia force; check its unit"
+            "the force of {experiment} is negligible beside the inertia force; check its unit"
         ),
     };
     Finding::of(warning, text)
@@ -94,8 +94,8 @@ pub fn warning(warning: &FitWarning) -> Finding {
 pub fn of_starts(finding: &multistart::MultistartFinding, starts: usize) -> Finding {
     use multistart::MultistartFinding as Starts;
     match finding {
-        Starts::Nowhere => {
-            let text = format!("no fit from the {starts} starting points reached a minimum");
+        Starts::NoMinimum => {
+            let text = format!("no fit from the {starts} starting points converged to a minimum");
             Finding::new("no_minimum", text)
         }
         Starts::Points {
@@ -108,18 +108,18 @@ pub fn of_starts(finding: &multistart::MultistartFinding, starts: usize) -> Find
                     "all {starts} starting points converged to the same minimum; lowest J = {lowest:.6e}"
                 ),
                 _ => format!(
-                    "{ended} of {starts} starting points led to {different} different end points; lowest J = {lowest:.6e}"
+                    "{ended} of {starts} starting points converged, to {different} different minima; lowest J = {lowest:.6e}"
                 ),
             };
             let finding = Finding::new("minima", text);
             let finding = finding.with("ended", ended).with("starts", starts);
             finding.with("different", different).with("lowest", lowest)
         }
-        Starts::OneValley(true) => Finding::new(
+        Starts::Connected(true) => Finding::new(
             "connected_minima",
             "the two lowest minima are connected by a path of nearly constant cost: the solution is not unique",
         ),
-        Starts::OneValley(false) => Finding::new(
+        Starts::Connected(false) => Finding::new(
             "separate_minima",
             "the cost rises between the two lowest minima, on the straight path and along the scaling ambiguity",
         ),
@@ -132,7 +132,9 @@ pub fn of_starts(finding: &multistart::MultistartFinding, starts: usize) -> Find
                 .with("fit", fit)
         }
         Starts::NotReached(fit) => {
-            let text = format!("no starting point reached the minimum of the fit (J = {fit:.6e})");
+            let text = format!(
+                "no starting point converged to a cost as low as that of the fit (J = {fit:.6e})"
+            );
             Finding::new("fit_not_reached", text).with("fit", fit)
         }
     }

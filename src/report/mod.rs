@@ -32,7 +32,7 @@ mod result_table;
 mod run;
 mod run_reader;
 pub mod study;
-mod suggestions;
+pub(crate) mod suggestions;
 mod summary;
 mod tables;
 mod terminal;

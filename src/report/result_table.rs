@@ -64,7 +64,7 @@ impl ResultTable {
             }),
             false => Err(
                 InputError::file(path, "the table does not belong to this result")
-                    .found(format!("{count} rows"))
+                    .found(format!("{count} row{}", if count == 1 { "" } else { "s" }))
                     .expected(format!("{rows} rows, one per {what}")),
             ),
         }

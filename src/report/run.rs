@@ -346,7 +346,7 @@ pub fn fit_claim(model: &Model) -> Claim {
             "trajectory.csv",
             "report.html",
         ])
-        .family("readings", "csv", samples.chain(["validation".to_owned()]))
+        .family("channels", "csv", samples.chain(["validation".to_owned()]))
         .family("figures", "svg", FIGURES)
         .journals(&[FIT_JOURNAL, CHECKPOINT])
 }

@@ -145,7 +145,11 @@ fn value(folder: &Path) -> Result<Value, InputError> {
     let text = read_text_within(&path, what, LONGEST_DOCUMENT, JSON)?;
     let value: Value = serde_json::from_str(&text).map_err(|error| {
         InputError::file(&path, "not a JSON document")
-            .found(error)
+            .found(format!(
+                "a syntax error at line {}, column {}",
+                error.line(),
+                error.column()
+            ))
             .expected("a result written by `kmcfit fit`")
     })?;
     let format = value.get("format").and_then(Value::as_u64);

@@ -112,14 +112,14 @@ impl FittedModel<'_> {
     pub(super) fn samples(&self) -> Vec<(String, CsvTable)> {
         let fitted = self.channels().into_iter().map(|(e, c)| {
             let view = self.channel_view(e, c);
-            let name = format!("readings/{}-{}.csv", e + 1, view.channel.kind().name());
+            let name = format!("channels/{}-{}.csv", e + 1, view.channel.kind().name());
             (name, view.table())
         });
         let validation = self.run_assessment.validation.iter().enumerate();
         let validation = validation.flat_map(|(i, out)| {
             out.channels().into_iter().map(move |view| {
                 let kind = view.channel.kind().name();
-                let name = format!("readings/validation-{}-{kind}.csv", i + 1);
+                let name = format!("channels/validation-{}-{kind}.csv", i + 1);
                 (name, view.table())
             })
         });

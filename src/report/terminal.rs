@@ -27,7 +27,7 @@ pub fn charts(
     let mut text = String::new();
     for (e, experiment) in document.experiments.iter().enumerate() {
         for channel in &experiment.channels {
-            let name = format!("readings/{}-{}.csv", e + 1, channel.kind);
+            let name = format!("channels/{}-{}.csv", e + 1, channel.kind);
             let table = ResultTable::read(&folder.join(name))?;
             let title = format!(
                 "{}: {} in {} (line: fit, o: samples)",
@@ -35,9 +35,9 @@ pub fn charts(
             );
             let times = table.required("t_s")?;
             let mut chart = Chart::new(width, TALL, &times);
-            chart.scale(&[&table.required("reading")?, &table.required("model")?]);
-            chart.line(&times, &table.required("model")?);
-            chart.points(&times, &table.required("reading")?);
+            chart.scale(&[&table.required("measured")?, &table.required("predicted")?]);
+            chart.line(&times, &table.required("predicted")?);
+            chart.points(&times, &table.required("measured")?);
             text += &format!("\n{title}\n{}", chart.text());
         }
     }
@@ -193,7 +193,7 @@ mod tests {
     use insta::assert_snapshot;
 
     #[test]
-    fn a_wave_with_readings_off_it() {
+    fn a_wave_with_outlying_samples_is_drawn() {
         let times: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.05).collect();
         let model: Vec<f64> = times.iter().map(|t| 3.0 * t.sin()).collect();
         let mut samples = model.clone();

@@ -89,7 +89,7 @@ impl TimingsSummary {
             qp: counted(times.qp, counts.qp),
             linear_algebra: part(times.linear_algebra),
             start: part(times.start),
-            io: part(overhead.io + times.keeping),
+            io: part(overhead.io + times.checkpoints),
             analysis: part(overhead.analysis),
             report: part(overhead.report),
             other: part(total.saturating_sub(times.sum() + overhead.sum())),
@@ -137,7 +137,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_stand_where_there_are_any() {
+    fn counts_are_shown_only_if_not_zero() {
         let part = |seconds, count| PartSummary { seconds, count };
         let timings = TimingsSummary {
             arithmetic: "scalar".into(),

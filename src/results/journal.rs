@@ -232,7 +232,7 @@ impl JournalText {
         // The version of the format is checked first, because the form of the lines depends on it.
         let json = line.split(|b| matches!(b, b'\t' | b'\n')).next();
         let value: serde_json::Value = serde_json::from_slice(json.unwrap_or_default())
-            .map_err(|error| no_journal(path, what).found(error))?;
+            .map_err(|_| no_journal(path, what).found("a first line that is not JSON"))?;
         Heading::check_format(&value, path)?;
         let (_, begin) = checked(line, JournalPosition::default())
             .ok_or_else(|| no_journal(path, what).found("a first line with a wrong checksum"))?;

@@ -261,7 +261,7 @@ impl DialectCandidate {
             return (None, units, data);
         }
         let has_units = match (format.units_row, above, two_above) {
-            (Some(told), ..) => told,
+            (Some(given), ..) => given,
             (None, Some(units), Some(names)) => self.names_and_units(names, units),
             _ => false,
         };

@@ -39,7 +39,7 @@ pub fn decode(path: &Path, bytes: Vec<u8>) -> Result<(String, Encoding), InputEr
             let (text, broken) = encoding.decode_with_bom_removal(&bytes);
             return match broken {
                 true => Err(InputError::file(path, "the file is not text")
-                    .found("a byte order mark of UTF-16, and then no UTF-16")
+                    .found("a byte order mark of UTF-16, but no UTF-16 text behind it")
                     .hint("save it as UTF-8")),
                 false => Ok((text.into_owned(), Encoding::Utf16)),
             };
@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn encodings_are_told_apart() {
+    fn encodings_are_detected() {
         let text = "m/s²".to_owned();
         assert_eq!(read("m/s²".as_bytes()), (text.clone(), Encoding::Utf8));
         assert_eq!(
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_text_is_refused() {
+    fn files_that_are_not_text_are_refused() {
         let message = |bytes: &[u8]| {
             let error = decode(Path::new("t.csv"), bytes.to_vec()).unwrap_err();
             error.to_string()

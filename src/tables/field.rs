@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn fields_say_what_they_are() {
+    fn fields_are_classified_by_their_contents() {
         for (text, decimal, field) in [
             ("1.5", '.', Field::Number(1.5)),
             ("1,5", '.', Field::Text),

@@ -52,9 +52,9 @@ impl TableFormat {
                 && !matches!(delimiter, '.' | '+' | '-' | '"' | '#');
         if !separates {
             return Err(
-                InputError::argument("delimiter", "fields cannot be separated by this")
+                InputError::argument("delimiter", "invalid delimiter")
                     .found(quote(&delimiter.to_string()))
-                    .expected("a comma, a semicolon, a tab, a blank or the like"),
+                    .expected("a comma, a semicolon, a tab, a space or another punctuation mark, except `.`, `+`, `-`, `#` and quotes"),
             );
         }
         match self.decimal == self.delimiter {

@@ -36,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cubics_are_exact_and_readings_are_kept() {
+    fn cubics_are_exact_and_samples_are_kept() {
         let cubic = |t: f64| 1.0 - 2.0 * t + 0.5 * t * t - 0.25 * t * t * t;
         let values: Vec<f64> = (0..11).map(|i| cubic(f64::from(i) * 0.3)).collect();
         for (i, y) in resample(&values, 101).iter().enumerate() {
@@ -46,7 +46,7 @@ mod tests {
     }
 
     #[test]
-    fn two_readings_are_joined_by_a_line() {
+    fn two_samples_are_joined_by_a_line() {
         assert_eq!(resample(&[1.0, 3.0], 3), [1.0, 2.0, 3.0]);
     }
 }

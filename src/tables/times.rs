@@ -65,9 +65,9 @@ pub fn equally_spaced_at(table: &Table, index: usize) -> Result<f64, InputError>
     let column = &*table.label(index);
     let (&[first, .., last], intervals) = (times, times.len().saturating_sub(1)) else {
         return Err(
-            InputError::new(table.place(0, Some(column)), "only one time")
+            InputError::new(table.place(0, Some(column)), "a single row of data")
                 .found("1 row")
-                .expected("at least 2 rows, to have a spacing"),
+                .expected("at least 2 rows"),
         );
     };
     let spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();

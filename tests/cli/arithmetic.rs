@@ -1,4 +1,4 @@
-//! What the processor offers decides how fast an answer comes, never what it is.
+//! Results do not depend on the SIMD instruction set of the processor.
 
 use crate::workbench::Workbench;
 
@@ -15,14 +15,14 @@ fn fitted(bench: &Workbench, model: &str, arithmetic: Option<&str>) -> [String; 
     assert_eq!(output.status.code(), Some(0), "{model}: {trouble}");
     let said = String::from_utf8(output.stdout).expect("text");
     if let Some(name) = arithmetic {
-        // A processor without it takes what it has.
+        // A processor without these instructions uses the widest that it has.
         let has_it = name != "AVX2" || !said.contains("scalar");
         assert!(!has_it || said.contains(name), "{said}");
     }
     ["history.csv", "functions.csv"].map(|file| bench.read(&format!("{out}/{file}")))
 }
 
-/// Motions, adjoints, tangents, trial steps and elimination, forced, nonlinear and free.
+/// Responses, adjoints, tangents, trial steps and elimination; forced, nonlinear and free.
 #[test]
 fn every_arithmetic_gives_the_same_bits() {
     for model in [
@@ -60,7 +60,7 @@ fn an_unknown_arithmetic_is_refused() {
     }
 }
 
-/// A shell or job file that clears a variable leaves an empty one: it sets no limit.
+/// An empty variable, as a shell or job file may leave it, sets no limit.
 #[test]
 fn an_empty_arithmetic_is_none() {
     let bench = Workbench::with_shipped_models();

@@ -1,9 +1,9 @@
-//! Every mistake in the input: exit code 2, a message that says where and what, nothing written.
+//! Invalid input: exit code 2, a message with location and problem, no file written.
 
 use crate::workbench::{MODEL, Workbench, readings};
 use insta::{Settings, assert_snapshot};
 
-/// The message of a command that refuses its input and leaves nothing behind.
+/// Message of a command that rejects its input and writes no file.
 fn refused(bench: &Workbench, arguments: &[&str]) -> String {
     let before = bench.contents();
     let (code, stdout, stderr) = bench.run(arguments);
@@ -13,7 +13,7 @@ fn refused(bench: &Workbench, arguments: &[&str]) -> String {
     stderr
 }
 
-/// The message about a model and its readings; `fit` and `check` say the same.
+/// Message about a model and its samples; `fit` and `check` print the same.
 fn message(bench: &Workbench) -> String {
     let message = refused(bench, &["fit", "model.yaml", "--out", "out"]);
     assert_eq!(
@@ -31,14 +31,14 @@ fn changed(from: &str, to: &str) -> String {
     message(&bench)
 }
 
-/// The message about the small model with other readings.
+/// The message about the small model with other samples.
 fn with_readings(text: &str) -> String {
     let bench = Workbench::with_small_model();
     bench.write("readings.csv", text);
     message(&bench)
 }
 
-/// The readings with a row, counted from 1, replaced.
+/// The samples with a row, counted from 1, replaced.
 fn with_row(row: usize, by: &str) -> String {
     let text = readings(21);
     let lines = text.lines().enumerate();
@@ -191,13 +191,13 @@ fn kinds_of_value() {
       expected: one of: nodal, constant, piecewise-constant, piecewise-linear, polynomial, b-spline
     ");
     assert_snapshot!(changed("format: 1", "format: 2"), @"
-    error: model.yaml:1:9: format: this version of the program cannot read that format
+    error: model.yaml:1:9: format: this format version is not supported
       |
     1 | format: 2
       |         ^
       found: the integer 2
       expected: 1
-      hint: a newer version of the program may
+      hint: a newer version of kmcfit may read it
     ");
     assert_snapshot!(changed("fit:", "fit: lbfgs\nfitting:"), @"
     error: model.yaml:13:6: fit: wrong type of value
@@ -329,7 +329,7 @@ fn grid() {
     8 | grid: {nodes: 21, duration: 3.0, method: midpoint}
       |                             ^^^
       found: 3
-      expected: 2 (or leave it out)
+      expected: 2 or no `duration`
     ");
     assert_snapshot!(changed("nodes: 21", "nodes: 2"), @"
     error: model.yaml:8:15: grid.nodes: invalid number of nodes
@@ -341,7 +341,7 @@ fn grid() {
     ");
 }
 
-/// What the machine has is in the message, and differs from one moment to the next.
+/// Replaces the available memory, which varies from run to run.
 #[test]
 fn a_grid_that_does_not_fit_into_memory_is_refused() {
     let mut settings = Settings::clone_current();
@@ -357,37 +357,37 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
         refused(&bench, &[command, "model.yaml"])
     };
     assert_snapshot!(with_nodes("fit", "100000000000"), @"
-    error: model.yaml:8:15: grid.nodes: a grid of so many nodes does not fit into memory
+    error: model.yaml:8:15: grid.nodes: the grid does not fit into memory
       |
     8 | grid: {nodes: 100000000000, method: midpoint}
       |               ^^^^^^^^^^^^
       found: 100000000000 nodes, which may need 378 TB: 3780 bytes each
       expected: at most [nodes] nodes within [bytes]
     ");
-    // The largest number that a computer counts to is no more of a trouble.
+    // The largest integer is rejected in the same way.
     assert_snapshot!(with_nodes("fit", "9223372036854775807"), @"
-    error: model.yaml:8:15: grid.nodes: a grid of so many nodes does not fit into memory
+    error: model.yaml:8:15: grid.nodes: the grid does not fit into memory
       |
     8 | grid: {nodes: 9223372036854775807, method: midpoint}
       |               ^^^^^^^^^^^^^^^^^^^
       found: 9223372036854775807 nodes, which may need 34864346 PB: 3780 bytes each
       expected: at most [nodes] nodes within [bytes]
     ");
-    // A simulation needs less for each node.
+    // A simulation needs less memory per node.
     let bench = Workbench::with_small_model();
     let with = |command: &str| refused(&bench, &[command, "model.yaml", "--nodes", "100000000000"]);
     assert_snapshot!(with("simulate"), @"
-    error: --nodes: a grid of so many nodes does not fit into memory
+    error: --nodes: the grid does not fit into memory
       found: 100000000000 nodes, which may need 50.0 TB: 500 bytes each
       expected: at most [nodes] nodes within [bytes]
     ");
     assert_snapshot!(with("check"), @"
-    error: --nodes: a grid of so many nodes does not fit into memory
+    error: --nodes: the grid does not fit into memory
       found: 100000000000 nodes, which may need 378 TB: 3780 bytes each
       expected: at most [nodes] nodes within [bytes]
     ");
     assert_snapshot!(with_nodes("study", "100000000000"), @"
-    error: model.yaml:8:15: grid.nodes: a grid of so many nodes does not fit into memory
+    error: model.yaml:8:15: grid.nodes: the grid does not fit into memory
       |
     8 | grid: {nodes: 100000000000, method: midpoint}
       |               ^^^^^^^^^^^^
@@ -395,7 +395,7 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
       expected: at most [nodes] nodes within [bytes]
     ");
     assert_snapshot!(with_nodes("compare", "100000000000"), @"
-    error: model.yaml:8:15: grid.nodes: a grid of so many nodes does not fit into memory
+    error: model.yaml:8:15: grid.nodes: the grid does not fit into memory
       |
     8 | grid: {nodes: 100000000000, method: midpoint}
       |               ^^^^^^^^^^^^
@@ -581,7 +581,7 @@ fn model_files() {
     ");
 }
 
-/// Below a regular file nobody can make a folder, not even root.
+/// No folder can be created below a regular file, not even by root.
 #[test]
 fn output_folders() {
     let bench = Workbench::with_small_model();
@@ -731,7 +731,7 @@ fn predict_arguments() {
     bench.write("other/functions.csv", "t_s,mass_kg\n0,1\n");
     assert_snapshot!(from("other", "1,0"), @"
     error: other/functions.csv: the table does not belong to this result
-      found: 1 rows
+      found: 1 row
       expected: 21 rows, one per node
     ");
 }

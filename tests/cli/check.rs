@@ -1,9 +1,9 @@
-//! `kmcfit check`.
+//! `kmcfit check`: validation, and gradients against finite differences.
 
 use crate::workbench::{MODEL, Workbench, column};
 
-/// On coarse grids the continuous gradient stops at its floor, which is no failure: the discrete
-/// one is judged.
+/// On coarse grids the error of the continuous gradient has a floor, which is not a failure: the exit code depends on the
+/// discrete gradient.
 #[test]
 fn discrete_gradient_passes_where_the_continuous_one_has_a_floor() {
     let bench = Workbench::with_shipped_models();
@@ -39,7 +39,7 @@ fn without_gradient_it_only_reads() {
 }
 
 #[test]
-fn what_is_all_fixed_has_no_gradient() {
+fn a_model_with_fixed_functions_has_no_gradient() {
     let bench = Workbench::with_small_model();
     let model = MODEL.replace("basis: nodal, start", "fixed");
     bench.write(
@@ -51,12 +51,12 @@ fn what_is_all_fixed_has_no_gradient() {
     assert!(stdout.contains("0 parameters"), "{stdout}");
     assert_eq!(
         stderr,
-        "warning: every function is fixed, so there is nothing to fit\n"
+        "warning: every function is fixed: there are no parameters to estimate\n"
     );
 }
 
-/// The steps follow the unit of the cost: a chi-square of a million is checked as well as an
-/// integral of a hundred.
+/// The steps of the differences scale with the cost: a chi-square of a million is checked as accurately as an integral of
+/// a hundred.
 #[test]
 fn steps_follow_the_size_of_the_cost() {
     let bench = Workbench::with_shipped_models();

@@ -1,4 +1,4 @@
-//! `kmcfit compare`.
+//! `kmcfit compare`: table, figures and page of several runs.
 
 use crate::workbench::Workbench;
 use insta::assert_snapshot;
@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-/// A model of the damped device below: `functions` and `fit` as given.
+/// A model of the damped system below: `functions` and `fit` as given.
 fn model(title: &str, nodes: usize, functions: &str, fit: &str) -> String {
     format!(
         "format: 1
@@ -53,7 +53,7 @@ const FREE: &str = "  mass: {basis: nodal, start: 2.0}
 const TO_THE_END: &str = "{method: lbfgs, stop: {iterations: 200, cost_ratio: 1e-12}}";
 const LOOSE: &str = "{method: lbfgs, stop: {iterations: 400, cost_ratio: 1e-6}}";
 
-/// Readings of a damped device with 200 nodes over 10 s, its truth, and models of it:
+/// Samples of a damped system with 200 nodes over 10 s, its truth, and models of it:
 /// `constants`, `twice` the mass, and one value per step in `free`.
 fn bench() -> Workbench {
     let bench = Workbench::empty();
@@ -76,7 +76,7 @@ fn json(text: &str) -> Value {
 
 /// The rows of a CSV file as maps from header to field.
 fn records(text: &str) -> Vec<std::collections::BTreeMap<String, String>> {
-    // The quoting is undone by a reader that knows nothing of the program.
+    // An independent CSV reader removes the quotes.
     let lines = text.lines().map(|line| {
         let (mut fields, mut quoted) = (vec![String::new()], false);
         let mut letters = line.chars().peekable();
@@ -103,7 +103,7 @@ fn records(text: &str) -> Vec<std::collections::BTreeMap<String, String>> {
         .collect()
 }
 
-/// The page, which must be well-formed and complete in itself; `tests/page` looks closer.
+/// The page, which must be well-formed and self-contained; `tests/page` tests its contents.
 fn with_page(bench: &Workbench, file: &str, look: impl Fn(&Document)) {
     let html = bench.read(file);
     for forbidden in [
@@ -136,7 +136,7 @@ fn the_table() {
     let stdout = bench.run_to(0, &names);
     let mut settings = insta::Settings::clone_current();
     settings.add_filter(r"(?m)^time \(s\) .*$", "time (s) [seconds]");
-    // What an optimum leaves of the errors is left to the machine.
+    // The remaining errors at the optimum depend on the machine.
     settings.add_filter(r"to \de-1\d", "to [tiny]");
     settings.add_filter(r" \de-1\d", "[tiny]");
     settings.add_filter(r"\d\.\d{3}e-1\d", "   [tiny]");
@@ -199,7 +199,7 @@ fn files() {
     ] {
         assert!(bench.path(file).is_file(), "{file}");
     }
-    // What a run leaves behind is what `fit` would have written.
+    // The folder of a run has the files that `fit` writes.
     bench.run_to(0, &["fit", "constants.yaml", "--out", "alone"]);
     for file in [
         "functions.csv",
@@ -279,7 +279,7 @@ fn as_json() {
     );
 }
 
-/// A finished run is taken as it is: nothing in its folder changes, and it is not run again.
+/// A finished run is only read: its folder does not change, and it is not fitted again.
 #[test]
 fn models_and_finished_runs() {
     let bench = bench();
@@ -326,7 +326,7 @@ fn equal_names() {
                 .exists()
         );
     }
-    // A finished run within the folder is compared with, not overwritten.
+    // A finished run within the output folder is compared, not overwritten.
     let before = bench.read("runs/compare/constants/result.json");
     bench.run_to(
         0,
@@ -345,7 +345,7 @@ fn equal_names() {
 }
 
 #[test]
-fn a_bad_argument_ends_everything_before_it_begins() {
+fn an_invalid_argument_ends_a_comparison_before_its_first_fit() {
     let bench = bench();
     bench.write(
         "bad.yaml",
@@ -379,7 +379,7 @@ fn a_bad_argument_ends_everything_before_it_begins() {
     assert_eq!(bench.run(&["compare"]).0, 2);
 }
 
-/// Twice the nodes, every second with a reading: each run is drawn on its own times.
+/// Twice the nodes, every second one with a sample: each run is drawn on its own times.
 #[test]
 fn different_grids() {
     let bench = bench();
@@ -464,7 +464,7 @@ fn a_run_that_does_not_converge() {
     assert!(bench.path("runs/compare/constants/result.json").exists());
 }
 
-/// A run that cannot begin is left out, with its reason; the others are compared.
+/// A run that cannot begin is listed with its reason; the others are compared.
 #[test]
 fn a_run_without_motion() {
     let bench = bench();
@@ -486,8 +486,8 @@ fn a_run_without_motion() {
     });
 }
 
-/// With a sigma the misfit is a chi-square, and its noise is the measure; without a truth nothing is
-/// said about it.
+/// With a sigma the misfit is a chi-square and is assessed against the noise; without a known true system no agreement with it
+/// is reported.
 #[test]
 fn noise_and_no_truth() {
     let bench = bench();
@@ -513,7 +513,7 @@ fn noise_and_no_truth() {
     assert_eq!(records[1]["mass_error_kg"], "");
 }
 
-/// Ctrl-C keeps what is finished, and the best so far of the run that it ends.
+/// Ctrl-C keeps the finished runs, and the best point of the interrupted one.
 #[test]
 #[cfg(unix)]
 fn interrupt() {

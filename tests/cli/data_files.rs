@@ -1,4 +1,4 @@
-//! The files of `data/` are what the program and the example make.
+//! The files of `data/` equal the output of the program and of the example that generate them.
 
 use crate::workbench::{Workbench, column, repository};
 use std::fs;
@@ -11,7 +11,7 @@ mod make_data;
 #[path = "../../examples/make_records.rs"]
 mod make_records;
 
-/// Numbers in the text are rounded to fewer digits than two libraries of sines differ in.
+/// Numbers in the text are rounded to fewer digits than those in which implementations of the sine differ.
 #[test]
 fn records() {
     for (name, text) in make_records::all() {
@@ -119,10 +119,10 @@ fn every_file_is_described() {
     }
 }
 
-/// Results and journals, which are text, name the model by its path: the model is at fault, not `--out`.
+/// Results and journals are text and contain the path of the model, so the error names the model and not `--out`.
 #[test]
 #[cfg(target_os = "linux")]
-fn a_path_that_is_no_text() {
+fn a_path_that_is_not_utf_8_is_refused() {
     use std::ffi::OsStr;
     use std::os::unix::ffi::OsStrExt;
     let bench = Workbench::with_shipped_models();

@@ -1,12 +1,11 @@
-//! Nothing is lost: runs that are killed, interrupted, or find the disk full, the folder taken or
-//! something else in their way.
+//! Crash safety: runs that are killed or interrupted, full disks, folders in use, and files in the way of results.
 
 use crate::workbench::{MODEL, Workbench};
 use serde_json::Value;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// What all runs of a model leave with the same bits: the document without its times, and the tables.
+/// The results that all runs of a model have in common, bit for bit: the document without its times, and the tables.
 fn bits(bench: &Workbench, run: &str) -> Vec<String> {
     let text = bench.read(&format!("{run}/result.json"));
     let mut result: Value = serde_json::from_str(&text).expect("JSON");
@@ -62,8 +61,8 @@ fn signal(child: &Child, name: &str) {
     assert!(sent.expect("kill runs").success());
 }
 
-/// Fifty moments of a fit and of its resumptions, drawn by a fixed generator. Whatever the moment, there
-/// is no result or a good one, and in the end the bits are those of a run that nobody killed.
+/// A fit and its resumptions are killed at fifty random times. After each kill there is either no result or a complete one, and
+/// the final result is bit-identical to that of an uninterrupted run.
 #[test]
 #[cfg(unix)]
 fn killed_at_any_moment() {
@@ -108,7 +107,7 @@ fn killed_at_any_moment() {
             std::fs::remove_dir_all(bench.path("run")).expect("a folder");
         }
     }
-    // Otherwise this was a test of nothing.
+    // At least some kills must have hit a running fit.
     assert!(resumed >= 5, "{resumed} resumptions, {finished} ends");
     match has("fit.journal") {
         true => bench.run_to(0, &["resume", "run"]),
@@ -126,18 +125,18 @@ fn killed_at_any_moment() {
         .collect();
     names.sort();
     let expected = [
+        "channels",
         "functions.csv",
         "history.csv",
         "kmcfit-manifest.json",
-        "readings",
         "result.json",
         "trajectory.csv",
     ];
     assert_eq!(names, expected, "temporary files are left");
 }
 
-/// A study that is killed in its fit goes on in the middle of it; one that is interrupted there is told as
-/// interrupted and goes on too.
+/// A study that is killed during its fit continues within the fit; one that is interrupted there is reported as interrupted and
+/// continues as well.
 #[test]
 #[cfg(unix)]
 fn a_study_whose_fit_is_ended() {
@@ -167,8 +166,8 @@ fn a_study_whose_fit_is_ended() {
     }
 }
 
-/// A sequence that is killed goes on in the middle of a fit; what was finished is kept, and what an older
-/// run left in its folders is none of it.
+/// A killed sequence continues within a fit; finished fits are kept, and results of older runs in its folders are not
+/// used.
 #[test]
 #[cfg(unix)]
 fn a_sequence_whose_fit_is_ended() {
@@ -193,10 +192,10 @@ fn a_sequence_whose_fit_is_ended() {
     assert!(bench.path("run/compare.html").exists());
 }
 
-/// The first Ctrl-C writes the best so far, from which `resume` goes on; figures included.
+/// The first Ctrl-C writes the results of the best point, figures included, and `resume` continues the fit.
 #[test]
 #[cfg(unix)]
-fn interrupted_and_gone_on_with() {
+fn an_interrupted_fit_is_resumed() {
     let bench = paper(3000);
     let mut child = started(&bench, &["fit", "models/paper.yaml"]);
     wait_for_line(&bench, "runs/paper/fit.journal", 20);
@@ -206,7 +205,7 @@ fn interrupted_and_gone_on_with() {
     assert_eq!(result["outcome"]["status"], "interrupted");
     let stdout = bench.run_to(0, &["resume", "runs/paper"]);
     assert!(
-        stdout.contains("ran the 3000 iterations asked for"),
+        stdout.contains("all 3000 iterations requested were run"),
         "{stdout}"
     );
     bench.run_to(0, &["fit", "models/paper.yaml", "--out", "whole"]);
@@ -215,7 +214,7 @@ fn interrupted_and_gone_on_with() {
         let drawn = |run: &str| bench.read(&format!("{run}/figures/{figure}.svg"));
         assert!(drawn("runs/paper") == drawn("whole"), "{figure}");
     }
-    // What is finished is told again.
+    // Resuming a finished run prints its results again.
     assert!(
         bench
             .run_to(0, &["resume", "runs/paper"])
@@ -223,11 +222,11 @@ fn interrupted_and_gone_on_with() {
     );
 }
 
-/// What was set beside the model is set again by `resume`, of fits and of studies, and is part of what
-/// may not have changed.
+/// `resume` applies the `--set` options of the interrupted fit or study again; they are part of the inputs that must not have
+/// changed.
 #[test]
 #[cfg(unix)]
-fn what_was_set_is_set_again() {
+fn resume_applies_the_same_overrides() {
     let bench = paper(1000);
     let set = [
         "--set",
@@ -253,7 +252,10 @@ fn what_was_set_is_set_again() {
             continue;
         }
         let stdout = bench.run_to(0, &["resume", "run"]);
-        assert!(stdout.contains("the 2000 iterations"), "{stdout}");
+        assert!(
+            stdout.contains("all 2000 iterations requested were run"),
+            "{stdout}"
+        );
         bench.run_to(0, &arguments("whole"));
         assert!(bits(&bench, "run") == bits(&bench, "whole"));
         std::fs::remove_dir_all(bench.path("run")).expect("a folder");
@@ -279,7 +281,7 @@ fn interrupted_twice() {
     assert!(!bench.path("runs/paper/result.json").exists());
 }
 
-/// One folder, one run. A killed run blocks nobody, and what it would have replaced is still there.
+/// Only one run at a time uses a folder. A killed run does not lock it, and the results that it would have replaced are intact.
 #[test]
 #[cfg(unix)]
 fn a_folder_that_is_taken() {
@@ -338,7 +340,7 @@ fn a_folder_that_is_taken() {
     assert!(!bench.path("run/fit.journal").exists());
 }
 
-/// A disk that is full, here a limit on the size of files: an error, and the older run is whole.
+/// A full disk (here a limit on the size of files) is an error, and the older run is intact.
 #[test]
 #[cfg(unix)]
 fn a_disk_that_is_full() {
@@ -368,13 +370,13 @@ fn a_disk_that_is_full() {
     for (name, text) in &before {
         assert!(after.get(name) == Some(text), "{name} is another one");
     }
-    // With room again the fit is finished from its journal.
+    // Without the limit the fit is completed from its journal.
     bench.run_to(0, &["resume", "fresh"]);
     bench.run_to(0, &["fit", "models/paper-lbfgs.yaml", "--out", "whole"]);
     assert!(bits(&bench, "fresh") == bits(&bench, "whole"));
 }
 
-/// A link in the place of a folder or file of a run is refused before the fit, and what it leads to stays.
+/// A link in the place of a folder or file of a run is refused before the fit, and its target is unchanged.
 #[test]
 #[cfg(unix)]
 fn links() {
@@ -396,13 +398,13 @@ fn links() {
         assert!(link.is_symlink());
         std::fs::remove_dir_all(bench.path("run")).expect("a folder");
     }
-    // The folder itself may be a link: the user asked for it.
+    // The output folder itself may be a link, because the user names it.
     symlink(bench.path("elsewhere"), bench.path("link")).expect("a link");
     bench.run_to(0, &["fit", "model.yaml", "--out", "link"]);
     assert!(bench.path("elsewhere/result.json").exists());
 }
 
-/// No name in a model, and no name of a model, is a way out of the output folder.
+/// Names in a model, and the name of the model, do not lead out of the output folder.
 #[test]
 fn names_that_look_like_paths() {
     let bench = Workbench::with_small_model();
@@ -422,7 +424,7 @@ fn names_that_look_like_paths() {
     assert!(bench.path("runs/run/result.json").exists() && bench.path("side/run").is_dir());
 }
 
-/// A fit goes on with what it was begun with, and nothing else.
+/// A fit is continued only with the inputs with which it was begun.
 #[test]
 #[cfg(unix)]
 fn a_resumption_that_is_refused() {
@@ -509,7 +511,7 @@ fn a_resumption_that_is_refused() {
       expected: 2
 
     error: run/fit.journal: not a journal of kmcfit, or it was edited
-      found: expected ident at line 1 column 2
+      found: a first line that is not JSON
       expected: the journal of a fit that was begun by `kmcfit fit`
 
     error: run: no unfinished run in this folder
@@ -522,7 +524,7 @@ fn a_resumption_that_is_refused() {
 #[cfg(target_os = "linux")]
 fn a_folder_that_cannot_be_written_to() {
     let bench = Workbench::with_small_model();
-    // Nobody makes folders there, the administrator included.
+    // No folder can be created there, not even by root.
     let (code, stdout, stderr) = bench.run(&["fit", "model.yaml", "--out", "/proc/kmcfit"]);
     assert_eq!((code, stdout.as_str()), (2, ""));
     assert!(
@@ -531,7 +533,7 @@ fn a_folder_that_cannot_be_written_to() {
     );
 }
 
-/// Nothing asks the system clock, which may be set back: times are taken from clocks that only go on.
+/// The system clock, which may be set back, is not used: times are taken from monotonic clocks.
 #[test]
 fn no_system_clock() {
     fn look(folder: &std::path::Path, found: &mut usize) {

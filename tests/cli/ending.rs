@@ -1,11 +1,11 @@
-//! How runs end: exit codes, statuses, and results in any case.
+//! Ends of runs: exit codes, statuses and results.
 
 use crate::workbench::{MODEL, Workbench, column};
 use serde_json::Value;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// The paper's problem with another end.
+/// The paper's problem with other stopping tests.
 fn paper_until(stop: &str) -> Workbench {
     let bench = Workbench::with_shipped_models();
     let model = bench.read("models/paper.yaml");
@@ -57,13 +57,13 @@ fn time_limit() {
     let stdout = bench.run_to(3, &["fit", "models/paper.yaml"]);
     assert!(begin.elapsed() < Duration::from_secs(30));
     assert!(
-        stdout.contains("time-limit: the limit of 0.3 s is reached"),
+        stdout.contains("time-limit: reached the limit of 0.3 s"),
         "{stdout}"
     );
     assert_eq!(status(&bench, "runs/paper"), "time-limit");
 }
 
-/// Ctrl-C ends a run in order, with the best so far.
+/// Ctrl-C ends a run with the results of the best point.
 #[test]
 #[cfg(unix)]
 fn interrupt() {
@@ -75,7 +75,7 @@ fn interrupt() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program runs");
-    // The folder is made when Ctrl-C is already looked after.
+    // The handler of Ctrl-C is installed before the folder is created.
     let begin = Instant::now();
     while !bench.path("runs/paper").exists() {
         assert!(
@@ -97,7 +97,7 @@ fn interrupt() {
     assert_eq!(status(&bench, "runs/paper"), "interrupted");
 }
 
-/// A motion that leaves the numbers is no bad input, but there is nothing to write.
+/// A response that overflows is not invalid input, but there is no result to write.
 #[test]
 fn a_start_without_motion() {
     let bench = Workbench::with_small_model();
@@ -111,7 +111,7 @@ fn a_start_without_motion() {
     );
 }
 
-/// Constraints that no device with a motion satisfies: what is kept is the start as given.
+/// Constraints under which no response can be simulated: the result is the start as given.
 fn infeasible(constraint: &str) -> (String, Value) {
     let bench = Workbench::with_small_model();
     let model = MODEL
@@ -135,12 +135,12 @@ fn infeasible(constraint: &str) -> (String, Value) {
 
 #[test]
 fn a_mass_that_must_pass_zero() {
-    // Each alone leaves a mass; together they fall below zero within a hundredth of a second.
+    // Either constraint permits a positive mass; together they make it negative within 0.01 s.
     let (stdout, result) =
         infeasible("{function: mass, max: 1.0}, {function: mass, slope: {max: -100.0}}");
     let reason = result["outcome"]["reason"].as_str().expect("text");
     assert!(reason.contains("the mass is -"), "{reason}");
-    // Nothing is said to push at a point outside.
+    // No constraint is reported as active at a point that violates them.
     assert_eq!(result["constraints"]["active"], serde_json::json!([]));
     assert!(stdout.contains(
         "infeasible: the simulation fails at all starting points within the constraints"
@@ -154,7 +154,7 @@ fn a_damping_that_must_overflow() {
     assert!(reason.contains("the response overflows"), "{reason}");
 }
 
-/// A run that failed is said to have; one whose history is empty is a run like any other.
+/// A failed run is reported as failed; a run with an empty history is valid.
 #[test]
 fn failed_and_empty_runs_are_read_back() {
     let bench = Workbench::with_small_model();

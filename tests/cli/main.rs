@@ -1,13 +1,13 @@
-//! The program as a program: arguments in; exit code, text and files out.
+//! The program as a process: exit code, output and files for given arguments.
 
 mod arithmetic;
 mod bad_input;
 mod check;
+mod command_line;
 mod compare;
 mod data_files;
 mod durable;
 mod ending;
-mod front;
 mod measured_input;
 mod models;
 mod predict;
@@ -17,5 +17,6 @@ mod results;
 mod sequence;
 mod simulate;
 mod study;
+mod uncommon_input;
 mod warnings;
 mod workbench;

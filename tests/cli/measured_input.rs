@@ -1,5 +1,5 @@
-//! Mistakes in records as engineers bring them: exit code 2, where and what, nothing written; and
-//! what is doubtful but no mistake.
+//! Mistakes in measured records: exit code 2, a message with location and problem, no file written; and warnings about
+//! suspicious records.
 
 use crate::workbench::Workbench;
 use insta::assert_snapshot;
@@ -26,7 +26,7 @@ functions:
 fit: {stop: {iterations: 2}}
 ";
 
-/// A cosine of 0.5 Hz over 2 s at 20 Hz with a force beside it.
+/// A cosine of 0.5 Hz over 2 s at 20 Hz with a column of a force.
 fn shaker(force_until: usize) -> String {
     let mut text = String::from("t,y,a,f,s\n");
     for i in 0..41 {
@@ -76,7 +76,7 @@ fn refused(bench: &Workbench) -> String {
     stderr
 }
 
-/// What is said on the error stream by a fit that is run all the same.
+/// Standard error of a fit that runs despite a warning.
 fn warned(changes: &[(&str, &str)]) -> String {
     let bench = bench();
     let mut model = MODEL.to_owned();
@@ -250,7 +250,7 @@ fn several() {
             "    initial: {displacement: 1.0, velocity: 0.0}",
             "    sensors: {displacement: {gain: estimate}}\n    initial: estimate",
         )]),
-        // Gains and the scale of the device.
+        // Gains and the scale of the system.
         changed(&[
             (
                 "    initial: {displacement: 1.0, velocity: estimate}",
@@ -274,7 +274,7 @@ fn several() {
 }
 
 #[test]
-fn doubts() {
+fn data_warnings() {
     let all = [
         warned(&[(
             "initial: {displacement: 1.0, velocity: estimate}",

@@ -1,4 +1,4 @@
-//! Every shipped model, and what a run leaves behind.
+//! The shipped models, and the files of a run.
 
 use crate::workbench::{MODEL, Workbench, column, paper_run, repository, table};
 use serde_json::Value;
@@ -9,11 +9,11 @@ fn result(bench: &Workbench, run: &str) -> Value {
     serde_json::from_str(&bench.read(&format!("{run}/result.json"))).expect("JSON")
 }
 
-/// Fits a shipped model, with as much work as ever: its folder and result.
+/// Fits a shipped model and checks the amount of work: folder and result.
 fn fitted(name: &str, code: i32) -> (Workbench, Value) {
     let bench = Workbench::with_shipped_models();
     let mut command = bench.command(&["fit", &format!("models/{name}.yaml")]);
-    // Work is the same with every arithmetic (tests/cli/arithmetic.rs); this one every processor has.
+    // The work does not depend on the arithmetic (tests/cli/arithmetic.rs); every processor has this one.
     let output = command.env("KMCFIT_ARITHMETIC", "scalar").output();
     let output = output.expect("the program runs");
     let said = String::from_utf8_lossy(&output.stderr);
@@ -24,9 +24,9 @@ fn fitted(name: &str, code: i32) -> (Workbench, Value) {
     (bench, result)
 }
 
-/// The work of a shipped model is pinned, so that lost efficiency is seen without a clock. More work
-/// is a loss, and less a gain to be pinned. The system's sines depend on the processor in
-/// their last bit, which moves the end of a search by an iteration: the band is two, and a twentieth.
+/// The work of a shipped model is pinned, which detects a loss of efficiency without a clock; a gain is pinned as well. The last
+/// bit of the system's sine depends on the processor, which shifts the end of a search by an iteration: the tolerance is two
+/// iterations and 5 %.
 fn takes_as_much_work_as_ever(name: &str, result: &Value) {
     let pinned = repository(&format!("tests/cli/work/{name}.txt"));
     let pinned =
@@ -44,14 +44,14 @@ fn takes_as_much_work_as_ever(name: &str, result: &Value) {
             "{name}: {key} {found}, pinned {count} within {band}"
         );
     }
-    // What is timed is what is counted.
+    // Timed work and counted work agree.
     for key in &keys[1..] {
         let (timed, counted) = (&result["timings"][key], &result["counts"][key]);
         assert_eq!(&timed["count"], counted, "{name}: {key}");
         let seconds = timed["seconds"].as_f64().expect("a number");
         assert_eq!(seconds > 0.0, *counted != 0, "{name}: {key} {timed}");
     }
-    // Time that was told twice would leave nothing for the rest.
+    // Time that is counted twice would leave a negative remainder.
     let other = &result["timings"]["other"]["seconds"];
     assert!(other.as_f64().expect("a number") > 0.0, "{name}: {result}");
 }
@@ -92,7 +92,7 @@ fn every_shipped_model_is_run_here() {
         "camera.yaml",
     ];
     assert_eq!(found, run_here.map(str::to_owned).into());
-    // All but those that are simulated and the sequence, which is of other models.
+    // All except models for simulation, and the sequence of other models.
     let without_fit = [
         "paper-device.yaml",
         "paper-experiments.yaml",
@@ -112,9 +112,9 @@ fn error(result: &Value, function: &str) -> f64 {
         .expect("a number")
 }
 
-/// The models that find the true device, and how well each function is found.
+/// Models that recover the true system, and the largest error of each function.
 #[test]
-fn models_that_recover_the_device() {
+fn models_that_recover_the_system() {
     let expected = [
         ("linear-mass", 1e-10, 1e-10),
         ("knots", 1e-6, 1e-6),
@@ -141,7 +141,7 @@ fn paper_positive() {
     assert!(result["cost"]["ratio"].as_f64().expect("a number") <= 1e-6);
     let least = |f: &str| result["functions"][f]["min"].as_f64().expect("a number");
     assert!(least("mass") >= 0.05 && least("damping") >= 0.0 && least("stiffness") >= 0.05);
-    // An exact fit, and another device.
+    // An exact fit of a different parameter set.
     assert!(error(&result, "mass") > 0.1 && error(&result, "damping") > 0.1);
 }
 
@@ -169,7 +169,7 @@ fn paper() {
     assert_eq!(result["counts"]["iterations"], 1000);
     assert_eq!(result["counts"]["forward"], 50_001);
     assert!(stdout.starts_with(
-        "The paper's run, start (2, 1, 1)\ncompleted: ran the 1000 iterations asked for\n"
+        "The paper's run, start (2, 1, 1)\ncompleted: all 1000 iterations requested were run\n"
     ));
     let ratio = result["cost"]["ratio"].as_f64().expect("a number");
     assert!((ratio / 8.130_155_3e-5 - 1.0).abs() < 1e-7, "{ratio}");
@@ -192,7 +192,7 @@ fn paper_lbfgs() {
     left_behind(&bench, "runs/paper-lbfgs");
 }
 
-/// It has no readings: it is there to make them.
+/// The model without samples, which generates them.
 #[test]
 fn paper_device() {
     let bench = Workbench::with_shipped_models();
@@ -227,7 +227,7 @@ fn left_behind(bench: &Workbench, run: &str) {
     let expected = "t_s,mass_kg,damping_N_s_per_m,stiffness_N_per_m,k_over_m_per_s2,\
                     c_over_m_per_s,natural_frequency_Hz,damping_ratio,\
                     true_mass_kg,true_damping_N_s_per_m,true_stiffness_N_per_m";
-    // Two ends of the band of each function and ratio where there are few free values.
+    // With few parameters: lower and upper end of the band of each function and ratio.
     let is_band = |name: &&String| name.ends_with("_low_95") || name.ends_with("_high_95");
     let bands = names.iter().filter(is_band).count();
     let few = result["model"]["parameters"]
@@ -313,7 +313,7 @@ fn two_runs_are_identical_but_for_their_times() {
         result["timings"] = Value::Null;
         let mut files = bench.contents();
         files.insert("runs/paper-lbfgs/result.json".into(), result.to_string());
-        // It has the digest of the document with its times.
+        // The manifest has the digest of the document with its times.
         assert!(
             files
                 .remove("runs/paper-lbfgs/kmcfit-manifest.json")
@@ -405,14 +405,14 @@ fn the_parts_of_the_time_add_up() {
     assert_eq!(rows, shown, "{table}");
     assert!(table.contains("\narithmetic: "), "{table}");
 
-    // Without being asked for it is in the document alone.
+    // Without `--timings` the times are in the document only.
     let quiet = bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
     assert!(!quiet.contains("arithmetic"), "{quiet}");
     let options = ["fit", "model.yaml", "--out", "run", "--json", "--timings"];
     assert_eq!(bench.run_to(0, &options), bench.read("run/result.json"));
 }
 
-/// Results may go into a pipe that nobody reads to its end; progress is for terminals.
+/// A closed pipe at standard output is not an error; progress is shown on terminals only.
 #[test]
 fn nothing_but_results_when_piped() {
     let bench = Workbench::with_small_model();
@@ -498,7 +498,7 @@ fn accelerometer() {
     let channel = &result["experiments"][0]["channels"][0];
     assert_eq!(channel["unit"], "g");
     assert_eq!(channel["ignored"][0]["samples"], 3);
-    // 1198 readings know their standard deviation to 2 %; three of that.
+    // The standard deviation of 1198 samples has a standard error of 2 %; the limit is three of them.
     let sigma = channel["sigma"].as_f64().expect("a number");
     assert!((sigma - 0.01).abs() < 6e-4, "{sigma}");
     let offset = scalar(&result, "offset of the acceleration of ring-down");
@@ -515,27 +515,27 @@ fn scalar(result: &Value, name: &str) -> f64 {
 }
 
 #[test]
-fn a_held_out_record_is_predicted_within_its_noise() {
+fn a_validation_record_is_predicted_within_its_noise() {
     let (bench, result) = fitted("hammer-and-shaker", 0);
     let held = &result["validation"][0];
     assert_eq!(held["name"], "hammer 3");
     let rms = held["channels"][0]["rms_residual"]
         .as_f64()
         .expect("a number");
-    // The noise is 0.02 mm; 301 readings know it to 4 %.
+    // The noise is 0.02 mm; the standard error from 301 samples is 4 %.
     assert!((rms - 0.02).abs() < 0.0025, "{rms}");
     let folder = "runs/hammer-and-shaker";
-    let table = bench.read(&format!("{folder}/readings/validation-1-displacement.csv"));
+    let table = bench.read(&format!("{folder}/channels/validation-1-displacement.csv"));
     let residuals = column(&table, "residual");
     let mean = residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64;
     assert!((mean.sqrt() - rms).abs() < 1e-9 * rms, "{rms}");
     let page = bench.read(&format!("{folder}/report.html"));
-    assert!(page.contains("Readings and model: hammer 3 (validation), displacement"));
+    assert!(page.contains("Samples and model: hammer 3 (validation), displacement"));
     let experiments = result["experiments"].as_array().expect("experiments");
     assert_eq!(experiments.len(), 3);
 }
 
-/// Readings far off hardly pull, and sigma is that of the others.
+/// Outliers have little influence on the estimates, and sigma is that of the other samples.
 #[test]
 fn camera() {
     let (_, result) = fitted("camera", 0);
@@ -552,7 +552,7 @@ fn camera() {
     assert!((drift - 0.002).abs() < 2e-4, "{drift}");
 }
 
-/// Nothing is simulated: one convex problem without an inequality that is met.
+/// The equation error: one convex problem without active inequalities, and no simulation.
 #[test]
 fn moving_support() {
     let (_, result) = fitted("moving-support", 0);
@@ -577,7 +577,7 @@ fn two_records_and_a_force() {
     let (bench, _) = fitted("paper-two-records", 0);
     let off = largest(&bench, "paper-two-records", "k_over_m_per_s2", &ratio);
     assert!(off < 5e-3, "{off}");
-    // Where nothing holds the scale, smoothness takes it as low as the bounds let it.
+    // The penalty lowers an undetermined scale down to the bounds.
     let off = largest(&bench, "paper-two-records", "mass_kg", &|t| t[0]);
     assert!(off > 0.5, "{off}");
     let (bench, _) = fitted("paper-forced", 0);

@@ -1,4 +1,4 @@
-//! `kmcfit predict`.
+//! `kmcfit predict`: free responses of identified systems from other initial states.
 
 use crate::workbench::{Workbench, column, paper_run, table};
 use insta::assert_snapshot;
@@ -57,9 +57,9 @@ fn motions_are_written() {
     roxmltree::Document::parse(&svg).expect("XML");
 }
 
-/// A rotation has the units of one, everywhere; without a truth a prediction says how far the motion goes.
+/// A rotation has angular units in all outputs; without a known true system a prediction reports the range of the response.
 #[test]
-fn a_rotation_is_told_in_its_units() {
+fn a_rotation_has_angular_units() {
     let bench = Workbench::with_shipped_models();
     let model = "models/roll-decay.yaml";
     let more = ["--no-report", "--set", "fit.stop.iterations=20"];
@@ -108,9 +108,9 @@ fn a_rotation_is_told_in_its_units() {
     );
 }
 
-/// Readings with the fit, then each function.
+/// Samples with the fit, then each function.
 #[test]
-fn the_plot_draws_readings_and_functions() {
+fn the_plot_draws_samples_and_functions() {
     let bench = Workbench::with_small_model();
     let plain = ["fit", "model.yaml", "--no-report", "--out", "run"];
     let without = bench.run_to(0, &plain);
@@ -121,7 +121,7 @@ fn the_plot_draws_readings_and_functions() {
     for title in ["mass in kg", "damping in N s/m", "stiffness in N/m"] {
         assert!(charts.contains(&format!("\n{title}\n")), "{charts}");
     }
-    // Ten rows of letters for the readings, five for each function, and an axis of times below each.
+    // Ten rows of characters for the samples, five for each function, and a time axis below each.
     let drawn = charts
         .lines()
         .filter(|line| line.contains('┤') || line.contains('│') || line.contains('|'));

@@ -1,11 +1,11 @@
-//! Runs are loaded back by the library.
+//! The library loads finished runs.
 
 use crate::workbench::{Workbench, column, paper_run};
 use kmcfit::Run;
 use kmcfit_core::internals::solvers::Status;
 
 #[test]
-fn a_run_is_what_its_files_say() {
+fn a_run_equals_its_files() {
     let (bench, _) = paper_run();
     let run = Run::open(bench.path("runs/paper")).expect("a run");
     let read = |table: &str, name: &str| column(&bench.read(&format!("runs/paper/{table}")), name);
@@ -52,7 +52,7 @@ fn bands() {
     assert!(run.band("k/m").is_some() && run.band("friction").is_none());
 }
 
-/// Whatever is missing or damaged is said with its file; nothing that is in a file ends the program.
+/// Missing or damaged contents are reported with the file; no content of a file causes a panic.
 #[test]
 fn damaged_runs() {
     let bench = Workbench::with_small_model();
@@ -88,7 +88,7 @@ fn damaged_runs() {
                 spoiled[place] = (state >> 20) as u8;
             }
             std::fs::write(&path, &spoiled).expect("room");
-            // A digit more or less may go unnoticed: that it ends in order is all.
+            // A changed digit may remain undetected: only a panic is a failure.
             let _ = Run::open(&folder);
         }
         std::fs::write(&path, &whole).expect("room");

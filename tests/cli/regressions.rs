@@ -1,4 +1,4 @@
-//! One test for each mistake that was found by using the program.
+//! Regression tests, one for each mistake found in use.
 
 use crate::workbench::{MODEL, Workbench, readings};
 
@@ -20,7 +20,7 @@ fn status(bench: &Workbench, run: &str) -> String {
 }
 
 #[test]
-fn a_prediction_without_motion_does_not_cost_the_fit() {
+fn a_failed_prediction_does_not_end_the_fit() {
     let bench = bench(
         "fit:",
         "predict: [{displacement: 1e308, velocity: 1e308}, {displacement: 1, velocity: 0}]\nfit:",
@@ -72,7 +72,7 @@ fn without_iterations_or_tests_the_default_tolerance_holds() {
 }
 
 #[test]
-fn simulate_does_not_write_over_the_model_s_readings() {
+fn simulate_does_not_write_over_the_samples_of_the_model() {
     let bench = Workbench::with_small_model();
     let before = bench.contents();
     let (code, _, stderr) = bench.run(&["simulate", "model.yaml", "--out", "./readings.csv"]);
@@ -106,7 +106,7 @@ fn experiments_have_names_of_their_own_and_columns_two() {
     assert!(stderr.contains("the same column"), "{stderr}");
 }
 
-/// More parameters than the paper's 10^5.
+/// More than 10^5 parameters, the number in the paper.
 #[test]
 fn forty_thousand_nodes_run_the_same_commands() {
     let bench = Workbench::with_shipped_models();

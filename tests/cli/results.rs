@@ -1,9 +1,9 @@
-//! What `result.json` says, held against the tables beside it.
+//! `result.json` agrees with the tables of the run.
 
 use crate::workbench::{Workbench, column};
 use serde_json::Value;
 
-/// A device with every kind of term in J, far enough from the truth that each costs something.
+/// A system with every kind of term in J, far enough from the truth that none of the terms vanishes.
 const EVERYTHING: &str = "format: 1
 title: Every term
 experiments:
@@ -73,7 +73,7 @@ fn squares(values: &[f64]) -> Vec<f64> {
     values.iter().map(|x| x * x).collect()
 }
 
-/// Every term of the sentence, computed from the tables alone, adds up to the cost.
+/// The terms of the cost, computed from the tables alone, add up to J.
 #[test]
 fn the_sentence_is_the_whole_cost() {
     let bench = bench();
@@ -121,7 +121,7 @@ fn the_sentence_is_the_whole_cost() {
         );
     };
     close(number(&result["cost"]["misfit"]), misfit, 1e-12);
-    // The differences leave out up to two cells of 400 at either end.
+    // The differences omit up to two of 400 cells at either end.
     let regularisation = number(&result["cost"]["regularisation"]);
     close(regularisation, terms.iter().sum(), 0.02);
     close(
@@ -131,7 +131,7 @@ fn the_sentence_is_the_whole_cost() {
     );
 }
 
-/// The factors of the powers of t make the function in the table.
+/// The polynomial with the given coefficients equals the function in the table.
 #[test]
 fn polynomials_are_given_in_powers_of_t() {
     let bench = bench();
@@ -146,7 +146,7 @@ fn polynomials_are_given_in_powers_of_t() {
     let times = column(&functions, "t_s");
     for (t, mass) in times.iter().zip(column(&functions, "mass_kg")) {
         let value = powers[0] + powers[1] * t + powers[2] * t * t;
-        // Rounding of three terms of the function's own size.
+        // Rounding error of three terms of the size of the function.
         assert!((value / mass - 1.0).abs() < 1e-14, "{t}: {value} {mass}");
     }
     for other in ["damping", "stiffness"] {
@@ -186,11 +186,11 @@ fn violated_soft_constraints_are_in_the_result_and_the_summary() {
     for (entry, (name, value)) in slack.iter().zip(ends) {
         assert_eq!(entry["name"], name);
         assert_eq!(entry["rows"], 1);
-        // Each row is computed from the knots, the column from the table: rounding apart.
+        // The rows are computed from the knots, the column from the table: they agree to machine precision.
         assert!((number(&entry["largest"]) - (value - 1.2).abs()).abs() < 1e-12);
         assert!((number(&entry["penalty"]) - 0.5 * (value - 1.2).powi(2)).abs() < 1e-12);
     }
-    // None is a hard one.
+    // None of them is a hard constraint.
     assert_eq!(result["constraints"]["max_violation"], 0.0);
     let summary = bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
     assert!(
@@ -198,7 +198,7 @@ fn violated_soft_constraints_are_in_the_result_and_the_summary() {
         "{summary}"
     );
     assert!(summary.contains(" on 1 row\n"), "{summary}");
-    // Where the data agree with it, nothing is said.
+    // A soft constraint that the data satisfy is not reported.
     let agreed = EVERYTHING
         .replace("value: 1.2", "value: 1.0")
         .replace("at: [0.0, 10.0]", "at: 0.0")
@@ -255,8 +255,8 @@ fit: {{stop: {{iterations: 200, tolerance: 1e-8}}}}
     let reached = cost("runs/coarse/result.json", "final");
     let begun = cost("runs/fine/result.json", "initial");
     let found = cost("runs/fine/result.json", "final");
-    // The table has all digits, and every coarse function is a fine one: what is left is the rounding
-    // of a projection, a few hundred additions.
+    // The table has all digits, and every coarse function is in the finer basis: the difference is the rounding error of a
+    // projection, a few hundred additions.
     assert!((begun / reached - 1.0).abs() < 1e-9, "{begun} {reached}");
     assert!(found <= begun, "{found} {begun}");
     assert!(
@@ -265,8 +265,8 @@ fit: {{stop: {{iterations: 200, tolerance: 1e-8}}}}
     );
 }
 
-/// Every attempt is in the result and in the summary, and the best of them is the fit:
-/// 40 periods with three readings each, from a period that is off (`tests/ladder.rs`).
+/// Every attempt is in the result and in the summary, and the best of them is the fit. The record has 40 periods with three
+/// samples each, and the start values have a wrong period (`crates/kmcfit-core/tests/start_strategy.rs`).
 #[test]
 fn every_attempt_is_in_the_result_and_the_summary() {
     let bench = Workbench::empty();

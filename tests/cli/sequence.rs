@@ -1,5 +1,5 @@
-//! The sequence of the README in one command: what the paper's fit does not find, what positivity alone
-//! does not find either, and what is known that brings the true device back.
+//! The sequence of the README in one command: neither the paper's fit nor positivity alone recovers the true system; the
+//! assumptions of the later models do.
 
 use crate::workbench::Workbench;
 use serde_json::Value;
@@ -14,7 +14,7 @@ const MODELS: [&str; 7] = [
     "noisy",
 ];
 
-/// The shipped models on 401 nodes, with readings made on as many, and a fifth of the paper's
+/// The shipped models on 401 nodes, with samples made on as many, and a fifth of the paper's
 /// iterations.
 fn bench() -> Workbench {
     let bench = Workbench::with_shipped_models();
@@ -35,7 +35,7 @@ fn bench() -> Workbench {
 }
 
 #[test]
-fn one_command_tells_what_finds_the_device() {
+fn a_sequence_states_which_assumptions_recover_the_system() {
     let bench = bench();
     let files = MODELS.map(|name| format!("models/{name}.yaml"));
     let files: Vec<&str> = files.iter().map(String::as_str).collect();
@@ -53,8 +53,8 @@ fn one_command_tells_what_finds_the_device() {
         panic!("{names:?}");
     };
 
-    // The paper's fit has mass and damping of the wrong sign or size; positivity alone has not, fits
-    // better, and is as wrong.
+    // In the paper's fit, mass and damping have the wrong sign or size. With positivity alone the misfit is smaller and the errors are
+    // as large.
     assert_eq!(paper["is_true_system"], false);
     assert_eq!(positive["is_true_system"], false);
     assert!(verdict(positive).starts_with("response fitted (J/J0 "));
@@ -66,8 +66,8 @@ fn one_command_tells_what_finds_the_device() {
     assert!(number(positive, "/smallest_mass") >= 0.05);
     assert!(number(positive, "/smallest_damping") >= 0.0);
 
-    // Smooth and normalised, few parameters, knots, splines: the device, and what it does elsewhere.
-    // The readings are those of the stepper and the truth costs no roughness: rounding is left.
+    // Smooth and normalised, few parameters, knots, splines: the true system and its predictions are recovered.
+    // The samples are computed by the same stepper, and the truth has no roughness: only rounding errors remain.
     for run in known {
         assert_eq!(run["is_true_system"], true, "{run}");
         assert_eq!(run["status"], "converged", "{run}");
@@ -77,12 +77,12 @@ fn one_command_tells_what_finds_the_device() {
         assert!(number(run, "/max_violation") <= 1e-9);
     }
 
-    // Noise costs digits, not the device: 401 readings of 0.1 m in 3 m.
+    // Noise limits the accuracy only: 401 samples with a noise of 0.1 m in 3 m.
     assert!(number(noisy, "/errors/k_over_m_relative") < 0.05, "{noisy}");
     assert!(number(noisy, "/errors/mass") < 0.05, "{noisy}");
     assert_eq!(noisy["misfit_unit"], "1");
     assert!(verdict(noisy).contains("to the true system") || noisy["is_true_system"] == true);
-    // The iterations on the way to the weight are counted, where nothing is left to do at its end.
+    // The iterations along the path of weights are counted, although the last fit needs none.
     let result = bench.read("runs/compare/noisy/result.json");
     let result: Value = serde_json::from_str(&result).expect("JSON");
     let path = result["weights"]["path"].as_array().expect("a path");
@@ -92,7 +92,7 @@ fn one_command_tells_what_finds_the_device() {
     let last = number(&result, "/counts/iterations");
     assert_eq!(number(noisy, "/iterations"), on_path + last);
 
-    // From other initial states: the matched record predicts nothing, the device everything.
+    // From other initial states: the fit with the wrong parameters does not predict the response, the true system does.
     let elsewhere = |run: &Value| number(run, "/predictions/4/cost");
     assert!(elsewhere(paper) > 1.0 && elsewhere(positive) > 1.0);
     assert!(known.iter().all(|run| elsewhere(run) < 1e-9));

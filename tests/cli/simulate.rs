@@ -1,4 +1,4 @@
-//! `kmcfit simulate`: noise that can be made again.
+//! `kmcfit simulate`: responses with reproducible noise.
 
 use crate::workbench::{Workbench, column};
 use serde_json::Value;
@@ -12,7 +12,7 @@ fn noisy(bench: &Workbench, seed: &str, out: &str) -> String {
 }
 
 #[test]
-fn one_seed_one_noise() {
+fn equal_seeds_give_equal_noise() {
     let bench = Workbench::with_shipped_models();
     let first = noisy(&bench, "7", "a.csv");
     assert!(first == noisy(&bench, "7", "b.csv"));
@@ -21,7 +21,7 @@ fn one_seed_one_noise() {
 }
 
 #[test]
-fn the_noise_has_the_standard_deviation_asked_for() {
+fn the_noise_has_the_given_standard_deviation() {
     let bench = Workbench::with_shipped_models();
     let clean = column(&bench.read("data/paper.csv"), "y_m");
     let noisy = column(&noisy(&bench, "1", "a.csv"), "y_m");
@@ -38,9 +38,9 @@ fn the_noise_has_the_standard_deviation_asked_for() {
 }
 
 #[test]
-fn the_record_tells_how_to_make_it_again() {
+fn the_provenance_file_reproduces_the_record() {
     let bench = Workbench::with_shipped_models();
-    // More than a double holds: a seed must not be rounded.
+    // More digits than a double has: a seed must not be rounded.
     noisy(&bench, "9007199254740993", "deep/a.csv");
     let record: Value = serde_json::from_str(&bench.read("deep/a.csv.json")).expect("JSON");
     assert_eq!(record["made_by"], "kmcfit simulate");
@@ -52,9 +52,9 @@ fn the_record_tells_how_to_make_it_again() {
     assert_eq!(record["noise"]["seed"], 9_007_199_254_740_993_u64);
 }
 
-/// On standard output there is no place for a record, so the seed is said beside it.
+/// With the table on standard output there is no provenance file: the seed is reported on standard error.
 #[test]
-fn readings_on_standard_output() {
+fn samples_on_standard_output_report_their_seed() {
     let bench = Workbench::with_shipped_models();
     let model = ["simulate", "models/paper-device.yaml"];
     let (code, stdout, stderr) = bench.run(&model);

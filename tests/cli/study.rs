@@ -1,10 +1,10 @@
-//! `kmcfit study` and `kmcfit resume`.
+//! `kmcfit study` and `kmcfit resume`: analyses of a fit, their journal, and sequences.
 
 use crate::workbench::Workbench;
 use insta::assert_snapshot;
 use serde_json::Value;
 
-/// A damped device read with noise; everything that a study can do.
+/// A damped system measured with noise, with all analyses of a study.
 const MODEL: &str = "\
 format: 1
 title: Studied
@@ -24,7 +24,7 @@ study:
   profiles:
     - {function: stiffness, at: 5.0}
     - {function: damping}
-    - {scalar: initial velocity of free decay}
+    - {parameter: initial velocity of free decay}
   starts: 4
   spread: 1.5
   bootstrap: 40
@@ -40,7 +40,7 @@ fn bench() -> Workbench {
     let mut text = String::from("t_s,y_m\n");
     for i in 0..201 {
         let t = 0.05 * f64::from(i);
-        // Noise without a generator: a sum of tones that no device of the model has.
+        // Deterministic noise: a sum of tones that no system of the model contains.
         let noise = 0.01 * ((37.0 * t).sin() + (53.0 * t + 1.0).cos() + (71.0 * t).sin());
         let y = (-0.1 * t).exp() * (1.99 * t).cos() + noise;
         text += &format!("{t},{y}\n");
@@ -54,7 +54,7 @@ fn document(bench: &Workbench, folder: &str) -> Value {
 }
 
 #[test]
-fn a_study_tells_what_the_data_tell() {
+fn a_study_reports_all_its_analyses() {
     let bench = bench();
     let stdout = bench.run_to(0, &["study", "model.yaml"]);
     assert!(stdout.contains("damping is identified"), "{stdout}");
@@ -90,10 +90,10 @@ fn a_study_tells_what_the_data_tell() {
     }
 }
 
-/// Whatever was finished is kept, and what is gone on with ends with the same bits; on any number of
+/// Finished analyses are kept, and a continued study is bit-identical to an uninterrupted one, with any number of
 /// threads.
 #[test]
-fn a_study_goes_on_where_it_was() {
+fn an_interrupted_study_is_resumed() {
     let bench = bench();
     bench.run_to(
         0,
@@ -102,7 +102,7 @@ fn a_study_goes_on_where_it_was() {
     let journal = bench.read("whole/study.journal");
     let lines: Vec<&str> = journal.lines().collect();
     assert!(lines.len() > 8, "{}", lines.len());
-    // Cut off after some pieces, in the middle of a line.
+    // Truncated after some analyses, within a line.
     for kept in [1, 3, 6] {
         let half = &lines[kept][..lines[kept].len() / 2];
         let part = lines[..kept].join("\n") + "\n" + half;
@@ -157,7 +157,10 @@ fn mistakes() {
         changed("{function: damping}", "{function: mass}"),
         changed("{function: damping}", "{function: offset}"),
         changed("{function: damping}", "{function: stiffness}"),
-        changed("{scalar: initial velocity", "{scalar: initial velocty"),
+        changed(
+            "{parameter: initial velocity",
+            "{parameter: initial velocty",
+        ),
         changed("sigma: 0.1", "sigma: 0"),
         changed("seed: 3", "misfit_limit: -1"),
         other_model,
@@ -169,7 +172,7 @@ fn mistakes() {
     assert_snapshot!(all.join("\n"));
 }
 
-/// A sequence is told from the numbers of its runs.
+/// The conclusions on a sequence are computed from the measures of its runs.
 #[test]
 fn a_sequence() {
     let bench = Workbench::with_shipped_models();
@@ -189,7 +192,7 @@ fn a_sequence() {
             .read("runs/short-study/compare.html")
             .contains("Conclusions")
     );
-    // Gone on with after the second fit was lost: the first is kept as it is, and all ends alike.
+    // Resumed after the second fit was lost: the first is unchanged, and the results are the same.
     let first = bench.read("runs/short-study/paper-positive/result.json");
     let second = bench.read("runs/short-study/linear-mass/functions.csv");
     std::fs::remove_file(bench.path("runs/short-study/linear-mass/result.json")).expect("removed");
@@ -211,7 +214,7 @@ fn a_sequence() {
     assert!(before.contains("the sequence has no model"), "{before}");
 }
 
-/// A record without motion: nothing is seen, and a study says so and ends.
+/// In a record at rest no parameter combination is identifiable; the study reports this and ends.
 #[test]
 fn a_record_at_rest() {
     let bench = bench();
@@ -225,7 +228,7 @@ fn a_record_at_rest() {
             "displacement: 1.0, velocity: estimate",
             "displacement: 0.0, velocity: 0.0",
         )
-        .replace("    - {scalar: initial velocity of free decay}\n", "");
+        .replace("    - {parameter: initial velocity of free decay}\n", "");
     bench.write("model.yaml", &model);
     let (code, stdout, stderr) = bench.run(&["study", "model.yaml"]);
     assert!(code == 0 || code == 3, "{code} {stderr}");
@@ -233,7 +236,7 @@ fn a_record_at_rest() {
     assert!(!stdout.contains("NaN"), "{stdout}");
 }
 
-/// A journal that somebody changed costs the pieces that were changed, and no panic.
+/// In an edited journal the edited analyses are computed again, without a panic.
 #[test]
 fn a_journal_of_another_shape() {
     let bench = Workbench::with_shipped_models();

@@ -1,4 +1,4 @@
-//! Where readings do not say what a fit came to, the summary does, and what to try next helps.
+//! Warnings and suggestions of a summary: each problem of a record is reported, and following the suggestion removes it.
 
 use crate::workbench::Workbench;
 use insta::assert_snapshot;
@@ -7,7 +7,7 @@ use kmcfit_core::internals::assessment::ResidualPattern;
 use serde_json::Value;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// A record for a model that leaves its mass alone.
+/// A record for a model with a fixed mass.
 fn starter(grid: &str, more: &str) -> String {
     format!(
         "format: 1
@@ -24,10 +24,10 @@ fit: {{method: gauss-newton}}
     )
 }
 
-/// Readings of one value move no oscillator: no starter is made of them, and steps as long as a period, which stand still
-/// as well and match them, show no device.
+/// From equal samples no model is scaffolded. Steps as long as a period match them with a response at rest, and no system is
+/// identified.
 #[test]
-fn what_stands_still_shows_no_device() {
+fn a_record_at_rest_identifies_no_system() {
     let bench = Workbench::empty();
     let rows: String = (0..12).map(|i| format!("{i},1\n")).collect();
     bench.write("record.csv", &format!("t,y\n{rows}"));
@@ -56,9 +56,9 @@ fn what_stands_still_shows_no_device() {
     }
 }
 
-/// Two readings a period, and so few: the frequency is an alias of others, if it is one at all.
+/// With few samples, two per period, the frequency is at best an alias of others.
 #[test]
-fn a_short_record_at_half_the_sampling_rate_is_not_called_sure() {
+fn a_short_record_near_the_nyquist_frequency_has_no_intervals() {
     let bench = Workbench::empty();
     let rows: String = (0..8).map(|i| format!("{i},{}\n", 1 - i % 2 * 2)).collect();
     bench.write("record.csv", &format!("t_s,y_m\n{rows}"));
@@ -68,12 +68,12 @@ fn a_short_record_at_half_the_sampling_rate_is_not_called_sure() {
     assert!(summary.contains(said), "{summary}");
 }
 
-/// What is added to the reading of this number at this time.
+/// Disturbance of the sample with this index at this time.
 type Spoiler = fn(usize, f64) -> f64;
 
-/// What is advised for single readings far off, an offset and a drift names a cure that is one.
+/// The suggestions for outliers, an offset and a drift remove these.
 #[test]
-fn what_to_try_next_helps() {
+fn suggestions_improve_the_fit() {
     let bench = Workbench::empty();
     let ring_down = |spoilt: Spoiler| {
         let rows = (0..401).map(|i| {
@@ -142,7 +142,7 @@ fn what_to_try_next_helps() {
     }
 }
 
-/// Numbers from -1/2 to 1/2 without a pattern: a multiplication alone would make a tone of the golden ratio.
+/// Pseudo-random numbers from -1/2 to 1/2; a multiplication alone would give a tone at the golden ratio.
 fn pseudo_random(i: u32) -> f64 {
     let mixed = i.wrapping_mul(2_654_435_761);
     let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(2_246_822_519);
@@ -159,10 +159,10 @@ fn ring_down(seconds: u32, size: f64) -> String {
     format!("t_s,y_m\n{}", rows.collect::<String>())
 }
 
-/// Residuals that are a hundred times the sigma that was given say nothing of errors, in a study neither; sigma itself is
-/// what to look at.
+/// With residuals a hundred times the given sigma no confidence intervals are reported, in a study neither; the suggestion
+/// concerns sigma.
 #[test]
-fn a_sigma_that_is_too_small_is_seen() {
+fn a_sigma_that_is_too_small_is_reported() {
     let bench = Workbench::empty();
     bench.write("record.csv", &ring_down(20, 1e-2));
     let model = starter("{nodes: 801}", "    sigma: {displacement: 1e-4}\n").replace("39", "3.8");
@@ -188,9 +188,9 @@ fn a_sigma_that_is_too_small_is_seen() {
     assert!(summary.contains("stiffness is identified"), "{summary}");
 }
 
-/// A device that is nearly right leaves a pattern: its errors are said to be too small.
+/// A slightly wrong model leaves autocorrelated residuals, and a warning says that the intervals are too small.
 #[test]
-fn errors_that_are_too_small_are_said_to_be() {
+fn autocorrelated_residuals_are_reported() {
     let bench = Workbench::empty();
     let beat = (0..=400).map(|i| {
         let t = 0.05 * f64::from(i);
@@ -215,7 +215,7 @@ fn errors_that_are_too_small_are_said_to_be() {
     );
 }
 
-/// One missing reading leaves the others where aliases match them; uneven times do not.
+/// With one missing sample aliases still match the others; with uneven times they do not.
 #[test]
 fn a_gap_hides_no_alias() {
     let bench = Workbench::empty();
@@ -241,9 +241,9 @@ fn a_gap_hides_no_alias() {
     }
 }
 
-/// Squares beyond the range of numbers make an infinite sigma, beside which every device fits.
+/// Squares that overflow give an infinite sigma, with which every system would fit.
 #[test]
-fn readings_without_squares_fail_by_name() {
+fn samples_whose_squares_overflow_fail_with_that_reason() {
     let bench = Workbench::empty();
     let rows: String = (0..40)
         .map(|i| format!("{i},{}e200\n", (i % 5) - 2))
@@ -254,13 +254,13 @@ fn readings_without_squares_fail_by_name() {
     let (code, summary, _) = bench.run(&["fit", "model.yaml", "--no-report"]);
     assert_eq!(code, 3, "{summary}");
     assert!(
-        summary.contains("failed: the squares of the samples leave the range of numbers"),
+        summary.contains("failed: the squares of the samples overflow"),
         "{summary}"
     );
     assert!(!summary.contains("is identified"), "{summary}");
 }
 
-/// Five minutes of a ring-down that is over after one: the nodes are for the motion, not for the noise after it.
+/// A five-minute record of a ring-down that lasts one minute: the number of nodes follows the response, not the noise after it.
 #[test]
 fn nodes_are_not_chosen_for_noise() {
     let bench = Workbench::empty();
@@ -273,13 +273,13 @@ fn nodes_are_not_chosen_for_noise() {
         .parse()
         .expect("a number");
     // By the rule of auto, for 0.32 Hz over 300 s: 300 s / (1.2e-2 / 600)^(1/4) * 2 rad/s = 9000; for noise up to
-    // 10 Hz it would be 64 a reading.
+    // 10 Hz it would be 64 per sample.
     assert!((5e3..2e4).contains(&nodes), "{notes}");
 }
 
-/// A laser that stands off: the readings swing about a distance.
+/// A laser at a stand-off distance: the samples oscillate about an offset.
 #[test]
-fn a_displacement_that_stands_off_gets_an_offset() {
+fn a_displacement_with_an_offset_gets_an_estimated_offset() {
     let bench = Workbench::empty();
     let far = |row: &str| match row.split_once(',') {
         Some((t, y)) => match y.parse::<f64>() {
@@ -300,7 +300,7 @@ fn a_displacement_that_stands_off_gets_an_offset() {
     assert!(summary.contains("stiffness is identified"), "{summary}");
 }
 
-/// Times that are called so, and do not increase, are shown where.
+/// For a column of times that do not increase, the message gives the row.
 #[test]
 fn a_starter_shows_where_times_do_not_increase() {
     let bench = Workbench::empty();
@@ -321,9 +321,9 @@ fn a_starter_shows_where_times_do_not_increase() {
     ");
 }
 
-/// A device of m = 1, c = 0.2, k = 9 from rest under a force whose sign is turned where it was written down.
+/// A system with m = 1, c = 0.2, k = 9 from rest under a force that is recorded with the wrong sign.
 #[test]
-fn a_force_of_the_wrong_sign_is_thought_of() {
+fn a_force_of_the_wrong_sign_is_suggested() {
     let bench = Workbench::empty();
     let force = |t: f64| (0.3 * t + 0.05 * t * t).sin();
     let acceleration = |t: f64, y: f64, v: f64| force(t) - 0.2 * v - 9.0 * y;
@@ -369,13 +369,13 @@ fn a_force_of_the_wrong_sign_is_thought_of() {
     );
 }
 
-/// What is seen of a function on a part of the record only is told with its values there, and what is not seen without
-/// any.
+/// A function that is identified on part of the record only is reported with its values there; one that is not identified,
+/// without values.
 #[test]
-fn values_are_told_where_they_are_seen() {
+fn values_are_reported_where_they_are_identified() {
     let bench = Workbench::empty();
     let found = |end: u32, knots: u32| {
-        // A row without a reading: the grid goes on to there.
+        // A row without a sample extends the grid.
         let record = format!("{}{end},\n", ring_down(20, 1e-3));
         bench.write("record.csv", &record);
         let sigma = "    sigma: {displacement: estimate}\n";
@@ -403,9 +403,9 @@ fn values_are_told_where_they_are_seen() {
     assert!(line == ": not identifiable", "{line}");
 }
 
-/// On more nodes than bands are computed at they are drawn between, and belong to the times that they stand beside.
+/// On fine grids bands are computed at some of the nodes and interpolated between them; each row has the band of its time.
 #[test]
-fn bands_lie_about_functions_on_many_nodes() {
+fn bands_contain_the_functions_on_many_nodes() {
     let bench = Workbench::empty();
     bench.write("record.csv", &ring_down(20, 1e-2));
     let sigma = "    sigma: {displacement: estimate}\n";
@@ -424,7 +424,7 @@ fn bands_lie_about_functions_on_many_nodes() {
     let mut rows = 0;
     for line in lines {
         let numbers: Vec<f64> = line.split(',').map(|x| x.parse().expect(line)).collect();
-        // The ends are drawn by straight lines between every third node, the knots lie on some others.
+        // The ends are interpolated linearly between every third node; the knots lie on some of the others.
         let slack = 1e-3 * (numbers[high] - numbers[low]);
         assert!(
             numbers[low] - slack <= numbers[value] && numbers[value] <= numbers[high] + slack,
@@ -435,9 +435,9 @@ fn bands_lie_about_functions_on_many_nodes() {
     assert_eq!(rows, 9001);
 }
 
-/// A sensor that reads to 0.5 and no further.
+/// A sensor that saturates at 0.5.
 #[test]
-fn readings_at_the_end_of_a_range_are_seen() {
+fn saturated_samples_are_reported() {
     let bench = Workbench::empty();
     let cut = |row: &str| match row.split_once(',') {
         Some((t, y)) => match y.parse::<f64>() {
@@ -457,7 +457,7 @@ fn readings_at_the_end_of_a_range_are_seen() {
     assert_snapshot!(check(), @"warning: experiments[0] (experiment 1): 66 samples of the displacement equal its extreme value 0.5 m; if the sensor saturates there, delete them (empty fields)");
 }
 
-/// `readings` at every 0.05 s, as a table.
+/// `samples` at every 0.05 s, as a table.
 fn table_of(readings: impl Fn(u32, f64) -> f64) -> String {
     let row = |i: u32| {
         let t = 0.05 * f64::from(i);
@@ -466,9 +466,9 @@ fn table_of(readings: impl Fn(u32, f64) -> f64) -> String {
     format!("t_s,y_mm\n{}", (0..=400).map(row).collect::<String>())
 }
 
-/// A device that is held for four seconds before it swings freely, and one that is struck then.
+/// A system that is released after four seconds at rest, and one that is struck then.
 #[test]
-fn what_stands_still_first_is_left_out() {
+fn rest_at_the_beginning_is_excluded() {
     let bench = Workbench::empty();
     for (is_held, begins) in [(true, "4.4"), (false, "4.1")] {
         let reading = |i: u32, t: f64| {
@@ -501,7 +501,7 @@ fn what_stands_still_first_is_left_out() {
         let hint =
             format!("the displacement is at rest before {begins} s; a free decay must begin");
         assert!(told.contains(&hint) && told.contains(&window), "{told}");
-        // On a clock of its own, and one that is set to zero.
+        // On the clock of the logger, and with `time_zero`.
         let late = |row: &str| match row.split_once(',').map(|(t, y)| (t.parse::<f64>(), y)) {
             Some((Ok(t), y)) => format!("{:.2},{y}\n", 1_700_006_000.0 + t),
             _ => format!("{row}\n"),
@@ -520,10 +520,10 @@ fn what_stands_still_first_is_left_out() {
     }
 }
 
-/// Sentinels among readings, under squares and under a robust loss: the second is judged by the readings that count, be
-/// its device the right one or not.
+/// Sentinel values among the samples, under a quadratic and under a robust loss: the second fit is assessed by the samples that are not
+/// outliers, for a right and a wrong model.
 #[test]
-fn a_robust_fit_is_judged_by_the_readings_that_count() {
+fn a_robust_fit_is_assessed_without_outliers() {
     let bench = Workbench::empty();
     let reading = |i: u32, t: f64| match i % 90 {
         17 => -9999.0,
@@ -531,8 +531,7 @@ fn a_robust_fit_is_judged_by_the_readings_that_count() {
     };
     bench.write("record.csv", &table_of(reading));
     let said = bench.run_to(0, &["init", "record.csv"]);
-    let far =
-        "5 samples lie far off (-9999): empty fields are better; the model has a robust loss\n";
+    let far = "5 outliers (first: -9999): if these stand for missing samples, use empty fields; the model has a robust loss\n";
     assert!(said.contains(far), "{said}");
     assert!(said.contains("dominant frequency 0.31"), "{said}");
     let robust = bench.read("record.yaml");
@@ -568,7 +567,7 @@ fn a_robust_fit_is_judged_by_the_readings_that_count() {
         told.contains("(`loss: {displacement: huber}`, with `sigma`)"),
         "{told}"
     );
-    // A device that cannot follow the readings.
+    // A model that cannot match the samples.
     let wrong = ["--set", "functions.stiffness={fixed: 9.0}"];
     let summary = bench.run_to(0, &[fit.as_slice(), &wrong].concat());
     assert!(!summary.contains("is identified"), "{summary}");
@@ -578,9 +577,9 @@ fn a_robust_fit_is_judged_by_the_readings_that_count() {
     );
 }
 
-/// Two sensors of one motion, of which one may be the wrong way round.
+/// Two sensors of one response, of which one may be reversed.
 #[test]
-fn a_sensor_the_wrong_way_round_is_seen() {
+fn a_reversed_sensor_is_reported() {
     let bench = Workbench::empty();
     let table = |sign: f64| {
         let rows = (0..=400).map(|i| {
@@ -624,7 +623,7 @@ fn a_sensor_the_wrong_way_round_is_seen() {
     assert!(!check(pairs[0], turned));
     assert!(!check(pairs[0], &turned.replace("-1", "{start: 1}")));
     assert!(check(pairs[2], turned));
-    // What only falls has both of one sign.
+    // In a monotone decay both have the same sign.
     let falls = (0..=400).map(|i| (0.05 * f64::from(i), (-0.02 * f64::from(i)).exp()));
     let rows: String = falls
         .map(|(t, y)| format!("{t},{y},{},{}\n", -0.4 * y, 0.16 * y))
@@ -633,9 +632,9 @@ fn a_sensor_the_wrong_way_round_is_seen() {
     assert_eq!(pairs.map(|pair| check(pair, "")), [false; 3]);
 }
 
-/// Records of noise alone, of several seeds: a device may match three per cent of them, and shows nothing.
+/// Records of noise, of several seeds: a model may explain three per cent of the variance, and no system is identified.
 #[test]
-fn noise_shows_no_device() {
+fn noise_identifies_no_system() {
     let bench = Workbench::empty();
     for seed in 1..5u32 {
         let reading = |i: u32| {
@@ -656,15 +655,15 @@ fn noise_shows_no_device() {
             "{seed}: {summary}{stderr}"
         );
         assert!(
-            summary.contains("white noise would be fitted equally well"),
+            summary.contains("the model would fit white noise equally well"),
             "{seed}: {summary}"
         );
     }
 }
 
-/// An overdamped device of c/m = 30 on steps for its slow mode alone: they decide what is found.
+/// An overdamped system with c/m = 30 on steps that resolve its slow mode only: the estimates depend on the step.
 #[test]
-fn steps_that_outweigh_the_residuals_are_doubted() {
+fn steps_with_errors_above_the_residuals_are_reported() {
     let bench = Workbench::empty();
     let rows: String = (0..500)
         .map(|i| {
@@ -691,9 +690,9 @@ fn steps_that_outweigh_the_residuals_are_doubted() {
     );
 }
 
-/// A record that was held out and is not predicted stands in the first lines; a stiffness below zero is told of.
+/// A validation record that is not predicted is in the first lines of the summary; a negative stiffness is reported.
 #[test]
-fn what_is_wrong_is_said_at_once() {
+fn failed_validation_and_negative_stiffness_are_in_the_first_lines() {
     let bench = Workbench::empty();
     bench.write("record.csv", &ring_down(20, 1e-2));
     let rows: String = (0..400)
@@ -727,7 +726,7 @@ fn what_is_wrong_is_said_at_once() {
     );
 }
 
-/// Columns as files have them: of the base, of other things, with a wrong cell, with an offset of two sensors.
+/// Columns of the base, of other quantities, with an invalid cell, and with an offset between two sensors.
 #[test]
 fn a_starter_reads_the_names_of_columns() {
     let bench = Workbench::empty();
@@ -755,21 +754,21 @@ fn a_starter_reads_the_names_of_columns() {
     let model = record("t_s,y_m,a_m_per_s2", &off);
     let sensors = "sensors: {acceleration: {offset: estimate}, displacement: {offset: estimate}}";
     assert!(model.contains(sensors), "{model}");
-    // Of several axes the one that moves.
+    // Of several axes the one with a response.
     let axes = |t: f64| format!("{t},{},{},0.1", 0.01 * (40.0 * t).sin(), (10.0 * t).cos());
     let model = record("t_s,acc_x_m_per_s2,acc_y_m_per_s2,acc_z_m_per_s2", &axes);
     assert!(
         model.contains("columns: {time: t_s, acceleration: acc_y_m_per_s2}"),
         "{model}"
     );
-    // Units that nobody says are no reason to leave a column that has one, nor are angles beside lengths.
+    // Columns without units, and angles beside lengths, do not prevent the use of a column with a unit.
     for header in ["t_s,y_mm,y_raw", "t_s,y_mm,roll_deg"] {
         let model = record(header, &|t| {
             format!("{t},{},{}", (10.0 * t).cos(), (9.0 * t).cos())
         });
         assert!(model.contains("displacement: y_mm"), "{model}");
     }
-    // An oscilloscope's: the first is the time, whatever it is called.
+    // A file of an oscilloscope: its first column is the time, whatever its name.
     let model = record("x,signal", &|t| format!("{t},{}", (10.0 * t).cos()));
     assert!(
         model.contains("columns: {time: x, displacement: signal}"),
@@ -817,7 +816,7 @@ fn a_starter_reads_the_names_of_columns() {
     assert!(refused.contains("abc"), "{refused}");
 }
 
-/// A second mode, or a hum: residuals that swing at a frequency of their own, which a band leaves out.
+/// A second mode, or mains hum: residuals that oscillate at another frequency, which `band` removes.
 #[test]
 fn a_tone_in_the_residuals_is_named() {
     let bench = Workbench::empty();
@@ -851,9 +850,10 @@ fn a_tone_in_the_residuals_is_named() {
     assert!(fit(&better) > fit(&summary) + 10.0, "{better}{stderr}");
 }
 
-/// What swings on by itself, at a phase that wanders, is no ring-down: motions are hardly matched, accelerations are.
+/// An oscillation sustained by an unknown force, with a random phase, is not a ring-down: its displacement is hardly fitted, its
+/// acceleration is.
 #[test]
-fn something_unknown_keeps_it_moving() {
+fn an_unknown_force_is_suggested_for_sustained_oscillations() {
     let bench = Workbench::empty();
     let rows: String = (0..2000)
         .map(|i| {
@@ -886,17 +886,17 @@ fn something_unknown_keeps_it_moving() {
     let stiffness = result["functions"]["stiffness"]["max"]
         .as_f64()
         .expect("a number");
-    // The frequency wanders from 4.9 to 7.5 rad/s about 6.2.
+    // The frequency varies from 4.9 to 7.5 rad/s about 6.2 rad/s.
     assert!((24.0..56.0).contains(&stiffness), "{stiffness}");
 }
 
-/// A stiffness on knots, of a device that has a constant one or one that falls: the probability is that of the ratio of
-/// likelihoods of both fits, which is another way to it.
+/// A piecewise-linear stiffness for a system with constant or decreasing stiffness: the p-value agrees with that of the
+/// likelihood ratio of two fits.
 #[test]
-fn whether_a_constant_would_do() {
+fn the_test_of_a_constant_agrees_with_the_likelihood_ratio() {
     let bench = Workbench::empty();
     for (name, falls) in [("constant", 0.0), ("falling", 0.004)] {
-        // y" = -(0.1 y' + k(t) y) by steps of a thousandth, and noise of 0.01.
+        // y" = -(0.1 y' + k(t) y) with steps of 0.001 s, and noise of 0.01.
         let (mut y, mut v) = (1.0f64, 0.0f64);
         let mut rows = String::from("t_s,y_m\n");
         let mut random = 17u64;
@@ -935,7 +935,7 @@ fn whether_a_constant_would_do() {
         let expected = law.sf(misfit(&constant) - misfit(&knots));
         let stiffness = &knots["functions"]["stiffness"];
         let found = stiffness["constant_p_value"].as_f64().expect("a number");
-        // To the part of the noise by which the model is not linear in the knots.
+        // Up to the nonlinearity of the model in the knot values over the noise.
         assert!(
             (found - expected).abs() <= 0.02,
             "{name}: {found} {expected}"

@@ -1,4 +1,4 @@
-//! A folder to run the program in.
+//! A temporary folder in which tests run the program.
 
 use assert_cmd::Command;
 use std::collections::BTreeMap;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use tempfile::TempDir;
 
-/// A small model that can be fitted at once; tests spoil it in one place.
+/// A small model that is fitted in milliseconds; tests change one place in it.
 pub const MODEL: &str = "\
 format: 1
 title: Small
@@ -45,7 +45,7 @@ impl Workbench {
         }
     }
 
-    /// An empty folder that costs no time to make durable, where the system has one.
+    /// An empty folder in memory, where syncing takes no time, if the system has one.
     #[allow(dead_code, reason = "used by the tests of reliability")]
     pub fn in_memory() -> Self {
         let place = Path::new("/dev/shm");
@@ -58,7 +58,7 @@ impl Workbench {
         }
     }
 
-    /// A folder with the small model as `model.yaml` and 21 readings over 2 s in `readings.csv`.
+    /// A folder with the small model as `model.yaml` and 21 samples over 2 s in `samples.csv`.
     pub fn with_small_model() -> Self {
         let bench = Self::empty();
         bench.write("model.yaml", MODEL);
@@ -112,7 +112,7 @@ impl Workbench {
         (code, text(output.stdout), text(output.stderr))
     }
 
-    /// Runs the program, which must end with `code`; its standard output.
+    /// Runs the program, which must exit with `code`, and returns its standard output.
     pub fn run_to(&self, code: i32, arguments: &[&str]) -> String {
         let (found, stdout, stderr) = self.run(arguments);
         assert_eq!(found, code, "{arguments:?}\n{stdout}\n{stderr}");
@@ -142,7 +142,7 @@ fn collect(root: &Path, below: &Path, found: &mut BTreeMap<String, String>) {
     }
 }
 
-/// `rows` readings of a decaying cosine, 0.1 s apart.
+/// `rows` samples of a decaying cosine, 0.1 s apart.
 pub fn readings(rows: usize) -> String {
     let mut text = String::from("t_s,y_m\n");
     for i in 0..rows {
@@ -163,7 +163,7 @@ pub fn table(text: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     (names.map(str::to_owned).collect(), lines.map(row).collect())
 }
 
-/// `models/paper.yaml` fitted into `runs/paper`, once for all tests that look at it.
+/// `models/paper.yaml` fitted into `runs/paper`, once for all tests.
 pub fn paper_run() -> &'static (Workbench, String) {
     static RUN: OnceLock<(Workbench, String)> = OnceLock::new();
     RUN.get_or_init(|| {

@@ -1,4 +1,4 @@
-//! Pages of the documentation: what they show is run, and compared with what is printed.
+//! Pages of the documentation: their commands are run, and the shown output is compared with the printed one.
 
 use super::repository;
 use std::fs;
@@ -74,7 +74,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// What a command of a page prints, `kmcfit` being the program under test.
+/// Output of a command of a page, with `kmcfit` as the program under test.
 pub fn output(folder: &Path, command: &str) -> String {
     let program = Path::new(env!("CARGO_BIN_EXE_kmcfit"));
     let programs = program.parent().expect("the program is in a folder");
@@ -90,7 +90,7 @@ pub fn output(folder: &Path, command: &str) -> String {
     String::from_utf8(text).expect("the program writes UTF-8")
 }
 
-/// A command of a page, the output shown for it, and what it prints.
+/// A command of a page with its shown and its printed output.
 pub struct Step {
     pub command: String,
     pub shown: String,
@@ -140,17 +140,17 @@ impl Tour {
     }
 }
 
-/// Stands for lines that are left out.
+/// Mark for omitted lines.
 const CUT: &str = "…";
 
-/// Below this an error is rounding, and differs from machine to machine.
+/// Relative errors below this are rounding errors and depend on the machine.
 const ROUNDING: f64 = 1e-7;
 
-/// How far a shown number may be from the printed one, as a part of it: libraries of elementary
-/// functions differ in the last digit, and L-BFGS works in logarithms.
+/// Largest relative difference of a shown and a printed number: implementations of elementary functions differ in the last
+/// digit, and L-BFGS uses logarithmic coordinates.
 const SLACK: f64 = 0.01;
 
-/// Whether a shown text is a printed one, but for the lines that are cut.
+/// True if a shown text equals the printed one, except for omitted lines.
 fn shows(shown: &str, printed: &str) -> bool {
     let (shown, printed): (Vec<&str>, Vec<&str>) =
         (shown.lines().collect(), printed.lines().collect());
@@ -170,10 +170,10 @@ fn shows_lines(shown: &[&str], printed: &[&str]) -> bool {
     same(first, line) && shows_lines(rest, after)
 }
 
-/// Whether two lines are the same word by word, and number by number within the slack.
+/// True if two lines have equal words, and equal numbers within the tolerance.
 fn same(shown: &str, printed: &str) -> bool {
     let words = |line: &str| -> Vec<String> {
-        // What follows are the seconds that a run takes.
+        // The next number is the duration of a run.
         let line = line
             .split_once(" solves, ")
             .map_or(line, |(before, _)| before);

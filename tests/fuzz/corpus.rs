@@ -1,13 +1,13 @@
-//! Where inputs come from.
+//! Inputs of the fuzz tests: the corpus, shipped files and generated long inputs.
 
 use crate::targets::made;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Bytes that are kept of a shipped table.
+/// Largest number of bytes of a shipped table.
 const LONGEST: usize = 4000;
 
-/// All inputs of a target that are not mutations, with names.
+/// All inputs of a target except mutations, with names.
 pub fn seeds(target: &str) -> Vec<(String, Vec<u8>)> {
     let mut seeds = files(&format!("tests/fuzz/corpus/{target}"));
     assert!(!seeds.is_empty(), "the corpus of {target}");
@@ -37,7 +37,7 @@ fn files(folder: &str) -> Vec<(String, Vec<u8>)> {
         .collect()
 }
 
-/// Inputs that are long and dull, so that they are made and not kept.
+/// Long repetitive inputs, which are generated instead of stored.
 fn long(target: &str) -> impl Iterator<Item = (&'static str, String)> {
     let repeat = |text: &str, times: usize| text.repeat(times);
     let model = "format: 1\nfunctions: {mass: {fixed: &m 1}, damping: {fixed: 0}, stiffness: {basis: \

@@ -1,11 +1,11 @@
-//! A corpus that grows from run to run.
+//! Additions to the corpus: inputs that led to new kinds of messages.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Longest input that is kept, bytes: as long as a model that is written by hand.
+/// Longest input that is added, bytes: the length of a hand-written model.
 const LONGEST: usize = 2000;
-/// Most inputs that one run adds to a target, so that the corpus stays one that is read in a second.
+/// Most inputs that one run adds to a target; the corpus must remain readable within a second.
 const MOST: usize = 20;
 
 /// Adds inputs to the corpus of a target, where `KMCFIT_FUZZ_GROW` is set.
@@ -24,7 +24,7 @@ impl Growth {
         }
     }
 
-    /// Keeps an input, under a name from its content.
+    /// Stores an input under a name derived from its content.
     pub fn add(&mut self, input: &[u8]) {
         let Some(folder) = &self.folder else { return };
         if input.len() > LONGEST || self.added == MOST {
@@ -38,7 +38,7 @@ impl Growth {
         self.added += 1;
     }
 
-    /// How many were kept.
+    /// Number of stored inputs.
     pub fn added(&self) -> usize {
         self.added
     }

@@ -1,4 +1,4 @@
-//! What is too large, or no file at all, is refused at once, with the limit.
+//! Inputs that are too large, or not regular files, are rejected at once, with the limit.
 
 use assert_cmd::Command;
 use std::fs::{self, File};
@@ -12,7 +12,7 @@ functions: {mass: {basis: constant, start: 2}, damping: {fixed: 0}, stiffness: {
 fit: {stop: {iterations: 2}}
 ";
 
-/// Runs a command in a folder; it must refuse its input, soon. What it says.
+/// Message of a command that must reject its input within seconds.
 fn refused(folder: &Path, arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_kmcfit"))
         .current_dir(folder)
@@ -33,7 +33,7 @@ fn bench(data: &str) -> TempDir {
     folder
 }
 
-/// Ten gigabytes of a hole, as one line.
+/// A sparse file of ten gigabytes without a line break.
 #[test]
 fn files_of_ten_gigabytes() {
     let folder = bench("long.csv");
@@ -80,7 +80,7 @@ fn a_long_line_and_many_columns() {
 }
 
 #[test]
-fn models_that_mean_more_than_they_say() {
+fn models_that_expand_beyond_the_limit() {
     let folder = bench("d.csv");
     let refuse = |text: String| {
         fs::write(folder.path().join("m.yaml"), text).expect("room");
@@ -118,10 +118,10 @@ fn models_that_mean_more_than_they_say() {
     );
 }
 
-/// Nothing that could be read for ever is read at all.
+/// Inputs without an end are not read.
 #[test]
 #[cfg(unix)]
-fn what_is_no_file() {
+fn inputs_that_are_not_regular_files_are_refused() {
     use std::os::unix::fs::symlink;
     use std::os::unix::net::UnixListener;
     let folder = bench("data");
@@ -147,7 +147,7 @@ fn what_is_no_file() {
     drop(socket);
     symlink("..", &data).expect("room");
     refuse("this is a folder, not a file");
-    // The model itself, and readings that a simulation does not need.
+    // The model itself, and samples that a simulation does not need.
     pipe();
     let said = refused(place, &["fit", "data"]);
     assert!(said.contains("this is a pipe"), "{said}");
@@ -167,7 +167,7 @@ fn what_is_no_file() {
     );
 }
 
-/// A pipe that the caller opened is an input like any other.
+/// A pipe that the caller opened is a valid input.
 #[test]
 #[cfg(target_os = "linux")]
 fn the_program_s_own_pipe() {
@@ -184,7 +184,7 @@ fn the_program_s_own_pipe() {
         .success();
 }
 
-/// What somebody else wrote does not command the terminal, and no name leads out of the output folder.
+/// Text from inputs cannot control the terminal, and names in them do not lead out of the output folder.
 #[test]
 fn names_are_only_names() {
     let folder = bench("d.csv");

@@ -1,11 +1,9 @@
-//! Nothing gets in: whatever the bytes of an input are, reading it ends, without a panic and without
-//! taking more memory than a multiple of the input.
+//! Reading of any input ends without a panic and within memory proportional to the length of the input.
 //!
-//! `tests/fuzz/corpus/` has a folder of inputs for each target: good ones, hand-made bad ones, and one for
-//! each mistake that was found. They are run with the shipped models and readings, and then so many
-//! mutations of them; `KMCFIT_FUZZ=100000` asks for as many of each target instead, `KMCFIT_FUZZ_SEED=7`
-//! draws other ones, and `KMCFIT_FUZZ_GROW=1` keeps those in the corpus that led to a message of a new
-//! kind. `.ci/long` does all three.
+//! `tests/fuzz/corpus/` has a folder of inputs for each target: valid ones, invalid ones written by hand, and one for
+//! each defect that was found. They are run together with the shipped models and samples, then mutations of them.
+//! `KMCFIT_FUZZ=100000` sets the number of mutations of each target, `KMCFIT_FUZZ_SEED=7` their seed, and `KMCFIT_FUZZ_GROW=1`
+//! adds inputs that lead to a new kind of message to the corpus. `.ci/long` sets all three.
 
 mod corpus;
 mod growth;
@@ -19,10 +17,10 @@ use mutate::Mutator;
 use targets::{TARGETS, Target};
 use watched::Watched;
 
-/// Mutations of each target where nothing else is asked for: a few seconds each.
+/// Default number of mutations of each target, which take a few seconds.
 const MUTATIONS: [usize; 8] = [12_000, 6000, 6000, 4000, 1000, 6000, 6000, 6000];
 
-/// The seed of the mutations where nothing else is asked for, so that a failure comes again.
+/// Default seed of the mutations, which makes failures reproducible.
 const SEED: u64 = 1;
 
 /// A number in a variable of the environment.
@@ -36,7 +34,7 @@ fn variable(name: &str) -> Option<u64> {
 
 fn hold(index: usize) {
     let (name, target): (&str, Target) = TARGETS[index];
-    // What is set up once is not counted.
+    // Memory of the setup is not counted.
     let mut seeds = corpus::seeds(name);
     target(b"");
     seeds.sort();

@@ -1,21 +1,21 @@
-//! Inputs that are nearly right: changes to those of the corpus, drawn by a generator from a seed.
+//! Mutations: random changes of the inputs of the corpus, reproducible by a seed.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeSet;
 
-/// Longest input that is made.
+/// Longest mutated input, bytes.
 const LONGEST: usize = 1 << 15;
-/// Seeds that are longer are only run as they are.
+/// Longer seeds are run without mutations.
 const LONGEST_SEED: usize = 1 << 14;
-/// Longer seeds than this take most of the time and have nothing that shorter ones lack but their length: one input in
-/// [`RARE`] comes from them.
+/// Seeds longer than this take most of the time and add little besides their length: one input in [`RARE`] is made from
+/// them.
 const SHORT_SEED: usize = 1 << 11;
 const RARE: usize = 50;
 /// Most changes of one input.
 const CHANGES: usize = 6;
 
-/// Numbers that are hard on readers.
+/// Numbers at the limits of number formats.
 const NUMBERS: &[&str] = &[
     "0",
     "-0",
@@ -54,7 +54,7 @@ const NUMBERS: &[&str] = &[
     "",
 ];
 
-/// Pieces of the formats.
+/// Fragments of the syntax of the formats.
 const PIECES: &[&str] = &[
     "{",
     "}",
@@ -106,7 +106,7 @@ const PIECES: &[&str] = &[
     "nan",
 ];
 
-/// Makes inputs.
+/// Generator of inputs.
 pub struct Mutator {
     random: ChaCha8Rng,
     short: Vec<Vec<u8>>,
@@ -177,7 +177,7 @@ impl Mutator {
         }
     }
 
-    /// Another number in the place of the next one.
+    /// Replaces the next number by another one.
     fn other_number(&mut self, bytes: &mut Vec<u8>, at: usize) {
         let number = NUMBERS[self.below(NUMBERS.len())];
         let is_part = |b: &u8| b.is_ascii_digit() || b".+-e".contains(b);
@@ -190,7 +190,7 @@ impl Mutator {
         bytes.splice(begin..end, number.bytes());
     }
 
-    /// Another word of the corpus in the place of the next one.
+    /// Replaces the next word by another one of the corpus.
     fn other_word(&mut self, bytes: &mut Vec<u8>, at: usize) {
         if self.words.is_empty() {
             return;
@@ -215,7 +215,7 @@ impl Mutator {
         bytes.splice(at..at, piece);
     }
 
-    /// A piece several times.
+    /// Repeats a fragment.
     fn twice(&mut self, bytes: &mut Vec<u8>, at: usize) {
         let end = (at + 1 + self.below(60)).min(bytes.len());
         let times = 1 + self.below(20);

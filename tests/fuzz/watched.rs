@@ -1,4 +1,4 @@
-//! Runs inputs, and watches what they take.
+//! Runs inputs within limits of time and memory.
 
 use crate::targets::{KINDS, Target, Verdict};
 use peak_alloc::PeakAlloc;
@@ -9,28 +9,28 @@ use std::time::Duration;
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// One target at a time: memory is counted for the whole program.
+/// Lock: memory is counted for the whole process, so only one target runs at a time.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// No input takes a second; one that takes so long hangs.
+/// Time after which an input counts as hanging; all valid ones take less than a second.
 const HANGS: Duration = Duration::from_secs(60);
 
-/// Memory that reading may take at once: so many bytes for each of the input, and besides so many for what
-/// does not depend on it. Both are stated in the README.
+/// Memory that reading may use: bytes per byte of input, and bytes independent of the input. Both are documented in
+/// `docs/input_errors.md`.
 const PER_BYTE: usize = 256;
 const BESIDES: usize = 128 << 20;
 
-/// What an input took, in bytes, and what became of it, if it came back.
+/// Memory used by an input, bytes, and its result, if it ended.
 type Taken = Option<(usize, Verdict)>;
 
-/// A target whose inputs are run one by one on a thread of their own.
+/// A target whose inputs run one after another on a second thread.
 pub struct Watched {
     inputs: Sender<Vec<u8>>,
     taken: Receiver<Taken>,
     name: String,
     /// Inputs that were accepted and refused.
     verdicts: [usize; 2],
-    /// The most that one took.
+    /// Largest memory of one input, bytes.
     most: (usize, String),
     _alone: MutexGuard<'static, ()>,
 }
@@ -63,7 +63,7 @@ impl Watched {
         }
     }
 
-    /// Runs an input, which must come back in time, without a panic, and without too much memory.
+    /// Runs an input, which must end within the limits and without a panic.
     pub fn hold(&mut self, name: &str, bytes: Vec<u8>) {
         let length = bytes.len();
         let shown = String::from_utf8_lossy(&bytes[..length.min(4000)]).into_owned();
@@ -82,12 +82,12 @@ impl Watched {
         }
     }
 
-    /// How many kinds of messages there were, in all targets so far.
+    /// Number of kinds of messages so far, over all targets.
     pub fn kinds(&self) -> usize {
         KINDS.lock().unwrap_or_else(PoisonError::into_inner).len()
     }
 
-    /// What became of the inputs, as `.ci/long` reads it.
+    /// Counts of the results, in the form that `.ci/long` reads.
     pub fn row(&self, seed: u64) -> String {
         let [accepted, refused] = self.verdicts;
         let (most, name) = &self.most;

@@ -13,7 +13,7 @@ const CSV: &str = "# made by hand\nt,\"y\",note\r\n0,1,a\n\n0.1, 2 ,\"b, c\"\n0.
 
 const INSTRUMENT: &str = "Rig 7\nRate;1000\n\nt [s];a\ns;m/s²\n0,0;1,5\n0,1;\n# x\n0,2;NaN\n";
 
-/// A piece of syntax, put in to break a text.
+/// Fragments of syntax that are inserted into a text.
 const PIECES: &[&str] = &[
     "{",
     "}",
@@ -59,7 +59,7 @@ const PIECES: &[&str] = &[
     "format: 1\n",
 ];
 
-/// Puts pieces into a text, or takes some of it out.
+/// Inserts fragments into a text, or removes parts of it.
 fn mutate(text: &str, changes: &[(usize, usize, usize)]) -> String {
     let mut chars: Vec<char> = text.chars().collect();
     for &(at, length, piece) in changes {
@@ -75,7 +75,7 @@ fn changes() -> impl Strategy<Value = Vec<(usize, usize, usize)>> {
     vec((0..4000usize, 0..12usize, 0..PIECES.len()), 1..6)
 }
 
-/// Reads a model; the message about it must be of text, and later errors must find a place.
+/// Reads a model; its message must be printable text, and later errors must have a location.
 fn read_model(text: &str) {
     match ModelFile::parse("m.yaml", text) {
         Ok(model) => {

@@ -1,11 +1,11 @@
-//! Constraints in model files: what they mean, and every message about what they cannot mean.
+//! Constraints in model files: their rows and cones, and the messages about invalid ones.
 
 use insta::assert_snapshot;
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
 use kmcfit::finding::Finding;
 use kmcfit_core::internals::solvers::{Initial, Solver};
 
-/// A model with 21 readings over 2 s; line 8 is the mass, line 11 the constraints, line 12 the fit.
+/// A model with 21 samples over 2 s; line 8 is the mass, line 11 the constraints, line 12 the fit.
 fn text(constraints: &str) -> String {
     format!(
         "format: 1
@@ -66,7 +66,7 @@ fn names(constraints: &str) -> Vec<String> {
 }
 
 #[test]
-fn every_kind_is_understood() {
+fn every_kind_of_constraint_is_accepted() {
     let list = "
   - {function: mass, shape: [non-increasing, convex]}
   - {function: mass, shape: non-decreasing, soft: 3}
@@ -135,7 +135,7 @@ fn bounds_of_the_functions_are_rows() {
     let model = with("max: 1.5");
     assert_eq!(
         Finding::texts(&model.warnings),
-        ["the start was moved into the constraints (`mass <= 1.5`)"]
+        ["the start values violate `mass <= 1.5` and were projected onto the constraints"]
     );
     assert_eq!(model.problem.functions.start()[..5], [1.5; 5]);
 }
@@ -169,20 +169,20 @@ fn methods_and_starts() {
         said(&text.replace("start: 1", "start: 1, min: 0"))
     };
     assert_snapshot!(bounded("lbfgs"), @"
-    m.yaml:11:15: fit.method: this method knows no constraints
+    m.yaml:11:15: fit.method: this method does not support constraints
       found: `lbfgs` with `damping >= 0`
-      expected: `gauss-newton` or `projected-gradient`, which do
+      expected: `gauss-newton` or `projected-gradient`
     ");
     assert_snapshot!(bounded("steepest-descent"), @"
-    m.yaml:11:15: fit.method: this method knows no constraints
+    m.yaml:11:15: fit.method: this method does not support constraints
       found: `steepest-descent` with `damping >= 0`
-      expected: `gauss-newton` or `projected-gradient`, which do
+      expected: `gauss-newton` or `projected-gradient`
     ");
     let listed = format!("{}fit: {{method: lbfgs}}\n", text("[{passive: true}]"));
     assert_snapshot!(said(&listed), @"
-    m.yaml:12:15: fit.method: this method knows no constraints
+    m.yaml:12:15: fit.method: this method does not support constraints
       found: `lbfgs` with `passive: c >= m'/2`
-      expected: `gauss-newton` or `projected-gradient`, which do
+      expected: `gauss-newton` or `projected-gradient`
     ");
 }
 
@@ -201,7 +201,7 @@ fn penalties_and_rules() {
     };
     assert_eq!((value.function, value.order, value.weight), (1, 0, 2.0));
     assert_eq!((slope.function, slope.order, slope.weight), (1, 1, 3.0));
-    // integral of (1 - 0.1 - 0.1 t^2)^2 from 0 to 2, but for the interpolation of t^2.
+    // integral of (1 - 0.1 - 0.1 t^2)^2 from 0 to 2, up to the interpolation error of t^2.
     let roughness = value.roughness(&[1.0; 21]);
     assert!((roughness - 1.204).abs() < 5e-3, "{roughness}");
     let reference: Vec<f64> = (0..21)
@@ -256,7 +256,7 @@ fn contradictions_name_their_lines() {
       expected: constraints that some functions satisfy together
       hint: removing any one of them resolves it
     ");
-    // Soft constraints contradict nobody.
+    // Soft constraints contradict no other constraint.
     assert_snapshot!(message("[{function: damping, at: 1, value: 1}, {function: damping, at: 1, value: 2, soft: 1}]"), @"no error []");
 }
 
@@ -318,9 +318,9 @@ fn kinds() {
       expected: one of: `min` or `max`, `slope`, `shape`, `at` and `value`, `mean`, `integral`, `equal`, `passive`, `frequency`, `damping_ratio`
     ");
     assert_snapshot!(message("[{function: mass, shape: convex, mean: 1}]"), @"
-    m.yaml:11:15: constraints[0]: a constraint demands one thing
+    m.yaml:11:15: constraints[0]: an entry of `constraints` is one constraint
       found: `shape` beside `mean`
-      expected: a map for each
+      expected: one entry for each
     ");
     assert_snapshot!(message("[{min: 0}]"), @"
     m.yaml:11:15: constraints[0]: this constraint needs a function
@@ -328,7 +328,7 @@ fn kinds() {
       expected: `function: mass`, `damping` or `stiffness`
     ");
     assert_snapshot!(message("[{function: mass, passive: true}]"), @"
-    m.yaml:11:26: constraints[0].function: this constraint is not about one function
+    m.yaml:11:26: constraints[0].function: this constraint applies to several functions
       found: `function` beside `passive`
       expected: no `function`
     ");
@@ -345,9 +345,9 @@ fn kinds() {
       hint: did you mean `min`?
     ");
     assert_snapshot!(message("[{passive: false}]"), @"
-    m.yaml:11:25: constraints[0].passive: this demands nothing
+    m.yaml:11:25: constraints[0].passive: this constraint has no effect
       found: false
-      expected: `passive: true`, or leave the constraint out
+      expected: `passive: true`, or no such constraint
     ");
     assert_snapshot!(message("[{passive: maybe}]"), @"
     m.yaml:11:25: constraints[0].passive: wrong type of value
@@ -361,7 +361,7 @@ fn shapes_and_ranges() {
     assert_snapshot!(message("[{function: mass, shape: decreasing}]"), @"
     m.yaml:11:39: constraints[0].shape: unknown choice
       found: `decreasing`
-      expected: one of: non-increasing, non-decreasing, convex, concave, or a list of such
+      expected: one of: non-increasing, non-decreasing, convex, concave, or a list of them
       hint: did you mean `non-increasing`?
     ");
     assert_snapshot!(message("[{function: mass, shape: []}]"), @"
@@ -390,7 +390,7 @@ fn shapes_and_ranges() {
       expected: one of: t_s, c
     ");
     assert_snapshot!(message("[{function: mass, slope: {}}]"), @"
-    m.yaml:11:39: constraints[0].slope: this range has no end
+    m.yaml:11:39: constraints[0].slope: this range has no limit
       found: neither `min` nor `max`
       expected: one of the two, or both
     ");
@@ -415,14 +415,14 @@ fn shapes_and_ranges() {
       expected: min at most max
     ");
     assert_snapshot!(message("[{damping_ratio: {}}]"), @"
-    m.yaml:11:31: constraints[0].damping_ratio: this range has no end
+    m.yaml:11:31: constraints[0].damping_ratio: this range has no limit
       found: neither `min` nor `max`
       expected: `max`, as in {max: 0.2}
     ");
     assert_snapshot!(message("[{damping_ratio: {min: 0.1}}]"), @"
-    m.yaml:11:37: constraints[0].damping_ratio.min: a damping ratio can only be capped
+    m.yaml:11:37: constraints[0].damping_ratio.min: a damping ratio has no lower bound
       found: 0.1
-      expected: `max` alone: a least damping ratio is no convex constraint
+      expected: `max` alone: a lower bound is not a convex constraint
     ");
     assert_snapshot!(message("[{damping_ratio: {max: 0}}]"), @"
     m.yaml:11:37: constraints[0].damping_ratio.max: this limit must be positive
@@ -435,7 +435,7 @@ fn shapes_and_ranges() {
       expected: a number greater than 0
     ");
     assert_snapshot!(message("[{damping_ratio: {max: 0.1}, soft: 1}]"), @"
-    m.yaml:11:49: constraints[0].soft: a cap on the damping ratio cannot be soft
+    m.yaml:11:49: constraints[0].soft: a bound of the damping ratio cannot be soft
       found: `soft` beside `damping_ratio`
       expected: no `soft`
     ");
@@ -476,24 +476,24 @@ fn values_at_times() {
     assert_snapshot!(message("[{function: mass, at: early, value: 1}]"), @"
     m.yaml:11:36: constraints[0].at: not a number
       found: text `early`
-      expected: a finite number, or a list of such
+      expected: a finite number, or a list of them
     ");
 }
 
 #[test]
 fn equalities() {
     assert_snapshot!(message("[{equal: []}]"), @"
-    m.yaml:11:23: constraints[0].equal: an equality is between two functions
+    m.yaml:11:23: constraints[0].equal: an equality needs two functions
       found: an empty list
       expected: two functions, as in [damping, stiffness]
     ");
     assert_snapshot!(message("[{equal: [mass]}]"), @"
-    m.yaml:11:23: constraints[0].equal: an equality is between two functions
+    m.yaml:11:23: constraints[0].equal: an equality needs two functions
       found: 1 function
       expected: two functions, as in [damping, stiffness]
     ");
     assert_snapshot!(message("[{equal: [mass, mass]}]"), @"
-    m.yaml:11:23: constraints[0].equal: these are the same function
+    m.yaml:11:23: constraints[0].equal: the two functions are the same
       found: `mass` twice
       expected: two functions, as in [damping, stiffness]
     ");
@@ -504,9 +504,9 @@ fn equalities() {
       hint: did you mean `damping`?
     ");
     assert_snapshot!(message("[{equal: [mass, damping], ratio: 0}]"), @"
-    m.yaml:11:47: constraints[0].ratio: a ratio cannot be zero
+    m.yaml:11:47: constraints[0].ratio: a ratio must not be 0
       found: 0
-      expected: another number; for a function that is zero, `max: 0` and `min: 0`
+      expected: a number other than 0; for a function that is zero, `max: 0` and `min: 0`
     ");
     assert_snapshot!(message("[{function: mass, mean: 1, ratio: 2}]"), @"
     m.yaml:11:48: constraints[0].ratio: only `equal` has a ratio
@@ -516,14 +516,14 @@ fn equalities() {
 }
 
 #[test]
-fn what_the_record_cannot_feel() {
+fn constraints_without_information_are_reported() {
     let free = |constraints: &str| {
         let free = text(constraints).replace("{fixed: 1}", "{basis: nodal, start: 1}");
         let model = read(&free).unwrap_or_else(|error| panic!("{error}"));
         Finding::texts(&model.warnings)
     };
     let nothing = free("[{function: stiffness, shape: non-increasing}]");
-    assert_snapshot!(nothing.join("\n"), @"constraints[0].shape: a monotone stiffness carries no information here. Without a force the response determines only k/m and c/m, and any s(t) may multiply all three functions; fix a function, bound the functions on both sides, or add a penalty");
+    assert_snapshot!(nothing.join("\n"), @"constraints[0].shape: a monotone stiffness carries no information here. Without a force the response determines only k/m and c/m: a factor s(t) of all three functions is undetermined; fix a function, bound the functions on both sides, or add a penalty");
     assert_eq!(free("[{passive: true}]").len(), 1);
     assert_eq!(
         free("[{function: mass, min: 1, max: 3}, {passive: true}]"),
@@ -534,14 +534,14 @@ fn what_the_record_cannot_feel() {
 }
 
 #[test]
-fn what_always_holds() {
+fn constraints_that_always_hold_are_reported() {
     let constant =
         text("[{function: damping, shape: convex}]").replace("basis: nodal", "basis: constant");
     assert_snapshot!(said(&constant), @r#"no error ["constraints[0].shape has no effect: it holds for all functions"]"#);
 }
 
 #[test]
-fn a_mass_must_be_left() {
+fn constraints_must_permit_a_positive_mass() {
     for held in [
         "max: 0.0",
         "at: 1.0, value: 0.0",
@@ -550,7 +550,7 @@ fn a_mass_must_be_left() {
     ] {
         let said = message(&format!("[{{function: mass, {held}}}]"));
         assert!(
-            said.contains("this excludes a positive mass"),
+            said.contains("this bound excludes a positive mass"),
             "{held}: {said}"
         );
     }

@@ -18,7 +18,7 @@ fn table_with(text: &str, format: &TableFormat) -> Table {
     Table::parse_with("t.csv", text.as_bytes(), format).unwrap()
 }
 
-/// The signs that were found, the lines of names and units, and the lines of the data.
+/// Detected separators, the lines of names and units, and the lines of the data.
 fn found(table: &Table) -> (char, char, Option<usize>, Option<usize>, &[usize]) {
     let format = table.format();
     (
@@ -96,7 +96,7 @@ fn a_preamble_of_commas_ends_at_the_names() {
     let scope = "\
 Model,DSO-X 3024\nSerial,12345\nStart,2024-05-03,10:15\nx-axis,1,2\nsecond,Volt,Volt
 0.0,1.0,2.0\n0.1,1.1,2.1\n";
-    // `Volt` twice: two columns of one name, unless the line is taken for units.
+    // `Volt` twice: two columns with the same name, unless the line has the units.
     let format = TableFormat {
         units_row: Some(true),
         ..ANY
@@ -198,7 +198,7 @@ fn encodings_are_read() {
 }
 
 #[test]
-fn missing_readings_are_not_numbers() {
+fn missing_samples_are_nan() {
     let table = table("t;y\n0;1,5\n1;\n2;NaN\n3;NA\n4;n/a\n5;-\n6;null\n7;#N/A\n8;2,5\n");
     let readings = table.samples(1).unwrap();
     assert_eq!((readings[0], readings[8]), (1.5, 2.5));
@@ -225,7 +225,7 @@ fn a_mistake_in_the_first_row_does_not_make_it_a_name() {
 }
 
 #[test]
-fn what_is_told_is_not_detected() {
+fn a_given_format_is_not_detected() {
     let text = "1;2\n3;4\n5;6\n";
     let told = |format| table_with(text, &format).lines().to_vec();
     assert_eq!(told(ANY), [1, 2, 3]);
@@ -282,7 +282,7 @@ fn what_is_told_is_not_detected() {
 }
 
 #[test]
-fn instruments_have_their_habits() {
+fn formats_of_common_instruments_are_read() {
     // Units in brackets, then a blank line.
     let scope = table("Time,Channel A\n(ms),(mV)\n\n-0.1,1.0\n0.0,1.5\n");
     assert_eq!(scope.headers(), ["Time", "Channel A"]);
@@ -294,7 +294,7 @@ fn instruments_have_their_habits() {
     );
     assert_eq!(scope.headers(), ["Second", "Volt"]);
     assert_eq!(scope.lines(), [5, 6]);
-    // A phone: quoted names with units.
+    // A recording of a phone: quoted names with units.
     let phone = table("\"Time (s)\",\"Acceleration x (m/s^2)\"\n0E0,1.5E-1\n1E-2,2E-1\n");
     assert_eq!(phone.column("Acceleration x").unwrap(), [0.15, 0.2]);
     // A spreadsheet.
@@ -305,18 +305,18 @@ fn instruments_have_their_habits() {
         let table = table(format!("{names}\n0\t1.5\t\n1\t2.5\t\n"));
         assert_eq!(table.column("y").unwrap(), [1.5, 2.5]);
     }
-    // Settings beside the readings.
+    // Settings beside the samples.
     let beside = table("Points,2500,,-0.5,1\nInterval,2e-4,,0.0,2\n,,,0.5,3\n,,,1.0,4\n");
     assert_eq!(beside.values(3).unwrap(), [-0.5, 0.0, 0.5, 1.0]);
     assert!(beside.headers().is_empty());
-    // Names with blanks in columns made by blanks: no names rather than wrong ones.
+    // Names with spaces in columns separated by spaces: no names rather than wrong ones.
     let aligned = table("Time (s)   Acc (g)\n   0.0       1.0\n   0.1       2.0\n");
     assert_eq!(aligned.values(1).unwrap(), [1.0, 2.0]);
     assert!(aligned.headers().is_empty());
 }
 
 #[test]
-fn rows_without_readings_are_no_names() {
+fn rows_without_samples_are_no_names() {
     for text in ["t,y\nNaN,NaN\n0,1\n1,2\n", "t,y\n,\n0,1\n1,2\n"] {
         let table = table(text);
         assert_eq!(table.headers(), ["t", "y"]);
@@ -326,7 +326,7 @@ fn rows_without_readings_are_no_names() {
 }
 
 #[test]
-fn long_files_are_read_beyond_what_is_looked_at() {
+fn long_files_are_read_beyond_the_detected_part() {
     let mut text = "Rig 7\nt;y\n".to_owned();
     for i in 0..20_000 {
         text.push_str(&format!("{},{:03};{}\n", i / 1000, i % 1000, i % 7));

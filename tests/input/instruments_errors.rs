@@ -116,9 +116,9 @@ fn formats() {
       expected: a CSV file with one row of column names and rows of numbers
     ");
     assert_snapshot!(told(TableFormat { delimiter: Some('x'), ..any }), @"
-    delimiter: fields cannot be separated by this
+    delimiter: invalid delimiter
       found: `x`
-      expected: a comma, a semicolon, a tab, a blank or the like
+      expected: a comma, a semicolon, a tab, a space or another punctuation mark, except `.`, `+`, `-`, `#` and quotes
     ");
     assert_snapshot!(told(TableFormat { decimal: Some('\''), ..any }), @"
     decimal: not a decimal sign

@@ -1,4 +1,4 @@
-//! The registry of keys, the reader and the schema say the same.
+//! The documentation of keys, the reader and the schema agree.
 #![allow(
     clippy::disallowed_methods,
     reason = "the texts are those of the project"
@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// A model in which every map can be put.
+/// A model into which every map can be inserted.
 const BASE: &str = "
 format: 1
 experiments:
@@ -35,7 +35,7 @@ fn as_json(model: &ModelFile) -> Value {
     serde_yaml::from_str(model.effective_text()).expect("YAML that is JSON")
 }
 
-/// What the reader would accept in the place of an unknown key.
+/// Keys that the reader accepts in place of an unknown one.
 fn accepted(message: &str) -> BTreeSet<String> {
     let (_, rest) = message.split_once("expected: ").expect("what is expected");
     let line = rest.lines().next().expect("a line");
@@ -72,7 +72,7 @@ fn visit(group: &'static KeyGroup, path: &str, model: &ModelFile, seen: &mut BTr
     }
 }
 
-/// Puts a map of a group behind a key and visits it.
+/// Inserts a map of a group at a key and visits it.
 fn descend(
     group: &'static KeyGroup,
     kind: ValueType,
@@ -153,7 +153,7 @@ fn required_keys_are_those_of_the_reader() {
 
 #[test]
 fn a_key_that_need_not_be_there_may_be_missing() {
-    // The model of every visit has the required keys alone, so they suffice.
+    // The model of every visit has only the required keys, which therefore suffice.
     let schema = key_documentation::schema();
     valid(&schema, &as_json(&base())).expect("a valid model");
 }
@@ -211,8 +211,8 @@ fn mistakes_are_no_models_of_the_schema() {
     }
 }
 
-/// Whether a document is one of a schema: the part of draft 07 that the schema uses. A word of the
-/// schema that is not known here is refused, so that nothing is passed over.
+/// True if a document satisfies a schema, for the part of draft 07 that the schema uses. An unknown keyword of the schema is an
+/// error.
 fn valid(root: &Value, document: &Value) -> Result<(), String> {
     check(root, root, document, "")
 }

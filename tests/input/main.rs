@@ -1,4 +1,4 @@
-//! Reading model files and tables: what is understood, and every message about what is not.
+//! Reading of model files and tables: valid inputs, and all messages about invalid ones.
 #![allow(clippy::result_large_err, reason = "as in the library")]
 
 mod arbitrary;

@@ -1,4 +1,4 @@
-//! Model files that are understood.
+//! Valid model files.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! Every message about a model file that is not understood.
+//! Messages about invalid model files.
 
 use insta::assert_snapshot;
 use kmcfit::config::ModelFile;
@@ -344,10 +344,10 @@ fn choices() {
 #[test]
 fn formats() {
     assert_snapshot!(changed("format: 1", "format: 2"), @"
-    m.yaml:1:9: format: this version of the program cannot read that format
+    m.yaml:1:9: format: this format version is not supported
       found: the integer 2
       expected: 1
-      hint: a newer version of the program may
+      hint: a newer version of kmcfit may read it
     ");
     assert_snapshot!(changed("format: 1", "format: one"), @"
     m.yaml:1:9: format: not a format number
@@ -549,7 +549,7 @@ fn broken_yaml() {
 }
 
 #[test]
-fn what_the_yaml_crate_does_not_cope_with() {
+fn limits_of_the_yaml_crate_are_reported() {
     let twice = SHORT.replace(
         "displacement: 3.3, velocity: 1.0",
         "displacement: &a 1, velocity: &a 2",

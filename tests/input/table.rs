@@ -1,4 +1,4 @@
-//! Tables that are understood.
+//! Valid tables.
 
 use kmcfit::error::Location;
 use kmcfit::tables::{Table, times};
@@ -19,7 +19,7 @@ fn columns_are_read_by_name() {
 }
 
 #[test]
-fn what_programs_add_does_no_harm() {
+fn byte_order_marks_and_blank_lines_are_ignored() {
     let plain = table("t,y\n0,1\n1,2\n");
     for text in [
         "\u{feff}t,y\n0,1\n1,2\n",
@@ -56,7 +56,7 @@ fn lines_are_those_of_the_file() {
 }
 
 #[test]
-fn text_is_allowed_where_nobody_asks() {
+fn text_is_allowed_in_unused_columns() {
     let table = table("t,note,\n0,start,a\n1,,b\n");
     assert_eq!(table.column("t").unwrap(), [0.0, 1.0]);
     assert!(table.column("note").is_err());

@@ -1,4 +1,4 @@
-//! Every message about a table that is not understood.
+//! Messages about invalid tables.
 
 use insta::assert_snapshot;
 use kmcfit::error::InputError;
@@ -67,7 +67,7 @@ fn empty_and_foreign() {
     ");
     assert_snapshot!(message(b"\xfe\xff\xd8\0\0,"), @"
     t.csv: the file is not text
-      found: a byte order mark of UTF-16, and then no UTF-16
+      found: a byte order mark of UTF-16, but no UTF-16 text behind it
       hint: save it as UTF-8
     ");
     assert_snapshot!(message("t;y\n"), @"
@@ -230,8 +230,8 @@ fn spacing() {
       expected: a time greater than 0
     ");
     assert_snapshot!(equal("t\n0\n"), @"
-    t.csv:2: row 1, column `t`: only one time
+    t.csv:2: row 1, column `t`: a single row of data
       found: 1 row
-      expected: at least 2 rows, to have a spacing
+      expected: at least 2 rows
     ");
 }

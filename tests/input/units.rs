@@ -1,11 +1,10 @@
-//! The unit of a column, from all places that may state it, and what is said where they differ.
+//! The unit of a column, from all places that may state it, and the warnings if they differ.
 
 use insta::assert_snapshot;
 use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit::finding::Finding;
 
-/// The warnings about a table with columns of a time and a displacement, or why it is refused; and the
-/// last time in s.
+/// Warnings about a table with columns of time and displacement, or its error; and the last time, s.
 fn built(table: &str, names: [&str; 2], units: &str) -> Result<(String, f64), String> {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("d.csv"), table).expect("room");
@@ -36,14 +35,14 @@ fn rows(head: &str) -> String {
 }
 
 #[test]
-fn a_name_that_ends_like_another_unit_is_a_warning_of_times_as_of_readings() {
+fn a_name_that_ends_like_another_unit_is_a_warning_for_times_and_samples() {
     let (warnings, time) = built(&rows("t_ms,y_mm"), ["t_ms", "y_mm"], "").expect("a model");
     assert_eq!(time, 100.0);
     assert_snapshot!(warnings, @"
     experiments[0].columns.displacement: column `y_mm` is read in m, although its name ends like mm; if mm is its unit, add `units: {displacement: mm}`
     experiments[0].columns.time: column `t_ms` is read in s, although its name ends like ms; if ms is its unit, add `units: {time: ms}`
     ");
-    // What the warnings advise.
+    // The remedy that the warnings suggest.
     let units = "units: {time: ms, displacement: mm}";
     let (warnings, time) = built(&rows("t_ms,y_mm"), ["t_ms", "y_mm"], units).expect("a model");
     assert_eq!((warnings.as_str(), time), ("", 0.1));

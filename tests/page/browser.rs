@@ -1,4 +1,4 @@
-//! A real browser without a window, driven over its debugging protocol.
+//! A headless browser, controlled by its debugging protocol.
 
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
@@ -9,10 +9,10 @@ use std::time::Duration;
 use tempfile::TempDir;
 use tungstenite::{Message, WebSocket};
 
-/// What `KMCFIT_CHROMIUM` says where a missing browser is a failure.
+/// Value of `KMCFIT_CHROMIUM` with which a missing browser is a failure.
 const REQUIRED: &str = "required";
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
-/// An answer that takes longer does not come: the slowest, the first page, takes a second or two.
+/// Time limit of an answer; the slowest, for the first page, takes one or two seconds.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A browser with one tab.
@@ -23,7 +23,7 @@ pub struct Browser {
     next: u64,
     /// Events since the last page was opened.
     events: Vec<Value>,
-    // Last: it is removed when the browser has ended.
+    // The last field: the folder is removed after the browser has ended.
     _profile: TempDir,
 }
 
@@ -54,7 +54,7 @@ fn program() -> Option<PathBuf> {
 }
 
 impl Browser {
-    /// Starts the browser; `None`, said on standard error, where there is none.
+    /// Starts the browser; without one, prints a note and returns `None`.
     pub fn start() -> Option<Self> {
         let profile = tempfile::tempdir().expect("a temporary folder");
         let mut process = Command::new(program()?)
@@ -86,7 +86,7 @@ impl Browser {
             Some(address.trim().to_owned())
         });
         let address = address.expect("the address of the browser");
-        // Nobody may stop reading, or the browser would wait for them.
+        // The output is read to its end, otherwise the browser would block.
         std::thread::spawn(move || lines.for_each(drop));
         let host = address.split('/').nth(2).expect("a host");
         let stream = TcpStream::connect(host).expect("a connection");
@@ -145,7 +145,7 @@ impl Browser {
         self.settle();
     }
 
-    /// Opens a file and waits until it is there.
+    /// Opens a file and waits until it is loaded.
     pub fn load(&mut self, file: &Path) {
         self.events.clear();
         let url = format!("file://{}", file.display());
@@ -160,7 +160,7 @@ impl Browser {
         }
     }
 
-    /// Waits for two pictures: what was asked for before is drawn in the first.
+    /// Waits for two frames: the first one shows all earlier changes.
     pub fn settle(&mut self) {
         self.evaluate(
             "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(1))))",
@@ -210,7 +210,7 @@ impl Browser {
         self.settle();
     }
 
-    /// What the page complained of: exceptions, errors and warnings, dialogs.
+    /// Exceptions, errors, warnings and dialogs of the page.
     pub fn complaints(&self) -> Vec<String> {
         const BAD: [&str; 4] = [
             "Runtime.exceptionThrown",
@@ -226,7 +226,7 @@ impl Browser {
             .collect()
     }
 
-    /// The addresses that were asked for.
+    /// Requested addresses.
     pub fn requests(&self) -> Vec<String> {
         let sent = self
             .events

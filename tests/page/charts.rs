@@ -1,4 +1,4 @@
-//! How the charts work, by the pointer, the keys and the eyes of a browser.
+//! Interaction of the charts: pointer, keyboard and visibility in a browser.
 
 use crate::browser::Browser;
 use crate::pages::{PAGES, pages};
@@ -17,7 +17,7 @@ fn plot(figure: &str) -> String {
     format!("document.querySelector('#figure-{figure} .plot')")
 }
 
-/// The range of the horizontal axis in sight.
+/// Visible range of the horizontal axis.
 fn range(browser: &mut Browser, figure: &str) -> [f64; 2] {
     ends(browser, figure, "x")
 }
@@ -34,7 +34,7 @@ fn ends(browser: &mut Browser, figure: &str, axis: &str) -> [f64; 2] {
     ends.try_into().expect("two ends")
 }
 
-/// The middle of a plot in the window, after it was brought there.
+/// Centre of a plot in the window, after scrolling to it.
 fn middle(browser: &mut Browser, figure: &str) -> [f64; 2] {
     let plot = plot(figure);
     browser.evaluate(&format!("{plot}.scrollIntoView({{block: 'center'}})"));
@@ -94,7 +94,7 @@ fn the_wheel_zooms_a_chart_that_has_the_focus() {
     browser.mouse("mouseWheel", at, turn.clone());
     let zoomed = range(&mut browser, "functions");
     assert!(zoomed[0] > 0.0 && zoomed[1] < 20.0, "{zoomed:?}");
-    // What is under the pointer stays there, and all charts of the time show the same of it.
+    // The value under the pointer stays in place, and all charts over time show the same range.
     for figure in ["channel", "residuals", "ratios", "motion"] {
         assert_eq!(range(&mut browser, figure), zoomed, "{figure}");
     }
@@ -102,7 +102,7 @@ fn the_wheel_zooms_a_chart_that_has_the_focus() {
     let upward = json!({"deltaX": 0, "deltaY": -240, "modifiers": 8});
     browser.mouse("mouseWheel", at, upward);
     let after = ends(&mut browser, "functions", "y");
-    // Some systems turn a wheel with Shift sideways: then there is nothing to be seen.
+    // On some systems Shift makes the wheel scroll sideways, which has no effect.
     assert!(after[1] - after[0] <= before[1] - before[0]);
     browser.key("Escape");
     assert_eq!(range(&mut browser, "functions"), whole);
@@ -117,7 +117,7 @@ fn keys_zoom_and_read() {
     };
     browser.evaluate(&format!("{}.focus()", plot("functions")));
     browser.key("ArrowRight");
-    let said = browser.text("document.getElementById('chart-reading').textContent");
+    let said = browser.text("document.getElementById('chart-cursor').textContent");
     assert!(said.starts_with("time t 10.2 s; "), "{said}");
     for part in ["found 1.", "truth 1 kg", "95 % band "] {
         assert!(said.contains(part), "{part} in {said}");
@@ -126,9 +126,9 @@ fn keys_zoom_and_read() {
     let zoomed = range(&mut browser, "functions");
     assert!((zoomed[1] - zoomed[0] - 10.0).abs() < 1e-9, "{zoomed:?}");
     browser.key("End");
-    let end = browser.text("document.getElementById('chart-reading').textContent");
+    let end = browser.text("document.getElementById('chart-cursor').textContent");
     assert_ne!(end, said);
-    // One step further takes the sight along.
+    // A step beyond the edge moves the visible range.
     browser.key("ArrowRight");
     let moved = range(&mut browser, "functions");
     assert!(moved[0] > zoomed[0] && moved[1] > zoomed[1], "{moved:?}");
@@ -138,7 +138,7 @@ fn keys_zoom_and_read() {
     browser.key("+");
     browser.key("Escape");
     assert_eq!(range(&mut browser, "functions"), [0.0, 20.0]);
-    // However far in, there is an axis, and a way out.
+    // At any zoom there is an axis, and the zoom can be reset.
     browser.evaluate(&format!(
         "for (let i = 0; i < 200; i += 1) {}.dispatchEvent(new KeyboardEvent('keydown', {{key: '+', bubbles: true}}))",
         plot("functions")
@@ -148,7 +148,7 @@ fn keys_zoom_and_read() {
     assert!(high - low > 0.0 && high - low < 1e-6, "{low} {high}");
     browser.key("Escape");
     assert_eq!(range(&mut browser, "functions"), [0.0, 20.0]);
-    // A logarithmic axis of its own.
+    // A chart with a separate logarithmic axis.
     browser.evaluate(&format!("{}.focus()", plot("convergence")));
     let whole = range(&mut browser, "convergence");
     browser.key("+");
@@ -183,9 +183,9 @@ fn a_drag_zooms_and_a_double_click_resets() {
     click(&mut browser, at, 2);
     assert_eq!(range(&mut browser, "channel"), [0.0, 20.0]);
     assert_eq!(browser.evaluate(disabled), json!(true));
-    // The pointer reads off: a line and the values at its place.
+    // The pointer shows a line and the values at its position.
     browser.mouse("mouseMoved", at, json!({}));
-    let reading = browser.text("document.querySelector('#figure-channel .reading').textContent");
+    let reading = browser.text("document.querySelector('#figure-channel .cursor').textContent");
     assert!(
         reading.contains("samples") && reading.contains("model"),
         "{reading}"
@@ -270,7 +270,7 @@ fn a_phone_shows_everything_and_two_fingers_zoom() {
     assert_eq!(browser.complaints(), [""; 0]);
 }
 
-/// The contrast of every text in sight with what lies behind it, as the browser computes its colours.
+/// Contrast of every visible text with its background, from the computed colours of the browser.
 const FAINT: &str = "(() => {
   const rgb = (c) => c.match(/[\\d.]+/g).map(Number);
   const light = (c) => { const [r, g, b] = c.map((v) => { const s = v / 255; return s <= 0.04045 ? s / 12.92 : ((s + 0.055) / 1.055) ** 2.4; }); return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
@@ -311,7 +311,7 @@ fn every_text_stands_out_in_light_and_dark() {
     }
 }
 
-/// On paper, and where scripts do not run, the drawings stand in the place of the charts.
+/// On paper, and without scripts, drawings replace the charts.
 #[test]
 fn paper_and_readers_without_scripts_get_drawings() {
     let Some(mut browser) = opened(REPORT) else {

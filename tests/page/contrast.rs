@@ -22,7 +22,7 @@ fn colours(block: &str) -> Colours {
     found
 }
 
-/// The colours of light and of dark.
+/// Colours of the light and the dark scheme.
 fn both(style: &str) -> [Colours; 2] {
     let mut blocks = style.split(":root {").skip(1).map(|rest| {
         let block = rest.split('}').next().expect("an end");
@@ -82,7 +82,7 @@ fn text_and_curves_stand_out_in_light_and_dark() {
             assert!(ratio >= 3.0, "{theme}: {drawn}: {ratio:.2}");
         }
     }
-    // Every other colour in the sheet only names the colours of drawings, to replace them.
+    // The other colours of the style sheet are those of drawings, which it replaces.
     let rest: String = style
         .split('}')
         .filter(|rule| !rule.contains(":root"))

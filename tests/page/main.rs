@@ -1,5 +1,4 @@
-//! The pages that runs, comparisons and studies leave behind: what is in them, and how they work in a
-//! real browser.
+//! Pages of runs, comparisons and studies: their contents, and their function in a browser.
 
 mod browser;
 mod charts;

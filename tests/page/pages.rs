@@ -1,4 +1,4 @@
-//! Pages to look at, each made once.
+//! Pages for the tests, each generated once.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,10 +6,10 @@ use std::process::Command;
 use std::sync::OnceLock;
 use tempfile::TempDir;
 
-/// What a name or a title must not become.
+/// Text that must not become markup.
 pub const HOSTILE: &str = "<script>alert(1)</script></script>\"'&";
 
-/// A light device with a force, a truth, a constraint that is active, and hostile names.
+/// A light system with a force, a known truth, an active constraint, and names that contain markup.
 const MODEL: &str = "format: 1
 title: TITLE
 experiments:
@@ -93,7 +93,7 @@ impl Pages {
     }
 }
 
-/// The pages that the tests look at.
+/// The pages of all tests.
 pub const PAGES: [&str; 4] = [
     "runs/plain/report.html",
     "runs/hostile/report.html",

@@ -1,10 +1,10 @@
-//! What stands in the pages.
+//! Contents of the pages.
 
 use crate::pages::{HOSTILE, PAGES, pages, repository};
 use roxmltree::{Document, Node, ParsingOptions};
 use serde_json::Value;
 
-/// The page as XML, which it is as well.
+/// The page parsed as XML, which it also is.
 fn parsed(html: &str) -> Document<'_> {
     let options = ParsingOptions {
         allow_dtd: true,
@@ -22,14 +22,14 @@ fn text_of(node: Node) -> String {
     texts.filter_map(|n| n.text()).collect()
 }
 
-/// The numbers of a chart.
+/// Data of a chart.
 fn numbers(figure: Node) -> Value {
     let script = figure.children().find(|n| n.has_tag_name("script"));
     let text = text_of(script.expect("the numbers of the chart"));
     serde_json::from_str(&text).expect("JSON")
 }
 
-/// How many finite numbers a mark has.
+/// Number of finite values of a mark.
 fn size(mark: &Value) -> usize {
     let finite = |key: &str| -> usize {
         let list = mark[key].as_array();
@@ -66,7 +66,7 @@ fn every_figure_has_its_texts_and_its_numbers() {
     }
 }
 
-/// All that a report must tell.
+/// A report has all required sections and values.
 #[test]
 fn a_report_is_complete() {
     let html = pages().read("runs/plain/report.html");
@@ -104,7 +104,7 @@ fn a_report_is_complete() {
     let sentences = |pointer: &str| -> Vec<String> {
         let list = result.pointer(pointer).and_then(Value::as_array);
         let list = list.unwrap_or_else(|| panic!("{pointer}"));
-        // What is quoted is code in the page.
+        // Text between backquotes is code in the page.
         list.iter()
             .filter_map(|v| v["text"].as_str())
             .map(|sentence| sentence.replace('`', ""))
@@ -150,7 +150,7 @@ fn a_report_is_complete() {
     }
 }
 
-/// Whatever loads anything is not there, whoever wrote it.
+/// No element loads an external resource, also not one from text of the user.
 #[test]
 fn nothing_is_loaded() {
     for name in PAGES {
@@ -190,7 +190,7 @@ fn nothing_is_loaded() {
     }
 }
 
-/// Titles, names and the model's text are shown as they are, and are nothing but text.
+/// Titles, names and the text of the model are shown literally, as text.
 #[test]
 fn hostile_texts_are_texts() {
     for name in ["runs/hostile/report.html", "runs/compare/compare.html"] {
@@ -206,7 +206,7 @@ fn hostile_texts_are_texts() {
     }
 }
 
-/// A long record makes a page of at most 2 MB; what is left out keeps its peaks.
+/// The page of a long record has at most 2 MB; decimation keeps the peaks.
 #[test]
 fn long_records_make_small_pages() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -262,9 +262,9 @@ fit: {stop: {iterations: 2}}
     assert!(largest > 4.0, "the spike is lost: {largest}");
 }
 
-/// The README names the page that it shows how to make.
+/// The README names the page that its commands write.
 #[test]
-fn the_readme_tells_of_the_page() {
+fn the_readme_names_the_page() {
     let readme = std::fs::read_to_string(repository("README.md")).expect("a file");
     assert!(readme.contains("`report.html`"));
 }

@@ -13,7 +13,7 @@ struct Case {
     /// Folders of runs that it writes, and single files that belong together.
     runs: &'static [&'static str],
     files: &'static [&'static str],
-    /// Every so manyth operation is tried: commands that compute for long have many.
+    /// Stride of the tried operations: long commands have many.
     stride: usize,
 }
 
@@ -91,7 +91,7 @@ const DEMO: Case = case(
     7,
 );
 
-/// A few parameters: a study of them takes a part of a second.
+/// A model with few parameters, whose study takes a fraction of a second.
 pub fn few() -> String {
     MODEL
         .replace("{basis: nodal, start: 2.0}", "{fixed: 2.0}")
@@ -179,7 +179,7 @@ fn check(case: &Case, mode: Mode, over_an_older_run: bool) {
     };
     let template = bench();
     if over_an_older_run && !["init", "resume"].contains(&case.arguments[0]) {
-        // Of another model, so that old and new results differ.
+        // A run of another model, so that old and new results differ.
         let other = MODEL.replace("iterations: 5", "iterations: 3");
         template.write("model.yaml", &other);
         template.write("few.yaml", &few().replace("start: 2.0", "start: 2.2"));
@@ -240,7 +240,7 @@ fn check(case: &Case, mode: Mode, over_an_older_run: bool) {
                 (Ok(found), Ok(older)) if found == *older => {}
                 (Ok(found), _) => is_new(&found, &whole.path(run), &what),
                 (Err(why), Ok(_)) => panic!("{what}: {run}: {why}"),
-                // Nothing was there before, and nothing is there now but what is on its way.
+                // There were no results before, and there are only temporary files now.
                 (Err(_), Err(_)) => {
                     let left = settled(&tree(&folder));
                     for (name, entry) in &left {
@@ -274,7 +274,7 @@ fn check(case: &Case, mode: Mode, over_an_older_run: bool) {
         // Without a fault the same command works.
         let is_done = match case.arguments[0] {
             "init" => bench.path("new/other.yaml").exists(),
-            // Nothing was begun that could be resumed, or it was completed.
+            // There is no unfinished work to resume, or it was completed.
             "demo" => true,
             _ => false,
         };
@@ -296,8 +296,8 @@ fn run_below(name: &str, run: &str, case: &Case) -> bool {
         .any(|other| path.starts_with(*other) && *other != run)
 }
 
-/// The results are those of a run without a fault, but for the times in the documents and what follows from the fault: a
-/// journal that could not be kept changes nothing.
+/// The results equal those of a run without a fault, except for times in the documents and effects of the fault. A journal
+/// that could not be written does not affect the results.
 fn is_new(found: &Tree, whole: &Path, what: &str) {
     let expected = contents(whole).expect("a whole run");
     let names = |tree: &Tree| tree.keys().cloned().collect::<Vec<_>>();

@@ -1,4 +1,4 @@
-//! Journals that were edited, cut off, or belong to other work: they cost time, and change no result.
+//! Journals that were edited or truncated, or belong to other work: they affect the duration and never a result.
 
 use crate::workbench::Workbench;
 use rand::{RngExt, SeedableRng};
@@ -11,7 +11,7 @@ fn study() -> Workbench {
     bench
 }
 
-/// Every digit of every line counts: an edited number ends what is taken over.
+/// A line with an edited digit, and all later lines, are not recalled.
 #[test]
 fn edited_numbers_in_a_study_journal_are_not_taken_over() {
     let bench = study();
@@ -39,7 +39,7 @@ fn edited_numbers_in_a_study_journal_are_not_taken_over() {
     }
 }
 
-/// Lines that were moved, removed or doubled are not taken over either.
+/// Lines that were moved, removed or duplicated are not recalled.
 #[test]
 fn reordered_lines_are_not_taken_over() {
     let bench = study();
@@ -57,7 +57,7 @@ fn reordered_lines_are_not_taken_over() {
     }
 }
 
-/// The heading has the version of the program, and is not to be edited.
+/// The heading has the version of the program; an edited heading is rejected.
 #[test]
 fn an_edited_heading_is_refused() {
     let bench = study();

@@ -1,6 +1,5 @@
-//! What the program does when something around it fails: files in the way, faults of the system, kills, full disks,
-//! closed pipes, edited journals. In every case no file of the user changes, and of an older run the old or the
-//! new results are whole.
+//! Reliability under external failures: files in the way, faults of the system, kills, full disks, closed pipes, edited
+//! journals. In every case no file of the user changes, and either the old or the new results of a run are complete.
 
 mod faults;
 mod journals;

@@ -1,11 +1,11 @@
-//! Output folders that hold something: files of the user, inputs, runs of other commands, links.
+//! Output folders that are not empty: files of the user, inputs, runs of other commands, links.
 
 use crate::tree::{settled, tree};
 #[cfg(target_os = "linux")]
 use crate::unprivileged::run_unprivileged;
 use crate::workbench::{MODEL, Workbench};
 
-/// The program refuses with exit code 2 and a message about this path, and nothing has changed.
+/// The program exits with code 2 and a message about this path, and changes no file.
 fn refused(bench: &Workbench, arguments: &[&str], about: &str) -> String {
     let before = tree(&bench.path(""));
     let (code, stdout, stderr) = bench.run(arguments);
@@ -22,10 +22,10 @@ fn refused(bench: &Workbench, arguments: &[&str], about: &str) -> String {
 #[test]
 fn a_project_folder_keeps_its_files() {
     let bench = Workbench::with_small_model();
-    let model = MODEL.replace("data: readings.csv", "data: readings/paper.csv");
+    let model = MODEL.replace("data: readings.csv", "data: channels/paper.csv");
     bench.write("model.yaml", &model);
-    bench.write("readings/paper.csv", &bench.read("readings.csv"));
-    bench.write("readings/other.csv", "t_s,y_m\n0,1\n");
+    bench.write("channels/paper.csv", &bench.read("readings.csv"));
+    bench.write("channels/other.csv", "t_s,y_m\n0,1\n");
     bench.write("figures/my_drawing.svg", "<svg/>");
     let before = tree(&bench.path(""));
     bench.run_to(0, &["fit", "model.yaml", "--out", "."]);
@@ -34,7 +34,7 @@ fn a_project_folder_keeps_its_files() {
         assert!(after.get(name) == Some(entry), "{name}");
     }
     assert!(bench.path("figures/motion.svg").exists());
-    // Once more: only the program's own files are replaced.
+    // A second run replaces only the program's own files.
     bench.run_to(0, &["fit", "model.yaml", "--out", ".", "--no-report"]);
     let after = tree(&bench.path(""));
     for (name, entry) in &before {
@@ -43,7 +43,7 @@ fn a_project_folder_keeps_its_files() {
     assert!(!bench.path("figures/motion.svg").exists());
 }
 
-/// Whatever stands in the place of a result is named before the fit.
+/// A file or folder in the place of a result is reported before the fit.
 #[test]
 fn files_in_the_way_are_refused_before_the_fit() {
     for name in [
@@ -54,7 +54,7 @@ fn files_in_the_way_are_refused_before_the_fit() {
         "fit.journal",
         "fit.checkpoint",
         "figures/motion.svg",
-        "readings/1-displacement.csv",
+        "channels/1-displacement.csv",
     ] {
         let bench = Workbench::with_small_model();
         bench.write(&format!("run/{name}"), "mine\n");
@@ -76,7 +76,7 @@ fn files_in_the_way_are_refused_before_the_fit() {
     );
 }
 
-/// A run's own table as the start of the next one: it would be replaced while it is an input.
+/// A table of a run as the start of the next one would be replaced while it is an input.
 #[test]
 fn inputs_are_never_replaced() {
     let bench = Workbench::with_small_model();
@@ -93,7 +93,7 @@ fn inputs_are_never_replaced() {
     bench.run_to(0, &["fit", "next.yaml", "--out", "other"]);
 }
 
-/// A file of an older run that was edited is the user's by now.
+/// An edited file of an older run belongs to the user.
 #[test]
 fn edited_results_are_refused() {
     let bench = Workbench::with_small_model();
@@ -128,7 +128,7 @@ fn the_results_of_another_command_are_refused() {
     }
 }
 
-/// A killed fit is not thrown away by another command.
+/// Another command does not discard a killed fit.
 #[test]
 fn unfinished_work_of_another_command_is_refused() {
     let bench = Workbench::with_small_model();
@@ -200,7 +200,7 @@ fn simulate_replaces_its_own_tables_only() {
     refused(&bench, &simulate, "--out");
 }
 
-/// A refusal leaves no folder behind that was not there before.
+/// A rejected command creates no folder.
 #[test]
 fn a_refused_command_leaves_no_folder() {
     let bench = Workbench::with_small_model();
@@ -210,7 +210,7 @@ fn a_refused_command_leaves_no_folder() {
     refused(&bench, &compare, "side/model/result.json");
 }
 
-/// What a killed run leaves on its way is removed by the next one; folders that only look alike stay.
+/// The next run removes temporary folders of a killed run; folders with similar names stay.
 #[test]
 fn leftovers_of_killed_runs_are_removed() {
     let bench = Workbench::with_small_model();
@@ -224,7 +224,7 @@ fn leftovers_of_killed_runs_are_removed() {
     assert_eq!(whole.len(), settled.len() + 3, "{:?}", whole.keys());
 }
 
-/// A folder below that cannot be written to is named before the fit, not after it.
+/// A subfolder that cannot be written to is reported before the fit.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_read_only_folder_below_is_refused_before_the_fit() {
@@ -240,7 +240,7 @@ fn a_read_only_folder_below_is_refused_before_the_fit() {
     assert!(!bench.path("run/fit.journal").exists());
 }
 
-/// What stands in the place of an output folder is named.
+/// A file in the place of an output folder is reported.
 #[test]
 #[cfg(unix)]
 fn other_things_in_the_place_of_the_folder_are_named() {
@@ -263,7 +263,7 @@ fn other_things_in_the_place_of_the_folder_are_named() {
 
 /// A study that was killed over the results of an older one is unfinished work as well; a finished one is replaced.
 #[test]
-fn a_study_killed_over_older_results_is_not_replaced_unsaid() {
+fn a_study_killed_over_older_results_is_replaced_with_a_note() {
     for command in ["study", "compare"] {
         let bench = Workbench::with_small_model();
         let run = || bench.run(&[command, "model.yaml", "--out", "twice"]);

@@ -1,6 +1,6 @@
 //! Random output folders (files, folders and links of the user, older runs of this and of other commands, edited and
 //! read-only entries) and random commands: afterwards every file of the user has its bytes, and of each run that
-//! stood there the old or the new one is whole.
+//! was there the old or the new one is complete.
 //!
 //! `KMCFIT_SEED` draws other folders, `KMCFIT_CASES` more of them.
 
@@ -27,7 +27,7 @@ const COMMANDS: [&[&str]; 10] = [
 ];
 /// Two fits of 2000 nodes: only in `.ci/long`.
 const DEMO: &[&str] = &["demo", "--out", OUT];
-/// Names that commands may want to write, and names that none does.
+/// Names that commands write, and names that no command writes.
 const NAMES: [&str; 22] = [
     "result.json",
     "history.csv",
@@ -38,8 +38,8 @@ const NAMES: [&str; 22] = [
     "figures/functions.svg",
     "figures/predictions.svg",
     "figures/mine.svg",
-    "readings/1-displacement.csv",
-    "readings/mine.csv",
+    "channels/1-displacement.csv",
+    "channels/mine.csv",
     "compare.csv",
     "compare.html",
     "gradient.csv",
@@ -85,7 +85,7 @@ fn templates() -> Workbench {
     bench
 }
 
-/// Puts something of the user into the folder.
+/// Creates a file, folder or link of the user.
 fn add_foreign(bench: &Workbench, random: &mut ChaCha8Rng) {
     let name = NAMES[random.random_range(0..NAMES.len())];
     let path = bench.path(OUT).join(name);
@@ -113,7 +113,7 @@ fn add_foreign(bench: &Workbench, random: &mut ChaCha8Rng) {
     }
 }
 
-/// Changes a file of a run: it is the user's from now on.
+/// Edits a file of a run, which then belongs to the user.
 fn edit(bench: &Workbench, random: &mut ChaCha8Rng) {
     if !bench.path(OUT).is_dir() {
         return;
@@ -227,16 +227,16 @@ fn files_of_the_user_stay_and_runs_are_whole() {
             }
         }
     }
-    // Otherwise this was a test of nothing.
+    // At least some commands must have written results.
     assert!(refused > 20 && done > 20, "{refused} refused, {done} done");
 }
 
-/// Whether an entry is a journal that the program wrote: they have a heading with a checksum.
+/// True if an entry is a journal of the program: it has a heading with a checksum.
 fn is_journal(entry: Option<&Entry>) -> bool {
     matches!(entry, Some(Entry::File(bytes)) if bytes.starts_with(b"{\"format\":2,"))
 }
 
-/// Whether a file is a table that `simulate` wrote, or its record.
+/// True if a file is a table of `simulate`, or its provenance file.
 fn is_simulated(before: &Tree, name: &str) -> bool {
     let record = match name.strip_suffix(".json") {
         Some(_) => name.to_owned(),

@@ -67,7 +67,7 @@ fn sigterm_writes_the_best_so_far() {
     }
 }
 
-/// A comparison that is killed or ended in its second fit is resumed: the first fit is kept as it is.
+/// A comparison that is killed or interrupted during its second fit is resumed with an unchanged first fit.
 #[test]
 #[cfg(unix)]
 fn a_comparison_is_resumed() {
@@ -92,7 +92,7 @@ fn a_comparison_is_resumed() {
     }
 }
 
-/// A signal that the process was started to ignore stays ignored.
+/// A signal that was ignored when the process started stays ignored.
 #[test]
 #[cfg(target_os = "linux")]
 fn an_ignored_signal_stays_ignored() {

@@ -21,7 +21,7 @@ fn bench() -> Workbench {
     bench
 }
 
-/// A reader of the messages that has gone: the results are written and the exit code is that of the run.
+/// With a closed standard error the results are written and the exit code is that of the run.
 #[test]
 #[cfg(unix)]
 fn a_closed_standard_error_changes_nothing() {
@@ -45,7 +45,7 @@ fn a_closed_standard_error_changes_nothing() {
         drop(child.stderr.take());
         let code = child.wait().expect("it ends").code();
         let expected = match arguments[0] {
-            // Whatever the study comes to, it ends by itself.
+            // The study ends without a signal, with any outcome.
             "study" => code.filter(|code| [0, 3].contains(code)),
             _ => Some(expected),
         };
@@ -54,7 +54,7 @@ fn a_closed_standard_error_changes_nothing() {
     whole_run(&bench.path("run")).expect("a whole run");
 }
 
-/// A full disk behind the messages or the summary.
+/// Standard output or standard error on a full disk.
 #[test]
 #[cfg(target_os = "linux")]
 fn full_devices_behind_the_streams() {
@@ -84,10 +84,10 @@ fn full_devices_behind_the_streams() {
     }
 }
 
-/// Threads that the system does not give, and far more than there are jobs: the same study.
+/// Without threads from the system, and with more threads than jobs, the results of a study are the same.
 #[test]
 #[cfg(target_os = "linux")]
-fn threads_that_cannot_be_had() {
+fn a_study_without_threads_has_the_same_results() {
     let bench = Workbench::with_shipped_models();
     let study = ["study", "models/linear-mass.yaml", "--out"];
     bench.run_to(0, &[&study[..], &["one", "--threads", "1"]].concat());
@@ -157,7 +157,7 @@ fn full_and_read_only_file_systems() {
     );
 }
 
-/// A limit on the size of files is an error of the write, and the older run is whole.
+/// A limit on the size of files is an error of the write, and the older run is complete.
 #[test]
 #[cfg(unix)]
 fn a_limit_on_the_size_of_files() {

@@ -1,11 +1,11 @@
-//! Snapshots of folders, and what counts as a whole run in one.
+//! Snapshots of folders, and the complete runs in them.
 
 use kmcfit::results::{FileRecord, MANIFEST, Manifest};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What stands at a path; links are not followed.
+/// Entry at a path; links are not followed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Entry {
     Folder,
@@ -16,7 +16,7 @@ pub enum Entry {
 /// All entries below a folder, by relative path.
 pub type Tree = BTreeMap<String, Entry>;
 
-/// Names of what a killed run leaves on its way: it is no result, and the next run removes it.
+/// Names of temporary files of a killed run, which the next run removes.
 const ON_ITS_WAY: &str = ".kmcfit-";
 
 pub fn tree(root: &Path) -> Tree {
@@ -43,7 +43,7 @@ fn collect(root: &Path, below: &str, found: &mut Tree) {
     }
 }
 
-/// Without what a killed run leaves on its way.
+/// The entries without temporary files of a killed run.
 pub fn settled(tree: &Tree) -> Tree {
     let mut settled = tree.clone();
     settled.retain(|name, _| !name.split('/').any(|part| part.starts_with(ON_ITS_WAY)));

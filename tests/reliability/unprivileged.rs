@@ -1,4 +1,4 @@
-//! The program run by a user without rights.
+//! Runs of the program by an unprivileged user.
 
 use crate::workbench::Workbench;
 use std::process::Command;

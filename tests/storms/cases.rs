@@ -1,6 +1,6 @@
-//! Records and models that are hard on numerics.
+//! Records and models with extreme numbers.
 
-/// A constant device, from which all records are made: `m y'' + c y' + k y = 0`, `y(0)` given, `y'(0) = 0`.
+/// The system of all records, with constant coefficients: `m y'' + c y' + k y = 0`, `y(0)` given, `y'(0) = 0`.
 #[derive(Clone, Copy)]
 pub struct Device {
     pub mass: f64,
@@ -9,7 +9,7 @@ pub struct Device {
     pub begin: f64,
 }
 
-/// Swings with a period of about 3.1 s.
+/// System with a period of about 3.1 s.
 pub const CALM: Device = Device {
     mass: 1.0,
     damping: 0.1,
@@ -39,13 +39,13 @@ impl Device {
     }
 }
 
-/// What one model asks for.
+/// A record and its model.
 pub struct Case {
     pub name: &'static str,
     pub device: Device,
-    /// Times of the readings, s.
+    /// Times of the samples, s.
     pub times: Vec<f64>,
-    /// What the readings are instead of the displacement there.
+    /// The samples, as a function of the displacement.
     pub spoil: fn(usize, f64) -> String,
     /// Start of mass and damping.
     pub start: [f64; 2],
@@ -63,7 +63,7 @@ fn times(count: usize, spacing: f64) -> Vec<f64> {
     (0..count).map(|i| i as f64 * spacing).collect()
 }
 
-/// A record of the device over about three periods, from a start that leads to it.
+/// A record of the system over about three periods, with a start that converges to it.
 fn case(name: &'static str, device: Device) -> Case {
     Case {
         name,
@@ -77,7 +77,7 @@ fn case(name: &'static str, device: Device) -> Case {
     }
 }
 
-/// The calm device with time in other units.
+/// The calm case with time in other units.
 fn at_pace(name: &'static str, second: f64) -> Case {
     let device = Device {
         damping: CALM.damping / second,
@@ -90,7 +90,7 @@ fn at_pace(name: &'static str, second: f64) -> Case {
     }
 }
 
-/// All of them; the first is the calm one.
+/// All cases; the first is the calm one.
 pub fn cases() -> Vec<Case> {
     let calm = |name| case(name, CALM);
     let with = |change: fn(&mut Device)| {
@@ -219,7 +219,7 @@ impl Case {
         .replace("grid: {}\n", "")
     }
 
-    /// The table of readings.
+    /// The table of samples.
     pub fn readings(&self) -> String {
         let row = |(i, t): (usize, &f64)| {
             let y = (self.spoil)(i, self.device.at(*t));

@@ -1,5 +1,5 @@
-//! Numerical storms: whatever the record, a fit ends in time, with a name for how it ended or a refusal, and
-//! nothing that makes no sense is told as a success.
+//! Numerical stress tests: for any record a fit ends in time, with a status or an error, and no meaningless result is
+//! reported as converged.
 
 mod cases;
 
@@ -17,21 +17,20 @@ const METHODS: [&str; 5] = [
     "gauss-newton",
     "equation-error",
 ];
-/// No case takes a minute; one that takes so long hangs.
+/// Time limit of a case; all take less.
 const HANGS: Duration = Duration::from_secs(300);
-/// How near mass and damping must be to those of the record to be called found: the step of the calm
-/// record allows no less for the fits that simulate.
+/// Largest relative error of mass and damping that counts as `found`; it is limited by the step of the calm record.
 const FOUND: f64 = 1e-4;
-/// The same for a fit that is on the way.
+/// Largest relative error that counts as `near`.
 const NEAR: f64 = 0.05;
 
-/// How a fit ended.
+/// End of a fit.
 struct End {
     /// The status, or `refused`.
     status: String,
-    /// Mass and damping, if there is a device.
+    /// Mass and damping, if the fit has a result.
     device: Option<[f64; 2]>,
-    /// What is said of the functions.
+    /// Classification of the functions.
     sentences: Vec<String>,
 }
 
@@ -84,7 +83,7 @@ fn run(case: &Case, method: &str) -> End {
     }
 }
 
-/// Numbers of a run that has a device make sense; its mass and damping.
+/// Checks that the numbers of a result are consistent; returns its mass and damping.
 fn sensible(what: &str, place: &Path, result: &Value) -> [f64; 2] {
     let cost = |key: &str| result["cost"][key].as_f64();
     if result["attempts"]
@@ -115,14 +114,14 @@ fn sensible(what: &str, place: &Path, result: &Value) -> [f64; 2] {
     first.expect("rows")
 }
 
-/// The largest error of mass and damping, relative to the device of the record.
+/// The largest error of mass and damping, relative to the system of the record.
 fn error(case: &Case, found: [f64; 2]) -> f64 {
     let part = |found: f64, true_one: f64| (found / true_one - 1.0).abs();
     let device = case.device;
     part(found[0], device.mass).max(part(found[1], device.damping))
 }
 
-/// What a fit came to: its status, and whether mass and damping are those of the record.
+/// Status of a fit, and agreement of mass and damping with the record.
 fn verdict(case: &Case, end: &End) -> String {
     let found = match end.device.map(|found| error(case, found)) {
         None => return end.status.clone(),
@@ -133,7 +132,7 @@ fn verdict(case: &Case, end: &End) -> String {
     format!("{}: {found}", end.status)
 }
 
-/// Records in which next to nothing of the device can be seen.
+/// Records from which almost no parameter combination is identifiable.
 const BLIND: [&str; 4] = [
     "constant readings",
     "nothing moves",
@@ -141,7 +140,7 @@ const BLIND: [&str; 4] = [
     "sigma 1e300",
 ];
 
-/// Where next to nothing can be seen, no function is called identified.
+/// From such records no function is classified as identified.
 fn says_little(case: &Case, method: &str, end: &End) {
     if BLIND.contains(&case.name) {
         for sentence in &end.sentences {
@@ -154,8 +153,8 @@ fn says_little(case: &Case, method: &str, end: &End) {
     }
 }
 
-/// Fits of the same motion in another size find the same device; those of the paper's method need not: its
-/// steps have a size.
+/// Fits of a scaled response give the same parameters, except for steepest descent, whose step lengths have a
+/// scale.
 fn same_device(calm: &[End], end: &End, name: &str, index: usize) {
     if METHODS[index] == "steepest-descent"
         || !["amplitude 1e-12", "amplitude 1e12"].contains(&name)
@@ -166,7 +165,7 @@ fn same_device(calm: &[End], end: &End, name: &str, index: usize) {
     let (before, now) = both.unwrap_or_else(|| panic!("{name}: no device"));
     assert_eq!(calm[index].status, end.status, "{name}");
     for (before, now) in before.into_iter().zip(now) {
-        // A fit ends where its tolerance of 1e-10 lets it, the root of which bounds the parameters.
+        // The tolerance of J is 1e-10; its square root bounds the error of the parameters.
         assert!((now / before - 1.0).abs() < 1e-5, "{name}: {before} {now}");
     }
 }

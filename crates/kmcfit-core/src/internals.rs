@@ -1,5 +1,5 @@
 //! Items that the application, tests, benches and fuzz targets of kmcfit use beyond the public API. No semantic versioning
-//! applies to them. A new item is added here on purpose, by name.
+//! applies to them. Every item is listed by name.
 
 pub mod assessment {
     pub use crate::assessment::{
@@ -24,8 +24,9 @@ pub mod constraints {
 }
 pub mod diagnostics {
     pub use crate::diagnostics::{
-        NORMAL_975, ResidualDiagnostics, SIGNIFICANCE, chi_square_one, far_off, normal_half_width,
-        offset_and_drift, rms, spread, without_line,
+        NORMAL_975, ResidualDiagnostics, SIGNIFICANCE, UntestedReason, Whiteness, WhitenessResult,
+        chi_square_one, normal_half_width, offset_and_drift, outlier_indices, rms, spread,
+        without_line,
     };
 }
 pub mod functions {
@@ -41,7 +42,7 @@ pub mod identifiability {
     pub use crate::identifiability::{
         Band, BandSettings, BandSide, Bands, CandidateChannel, CandidateExperiment, Classification,
         ClassificationKind, FunctionClassification, Gain, RankFinding, RankFindingKind, Ranked,
-        ResolvedDirection, ScalingAmbiguity, Sensitivity, SingularSpectrum, Symmetry, anchors,
+        ResolvedDirection, ScaleFreedom, ScalingAmbiguity, Sensitivity, SingularSpectrum, anchors,
         classify_functions, is_negligible, is_unhindered, rank_experiments, residual_spread,
         structural_rank,
     };
@@ -75,19 +76,20 @@ pub mod simd {
 }
 pub mod simulate {
     pub use crate::simulate::{
-        Cause, Engine, Purpose, SimulationError, Trajectory, arithmetic, continuous_adjoint,
+        Cause, Engine, EngineMode, SimulationError, Trajectory, arithmetic, continuous_adjoint,
         reference,
     };
 }
 pub mod solvers {
     pub use crate::problem::FEW_PARAMETERS;
     pub use crate::solvers::{
-        ActiveGroup, Attempt, CheckpointStore, CheckpointUnit, ExactF64s, Fit, FitSettings,
-        Initial, IterationEvent, IterationRecord, Measurements, Observer, Optimality, PathPoint,
-        QpSolver, Solver, SolverState, StartProjection, StartStrategy, Status, Stopping,
-        WeightPath, WeightRule, active_constraints, choose_weight, choose_weight_watched,
-        equation_error, estimate_states, fit, fit_from, fit_with_noise, fit_with_noise_watched,
-        no_response, number_or_nan, predict_validation, timed,
+        ActiveGroup, Attempt, BoundedValue, CheckpointStore, CheckpointUnit, ConditionFailure,
+        ExactF64s, Fit, FitSettings, Initial, IterationEvent, IterationRecord, Measurements,
+        MissingMeasurement, Observer, Optimality, PathPoint, QpSolver, Reason, Solver, SolverState,
+        StartProjection, StartStrategy, Status, Stopping, UnsupportedRecord, WeightPath,
+        WeightRule, active_constraints, choose_weight, choose_weight_watched, equation_error,
+        estimate_states, fit, fit_from, fit_with_noise, fit_with_noise_watched, no_response,
+        number_or_nan, predict_validation, timed,
     };
 }
 pub mod study {

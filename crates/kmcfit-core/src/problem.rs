@@ -38,7 +38,7 @@ pub struct Problem(ProblemParts);
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ProblemError {
     /// Functions and grid have different numbers of nodes.
-    #[error("functions on {functions} nodes, a grid of {grid}")]
+    #[error("the functions have {functions} nodes, the grid {grid}")]
     Nodes {
         /// Nodes of the functions.
         functions: usize,
@@ -46,7 +46,7 @@ pub enum ProblemError {
         grid: usize,
     },
     /// A coefficient set does not have one function for the mass and one for each term.
-    #[error("{found} functions for a mass and {terms} terms")]
+    #[error("a mass and {terms} terms need one function each; found {found}")]
     Functions {
         /// Number of functions.
         found: usize,
@@ -62,13 +62,15 @@ pub enum ProblemError {
         reason: &'static str,
     },
     /// A penalty has a function index out of range, or a wrong number of parameters.
-    #[error("a penalty does not fit function {function}")]
+    #[error(
+        "a penalty does not match the number of parameters of function {function}, or there is no such function"
+    )]
     Penalty {
         /// Index of the function.
         function: usize,
     },
     /// A constraint has a parameter index out of range.
-    #[error("`{name}` is about a parameter that is not there")]
+    #[error("constraint `{name}` refers to a parameter that does not exist")]
     Constraint {
         /// Name of the constraint.
         name: String,

@@ -1,4 +1,4 @@
-//! Which constraints a report calls active, and how hard it says they are pushed.
+//! Active constraints of a fit and their multipliers.
 
 mod common;
 
@@ -13,7 +13,7 @@ use kmcfit_core::internals::system::{Method, NodalCoefficients};
 
 const NODES: usize = 101;
 
-/// m = k = 1 known, a constant c estimated from the response of c = 0.8, its damping ratio capped.
+/// m = k = 1 known, a constant c estimated from the response of c = 0.8, with an upper bound of its damping ratio.
 fn capped(cap: f64) -> Problem {
     let system = common::system(NODES, Method::Rk4);
     let truth = NodalCoefficients {
@@ -47,10 +47,10 @@ fn settings() -> FitSettings {
     }
 }
 
-/// zeta = c/2 here, so the cap 0.2 stops c at 0.4. The bound of the cone is m + k, against
-/// |(c/zeta, m - k)|: where it gives way by d, c grows by zeta d, and J falls by zeta |dJ/dc| d.
+/// zeta = c/2 here, so the bound 0.2 limits c to 0.4. The bound of the cone is m + k, against
+/// |(c/zeta, m - k)|: if it is relaxed by d, c grows by zeta d, and J falls by zeta |dJ/dc| d.
 #[test]
-fn a_cap_on_the_damping_ratio_is_reported_with_its_multiplier() {
+fn an_active_bound_on_the_damping_ratio_is_reported_with_its_multiplier() {
     let problem = capped(0.2);
     let found = fit(
         &problem,
@@ -60,7 +60,7 @@ fn a_cap_on_the_damping_ratio_is_reported_with_its_multiplier() {
     )
     .unwrap();
     let theta = &found.best.parameters;
-    // To the 1e-9 of the cone's size that constraints hold to.
+    // To the tolerance of constraints, 1e-9 of the size of the cone.
     assert!((theta[0] - 0.4).abs() < 1e-8, "{theta:?}");
     let active = active_constraints(&problem, &found.best);
     let [cap] = active.as_slice() else {
@@ -69,7 +69,7 @@ fn a_cap_on_the_damping_ratio_is_reported_with_its_multiplier() {
     assert!(cap.name.contains("damping ratio"), "{}", cap.name);
     assert!(!cap.pushed.is_empty(), "{cap:?}");
     let expected = 0.2 * found.best.gradient.euclidean[0].abs();
-    // The accuracy of the quadratic program behind it.
+    // The accuracy of the quadratic program.
     assert!(
         (cap.multiplier / expected - 1.0).abs() < 1e-6,
         "{} is not {expected}",
@@ -78,7 +78,7 @@ fn a_cap_on_the_damping_ratio_is_reported_with_its_multiplier() {
 }
 
 #[test]
-fn a_cap_that_is_not_reached_is_not_reported() {
+fn an_inactive_bound_on_the_damping_ratio_is_not_reported() {
     let problem = capped(0.5);
     let found = fit(
         &problem,
@@ -91,8 +91,8 @@ fn a_cap_that_is_not_reached_is_not_reported() {
     assert!(active_constraints(&problem, &found.best).is_empty());
 }
 
-/// `-2 c >= -0.8` stops c at 0.4: where the bound gives way by d, c grows by d/2. The wider bound
-/// on the same parameter is not near.
+/// `-2 c >= -0.8` limits c to 0.4: if the bound is relaxed by d, c grows by d/2. The wider bound on the same parameter
+/// is inactive.
 #[test]
 fn a_bound_on_one_parameter_is_reported_with_its_multiplier() {
     let mut problem = capped(0.2);
@@ -125,7 +125,7 @@ fn a_bound_on_one_parameter_is_reported_with_its_multiplier() {
         assert_eq!(bound.name, "-2 c >= -0.8");
         assert!(!bound.pushed.is_empty(), "{bound:?}");
         let expected = 0.5 * found.best.gradient.euclidean[0].abs();
-        // Exact but for the distance of the parameter from its bound.
+        // Exact up to the distance of the parameter from its bound.
         assert!(
             (bound.multiplier / expected - 1.0).abs() < 1e-10,
             "{bound:?} {expected}"
@@ -133,7 +133,7 @@ fn a_bound_on_one_parameter_is_reported_with_its_multiplier() {
     }
 }
 
-/// m = 1 known, c and k estimated from samples of sigma `sigma`, by a fit that stays where it starts.
+/// m = 1 known, c and k estimated from samples of sigma `sigma`, by a fit without iterations.
 fn resting(c: f64, k: f64, sigma: f64, groups: Vec<RowGroup>) -> Vec<ActiveGroup> {
     let plain = capped(0.2);
     let list = vec![
@@ -158,7 +158,7 @@ fn resting(c: f64, k: f64, sigma: f64, groups: Vec<RowGroup>) -> Vec<ActiveGroup
 }
 
 /// Multipliers of bounds on single parameters, against those of the program that rows of several
-/// parameters need: with a row that is far away, which changes nothing else. J falls with c below 0.8, and with
+/// parameters need: with a row that is far from active, which has no other effect. J falls with c below 0.8, and with
 /// k above 1. The point lies as near to its bounds as a program comes, for J in any unit.
 #[test]
 fn multipliers_of_bounds_on_one_parameter_are_those_of_a_program() {
@@ -212,9 +212,9 @@ fn multipliers_of_bounds_on_one_parameter_are_those_of_a_program() {
     }
 }
 
-/// J falls away from the bound that is near, towards one on the same row that is not.
+/// J falls away from the active bound, towards the inactive bound of the same row.
 #[test]
-fn a_bound_that_the_data_pull_away_from_is_not_pushed() {
+fn a_bound_with_a_gradient_away_from_it_is_not_active() {
     for a in [1.0, -2.0] {
         let mut group = RowGroup::new("c");
         let mut bounds = [0.4 * a, 0.5 * a];
@@ -260,7 +260,7 @@ fn with_sum_below(cap: f64) -> Problem {
     problem
 }
 
-/// The multiplier is what the least J loses per unit by which the bound gives way.
+/// The multiplier is the decrease of the minimum of J per unit by which the bound is relaxed.
 #[test]
 fn a_bound_on_a_sum_is_reported_with_its_multiplier() {
     let best = |cap: f64| {
@@ -306,8 +306,8 @@ fn capped_in_units(unit: f64, cap: f64) -> Problem {
     problem
 }
 
-/// A push counts if giving way by one per cent would lower J by more than a millionth, to first order.
-/// The bound m + k gives way by one per cent where c = zeta (m + k) does.
+/// A constraint counts as active if relaxing it by one per cent would lower J by more than 1e-6 of J, to first order. The bound
+/// m + k is relaxed by one per cent if c = zeta (m + k) is.
 #[test]
 fn the_significance_of_a_multiplier_does_not_depend_on_units() {
     let best = |unit: f64, cap: f64| {
@@ -322,7 +322,7 @@ fn the_significance_of_a_multiplier_does_not_depend_on_units() {
     let h = 1e-3;
     let bend = (slope_at(c + h) - slope_at(c - h)) / (2.0 * h);
     for (share, counts) in [(20.0, true), (0.05, false)] {
-        // So far below the best c the slope is this share of the least that counts.
+        // At this distance below the best c the slope is this share of the smallest that counts.
         let distance = share * 1e-6 * cost / (0.01 * c * bend);
         assert!(distance < 0.05 * c, "{distance}");
         for unit in [1e-3, 1.0, 1e3] {
@@ -336,10 +336,10 @@ fn the_significance_of_a_multiplier_does_not_depend_on_units() {
     }
 }
 
-/// The bound m + k of a cone is part known and part estimated. A push counts if where it gives way by one per
-/// cent J would fall by more than a millionth, to first order.
+/// The bound m + k of a cone is partly known and partly estimated. The constraint counts as active if relaxing it by one per
+/// cent would lower J by more than 1e-6 of J, to first order.
 #[test]
-fn a_push_against_a_cone_is_measured_by_its_whole_bound() {
+fn the_significance_of_a_cone_is_relative_to_its_whole_bound() {
     let mut problem = capped_in_units(1.0, 10.0);
     let list = vec![
         CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; NODES]),
@@ -377,9 +377,9 @@ fn a_push_against_a_cone_is_measured_by_its_whole_bound() {
     assert!(seen.iter().all(|n| *n > 2), "{seen:?}");
 }
 
-/// Where the bound stops the step altogether, the start is the minimum.
+/// If the bound prevents any step, the start is the minimum.
 #[test]
-fn a_start_that_is_pressed_against_its_bound_is_the_minimum() {
+fn a_start_at_an_active_bound_is_the_minimum() {
     let mut problem = capped(0.2);
     let mut group = RowGroup::new("c <= 0.1");
     let times = [0.0, common::DURATION];

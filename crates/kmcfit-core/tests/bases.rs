@@ -1,4 +1,4 @@
-//! Every basis against what its functions must be: one table over all of them.
+//! Every basis against independent evaluations of its functions.
 
 use kmcfit_core::internals::constraints::Rows;
 use kmcfit_core::internals::functions::basis::{
@@ -16,7 +16,7 @@ use proptest::prelude::*;
 mod properties;
 use properties::properties;
 
-/// A record that does not begin at zero, with a step that no knot is a multiple of.
+/// A record that does not begin at zero, with knots that are not multiples of the step.
 fn grid(nodes: usize) -> Grid {
     Grid::new(-1.5, 4.0, nodes).unwrap()
 }
@@ -26,7 +26,7 @@ fn knots() -> Vec<f64> {
     vec![-1.5, -1.171, -0.3, 0.24, 1.0, 1.9, 2.5]
 }
 
-/// Every basis with the degree of the polynomials it contains and how often its functions can be
+/// Every basis with the degree of the polynomials it contains and the number of times that its functions can be
 /// differentiated with a square-integrable result.
 fn table() -> Vec<(Basis, usize, usize)> {
     vec![
@@ -68,7 +68,7 @@ fn squared(matrix: &Rows, theta: &[f64]) -> f64 {
     apply(matrix, theta).iter().map(|x| x * x).sum()
 }
 
-/// Parameters without a pattern.
+/// Irregular parameters.
 fn some_parameters(count: usize) -> Vec<f64> {
     (0..count)
         .map(|j| 1.0 + (2.3 * j as f64 + 0.4).sin())
@@ -206,7 +206,7 @@ fn at_a_jump_the_side_after_counts_and_at_the_end_the_side_before() {
     let hats = Basis::PiecewiseLinear { knots };
     let slopes = apply(&hats.rows(&grid, &at, 1), &[0.0, 1.0, 3.0, 0.0]);
     assert_eq!(slopes, [1.0, 1.0, 2.0, -3.0, -3.0]);
-    // Node 10 misses the knot 0.3 by rounding, and still belongs to the cell after it.
+    // Node 10 differs from the knot 0.3 by a rounding error, and belongs to the cell after it.
     let grid = Grid::new(0.0, 0.9, 31).unwrap();
     assert!(grid.time(10) != 0.3);
     let steps = Basis::PiecewiseConstant {
@@ -217,14 +217,14 @@ fn at_a_jump_the_side_after_counts_and_at_the_end_the_side_before() {
 }
 
 /// The integral of the squared derivative by Simpson's rule on each cell, derivatives taken inside
-/// it: an independent rule, exact for what the functions here are up to its error.
+/// it: an independent rule, exact for these functions up to its error.
 fn integral(basis: &Basis, grid: &Grid, theta: &[f64], q: usize) -> f64 {
     let parts = 2000;
     let knots = basis.knot_times(grid);
     let mut sum = 0.0;
     for cell in knots.windows(2) {
         let width = cell[1] - cell[0];
-        // A hair inside, so that both ends belong to this cell.
+        // Slightly inside, so that both ends belong to this cell.
         let inset = 1e-10 * width.max(0.5);
         let times: Vec<f64> = (0..=2 * parts)
             .map(|i| cell[0] + width * f64::from(i) / f64::from(2 * parts))
@@ -273,8 +273,8 @@ fn roughness_of_a_parabola_in_closed_form() {
             assert!((found / expected - 1.0).abs() < 1e-11, "{basis:?}, {q}");
         }
     }
-    // Divided differences of a parabola are exact, whatever the spacing; they leave out the halves
-    // of the two end cells.
+    // Divided differences of a parabola are exact, for any spacing; they omit the halves of the two
+    // end cells.
     let hats = Basis::PiecewiseLinear { knots: knots() };
     let theta: Vec<f64> = knots().iter().map(|t| t * t).collect();
     let inner = 4.0 - 0.5 * (0.329 + 0.6);
@@ -319,8 +319,8 @@ fn a_smooth_function_is_equally_rough_in_every_basis() {
                 Basis::PiecewiseLinear { knots: knots(81) },
                 [1e-4, 1e-3, 4e-2],
             ),
-            // Values of cells hold noise of the size of a step: slopes see it, curvatures drown in
-            // it unless the cells are wide.
+            // Cell values differ from the function by the size of a step, which affects slopes, and dominates curvatures unless the
+            // cells are wide.
             (
                 Basis::PiecewiseConstant { knots: knots(51) },
                 [4e-3, 4e-2, 8e-2],
@@ -345,7 +345,7 @@ fn second_differences_keep_their_digits_on_fine_grids() {
     let grid = Grid::new(0.0, 25.0, 40_000).unwrap();
     let line: Vec<f64> = grid.times().iter().map(|t| 1.0 - 0.02 * t).collect();
     let rough = Basis::Nodal.roughness(&grid, 2);
-    // Only the rounding of the values, 1e-16 / dt^1.5 a row, is left.
+    // The remaining error is the rounding error of the values, 1e-16 / dt^1.5 per row.
     assert!(squared(&rough, &line) < 1e-14 * 40_000.0);
 }
 
@@ -449,7 +449,7 @@ fn dependent_functions_are_refused() {
     refused(Basis::PiecewiseLinear { knots: knots(10) });
     refused(Basis::BSpline { knots: knots(8) });
     refused(Basis::Polynomial { degree: 9 });
-    // Enough nodes, but five functions that only four of them see.
+    // Enough nodes, but only four of them lie in the support of five functions.
     refused(Basis::PiecewiseLinear {
         knots: vec![-1.5, -1.4, -1.3, -1.2, -1.1, 2.5],
     });
@@ -563,7 +563,7 @@ proptest! {
     #![proptest_config(properties(200, 1))]
 
     #[test]
-    fn random_knots_keep_the_promises(knots in random_knots(), times in proptest::collection::vec(-1.5..2.5_f64, 1..40)) {
+    fn bases_on_random_knots_reproduce_their_polynomials(knots in random_knots(), times in proptest::collection::vec(-1.5..2.5_f64, 1..40)) {
         let grid = grid(2001);
         for basis in [
             Basis::PiecewiseConstant { knots: knots.clone() },

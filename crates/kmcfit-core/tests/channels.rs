@@ -53,7 +53,7 @@ const LOSSES: [Loss; 3] = [
 
 /// One channel of a random record.
 #[derive(Debug, Clone)]
-struct Readings {
+struct ChannelSpec {
     kind: ChannelKind,
     /// Step and share of it.
     places: Vec<(usize, f64)>,
@@ -66,7 +66,7 @@ struct Readings {
     loss: Loss,
 }
 
-/// A random record with everything in it.
+/// A random record with all kinds of samples, sensors and inputs.
 #[derive(Debug, Clone)]
 struct Case {
     method: Method,
@@ -76,7 +76,7 @@ struct Case {
     force: Vec<[f64; 3]>,
     base: Vec<[f64; 3]>,
     initial: [f64; 2],
-    channels: Vec<Readings>,
+    channels: Vec<ChannelSpec>,
 }
 
 fn case(method: Method, nodes: usize, seed: u64) -> Case {
@@ -98,7 +98,7 @@ fn case(method: Method, nodes: usize, seed: u64) -> Case {
         (-1.0, 1.0),
     ];
     let coefficients = ranges.iter().map(|(a, b)| list(nodes, *a, *b)).collect();
-    // Left, middle and right of each step apart: a force that jumps at every node.
+    // Separate values at the left end, middle and right end of each step: a force that jumps at every node.
     let force = three(list(3 * steps, -2.0, 2.0));
     let base = three(list(3 * steps, -2.0, 2.0));
     let initial = list(2, -1.5, 1.5);
@@ -113,7 +113,7 @@ fn case(method: Method, nodes: usize, seed: u64) -> Case {
             times.sort_by(f64::total_cmp);
             times.dedup();
             if (seed as usize + n).is_multiple_of(3) {
-                // Or one on every node, as a sensor sampled with the grid gives them.
+                // Or one sample at every node.
                 times = (0..nodes).map(|i| i as f64).collect();
             }
             let place = |x: &f64| {
@@ -123,7 +123,7 @@ fn case(method: Method, nodes: usize, seed: u64) -> Case {
             let count = times.len();
             let around = list(2 * count, -2.0, 2.0);
             let sensor = list(3, 0.5, 1.5);
-            Readings {
+            ChannelSpec {
                 kind,
                 places: times.iter().map(place).collect(),
                 values: list(count, -2.0, 2.0),
@@ -372,7 +372,7 @@ fn on_few_parameters(problem: &Problem, with_knots: bool) -> Problem {
             .collect(),
     };
     let list = problem.functions.iter().enumerate().map(|(i, nodal)| {
-        // No term that drives the response out of bounds.
+        // No term that makes the response unbounded.
         let start = nodal.start[0].abs();
         match i % 3 {
             1 if with_knots => {
@@ -396,8 +396,8 @@ fn on_few_parameters(problem: &Problem, with_knots: bool) -> Problem {
 proptest! {
     #![proptest_config(properties(60, 3))]
 
-    /// Constants are carried along by a way of their own: against values at the nodes, to which a design takes
-    /// their gradient, and against one direction at a time.
+    /// Constant functions have a specialised algorithm: compared with values at the nodes and a design matrix, and with one direction
+    /// at a time.
     #[test]
     fn few_parameters_have_the_tangents_of_nodal_values(
         methods in prop_oneof![Just(Method::Midpoint), Just(Method::Rk4)],

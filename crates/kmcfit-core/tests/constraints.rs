@@ -1,5 +1,4 @@
-//! Constraints: every statement on every basis against a dense evaluation of the functions, and every
-//! message about constraints in model files.
+//! Constraints: every kind on every basis against a dense evaluation of the functions.
 
 use kmcfit_core::internals::constraints::{
     Constraint, ConstraintError, Constraints, RowGroup, Shape, TimeHistory,
@@ -47,7 +46,7 @@ fn bases() -> Vec<Basis> {
     ]
 }
 
-/// Whether the functions of a basis are linear between knots, so that constraints hold everywhere.
+/// True if the functions of a basis are linear between knots, so that constraints hold everywhere.
 fn is_piecewise(basis: &Basis) -> bool {
     !matches!(
         basis,
@@ -99,7 +98,7 @@ fn built(statement: &Constraint, functions: &Parameterization) -> Constraints {
     statement.build(&grid(), functions).unwrap()
 }
 
-/// The nearest point inside.
+/// The nearest feasible point.
 fn inside(constraints: &Constraints, functions: &Parameterization, seed: u64) -> Vec<f64> {
     let start = random(functions.parameters(), seed);
     let metric = functions.relative_metric(&[1.0; 3], 10.0);
@@ -123,7 +122,7 @@ fn shape(of: CoefficientKind, shape: Shape) -> Constraint {
     Constraint::Shape { of, shape }
 }
 
-/// Whether a derivative of function `j` nowhere rises, or for smooth bases at no node.
+/// True if a derivative of function `j` is non-increasing everywhere, or for smooth bases at all nodes.
 fn falls(functions: &Parameterization, theta: &[f64], j: usize, q: usize) -> bool {
     let basis = functions.iter().nth(j).unwrap().basis.clone().unwrap();
     let slack = 1e-6;
@@ -136,7 +135,7 @@ fn falls(functions: &Parameterization, theta: &[f64], j: usize, q: usize) -> boo
     }
 }
 
-/// Times of a basis at which a statement is tested from outside.
+/// Times at which a constraint on a basis is tested independently.
 fn tested(basis: &Basis) -> Vec<f64> {
     match is_piecewise(basis) {
         true => fine(),
@@ -159,7 +158,7 @@ fn rows_agree_with_the_functions() {
         let found = group.rows.multiply(&theta)[0];
         assert!((found - value).abs() < 1e-12, "{basis:?}: {found} {value}");
 
-        // By the midpoint rule on so many cells that its error is no more than 1e-6.
+        // By the midpoint rule with enough cells for an error of at most 1e-6.
         let count = 200_000;
         let step = 10.0 / count as f64;
         let middles: Vec<f64> = (0..count).map(|i| 1.0 + (i as f64 + 0.5) * step).collect();
@@ -366,7 +365,7 @@ fn the_true_system_is_passive_and_a_stiffening_spring_is_not() {
     assert!(!holds(&passive, [&growth, &|_| 0.0, &|_| 1.0]));
     assert!(holds(&passive, [&growth, &|_| 0.01, &|_| 1.0]));
 
-    // A mass with jumps may only jump down, and damps nothing in between.
+    // A mass with jumps may only jump down, and does not limit the damping in between.
     let knots = uniform_knots(&grid(), 3);
     let jumps = functions([
         &Basis::PiecewiseConstant { knots },
@@ -380,7 +379,7 @@ fn the_true_system_is_passive_and_a_stiffening_spring_is_not() {
 }
 
 #[test]
-fn the_cone_is_the_cap_on_the_damping_ratio() {
+fn the_cone_is_the_bound_on_the_damping_ratio() {
     let constants = |mass: f64, stiffness: f64| {
         let list = [(MASS, mass), (DAMPING, 1.0), (STIFFNESS, stiffness)];
         collect(list.map(|(q, p)| free(q, &Basis::Constant, p)).into())
@@ -404,7 +403,7 @@ fn the_cone_is_the_cap_on_the_damping_ratio() {
         }
         assert!(!cones.hold(&[-mass, 0.0, -stiffness], 1e-9));
     }
-    // Between nodes it holds too, and fixed functions are constants of the cone.
+    // It holds between nodes as well, and fixed functions are constants of the cone.
     let nodal = functions([&Basis::Nodal, &Basis::Nodal, &Basis::Nodal]);
     let cap = built(&Constraint::DampingRatio { max: zeta }, &nodal);
     assert_eq!(cap.cones[0].cones.len(), NODES);
@@ -446,7 +445,7 @@ fn fixed_functions_move_to_the_bounds() {
         assert!(groups[0].single(i).is_some());
         assert_eq!(groups[0].bounds(i), [f64::NEG_INFINITY, -2.0]);
     }
-    // Only what is about free functions is left of passivity.
+    // Only the rows on estimated functions remain of passivity.
     let names = |f: &Parameterization| {
         let groups = built(&Constraint::Passive, f).groups;
         groups.into_iter().map(|g| g.name).collect::<Vec<_>>()

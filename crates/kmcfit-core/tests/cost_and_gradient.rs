@@ -1,4 +1,4 @@
-//! Cost and gradient in one go are those of an evaluation and its adjoint, whichever way they take.
+//! The combined computation of cost and gradient equals an evaluation followed by its adjoint, for each algorithm.
 
 mod common;
 
@@ -28,7 +28,7 @@ fn agree(problem: &Problem, theta: &[f64]) {
     }
 }
 
-/// A start that is no constant.
+/// A non-constant start.
 fn uneven(problem: &Problem) -> Vec<f64> {
     let start = problem.start();
     let wave = |(i, p): (usize, &f64)| p * (1.0 + 0.1 * (0.37 * i as f64).sin());
@@ -36,7 +36,7 @@ fn uneven(problem: &Problem) -> Vec<f64> {
 }
 
 #[test]
-fn of_one_value_a_node() {
+fn cost_and_gradient_agree_with_one_value_per_node() {
     // The last is long enough for several tiles and, where there are two cores, two threads.
     for nodes in [65, 100, 2000, 4097, 120_000] {
         let problem = paper_problem(nodes, [2.0, 1.0, 1.0]);
@@ -45,7 +45,7 @@ fn of_one_value_a_node() {
 }
 
 #[test]
-fn with_a_sigma_and_with_penalties() {
+fn cost_and_gradient_agree_with_sigma_and_penalties() {
     let mut problem = paper_problem(300, [2.0, 1.0, 1.0]);
     let samples = problem.experiments[0].channels[0].observed().to_vec();
     let grid = problem.system.grid;
@@ -71,9 +71,9 @@ fn with_a_sigma_and_with_penalties() {
     agree(&smooth, &uneven(&smooth));
 }
 
-/// Every second node is read, or other bases are estimated: no short way.
+/// Samples at every second node, or other bases: cases without the fast algorithm.
 #[test]
-fn of_everything_else() {
+fn cost_and_gradient_agree_without_the_fast_algorithm() {
     let mut problem = paper_problem(301, [2.0, 1.0, 1.0]);
     let grid = problem.system.grid;
     let samples: Vec<f64> = problem.experiments[0].channels[0].observed().to_vec();

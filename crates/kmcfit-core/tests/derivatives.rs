@@ -6,7 +6,7 @@ use common::properties::properties;
 use common::reference::{Inputs, response};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::simulate::{
-    Engine, Purpose, Trajectory, continuous_adjoint, reference,
+    Engine, EngineMode, Trajectory, continuous_adjoint, reference,
 };
 use kmcfit_core::internals::system::quadrature::trapezoid_weights;
 use kmcfit_core::internals::system::{
@@ -23,7 +23,7 @@ fn discrete_adjoint(
     response: &Trajectory,
     source: &Trajectory,
 ) -> SystemTangent {
-    let engine = Engine::choose(system, excitation, response.nodes(), Purpose::Estimation);
+    let engine = Engine::choose(system, excitation, response.nodes(), EngineMode::Fastest);
     engine.discrete_adjoint(system, nodal, excitation, response, source)
 }
 
@@ -293,7 +293,7 @@ fn the_continuous_gradient_converges_to_the_discrete_one() {
     }
 }
 
-/// Of a system whose mass and damping at the beginning are neither 1 nor 0, nor at rest.
+/// A system with initial mass other than 1, nonzero damping, and not at rest.
 fn initial_gradients(nodes: usize) -> [State; 2] {
     let system = common::system(nodes, Method::Midpoint);
     let times = system.grid.times();

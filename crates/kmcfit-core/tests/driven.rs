@@ -1,5 +1,5 @@
-//! Driven responses against closed forms: harmonic, base and transient excitation, Coulomb friction, and
-//! what sensors see between nodes.
+//! Forced responses against closed forms: harmonic, base and transient excitation, Coulomb friction, and samples between
+//! nodes.
 
 mod common;
 
@@ -39,7 +39,7 @@ fn constants(nodes: usize, values: &[f64]) -> NodalCoefficients {
     }
 }
 
-/// A function of time as the stepper sees it: exact at both ends and in the middle of each step.
+/// A function of time as input of the stepper: exact at both ends and in the middle of each step.
 fn sampled(grid: &Grid, f: impl Fn(f64) -> f64) -> StageSamples {
     let h = grid.step();
     let step = |i: usize| [0.0, 0.5, 1.0].map(|x| f(grid.time(i) + x * h));
@@ -84,11 +84,11 @@ fn tone(times: &[f64], values: &[f64], w: f64) -> (f64, f64) {
     (a.hypot(b), b.atan2(a))
 }
 
-/// How many times as many steps the long records take: 0.02 and 0.01 s, 50 and 100 or more steps in
+/// Factors of the number of steps of the long records: 0.02 and 0.01 s, 50 and 100 or more steps in
 /// the shorter of the periods of force and system.
 const STEADY: usize = 30;
 
-/// Far below, near and far above resonance (3 rad/s), long after the beginning is forgotten:
+/// Far below, near and far above resonance (3 rad/s), long after the transient:
 /// `exp(-c t / 2m)` is 1e-13 at 200 s.
 #[test]
 fn a_harmonic_force_gives_the_steady_state_of_the_textbook() {
@@ -119,8 +119,8 @@ fn a_harmonic_force_gives_the_steady_state_of_the_textbook() {
     }
 }
 
-/// A sensor that moves with the base sees the relative motion, one that is fixed in space sees base
-/// and relative motion together: `|X/B|^2 = (k^2 + (c w)^2) / ((k - m w^2)^2 + (c w)^2)`.
+/// A sensor on the base measures the relative motion, one fixed in space the sum of base and relative
+/// motion: `|X/B|^2 = (k^2 + (c w)^2) / ((k - m w^2)^2 + (c w)^2)`.
 #[test]
 fn base_and_relative_motion_together_have_the_transmissibility() {
     for method in METHODS {
@@ -181,7 +181,7 @@ fn step_response(t: f64) -> f64 {
     constant_coefficients((M, C, K), from, t).0 + 1.0 / K
 }
 
-/// A push of constant size that begins at a node and ends at another one.
+/// A constant force that begins at one node and ends at another.
 #[test]
 fn a_force_that_jumps_at_nodes_gives_the_step_response() {
     for method in METHODS {
@@ -203,7 +203,7 @@ fn a_force_that_jumps_at_nodes_gives_the_step_response() {
     }
 }
 
-/// `sin(pi t / 2)` for 2 s, without damping: in closed form during the push, free response after it.
+/// `sin(pi t / 2)` for 2 s, without damping: in closed form during the pulse, free response after it.
 #[test]
 fn a_half_sine_gives_the_response_of_the_textbook() {
     let (w, wn) = (PI / 2.0, (K / M).sqrt());
@@ -316,7 +316,7 @@ fn dry_friction_decays_in_a_line() {
     }
 }
 
-/// What sensors see between nodes has the order of the stepper: the interpolation is not worse.
+/// Samples between nodes converge with the order of the stepper: the interpolation has at least this order.
 #[test]
 fn samples_between_nodes_have_the_order_of_the_stepper() {
     let w = 2.0;

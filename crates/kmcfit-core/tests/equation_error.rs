@@ -1,5 +1,5 @@
-//! The start from the equation of motion: what fixes the common scale of m, c and k, and what only
-//! looks as if it did.
+//! The equation-error start: information that determines the common scale of m, c and k, and information that does
+//! not.
 
 mod common;
 
@@ -61,8 +61,8 @@ fn close(found: f64, expected: f64) {
     );
 }
 
-/// What says nothing about the scale leaves the mass at its start: without that the equation is
-/// solved best by a system of nothing.
+/// Without information about the scale the mass keeps its start value; otherwise zero coefficients would minimise the equation
+/// error.
 #[test]
 fn the_mass_keeps_its_mean_where_nothing_fixes_the_scale() {
     let mut with_zero = problem(None, false);
@@ -100,7 +100,7 @@ fn a_fixed_function_or_value_sets_the_scale() {
     let known = problem(Some(0.1), false);
     let found = equation_error(&known, &known.functions.start()).unwrap();
     assert!((found[0] - 1.0).abs() < 0.1, "{found:?}");
-    // k = 3 is demanded, so m is 2 k/m apart from it; an equality far smaller than the start as well.
+    // k = 3 is imposed, so m is 2 k/m apart from it; an equality far smaller than the start as well.
     for value in [3.0, 3e-7] {
         let mut demanded = problem(None, false);
         demanded = demanded
@@ -118,7 +118,7 @@ fn a_fixed_function_or_value_sets_the_scale() {
 
 /// A system need not have a damping, nor a stiffness in any place of its list.
 #[test]
-fn a_spring_alone_has_an_equation_too() {
+fn systems_without_damping_have_an_equation_error() {
     let mut system = common::system(NODES, Method::Rk4);
     system.terms = vec![Term::Stiffness];
     let truth = NodalCoefficients {
@@ -135,8 +135,8 @@ fn a_spring_alone_has_an_equation_too() {
     close(found[0], 1.5);
 }
 
-/// Velocities at irregular times, with next to no noise: integrated without losing the displacement,
-/// though their spectrum is not that of as many equally spaced values.
+/// Velocities at irregular times, almost without noise: they are integrated to the displacement although their spectrum differs from that
+/// of equally spaced samples.
 #[test]
 fn irregular_velocities_are_integrated() {
     let mut problem = problem(Some(0.1), false);
@@ -168,8 +168,8 @@ fn irregular_velocities_are_integrated() {
     assert!((ratio / 1.5 - 1.0).abs() < 0.05, "{found:?}");
 }
 
-/// Mass, stiffness and samples in other units, and the penalty with them: the samples count as they did,
-/// so the start is the same but for the unit.
+/// Mass, stiffness and samples in other units, and the penalty with them: the weight of the
+/// samples is unchanged, so the start is the same up to the unit.
 #[test]
 fn the_start_does_not_depend_on_units_of_mass_and_length() {
     let plain = problem(Some(0.0), false);

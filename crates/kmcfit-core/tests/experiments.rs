@@ -1,4 +1,4 @@
-//! What several records of one system determine together that one alone does not.
+//! Several records of one system determine coefficients that one record does not.
 
 mod common;
 
@@ -45,7 +45,7 @@ fn system(nodes: usize) -> System {
     }
 }
 
-/// No line and no constant, so that smoothness does not know it beforehand; k(0) = 1.
+/// Neither linear nor constant, so that the penalty is not zero at the truth; k(0) = 1.
 fn truth(grid: &Grid) -> NodalCoefficients {
     let times = grid.times();
     let each = |f: &dyn Fn(f64) -> f64| times.iter().map(|t| f(*t)).collect();
@@ -66,7 +66,7 @@ fn force(grid: &Grid) -> Excitation {
     Excitation::force_at_nodes(&force)
 }
 
-/// Which records there are: of each the initial state, and whether it is forced.
+/// Initial state of each record, and true if it is forced.
 type Records<'a> = &'a [(State, bool)];
 
 /// One value per step for each function, from (2, 1, 1), with samples at all nodes.
@@ -135,7 +135,7 @@ fn ratio_errors(found: &Fit, truth: &NodalCoefficients) -> [f64; 2] {
     ]
 }
 
-/// A fit of one record that explains it, but with another system.
+/// A fit that explains one record with a different parameter set.
 fn another_system(records: Records, scale_fixed: bool, truth: &NodalCoefficients) -> Fit {
     let problem = smooth(problem(NODES, truth, records), scale_fixed);
     let found = fit(&problem, &problem.start(), &settings(), &mut |_| {}).unwrap();
@@ -160,7 +160,7 @@ fn two_free_records_determine_the_ratios() {
         "{errors:?} {:#?}",
         found.attempts
     );
-    // The functions themselves are not to be seen: their common factor s(t) is the smoothest one.
+    // The functions themselves are not identifiable: the penalty selects the smoothest common factor s(t).
     let off = common::errors(&found.best.evaluation.nodal, &truth);
     assert!(off[0] > 0.05, "{off:?}");
     let one = ratio_errors(&another_system(&two[..1], true, &truth), &truth);
@@ -246,7 +246,7 @@ fn the_rank_of_the_records_is_that_of_the_table() {
         println!("{words}: {found}");
         assert_eq!(found, expected, "{words}");
     }
-    // Where there is no force, the common factor is not to be seen: one unknown less for each such node,
+    // Without a force the common factor is not identifiable: one unknown less for each such node,
     // the first one, or the 40 before a force that sets in at 5 s.
     let (_, records, _) = table[4];
     assert_eq!(sensitivity(records, 1), 596);

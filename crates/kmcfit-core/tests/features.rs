@@ -1,5 +1,5 @@
-//! What records, sensors, systems and terms can be, each alone and all together: noise-free records
-//! by an independent evaluation, from which the truth is found again to 1e-8.
+//! Records, sensors, systems and terms, separately and combined: from noise-free records of an independent evaluation the
+//! parameters are recovered to 1e-8.
 
 mod common;
 
@@ -22,8 +22,8 @@ use rand_chacha::ChaCha8Rng;
 /// 63 steps in a period of the system.
 const NODES: usize = 301;
 const DURATION: f64 = 15.0;
-/// Rounding of some hundred steps is 1e-14, and parameters that are well determined move the response by
-/// about as much as they move themselves: 1e-8 leaves room for those that are not.
+/// The rounding error of some hundred steps is 1e-14, and the relative sensitivity of the response to well-determined parameters is about
+/// 1; the tolerance of 1e-8 allows for poorly determined ones.
 const EXACT: f64 = 1e-8;
 const WIDTH: f64 = 0.3;
 const INITIAL: State = State {
@@ -49,7 +49,7 @@ fn line() -> Basis {
     }
 }
 
-/// A function to be found: its basis, the true parameters, and the start.
+/// An estimated function: basis, true parameters and start.
 #[derive(Clone)]
 struct EstimatedFunction {
     quantity: CoefficientKind,
@@ -91,7 +91,7 @@ impl EstimatedFunction {
     }
 }
 
-/// Damping and stiffness of the linear system, which most tests look for; the mass is known.
+/// Damping and stiffness of the linear system, which most tests estimate; the mass is known.
 fn damping() -> EstimatedFunction {
     constant(CoefficientKind::Damping, 0.25, 0.4)
 }
@@ -118,13 +118,13 @@ fn scattered(count: usize, seed: u64) -> Vec<f64> {
     times
 }
 
-/// How one channel was read.
+/// One channel and its sensor.
 #[derive(Clone)]
-struct Reading {
+struct ChannelSpec {
     kind: ChannelKind,
     times: Vec<f64>,
     sigma: Weighting,
-    /// True gain, offset and drift, and which scalars they are where they are estimated.
+    /// True gain, offset and drift, with the indices of the scalars if they are estimated.
     sensor: [f64; 3],
     initial_parameters: [Option<usize>; 3],
     around: Vec<InputSample>,
@@ -133,7 +133,7 @@ struct Reading {
     loss: Loss,
 }
 
-impl Reading {
+impl ChannelSpec {
     fn of(kind: ChannelKind, times: Vec<f64>) -> Self {
         Self {
             kind,
@@ -193,20 +193,20 @@ impl Reading {
     }
 }
 
-/// One record: where it started, what drove it, and what was read.
+/// One record: initial state, input and channels.
 #[derive(Clone)]
 struct Record {
     initial: State,
-    /// The scalars that the initial state is, where it is estimated.
+    /// Indices of the scalars of an estimated initial state.
     initial_parameters: [Option<usize>; 2],
     excitation: Option<Excitation>,
-    samples: Vec<Reading>,
-    /// Which system of the case.
+    samples: Vec<ChannelSpec>,
+    /// Index of the coefficient set.
     coefficient_set: usize,
 }
 
 impl Record {
-    fn free(samples: Vec<Reading>) -> Self {
+    fn free(samples: Vec<ChannelSpec>) -> Self {
         Self {
             initial: INITIAL,
             initial_parameters: [None; 2],
@@ -216,7 +216,7 @@ impl Record {
         }
     }
 
-    fn driven(excitation: Excitation, samples: Vec<Reading>) -> Self {
+    fn driven(excitation: Excitation, samples: Vec<ChannelSpec>) -> Self {
         Self {
             excitation: Some(excitation),
             ..Self::free(samples)
@@ -224,7 +224,7 @@ impl Record {
     }
 }
 
-/// A number beside the functions.
+/// A scalar parameter.
 fn scalar(truth: f64, start: f64, prior: Option<f64>) -> (f64, ScalarParameter) {
     let prior = prior.map(|sigma| Prior { mean: truth, sigma });
     let scalar = ScalarParameter {
@@ -237,7 +237,7 @@ fn scalar(truth: f64, start: f64, prior: Option<f64>) -> (f64, ScalarParameter) 
     (truth, scalar)
 }
 
-/// A system, its records, and what is to be found.
+/// A system, its records and its estimated parameters.
 struct Case {
     terms: Vec<Term>,
     /// `None` where the mass is known.
@@ -407,8 +407,8 @@ fn forced() -> Excitation {
 #[test]
 fn each_kind_of_channel() {
     for kind in ChannelKind::ALL {
-        Case::linear(vec![Record::free(vec![Reading::at_nodes(kind)])]).check(kind.name());
-        let scattered = Reading::of(kind, scattered(160, 3));
+        Case::linear(vec![Record::free(vec![ChannelSpec::at_nodes(kind)])]).check(kind.name());
+        let scattered = ChannelSpec::of(kind, scattered(160, 3));
         Case::linear(vec![Record::free(vec![scattered])])
             .check(&format!("{} between nodes", kind.name()));
     }
@@ -417,7 +417,7 @@ fn each_kind_of_channel() {
 #[test]
 fn channels_at_times_of_their_own() {
     let samples = ChannelKind::ALL.iter().zip(1..);
-    let samples = samples.map(|(kind, seed)| Reading::of(*kind, scattered(70, seed)));
+    let samples = samples.map(|(kind, seed)| ChannelSpec::of(*kind, scattered(70, seed)));
     Case::linear(vec![Record::free(samples.collect())]).check("mixed");
 }
 
@@ -425,7 +425,7 @@ fn channels_at_times_of_their_own() {
 fn samples_with_individual_sigmas_and_robust_losses() {
     let times = scattered(150, 8);
     let sigmas = (0..times.len()).map(|i| 1e-3 * (1.0 + (i % 7) as f64));
-    let mut sample = Reading::of(ChannelKind::Displacement, times.clone());
+    let mut sample = ChannelSpec::of(ChannelKind::Displacement, times.clone());
     sample.sigma = Weighting::Sigmas(sigmas.collect());
     for loss in [
         Loss::Squares,
@@ -443,8 +443,8 @@ fn samples_with_individual_sigmas_and_robust_losses() {
 #[test]
 fn gain_offset_and_drift() {
     for kind in ChannelKind::ALL {
-        // The mass is known, so that a force tells what the gain is; a free record could not.
-        let sample = Reading::of(kind, scattered(150, 4)).unknown_sensor([1.3, 0.4, -0.05], 0);
+        // With a known mass a force determines the gain; a free record does not.
+        let sample = ChannelSpec::of(kind, scattered(150, 4)).unknown_sensor([1.3, 0.4, -0.05], 0);
         let scalars = vec![
             scalar(1.3, 1.0, None),
             scalar(0.4, 0.0, None),
@@ -460,7 +460,7 @@ fn gain_offset_and_drift() {
 fn initial_states_with_and_without_a_prior() {
     for kind in ChannelKind::ALL {
         for prior in [None, Some(0.02)] {
-            let mut record = Record::free(vec![Reading::of(kind, scattered(150, 5))]);
+            let mut record = Record::free(vec![ChannelSpec::of(kind, scattered(150, 5))]);
             record.initial_parameters = [Some(0), Some(1)];
             let scalars = vec![
                 scalar(INITIAL.displacement, 0.8, prior),
@@ -478,7 +478,7 @@ fn a_measured_force_gives_the_mass_too() {
     for kind in ChannelKind::ALL {
         let mut case = Case::linear(vec![Record::driven(
             forced(),
-            vec![Reading::of(kind, scattered(200, 6))],
+            vec![ChannelSpec::of(kind, scattered(200, 6))],
         )]);
         case.mass = Some(constant(CoefficientKind::Mass, 1.2, 1.6));
         case.check(&format!("forced, {}", kind.name()));
@@ -498,7 +498,7 @@ fn base_excitation_with_sensors_on_the_base_and_in_space() {
     };
     for fixed_in_space in [false, true] {
         for kind in [ChannelKind::Displacement, ChannelKind::Acceleration] {
-            let mut sample = Reading::of(kind, times.clone());
+            let mut sample = ChannelSpec::of(kind, times.clone());
             sample.around = (times.iter())
                 .map(|t| InputSample {
                     force: 0.0,
@@ -522,7 +522,7 @@ fn base_excitation_with_sensors_on_the_base_and_in_space() {
 #[test]
 fn several_experiments_share_functions_and_have_some_of_their_own() {
     let times = |seed| scattered(120, seed);
-    let mut second = Record::free(vec![Reading::of(ChannelKind::Velocity, times(12))]);
+    let mut second = Record::free(vec![ChannelSpec::of(ChannelKind::Velocity, times(12))]);
     second.initial = State {
         displacement: -0.4,
         velocity: 2.0,
@@ -532,10 +532,10 @@ fn several_experiments_share_functions_and_have_some_of_their_own() {
     let short = times(13).into_iter().filter(|t| *t < 9.0).collect();
     let third = Record::driven(
         forced(),
-        vec![Reading::of(ChannelKind::Acceleration, short)],
+        vec![ChannelSpec::of(ChannelKind::Acceleration, short)],
     );
     let mut case = Case::linear(vec![
-        Record::free(vec![Reading::of(ChannelKind::Displacement, times(11))]),
+        Record::free(vec![ChannelSpec::of(ChannelKind::Displacement, times(11))]),
         second,
         third,
     ])
@@ -573,7 +573,10 @@ fn each_nonlinear_term() {
         ),
     ];
     for (term, estimated) in others {
-        let samples = vec![Reading::of(ChannelKind::Displacement, scattered(250, 9))];
+        let samples = vec![ChannelSpec::of(
+            ChannelKind::Displacement,
+            scattered(250, 9),
+        )];
         let mut case = Case::linear(vec![Record::driven(forced(), samples)]);
         case.terms.push(term);
         case.functions[1] = constant(CoefficientKind::Stiffness, 4.0, 3.6);
@@ -586,14 +589,14 @@ fn each_nonlinear_term() {
 fn a_band_pass_filter() {
     let rate = 1.0 / grid().step();
     for kind in ChannelKind::ALL {
-        let mut sample = Reading::at_nodes(kind);
+        let mut sample = ChannelSpec::at_nodes(kind);
         sample.filter = band_pass(2, 0.1, 2.0, rate).unwrap();
         sample.sensor = [1.0, 0.7, 0.02];
         Case::linear(vec![Record::free(vec![sample])]).check(&format!("band of {}", kind.name()));
     }
 }
 
-/// Everything at once: all terms, a mass, three experiments with states, sensors, filters, sigmas and
+/// All features combined: all terms, a mass, three experiments with states, sensors, filters, sigmas and
 /// a stiffness of their own.
 #[test]
 fn all_together() {
@@ -601,15 +604,15 @@ fn all_together() {
         force: Some(force()),
         base: Some(base()),
     };
-    let displacement = Reading::of(ChannelKind::Displacement, scattered(150, 21))
+    let displacement = ChannelSpec::of(ChannelKind::Displacement, scattered(150, 21))
         .unknown_sensor([0.8, 0.2, 0.03], 2);
-    let mut velocity = Reading::of(ChannelKind::Velocity, scattered(120, 22));
+    let mut velocity = ChannelSpec::of(ChannelKind::Velocity, scattered(120, 22));
     velocity.sigma = Weighting::Sigmas(
         (0..velocity.times.len())
             .map(|i| 1e-3 + 1e-5 * i as f64)
             .collect(),
     );
-    let mut acceleration = Reading::at_nodes(ChannelKind::Acceleration);
+    let mut acceleration = ChannelSpec::at_nodes(ChannelKind::Acceleration);
     acceleration.filter = band_pass(2, 0.1, 2.5, 1.0 / grid().step()).unwrap();
     let mut first = Record::driven(both, vec![displacement, velocity.clone()]);
     first.initial_parameters = [Some(0), Some(1)];
@@ -622,7 +625,7 @@ fn all_together() {
     let short = (0..180).map(|i| grid().time(i)).collect();
     let third = Record::driven(
         forced(),
-        vec![Reading::of(ChannelKind::Displacement, short)],
+        vec![ChannelSpec::of(ChannelKind::Displacement, short)],
     );
     Case {
         terms: vec![
@@ -669,11 +672,11 @@ fn one_value_per_node_with_sensors_states_and_a_filter() {
         truth: grid().times().iter().map(|t| from + slope * t).collect(),
         start: vec![start; NODES],
     };
-    let mut filtered = Reading::at_nodes(ChannelKind::Velocity);
+    let mut filtered = ChannelSpec::at_nodes(ChannelKind::Velocity);
     filtered.filter = band_pass(2, 0.1, 3.0, 1.0 / grid().step()).unwrap();
-    let displacement = Reading::of(ChannelKind::Displacement, scattered(250, 31))
+    let displacement = ChannelSpec::of(ChannelKind::Displacement, scattered(250, 31))
         .unknown_sensor([1.2, 0.3, 0.01], 2);
-    let acceleration = Reading::of(ChannelKind::Acceleration, scattered(200, 32));
+    let acceleration = ChannelSpec::of(ChannelKind::Acceleration, scattered(200, 32));
     let mut first = Record::driven(forced(), vec![displacement, acceleration]);
     first.initial_parameters = [Some(0), Some(1)];
     let mut second = Record::free(vec![filtered]);
@@ -712,20 +715,20 @@ fn one_value_per_node_with_sensors_states_and_a_filter() {
 }
 
 /// Fifty periods, with six nodes in each, of a system that is three times as stiff as the start says:
-/// differences are too coarse for an equation error. States and functions are corrected at once for
+/// differences are too coarse for an equation error. States and functions are corrected together for
 /// several systems, sensors, unknown states and a filter together.
 #[test]
-fn all_of_it_from_far_away_on_a_coarse_grid() {
+fn all_features_converge_from_a_distant_start_on_a_coarse_grid() {
     let rate = 1.0 / grid().step();
     // Some six irregular samples in a period, every tenth of them missing.
     let late = |i: usize| 0.2 * (1.0 + (1.7 * i as f64).sin());
     let times = (0..NODES - 1).filter(|i| i % 10 != 7);
     let times = times.map(|i| (i as f64 + late(i)) * grid().step());
-    let mut displacement = Reading::of(ChannelKind::Displacement, times.collect())
+    let mut displacement = ChannelSpec::of(ChannelKind::Displacement, times.collect())
         .unknown_sensor([1.0, 0.05, 0.002], 2);
-    // A free record could not tell the gain from the initial state.
+    // In a free record gain and initial state are not identifiable separately.
     displacement.initial_parameters = [None, Some(2), Some(3)];
-    let mut filtered = Reading::at_nodes(ChannelKind::Velocity);
+    let mut filtered = ChannelSpec::at_nodes(ChannelKind::Velocity);
     filtered.filter = band_pass(2, 1.0, 8.0, rate).unwrap();
     let mut first = Record::free(vec![displacement]);
     first.initial_parameters = [Some(0), Some(1)];
@@ -759,10 +762,10 @@ fn all_of_it_from_far_away_on_a_coarse_grid() {
     case.check("far away");
 }
 
-/// A prior with another mean pulls, by as much as its weight beside that of the samples says.
+/// A prior with another mean shifts the estimate according to its weight relative to that of the samples.
 #[test]
-fn a_prior_pulls_towards_its_mean() {
-    let mut record = Record::free(vec![Reading::of(
+fn a_prior_shifts_the_estimate_towards_its_mean() {
+    let mut record = Record::free(vec![ChannelSpec::of(
         ChannelKind::Displacement,
         scattered(150, 5),
     )]);
@@ -784,7 +787,7 @@ fn a_prior_pulls_towards_its_mean() {
     let truth = case.truth();
     let found = run(&problem).best.parameters;
     let last = truth.len() - 1;
-    // Of a linear problem: the pull is shared as the inverse of the variances.
+    // In a linear problem the weights are the inverse variances.
     let variance = common::synthetic::cramer_rao(&problem, &truth)[(last, last)];
     let expected = truth[last] + 1e-3 * variance / (variance + sigma * sigma);
     // The problem is linear for a change of some 1e-4 but for its square.
@@ -796,11 +799,11 @@ fn a_prior_pulls_towards_its_mean() {
     );
 }
 
-/// The part of a record that a growing horizon looks at is filtered like the whole: at the truth
-/// nothing is left of it.
+/// The part of a record within a growing horizon is filtered like the whole: its residuals at the true parameters are
+/// zero.
 #[test]
 fn a_part_of_a_filtered_record_is_a_record() {
-    let mut sample = Reading::at_nodes(ChannelKind::Displacement);
+    let mut sample = ChannelSpec::at_nodes(ChannelKind::Displacement);
     sample.filter = band_pass(2, 0.1, 2.0, 1.0 / grid().step()).unwrap();
     let case = Case::linear(vec![Record::free(vec![sample])]);
     let part = case.problem().truncated(0.3);

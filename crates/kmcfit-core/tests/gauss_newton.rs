@@ -25,7 +25,7 @@ const PRIOR: Prior = Prior {
 struct Units {
     /// One metre.
     length: f64,
-    /// What the sigmas of samples and priors are multiplied with: J is divided by its square.
+    /// Factor of the sigmas of samples and priors; J is divided by its square.
     sigma: f64,
 }
 
@@ -34,7 +34,7 @@ const PLAIN: Units = Units {
     sigma: 1.0,
 };
 
-/// A known response, read with an offset (m) and a drift (m/s) that are estimated: the samples are linear in
+/// A known response, measured with an offset (m) and a drift (m/s) that are estimated: the samples are linear in
 /// both. The noise is as large, so that a step leaves half of the cost.
 fn problem(units: Units) -> Problem {
     let system = common::system(NODES, Method::Rk4);
@@ -164,7 +164,7 @@ fn after(problem: &Problem, iterations: u64) -> Fit {
 }
 
 /// Three steps of the free problem with the offset held below a bound: clipping it costs `share` of the
-/// decrease of the first plain step. The model of linear samples comes true, so the damping falls to a
+/// decrease of the first plain step. The linear model is exact, so the damping falls to a
 /// tenth with every step.
 fn check(units: Units, share: f64, is_clipped: bool, programs: u64) {
     let mut bounded = problem(units);

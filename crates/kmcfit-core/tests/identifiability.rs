@@ -1,4 +1,4 @@
-//! What records can show: counts, ranks, gauges, bands, and the next experiment.
+//! Identifiability: structural ranks, numerical ranks, scaling ambiguities, bands, and experiment design.
 
 mod common;
 
@@ -11,7 +11,7 @@ use kmcfit_core::internals::functions::{
 };
 use kmcfit_core::internals::identifiability::{
     Band, BandSettings, BandSide, Bands, CandidateChannel, CandidateExperiment, Classification,
-    ScalingAmbiguity, Sensitivity, SingularSpectrum, Symmetry, classify_functions,
+    ScaleFreedom, ScalingAmbiguity, Sensitivity, SingularSpectrum, classify_functions,
     rank_experiments, structural_rank,
 };
 use kmcfit_core::internals::problem::Problem;
@@ -113,42 +113,47 @@ fn structural_and_numerical_rank_are_those_of_the_table() {
     let nodal = common::paper_system(nodes);
     let grid = system.grid;
     let drive = |i, silent| forced(i, &grid, silent);
-    let table: [(&str, Vec<Record>, usize, Symmetry); 8] = [
-        ("one free", vec![free(0)], 199, Symmetry::Function),
-        ("two free", vec![free(0), free(1)], 398, Symmetry::Function),
+    let table: [(&str, Vec<Record>, usize, ScaleFreedom); 8] = [
+        ("one free", vec![free(0)], 199, ScaleFreedom::Function),
+        (
+            "two free",
+            vec![free(0), free(1)],
+            398,
+            ScaleFreedom::Function,
+        ),
         (
             "three free",
             vec![free(0), free(1), free(2)],
             398,
-            Symmetry::Function,
+            ScaleFreedom::Function,
         ),
-        ("one forced", vec![drive(0, 0)], 199, Symmetry::None),
+        ("one forced", vec![drive(0, 0)], 199, ScaleFreedom::None),
         (
             "two free, one forced",
             vec![free(0), free(1), drive(2, 0)],
             597,
-            Symmetry::None,
+            ScaleFreedom::None,
         ),
         (
             "three forced",
             vec![drive(0, 0), drive(1, 0), drive(2, 0)],
             597,
-            Symmetry::None,
+            ScaleFreedom::None,
         ),
         (
             "f(0) = 0",
             vec![free(0), free(1), drive(2, 1)],
             596,
-            Symmetry::None,
+            ScaleFreedom::None,
         ),
         (
             "f from 5 s",
             vec![free(0), free(1), drive(2, 40)],
             557,
-            Symmetry::Function,
+            ScaleFreedom::Function,
         ),
     ];
-    for (words, records, expected, symmetry) in table {
+    for (words, records, expected, freedom) in table {
         let problem = nodal_problem(&system, &nodal, &records);
         let counted = structural_rank(&problem);
         let seen = spectrum(&problem);
@@ -164,12 +169,12 @@ fn structural_and_numerical_rank_are_those_of_the_table() {
             (expected, 600),
             "{words}"
         );
-        assert_eq!(counted.symmetry, symmetry, "{words}");
+        assert_eq!(counted.scale_freedom, freedom, "{words}");
     }
 }
 
 #[test]
-fn a_force_that_pauses_sees_less_while_it_does() {
+fn nodes_without_a_force_add_fewer_equations() {
     let nodes = 80;
     let system = common::system(nodes, Method::Midpoint);
     let nodal = common::paper_system(nodes);
@@ -186,16 +191,16 @@ fn a_force_that_pauses_sees_less_while_it_does() {
 fn a_linear_mass_lacks_one_direction_until_a_force_acts() {
     let system = common::system(200, Method::Midpoint);
     let force = forced(0, &system.grid, 0);
-    for (record, expected, symmetry) in [
-        (free(0), 3, Symmetry::ConstantFactor),
-        (force, 4, Symmetry::None),
+    for (record, expected, freedom) in [
+        (free(0), 3, ScaleFreedom::ConstantFactor),
+        (force, 4, ScaleFreedom::None),
     ] {
         let problem = linear_mass(&system, record);
         let counted = structural_rank(&problem);
         println!("{}", counted.sentences().join("; "));
         assert_eq!((counted.rank_bound, counted.parameters), (expected, 4));
         assert_eq!(spectrum(&problem).rank(), expected);
-        assert_eq!(counted.symmetry, symmetry);
+        assert_eq!(counted.scale_freedom, freedom);
     }
 }
 
@@ -242,7 +247,7 @@ fn a_constant_factor_leaves_response_and_cost_and_is_named() {
     let system = common::system(200, Method::Midpoint);
     let problem = linear_mass(&system, free(0));
     let theta = problem.start();
-    // Off the truth, so that there is a cost.
+    // Away from the truth, so that the cost is not zero.
     let theta: Vec<f64> = theta.iter().map(|x| 1.05 * x - 0.01).collect();
     let scaled: Vec<f64> = theta.iter().map(|x| 1.7 * x).collect();
     let (a, b) = (
@@ -342,7 +347,7 @@ fn constraints_and_penalties_determine_the_scale_or_its_constant_factor() {
         })
         .unwrap();
     assert!(ambiguity(&fixed).is_empty());
-    assert_eq!(structural_rank(&fixed).symmetry, Symmetry::None);
+    assert_eq!(structural_rank(&fixed).scale_freedom, ScaleFreedom::None);
 
     let first = open.functions.ranges()[2].start;
     let mut value = RowGroup::new("k(0) = 1");
@@ -366,7 +371,7 @@ fn constraints_and_penalties_determine_the_scale_or_its_constant_factor() {
         assert_eq!(found.over_time().count(), nodes - 1);
         let counted = structural_rank(&held);
         println!("{}", counted.sentences().join("; "));
-        assert_eq!(counted.symmetry, Symmetry::Function);
+        assert_eq!(counted.scale_freedom, ScaleFreedom::Function);
         let mut smooth = held.clone();
         let rows = Basis::Nodal.roughness(&system.grid, 2);
         smooth = smooth
@@ -374,7 +379,7 @@ fn constraints_and_penalties_determine_the_scale_or_its_constant_factor() {
                 parts.penalties.push(Penalty::new(0, 2, 1.0, rows));
             })
             .unwrap();
-        assert_eq!(structural_rank(&smooth).symmetry, Symmetry::None);
+        assert_eq!(structural_rank(&smooth).scale_freedom, ScaleFreedom::None);
     }
 }
 
@@ -652,7 +657,7 @@ fn a_bound_that_is_active_makes_the_band_one_sided() {
 }
 
 #[test]
-fn without_sigma_the_residuals_say_it() {
+fn without_sigma_the_residuals_determine_it() {
     let nodes = 400;
     let system = common::system(nodes, Method::Rk4);
     let with_sigma = linear_mass(&system, forced(0, &system.grid, 0));
@@ -708,7 +713,7 @@ fn candidate(name: &str, (initial, force): Record) -> CandidateExperiment {
 }
 
 #[test]
-fn the_next_experiment_is_the_one_that_sees_something_new() {
+fn experiments_that_add_identifiable_combinations_rank_first() {
     let nodes = 60;
     let system = common::system(nodes, Method::Midpoint);
     let nodal = common::paper_system(nodes);
@@ -845,8 +850,8 @@ fn a_record_that_ends_early_identifies_only_its_span() {
     assert_eq!(words[2].verdict, Classification::Fixed);
 }
 
-/// Smoothness so heavy that the estimate scatters much less than Cramer and Rao would have it: the
-/// sandwich says by how much.
+/// A penalty so large that the estimate scatters much less than the Cramer-Rao bound: the sandwich covariance predicts the
+/// scatter.
 #[test]
 fn the_sandwich_is_the_scatter_of_smoothed_estimates() {
     let (nodes, sigma, seeds) = (300, 0.05, 200);
@@ -939,8 +944,8 @@ fn the_scale_by_bases_and_drives() {
         knots: knots(count),
     };
     let table = [
-        (all(cells.clone()), 12, Symmetry::Function),
-        // Six cells and four have two halves of the record in common.
+        (all(cells.clone()), 12, ScaleFreedom::Function),
+        // Six cells and four cells share the middle of the record as a knot.
         (
             [
                 cells.clone(),
@@ -948,22 +953,22 @@ fn the_scale_by_bases_and_drives() {
                 cells,
             ],
             14,
-            Symmetry::Function,
+            ScaleFreedom::Function,
         ),
-        (all(line(9)), 26, Symmetry::NearlyFunction),
-        (all(line(3)), 8, Symmetry::ConstantFactor),
+        (all(line(9)), 26, ScaleFreedom::NearlyFunction),
+        (all(line(3)), 8, ScaleFreedom::ConstantFactor),
         (
             all(Basis::BSpline { knots: knots(9) }),
             32,
-            Symmetry::NearlyFunction,
+            ScaleFreedom::NearlyFunction,
         ),
         (
             [line(9), Basis::Constant, line(9)],
             18,
-            Symmetry::ConstantFactor,
+            ScaleFreedom::ConstantFactor,
         ),
     ];
-    for (bases, expected, symmetry) in table {
+    for (bases, expected, freedom) in table {
         let name = format!("{bases:?}");
         let problem = with(bases, &[free(0), free(1)]);
         let counted = structural_rank(&problem);
@@ -973,20 +978,20 @@ fn the_scale_by_bases_and_drives() {
             counted.sentences().join("; ")
         );
         assert_eq!(
-            (counted.rank_bound, counted.symmetry),
-            (expected, symmetry),
+            (counted.rank_bound, counted.scale_freedom),
+            (expected, freedom),
             "{name}"
         );
         // Values that jump at knots are linear over the step there: the rank is that of the constant
         // factor alone, with singular values that fall with the step.
-        if symmetry != Symmetry::Function {
+        if freedom != ScaleFreedom::Function {
             assert!(spectrum(&problem).rank() <= expected, "{name}");
         }
         let ambiguity = ScalingAmbiguity::at(&problem, &problem.start());
         assert_eq!(ambiguity.constant().count(), 1, "{name}");
     }
 
-    // A base that moves pushes with m b'': that scales too.
+    // The force of a moving base is -m b'', which scales with the mass.
     let mut problem = nodal_problem(&system, &nodal, &[free(0)]);
     problem = problem
         .with(|parts| {
@@ -996,7 +1001,10 @@ fn the_scale_by_bases_and_drives() {
             });
         })
         .unwrap();
-    assert_eq!(structural_rank(&problem).symmetry, Symmetry::Function);
+    assert_eq!(
+        structural_rank(&problem).scale_freedom,
+        ScaleFreedom::Function
+    );
     assert_eq!(
         ScalingAmbiguity::at(&problem, &problem.start())
             .over_time()
@@ -1004,7 +1012,7 @@ fn the_scale_by_bases_and_drives() {
         nodes
     );
 
-    // Motions of a stiffness that is not linear do not add up: a third free record counts.
+    // Responses of a nonlinear spring cannot be superposed: a third free record adds information.
     let mut cubic = system.clone();
     cubic.terms = vec![Term::Damping, Term::CubicStiffness];
     let records = [free(0), free(1), free(2)];

@@ -1,5 +1,4 @@
-//! Problems without a system, and quadratic programs without an answer: the fit ends with a word for
-//! it, and keeps its best point.
+//! Infeasible problems, and quadratic programs without a solution: the fit ends with a status and its best point.
 
 mod common;
 
@@ -87,7 +86,7 @@ fn keeps_the_best_point(problem: &Problem, found: &Fit) {
 fn a_stalled_program_ends_a_fit_with_its_best_point() {
     for solver in SOLVERS {
         let mut problem = problem(&knots());
-        // The data push against it from the first iteration on, and no clipping will do.
+        // The constraint is active from the first iteration on, and clipping is not sufficient.
         problem = problem
             .with(|parts| {
                 parts.constraints.groups = vec![falling([0.0, UNBOUNDED], 1.0)];
@@ -95,7 +94,7 @@ fn a_stalled_program_ends_a_fit_with_its_best_point() {
             .unwrap();
         let solved = run(&problem, solver, Stopping::default().program_iterations);
         assert_eq!(solved.outcome.status, Status::Converged, "{solver:?}");
-        // Without an iteration every program is refused.
+        // Without iterations no program is solved.
         let found = run(&problem, solver, 0);
         assert_eq!(found.outcome.status, Status::Stalled, "{solver:?}");
         assert!(found.outcome.reason.to_string().contains("solver stalled"));
@@ -110,10 +109,10 @@ fn a_stalled_program_ends_a_fit_with_its_best_point() {
     }
 }
 
-/// A program may also stall after some were solved: whatever the limit, what was reached is kept, and
-/// more iterations for each program never bring a worse end.
+/// A program may also stall after others were solved: for any limit the best point is kept, and more iterations per program never lead to
+/// a higher cost.
 #[test]
-fn a_program_that_stalls_on_the_way_costs_nothing_that_was_reached() {
+fn a_stalled_program_does_not_lose_the_best_point() {
     let mut problem = problem(&knots());
     problem = problem
         .with(|parts| {
@@ -134,10 +133,10 @@ fn a_program_that_stalls_on_the_way_costs_nothing_that_was_reached() {
     assert_eq!(last.outcome.status, Status::Converged);
 }
 
-/// Rows with factors from 1e-200 to 1e200 say the same as rows of size 1; rows whose own entries are
-/// that far apart are beyond any solver. Either way there is a word for the end and a point.
+/// Rows with factors from 1e-200 to 1e200 are equivalent to rows of size 1; rows whose entries differ by as
+/// much cannot be solved. In both cases the fit has a status and a point.
 #[test]
-fn badly_scaled_constraints_cost_no_point() {
+fn badly_scaled_constraints_end_with_a_point() {
     let mut mixed = RowGroup::new("sizes apart");
     mixed.push([(0, 1e-150), (1, 1e150)], [0.0, UNBOUNDED], [0.0, 0.0]);
     mixed.push([(2, 1e-9), (3, -1e9), (4, 1.0)], [-1.0, 1e9], [0.0, 0.0]);
@@ -158,7 +157,7 @@ fn badly_scaled_constraints_cost_no_point() {
             let start = match problem.feasible_start(&problem.functions.start()) {
                 StartProjection::Kept(start) => start,
                 StartProjection::Moved { parameters, .. } => parameters,
-                // A program that stalls here is said before there is a fit.
+                // A program that stalls here is reported before the fit.
                 StartProjection::Unsolved(_) => continue,
                 other => panic!("{i} {solver:?}: {other:?}"),
             };
@@ -175,7 +174,7 @@ fn badly_scaled_constraints_cost_no_point() {
     }
 }
 
-/// From a start outside of constraints that contradict each other no step leads anywhere.
+/// From a start outside contradictory constraints no step is possible.
 #[test]
 fn contradictory_constraints_of_a_problem_make_a_fit_infeasible() {
     for solver in SOLVERS {
@@ -195,10 +194,10 @@ fn contradictory_constraints_of_a_problem_make_a_fit_infeasible() {
     }
 }
 
-/// The nearest function that goes through three points dips below zero between two of them; the
-/// nearest that is positive does not.
+/// The nearest function through three points is negative between two of them; the nearest non-negative function is
+/// not.
 #[test]
-fn a_start_is_moved_to_where_there_is_a_mass() {
+fn a_start_is_projected_to_a_positive_mass() {
     let basis = Basis::Polynomial { degree: 4 };
     let mut problem = problem(&basis);
     let grid = problem.system.grid;

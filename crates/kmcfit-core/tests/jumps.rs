@@ -1,4 +1,4 @@
-//! A stiffness that jumps: total variation finds it, squared smoothness does not.
+//! A stiffness with a jump: a total-variation penalty recovers it, a Tikhonov penalty does not.
 
 mod common;
 
@@ -105,7 +105,7 @@ fn total_variation_finds_the_jump_and_both_levels() {
     let k = stiffness(&problem);
     let jump = cells.windows(2).position(|w| w[0] != w[1]).unwrap() + 1;
     assert_eq!(jumps(&k), [jump]);
-    // The jump is found to one knot: the cell beside it may carry a part of it.
+    // The jump is located to one knot: the adjacent cell may have a part of it.
     let beside = |i: usize| i.abs_diff(jump) <= 1;
     for (i, (k, truth)) in k
         .iter()
@@ -121,7 +121,7 @@ fn total_variation_finds_the_jump_and_both_levels() {
 }
 
 #[test]
-fn squared_smoothness_smears_the_jump() {
+fn tikhonov_penalties_smooth_the_jump() {
     let (mut problem, cells) = problem();
     let Some(basis) = problem
         .functions

@@ -1,4 +1,4 @@
-//! Laws that hold for every system: checked on random ones, the same in every run.
+//! Physical laws and invariances, tested on random systems from a fixed seed.
 
 use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
 use kmcfit_core::internals::problem::Problem;
@@ -106,7 +106,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 const ROUNDING: f64 = 1e-12;
 
 #[test]
-fn the_sum_of_two_causes_has_the_sum_of_their_effects() {
+fn responses_of_a_linear_system_superpose() {
     for_cases(|case| {
         let system = system(501, Method::Rk4);
         let nodal = case.nodal(&system.grid);
@@ -211,7 +211,7 @@ fn energy_is_balanced_to_the_order_of_the_stepper() {
             ]
         };
         let ([coarse, scale], [fine, _]) = (imbalance(401), imbalance(801));
-        // Where the leading error nearly cancels, a part of its scale is left of the next order.
+        // If the leading error nearly cancels, the next order remains, as a fraction of its scale.
         let bound = coarse.abs() / 4.0 * 1.15 + 1e-3 * scale;
         assert!(fine.abs() <= bound, "{case:?}: {coarse:e} -> {fine:e}");
         assert!(coarse.abs() <= 10.0 * scale, "{case:?}: {coarse:e}");
@@ -225,7 +225,7 @@ fn record(case: Case, per_metre: f64, later: f64) -> Record {
     let response = system
         .forward(&case.nodal(&grid), case.state(), None)
         .unwrap();
-    // A deterministic error, so that no fit is exact.
+    // A deterministic error makes every fit inexact.
     let read = |(i, y): (usize, &f64)| per_metre * (y + 0.01 * (1.3 * i as f64).sin());
     let samples: Vec<f64> = response.displacement.iter().enumerate().map(read).collect();
     let times: Vec<f64> = grid.times().iter().map(|t| t + later).collect();
@@ -249,8 +249,8 @@ fn fitted(problem: &Problem) -> Fit {
     problem.fit().unwrap()
 }
 
-/// What two fits of the same minimum may differ by: the tolerance of J is 1e-10, that of the parameters its
-/// root.
+/// Largest difference of two fits of the same minimum: the tolerance of J is 1e-10, that of the parameters its
+/// square root.
 const SAME_MINIMUM: f64 = 1e-4;
 
 fn same(a: &Fit, b: &Fit, case: Case) {
@@ -263,7 +263,7 @@ fn same(a: &Fit, b: &Fit, case: Case) {
     }
 }
 
-/// Eight of the cases, for laws that take fits.
+/// Eight of the cases, for laws that need fits.
 fn for_some_cases(law: impl Fn(Case)) {
     let count = std::cell::Cell::new(0);
     for_cases(|case| {

@@ -16,7 +16,7 @@ use std::f64::consts::{PI, TAU};
 
 /// From 1 Hz to 2 Hz in 200 s: 300 periods.
 const DURATION: f64 = 200.0;
-/// 16 steps in the shortest period: the stepper turns too slowly by 2e-4 there, for data and model alike.
+/// 16 steps in the shortest period: the frequency error of the stepper is 2e-4 there, for data and model alike.
 const NODES: usize = 6_401;
 const NOISE: f64 = 0.01;
 const DAMPING: f64 = 0.01;
@@ -45,7 +45,7 @@ fn line(grid: &Grid) -> Basis {
     }
 }
 
-/// The function of `basis` nearest to a frequency that goes from 1 to 2 Hz in an S.
+/// The function of `basis` nearest to a frequency that rises from 1 to 2 Hz along an S-curve.
 fn truth(grid: &Grid, basis: &Basis) -> NodalCoefficients {
     let frequency = |t: &f64| 1.5 - 0.5 * (PI * t / DURATION).cos();
     let stiffness: Vec<f64> = (grid.times().iter())
@@ -61,16 +61,16 @@ fn truth(grid: &Grid, basis: &Basis) -> NodalCoefficients {
     }
 }
 
-/// What is read, and how often: every so many nodes, on them or not, with so much noise.
+/// Samples of a channel: their stride in nodes, their offset from the nodes, and their noise.
 #[derive(Debug, Clone, Copy)]
-struct Reading {
+struct ChannelSpec {
     kind: ChannelKind,
     stride: usize,
     irregular: bool,
     noise: f64,
 }
 
-impl Reading {
+impl ChannelSpec {
     const fn every_node(kind: ChannelKind) -> Self {
         Self {
             kind,
@@ -93,8 +93,13 @@ impl Reading {
 }
 
 /// Mass known, damping constant, stiffness in `basis`; the start is a constant.
-fn problem(basis: &Basis, sample: Reading, factor: f64, seed: u64) -> (Problem, NodalCoefficients) {
-    let Reading { kind, noise, .. } = sample;
+fn problem(
+    basis: &Basis,
+    sample: ChannelSpec,
+    factor: f64,
+    seed: u64,
+) -> (Problem, NodalCoefficients) {
+    let ChannelSpec { kind, noise, .. } = sample;
     let system = system();
     let grid = system.grid;
     let truth = truth(&grid, basis);
@@ -169,7 +174,7 @@ fn errors(problem: &Problem, found: &Fit, truth: &NodalCoefficients) -> [f64; 2]
 
 /// From a stiffness three times too large and three times too small: within `limit` of the truth at
 /// all times, and as near as the noise allows. Returns the attempts.
-fn check(basis: &Basis, sample: Reading, limit: f64) -> Vec<&'static str> {
+fn check(basis: &Basis, sample: ChannelSpec, limit: f64) -> Vec<&'static str> {
     let mut last = Vec::new();
     for (factor, seed) in [(3.0, 1), (1.0 / 3.0, 2)] {
         let (problem, truth) = problem(basis, sample, factor, seed);
@@ -182,7 +187,7 @@ fn check(basis: &Basis, sample: Reading, limit: f64) -> Vec<&'static str> {
             "{sample:?} {} x{factor:.2}: {relative:.1e}, {standard:.2} sigma",
             basis.name()
         );
-        // The start values alone lead to a wrong period: they explain next to nothing.
+        // The start values have a wrong period and explain almost nothing.
         assert!(found.attempts[0].cost > 0.5 * problem.zero_response_misfit());
         assert!(relative < limit, "{relative} {:#?}", found.attempts);
         // The largest of some ten independent values: beyond 4 by chance once in a thousand times.
@@ -196,23 +201,27 @@ fn check(basis: &Basis, sample: Reading, limit: f64) -> Vec<&'static str> {
 fn displacements_at_every_node_give_the_stiffness_to_a_thousandth() {
     let grid = system().grid;
     for basis in [spline(&grid), line(&grid)] {
-        check(&basis, Reading::every_node(ChannelKind::Displacement), 1e-3);
+        check(
+            &basis,
+            ChannelSpec::every_node(ChannelKind::Displacement),
+            1e-3,
+        );
     }
 }
 
 #[test]
 fn accelerations_alone_give_the_stiffness_to_a_thousandth() {
-    let sample = Reading::every_node(ChannelKind::Acceleration);
+    let sample = ChannelSpec::every_node(ChannelKind::Acceleration);
     check(&spline(&system().grid), sample, 1e-3);
 }
 
-/// Five samples in the shortest period. Differences over them take several per cent off the
-/// acceleration, and the equation error is wrong by several periods; the response is not.
+/// Five samples in the shortest period. Their differences underestimate the acceleration by
+/// several per cent, and the equation error accumulates several periods; the response does not.
 #[test]
 fn few_displacements_in_a_period_need_states_and_functions_at_once() {
-    let sample = Reading {
+    let sample = ChannelSpec {
         stride: 3,
-        ..Reading::every_node(ChannelKind::Displacement)
+        ..ChannelSpec::every_node(ChannelKind::Displacement)
     };
     // Four times fewer samples: errors twice as large.
     let last = check(&line(&system().grid), sample, 2e-3);
@@ -222,21 +231,21 @@ fn few_displacements_in_a_period_need_states_and_functions_at_once() {
 /// Between samples, between nodes, without a displacement.
 #[test]
 fn few_irregular_accelerations_need_states_and_functions_at_once() {
-    let sample = Reading {
+    let sample = ChannelSpec {
         stride: 3,
         irregular: true,
-        ..Reading::every_node(ChannelKind::Acceleration)
+        ..ChannelSpec::every_node(ChannelKind::Acceleration)
     };
     let last = check(&spline(&system().grid), sample, 2e-3);
     assert_eq!(last, ["motion of the samples"; 2]);
 }
 
-/// With so much noise that smoothing takes a part of the response with it.
+/// With so much noise that smoothing removes part of the response.
 #[test]
 fn twenty_per_cent_of_noise_give_the_stiffness_to_two_per_cent() {
-    let sample = Reading {
+    let sample = ChannelSpec {
         noise: 0.2,
-        ..Reading::every_node(ChannelKind::Displacement)
+        ..ChannelSpec::every_node(ChannelKind::Displacement)
     };
     let last = check(&spline(&system().grid), sample, 2e-2);
     assert_eq!(last, ["motion of the samples"; 2]);

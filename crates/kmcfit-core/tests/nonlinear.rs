@@ -1,4 +1,4 @@
-//! Nonlinear systems from what drives them and how they move, with one per cent of noise.
+//! Identification of nonlinear systems from input and response with one per cent of noise.
 
 mod common;
 
@@ -17,7 +17,7 @@ const REST: State = State {
     velocity: 0.0,
 };
 
-/// A constant: what it is, its truth and its start.
+/// A constant: its kind, true value and start value.
 type Constant = (CoefficientKind, f64, f64);
 
 struct Case {
@@ -75,7 +75,7 @@ impl Case {
                 let error = found.best.parameters[j] / truth - 1.0;
                 let spread = covariance[(j, j)].sqrt() / truth;
                 println!("{} {error:+.1e}, spread {spread:.1e}", quantity.name());
-                // One per cent is asked for; beyond four times the spread once in a thousand of the 40.
+                // The limit is one per cent; an error beyond four standard deviations has a probability of 1e-3 for all 40 together.
                 assert!(
                     error.abs() < 0.01,
                     "{quantity:?} {error} {:#?}",
@@ -128,12 +128,12 @@ fn duffing(factors: [f64; 4]) -> Case {
     }
 }
 
-/// From too heavy, too stiff and too much damping, and from the opposite, without a cubic term.
+/// From start values that are all too large and all too small, without a cubic term.
 #[test]
 fn a_forced_duffing_oscillator_to_one_per_cent() {
     for factors in [[2.5, 5.0, 2.0, 3.0], [0.4, 0.2, 0.5, 0.0]] {
         let case = duffing(factors);
-        // It is nonlinear: at the largest displacement the cubic spring is the stronger one.
+        // Strongly nonlinear: at the largest displacement the cubic force exceeds the linear one.
         let most = (case.response().displacement.iter()).fold(0.0f64, |m, y| m.max(y.abs()));
         assert!(1.2 * most * most > 2.5, "{most}");
         case.check();
@@ -171,7 +171,7 @@ fn a_mass_that_sticks_in_every_cycle_to_one_per_cent() {
     let force = case.excitation.force.as_ref().unwrap().at_nodes();
     for cycle in 0..PERIODS {
         let nodes = cycle * STEPS..(cycle + 1) * STEPS;
-        // At rest but for the creep of the smoothed friction, which alone holds the mass.
+        // At rest except for the creep of the smoothed friction, which alone balances the force.
         let sticks = |i: &usize| {
             let pull = force[*i] - 2.0 * response.displacement[*i];
             response.velocity[*i].abs() < 2.0 * WIDTH && pull.abs() < FRICTION

@@ -12,10 +12,10 @@ use kmcfit_core::internals::solvers::{FitSettings, Solver, Stopping, fit_from};
 use kmcfit_core::internals::system::{Method, NodalCoefficients};
 
 const NODES: usize = 101;
-/// The share of the slope by which the method has J fall at least.
+/// Fraction of the slope by which a step must lower J (Armijo).
 const DECREASE: f64 = 1e-4;
 
-/// A known response and noise, read with an offset that is estimated, with samples' sigma.
+/// A known response and noise, measured with an estimated offset, with sigma.
 fn problem(sigma: f64) -> Problem {
     let system = common::system(NODES, Method::Rk4);
     let values = [1.0, 0.1, 1.0].map(|value| vec![value; NODES]);
@@ -59,7 +59,7 @@ fn problem(sigma: f64) -> Problem {
 /// `-J/(2 q x)`, with the slope -J; a share s of it gives `J (1 - s + s^2 k)` with
 /// `k = 1/4 + r/(4 q x^2)`. So a start is chosen by the decrease that a share brings.
 #[test]
-fn a_step_is_halved_until_it_brings_its_share_of_the_slope() {
+fn a_step_is_halved_until_it_lowers_the_cost_by_its_share_of_the_slope() {
     // In any unit of J.
     for sigma in [1e-3, 1.0, 1e6] {
         let problem = problem(sigma);

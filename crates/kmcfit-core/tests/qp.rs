@@ -1,4 +1,4 @@
-//! The convex subproblems on their own, against answers found another way.
+//! Convex subproblems against solutions by independent methods.
 
 use kmcfit_core::internals::constraints::{Cone, Constraints, RowGroup, Rows};
 use kmcfit_core::internals::qp::{ConicStatus, Subproblem, project};
@@ -55,7 +55,7 @@ fn bounds_from_below_have_negative_multipliers() {
 fn equalities_and_their_multipliers() {
     let mut sub = nearest(&[1.0, 0.0]);
     sub.equalities.push([(0, 2.0), (1, 2.0)], 4.0);
-    let plain = sub.solve_plain().unwrap();
+    let plain = sub.solve_equality_constrained().unwrap();
     let conic = sub.solve();
     for z in [&plain, &conic.z] {
         assert!(close(z, &[1.5, 0.5], 1e-8), "{z:?}");
@@ -84,7 +84,7 @@ fn absolute_values_are_soft_thresholds() {
         let mut sub = nearest(&[a]);
         sub.absolute.push([(0, 1.0)], 0.0);
         sub.absolute_weights.push(w);
-        assert!(sub.solve_plain().is_none());
+        assert!(sub.solve_equality_constrained().is_none());
         let solution = sub.solve();
         assert!(
             close(&solution.z, &[expected], 1e-6),
@@ -134,7 +134,7 @@ fn contradictions_are_infeasible() {
 }
 
 #[test]
-fn every_ending_has_a_sentence_of_its_own() {
+fn every_status_has_a_different_sentence() {
     let all = [
         ConicStatus::Solved,
         ConicStatus::Almost,
@@ -159,7 +159,7 @@ fn numbers_that_are_not_finite_do_not_panic() {
         sub.bound([(0, bad), (1, 1.0)], 0.0, f64::INFINITY);
         let solution = sub.solve();
         assert!(solution.z.iter().all(|z| z.is_finite()));
-        let _ = sub.solve_plain();
+        let _ = sub.solve_equality_constrained();
     }
 }
 
@@ -225,8 +225,8 @@ proptest! {
         let constraints = Constraints { groups: vec![group], cones: Vec::new() };
         let projection = project(&constraints, &target, &[1.0; 3]);
         prop_assert_eq!(projection.status, ConicStatus::Solved);
-        // The distance is right to the program's own gap of 1e-8; the point, where a row is only just
-        // active, to the root of that.
+        // The distance is accurate to the duality gap of 1e-8, the point to its square root if a row is weakly
+        // active.
         let distance = |z: &[f64]| z.iter().zip(&target).map(|(z, t)| (z - t).powi(2)).sum::<f64>();
         let (found, least) = (distance(&projection.theta), distance(&expected));
         prop_assert!((found - least).abs() <= 1e-8 * (1.0 + least), "{found} {least}");
@@ -245,7 +245,7 @@ proptest! {
             sub.residuals.push((0..3).map(|j| (j, scale * a[3 * i + j])), scale * b[i]);
         }
         sub.proximal = vec![1e-3 * scale * scale; 3];
-        let (plain, conic) = (sub.solve_plain().unwrap(), sub.solve());
+        let (plain, conic) = (sub.solve_equality_constrained().unwrap(), sub.solve());
         prop_assert!(close(&plain, &conic.z, 1e-5), "{plain:?} {:?}", conic.z);
     }
 }

@@ -3,7 +3,7 @@
 //! Every program has small integers for data, and its minimum is found in rational numbers by trying
 //! every active set. Rows, variables and cost are then multiplied by powers of two up to 2^20 and down to
 //! 2^-20, which are exact in floating point and leave the minimum, in the scale of the cost, as it is.
-//! `KMCFIT_QP_SEED` gives other programs.
+//! `KMCFIT_QP_SEED` selects other programs.
 
 mod rational;
 
@@ -14,7 +14,7 @@ use rational::{Program, Row};
 
 /// Programs in all.
 const PROGRAMS: u64 = 500;
-/// Programs that may be refused.
+/// Largest number of programs that may fail.
 const REFUSALS: usize = 5;
 /// Accuracy of the minimum, relative to the larger of it and the cost at zero.
 const COST: f64 = 1e-9;
@@ -51,7 +51,7 @@ fn times(a: &[i128], z: &[i128]) -> i128 {
     a.iter().zip(z).map(|(a, z)| a * z).sum()
 }
 
-/// A program around the point `z`, which satisfies its constraints unless it is `contradicted`.
+/// A program whose constraints the point `z` satisfies, unless it is `contradicted`.
 fn program(random: &mut ChaCha8Rng, contradicted: bool) -> Program {
     let n = random.random_range(2..=4usize);
     let z: Vec<i128> = (0..n).map(|_| small(random)).collect();

@@ -1,5 +1,5 @@
-//! Every basis, method and kind of constraint on problems with known answers, from random starts: how
-//! many of them reach the answer.
+//! Every basis, method and kind of constraint on problems with known solutions: number of random starts that reach the
+//! solution.
 
 mod common;
 
@@ -19,7 +19,7 @@ const STARTS: u64 = 20;
 const NODES: usize = 61;
 const ITERATIONS: u64 = 400;
 
-/// Every basis, small enough that a mass which falls in a line is far from a constant in it.
+/// Every basis, with few enough parameters that a linearly decreasing mass is far from a constant.
 fn bases(grid: &Grid) -> [Basis; 6] {
     let knots = |count| uniform_knots(grid, count);
     [
@@ -64,7 +64,7 @@ fn problem(basis: &Basis, constrained: bool, start: (f64, f64)) -> (Problem, Nod
         CoefficientFunction::fixed(CoefficientKind::Stiffness, vec![1.0; NODES]),
     ];
     let mut problem = common::problem_of(system, list, observed, None);
-    // Weak enough not to move the answer, which it does not charge; it makes it the only one.
+    // The penalty is zero at the solution and makes it unique.
     let rows = basis.roughness(&grid, 2);
     problem.penalize(Penalty::new(0, 2, 1.0, rows)).unwrap();
     if constrained {
@@ -78,7 +78,7 @@ fn problem(basis: &Basis, constrained: bool, start: (f64, f64)) -> (Problem, Nod
     (problem, truth)
 }
 
-/// The mass is only lost, and the damping is never negative.
+/// The mass is non-increasing and the damping non-negative.
 fn constraints(problem: &Problem, basis: &Basis) -> Vec<RowGroup> {
     let grid = problem.system.grid;
     let mut falling = RowGroup::new("mass non-increasing");
@@ -92,7 +92,7 @@ fn constraints(problem: &Problem, basis: &Basis) -> Vec<RowGroup> {
         });
         let mut row = vec![0.0; basis.parameters(&grid)];
         entries.concat().iter().for_each(|(j, a)| row[*j] += a);
-        // Within a cell, and for a constant, the mass is the same: there is nothing to demand.
+        // Within a cell, and for a constant, the mass does not change: there is no row.
         let row: Vec<_> = row
             .into_iter()
             .enumerate()
@@ -135,7 +135,7 @@ fn reaches(basis: &Basis, solver: Solver, constrained: bool, seed: u64) -> bool 
     assert!(problem.constraints.hold(&found.best.parameters, 1e-9));
     let errors = common::errors(&found.best.evaluation.nodal, &truth);
     let reached = errors.iter().all(|e| *e < 1e-3);
-    // No fit ends elsewhere; unfinished fits are on the way.
+    // No fit converges elsewhere; unfinished fits approach the solution.
     let status = found.outcome.status;
     assert!(
         reached || status == Status::MaxIterations,

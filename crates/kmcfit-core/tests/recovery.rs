@@ -1,4 +1,4 @@
-//! The true system is found again.
+//! Recovery of the true system from simulated records.
 
 mod common;
 
@@ -236,8 +236,8 @@ fn the_scatter_of_the_linear_mass_agrees_with_the_fisher_information() {
     assert!((30.3..102.7).contains(&sum), "{sum}");
 }
 
-/// Positivity alone: an exact fit, and another system. Without a force only k/m and c/m can be
-/// seen, and one record gives one equation per instant for the two.
+/// Positivity alone: an exact fit with a different parameter set. Without a force only k/m and c/m are identifiable, and one
+/// record gives one equation per instant for the two.
 #[test]
 fn positivity_alone_does_not_recover_the_system() {
     let (system, truth, observed) = paper_data(2000);
@@ -283,7 +283,7 @@ fn positivity_alone_does_not_recover_the_system() {
         "{:?}",
         found.outcome
     );
-    // Judged by what a free record could show at all: the ratios.
+    // Assessed by the ratios, which a free record can determine.
     let (ratios, exact) = (Ratios::of(nodal), Ratios::of(&truth));
     let off = |a: &[f64], b: &[f64]| {
         a.iter()

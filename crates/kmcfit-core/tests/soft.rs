@@ -1,4 +1,4 @@
-//! Constraints that may be broken at a price, and what becomes of them as the price rises.
+//! Soft constraints: their violation and cost as the weight of the penalty increases.
 
 mod common;
 
@@ -28,7 +28,7 @@ fn problem() -> Problem {
     common::problem_of(system, list, observed, None)
 }
 
-/// `mass >= 0.7` at every knot, which the truth breaks after 15 s.
+/// `mass >= 0.7` at every knot, which the truth violates after 15 s.
 fn heavy(soft: Option<f64>) -> RowGroup {
     let mut group = RowGroup::new("mass >= 0.7");
     for j in 0..6 {
@@ -88,7 +88,7 @@ fn a_large_penalty_weight_is_a_hard_constraint() {
         let theta = &found.best.parameters;
         let (rows, largest) = group.slack(theta);
         assert!(!rows.is_empty(), "the data always push");
-        // J is the misfit and the price, mean over the six rows, and nothing else.
+        // J is the sum of the misfit and the penalty, a mean over the six rows.
         let squares: f64 = (0..6).map(|j| (0.7 - theta[j]).max(0.0).powi(2)).sum();
         let whole = found.best.evaluation.misfit + price * squares / 6.0;
         assert!((found.best.evaluation.cost / whole - 1.0).abs() < 1e-12);
@@ -98,7 +98,7 @@ fn a_large_penalty_weight_is_a_hard_constraint() {
         costs.push(found.best.evaluation.cost);
     }
     println!("{excesses:?}\n{costs:?}\n{distances:?}");
-    // The least cost rises with the price, from that without the constraint to that with it.
+    // The minimum of J rises with the weight, from that without the constraint to that with it.
     let bounds = [free.best.evaluation.cost, hard.best.evaluation.cost];
     let bracketing = [&bounds[..1], &costs, &bounds[1..]].concat();
     let rounding = 1.0 + 1e-9;
@@ -106,9 +106,8 @@ fn a_large_penalty_weight_is_a_hard_constraint() {
         bracketing.windows(2).all(|w| w[0] <= w[1] * rounding),
         "{bracketing:?}"
     );
-    // A quadratic price: what is broken is the multiplier over twice the price, so it falls as 1/price,
-    // and so does the rest of the cost and of the way to the constrained answer; not before the
-    // multiplier is the one of the constrained answer.
+    // With a quadratic penalty the violation is the multiplier over twice the weight. It falls as 1/weight, as do the differences of
+    // cost and parameters from the constrained solution, once the multiplier is that of the constrained solution.
     assert!(excesses.windows(2).all(|w| w[1] < w[0]), "{excesses:?}");
     let fall = excesses[prices.len() - 2] / excesses[prices.len() - 1];
     assert!((90.0..110.0).contains(&fall), "{excesses:?}");
@@ -133,7 +132,7 @@ fn the_gradient_of_the_penalty_is_its_derivative() {
     group.push([(1, 2.5), (2, 0.3)], [1.0, f64::INFINITY], [1.0, 1.0]);
     group.push([(0, 1.1), (2, 1.3)], [f64::NEG_INFINITY, 9.0], [2.0, 2.0]);
     group.soft = Some(3.7);
-    // Broken from above, broken from below, held.
+    // Violated from above, violated from below, satisfied.
     let theta = [2.3, -0.4, 1.7];
     let mut gradient = vec![0.25; 3];
     group.add_price_gradient(&theta, &mut gradient);
@@ -149,8 +148,8 @@ fn the_gradient_of_the_penalty_is_its_derivative() {
     }
 }
 
-/// `2 m >= 1.4` breaks by twice as much as `m >= 0.7`, so at a quarter of the price it is the same
-/// constraint, on every step of the way.
+/// `2 m >= 1.4` is violated by twice as much as `m >= 0.7`, so with a quarter of the weight it is the same
+/// constraint at every iteration.
 #[test]
 fn a_soft_row_does_not_depend_on_units() {
     let found = |factor: f64| {

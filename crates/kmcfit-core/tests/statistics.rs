@@ -1,4 +1,4 @@
-//! Estimates under Gaussian noise: without bias, and with the spread of Cramer and Rao. Two hundred
+//! Estimates under Gaussian noise: unbiased, with the standard deviations of the Cramer-Rao bound. Two hundred
 //! records of each problem, without bounds and penalties.
 
 mod common;
@@ -21,8 +21,8 @@ use rand_chacha::ChaCha8Rng;
 const NODES: usize = 201;
 const DURATION: f64 = 12.0;
 const SEEDS: u64 = 200;
-/// Of the samples' size: small enough that the problem is linear over the errors that it makes (per
-/// mille to per cent), whose bias of second order is a hundredth of their spread.
+/// Noise relative to the samples: small enough that the problem is linear over the errors of the parameters (per mille to per cent),
+/// whose second-order bias is a hundredth of their standard deviation.
 const NOISE: f64 = 0.02;
 const INITIAL: State = State {
     displacement: 1.5,
@@ -32,7 +32,7 @@ const INITIAL: State = State {
 /// Samples from clean ones, sigma and a seed.
 type Spoil = fn(&[f64], f64, u64) -> Vec<f64>;
 
-/// A system of constants that is read through one channel at all nodes.
+/// A system of constants with one channel sampled at all nodes.
 struct Setup {
     terms: Vec<(Term, CoefficientKind)>,
     /// Mass first; `None` for what is known.
@@ -40,9 +40,9 @@ struct Setup {
     truth: Vec<f64>,
     kind: ChannelKind,
     excitation: Option<Excitation>,
-    /// Whether the initial state is estimated.
+    /// True if the initial state is estimated.
     state: bool,
-    /// Gain and offset, where they are estimated.
+    /// Gain and offset, if they are estimated.
     sensor: Option<[f64; 2]>,
     loss: Loss,
 }
@@ -186,7 +186,7 @@ impl Setup {
             let spread = (squares / (count - 1.0)).sqrt();
             let standard = mean * count.sqrt();
             println!("{words} [{j}]: mean {standard:+.2} standard errors, spread {spread:.3}");
-            // By chance once in two thousand times.
+            // Probability 1/2000.
             assert!(standard.abs() < 3.5, "{words} {j}: {standard}");
             // The spread of 200 normal values has a standard error of 1/20.
             assert!((0.82..1.18).contains(&spread), "{words} {j}: {spread}");
@@ -260,7 +260,7 @@ fn robust_losses_stay_close_where_least_squares_does_not() {
     let student = with_loss(Loss::StudentT { degrees: 4.0 });
     println!("5 % outliers: squares {squares:.2}, Huber {huber:.2}, Student {student:.2}");
     // The variance of a sample is 1 + 0.05 * 900 = 46 of its own: 6.8 times the spread; 80 errors
-    // know that to a tenth.
+    // determine it to a tenth.
     assert!((5.4..8.2).contains(&squares), "{squares}");
     // Huber (1964): with a share e of outliers and the threshold a = 1.345 the variance is
     // ((1 - e) E psi^2 + e a^2) / ((1 - e) E psi')^2 = 1.26 of the clean one, the spread 1.12, and that
@@ -286,7 +286,7 @@ fn the_covariance_is_that_of_cramer_and_rao() {
     }
 }
 
-/// Where no sigma is given the residuals tell it: by their weighted mean square, with `n - p` below it.
+/// Without a given sigma the residuals determine it: by their weighted mean square, with `n - p` below it.
 #[test]
 fn without_a_sigma_the_covariance_is_that_of_the_residuals() {
     let mut setup = Setup::forced(ChannelKind::Acceleration);
@@ -316,7 +316,7 @@ fn without_a_sigma_the_covariance_is_that_of_the_residuals() {
         let ratio = covariance[(j, j)] / expected[(j, j)];
         assert!((ratio - 1.0).abs() < 1e-9, "{j}: {ratio}");
     }
-    // Samples that leave no residual do not tell it.
+    // Zero residuals do not determine it.
     let exact = evaluation.predictions[0][0].clone();
     assert!(found(exact).2.is_none());
 }
@@ -352,15 +352,15 @@ fn a_covariance_is_formed_of_up_to_64_parameters() {
             .unwrap();
         problem.covariance(&problem.evaluate(&problem.start()).unwrap())
     };
-    // The stiffness at the last knot moves the last sample by next to nothing: one knot fewer is seen.
+    // The stiffness at the last knot hardly affects the last sample: one parameter fewer is identifiable.
     assert!(covariance(63, NODES).is_some());
     assert!(covariance(64, NODES).is_some());
     assert!(covariance(65, NODES).is_none());
     assert!(covariance(20, NODES / 2).is_none());
 }
 
-/// A free response tells the ratios to the mass alone; and as many samples as functions leave nothing to
-/// judge these by.
+/// A free response determines only ratios to the mass; and with as many samples as parameters no degrees of freedom
+/// remain.
 #[test]
 fn undetermined_parameters_have_no_covariance() {
     let mut setup = Setup::free(ChannelKind::Displacement);
@@ -450,7 +450,7 @@ fn the_sigma_is_the_sample_standard_deviation() {
 /// Two sensors of one response with the same offset, one ten times as noisy: their sigmas are those about the
 /// offset, and the offset is the mean with the weights of these sigmas.
 #[test]
-fn sigmas_of_two_channels_rest_with_their_weighted_mean() {
+fn sigmas_of_two_channels_converge_with_the_weighted_mean() {
     let mut setup = Setup::free(ChannelKind::Displacement);
     setup.start = vec![None; 3];
     let clean = setup.clean();
@@ -487,7 +487,7 @@ fn sigmas_of_two_channels_rest_with_their_weighted_mean() {
     let channels = with_sigmas.experiments[0].channels.iter();
     for (channel, variance) in channels.zip(variances) {
         let sigma = channel.weighting().sigma(0).unwrap();
-        // Where the sigmas are said to rest.
+        // The sigmas at which the iteration stops.
         assert!((sigma / variance.sqrt() - 1.0).abs() < 1e-6, "{sigma}");
     }
     assert!(!fit.attempts.is_empty() && !fit.history.is_empty() && !fit.snapshots.is_empty());
@@ -533,7 +533,7 @@ fn samples_that_are_fitted_exactly_have_a_sigma() {
     assert!((sigma - 1.0).abs() < 1e-12, "{sigma}");
 }
 
-/// Samples that are all zero, of what is at rest, have no scale: the sigma stays as it was.
+/// Samples that are all zero have no scale: the sigma is unchanged.
 #[test]
 fn zero_samples_keep_their_sigma() {
     let mut setup = Setup::free(ChannelKind::Displacement);
@@ -554,8 +554,8 @@ fn zero_samples_keep_their_sigma() {
     assert_eq!(fit.best.parameters, [0.0]);
 }
 
-/// Standard errors and bands come from one factorisation: where the measurements leave a parameter open, both say so,
-/// and elsewhere the standard error of a constant is that of its band.
+/// Standard errors and bands come from one factorisation: for an undetermined parameter both are absent, and
+/// otherwise the standard error of a constant is that of its band.
 #[test]
 fn standard_errors_and_bands_agree() {
     let settings = BandSettings {
@@ -578,8 +578,8 @@ fn standard_errors_and_bands_agree() {
         let ratio = band.standard_error[0] / covariance[(j, j)].sqrt();
         assert!((ratio - 1.0).abs() < 1e-9, "{j}: {ratio}");
     }
-    // The smaller the force, the nearer the mass is to being undetermined. At every size both agree, also where
-    // rounding decides.
+    // The smaller the force, the nearer the mass is to being undetermined. At every size both agree, also at the level of
+    // rounding errors.
     let mut open = Vec::new();
     for exponent in 1..=16 {
         let mut setup = Setup::forced(ChannelKind::Displacement);

@@ -1,4 +1,4 @@
-//! Choosing the weight of the smoothness from noisy samples.
+//! Choice of the penalty weight from noisy samples.
 
 mod common;
 
@@ -77,7 +77,7 @@ fn paper_system_with_noise(nodes: usize, bounded: bool, seeds: RangeInclusive<u6
         let (path, theta) = path(&problem, WeightRule::Discrepancy);
         let errors = relative_errors(&problem, &theta, &truth);
         assert!(errors.iter().all(|e| *e <= 0.05), "seed {seed}: {errors:?}");
-        // Every weight that the rule passes over in favour of a larger one also explains the data.
+        // Every smaller weight on the path also explains the data.
         let limit = nodes as f64 + 2.0 * (2.0 * nodes as f64).sqrt();
         assert!(path.points[path.chosen].misfit <= limit);
         assert!(path.points[..path.chosen].iter().all(|p| p.misfit > limit));
@@ -108,7 +108,7 @@ fn curved_system(nodes: usize) -> NodalCoefficients {
     }
 }
 
-/// Largest error of the mass at every rule's pick over the best on the path; by seed.
+/// Largest error of the mass at the weight of each rule, relative to the best on the path, by seed.
 fn ratios_to_the_best(nodes: usize, order_of_mass: usize, seeds: u64) -> Vec<[f64; 3]> {
     let truth = curved_system(nodes);
     let each = (1..=seeds).map(|seed| {
@@ -145,7 +145,7 @@ fn within_twice(ratios: &[[f64; 3]], rule: WeightRule) -> usize {
     count
 }
 
-/// Slopes are penalised, and the mass has one: no rule may cost more than a factor of two.
+/// With a penalty on the slope of a sloping mass the error of each rule is at most twice the smallest.
 #[test]
 fn every_rule_comes_near_the_best_weight_under_a_penalty_on_slopes() {
     let ratios = ratios_to_the_best(500, 1, 20);

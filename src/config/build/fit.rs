@@ -97,9 +97,9 @@ fn can_constrain(file: &ModelFile, problem: &Problem, solver: Solver) -> Result<
     let cones = constraints.cones.iter().map(|group| &group.name);
     match (solver, rows.chain(cones).next()) {
         (Solver::SteepestDescent | Solver::Lbfgs { .. }, Some(name)) => Err(file
-            .error_at("fit.method", "this method knows no constraints")
+            .error_at("fit.method", "this method does not support constraints")
             .found(format!("`{}` with `{name}`", solver.name()))
-            .expected("`gauss-newton` or `projected-gradient`, which do")),
+            .expected("`gauss-newton` or `projected-gradient`")),
         _ => Ok(()),
     }
 }

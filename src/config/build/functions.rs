@@ -251,7 +251,7 @@ fn total_variation(
         return Err(file
             .error_at(
                 &format!("{key}.{other}"),
-                "total variation has a weight alone",
+                "a penalty on total variation has only a weight",
             )
             .found(format!("`{other}` beside `kind: tv`"))
             .expected(format!("no `{other}`, or `kind: tikhonov`")));

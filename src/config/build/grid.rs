@@ -17,12 +17,12 @@ const MOST_CHOSEN: usize = 10_000_000;
 
 pub(super) fn build(
     file: &ModelFile,
-    purpose: BuildMode,
+    mode: BuildMode,
     records: &[Option<RawRecord>],
     notes: &mut Vec<Finding>,
 ) -> Result<Grid, InputError> {
     let asked = file.spec.grid.as_ref().and_then(|g| g.nodes.as_ref());
-    let asked = match (purpose.nodes(), asked) {
+    let asked = match (mode.nodes(), asked) {
         (Some(nodes), _) => Some(Nodes::Count(Count(nodes))),
         (None, asked) => asked.copied(),
     };
@@ -42,50 +42,46 @@ pub(super) fn build(
         },
     };
     if nodes < Grid::FEWEST_NODES {
-        return Err(about_nodes(file, purpose, "invalid number of nodes")
+        return Err(about_nodes(file, mode, "invalid number of nodes")
             .found(nodes)
             .expected(format!("{} or more", Grid::FEWEST_NODES)));
     }
-    fits_into_memory(file, purpose, nodes)?;
+    fits_into_memory(file, mode, nodes)?;
     Grid::new(start, duration, nodes).ok_or_else(|| {
         file.error_at("grid", "invalid time axis")
-            .found(format!("{nodes} nodes over {duration} s"))
+            .found(format!("{nodes} nodes over {duration:?} s"))
             .expected("a positive duration whose steps are not zero")
     })
 }
 
-fn about_nodes(file: &ModelFile, purpose: BuildMode, problem: &str) -> InputError {
-    match purpose.nodes() {
+fn about_nodes(file: &ModelFile, mode: BuildMode, problem: &str) -> InputError {
+    match mode.nodes() {
         Some(_) => InputError::new(Location::Argument("--nodes".into()), problem),
         None => file.error_at("grid.nodes", problem),
     }
 }
 
 /// Upper estimate of the memory of a run with this number of nodes, bytes.
-pub(super) fn memory_of(file: &ModelFile, purpose: BuildMode, nodes: usize) -> f64 {
-    nodes as f64 * per_node::per_node(file, purpose) as f64 + memory::BASE as f64
+pub(super) fn memory_of(file: &ModelFile, mode: BuildMode, nodes: usize) -> f64 {
+    nodes as f64 * per_node::per_node(file, mode) as f64 + memory::BASE as f64
 }
 
 /// Refuses a grid that exceeds the available memory, before allocation.
-fn fits_into_memory(file: &ModelFile, purpose: BuildMode, nodes: usize) -> Result<(), InputError> {
-    let needed = memory_of(file, purpose, nodes);
+fn fits_into_memory(file: &ModelFile, mode: BuildMode, nodes: usize) -> Result<(), InputError> {
+    let needed = memory_of(file, mode, nodes);
     let Err(available) = memory::check(needed as u64) else {
         return Ok(());
     };
-    let each = per_node::per_node(file, purpose) as u64;
-    Err(about_nodes(
-        file,
-        purpose,
-        "a grid of so many nodes does not fit into memory",
-    )
-    .found(format!(
-        "{nodes} nodes, which may need {}: {each} bytes each",
-        memory::in_words(needed)
-    ))
-    .expected(format!(
-        "at most {} nodes within {available}",
-        available.bytes.saturating_sub(memory::BASE) / each,
-    )))
+    let each = per_node::per_node(file, mode) as u64;
+    Err(about_nodes(file, mode, "the grid does not fit into memory")
+        .found(format!(
+            "{nodes} nodes, which may need {}: {each} bytes each",
+            memory::in_words(needed)
+        ))
+        .expected(format!(
+            "at most {} nodes within {available}",
+            available.bytes.saturating_sub(memory::BASE) / each,
+        )))
 }
 
 /// Number of nodes for one node per sample, if all channels of all records have the same equally spaced times.
@@ -138,7 +134,7 @@ fn span(file: &ModelFile, records: &[Option<RawRecord>]) -> Result<(f64, f64), I
                 "the duration differs from that of the records",
             )
             .found(asked.0)
-            .expected(format!("{duration} (or leave it out)")));
+            .expected(format!("{duration} or no `duration`")));
     }
     Ok((start, asked.map_or(duration, |asked| asked.0)))
 }

@@ -8,6 +8,8 @@ mod grid;
 mod on_grid;
 mod study;
 
+#[cfg(test)]
+pub(crate) use experiments::DataWarning;
 pub use experiments::{ChannelNote, HoldOut};
 pub use kmcfit_core::internals::builder::WeightSearch;
 pub use study::{Candidate, Equivalent, StudyPlan, StudyTarget};
@@ -117,7 +119,7 @@ fn asked_for(file: &ModelFile, key: impl Into<String>) -> impl Fn(InputError) ->
 /// The builder of the core for a model file and its data, and the notes on its channels.
 fn builder(
     file: &ModelFile,
-    purpose: BuildMode,
+    mode: BuildMode,
     grid: &Grid,
     solver: Solver,
     records: Vec<Option<experiments::RawRecord>>,
@@ -130,12 +132,12 @@ fn builder(
     let shared = shared.collect::<Result<_, _>>()?;
     let mut builder = Builder::of(shared).grid(*grid).solver(solver);
     builder = builder.method(grid::method(file));
-    if matches!(purpose, BuildMode::Simulate { .. }) {
+    if matches!(mode, BuildMode::Simulate { .. }) {
         builder = builder.simulation();
     }
     let mut notes = Vec::new();
     for (i, record) in records.into_iter().enumerate() {
-        let (record, of_record) = experiments::specification(file, purpose, grid, i, record)?;
+        let (record, of_record) = experiments::specification(file, mode, grid, i, record)?;
         builder = builder.record(record);
         notes.push(of_record);
     }
@@ -188,29 +190,29 @@ fn contradicted(file: &ModelFile, contradiction: &Contradiction, problem: &str) 
         .found(listed(rows.iter().map(String::as_str)))
 }
 
-/// Builds the model of a file for a purpose.
+/// Builds the model of a file in a mode.
 ///
 /// # Errors
 /// At the first invalid key, with its line.
-pub fn build(file: &ModelFile, purpose: BuildMode) -> Result<Model, InputError> {
+pub fn build(file: &ModelFile, mode: BuildMode) -> Result<Model, InputError> {
     let clock = Instant::now();
     let mut reading = Duration::ZERO;
     let spec = &file.spec;
     let mut warnings = Vec::new();
     let mut automatic = Vec::new();
     let records = timed(&mut reading, || {
-        experiments::read(file, purpose, &mut warnings)
+        experiments::read(file, mode, &mut warnings)
     })?;
-    let grid = grid::build(file, purpose, &records, &mut automatic)?;
+    let grid = grid::build(file, mode, &records, &mut automatic)?;
     let solver = fit::solver(file)?;
-    let (builder, notes) = builder(file, purpose, &grid, solver, records)?;
+    let (builder, notes) = builder(file, mode, &grid, solver, records)?;
     let about = |error| input_error(file, error);
     let mut built = builder.lower().map_err(about)?;
     let searches = built.weight_search.is_some();
     let settings = fit::build(file, &built.problem, solver, searches)?;
     let given_start = built.problem.functions.start();
     // A simulation uses the functions as given.
-    if !matches!(purpose, BuildMode::Simulate { .. }) {
+    if !matches!(mode, BuildMode::Simulate { .. }) {
         built.move_start().map_err(about)?;
     }
     warnings.extend(built.notices.iter().map(Finding::stated));
@@ -224,7 +226,7 @@ pub fn build(file: &ModelFile, purpose: BuildMode) -> Result<Model, InputError> 
         displacement: s.displacement.0,
         velocity: s.velocity.0,
     };
-    let memory = grid::memory_of(file, purpose, grid.nodes()) as u64;
+    let memory = grid::memory_of(file, mode, grid.nodes()) as u64;
     let study = study::build(file, &built.problem)?;
     let source = timed(&mut reading, || ModelSource::of(file));
     Ok(Model {

@@ -191,7 +191,7 @@ fn check(file: &ModelFile, spec: &StudySpec) -> Result<(), InputError> {
         .is_some_and(|extremes| extremes.values().is_empty())
     {
         return Err(file
-            .error_at("study.extremes", "there is no time")
+            .error_at("study.extremes", "the list of times is empty")
             .found("an empty list")
             .expected("times in s, or no `extremes` for five over the record"));
     }
@@ -283,7 +283,7 @@ fn target(
     spec: &ProfileSpec,
 ) -> Result<StudyTarget, InputError> {
     let mean = spec.mean == Some(true);
-    match (spec.function, &spec.scalar) {
+    match (spec.function, &spec.parameter) {
         (Some(name), None) => {
             let function = function(file, problem, key, name)?;
             match (spec.at, mean) {
@@ -299,7 +299,7 @@ fn target(
                     Ok(StudyTarget::Mean { function })
                 }
                 _ => Err(file
-                    .error_at(key, "a profile is of one number")
+                    .error_at(key, "a profile needs one quantity")
                     .expected("`at: TIME` or `mean: true`")),
             }
         }
@@ -311,7 +311,7 @@ fn target(
                 .ok_or_else(|| {
                     let names = || scalars.iter().map(|s| s.name.as_str());
                     let error = file
-                        .error_at(&format!("{key}.scalar"), "no such nuisance parameter")
+                        .error_at(&format!("{key}.parameter"), "no such nuisance parameter")
                         .found(quote(&name.0))
                         .expected(match scalars.is_empty() {
                             true => "a model that estimates initial states or sensors".to_owned(),
@@ -324,8 +324,8 @@ fn target(
                 })
         }
         _ => Err(file
-            .error_at(key, "a profile is of one number")
-            .expected("either `function` or `scalar`")),
+            .error_at(key, "a profile needs one quantity")
+            .expected("either `function` or `parameter`")),
     }
 }
 

@@ -103,12 +103,16 @@ fn entry(found: &Found, wanted: &str) -> String {
     }
     let mut listed: Vec<&str> = Vec::new();
     for group in key.kind.groups() {
-        // A map, or a list of such maps.
+        // A map, or a list of them maps.
         if listed.contains(&group.name) {
             continue;
         }
         listed.push(group.name);
-        let _ = write!(text, "\n  {}\n", group.text);
+        let heading = match group.text == key.text {
+            true => "Keys:",
+            false => group.text,
+        };
+        let _ = write!(text, "\n  {heading}\n");
         list(&mut text, group.keys.iter().map(|key| (key.name, key.text)));
     }
     text

@@ -94,7 +94,7 @@ pub struct UsedColumn {
     /// The unit.
     pub unit: Unit,
     /// True if the model file must state the unit, because no row of units or name does so in a recognised form.
-    tell_unit: bool,
+    state_unit: bool,
     /// True if the role follows from the position of the column alone.
     guessed: bool,
     /// True if the file states the unit.
@@ -208,7 +208,7 @@ impl ColumnAssignment {
             index: self.unused.remove(place),
             role: Role::Displacement,
             unit: Unit::si(Quantity::Displacement),
-            tell_unit: false,
+            state_unit: false,
             guessed: true,
             has_unit: false,
         });
@@ -243,8 +243,8 @@ impl ColumnAssignment {
 
     /// The units that the model file must state, as a YAML map.
     pub fn units(&self) -> Option<String> {
-        let told = self.used.iter().filter(|c| c.tell_unit);
-        let pairs: Vec<String> = told
+        let assumed = self.used.iter().filter(|c| c.state_unit);
+        let pairs: Vec<String> = assumed
             .map(|c| format!("{}: {}", c.role.key(), quoted(c.unit.symbol())))
             .collect();
         (!pairs.is_empty()).then(|| format!("{{{}}}", pairs.join(", ")))
@@ -254,8 +254,8 @@ impl ColumnAssignment {
     pub fn in_words(&self, table: &Table) -> Vec<String> {
         let said = |c: &UsedColumn| {
             let guess = match (c.guessed, c.has_unit || c.role == Role::Time) {
-                (true, _) => ": a guess, please look",
-                (false, false) => ": the unit is a guess, please look",
+                (true, _) => ": a guess, please check",
+                (false, false) => ": the unit is a guess, please check",
                 (false, true) => "",
             };
             let role = c.role.key().replace('_', " of the ");
@@ -309,7 +309,7 @@ fn time(table: &Table, numeric: &[usize]) -> Result<UsedColumn, InputError> {
                 index: *index,
                 role: Role::Time,
                 unit: Unit::si(Quantity::Time),
-                tell_unit: false,
+                state_unit: false,
                 guessed: true,
                 has_unit: false,
             })),
@@ -351,7 +351,7 @@ fn known(table: &Table, index: usize) -> Option<UsedColumn> {
         index,
         role: role.of_base().filter(|_| is_base).unwrap_or(role),
         unit,
-        tell_unit: in_name && unit.factor() != 1.0,
+        state_unit: in_name && unit.factor() != 1.0,
         guessed: false,
         has_unit: found.is_some(),
     })

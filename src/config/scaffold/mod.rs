@@ -60,13 +60,13 @@ pub fn scaffold(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Scaf
         );
     }
     found.extend(columns.in_words(&table));
-    if let Some((count, first)) = record.far_off {
-        let lie = match count {
-            1 => "1 sample lies".to_owned(),
-            _ => format!("{count} samples lie"),
+    if let Some((count, first)) = record.outliers {
+        let outliers = match count {
+            1 => "1 outlier".to_owned(),
+            _ => format!("{count} outliers"),
         };
         found.push(format!(
-            "{lie} far off ({}): empty fields are better; the model has a robust loss",
+            "{outliers} (first: {}): if these stand for missing samples, use empty fields; the model has a robust loss",
             significant(first / record.channel.1, 4)
         ));
     }
@@ -176,7 +176,7 @@ fn keys(
         ),
         (
             "    loss",
-            record.far_off.map(|_| robust),
+            record.outliers.map(|_| robust),
             "robust against outliers; or `squares`",
         ),
         (

@@ -4,7 +4,9 @@
 use super::columns::{ColumnAssignment, Role, UsedColumn};
 use crate::error::InputError;
 use crate::tables::{Table, increasing_at};
-use kmcfit_core::internals::diagnostics::{far_off, offset_and_drift, spread, without_line};
+use kmcfit_core::internals::diagnostics::{
+    offset_and_drift, outlier_indices, spread, without_line,
+};
 use kmcfit_core::internals::signal::{Spectrum, onset};
 use kmcfit_core::internals::system::round_time;
 
@@ -32,7 +34,7 @@ pub struct RecordSummary {
     /// The summarised channel, and the factor of its unit to SI.
     pub channel: (Role, f64),
     /// Number of outliers, and the first one in SI.
-    pub far_off: Option<(usize, f64)>,
+    pub outliers: Option<(usize, f64)>,
     /// Onset of the response, s; `None` without an initial rest.
     pub begins: Option<f64>,
     /// Dominant frequency, Hz.
@@ -77,7 +79,7 @@ impl RecordSummary {
         let drive = drives.into_iter().find_map(channel);
         let drive = drive.map(|c| in_si(table, c)).transpose()?;
         let missing = times.len() - pairs.len();
-        let far_off = leave_out_far_off(&mut pairs);
+        let outliers = remove_outliers(&mut pairs);
         let values = values_of(&pairs);
         // The excitation can set in late as well.
         let begins = match drive {
@@ -94,7 +96,7 @@ impl RecordSummary {
             samples: pairs.len(),
             missing,
             channel: (column.role, column.unit.factor()),
-            far_off,
+            outliers,
             begins: begins.map(|_| round_time(pairs[0].0, spacing)),
             duration,
             spacing,
@@ -154,11 +156,11 @@ fn moving(table: &Table, times: &[f64], values: Vec<f64>) -> Result<Vec<(f64, f6
 }
 
 /// Removes outliers; returns their number and the first one.
-fn leave_out_far_off(pairs: &mut Vec<(f64, f64)>) -> Option<(usize, f64)> {
+fn remove_outliers(pairs: &mut Vec<(f64, f64)>) -> Option<(usize, f64)> {
     let values: Vec<f64> = pairs.iter().map(|(_, value)| *value).collect();
     let level = median(&values);
     let away: Vec<f64> = values.iter().map(|value| value - level).collect();
-    let far = far_off(&away);
+    let far = outlier_indices(&away);
     let first = values[*far.first()?];
     let mut place = 0..;
     pairs.retain(|_| place.next().is_some_and(|i| far.binary_search(&i).is_err()));

@@ -88,7 +88,7 @@ keys! {
             example "true",
             needs "`function`";
         /// Name of a nuisance parameter, in place of a function.
-        scalar: Option<Text>,
+        parameter: Option<Text>,
             example "initial velocity",
             needs "an estimated nuisance parameter of this name";
     }

@@ -1,4 +1,4 @@
-//! The overlaid figures: every run in its own look, on its own times.
+//! Overlaid figures of several runs, each with its own line style and its own time grid.
 
 use super::Comparison;
 use super::measures::Measures;
@@ -9,9 +9,9 @@ use kmcfit_core::internals::assessment::is_same_truth;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::system::NodalCoefficients;
 
-/// The look of run `index` in all figures: 24 runs differ in colour or dash pattern.
+/// Line style of run `index` in all figures; up to 24 runs differ in colour or dash pattern.
 pub(super) fn style(index: usize) -> Style {
-    // Black and grey, the last two, are left to the truth.
+    // The last two colours, black and grey, are reserved for the true systems.
     let colour = Colour::nth(index % (Colour::ALL.len() - 2));
     let dash = Dash::nth(index + index / 12);
     // Dots are drawn larger than lines are wide.

@@ -105,7 +105,7 @@ fn card(run: &Measures, look: Style) -> String {
     text + "</section>\n"
 }
 
-/// The text with a capital letter in front.
+/// The text with a capital first letter.
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
     match letters.next() {

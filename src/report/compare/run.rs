@@ -45,7 +45,7 @@ impl ComparedRun {
         let violation = finished.value.pointer("/constraints/max_violation");
         Ok(Self {
             name: name.into(),
-            // Older documents have none.
+            // Documents of earlier versions have no such field.
             max_violation: violation.and_then(serde_json::Value::as_f64),
             iterations: finished
                 .history

@@ -13,7 +13,7 @@ const FITTED: f64 = 90.0;
 pub(super) enum ResponseFit {
     /// Fit of the worst channel, per cent. Sigma was estimated, so chi-square carries no information.
     Fit(f64),
-    /// Chi-square of so many samples.
+    /// Chi-square and number of samples.
     ChiSquare { misfit: f64, samples: f64 },
     /// `J/J0` of the equation error; no response was simulated.
     Equation(f64),
@@ -140,7 +140,7 @@ fn residual_share(run: &ComparedRun) -> f64 {
     shares.fold(0.0, f64::max)
 }
 
-/// Errors of `k/m` and `c/m`; the one below the tolerance is left out.
+/// Errors of `k/m` and `c/m` that exceed the tolerance.
 fn distances(errors: &TruthErrors) -> String {
     let stiffness = format!("error of k/m {}", percent(errors.k_over_m_relative));
     let of = if errors.undamped {

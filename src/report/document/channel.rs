@@ -16,7 +16,7 @@ pub struct ChannelSummary {
     /// Unused samples.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ignored: Vec<IgnoredSummary>,
-    /// Number of samples rejected as outliers under a robust loss ([`kmcfit_core::internals::diagnostics::far_off`]);
+    /// Number of samples rejected as outliers under a robust loss ([`kmcfit_core::internals::diagnostics::outlier_indices`]);
     /// rms, fit and whiteness are those of the other samples.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub outliers: usize,

@@ -50,8 +50,8 @@ pub(super) fn page(title: &str, body: &str) -> String {
          <meta name=\"color-scheme\" content=\"light dark\"/>\n\
          <title>{title}</title>\n<style>{style}</style>\n</head>\n<body>\n<main>\n\
          <h1>{title}</h1>\n{body}</main>\n\
-         <p id=\"chart-keys\" class=\"unseen\">{}</p>\n\
-         <div id=\"chart-reading\" class=\"unseen\" aria-live=\"polite\"></div>\n\
+         <p id=\"chart-keys\" class=\"visually-hidden\">{}</p>\n\
+         <div id=\"chart-cursor\" class=\"visually-hidden\" aria-live=\"polite\"></div>\n\
          <script>{script}</script>\n</body>\n</html>\n",
         escape(KEYS)
     )

@@ -18,7 +18,7 @@ pub const NAMES: [&str; 8] = [
     "study-predictions",
 ];
 
-/// The figures of all analyses that the study has.
+/// Figures of all analyses in the study.
 pub fn all(study: &StudyDocument) -> Vec<Figure> {
     let mut figures = Vec::new();
     figures.extend(bands(study));
@@ -49,7 +49,7 @@ fn bands(study: &StudyDocument) -> Option<Figure> {
     Some(figure.columns(2).panels(panels))
 }
 
-/// The area between the ends of a band; times without ends are left out.
+/// Area between the ends of a band; times without ends are omitted.
 fn area(
     times: &[f64],
     (low, high): (&Numbers, &Numbers),

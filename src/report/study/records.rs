@@ -63,12 +63,12 @@ fn finite_numbers(values: &[f64]) -> Numbers {
 /// Sensitivity of the samples to the parameters.
 pub fn sensitivity(at: Optimum) -> SensitivityRecord {
     let spectrum = Sensitivity::of(at.problem, at.evaluation).spectrum();
-    let unseen = ScalingAmbiguity::at(at.problem, at.theta).undetermined(&spectrum);
-    let unseen = unseen.into_iter().take(NAMED);
+    let unidentifiable = ScalingAmbiguity::at(at.problem, at.theta).undetermined(&spectrum);
+    let unidentifiable = unidentifiable.into_iter().take(NAMED);
     let records = |list: Vec<identifiability::ResolvedDirection>| {
-        let record = |seen: identifiability::ResolvedDirection| DirectionRecord {
-            singular_value: seen.singular_value,
-            functions: seen.functions,
+        let record = |resolved: identifiability::ResolvedDirection| DirectionRecord {
+            singular_value: resolved.singular_value,
+            functions: resolved.functions,
         };
         list.into_iter().map(record).collect()
     };
@@ -76,7 +76,7 @@ pub fn sensitivity(at: Optimum) -> SensitivityRecord {
         text: spectrum.sentence(),
         rank: spectrum.rank(),
         combinations: spectrum.of(),
-        unidentifiable: unseen
+        unidentifiable: unidentifiable
             .map(|named| UnidentifiableRecord {
                 name: named.name,
                 share: named.share,
@@ -261,7 +261,7 @@ pub fn equivalent(at: Optimum, asked: &[Equivalent]) -> Vec<EquivalentSystemReco
 pub fn starts(model: &Model, at: Optimum, threads: usize) -> MultistartRecord {
     let (plan, problem) = (&model.study, at.problem);
     let how = Multistart {
-        // Between the bounds, if every function has both, else around the start values.
+        // Ranges between the bounds if every function has both, otherwise around the start values.
         ranges: Ranges::of_bounds(problem)
             .unwrap_or_else(|| Ranges::around_starts(&problem.functions, plan.spread)),
         starts: plan.starts,

@@ -22,7 +22,7 @@ pub fn text(study: &StudyDocument) -> String {
     text
 }
 
-/// Headings and their sentences; analyses that were not run are left out.
+/// Headings and their sentences; analyses that were not run are omitted.
 pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
     let multistart = study.multistart.iter();
     let sections = [

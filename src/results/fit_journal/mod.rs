@@ -48,7 +48,7 @@ enum Entry {
     /// Final state of a solver run.
     End(Box<SolverState>),
     /// Computed numbers.
-    Piece(ExactF64s),
+    Numbers(ExactF64s),
     /// End without a result.
     Nothing,
 }
@@ -237,14 +237,14 @@ impl FitJournal {
         }
     }
 
-    fn checkpoint(&mut self, standing: SolverState) -> io::Result<()> {
+    fn checkpoint(&mut self, state: SolverState) -> io::Result<()> {
         // The iterations before a checkpoint are written first.
         self.write();
         self.file.sync()?;
         let path = self.folder.join(CHECKPOINT);
         replace_with(self.work.path(), &path, |out| {
             let begin = write_line(&mut *out, JournalPosition::default(), &self.heading)?;
-            write_line(out, begin, &(self.unit, standing))?;
+            write_line(out, begin, &(self.unit, state))?;
             Ok(())
         })
     }
@@ -274,8 +274,8 @@ impl CheckpointStore for FitJournal {
             }
             None => {
                 // An unfinished unit continues from its checkpoint, or starts over.
-                let standing = self.before.standing.take().filter(|(u, _)| *u == self.unit);
-                let (length, kept) = unit.at_work(standing.map(|(_, standing)| standing));
+                let state = self.before.state.take().filter(|(u, _)| *u == self.unit);
+                let (length, kept) = unit.at_work(state.map(|(_, state)| state));
                 let begin = self.before.begin;
                 self.cut(length);
                 self.before.begin = begin;
@@ -284,12 +284,12 @@ impl CheckpointStore for FitJournal {
         }
     }
 
-    fn refuse(&mut self) {
+    fn discard(&mut self) {
         self.is_recalled = false;
         self.cut(self.before.begin);
     }
 
-    fn row(&mut self, row: &IterationRecord) {
+    fn save_iteration(&mut self, row: &IterationRecord) {
         self.append(Entry::Row(row.clone()));
     }
 
@@ -297,22 +297,22 @@ impl CheckpointStore for FitJournal {
         self.trouble.is_none() && self.pace.is_due(parameters)
     }
 
-    fn stand(&mut self, standing: SolverState) {
+    fn save_state(&mut self, state: SolverState) {
         if self.trouble.is_some() || self.is_recalled {
             return;
         }
-        if standing.outcome.is_some() {
-            return self.append(Entry::End(Box::new(standing)));
+        if state.outcome.is_some() {
+            return self.append(Entry::End(Box::new(state)));
         }
         let clock = Instant::now();
-        self.trouble = self.checkpoint(standing).err();
+        self.trouble = self.checkpoint(state).err();
         self.pace.took = clock.elapsed();
         self.pace.last = Instant::now();
     }
 
-    fn end(&mut self, piece: Option<&[f64]>) {
-        self.append(match piece {
-            Some(piece) => Entry::Piece(ExactF64s(piece.to_vec())),
+    fn end(&mut self, numbers: Option<&[f64]>) {
+        self.append(match numbers {
+            Some(numbers) => Entry::Numbers(ExactF64s(numbers.to_vec())),
             None => Entry::Nothing,
         });
     }

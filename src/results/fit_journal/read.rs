@@ -20,7 +20,7 @@ pub(super) struct JournalReader {
 pub(super) struct JournalContents {
     pub units: BTreeMap<u64, JournalUnit>,
     /// Number of the unfinished unit and its state.
-    pub standing: Option<(u64, SolverState)>,
+    pub state: Option<(u64, SolverState)>,
     /// Begin of the unfinished unit.
     pub begin: JournalPosition,
     /// End of the recalled part; `None` for all of it.
@@ -57,13 +57,13 @@ impl JournalUnit {
             Entry::Row(row) if row.iteration == self.rows.len() as u64 + 1 => {
                 self.rows.push((row, end));
             }
-            Entry::End(standing) if standing.iterations == self.rows.len() as u64 => {
+            Entry::End(state) if state.iterations == self.rows.len() as u64 => {
                 let rows = std::mem::take(&mut self.rows).into_iter();
                 let rows = rows.map(|(row, _)| row).collect();
-                self.kept = Some(CheckpointUnit::Search(rows, standing));
+                self.kept = Some(CheckpointUnit::Search(rows, state));
             }
-            Entry::Piece(piece) if self.rows.is_empty() => {
-                self.kept = Some(CheckpointUnit::Piece(piece.0));
+            Entry::Numbers(numbers) if self.rows.is_empty() => {
+                self.kept = Some(CheckpointUnit::Numbers(numbers.0));
             }
             Entry::Nothing if self.rows.is_empty() => self.kept = Some(CheckpointUnit::Nothing),
             _ => return false,
@@ -75,19 +75,19 @@ impl JournalUnit {
     /// End of the usable entries of an unfinished unit, and the state to continue from.
     pub fn at_work(
         mut self,
-        standing: Option<SolverState>,
+        state: Option<SolverState>,
     ) -> (JournalPosition, Option<CheckpointUnit>) {
-        let usable = standing.and_then(|standing| {
-            let iterations = usize::try_from(standing.iterations).ok()?;
+        let usable = state.and_then(|state| {
+            let iterations = usize::try_from(state.iterations).ok()?;
             let (_, end) = *self.rows.get(iterations.checked_sub(1)?)?;
-            Some((standing, iterations, end))
+            Some((state, iterations, end))
         });
         match usable {
             None => (self.begin, None),
-            Some((standing, iterations, end)) => {
+            Some((state, iterations, end)) => {
                 self.rows.truncate(iterations);
                 let rows = self.rows.into_iter().map(|(row, _)| row).collect();
-                (end, Some(CheckpointUnit::Search(rows, Box::new(standing))))
+                (end, Some(CheckpointUnit::Search(rows, Box::new(state))))
             }
         }
     }
@@ -121,7 +121,7 @@ impl JournalReader {
         }
         let contents = JournalContents {
             units,
-            standing: self.standing(),
+            state: self.state(),
             begin: JournalPosition::default(),
             end: Some(self.text.begin),
         };
@@ -129,10 +129,10 @@ impl JournalReader {
     }
 
     /// The checkpoint, if undamaged and of this fit.
-    fn standing(&self) -> Option<(u64, SolverState)> {
+    fn state(&self) -> Option<(u64, SolverState)> {
         let checkpoint = JournalText::read(&self.folder.join(CHECKPOINT), WHAT).ok()?;
         let is_of_this_fit = checkpoint.heading == self.text.heading;
-        let (standing, _) = checkpoint.lines().next()?;
-        is_of_this_fit.then_some(standing)
+        let (state, _) = checkpoint.lines().next()?;
+        is_of_this_fit.then_some(state)
     }
 }

@@ -1,6 +1,6 @@
 //! Assessment of one channel: outliers, residual diagnostics, and systematic patterns of the residuals.
 
-use crate::diagnostics::{ResidualDiagnostics, ResidualRecord, far_off, offset_and_drift};
+use crate::diagnostics::{ResidualDiagnostics, ResidualRecord, offset_and_drift, outlier_indices};
 use crate::record::{Channel, Loss};
 use crate::signal::{Spectrum, even_spacing};
 use serde::{Deserialize, Serialize};
@@ -20,8 +20,7 @@ const HALF: f64 = 0.5;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ResidualPattern {
-    /// Single outliers ([`far_off`]) under least squares.
-    #[serde(rename = "far-off")]
+    /// Single outliers ([`outlier_indices`]) under least squares.
     Outliers {
         /// Number of outliers.
         samples: usize,
@@ -52,7 +51,7 @@ pub fn pattern(channel: &Channel, predicted: &[f64]) -> Option<ResidualPattern> 
     if largest(&mut missed.iter()) <= ROUNDING * largest(&mut channel.observed().iter()) {
         return None;
     }
-    let far = far_off(&residuals);
+    let far = outlier_indices(&residuals);
     if let (Some(first), Loss::Squares) = (far.first(), channel.loss()) {
         return Some(ResidualPattern::Outliers {
             samples: far.len(),
@@ -101,11 +100,11 @@ pub fn diagnostics(channel: &Channel, predicted: &[f64]) -> ResidualDiagnostics 
     })
 }
 
-/// Indices of outliers ([`far_off`]) under a robust loss, which are excluded from the statistics of the fit. Empty under least
+/// Indices of outliers ([`outlier_indices`]) under a robust loss, which are excluded from the statistics of the fit. Empty under least
 /// squares.
 pub fn outliers(channel: &Channel, residuals: &[f64]) -> Vec<usize> {
     match channel.loss() {
         Loss::Squares => Vec::new(),
-        _ => far_off(residuals),
+        _ => outlier_indices(residuals),
     }
 }

@@ -69,7 +69,7 @@ pub fn function_summaries(
     let summary = |(i, (function, values)): (usize, (&CoefficientFunction, &Vec<f64>))| {
         let range = problem.functions.ranges()[i].clone();
         // Classifications of the functions come first, in their order.
-        let judged = assessment.and_then(|a| a.judgements.get(i));
+        let judged = assessment.and_then(|a| a.classifications.get(i));
         let largest = values.iter().fold(0.0f64, |most, x| most.max(x.abs()));
         let truth = truth.and_then(|truth| truth.functions().nth(i));
         let errors = truth.map(|truth| -> Vec<f64> {

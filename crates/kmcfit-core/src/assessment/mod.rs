@@ -35,23 +35,23 @@ pub struct FitAssessment {
     /// Bands of functions and ratios, where standard errors are meaningful.
     pub bands: Option<Bands>,
     /// Classification of functions and ratios by their bands.
-    pub judgements: Vec<FunctionClassification>,
+    pub classifications: Vec<FunctionClassification>,
 }
 
 impl FitAssessment {
-    /// Assesses `fit`; covariance, bands and judgements for up to 64 parameters.
+    /// Assesses `fit`; covariance, bands and classifications for up to 64 parameters.
     pub fn of(problem: &Problem, fit: &Fit) -> Self {
         let best = &fit.best;
         let step_check = step_check(problem, &best.evaluation);
         let statistics = statistics(problem, &best.evaluation);
         let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
-        let tells_errors = few && problem.sample_count() > problem.parameters();
+        let reports_errors = few && problem.sample_count() > problem.parameters();
         let mut plausibility = Plausibility::of(
             problem,
             &best.evaluation,
             &step_check,
             &statistics,
-            tells_errors,
+            reports_errors,
         );
         if fit.outcome.status == Status::Failed {
             plausibility.fail();
@@ -62,15 +62,15 @@ impl FitAssessment {
             plausibility,
             covariance: None,
             bands: None,
-            judgements: Vec::new(),
+            classifications: Vec::new(),
         };
-        if tells_errors && assessment.plausibility.errors_hold {
+        if reports_errors && assessment.plausibility.errors_hold {
             let settings = BandSettings {
                 draws: 0,
                 ..BandSettings::default()
             };
             let bands = Bands::at(problem, &best.parameters, &best.evaluation, &settings);
-            assessment.judgements = classify_functions(problem, &best.evaluation, &bands);
+            assessment.classifications = classify_functions(problem, &best.evaluation, &bands);
             assessment.bands = Some(bands);
             assessment.covariance = problem.covariance(&best.evaluation);
         }

@@ -18,7 +18,7 @@ use std::f64::consts::TAU;
 /// dominates the fit.
 const STEPPER: f64 = 0.1;
 /// NRMSE fit, per cent, below which a channel is unrelated to the model: residuals more than twice the variation of the samples.
-const ABSURD: f64 = -100.0;
+const UNRELATED: f64 = -100.0;
 /// NRMSE fit, per cent, below which a fit does not explain the record.
 pub const POOR: f64 = 90.0;
 /// Root of the reduced chi-square above which the stated sigma is inconsistent with the residuals.
@@ -34,7 +34,7 @@ const NEGATIVE: f64 = 1e-3;
 /// Share of mass times acceleration below which a force is negligible.
 const IGNORED: f64 = 1e-3;
 /// Periods per sample from which on the frequency is close to that of its first alias: two and a half samples per period.
-const PERIODS_PER_READING: f64 = 0.4;
+const PERIODS_PER_SAMPLE: f64 = 0.4;
 /// Largest deviation of equally spaced samples from their grid, as a share of the spacing.
 const EVEN: f64 = 0.01;
 
@@ -109,19 +109,20 @@ pub struct Plausibility {
 }
 
 impl Plausibility {
-    /// Plausibility of the optimum `evaluation`, given its step-size check and statistics; `tells_errors` is true if standard errors
+    /// Plausibility of the optimum `evaluation`, given its step-size check and statistics; `reports_errors` is true if standard errors
     /// are reported also for samples without sigma.
     pub fn of(
         problem: &Problem,
         evaluation: &Evaluation,
         step_check: &StepCheckOutcome,
         statistics: &FitStatistics,
-        tells_errors: bool,
+        reports_errors: bool,
     ) -> Self {
-        let unidentified = meaningless(problem, evaluation, step_check).or_else(|| {
-            (tells_errors && noise_would_do(problem, evaluation)).then_some(Unidentified::Noise)
+        let unidentified = unidentified(problem, evaluation, step_check).or_else(|| {
+            (reports_errors && noise_fits_equally(problem, evaluation))
+                .then_some(Unidentified::Noise)
         });
-        let (coloured, poor) = residuals(problem, evaluation, tells_errors);
+        let (coloured, poor) = residuals(problem, evaluation, reports_errors);
         let unexplained = unexplained(statistics)
             .or_else(|| coarse(problem, evaluation, step_check))
             .or_else(|| poor.then_some(FitWarning::PoorFit));
@@ -130,7 +131,7 @@ impl Plausibility {
         let optimistic = (errors_hold && coloured).then_some(FitWarning::Coloured);
         let warnings = unexplained.into_iter().chain(optimistic).chain(aliased);
         Self {
-            warnings: warnings.chain(absurd(problem, evaluation)).collect(),
+            warnings: warnings.chain(implausible(problem, evaluation)).collect(),
             unidentified,
             errors_hold,
             is_coloured: coloured,
@@ -152,11 +153,11 @@ impl Plausibility {
 }
 
 /// True if the residuals of a channel are certainly coloured; and if such a channel is also fitted poorly.
-fn residuals(problem: &Problem, evaluation: &Evaluation, tells_errors: bool) -> (bool, bool) {
+fn residuals(problem: &Problem, evaluation: &Evaluation, reports_errors: bool) -> (bool, bool) {
     let (mut coloured, mut poor) = (false, false);
     for (channel, predicted) in problem.predicted(evaluation) {
         let found = diagnostics(channel, predicted);
-        let is_judged = tells_errors || channel.weighting().sigma(0).is_some();
+        let is_judged = reports_errors || channel.weighting().sigma(0).is_some();
         if is_judged && found.whiteness.p_value < CERTAIN && found.fit_percent < EXACT {
             coloured = true;
             poor |= found.fit_percent < POOR;
@@ -166,7 +167,7 @@ fn residuals(problem: &Problem, evaluation: &Evaluation, tells_errors: bool) -> 
 }
 
 /// Reason for which no statement on the functions is meaningful, if any.
-fn meaningless(
+fn unidentified(
     problem: &Problem,
     evaluation: &Evaluation,
     step_check: &StepCheckOutcome,
@@ -182,13 +183,13 @@ fn meaningless(
     let mut fits = (problem.channels().zip(predictions))
         .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent)
         .peekable();
-    let absurd = fits.peek().is_some() && fits.all(|fit| fit < ABSURD);
-    absurd.then_some(Unidentified::Unrelated)
+    let unrelated = fits.peek().is_some() && fits.all(|fit| fit < UNRELATED);
+    unrelated.then_some(Unidentified::Unrelated)
 }
 
 /// True if a fit with as many parameters would match white noise as well, by the likelihood ratio of the system and of a constant
 /// for each channel; a search among many frequencies has as many chances. Outliers are excluded.
-fn noise_would_do(problem: &Problem, evaluation: &Evaluation) -> bool {
+fn noise_fits_equally(problem: &Problem, evaluation: &Evaluation) -> bool {
     let predictions = evaluation.predictions.iter().flatten();
     let (mut gain, mut samples) = (0.0, 0);
     for (channel, predicted) in problem.channels().zip(predictions) {
@@ -203,7 +204,7 @@ fn noise_would_do(problem: &Problem, evaluation: &Evaluation) -> bool {
         gain += n * (constant / left).ln();
         samples += channel.len();
     }
-    // With as many parameters as samples anything is matched, and the ratio carries no information.
+    // With as many parameters as samples every record is matched, and the ratio carries no information.
     let Ok(law) = ChiSquared::new(problem.parameters() as f64) else {
         return false;
     };
@@ -232,7 +233,7 @@ fn coarse(
 }
 
 /// Warnings about implausible optima.
-fn absurd(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
+fn implausible(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
     let mut warnings = Vec::new();
     let sizes = problem.natural_scales(evaluation);
     let passive = [
@@ -308,7 +309,7 @@ fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
     squares.sort_by(f64::total_cmp);
     // Median over time, because k/m may be arbitrary at the ends of a record.
     let frequency = squares[squares.len() / 2].sqrt() / TAU;
-    (frequency * spacing > PERIODS_PER_READING).then(|| FitWarning::Aliased {
+    (frequency * spacing > PERIODS_PER_SAMPLE).then(|| FitWarning::Aliased {
         per_period: 1.0 / (frequency * spacing),
         frequency,
     })

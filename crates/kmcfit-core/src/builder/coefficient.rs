@@ -333,9 +333,11 @@ pub(super) fn values_at_nodes(
         TimeHistory::Nodal { values, .. } => values.clone(),
     };
     if values.len() != nodes {
-        return Err(BuildError::new(key, "there is not one value per node")
-            .found(format!("{} values", values.len()))
-            .expected(format!("{nodes} values")));
+        return Err(
+            BuildError::new(key, "the number of values differs from that of the nodes")
+                .found(format!("{} values", values.len()))
+                .expected(format!("{nodes} values")),
+        );
     }
     match values.iter().find(|value| !value.is_finite()) {
         Some(value) => Err(BuildError::new(key, "not a finite number")
@@ -377,9 +379,9 @@ fn parameters(
         Start::Constant(value) => Ok(basis.constant(grid, *value)),
         Start::Parameters(values) => listed(key, basis, values, grid),
         Start::Nodal(values) => basis.project(grid, values).ok_or_else(|| {
-            BuildError::new(key, "the column cannot be turned into this basis")
+            BuildError::new(key, "the column cannot be projected onto this basis")
                 .found(format!("`{}`", basis.name()))
-                .expected("a basis whose functions the nodes can tell apart")
+                .expected("a basis whose functions are linearly independent at the nodes")
         }),
     }
 }

@@ -87,7 +87,9 @@ impl Builder {
                 return Err(
                     BuildError::new(format!("experiments[{i}].functions"), problem)
                         .found("`functions` beside `validation: true`")
-                        .expected("the shared functions, which the validation tests"),
+                        .expected(
+                            "no `functions`: the record is predicted with the shared functions",
+                        ),
                 );
             }
             for (f, entry) in entries
@@ -123,7 +125,8 @@ impl Builder {
         match entry.kind {
             CoefficientKind::CoulombFriction => {
                 let problem = "Coulomb friction is shared by all experiments";
-                Err(BuildError::new(&entry.key, problem).expected("it under `functions` alone"))
+                Err(BuildError::new(&entry.key, problem)
+                    .expected("`functions.coulomb_friction`, for all experiments"))
             }
             _ => Ok(place),
         }
@@ -141,15 +144,15 @@ fn check_shared(entries: &[FunctionEntry], found: &CoefficientSets) -> Result<()
     if found.of_record.len() > 1 && own && !entries.iter().enumerate().any(shared) {
         let problem = "the experiments share no function that is fitted";
         return Err(BuildError::new("experiments", problem)
-            .found("functions of its own in every experiment")
+            .found("separate functions in every experiment")
             .expected("a function that several experiments share, or a model for each"));
     }
     match (entries.iter().enumerate()).find(|(f, _)| users(*f) == 0 && !found.of_record.is_empty())
     {
         Some((_, entry)) => Err(
             BuildError::new(&entry.key, "no experiment uses this function")
-                .found("one of its own in every experiment")
-                .expected("at least one experiment without, or `fixed` here"),
+                .found("a separate function in every experiment")
+                .expected("an experiment without a separate function, or `fixed` here"),
         ),
         None => Ok(()),
     }

@@ -70,7 +70,7 @@ impl Builder {
         if rows.is_empty() {
             notices.push(BuildNotice::AlwaysHolds { key: key.clone() });
         }
-        notices.extend(self.unfelt(constraint, problem));
+        notices.extend(self.uninformative(constraint, problem));
         let soft = constraint.soft;
         rows.groups.iter_mut().for_each(|group| group.soft = soft);
         keys.extend(names(&rows).map(|name| RowKey {
@@ -85,7 +85,7 @@ impl Builder {
     /// `s(t) (m, c, k)` have the same response for every positive `s(t)`. Passivity and monotonicity of mass or stiffness are not
     /// invariant under this change: unless `s(t)` is determined otherwise, a suitable `s(t)` satisfies them, and they carry no
     /// information on the system.
-    fn unfelt(&self, constraint: &ConstraintSpec, problem: &Problem) -> Option<BuildNotice> {
+    fn uninformative(&self, constraint: &ConstraintSpec, problem: &Problem) -> Option<BuildNotice> {
         let what = match &constraint.statement {
             Constraint::Passive => "passivity",
             Constraint::Shape {
@@ -108,7 +108,7 @@ impl Builder {
         let smoothed = problem.penalties.iter().any(|p| p.weight > 0.0)
             || problem.variations.iter().any(|v| v.weight > 0.0);
         let key = constraint.key.clone();
-        let notice = BuildNotice::Unfelt { key, what };
+        let notice = BuildNotice::Uninformative { key, what };
         (!(forced || held || smoothed || self.bounded_on_both_sides())).then_some(notice)
     }
 
@@ -147,7 +147,7 @@ impl ConstraintSpec {
             return match self.statement {
                 Constraint::DampingRatio { .. } => Err(BuildError::new(
                     key,
-                    "a cap on the damping ratio cannot be soft",
+                    "a bound of the damping ratio cannot be soft",
                 )
                 .found("`soft` beside `damping_ratio`")
                 .expected("no `soft`")),
@@ -178,7 +178,7 @@ impl ConstraintSpec {
         if held > 0.0 {
             return Ok(());
         }
-        let problem = "this excludes a positive mass: the mass must be positive at all times";
+        let problem = "this bound excludes a positive mass: the mass must be positive at all times";
         Err(BuildError::new(&self.key, problem)
             .found(held)
             .expected("a number greater than 0"))

@@ -24,8 +24,8 @@ pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
     if let Some(place) = problem.experiments.iter().position(free_and_open) {
         let name = &problem.experiments[place].name;
         let problem = format!(
-            "the gain and the initial state of {name} cannot both be estimated: a larger response measured by a weaker sensor looks \
-             the same"
+            "the gain and the initial state of {name} cannot both be estimated: only their product is \
+             identifiable"
         );
         return Err(BuildError::new("experiments", problem)
             .found(format!(
@@ -40,8 +40,8 @@ pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
     match all && scale_is_open(problem) {
         true => Err(BuildError::new(
             "experiments",
-            "the gains and the scale of mass, damping and stiffness cannot both be estimated: a heavier system measured by a \
-             stronger sensor looks the same",
+            "the gains and the scale of mass, damping and stiffness cannot both be estimated: only their ratio \
+             is identifiable",
         )
         .found("no known gain, no fixed function and no value that determines the scale")
         .expected(
@@ -96,7 +96,7 @@ fn check_offsets(
     if !(estimated && problem.experiments.iter().all(shifted)) {
         return Ok(());
     }
-    let problem = "a static force and the offsets of the sensors cannot both be estimated: a shifted response looks the same";
+    let problem = "a static force and the offsets of the sensors cannot both be estimated: only their sum is identifiable";
     Err(BuildError::new("functions.static_force", problem)
         .found("no known offset, initial displacement or prior")
         .expected("a number for one of them, or a `prior`"))

@@ -120,7 +120,7 @@ impl Builder {
         let spans = self.records.iter().filter_map(Record::span);
         let Some([start, end]) = spans.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]) else {
             return Err(
-                BuildError::new("grid", "there are no samples to take it from")
+                BuildError::new("grid", "the grid cannot be chosen without samples")
                     .expected("a grid, or records with channels"),
             );
         };
@@ -135,14 +135,14 @@ impl Builder {
             }
         };
         if !(Grid::FEWEST_NODES..=MOST_NODES).contains(&nodes) {
-            let problem = "this number of nodes cannot be used";
+            let problem = "invalid number of nodes";
             return Err(BuildError::new("grid.nodes", problem)
                 .found(nodes)
                 .expected(format!("{} to {MOST_NODES}", Grid::FEWEST_NODES)));
         }
         Grid::new(start, end - start, nodes).ok_or_else(|| {
-            BuildError::new("grid", "the times make no grid")
-                .found(format!("{nodes} nodes over {} s", end - start))
+            BuildError::new("grid", "invalid time axis")
+                .found(format!("{nodes} nodes over {:?} s", end - start))
                 .expected("a positive duration whose steps are not zero")
         })
     }

@@ -15,7 +15,7 @@ pub enum BuildNotice {
         key: String,
     },
     /// A constraint without information in free records, which the scaling ambiguity can satisfy.
-    Unfelt {
+    Uninformative {
         /// Key.
         key: String,
         /// Description of the constraint.
@@ -44,15 +44,15 @@ impl fmt::Display for BuildNotice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NothingToFit => {
-                f.write_str("every function is fixed, so there is nothing to fit")
+                f.write_str("every function is fixed: there are no parameters to estimate")
             }
             Self::AlwaysHolds { key } => {
                 write!(f, "{key} has no effect: it holds for all functions")
             }
-            Self::Unfelt { key, what } => write!(
+            Self::Uninformative { key, what } => write!(
                 f,
-                "{key}: {what} carries no information here. Without a force the response determines only k/m and c/m, and any \
-                 s(t) may multiply all three functions; fix a function, bound the functions on both sides, or add a penalty"
+                "{key}: {what} carries no information here. Without a force the response determines only k/m and c/m: a factor \
+                 s(t) of all three functions is undetermined; fix a function, bound the functions on both sides, or add a penalty"
             ),
             Self::NoRoughness { key, basis } => write!(
                 f,
@@ -62,7 +62,7 @@ impl fmt::Display for BuildNotice {
             Self::StartMoved { constraint } => {
                 write!(
                     f,
-                    "the start was moved into the constraints (`{constraint}`)"
+                    "the start values violate `{constraint}` and were projected onto the constraints"
                 )
             }
         }

@@ -178,9 +178,9 @@ fn residuals_at(
     let values = values_at_nodes(reference, &key, grid.nodes())?;
     // The part of the reference outside the basis adds a constant to the cost.
     let nearest = basis.project(grid, &values).ok_or_else(|| {
-        BuildError::new(&key, "the reference cannot be turned into this basis")
+        BuildError::new(&key, "the reference cannot be projected onto this basis")
             .found(format!("`{}`", basis.name()))
-            .expected("a basis whose functions the nodes can tell apart")
+            .expected("a basis whose functions are linearly independent at the nodes")
     })?;
     Ok(penalty.residuals(&nearest))
 }

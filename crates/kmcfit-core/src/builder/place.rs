@@ -237,7 +237,7 @@ impl Placement<'_> {
             drift: value("drift", drift, &per_second, [0.0, 0.0, size])?,
         };
         if sensor.gain == ScalarValue::Known(0.0) {
-            let problem = "a sensor with gain 0 measures nothing";
+            let problem = "the gain of a sensor must not be 0";
             return Err(BuildError::new(format!("{key}.gain"), problem)
                 .found("0")
                 .expected("another number, or `estimate`"));

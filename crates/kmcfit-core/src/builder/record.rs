@@ -93,7 +93,7 @@ impl ChannelSpec {
         let increasing = self.times.windows(2).all(|pair| pair[0] < pair[1]);
         let finite = self.times.iter().chain(&self.values).all(|x| x.is_finite());
         if self.times.len() != self.values.len() {
-            let problem = "there is not one time for each sample";
+            let problem = "the numbers of times and samples differ";
             return Err(BuildError::new(columns(), problem)
                 .found(format!(
                     "{} values at {} times",
@@ -103,12 +103,12 @@ impl ChannelSpec {
                 .expected("as many times as values"));
         }
         if self.times.len() < 2 {
-            return Err(BuildError::new(columns(), "there are too few samples")
+            return Err(BuildError::new(columns(), "too few samples")
                 .found(self.times.len())
                 .expected("at least 2"));
         }
         if !finite || !increasing {
-            return Err(BuildError::new(columns(), "these samples are invalid")
+            return Err(BuildError::new(columns(), "invalid samples")
                 .found(match finite {
                     true => "times that do not increase",
                     false => "a time or sample that is not a finite number",
@@ -340,7 +340,7 @@ impl Record {
             let signal = Signal::new(times.clone(), values.clone(), self.interpolation);
             signal.map(Some).ok_or_else(|| {
                 let key = format!("{key}.columns.{name}");
-                BuildError::new(key, "these samples are invalid")
+                BuildError::new(key, "invalid samples")
                     .found(format!("{} values at {} times", values.len(), times.len()))
                     .expected("finite values at increasing times")
             })

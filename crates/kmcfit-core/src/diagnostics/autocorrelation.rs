@@ -163,7 +163,7 @@ mod tests {
         let outside: usize = (0..100)
             .map(|seed| {
                 let mut values = white(seed, 2000);
-                // A third of the samples are missing where the noise itself, and so chance, says.
+                // A third of the samples are missing, at random positions that the noise determines.
                 let missing = white(seed + 1000, 2000);
                 for (x, gap) in values.iter_mut().zip(missing) {
                     if gap > 0.43 {
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn size_does_not_matter() {
+    fn autocorrelations_do_not_depend_on_scale() {
         let small: Vec<f64> = white(5, 100).iter().map(|x| x * 1e-250).collect();
         let r = autocorrelation(&small, 5);
         let same = autocorrelation(&white(5, 100), 5);

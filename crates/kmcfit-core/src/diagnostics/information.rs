@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_said() {
+    fn criteria_without_degrees_of_freedom_are_absent() {
         assert_eq!(with_known_sigma(1.0, 0, 1.0), None);
         assert_eq!(with_known_sigma(f64::NAN, 9, 1.0), None);
         assert_eq!(with_estimated_sigma(0.0, 9, 1.0), None);

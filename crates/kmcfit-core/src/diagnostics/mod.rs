@@ -16,11 +16,11 @@ mod words;
 pub use autocorrelation::{Autocorrelation, NORMAL_975, autocorrelation, default_lags};
 pub use information::{InformationCriteria, with_estimated_sigma, with_known_sigma};
 pub(crate) use pattern::median_size;
-pub use pattern::{far_off, offset_and_drift};
+pub use pattern::{offset_and_drift, outlier_indices};
 pub use quantiles::{chi_square_one, normal_half_width};
 pub use record::{ResidualDiagnostics, ResidualRecord};
 pub use residuals::{fit_percent, rms};
 pub use residuals::{spread, without_line};
 pub use whiteness::{
-    FEWEST_READINGS, SIGNIFICANCE, UntestedReason, Whiteness, WhitenessResult, whiteness,
+    FEWEST_SAMPLES, SIGNIFICANCE, UntestedReason, Whiteness, WhitenessResult, whiteness,
 };

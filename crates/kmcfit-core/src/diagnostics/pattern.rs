@@ -18,14 +18,14 @@ const FEWEST: usize = 16;
 /// sample in twenty, and at most three are consecutive. Empty otherwise.
 ///
 /// ```
-/// use kmcfit_core::internals::diagnostics::far_off;
+/// use kmcfit_core::internals::diagnostics::outlier_indices;
 /// let mut residuals: Vec<f64> = (0..100).map(|i| (0.7 * f64::from(i)).sin()).collect();
 /// residuals[30] = 80.0;
-/// assert_eq!(far_off(&residuals), [30]);
+/// assert_eq!(outlier_indices(&residuals), [30]);
 /// residuals[30] = 0.8;
-/// assert!(far_off(&residuals).is_empty());
+/// assert!(outlier_indices(&residuals).is_empty());
 /// ```
-pub fn far_off(residuals: &[f64]) -> Vec<usize> {
+pub fn outlier_indices(residuals: &[f64]) -> Vec<usize> {
     if residuals.len() < FEWEST || residuals.iter().any(|r| !r.is_finite()) {
         return Vec::new();
     }
@@ -106,13 +106,13 @@ mod tests {
     #[test]
     fn noise_and_systematic_patterns_have_no_outliers() {
         for seed in 1..20 {
-            assert!(far_off(&white(seed, 2000)).is_empty(), "{seed}");
+            assert!(outlier_indices(&white(seed, 2000)).is_empty(), "{seed}");
         }
         let decay = |i: i32| (-0.1 * f64::from(i)).exp() * (0.3 * f64::from(i)).cos();
         let missed: Vec<f64> = (0..1000).map(decay).collect();
-        assert!(far_off(&missed).is_empty());
-        assert!(far_off(&[0.0; 100]).is_empty());
-        assert!(far_off(&[f64::NAN; 100]).is_empty());
+        assert!(outlier_indices(&missed).is_empty());
+        assert!(outlier_indices(&[0.0; 100]).is_empty());
+        assert!(outlier_indices(&[f64::NAN; 100]).is_empty());
     }
 
     #[test]
@@ -121,12 +121,12 @@ mod tests {
         for i in [0, 90, 91, 199] {
             residuals[i] = 60.0;
         }
-        assert_eq!(far_off(&residuals), [0, 90, 91, 199]);
+        assert_eq!(outlier_indices(&residuals), [0, 90, 91, 199]);
         // One in ten is too frequent for outliers.
         for i in (0..200).step_by(10) {
             residuals[i] = 60.0;
         }
-        assert!(far_off(&residuals).is_empty());
+        assert!(outlier_indices(&residuals).is_empty());
     }
 
     #[test]

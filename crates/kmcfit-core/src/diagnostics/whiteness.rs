@@ -6,7 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// Significance level of the test.
 pub const SIGNIFICANCE: f64 = 0.05;
 /// Smallest number of samples for a test.
-pub const FEWEST_READINGS: usize = 20;
+pub const FEWEST_SAMPLES: usize = 20;
 
 /// Outcome of the test.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,8 +26,8 @@ pub enum WhitenessResult {
 /// Reason for an omitted test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum UntestedReason {
-    /// Fewer than [`FEWEST_READINGS`].
-    FewReadings,
+    /// Fewer than [`FEWEST_SAMPLES`].
+    FewSamples,
     /// No more lags with pairs than fitted parameters of the noise.
     FewLags,
     /// All residuals are zero: the model equals every sample.
@@ -72,8 +72,8 @@ pub fn whiteness(autocorrelation: &Autocorrelation, step: f64, fitted: usize) ->
     let lags: Vec<usize> = (1..=autocorrelation.lags()).filter(paired).collect();
     let outside = (lags.iter()).filter(|lag| autocorrelation.is_outside(**lag));
     let share_outside = outside.count() as f64 / lags.len().max(1) as f64;
-    let reason = if autocorrelation.count < FEWEST_READINGS {
-        Some(UntestedReason::FewReadings)
+    let reason = if autocorrelation.count < FEWEST_SAMPLES {
+        Some(UntestedReason::FewSamples)
     } else if !autocorrelation.varies() {
         Some(UntestedReason::NoResiduals)
     } else {

@@ -1,6 +1,6 @@
 //! Sentences of the whiteness test.
 
-use super::{FEWEST_READINGS, UntestedReason, Whiteness, WhitenessResult};
+use super::{FEWEST_SAMPLES, UntestedReason, Whiteness, WhitenessResult};
 use std::fmt;
 
 /// Probability below which a bound is printed.
@@ -28,13 +28,16 @@ impl fmt::Display for Whiteness {
 impl fmt::Display for UntestedReason {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            UntestedReason::FewReadings => {
-                write!(f, "there are fewer than {FEWEST_READINGS} samples")
+            UntestedReason::FewSamples => {
+                write!(f, "there are fewer than {FEWEST_SAMPLES} samples")
             }
             UntestedReason::FewLags => {
-                write!(f, "there are too few lags for the parameters of the noise")
+                write!(
+                    f,
+                    "the noise model has too many parameters for the number of lags"
+                )
             }
-            UntestedReason::NoResiduals => write!(f, "the model equals every sample"),
+            UntestedReason::NoResiduals => write!(f, "all residuals are zero"),
         }
     }
 }
@@ -110,7 +113,7 @@ mod tests {
         );
         assert_eq!(
             say(&[0.0; 40]),
-            "the residuals were not tested: the model equals every sample"
+            "the residuals were not tested: all residuals are zero"
         );
     }
 

@@ -179,11 +179,11 @@ pub fn classify_functions(
                 other => known(f).map_or(other, Classification::OnlyRatio),
             },
         };
-        judgement(&band.name, verdict, band, sizes[f])
+        classification(&band.name, verdict, band, sizes[f])
     });
     let functions: Vec<FunctionClassification> = functions.collect();
     let ratios = (ratios.into_iter())
-        .filter_map(|(name, _, size, v)| Some(judgement(name, v, bands.ratio(name)?, size)));
+        .filter_map(|(name, _, size, v)| Some(classification(name, v, bands.ratio(name)?, size)));
     functions.into_iter().chain(ratios).collect()
 }
 
@@ -204,7 +204,7 @@ fn judge(times: &[f64], band: &Band, size: f64) -> Classification {
     }
 }
 
-fn judgement(
+fn classification(
     name: &str,
     verdict: Classification,
     band: &Band,

@@ -43,4 +43,4 @@ pub use experiments::{
 pub(crate) use factorisation::Factorisation;
 pub use scaling_ambiguity::ScalingAmbiguity;
 pub use sensitivity::{ResolvedDirection, Sensitivity, SingularSpectrum};
-pub use structural_rank::{RankFinding, RankFindingKind, Symmetry, structural_rank};
+pub use structural_rank::{RankFinding, RankFindingKind, ScaleFreedom, structural_rank};

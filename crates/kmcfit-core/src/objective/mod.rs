@@ -21,7 +21,7 @@ pub use step_halving::Refined;
 use crate::problem::Problem;
 use crate::record::Channel;
 use crate::simulate::reference::tangent;
-use crate::simulate::{Cause, Engine, Purpose, SimulationError, Trajectory};
+use crate::simulate::{Cause, Engine, EngineMode, SimulationError, Trajectory};
 use crate::system::{NodalCoefficients, State, SystemTangent, TimePoint};
 
 /// Cost at one point, with the simulation it was computed from.
@@ -100,21 +100,21 @@ impl Problem {
         theta: &[f64],
         evaluation: &mut Evaluation,
     ) -> Result<(), SimulationError> {
-        self.evaluate_for(Purpose::Estimation, theta, evaluation)
+        self.evaluate_for(EngineMode::Fastest, theta, evaluation)
     }
 
-    /// [`Problem::evaluate_into`] with the engine for a [`Purpose`].
+    /// [`Problem::evaluate_into`] with the engine for a [`EngineMode`].
     ///
     /// # Errors
     /// As [`Problem::evaluate`].
     pub fn evaluate_for(
         &self,
-        purpose: Purpose,
+        mode: EngineMode,
         theta: &[f64],
         evaluation: &mut Evaluation,
     ) -> Result<(), SimulationError> {
         self.set_parameters(theta, evaluation);
-        self.responses(purpose, evaluation)?;
+        self.responses(mode, evaluation)?;
         evaluation.regularisation = self.regularisation(theta);
         evaluation.cost = evaluation.misfit + evaluation.regularisation;
         if !evaluation.cost.is_finite() {
@@ -142,7 +142,7 @@ impl Problem {
 
     fn responses(
         &self,
-        purpose: Purpose,
+        mode: EngineMode,
         evaluation: &mut Evaluation,
     ) -> Result<(), SimulationError> {
         evaluation.misfit = 0.0;
@@ -154,7 +154,7 @@ impl Problem {
             let response = &mut evaluation.trajectories[e];
             let initial = experiment.initial_state(&evaluation.scalars);
             let (system, excitation) = (&self.system, experiment.excitation.as_ref());
-            let engine = Engine::choose(system, excitation, response.nodes(), purpose);
+            let engine = Engine::choose(system, excitation, response.nodes(), mode);
             engine.forward_into(system, nodal, initial, excitation, response)?;
             let view = SimulatedRecord {
                 system,

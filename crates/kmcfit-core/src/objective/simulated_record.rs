@@ -1,6 +1,6 @@
 //! A simulated record with the system that produced it, and its directional derivative.
 
-use crate::simulate::{Engine, Purpose, Trajectory};
+use crate::simulate::{Engine, EngineMode, Trajectory};
 use crate::system::{Excitation, NodalCoefficients, System, SystemTangent};
 
 /// A simulated record.
@@ -33,7 +33,7 @@ impl SimulatedRecord<'_> {
     /// Engine of the response and its derivatives.
     pub(crate) fn engine(&self) -> Engine {
         let nodes = self.response.nodes();
-        Engine::choose(self.system, self.excitation, nodes, Purpose::Estimation)
+        Engine::choose(self.system, self.excitation, nodes, EngineMode::Fastest)
     }
 
     /// [`discrete_adjoint`](crate::simulate::reference::discrete_adjoint()) of the response.

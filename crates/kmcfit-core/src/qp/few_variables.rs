@@ -1,7 +1,7 @@
 //! Least squares in few variables by one triangular factor.
 
 use super::Subproblem;
-use crate::simd::tall_qr::{PIECE, RowBlock, Triangle};
+use crate::simd::tall_qr::{BLOCK_ROWS, RowBlock, Triangle};
 
 /// Share of its length below which the rest of a column depends on the previous columns.
 const INDEPENDENT: f64 = 1e-14;
@@ -9,7 +9,8 @@ const INDEPENDENT: f64 = 1e-14;
 /// Minimiser of `|F z - f|^2 + sum d z^2` subject to `E z = e` for one `f`, by reflecting all rows into a triangle; `None` if the variables
 /// have an elimination order of several places, if an equality has more than one variable, or if the minimum is not unique.
 pub fn minimise(sub: &Subproblem, target: &[f64]) -> Option<Vec<f64>> {
-    let at_once = sub.stations.len() == sub.variables && sub.stations.iter().all(|s| *s == 0);
+    let at_once = sub.elimination_order.len() == sub.variables
+        && sub.elimination_order.iter().all(|s| *s == 0);
     at_once.then_some(())?;
     let mut z = vec![f64::NAN; sub.variables];
     for i in 0..sub.equalities.len() {
@@ -48,26 +49,26 @@ pub fn minimise(sub: &Subproblem, target: &[f64]) -> Option<Vec<f64>> {
     rows.sort_by(|(a, _), (b, _)| b.total_cmp(a));
 
     let mut triangle = Triangle::new(free.len());
-    let mut piece = RowBlock::new(free.len());
-    let mut right = [0.0; PIECE];
-    for part in rows.chunks(PIECE) {
-        piece.clear();
-        piece.count = part.len();
+    let mut block = RowBlock::new(free.len());
+    let mut right = [0.0; BLOCK_ROWS];
+    for part in rows.chunks(BLOCK_ROWS) {
+        block.clear();
+        block.count = part.len();
         for (r, &(size, i)) in part.iter().enumerate() {
             right[r] = 0.0;
             if i >= count {
-                piece.column_mut(i - count)[r] = size;
+                block.column_mut(i - count)[r] = size;
                 continue;
             }
             right[r] = target[i];
             for (j, a) in sub.residuals.row(i) {
                 match places[j] {
-                    Some(place) => piece.column_mut(place)[r] = a,
+                    Some(place) => block.column_mut(place)[r] = a,
                     None => right[r] -= a * z[j],
                 }
             }
         }
-        triangle.add(&mut piece, &right[..part.len()]);
+        triangle.add(&mut block, &right[..part.len()]);
     }
     for (j, x) in free.iter().zip(triangle.solve(INDEPENDENT)?) {
         z[*j] = x;

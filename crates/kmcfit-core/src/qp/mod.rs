@@ -1,7 +1,7 @@
 //! Convex subproblems; the only module that uses Clarabel.
 //!
 //! Each subproblem is a least-squares problem in residual form with linear and second-order-cone constraints ([`Subproblem`]).
-//! [`Subproblem::solve_plain`] solves it without its inequalities, by one elimination or one sparse factorisation;
+//! [`Subproblem::solve_equality_constrained`] solves it with its equalities only, by one elimination or one sparse factorisation;
 //! [`Subproblem::solve`] solves the full problem by Clarabel.
 
 mod chain;
@@ -10,10 +10,10 @@ mod contradiction;
 mod few_variables;
 mod kkt;
 mod ldl;
-mod normal;
 mod polish;
 mod primal_dual;
 mod projection;
+mod scaling;
 mod solve;
 mod stages;
 mod subproblem;

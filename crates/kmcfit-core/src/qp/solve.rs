@@ -1,7 +1,7 @@
 //! Solution of a program: attempts with different settings, each checked by the residuals of the optimality conditions.
 
 use super::clarabel::{Ending, Settings};
-use super::normal::Normalised;
+use super::scaling::ScaledProgram;
 use super::{Kkt, PrimalDual, Subproblem};
 use crate::constraints::{Rows, TOLERANCE};
 
@@ -69,8 +69,8 @@ struct ClarabelAttempt {
 enum Units {
     /// Original units.
     Own,
-    /// Scaled by [`Normalised`].
-    Normalised,
+    /// Scaled by [`ScaledProgram`].
+    ScaledProgram,
 }
 
 /// Settings in the order of the attempts. No regularisation suits all programs: a large one exceeds the small coefficients of heavily weighted
@@ -87,11 +87,11 @@ const ATTEMPTS: [ClarabelAttempt; 5] = [
     },
     ClarabelAttempt {
         regularisation: 1e-8,
-        units: Units::Normalised,
+        units: Units::ScaledProgram,
     },
     ClarabelAttempt {
         regularisation: 1e-12,
-        units: Units::Normalised,
+        units: Units::ScaledProgram,
     },
     ClarabelAttempt {
         regularisation: 1e-10,
@@ -99,7 +99,7 @@ const ATTEMPTS: [ClarabelAttempt; 5] = [
     },
 ];
 
-impl Normalised {
+impl ScaledProgram {
     /// [`Subproblem::run_clarabel`] in these units.
     fn run(&self, settings: Settings) -> Ending {
         let ending = self.sub.run_clarabel(settings);
@@ -184,14 +184,14 @@ impl Subproblem {
                     Ending::Point(point) => Ending::Point(self.repaired(point)),
                     ending => ending,
                 },
-                Units::Normalised => normalised
-                    .get_or_insert_with(|| Normalised::new(self))
+                Units::ScaledProgram => normalised
+                    .get_or_insert_with(|| ScaledProgram::new(self))
                     .run(settings),
             };
             match ending {
                 Ending::Point(point) => {
                     let kkt = self.kkt(&point);
-                    let normalised = normalised.get_or_insert_with(|| Normalised::new(self));
+                    let normalised = normalised.get_or_insert_with(|| ScaledProgram::new(self));
                     if !normalised.resolves(&point.z) {
                         continue;
                     }
@@ -216,7 +216,7 @@ impl Subproblem {
             }
         }
         let attempts = ATTEMPTS.len() as u32;
-        let normalised = normalised.unwrap_or_else(|| Normalised::new(self));
+        let normalised = normalised.unwrap_or_else(|| ScaledProgram::new(self));
         if normalised.sub.has_violations(iterations) {
             return self.solution(ConicStatus::Infeasible, best, attempts);
         }

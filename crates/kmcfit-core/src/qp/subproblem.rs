@@ -29,7 +29,7 @@ pub struct Subproblem {
     pub cones: Vec<Cone>,
     /// Elimination order: place of each variable along a chain, mostly time, in which rows couple neighbours only; empty if unknown for some
     /// variable.
-    pub stations: Vec<u32>,
+    pub elimination_order: Vec<u32>,
     /// Assignment of the variables to the nodes of a time grid, if known for all.
     pub layout: Option<StageLayout>,
 }
@@ -48,7 +48,7 @@ impl Subproblem {
             inequalities: Rows::new(),
             upper: Vec::new(),
             cones: Vec::new(),
-            stations: Vec::new(),
+            elimination_order: Vec::new(),
             layout: None,
         }
     }
@@ -89,19 +89,19 @@ impl Subproblem {
 
     /// Minimiser without inequalities and cones; `None` if it is not found to [`Subproblem::PLAIN_RESIDUAL`] or the cost has absolute values.
     ///
-    /// Variables with an elimination order ([`Subproblem::stations`]) are eliminated along it, or together if it has one place. Otherwise, or if
+    /// Variables with an elimination order ([`Subproblem::elimination_order`]) are eliminated along it, or together if it has one place. Otherwise, or if
     /// that fails, solves the optimality conditions with the residuals `rho = F z - f` as unknowns,
     /// `[D F' E'; F -I 0; E 0 0] (z, rho, lambda) = (0, f, e)`, which avoids `F^T F`.
-    pub fn solve_plain(&self) -> Option<Vec<f64>> {
+    pub fn solve_equality_constrained(&self) -> Option<Vec<f64>> {
         if !self.absolute.is_empty() {
             return None;
         }
-        self.solve_plain_for(&[self.residuals.right().to_vec()])?
+        self.solve_equality_constrained_for(&[self.residuals.right().to_vec()])?
             .pop()
     }
 
-    /// [`Subproblem::solve_plain`] for several right-hand sides `f` of the residuals, by one factorisation; absolute values are ignored.
-    pub fn solve_plain_for(&self, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+    /// [`Subproblem::solve_equality_constrained`] for several right-hand sides `f` of the residuals, by one factorisation; absolute values are ignored.
+    pub fn solve_equality_constrained_for(&self, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         if let [target] = targets
             && let Some(z) = few_variables::minimise(self, target)
         {
@@ -110,7 +110,7 @@ impl Subproblem {
         chain::minimise(self, targets).or_else(|| self.solve_by_factor(targets))
     }
 
-    /// [`Subproblem::solve_plain_for`] by one symmetric factorisation.
+    /// [`Subproblem::solve_equality_constrained_for`] by one symmetric factorisation.
     fn solve_by_factor(&self, targets: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         let solutions = self.solve_conditions(targets)?.into_iter();
         let variables = solutions.map(|mut solution| {
@@ -148,10 +148,10 @@ impl Subproblem {
         matrix
     }
 
-    /// Plain minimum that satisfies the inequalities to `tolerance`, with those as equalities that `z`, a plain minimum, or a later minimum
-    /// violates. Equalities are not removed again, so it need not be the minimum under the inequalities. `None` if a few rounds do not suffice, or
-    /// with cones.
-    pub fn solve_held(&self, mut z: Vec<f64>, tolerance: f64) -> Option<Vec<f64>> {
+    /// Feasible point from an active-set iteration that only adds rows: inequalities that `z`, the minimum without them, violates beyond
+    /// `tolerance` become equalities, and the minimum is computed again. Rows are not removed, so the point need not be the constrained
+    /// minimum. `None` if a few rounds do not suffice, or with cones.
+    pub fn solve_active_set(&self, mut z: Vec<f64>, tolerance: f64) -> Option<Vec<f64>> {
         if !self.cones.is_empty() {
             return None;
         }
@@ -172,12 +172,12 @@ impl Subproblem {
             if inside {
                 return Some(z);
             }
-            z = held.solve_plain()?;
+            z = held.solve_equality_constrained()?;
         }
         None
     }
 
-    /// Largest number of rounds of [`Subproblem::solve_held`], after which a quadratic program is solved.
+    /// Largest number of rounds of [`Subproblem::solve_active_set`]; after them a quadratic program is solved.
     const HOLDING_ROUNDS: usize = 10;
 
     /// The problem in the variables `z_j / units_j`.

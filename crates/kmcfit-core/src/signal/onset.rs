@@ -1,7 +1,7 @@
 //! Onset of a response after a rest or a static deflection.
 
 use super::Spectrum;
-use crate::diagnostics::{far_off, median_size, rms};
+use crate::diagnostics::{median_size, outlier_indices, rms};
 
 /// Smallest number of samples at rest.
 const STILL: usize = 16;
@@ -36,7 +36,7 @@ pub fn onset(values: &[f64], spacing: f64) -> Option<usize> {
     let (still, moves) = (&away[..begins], &away[begins..]);
     // The last quarter of the rest shows a slow growth.
     let is_sudden = rms(moves) > SUDDEN * median_size(&still[begins - begins / 4..]);
-    if begins < STILL || moves.len() < STILL || !is_sudden || !far_off(&away).is_empty() {
+    if begins < STILL || moves.len() < STILL || !is_sudden || !outlier_indices(&away).is_empty() {
         return None;
     }
     let frequency = Spectrum::of(moves, spacing)?.dominant();
@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn an_impact_ends_the_rest() {
         for noise in [0.0, 0.005, 0.02] {
-            let begins = onset(&record(100, noise), 0.01).expect("it stands still");
+            let begins = onset(&record(100, noise), 0.01).expect("an onset after rest");
             assert!((100..=102).contains(&begins), "{noise}: {begins}");
         }
         // Independent of level and unit.

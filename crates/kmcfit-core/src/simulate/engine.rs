@@ -8,13 +8,13 @@ use super::reference::{self, AdjointEquation};
 use super::{CoefficientGradient, Trajectory};
 use crate::system::{Excitation, Method, NodalCoefficients, State, System, SystemTangent, Term};
 
-/// Purpose of a simulation.
+/// Required agreement of a simulation with the reference implementation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Purpose {
+pub enum EngineMode {
     /// Bit-identity with [`reference`](mod@super::reference). The history of the paper's run depends on every bit.
-    Reproduction,
+    Reference,
     /// Machine precision at the highest speed.
-    Estimation,
+    Fastest,
 }
 
 /// Implementation of response and discrete adjoint.
@@ -45,18 +45,18 @@ impl Engine {
         system: &System,
         excitation: Option<&Excitation>,
         nodes: usize,
-        purpose: Purpose,
+        mode: EngineMode,
     ) -> Self {
         let has_blocks = nodes > SHORTEST_IN_BLOCKS && is_linear_midpoint(system);
-        match purpose {
-            Purpose::Reproduction => Self::Reference,
+        match mode {
+            EngineMode::Reference => Self::Reference,
             // Gradient descent depends on every bit; for linear free responses the bits of the reference are kept on records that
             // are not divided.
-            Purpose::Estimation if system.is_linear_and_free(excitation) => match has_blocks {
+            EngineMode::Fastest if system.is_linear_and_free(excitation) => match has_blocks {
                 true => Self::ParallelInTime,
                 false => Self::Reference,
             },
-            Purpose::Estimation => Self::Prefactored,
+            EngineMode::Fastest => Self::Prefactored,
         }
     }
 
@@ -180,7 +180,7 @@ pub(crate) fn least_squares(
 ) -> Option<(f64, State)> {
     let nodes = system.grid.nodes();
     assert_eq!(observed.len(), nodes, "a measurement per node");
-    let engine = Engine::choose(system, None, nodes, Purpose::Estimation);
+    let engine = Engine::choose(system, None, nodes, EngineMode::Fastest);
     (engine == Engine::ParallelInTime).then_some(())?;
     let nodal = LinearSystem::new(functions, system.grid.step(), nodes)?;
     Some(nodal.least_squares(initial, observed, weights, gradient))

@@ -10,7 +10,7 @@ mod gradient;
 pub mod reference;
 mod trajectory;
 
-pub use engine::{Engine, Purpose, continuous_adjoint};
+pub use engine::{Engine, EngineMode, continuous_adjoint};
 pub(crate) use engine::{is_linear_midpoint, least_squares};
 pub use error::{Cause, SimulationError};
 pub use gradient::CoefficientGradient;

@@ -8,7 +8,7 @@ use crate::solvers::iterate::Iterate;
 /// Largest distance from the bound of an active row, relative to its scale; larger than the accuracy with which a quadratic
 /// program satisfies an active row.
 const NEAR: f64 = 1e-6;
-/// A bound is pushed against if relaxing it by one per cent of the row's scale lowers J by more than this share of J, and by
+/// A bound is active if relaxing it by one per cent of the row's scale lowers J by more than this share of J, and by
 /// more than [`ROUNDING`] of the zero-response misfit.
 const PUSH: f64 = 1e-6;
 /// Rounding error of a change of J, as a share of the zero-response misfit: residuals carry the accumulated rounding errors

@@ -15,8 +15,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 use std::fmt;
 use std::time::Duration;
 
-/// Number of values written at once.
-const PIECE: usize = 64;
+/// Number of values written in one call.
+const CHUNK: usize = 64;
 
 /// Numbers stored with all their bits, also where not finite: as text of 16 hexadecimal digits each.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -84,7 +84,7 @@ pub enum CheckpointUnit {
     /// A search: history and state.
     Search(Vec<IterationRecord>, Box<SolverState>),
     /// Numbers computed between searches.
-    Piece(Vec<f64>),
+    Numbers(Vec<f64>),
     /// A unit without a result.
     Nothing,
 }
@@ -94,15 +94,15 @@ pub trait CheckpointStore {
     /// Begins the next unit and returns its saved result, if any. Results of a completed unit are not saved again.
     fn begin(&mut self) -> Option<CheckpointUnit>;
     /// Discards the saved result of the unit, and of all later units.
-    fn refuse(&mut self);
+    fn discard(&mut self);
     /// Saves an iteration of the search.
-    fn row(&mut self, row: &IterationRecord);
+    fn save_iteration(&mut self, row: &IterationRecord);
     /// True if the state of a search with so many parameters should be saved now.
     fn is_due(&self, parameters: usize) -> bool;
     /// Saves the state of the search, replacing the previous one, or its final state.
-    fn stand(&mut self, standing: SolverState);
+    fn save_state(&mut self, state: SolverState);
     /// Ends the unit with computed numbers, or without a result.
-    fn end(&mut self, piece: Option<&[f64]>);
+    fn end(&mut self, numbers: Option<&[f64]>);
 }
 
 /// An iteration and its context in the fit.
@@ -119,10 +119,10 @@ pub struct IterationEvent<'a> {
 /// Observer of a fit: callbacks for iterations, and storage of checkpoints.
 pub struct Observer<'a> {
     observe: &'a mut dyn FnMut(&IterationRecord),
-    look: Option<&'a mut dyn FnMut(&IterationEvent)>,
+    on_event: Option<&'a mut dyn FnMut(&IterationEvent)>,
     start: Option<StartStrategy>,
     is_shown: bool,
-    keeper: Option<&'a mut dyn CheckpointStore>,
+    store: Option<&'a mut dyn CheckpointStore>,
 }
 
 impl<'a> Observer<'a> {
@@ -130,29 +130,29 @@ impl<'a> Observer<'a> {
     pub fn new(observe: &'a mut dyn FnMut(&IterationRecord)) -> Self {
         Self {
             observe,
-            look: None,
+            on_event: None,
             start: None,
             is_shown: true,
-            keeper: None,
+            store: None,
         }
     }
 
     /// Adds a callback that receives the context of each iteration.
     #[must_use]
-    pub fn looking(mut self, look: &'a mut dyn FnMut(&IterationEvent)) -> Self {
-        self.look = Some(look);
+    pub fn with_events(mut self, on_event: &'a mut dyn FnMut(&IterationEvent)) -> Self {
+        self.on_event = Some(on_event);
         self
     }
 
     /// Adds storage for checkpoints.
     #[must_use]
-    pub fn keeping(mut self, keeper: &'a mut dyn CheckpointStore) -> Self {
-        self.keeper = Some(keeper);
+    pub fn with_checkpoints(mut self, store: &'a mut dyn CheckpointStore) -> Self {
+        self.store = Some(store);
         self
     }
 
     /// Runs a search whose iterations are saved but not reported.
-    pub(super) fn unseen<T>(&mut self, search: impl FnOnce(&mut Self) -> T) -> T {
+    pub(super) fn unreported<T>(&mut self, search: impl FnOnce(&mut Self) -> T) -> T {
         let before = std::mem::replace(&mut self.is_shown, false);
         let result = search(self);
         self.is_shown = before;
@@ -161,7 +161,7 @@ impl<'a> Observer<'a> {
 
     /// Stops saving: results after an interrupt differ from those of an uninterrupted fit.
     pub(super) fn close(&mut self) {
-        self.keeper = None;
+        self.store = None;
     }
 
     pub(super) fn observe(&mut self) -> &mut dyn FnMut(&IterationRecord) {
@@ -170,19 +170,19 @@ impl<'a> Observer<'a> {
 
     /// Begins a search; returns its history and state, if saved.
     pub(super) fn begin_search(&mut self) -> Option<(Vec<IterationRecord>, SolverState)> {
-        match self.keeper.as_mut()?.begin()? {
-            CheckpointUnit::Search(rows, standing) => Some((rows, *standing)),
+        match self.store.as_mut()?.begin()? {
+            CheckpointUnit::Search(rows, state) => Some((rows, *state)),
             CheckpointUnit::Nothing => None,
-            CheckpointUnit::Piece(_) => {
-                self.refuse();
+            CheckpointUnit::Numbers(_) => {
+                self.discard();
                 None
             }
         }
     }
 
-    pub(super) fn refuse(&mut self) {
-        if let Some(keeper) = &mut self.keeper {
-            keeper.refuse();
+    pub(super) fn discard(&mut self) {
+        if let Some(store) = &mut self.store {
+            store.discard();
         }
     }
 
@@ -198,59 +198,59 @@ impl<'a> Observer<'a> {
     ) {
         if self.is_shown {
             (self.observe)(row);
-            if let Some(look) = &mut self.look {
-                look(&IterationEvent {
+            if let Some(on_event) = &mut self.on_event {
+                on_event(&IterationEvent {
                     row,
                     start: self.start,
                     violation: violation(),
                 });
             }
         }
-        if let Some(keeper) = &mut self.keeper {
-            keeper.row(row);
+        if let Some(store) = &mut self.store {
+            store.save_iteration(row);
         }
     }
 
     pub(super) fn is_due(&self, parameters: usize) -> bool {
-        let keeper = self.keeper.as_ref();
-        keeper.is_some_and(|keeper| keeper.is_due(parameters))
+        let store = self.store.as_ref();
+        store.is_some_and(|store| store.is_due(parameters))
     }
 
     /// Saves the state of the search, which is built only if checkpoints are stored.
-    pub(super) fn stand(&mut self, standing: impl FnOnce() -> SolverState) {
-        if let Some(keeper) = &mut self.keeper {
-            keeper.stand(standing());
+    pub(super) fn save_state(&mut self, state: impl FnOnce() -> SolverState) {
+        if let Some(store) = &mut self.store {
+            store.save_state(state());
         }
     }
 
     /// Ends a search that could not begin.
-    pub(super) fn nothing(&mut self) {
-        if let Some(keeper) = &mut self.keeper {
-            keeper.end(None);
+    pub(super) fn end_without_result(&mut self) {
+        if let Some(store) = &mut self.store {
+            store.end(None);
         }
     }
 
     /// Returns `len` numbers from the checkpoint, or from `compute`; results that were `cut_short` are not saved.
-    pub(super) fn piece(
+    pub(super) fn numbers(
         &mut self,
         len: usize,
         cut_short: &dyn Fn() -> bool,
         compute: impl FnOnce() -> Vec<f64>,
     ) -> Vec<f64> {
-        let Some(keeper) = &mut self.keeper else {
+        let Some(store) = &mut self.store else {
             return compute();
         };
-        match keeper.begin() {
-            Some(CheckpointUnit::Piece(piece)) if piece.len() == len => return piece,
-            Some(_) => keeper.refuse(),
+        match store.begin() {
+            Some(CheckpointUnit::Numbers(numbers)) if numbers.len() == len => return numbers,
+            Some(_) => store.discard(),
             None => {}
         }
-        let piece = compute();
+        let numbers = compute();
         match cut_short() {
             true => self.close(),
-            false => keeper.end(Some(&piece)),
+            false => store.end(Some(&numbers)),
         }
-        piece
+        numbers
     }
 }
 
@@ -266,14 +266,14 @@ struct Digits<'a>(&'a [f64]);
 impl fmt::Display for Digits<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         const DIGITS: &[u8; 16] = b"0123456789abcdef";
-        let mut piece = String::with_capacity(16 * PIECE);
-        for numbers in self.0.chunks(PIECE) {
-            piece.clear();
+        let mut text = String::with_capacity(16 * CHUNK);
+        for numbers in self.0.chunks(CHUNK) {
+            text.clear();
             for bits in numbers.iter().map(|x| x.to_bits()) {
                 let digit = |place: usize| DIGITS[(bits >> (4 * place)) as usize & 15];
-                piece.extend((0..16).rev().map(|place| char::from(digit(place))));
+                text.extend((0..16).rev().map(|place| char::from(digit(place))));
             }
-            f.write_str(&piece)?;
+            f.write_str(&text)?;
         }
         Ok(())
     }

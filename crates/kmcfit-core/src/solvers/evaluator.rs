@@ -8,14 +8,14 @@ use super::timings::{Timings, timed};
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
 use crate::record::{Channel, Loss};
-use crate::simulate::{Purpose, SimulationError, Trajectory};
+use crate::simulate::{EngineMode, SimulationError, Trajectory};
 use std::sync::OnceLock;
 
 /// Evaluator of a problem with argmin's counters; the solvers evaluate through it alone.
 pub(crate) struct CountedEvaluator<'a, 'p> {
     problem: &'a mut argmin::core::Problem<&'p Problem>,
     kind: GradientKind,
-    purpose: Purpose,
+    mode: EngineMode,
     /// Step at which the record is divided in two, for gradients from tangent solves without an adjoint.
     halfway: Option<usize>,
     /// Iteration limit of a quadratic program.
@@ -43,9 +43,9 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
             problem,
             halfway,
             kind: settings.gradient,
-            purpose: match has_paper_order {
-                true => Purpose::Reproduction,
-                false => Purpose::Estimation,
+            mode: match has_paper_order {
+                true => EngineMode::Reference,
+                false => EngineMode::Fastest,
             },
             program_iterations: settings.stopping.program_iterations,
             qp: settings.qp,
@@ -65,7 +65,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
     pub fn again(&self, parameters: Vec<f64>, fingerprint: u64) -> Option<Iterate> {
         let problem = self.problem();
         let mut evaluation = problem.workspace();
-        (problem.evaluate_for(self.purpose, &parameters, &mut evaluation)).ok()?;
+        (problem.evaluate_for(self.mode, &parameters, &mut evaluation)).ok()?;
         let point = self.completed(parameters, evaluation, &mut Timings::default());
         if point.fingerprint() == fingerprint || self.halfway.is_none() {
             return Some(point).filter(|point| point.fingerprint() == fingerprint);
@@ -85,7 +85,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
     pub fn responses_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, SimulationError> {
         let problem = self.problem();
         let mut evaluation = problem.workspace();
-        problem.evaluate_for(self.purpose, parameters, &mut evaluation)?;
+        problem.evaluate_for(self.mode, parameters, &mut evaluation)?;
         Ok(evaluation.trajectories)
     }
 
@@ -96,9 +96,9 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         evaluation: &mut Evaluation,
     ) -> Result<(), SimulationError> {
         self.count(FORWARD, 1);
-        let (problem, purpose) = (self.problem(), self.purpose);
+        let (problem, mode) = (self.problem(), self.mode);
         timed(&mut self.timings.forward, || {
-            problem.evaluate_for(purpose, parameters, evaluation)
+            problem.evaluate_for(mode, parameters, evaluation)
         })
     }
 

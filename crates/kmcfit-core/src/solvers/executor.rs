@@ -186,47 +186,47 @@ impl SearchDriver<'_, '_> {
 
     /// The search continued from its saved state; `None` if none is saved or it cannot be reproduced bit by bit.
     fn restored(&mut self, work: &CountedEvaluator) -> Option<SearchProgress> {
-        let (rows, standing) = self.kept.take()?;
-        let progress = self.stand_again(work, rows, standing);
+        let (rows, state) = self.kept.take()?;
+        let progress = self.restore_state(work, rows, state);
         if progress.is_none() {
             // A saved state that does not fit the problem is not used in part.
             self.method = step_rule(self.settings.solver);
-            self.watch.refuse();
+            self.watch.discard();
         }
         progress
     }
 
-    fn stand_again(
+    fn restore_state(
         &mut self,
         work: &CountedEvaluator,
         rows: Vec<IterationRecord>,
-        standing: SolverState,
+        state: SolverState,
     ) -> Option<SearchProgress> {
         let fits = |parameters: &[f64]| parameters.len() == work.problem().parameters();
-        if !fits(&standing.parameters.0) {
+        if !fits(&state.parameters.0) {
             return None;
         }
         let responses = |parameters: &[f64]| match fits(parameters) {
             true => work.responses_again(parameters).ok(),
             false => None,
         };
-        if rows.len() as u64 != standing.iterations {
+        if rows.len() as u64 != state.iterations {
             return None;
         }
-        let snapshots = standing.snapshots.into_iter();
+        let snapshots = state.snapshots.into_iter();
         let snapshots = snapshots.map(|(iteration, at)| (iteration, at.0)).collect();
-        let recorder = Recorder::restored(rows, &standing.references.0, snapshots, responses)?;
-        let mut point = work.again(standing.parameters.0, standing.fingerprint)?;
-        if standing.outcome.is_none()
-            && !(self.method).restore(standing.memory, work.problem(), &mut point)
+        let recorder = Recorder::restored(rows, &state.references.0, snapshots, responses)?;
+        let mut point = work.again(state.parameters.0, state.fingerprint)?;
+        if state.outcome.is_none()
+            && !(self.method).restore(state.memory, work.problem(), &mut point)
         {
             return None;
         }
-        self.outcome = standing.outcome;
+        self.outcome = state.outcome;
         self.before = PriorWork {
-            counts: standing.counts,
-            timings: standing.timings,
-            elapsed: standing.elapsed,
+            counts: state.counts,
+            timings: state.timings,
+            elapsed: state.elapsed,
         };
         Some(SearchProgress { point, recorder })
     }
@@ -242,18 +242,18 @@ impl SearchDriver<'_, '_> {
             }
         };
         if now {
-            self.stand(counts, None);
+            self.save_state(counts, None);
         }
         if self.outcome.as_ref().is_some_and(interrupted) {
             self.watch.close();
         }
     }
 
-    fn stand(&mut self, counts: SolveCounts, outcome: Option<Outcome>) {
+    fn save_state(&mut self, counts: SolveCounts, outcome: Option<Outcome>) {
         let Some(SearchProgress { point, recorder }) = &self.progress else {
             return;
         };
-        let standing = || SolverState {
+        let state = || SolverState {
             iterations: recorder.rows.len() as u64,
             parameters: ExactF64s(point.parameters.clone()),
             fingerprint: point.fingerprint(),
@@ -271,8 +271,8 @@ impl SearchDriver<'_, '_> {
             outcome,
         };
         let clock = Instant::now();
-        self.watch.stand(standing);
-        self.timings.keeping += clock.elapsed();
+        self.watch.save_state(state);
+        self.timings.checkpoints += clock.elapsed();
     }
 
     fn elapsed(&self) -> Duration {
@@ -332,7 +332,7 @@ impl SearchDriver<'_, '_> {
             }
             // Squares of samples below 1e-154 underflow.
             return match problem.is_some_and(|p| p.zero_response_misfit() == 0.0) {
-                true => converged(Reason::ZeroReadings),
+                true => converged(Reason::ZeroSamples),
                 false => converged(Reason::ExactStart),
             };
         }
@@ -351,10 +351,10 @@ impl SearchDriver<'_, '_> {
 
     fn finish(mut self, counts: SolveCounts) -> Result<Fit, SimulationError> {
         match &self.outcome {
-            _ if self.progress.is_none() => self.watch.nothing(),
+            _ if self.progress.is_none() => self.watch.end_without_result(),
             // Saved, so that the search can continue from here.
             Some(outcome) if outcome.status == Status::Interrupted => {}
-            outcome => self.stand(counts, outcome.clone()),
+            outcome => self.save_state(counts, outcome.clone()),
         }
         let elapsed = self.elapsed();
         let Some(SearchProgress { point, recorder }) = self.progress else {

@@ -41,7 +41,7 @@ pub use methods::equation_error::{Measurements, equation_error};
 pub use no_response::no_response;
 pub use noise_estimation::{fit_with_noise, fit_with_noise_watched};
 pub use optimality::Optimality;
-pub use reason::Reason;
+pub use reason::{BoundedValue, ConditionFailure, MissingMeasurement, Reason, UnsupportedRecord};
 pub use settings::{FitSettings, Initial, QpSolver, Solver, StartStrategy};
 pub use solve_counts::SolveCounts;
 pub use start_projection::StartProjection;

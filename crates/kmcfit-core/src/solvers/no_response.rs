@@ -15,7 +15,8 @@ use crate::simulate::SimulationError;
 /// Result of a fit whose starting points in the constraint set cannot be simulated, the first because of `breakdown`: status
 /// `infeasible`, with the start `given`, before projection onto the constraints, as the only point with a response.
 ///
-/// This is no proof that no feasible point can be simulated; the reason states the facts.
+/// A feasible point that can be simulated may still exist: only the starting points were simulated, and the reason states
+/// this.
 ///
 /// # Errors
 /// The `breakdown`, if `given` satisfies the constraints or cannot be simulated either.

@@ -159,7 +159,10 @@ struct LinearisedMinimum {
 
 impl LinearisedMinimum {
     fn of(sub: &Subproblem) -> Option<Self> {
-        if let Some(z) = sub.solve_plain().filter(|z| sub.holds(z, 0.1 * TOLERANCE)) {
+        if let Some(z) = sub
+            .solve_equality_constrained()
+            .filter(|z| sub.holds(z, 0.1 * TOLERANCE))
+        {
             return Some(Self {
                 z,
                 complementarity: 0.0,

@@ -43,37 +43,37 @@ pub enum Reason {
     #[error("no stopping test was met in {0} iterations")]
     IterationLimit(u64),
     /// All requested iterations were run without a stopping test.
-    #[error("ran the {0} iterations asked for")]
+    #[error("all {0} iterations requested were run")]
     AllIterations(u64),
     /// The wall-clock limit was reached.
-    #[error("the limit of {} s is reached", .0.as_secs_f64())]
+    #[error("reached the limit of {} s", .0.as_secs_f64())]
     TimeLimit(Duration),
     /// Interrupted by the user.
-    #[error("asked to stop; the best point so far is kept")]
+    #[error("interrupted; the result is the best point so far")]
     Interrupted,
     /// All functions are fixed.
-    #[error("there is nothing to fit: every function is fixed")]
+    #[error("no parameters to estimate: every function is fixed")]
     NoParameters,
     /// The samples, or their squares, are zero.
-    #[error("there is nothing to explain: the samples, or their squares, are zero")]
-    ZeroReadings,
+    #[error("nothing to fit: the samples, or their squares, are zero")]
+    ZeroSamples,
     /// The cost at the start is zero.
-    #[error("the start fits exactly")]
+    #[error("the start values match the record exactly")]
     ExactStart,
     /// The squares of the samples overflow.
-    #[error("the squares of the samples leave the range of numbers: give them in a larger unit")]
+    #[error("the squares of the samples overflow: give the samples in a larger unit")]
     Overflow,
     /// The cost is zero to machine precision.
-    #[error("the cost is zero to rounding")]
+    #[error("the cost is zero to machine precision")]
     ZeroCost,
     /// The residuals are negligible beside the measurements.
     #[error("the residuals are below 1e-10 of the measurements")]
     NegligibleResiduals,
     /// The linearised cost cannot be lowered.
-    #[error("the linearised cost cannot be lowered any further")]
+    #[error("the predicted decrease of the cost is below its tolerance")]
     NoPredictedDecrease,
     /// The step of the linearised problem changes every function by at most this share of its size.
-    #[error("no function is to change by more than {0:.1e} of its size")]
+    #[error("the predicted step changes no function by more than {0:.1e} of its size")]
     NoPredictedChange(f64),
     /// No Gauss-Newton step lowers the cost.
     #[error("no Gauss-Newton step lowers the cost")]
@@ -85,7 +85,7 @@ pub enum Reason {
     #[error("no step along the gradient lowers the cost enough")]
     NoLowerLineStep,
     /// The projected gradient is zero to machine precision.
-    #[error("the projected gradient vanishes to rounding")]
+    #[error("the projected gradient is zero to machine precision")]
     ZeroProjectedGradient,
     /// The cost rises towards the projected gradient.
     #[error("the cost does not fall towards the projected gradient")]
@@ -136,10 +136,10 @@ pub enum ConditionFailure {
     #[error("a constraint is violated by {0:.1e} of its scale")]
     Violation(f64),
     /// Predicted decrease of J by moving to the bounds, as a share of J.
-    #[error("moving to its bounds promises to lower J by a fraction of {0:.1e}")]
+    #[error("moving parameters to their bounds is predicted to lower J by a fraction of {0:.1e}")]
     Complementarity(f64),
     /// Predicted decrease of J by the linearised problem, as a share of J.
-    #[error("the linearised cost can be lowered by a fraction of {0:.1e}")]
+    #[error("a step of the linearised problem is predicted to lower J by a fraction of {0:.1e}")]
     Stationarity(f64),
 }
 
@@ -159,24 +159,24 @@ pub struct UnsupportedRecord {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum MissingMeasurement {
     /// A quadratic loss.
-    #[error("the equation error knows no robust loss")]
+    #[error("the equation error supports only the quadratic loss")]
     QuadraticLoss,
     /// Sensors with known gain and offset.
-    #[error("the equation error takes the sensors as known")]
+    #[error("the equation error needs known sensors: no gain, offset or drift can be estimated")]
     KnownSensors,
     /// An acceleration that oscillates long enough.
     #[error("the acceleration is too short or does not oscillate")]
     Oscillation,
     /// A displacement, or equally spaced accelerations alone; force and base cannot be filtered consistently with other channels.
     #[error(
-        "its force or base cannot be filtered like its response, which is integrated from channels other than one of equally spaced accelerations"
+        "the force or base cannot be filtered like the response: this needs a displacement, or equally spaced accelerations alone"
     )]
     FilteredDrive,
     /// Samples.
-    #[error("there are too few samples")]
-    Readings,
+    #[error("too few samples")]
+    Samples,
     /// A nonzero response.
-    #[error("nothing moves")]
+    #[error("all samples are zero")]
     Motion,
 }
 
@@ -191,9 +191,9 @@ fn ratios(cost: Option<&BoundedValue>, gradient: Option<&BoundedValue>) -> Strin
 
 fn no_minimum(failure: Option<&ConditionFailure>) -> String {
     match failure {
-        Some(failure) => format!("but the first-order condition is violated: {failure}"),
+        Some(failure) => format!("however, the first-order condition is violated: {failure}"),
         None => format!(
-            "whether this is a minimum could not be measured: {}",
+            "the first-order condition could not be evaluated: {}",
             ConicStatus::Stalled.sentence()
         ),
     }

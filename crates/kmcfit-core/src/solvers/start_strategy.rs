@@ -13,8 +13,8 @@ use super::settings::{FitSettings, Initial, Solver, StartStrategy};
 use super::solve_counts::SolveCounts;
 use super::start_projection::StartProjection;
 use super::starts::{
-    Referred, collocation_start, data_start, growing_horizon_start, reference, truncated_start,
-    truncated_steps,
+    Referred, collocation_start, equation_error_start, growing_horizon_start, reference,
+    truncated_start, truncated_steps,
 };
 use super::termination::Status;
 use super::timings::{Timings, timed};
@@ -214,8 +214,9 @@ impl<'a, 'w> Attempts<'a, 'w> {
 
     fn starting_point(&mut self, strategy: StartStrategy) -> Prepared {
         let (problem, start) = (self.problem, self.start);
-        let data_start =
-            |timings: &mut Timings| timed(&mut timings.start, || data_start(problem, start));
+        let equation_error_start = |timings: &mut Timings| {
+            timed(&mut timings.start, || equation_error_start(problem, start))
+        };
         let parameters = match strategy {
             StartStrategy::Truncated { .. } => match self.truncated.take() {
                 Some((_, prepared)) => return prepared,
@@ -223,11 +224,11 @@ impl<'a, 'w> Attempts<'a, 'w> {
             },
             StartStrategy::StartValues | StartStrategy::Continued => start.to_vec(),
             StartStrategy::EquationError => {
-                let found = data_start(&mut self.timings);
+                let found = equation_error_start(&mut self.timings);
                 self.inside(found)
             }
             StartStrategy::GrowingHorizon => {
-                let from = data_start(&mut self.timings);
+                let from = equation_error_start(&mut self.timings);
                 let (found, counts, timings) =
                     growing_horizon_start(problem, from, &self.probing, self.watch);
                 self.counts += counts;
@@ -238,11 +239,11 @@ impl<'a, 'w> Attempts<'a, 'w> {
                 let flag = self.settings.interrupt.as_ref();
                 let interrupted = || flag.is_some_and(|flag| flag.load(Ordering::Relaxed));
                 let timings = &mut self.timings;
-                let found = self.watch.piece(start.len(), &interrupted, || {
+                let found = self.watch.numbers(start.len(), &interrupted, || {
                     let found = timed(&mut timings.start, || {
                         collocation_start(problem, start, &interrupted)
                     });
-                    found.unwrap_or_else(|| data_start(timings))
+                    found.unwrap_or_else(|| equation_error_start(timings))
                 });
                 self.inside(found)
             }

@@ -23,7 +23,7 @@ pub struct Timings {
     pub start: Duration,
     /// Checkpoints and the final state of the search, without the rows of iterations.
     #[serde(default)]
-    pub keeping: Duration,
+    pub checkpoints: Duration,
 }
 
 impl Timings {
@@ -35,7 +35,7 @@ impl Timings {
             + self.qp
             + self.linear_algebra
             + self.start
-            + self.keeping
+            + self.checkpoints
     }
 }
 
@@ -50,7 +50,7 @@ impl Add for Timings {
             qp: self.qp + other.qp,
             linear_algebra: self.linear_algebra + other.linear_algebra,
             start: self.start + other.start,
-            keeping: self.keeping + other.keeping,
+            checkpoints: self.checkpoints + other.checkpoints,
         }
     }
 }

@@ -240,7 +240,7 @@ impl WeightPathSearch<'_, '_> {
         self.counts.tangent += linearisation_tangents(&problem);
         let timings = &mut self.timings;
         let compute = || vec![degrees_of_freedom(&problem, &found, timings)];
-        let degrees_of_freedom = self.watch.piece(1, &|| false, compute)[0];
+        let degrees_of_freedom = self.watch.numbers(1, &|| false, compute)[0];
         Ok(PathPoint {
             weight,
             iterations: iterations(&found),
@@ -322,7 +322,9 @@ fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> 
         })
         .collect();
     sub.homogeneous();
-    let solutions = timed(&mut timings.linear_algebra, || sub.solve_plain_for(&probes));
+    let solutions = timed(&mut timings.linear_algebra, || {
+        sub.solve_equality_constrained_for(&probes)
+    });
     let Some(solutions) = solutions else {
         return f64::NAN;
     };

@@ -1,4 +1,4 @@
-//! Motions known in closed form.
+//! Responses in closed form.
 
 use kmcfit_core::internals::system::State;
 

@@ -1,4 +1,4 @@
-//! Problems with known answers, met by the tests of every layer.
+//! Problems with known solutions for the tests of all modules.
 #![allow(dead_code)]
 
 pub mod closed_form;
@@ -86,8 +86,8 @@ pub fn repository(path: &str) -> PathBuf {
     root.expect("the repository").join(path)
 }
 
-/// A folder of shared reference data (`KMCFIT_SHARED`, by default `../shared`); `None`, loudly,
-/// where it is absent.
+/// A folder of shared reference data (`KMCFIT_SHARED`, by default `../shared`); `None` with a
+/// note if it is absent.
 pub fn shared(folder: &str) -> Option<PathBuf> {
     let root =
         std::env::var_os("KMCFIT_SHARED").map_or_else(|| repository("../shared"), PathBuf::from);

@@ -1,4 +1,4 @@
-//! A second, independent forward solve: textbook formulas, written out, for any kind of number.
+//! An independent simulation by textbook formulas, generic over the type of number.
 
 use kmcfit_core::internals::system::Method;
 use num_dual::DualNum;

@@ -1,15 +1,15 @@
-//! A second, independent evaluation of a record with everything in it: textbook formulas, written
-//! out, for any kind of number.
+//! An independent evaluation of records with all terms, inputs, sensors and losses by textbook formulas, generic over the type of
+//! number.
 
 use kmcfit_core::internals::record::{ChannelKind, Loss};
 use kmcfit_core::internals::system::Method;
 use num_dual::DualNum;
 
-/// A number that derivatives run through.
+/// A number type with derivatives.
 pub trait Real: DualNum<Primitive = f64> + Copy {}
 impl<D: DualNum<Primitive = f64> + Copy> Real for D {}
 
-/// Which response a coefficient function multiplies.
+/// Factor of a coefficient function in the equation of motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Response {
     Damping,
@@ -35,7 +35,7 @@ impl Response {
     }
 }
 
-/// A system, what drives it, and where it starts.
+/// A system, its input and its initial state.
 pub struct Record<D> {
     pub method: Method,
     pub dt: f64,
@@ -93,7 +93,7 @@ impl<D: Real> Record<D> {
         states
     }
 
-    /// What a sensor sees a share `x` of step `i` on; `around` is force and base there.
+    /// Ideal sample at the fraction `x` of step `i`; `around` is force and base there.
     pub fn seen(
         &self,
         kind: ChannelKind,
@@ -125,7 +125,7 @@ impl<D: Real> Record<D> {
     }
 }
 
-/// What a residual in standard deviations costs.
+/// Loss of a residual in standard deviations.
 pub fn cost<D: Real>(loss: Loss, u: D) -> D {
     match loss {
         Loss::Squares => u.powi(2),

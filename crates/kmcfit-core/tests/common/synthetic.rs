@@ -1,5 +1,4 @@
-//! Records of known systems by the independent evaluation of [`super::sensed`], and how they are
-//! fitted.
+//! Records of known systems by the independent evaluation of [`super::sensed`], and their fits.
 
 use super::sensed::{Record, Response};
 use kmcfit_core::internals::objective::GradientKind;
@@ -14,7 +13,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// What moves, what drives it and where it starts.
+/// System, input and initial state.
 pub struct Truth<'a> {
     pub system: &'a System,
     pub nodal: &'a NodalCoefficients,

@@ -13,8 +13,8 @@ fn optimum(problem: &Problem) -> Vec<f64> {
         .parameters
 }
 
-/// 2000 replicates know a standard deviation to 1/sqrt(4000), 1.6 %; ten per cent is six of those,
-/// and leaves room for the model's curvature.
+/// A standard deviation from 2000 replicates has a standard error of 1/sqrt(4000), 1.6 %; the limit of ten per cent is six of those
+/// and allows for the nonlinearity of the model.
 #[test]
 fn the_scatter_of_the_refits_agrees_with_the_covariance() {
     let problem = regular(7);
@@ -37,7 +37,7 @@ fn the_scatter_of_the_refits_agrees_with_the_covariance() {
         }
     };
     check(&problem, ReplicateNoise::Parametric);
-    // The residuals of 51 samples know their own spread to a tenth: the covariance from them.
+    // The standard deviation of 51 residuals is accurate to a tenth; the covariance uses it.
     let problem = problem
         .with(|parts| {
             for experiment in &mut parts.experiments {

@@ -114,19 +114,19 @@ fn random_masses_have_the_response_to_the_order_of_the_stepper() {
             .iter()
             .fold(0.0f64, |m, r| m.max(r.abs()));
         assert!(off < 1e-6, "{off}");
-        // Where y crosses zero the damping is what the anchor says, to the square of the step.
+        // At zero crossings of y the damping is that of the anchor, to second order in the step.
         for (t, c) in anchors(&nodal.mass, &response) {
             let i = (t / response.grid.step()).round() as usize;
             let found = nodal.coefficients[0][i];
             assert!((found - c).abs() < 0.05, "at {t}: {found} {c}");
         }
-        // It is another system.
+        // It is a different parameter set.
         let truth = truth(&response.grid);
         assert!(crate::common::errors(&nodal, &truth)[0] > 0.1);
     }
 }
 
-/// With the true mass the options for the true damping is granted, and the true stiffness comes back.
+/// With the true mass and the true damping as the target, the true stiffness is recovered.
 #[test]
 fn the_true_mass_and_damping_bring_the_true_stiffness() {
     let response = response(401);
@@ -136,11 +136,11 @@ fn the_true_mass_and_damping_bring_the_true_stiffness() {
     let nodal = equivalent_coefficients(&truth.mass, &response, &options).unwrap();
     let errors = crate::common::errors(&nodal, &truth);
     println!("{errors:?}");
-    // The smoothness of k, 1e-9 of T^4 k''^2, bends it by thousandths.
+    // The penalty on k, 1e-9 of T^4 k''^2, changes it by some 1e-3.
     assert!(errors[1] < 5e-3 && errors[2] < 2e-2, "{errors:?}");
 }
 
-/// A mass that grows fast asks for negative damping at the crossings: with c >= 0 there is none.
+/// A fast growing mass requires negative damping at the zero crossings: with c >= 0 there is no equivalent system.
 #[test]
 fn impossible_responses_are_infeasible() {
     let response = response(401);

@@ -50,7 +50,7 @@ fn the_extremes_of_an_ellipse_are_those_of_its_closed_form() {
     }
 }
 
-/// The profile and the push ask the same question two ways.
+/// Profiles and extremes give the same interval.
 #[test]
 fn the_extremes_are_the_ends_of_the_profile() {
     let problem = regular(3);
@@ -101,7 +101,7 @@ fn with_a_robust_loss_the_extremes_are_the_ends_of_the_profile() {
     let bands = extreme_pairs(&problem, std::slice::from_ref(&best), &targets, &level, 2).unwrap();
     let found = [bands[0].low.value, bands[0].high.value];
     println!("{found:?} {low} {high}");
-    // Few samples change sides of the threshold near the level, so reweighting loses little: 1e-7.
+    // Few samples cross the threshold near the misfit limit, so the error of reweighting is small: 1e-7.
     let tolerance = 1e-5 * (high - low);
     assert!((found[0] - low).abs() < tolerance && (found[1] - high).abs() < tolerance);
 }
@@ -126,7 +126,7 @@ fn positive() -> Problem {
 }
 
 /// 200 nodes, the misfit of the paper's own optimum, 0.0114 m^2 s: the extremes, started at the true
-/// system alone, hold the paper's optimum too.
+/// system, contain the paper's optimum.
 #[test]
 fn extremes_of_the_paper_s_data_contain_the_truth_and_the_paper_s_optimum() {
     let problem = positive();
@@ -272,7 +272,7 @@ fn roughness_limits_bound_the_extremes() {
     }
 }
 
-/// On the paper's own grid its own optimum is within the level, and the search starts there.
+/// On the paper's grid its optimum is within the misfit limit, and the search starts there.
 #[test]
 fn the_paper_s_optimum_is_within_its_level_on_its_grid() {
     let Some(folder) = shared("reference") else {

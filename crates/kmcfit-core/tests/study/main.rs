@@ -1,4 +1,4 @@
-//! What the samples say beyond one fit.
+//! Further analyses of a fit: profiles, extremes, equivalent systems, multistart, bootstrap, predictions.
 
 #[path = "../common/mod.rs"]
 mod common;

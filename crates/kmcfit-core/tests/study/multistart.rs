@@ -78,12 +78,12 @@ fn the_aliases_of_a_period_are_found_and_counted() {
         k.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 0.011),
         "{k:?} {expected:?}"
     );
-    // Three of them fit exactly: alike in cost, and yet apart.
+    // Three of them fit exactly: equal costs, distinct minima.
     let exact = clusters.iter().filter(|c| c.cost < 1e-9).count();
     assert_eq!(exact, 3);
     let costs = found.costs();
     assert!(costs.windows(2).all(|w| w[0] <= w[1]));
-    // A ridge of thousands lies between two of them; an optimum is connected with itself.
+    // The cost between two of them rises to thousands; a minimum is connected with itself.
     let best = |i: usize| {
         found.runs[clusters[i].members[0]]
             .found
@@ -110,7 +110,7 @@ fn the_threads_change_no_bit() {
     assert_eq!(bits(&one), bits(&two));
 }
 
-/// Starts with a negative mass have no response: they are records, and the others are fitted.
+/// Starts with a negative mass have no response: they are listed as failed, and the others are fitted.
 #[test]
 fn starts_that_cannot_be_simulated_are_listed_with_their_reason() {
     let system = system(6.0, 301);
@@ -128,7 +128,7 @@ fn starts_that_cannot_be_simulated_are_listed_with_their_reason() {
     assert!(failed.reason.contains("mass"), "{}", failed.reason);
 }
 
-/// Free response: two systems of which one is twice the other fit alike, and the scaling path connects them.
+/// Free response: two systems of which one is twice the other fit equally well, and the scaling path connects them.
 #[test]
 fn a_system_and_its_multiple_are_connected_by_the_scaling_path() {
     let problem = crate::common::paper_problem(200, [2.0, 1.0, 1.0]);

@@ -9,9 +9,8 @@ use kmcfit_core::internals::study::profile_likelihood::QUANTILE_95;
 use kmcfit_core::internals::study::{Linear, Target};
 use kmcfit_core::internals::system::{Excitation, State};
 
-/// The band is as wide as the spread of the responses of refitted systems; the worst case over the
-/// extreme systems, which are at the ends of the same ellipse, is a little narrower than the band
-/// where the response depends on both numbers, and never wider.
+/// The band is as wide as the spread of the responses of refitted systems. The envelope over the extreme systems, at the ends of
+/// the same ellipse, is slightly narrower than the band where the response depends on both parameters, and never wider.
 #[test]
 fn the_band_of_a_prediction_agrees_with_refits() {
     let problem = regular(3);
@@ -90,7 +89,7 @@ fn the_band_of_a_prediction_agrees_with_refits() {
             "{i}: {y:.3} +- {half:.4}, refits {ratio:.3}, worst {:?}",
             worst[i]
         );
-        // 1000 replicates know a spread to 2.2 %.
+        // A standard deviation from 1000 replicates has a standard error of 2.2 %.
         assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
         assert!(worst[i][0] <= y && y <= worst[i][1]);
         assert!(
@@ -103,8 +102,8 @@ fn the_band_of_a_prediction_agrees_with_refits() {
     assert!(name.contains("parameter") && distance > 0.0);
 }
 
-/// On the paper's data the extreme systems at its misfit move alike from nearly the same state, and
-/// apart from another one.
+/// On the paper's data the extreme systems at its misfit have similar responses from nearly the same initial state, and
+/// different ones from another state.
 #[test]
 fn systems_of_equal_fit_differ_in_prediction() {
     let nodes = 200;
@@ -125,7 +124,7 @@ fn systems_of_equal_fit_differ_in_prediction() {
         programs: 15,
         ..MisfitLimit::of(0.0114)
     };
-    // What free response shows: c/m and k/m, pushed apart.
+    // Extremes of c/m and k/m, the ratios that a free response determines.
     let targets: Vec<Target> = [1, 2]
         .iter()
         .flat_map(|f| ratios_at(&problem, *f, 0, &[12.0]))

@@ -112,14 +112,14 @@ fn damping_and_stiffness_of_a_known_mass_are_identified() {
         let [low, high] = found.interval.map(Option::unwrap);
         println!("{}", found.sentence());
         assert_eq!(found.verdict, Interval::Identified);
-        // 1.96 standard deviations but for the curvature of the model, a few per cent here.
+        // 1.96 standard deviations up to the nonlinearity of the model, a few per cent here.
         let width = (high - low) / (2.0 * 1.96 * deviation);
         assert!((width - 1.0).abs() < 0.1, "{width}");
         assert!(found.sentence().contains("identified"));
     }
 }
 
-/// Free response shows k/m and c/m: of m, c and k together no number is seen.
+/// A free response determines k/m and c/m; m, c and k themselves are not identifiable.
 #[test]
 fn the_mass_of_a_free_response_has_a_flat_profile() {
     let system = system(10.0, 101);
@@ -142,7 +142,7 @@ fn the_mass_of_a_free_response_has_a_flat_profile() {
     assert!(found.sentence().contains("not identifiable"));
 }
 
-/// The noise of the samples leaves room for no damping at all: below it ends at its own bound.
+/// The noise permits zero damping: the lower end of the profile is the bound.
 #[test]
 fn a_damping_near_its_bound_is_one_sided() {
     let system = system(10.0, 101);
@@ -159,9 +159,9 @@ fn a_damping_near_its_bound_is_one_sided() {
 }
 
 /// The same free response, but the stiffness must not exceed 3: a mass above 1.5 times its ratio fits
-/// worse, though the samples do not see the mass.
+/// worse, though the samples do not determine the mass.
 #[test]
-fn a_rise_that_another_bound_makes_is_called_so() {
+fn a_rise_caused_by_another_bound_is_reported() {
     let system = system(10.0, 101);
     let values = samples(&system, &nodal(101, [1.0, 0.2, 2.0]), None, 2, 0.05, 3);
     let list = constants(101, [Some(1.0), Some(0.2), Some(2.0)], [0.0; 3]);
@@ -184,13 +184,13 @@ fn a_rise_that_another_bound_makes_is_called_so() {
     assert!((found.interval[1].unwrap() - 1.5).abs() < 0.05);
 }
 
-/// From a false minimum the walk meets the true one and says so.
+/// From a local minimum the profile reaches the global one and reports it.
 #[test]
 fn a_better_optimum_on_the_way_is_reported() {
     let problem = crate::multistart::aliased(0.0);
     let how = ProfileSettings {
         limits: [1.0, 60.0],
-        // Above the ridges between the minima, which are of some thousands.
+        // Above the maxima between the minima, of some thousands.
         quantile: 1e5,
         step: Some(0.1),
         ..ProfileSettings::default()
@@ -264,7 +264,7 @@ fn without_sigma_the_interval_is_that_of_the_likelihood_ratio() {
 }
 
 /// A mean over time, under constraints about several parameters at once (a falling stiffness): the
-/// profile and the push to the extremes are two ways to the same ends.
+/// profile and the extremes give the same interval.
 #[test]
 fn the_mean_of_a_monotone_function_has_the_same_ends_both_ways() {
     let mut problem = knots(&|t| 2.0 - 0.02 * t, 6, 0.05, 9);

@@ -131,9 +131,9 @@ impl ConstraintReader<'_> {
                     .expected(format!("one of: {}", all.join(", "))))
             }
             [first, second, ..] => Err(self
-                .error("", "a constraint demands one thing")
+                .error("", "an entry of `constraints` is one constraint")
                 .found(format!("{} beside {}", first.name(), second.name()))
-                .expected("a map for each")),
+                .expected("one entry for each")),
         }
     }
 
@@ -147,7 +147,7 @@ impl ConstraintReader<'_> {
             }
             (false, Some(_)) => {
                 return Err(self
-                    .error("function", "this constraint is not about one function")
+                    .error("function", "this constraint applies to several functions")
                     .found(format!("`function` beside {}", kind.name()))
                     .expected("no `function`"));
             }
@@ -159,9 +159,11 @@ impl ConstraintReader<'_> {
                 .found(format!("`ratio` beside {}", kind.name()))
                 .expected("no `ratio`")),
             Some(ratio) if ratio.0 == 0.0 => Err(self
-                .error("ratio", "a ratio cannot be zero")
+                .error("ratio", "a ratio must not be 0")
                 .found(ratio.0)
-                .expected("another number; for a function that is zero, `max: 0` and `min: 0`")),
+                .expected(
+                    "a number other than 0; for a function that is zero, `max: 0` and `min: 0`",
+                )),
             _ => Ok(()),
         }
     }
@@ -204,9 +206,9 @@ impl ConstraintReader<'_> {
             ConstraintKey::Passive | ConstraintKey::Shape | ConstraintKey::Values => {
                 if spec.passive == Some(false) {
                     return Err(self
-                        .error("passive", "this demands nothing")
+                        .error("passive", "this constraint has no effect")
                         .found("false")
-                        .expected("`passive: true`, or leave the constraint out"));
+                        .expected("`passive: true`, or no such constraint"));
                 }
                 Constraint::Passive
             }
@@ -290,11 +292,11 @@ impl ConstraintReader<'_> {
                 ratio: self.spec.ratio.map_or(1.0, |r| r.0),
             }),
             [first, _] => Err(self
-                .error("equal", "these are the same function")
+                .error("equal", "the two functions are the same")
                 .found(format!("`{}` twice", first.name()))
                 .expected("two functions, as in [damping, stiffness]")),
             _ => Err(self
-                .error("equal", "an equality is between two functions")
+                .error("equal", "an equality needs two functions")
                 .found(match names.len() {
                     0 => "an empty list".to_owned(),
                     1 => "1 function".to_owned(),
@@ -308,9 +310,9 @@ impl ConstraintReader<'_> {
         let range = self.spec.damping_ratio.as_ref();
         if let Some(min) = range.and_then(|r| r.min) {
             return Err(self
-                .error("damping_ratio.min", "a damping ratio can only be capped")
+                .error("damping_ratio.min", "a damping ratio has no lower bound")
                 .found(min.0)
-                .expected("`max` alone: a least damping ratio is no convex constraint"));
+                .expected("`max` alone: a lower bound is not a convex constraint"));
         }
         let (_, max) = self.range("damping_ratio", range)?;
         let Some(max) = self.positive("damping_ratio.max", max)? else {
@@ -331,7 +333,7 @@ impl ConstraintReader<'_> {
         let (min, max) = (end(|r| r.min), end(|r| r.max));
         match (min, max) {
             (None, None) => Err(self
-                .error(key, "this range has no end")
+                .error(key, "this range has no limit")
                 .found("neither `min` nor `max`")
                 .expected(match key {
                     "damping_ratio" => "`max`, as in {max: 0.2}",

@@ -6,7 +6,7 @@ use crate::config::ModelFile;
 use crate::config::spec::{ExperimentSpec, InitialSpec};
 use crate::config::values::{NumberOrEstimate, ScalarOr};
 use crate::finding::Finding;
-use kmcfit_core::internals::diagnostics::{far_off, spread, without_line};
+use kmcfit_core::internals::diagnostics::{outlier_indices, spread, without_line};
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::signal::{Interpolation, Signal, Spectrum, clipped, onset};
 use kmcfit_core::internals::system::round_time;
@@ -174,9 +174,9 @@ fn stillness(spec: &ExperimentSpec, record: &RawRecord) -> Option<DataWarning> {
 }
 
 /// Time of a sample on the time axis of its file, s.
-fn in_file(spec: &ExperimentSpec, channel: &RawChannel, reading: usize) -> f64 {
+fn in_file(spec: &ExperimentSpec, channel: &RawChannel, sample: usize) -> f64 {
     let zero = spec.time_zero.as_ref().map_or(0.0, |zero| zero.0);
-    round_time(channel.times[reading] + zero, channel.median_spacing)
+    round_time(channel.times[sample] + zero, channel.median_spacing)
 }
 
 /// Outliers of a channel with a quadratic loss.
@@ -188,7 +188,7 @@ fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<DataWarning> 
     sorted.sort_by(f64::total_cmp);
     let level = sorted[sorted.len() / 2];
     let away: Vec<f64> = channel.values.iter().map(|value| value - level).collect();
-    let far = far_off(&away);
+    let far = outlier_indices(&away);
     let first = *far.first()?;
     Some(DataWarning::Outliers {
         channel: channel.kind.name(),

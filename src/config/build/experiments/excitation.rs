@@ -288,6 +288,6 @@ fn listed_keys(needed: &[&str], possible: &[&str]) -> String {
     };
     match possible {
         [] => quoted(needed),
-        _ => format!("{}, and if need be {}", quoted(needed), quoted(possible)),
+        _ => format!("{}, optionally {}", quoted(needed), quoted(possible)),
     }
 }

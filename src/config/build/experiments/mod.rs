@@ -23,6 +23,8 @@ use kmcfit_core::internals::record::{ChannelKind, Experiment, Weighting};
 use kmcfit_core::internals::system::Grid;
 
 pub(super) use excitation::shape;
+#[cfg(test)]
+pub(crate) use warning::DataWarning;
 
 /// Data of one experiment before it is placed on the grid, at the times of its samples.
 pub(super) struct RawRecord {
@@ -93,7 +95,7 @@ pub(super) fn is_held_out(spec: &ExperimentSpec) -> bool {
 /// Reads the files of all experiments; `None` for an experiment without files.
 pub(super) fn read(
     file: &ModelFile,
-    purpose: BuildMode,
+    mode: BuildMode,
     warnings: &mut Vec<Finding>,
 ) -> Result<Vec<Option<RawRecord>>, InputError> {
     let specs = &file.spec.experiments;
@@ -103,7 +105,7 @@ pub(super) fn read(
             .found("`validation: true` in all of them")
             .expected("at least one experiment without"));
     }
-    if matches!(purpose, BuildMode::Simulate { .. }) {
+    if matches!(mode, BuildMode::Simulate { .. }) {
         // Without `duration` the length of the grid follows from the samples.
         let has_duration = (file.spec.grid.as_ref()).is_some_and(|g| g.duration.is_some());
         let all_have_data = specs.iter().all(|e| e.data.is_some());
@@ -143,7 +145,7 @@ fn read_one(
 /// The specification of experiment `i` with its data, and the notes on its channels.
 pub(super) fn specification(
     file: &ModelFile,
-    purpose: BuildMode,
+    mode: BuildMode,
     grid: &Grid,
     i: usize,
     record: Option<RawRecord>,
@@ -166,7 +168,7 @@ pub(super) fn specification(
     let mut notes = Vec::new();
     if let Some(mut record) = record {
         found = found.input(record.excitation.into_input());
-        if let (BuildMode::Check { .. }, [only]) = (purpose, record.channels.as_mut_slice()) {
+        if let (BuildMode::Check { .. }, [only]) = (mode, record.channels.as_mut_slice()) {
             sample_per_node(only, grid);
         }
         for raw in record.channels {

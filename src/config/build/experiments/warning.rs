@@ -8,7 +8,7 @@ use thiserror::Error;
 /// A warning about the data of an experiment. Values are in the unit of the column.
 #[derive(Debug, Clone, PartialEq, Serialize, Error)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub(super) enum DataWarning {
+pub(crate) enum DataWarning {
     /// The model and the file state different units of a column.
     #[error("column `{column}` is read in {used}, as the model states; the file states {stated}")]
     UnitDiffersFromFile {

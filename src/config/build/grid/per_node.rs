@@ -32,10 +32,10 @@ const MANY_FUNCTION: usize = 1500;
 const PROGRAMS: usize = 2;
 
 /// Upper estimate of the memory of a run, bytes per node.
-pub fn per_node(file: &ModelFile, purpose: BuildMode) -> usize {
+pub fn per_node(file: &ModelFile, mode: BuildMode) -> usize {
     let spec = &file.spec;
     let (records, functions) = (spec.experiments.len(), functions::all(file));
-    if let BuildMode::Simulate { .. } = purpose {
+    if let BuildMode::Simulate { .. } = mode {
         return SIMULATION * (1 + records + functions.len());
     }
     let common = RUN + RECORD * records + FUNCTION * functions.len();
@@ -123,7 +123,7 @@ mod tests {
         ModelFile::parse("m.yaml", text).expect("a model")
     }
 
-    /// The growth that was measured, in bytes per node, is below what is asked for, and not far.
+    /// The measured growth, in bytes per node, is slightly below the estimate.
     #[test]
     fn the_estimate_is_above_what_was_measured() {
         let nodal = "{basis: nodal, start: 1.0}";

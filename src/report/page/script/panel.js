@@ -39,7 +39,7 @@ class Panel {
     }, this.box);
     this.svg = shape(chart.space, "svg", { role: "img", "aria-label": name }, this.plot);
     element("div", { class: "xlabel" }, this.box).textContent = caption(this.x);
-    this.reading = element("div", { class: "reading" }, this.box);
+    this.cursor = element("div", { class: "cursor" }, this.box);
     this.cross = null;
     listen(this);
   }
@@ -106,7 +106,7 @@ class Panel {
   /** The line at the place that is read, and the values there. */
   read(view) {
     const place = this.axis.at;
-    this.reading.replaceChildren();
+    this.cursor.replaceChildren();
     if (place === null) return;
     const x = uneven(this.x.log, place);
     const pixel = view.xAt(place);
@@ -121,7 +121,7 @@ class Panel {
         shape(this.chart.space, "circle", { class: `at ${mark.colour}`, cx: fixed(pixel), cy: fixed(height), r: 3.5 }, this.svg);
       }
     }
-    for (const part of parts) element("span", {}, this.reading).textContent = part;
+    for (const part of parts) element("span", {}, this.cursor).textContent = part;
   }
 
   /** Digits that tell neighbouring pixels apart. */
@@ -147,7 +147,7 @@ class Panel {
 
   /** Says the values to those who listen. */
   say() {
-    const words = [...this.reading.children].map((part) => part.textContent);
-    document.getElementById("chart-reading").textContent = words.join("; ");
+    const words = [...this.cursor.children].map((part) => part.textContent);
+    document.getElementById("chart-cursor").textContent = words.join("; ");
   }
 }

@@ -29,9 +29,9 @@ use rows::equations;
 use scale::CommonScale;
 use serde::{Deserialize, Serialize};
 
-/// Common factor of all functions that the problem leaves undetermined.
+/// Factor `s(t)` of all functions, `(m, c, k) -> s(t) (m, c, k)`, that the problem leaves undetermined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Symmetry {
+pub enum ScaleFreedom {
     /// None.
     None,
     /// One factor for all times.
@@ -52,7 +52,7 @@ pub struct StructuralRank {
     /// Independent equations of the samples.
     pub equations: usize,
     /// Scaling ambiguity that records, functions, penalties and equality constraints leave together.
-    pub symmetry: Symmetry,
+    pub scale_freedom: ScaleFreedom,
     /// Intervals of time on which the scale is free, s.
     pub free_on: Vec<[f64; 2]>,
     /// Findings on the rank and on the scale of the functions.
@@ -121,7 +121,7 @@ pub fn structural_rank(problem: &Problem) -> StructuralRank {
     let mut seen = (0..problem.parameters())
         .filter(|j| parameter_is_visible(problem, *j, &visible))
         .count();
-    let mut worst = Symmetry::None;
+    let mut worst = ScaleFreedom::None;
     let mut free_on = Vec::new();
     for component in components(problem) {
         let scale = CommonScale::of(problem, &component);
@@ -137,7 +137,7 @@ pub fn structural_rank(problem: &Problem) -> StructuralRank {
         rank_bound: seen.min(equations),
         parameters: problem.parameters(),
         equations,
-        symmetry: worst,
+        scale_freedom: worst,
         free_on,
         findings,
     }

@@ -2,7 +2,7 @@
 
 use super::super::components::{Component, given_words};
 use super::super::spans::{span_words, spans};
-use super::{RankFinding, RankFindingKind, Symmetry};
+use super::{RankFinding, RankFindingKind, ScaleFreedom};
 use crate::functions::{Basis, CoefficientFunction};
 use crate::problem::Problem;
 
@@ -72,16 +72,16 @@ impl CommonScale {
     }
 
     /// The scaling ambiguity that records, penalties and equality constraints leave, and the finding about it.
-    pub fn left(&self, problem: &Problem, component: &Component) -> (Symmetry, RankFinding) {
+    pub fn left(&self, problem: &Problem, component: &Component) -> (ScaleFreedom, RankFinding) {
         let symbols = component.symbols(problem);
         let by_records = match &self.space {
-            FactorSpace::Constant { .. } if !self.all_free() => Symmetry::None,
-            FactorSpace::Constant { nearly_more: true } => Symmetry::NearlyFunction,
-            FactorSpace::Constant { nearly_more: false } => Symmetry::ConstantFactor,
-            _ if !(0..self.forced.len()).any(|i| self.is_free(i)) => Symmetry::None,
-            _ => Symmetry::Function,
+            FactorSpace::Constant { .. } if !self.all_free() => ScaleFreedom::None,
+            FactorSpace::Constant { nearly_more: true } => ScaleFreedom::NearlyFunction,
+            FactorSpace::Constant { nearly_more: false } => ScaleFreedom::ConstantFactor,
+            _ if !(0..self.forced.len()).any(|i| self.is_free(i)) => ScaleFreedom::None,
+            _ => ScaleFreedom::Function,
         };
-        if by_records == Symmetry::None {
+        if by_records == ScaleFreedom::None {
             let given: Vec<String> = component.given(problem).map(|f| f.name()).collect();
             let sentence = match (self.free_functions, given.as_slice()) {
                 (0, _) => format!("the scale of {symbols} is fixed: none of them is estimated"),
@@ -89,7 +89,7 @@ impl CommonScale {
                 (_, given) => format!("the scale of {symbols} is that of {}", given_words(given)),
             };
             let kind = RankFindingKind::ScaleIdentified;
-            return (Symmetry::None, RankFinding { kind, sentence });
+            return (ScaleFreedom::None, RankFinding { kind, sentence });
         }
         let held = self.held(problem, component);
         let smooth = smoothness(problem, component);
@@ -100,16 +100,18 @@ impl CommonScale {
         let partly = !self.all_free();
         let reference = smooth.is_some_and(|order| order == 0);
         let left = match by_records {
-            _ if reference => Symmetry::None,
+            _ if reference => ScaleFreedom::None,
             // A force at other times and a penalty determine the scale on force-free intervals.
-            Symmetry::Function if smooth.is_some() && (held || partly) => Symmetry::None,
-            Symmetry::Function | Symmetry::NearlyFunction if smooth.is_some() && !held => {
-                Symmetry::ConstantFactor
+            ScaleFreedom::Function if smooth.is_some() && (held || partly) => ScaleFreedom::None,
+            ScaleFreedom::Function | ScaleFreedom::NearlyFunction if smooth.is_some() && !held => {
+                ScaleFreedom::ConstantFactor
             }
-            Symmetry::ConstantFactor | Symmetry::NearlyFunction if held && smooth.is_some() => {
-                Symmetry::None
+            ScaleFreedom::ConstantFactor | ScaleFreedom::NearlyFunction
+                if held && smooth.is_some() =>
+            {
+                ScaleFreedom::None
             }
-            Symmetry::ConstantFactor if held => Symmetry::None,
+            ScaleFreedom::ConstantFactor if held => ScaleFreedom::None,
             other => other,
         };
         let sentence = scale_sentence(
@@ -119,10 +121,10 @@ impl CommonScale {
             [reference, held, smooth.is_some(), partly],
         );
         let kind = match left {
-            Symmetry::None => RankFindingKind::ScaleConstrained,
-            Symmetry::ConstantFactor => RankFindingKind::ConstantScaleFree,
-            Symmetry::NearlyFunction => RankFindingKind::ScaleNearlyFree,
-            Symmetry::Function => RankFindingKind::ScaleFree,
+            ScaleFreedom::None => RankFindingKind::ScaleConstrained,
+            ScaleFreedom::ConstantFactor => RankFindingKind::ConstantScaleFree,
+            ScaleFreedom::NearlyFunction => RankFindingKind::ScaleNearlyFree,
+            ScaleFreedom::Function => RankFindingKind::ScaleFree,
         };
         (left, RankFinding { kind, sentence })
     }
@@ -220,13 +222,13 @@ fn smoothness(problem: &Problem, component: &Component) -> Option<usize> {
 /// The sentence about the scale that is left, by whether there is a reference, a constraint that determines a constant factor, a
 /// penalty, and a force at other times.
 fn scale_sentence(
-    left: Symmetry,
+    left: ScaleFreedom,
     symbols: &str,
     where_free: &str,
     [reference, held, smooth, partly]: [bool; 4],
 ) -> String {
     match left {
-        Symmetry::None => format!(
+        ScaleFreedom::None => format!(
             "{where_free}: the records do not determine the scale of {symbols}; {} it",
             match (reference, held, smooth) {
                 (true, ..) => "a reference determines",
@@ -235,11 +237,11 @@ fn scale_sentence(
                 _ => "a penalty and the force at other times determine",
             }
         ),
-        Symmetry::ConstantFactor => format!(
+        ScaleFreedom::ConstantFactor => format!(
             "{where_free}: {symbols} are determined only up to a common constant factor; fix a function, constrain a \
                  value or mean, or add a record with a measured force"
         ),
-        Symmetry::NearlyFunction => format!(
+        ScaleFreedom::NearlyFunction => format!(
             "{where_free}: {symbols} are determined only up to a common factor{}, and with bases of many knots a slowly \
                  varying factor s(t) is hardly identifiable; fix a function, add a penalty, or add a record with a \
                  measured force",
@@ -248,7 +250,7 @@ fn scale_sentence(
                 false => "",
             }
         ),
-        Symmetry::Function => format!(
+        ScaleFreedom::Function => format!(
             "{where_free}: {symbols} are determined only up to a common factor s(t){}; fix a function, add a penalty, or \
                  add a record with a measured force {}",
             match held {

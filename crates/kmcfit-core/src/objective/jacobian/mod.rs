@@ -21,13 +21,13 @@ impl Problem {
     pub fn predictions_jacobian(&self, evaluation: &Evaluation) -> DMatrix<f64> {
         let mut jacobian = DMatrix::zeros(self.sample_count(), self.parameters());
         let order = self.places();
-        self.each_row_block(evaluation, &order, |piece| {
-            for (place, j) in order.iter().enumerate().take(piece.begun()) {
+        self.each_row_block(evaluation, &order, |block| {
+            for (place, j) in order.iter().enumerate().take(block.begun()) {
                 let mut column = jacobian.column_mut(*j);
-                let rows = piece.first..piece.first + piece.count;
-                column.as_mut_slice()[rows].copy_from_slice(piece.column(place));
+                let rows = block.first..block.first + block.count;
+                column.as_mut_slice()[rows].copy_from_slice(block.column(place));
             }
-            piece
+            block
         });
         self.add_sensors(evaluation, &mut jacobian);
         match are_finite(jacobian.as_slice()) {
@@ -149,16 +149,16 @@ fn sweep(
     let mut readers = Vec::with_capacity(experiment.channels.len());
     for channel in &experiment.channels {
         let first = channel.places().partition_point(|p| p.step < steps.start);
-        let mut piece = RowBlock::new(places);
-        piece.restart(row + first);
-        readers.push((JacobianRows::new(channel, view, first), piece));
+        let mut block = RowBlock::new(places);
+        block.restart(row + first);
+        readers.push((JacobianRows::new(channel, view, first), block));
         row += channel.len();
     }
-    let mut give = |piece: &mut RowBlock| {
-        let next = piece.first + piece.count;
-        let full = std::mem::take(piece);
-        *piece = take(full);
-        piece.restart(next);
+    let mut give = |block: &mut RowBlock| {
+        let next = block.first + block.count;
+        let full = std::mem::take(block);
+        *block = take(full);
+        block.restart(next);
     };
     let base = BaseTrajectory {
         system: view.system,
@@ -172,17 +172,17 @@ fn sweep(
         let to = (from + TILE).min(steps.end);
         moving.fill(&mut tangents, from, from == steps.start);
         tangents.advance(base, from..to);
-        for (reader, piece) in &mut readers {
-            while reader.read(&tangents, from..to, piece) {
-                give(piece);
+        for (reader, block) in &mut readers {
+            while reader.read(&tangents, from..to, block) {
+                give(block);
             }
         }
         last = to - from;
         from = to;
     }
-    for (_, piece) in &mut readers {
-        if piece.count > 0 {
-            give(piece);
+    for (_, block) in &mut readers {
+        if block.count > 0 {
+            give(block);
         }
     }
     let end = |place: usize| {
@@ -291,16 +291,16 @@ mod tests {
                 let expected = problem.jacobian_by_columns(&evaluation);
                 let order = problem.places();
                 let mut found = DMatrix::zeros(expected.nrows(), expected.ncols());
-                problem.each_row_block(&evaluation, &order, |mut piece| {
+                problem.each_row_block(&evaluation, &order, |mut block| {
                     for (place, j) in order.iter().enumerate() {
-                        if place < piece.begun() {
-                            let rows = piece.first..piece.first + piece.count;
+                        if place < block.begun() {
+                            let rows = block.first..block.first + block.count;
                             let column = &mut found.column_mut(*j);
-                            column.as_mut_slice()[rows].copy_from_slice(piece.column(place));
+                            column.as_mut_slice()[rows].copy_from_slice(block.column(place));
                         }
-                        piece.column_mut(place).fill(f64::NAN);
+                        block.column_mut(place).fill(f64::NAN);
                     }
-                    piece
+                    block
                 });
                 for (found, expected) in found.column_iter().zip(expected.column_iter()) {
                     let size = expected.amax();

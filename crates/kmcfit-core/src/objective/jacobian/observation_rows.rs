@@ -81,16 +81,16 @@ impl<'a> JacobianRows<'a> {
         }
     }
 
-    /// Appends the rows of samples within `steps`, the current tile of the tangents, until `piece` is full; returns true if
+    /// Appends the rows of samples within `steps`, the current tile of the tangents, until `block` is full; returns true if
     /// samples may remain.
-    pub fn read(&mut self, tangents: &Tangents, steps: Range<usize>, piece: &mut RowBlock) -> bool {
+    pub fn read(&mut self, tangents: &Tangents, steps: Range<usize>, block: &mut RowBlock) -> bool {
         simd::run(Read {
             reader: self,
             tangents,
             steps,
-            piece: &mut *piece,
+            block: &mut *block,
         });
-        piece.is_full()
+        block.is_full()
     }
 
     /// Collects up to `most` next samples within `steps` and returns their number.
@@ -135,7 +135,7 @@ struct Read<'a, 'c> {
     reader: &'a mut JacobianRows<'c>,
     tangents: &'a Tangents,
     steps: Range<usize>,
-    piece: &'a mut RowBlock,
+    block: &'a mut RowBlock,
 }
 
 impl Kernel for Read<'_, '_> {
@@ -145,7 +145,7 @@ impl Kernel for Read<'_, '_> {
     fn run<A: Arithmetic>(self, arithmetic: A) {
         let reader = self.reader;
         loop {
-            reader.batch(arithmetic, &self.steps, self.piece.room());
+            reader.batch(arithmetic, &self.steps, self.block.room());
             if reader.batch.count == 0 {
                 return;
             }
@@ -155,7 +155,7 @@ impl Kernel for Read<'_, '_> {
                 kind: reader.kind,
                 gain: reader.gain,
             };
-            answer.write(arithmetic, self.piece);
+            answer.write(arithmetic, self.block);
             reader.next += reader.batch.count;
         }
     }
@@ -170,15 +170,15 @@ struct BatchSensitivity<'a> {
 }
 
 impl BatchSensitivity<'_> {
-    /// Writes the derivatives behind the rows of `piece`, which must have space for them.
+    /// Writes the derivatives behind the rows of `block`, which must have space for them.
     #[inline(always)]
-    fn write<A: Arithmetic>(&self, arithmetic: A, piece: &mut RowBlock) {
+    fn write<A: Arithmetic>(&self, arithmetic: A, block: &mut RowBlock) {
         let gain = Eight::splat(arithmetic, self.gain);
         let count = self.batch.count;
         let begun = self.tangents.begun_groups() * LANES;
-        let (row, places) = (piece.count, begun.min(piece.places()));
-        piece.widen(places);
-        piece.count += count;
+        let (row, places) = (block.count, begun.min(block.places()));
+        block.widen(places);
+        block.count += count;
         for (g, first) in (0..places).step_by(LANES).enumerate() {
             let mut answers = [Eight::splat(arithmetic, 0.0); LANES];
             if self.tangents.has_begun(g) {
@@ -209,7 +209,7 @@ impl BatchSensitivity<'_> {
             }
             for (place, answer) in (first..places).zip(&answers) {
                 let answer = (gain * *answer).row();
-                let rows = &mut piece.column_mut(place)[row..];
+                let rows = &mut block.column_mut(place)[row..];
                 match rows.first_chunk_mut::<LANES>() {
                     // Entries below the last row are undefined.
                     Some(rows) => *rows = answer,

@@ -75,12 +75,16 @@ impl Buckets {
 
 impl<'a> Chain<'a> {
     fn of(sub: &'a Subproblem) -> Option<Self> {
-        if sub.stations.len() != sub.variables {
+        if sub.elimination_order.len() != sub.variables {
             return None;
         }
-        let last = *sub.stations.iter().max()?;
+        let last = *sub.elimination_order.iter().max()?;
         let blocks = last as usize + 1;
-        let own: Vec<u32> = sub.stations.iter().map(|station| last - station).collect();
+        let own: Vec<u32> = sub
+            .elimination_order
+            .iter()
+            .map(|station| last - station)
+            .collect();
         let variables = Buckets::new(blocks, &own);
         let mut places = vec![0u32; sub.variables];
         for (place, j) in variables.rows.iter().enumerate() {

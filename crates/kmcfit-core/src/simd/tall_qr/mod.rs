@@ -1,10 +1,10 @@
 //! QR factorisation of tall matrices, block of rows by block of rows.
 
-mod piece;
+mod row_block;
 mod triangle;
 
 use super::{Aligned, LANES, Row};
-pub(crate) use piece::{PIECE, RowBlock};
+pub(crate) use row_block::{BLOCK_ROWS, RowBlock};
 pub(crate) use triangle::Triangle;
 
 /// Rows of a block in units of SIMD rows; with 34 columns a block fills the first-level cache.

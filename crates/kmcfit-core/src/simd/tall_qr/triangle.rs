@@ -3,7 +3,7 @@
 //! Blocks fit into the first-level cache; each is reflected into the triangle of all previous rows. Columns are ordered by their first
 //! nonzero row, so that columns without entries so far cost nothing.
 
-use super::{BlockColumn, HIGH, LANES, PIECE, Row, RowBlock};
+use super::{BLOCK_ROWS, BlockColumn, HIGH, LANES, Row, RowBlock};
 use crate::simd::{self, Arithmetic, Eight, Kernel};
 use nalgebra::DMatrix;
 
@@ -39,51 +39,54 @@ impl Triangle {
         let mut order: Vec<usize> = (0..columns.len()).collect();
         order.sort_by_key(|j| begins[*j]);
         let mut triangle = Self::new(order.len());
-        let mut piece = RowBlock::new(order.len());
-        while piece.first < height {
-            let rows = piece.first..(piece.first + PIECE).min(height);
-            piece.count = rows.len();
+        let mut block = RowBlock::new(order.len());
+        while block.first < height {
+            let rows = block.first..(block.first + BLOCK_ROWS).min(height);
+            block.count = rows.len();
             for (place, j) in order.iter().enumerate() {
                 let column = &columns[*j][rows.clone()];
-                piece.column_mut(place)[..rows.len()].copy_from_slice(column);
+                block.column_mut(place)[..rows.len()].copy_from_slice(column);
             }
-            triangle.add_weighted(&mut piece, &roots[rows.clone()], &right[rows.clone()]);
-            piece.first = rows.end;
+            triangle.add_weighted(&mut block, &roots[rows.clone()], &right[rows.clone()]);
+            block.first = rows.end;
         }
         (triangle, order)
     }
 
     /// Adds the rows of a block, with `D` and `d` for each; the contents of the block are then undefined.
-    pub fn add_weighted(&mut self, piece: &mut RowBlock, roots: &[f64], right: &[f64]) {
-        let places = self.begin(piece);
+    pub fn add_weighted(&mut self, block: &mut RowBlock, roots: &[f64], right: &[f64]) {
+        let places = self.begin(block);
         simd::run(Weigh {
-            columns: &mut piece.columns[..places],
+            columns: &mut block.columns[..places],
             roots,
         });
-        self.reflect(piece, right);
+        self.reflect(block, right);
     }
 
     /// [`Triangle::add_weighted`] with `D = 1`.
-    pub fn add(&mut self, piece: &mut RowBlock, right: &[f64]) {
-        self.begin(piece);
-        self.reflect(piece, right);
+    pub fn add(&mut self, block: &mut RowBlock, right: &[f64]) {
+        self.begin(block);
+        self.reflect(block, right);
     }
 
     /// Adds the columns that start in a block; returns the number of columns in use.
-    fn begin(&mut self, piece: &mut RowBlock) -> usize {
+    fn begin(&mut self, block: &mut RowBlock) -> usize {
         let any = |part: &[f64]| part.iter().fold(false, |any, a| any | (*a != 0.0));
-        let has_begun = |place: &usize| piece.column(*place).chunks(4 * LANES).any(any);
-        let last = (self.begun..piece.begun()).rev().find(has_begun);
+        let has_begun = |place: &usize| block.column(*place).chunks(4 * LANES).any(any);
+        let last = (self.begun..block.begun()).rev().find(has_begun);
         self.widen(last.map_or(self.begun, |last| last + 1));
-        piece.widen(self.begun);
+        block.widen(self.begun);
         self.begun
     }
 
-    fn reflect(&mut self, piece: &mut RowBlock, right: &[f64]) {
-        let columns = &mut piece.columns[..=self.begun];
+    fn reflect(&mut self, block: &mut RowBlock, right: &[f64]) {
+        let columns = &mut block.columns[..=self.begun];
         // The right-hand side follows the columns in use; the others are zero.
         let to = columns[self.begun].as_flattened_mut();
-        match (to.first_chunk_mut::<PIECE>(), right.first_chunk::<PIECE>()) {
+        match (
+            to.first_chunk_mut::<BLOCK_ROWS>(),
+            right.first_chunk::<BLOCK_ROWS>(),
+        ) {
             (Some(to), Some(right)) => *to = *right,
             _ => to[..right.len()].copy_from_slice(right),
         }
@@ -92,7 +95,7 @@ impl Triangle {
         }
         simd::run(BlockReflection {
             triangle: self,
-            piece: columns,
+            block: columns,
         });
     }
 
@@ -119,24 +122,24 @@ impl Triangle {
     /// columns of this one.
     pub fn join(&mut self, other: &Triangle, states: &[[f64; 2]]) {
         let n = self.rows.len();
-        let mut piece = RowBlock::new(n);
-        piece.restart(0);
-        piece.count = other.begun;
-        piece.widen(n);
+        let mut block = RowBlock::new(n);
+        block.restart(0);
+        block.count = other.begun;
+        block.widen(n);
         let mut right = Vec::with_capacity(other.begun);
         for (i, (entries, b)) in other.rows().enumerate() {
             for (place, r) in entries {
                 if place < n {
-                    piece.column_mut(place)[i] += r;
+                    block.column_mut(place)[i] += r;
                     continue;
                 }
                 for (own, state) in states.iter().take(n).enumerate() {
-                    piece.column_mut(own)[i] += r * state[place - n];
+                    block.column_mut(own)[i] += r * state[place - n];
                 }
             }
             right.push(b);
         }
-        self.add(&mut piece, &right);
+        self.add(&mut block, &right);
         self.rest += other.rest;
     }
 
@@ -229,7 +232,7 @@ impl Kernel for Weigh<'_> {
 /// Reflects a block, its right-hand side last, into the triangle.
 struct BlockReflection<'a> {
     triangle: &'a mut Triangle,
-    piece: &'a mut [BlockColumn],
+    block: &'a mut [BlockColumn],
 }
 
 impl Kernel for BlockReflection<'_> {
@@ -237,9 +240,9 @@ impl Kernel for BlockReflection<'_> {
 
     #[inline(always)]
     fn run<A: Arithmetic>(self, arithmetic: A) {
-        let columns = self.piece.len();
+        let columns = self.block.len();
         for k in 0..columns - 1 {
-            let (before, after) = self.piece.split_at_mut(k + 1);
+            let (before, after) = self.block.split_at_mut(k + 1);
             let column = &before[k];
             let square = dot(arithmetic, column, column);
             if square == 0.0 {
@@ -273,7 +276,7 @@ impl Kernel for BlockReflection<'_> {
                 from = to;
             }
         }
-        let right = &self.piece[columns - 1];
+        let right = &self.block[columns - 1];
         self.triangle.rest += dot(arithmetic, right, right);
     }
 }
@@ -347,11 +350,11 @@ mod tests {
     use super::*;
     use nalgebra::DVector;
 
-    const ROWS: usize = 2 * PIECE + 37;
+    const ROWS: usize = 2 * BLOCK_ROWS + 37;
 
     /// A matrix whose columns start at different rows, in another order; weights; right-hand side.
     fn problem() -> (DMatrix<f64>, Vec<f64>, Vec<f64>) {
-        let begins = [PIECE + 5, 0, 90, 3, PIECE];
+        let begins = [BLOCK_ROWS + 5, 0, 90, 3, BLOCK_ROWS];
         let entry = |i: usize, j: usize| match i < begins[j] {
             true => 0.0,
             false => ((i * (j + 2)) as f64 * 0.7 + j as f64).sin(),
@@ -402,24 +405,24 @@ mod tests {
         assert!(wider.beside(&expected.products(), square).is_none());
     }
 
-    /// Every division of the rows into blocks gives the same result, to rounding.
+    /// Every division of the rows into blocks gives the same result, to machine precision.
     #[test]
     fn the_result_does_not_depend_on_the_blocks() {
         let (matrix, roots, right) = problem();
         let (whole, order) = Triangle::of(&matrix, &roots, &right);
         let mut parts = Triangle::new(order.len());
-        let mut piece = RowBlock::new(order.len());
+        let mut block = RowBlock::new(order.len());
         let mut first = 0;
         for count in (1..).take_while(|count| *count < 100) {
             let rows = first..(first + count).min(ROWS);
-            piece.clear();
-            piece.count = rows.len();
+            block.clear();
+            block.count = rows.len();
             for (place, j) in order.iter().enumerate() {
                 for (r, i) in rows.clone().enumerate() {
-                    piece.column_mut(place)[r] = matrix[(i, *j)];
+                    block.column_mut(place)[r] = matrix[(i, *j)];
                 }
             }
-            parts.add_weighted(&mut piece, &roots[rows.clone()], &right[rows.clone()]);
+            parts.add_weighted(&mut block, &roots[rows.clone()], &right[rows.clone()]);
             first = rows.end;
         }
         assert_eq!(first, ROWS);

@@ -7,7 +7,7 @@ use super::step_batch::{LaneLayout, SearchRay, StepBatch, reconstruct};
 use crate::record::ChannelKind;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES};
 use crate::simulate::reference::{self, AdjointEquation};
-use crate::simulate::{Engine, Purpose, Trajectory, least_squares};
+use crate::simulate::{Engine, EngineMode, Trajectory, least_squares};
 use crate::system::quadrature::trapezoid;
 use crate::system::{
     Excitation, Grid, Method, NodalCoefficients, StageSamples, State, System, SystemTangent, Term,
@@ -65,7 +65,7 @@ impl Case {
 
     fn engine(&self) -> Engine {
         let (system, excitation) = (&self.system, self.excitation());
-        Engine::choose(system, excitation, self.nodes(), Purpose::Estimation)
+        Engine::choose(system, excitation, self.nodes(), EngineMode::Fastest)
     }
 
     /// Checks that two series agree.

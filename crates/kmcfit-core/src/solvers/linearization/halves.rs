@@ -6,7 +6,7 @@ use super::reduced::{NARROW, Reduced};
 use super::residuals::Residuals;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::simd::tall_qr::{PIECE, Triangle};
+use crate::simd::tall_qr::{BLOCK_ROWS, Triangle};
 use crate::threads;
 use std::ops::Range;
 
@@ -55,10 +55,10 @@ impl Half {
         let order = problem.places();
         let experiment = &problem.experiments[0];
         let mut triangle = Triangle::new(columns);
-        let mut residuals = Residuals::with_capacity(PIECE);
-        let states = problem.each_row_block_of_part(evaluation, &order, steps, |mut piece| {
+        let mut residuals = Residuals::with_capacity(BLOCK_ROWS);
+        let states = problem.each_row_block_of_part(evaluation, &order, steps, |mut block| {
             // All rows of a block belong to one channel.
-            let mut first = piece.first;
+            let mut first = block.first;
             let mut of = experiment.channels.iter().zip(&evaluation.predictions[0]);
             let channel = of.find(|(channel, _)| match first.checked_sub(channel.len()) {
                 Some(rest) => {
@@ -69,10 +69,10 @@ impl Half {
             });
             if let Some((channel, predicted)) = channel {
                 residuals.clear();
-                residuals.push(channel, predicted, first..first + piece.count);
-                triangle.add_weighted(&mut piece, &residuals.roots, &residuals.weighted);
+                residuals.push(channel, predicted, first..first + block.count);
+                triangle.add_weighted(&mut block, &residuals.roots, &residuals.weighted);
             }
-            piece
+            block
         });
         Self {
             triangle,

@@ -40,15 +40,15 @@ impl Reduced {
         let Residuals { roots, weighted } = Residuals::at(problem, evaluation);
         let mut triangle = Triangle::new(order.len());
         let mut reducing = Duration::ZERO;
-        problem.each_row_block(evaluation, &order, |mut piece| {
-            let rows = piece.first..piece.first + piece.count;
+        problem.each_row_block(evaluation, &order, |mut block| {
+            let rows = block.first..block.first + block.count;
             let (roots, right) = (&roots[rows.clone()], &weighted[rows]);
-            let mut add = || triangle.add_weighted(&mut piece, roots, right);
+            let mut add = || triangle.add_weighted(&mut block, roots, right);
             match order.len() > NARROW {
                 true => timed(&mut reducing, add),
                 false => add(),
             }
-            piece
+            block
         });
         timings.linear_algebra += reducing;
         timings.tangent += clock.elapsed().saturating_sub(reducing);
@@ -100,7 +100,7 @@ impl Reduced {
 /// Subproblem whose variables are eliminated together.
 fn empty(variables: usize) -> Subproblem {
     let mut sub = Subproblem::new(variables);
-    sub.stations = vec![0; variables];
+    sub.elimination_order = vec![0; variables];
     sub
 }
 

@@ -36,10 +36,10 @@ pub fn subproblem(
     let parameters = problem.parameters();
     let states: usize = problem.experiments.iter().map(|e| 2 * (e.nodes - 1)).sum();
     let mut sub = Subproblem::new(parameters + states);
-    sub.stations = problem.functions.first_nodes();
+    sub.elimination_order = problem.functions.first_nodes();
     for experiment in &problem.experiments {
         let nodes = 1..experiment.nodes as u32;
-        sub.stations.extend(nodes.flat_map(|i| [i, i]));
+        sub.elimination_order.extend(nodes.flat_map(|i| [i, i]));
     }
     sub.layout = layout(problem);
     let mut base = parameters;
@@ -215,7 +215,7 @@ fn add_filter(
 ) -> Vec<usize> {
     let mut signal = rows;
     let mut indices = Vec::new();
-    sub.stations.clear();
+    sub.elimination_order.clear();
     sub.layout = None;
     for backward in [false, true] {
         if backward {

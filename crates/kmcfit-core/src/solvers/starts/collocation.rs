@@ -75,7 +75,7 @@ pub(in crate::solvers) fn collocation_start(
     best.map(|(_, theta)| theta)
 }
 
-/// States of each experiment near its samples; those of a simulation where there are too few samples.
+/// States of each experiment near its samples; those of a simulation where too few samples.
 fn first_states(problem: &Problem, theta: &[f64]) -> Option<Vec<Trajectory>> {
     let scalars = problem.scalars(theta);
     let mut own = None;
@@ -157,7 +157,10 @@ fn add_pull(problem: &Problem, evaluation: &Evaluation, sub: &mut Subproblem) {
 }
 
 fn solve(sub: &Subproblem) -> Option<Vec<f64>> {
-    if let Some(z) = sub.solve_plain().filter(|z| sub.holds(z, TOLERANCE)) {
+    if let Some(z) = sub
+        .solve_equality_constrained()
+        .filter(|z| sub.holds(z, TOLERANCE))
+    {
         return Some(z);
     }
     let solution = sub.solve();

@@ -25,7 +25,7 @@ pub(in crate::solvers) fn growing_horizon_start(
     short.stopping.iterations = HORIZON_ITERATIONS;
     for share in HORIZONS {
         let part = problem.truncated(share);
-        let found = watch.unseen(|watch| search(&part, &parameters, &short, None, watch));
+        let found = watch.unreported(|watch| search(&part, &parameters, &short, None, watch));
         if let Ok(fit) = found {
             counts += fit.counts;
             timings += fit.timings;

@@ -1,12 +1,12 @@
 //! Starting points, one module for each strategy.
 
 mod collocation;
-mod data;
+mod equation_error;
 mod growing_horizon;
 mod truncated;
 
 pub(super) use collocation::collocation_start;
-pub(super) use data::data_start;
+pub(super) use equation_error::equation_error_start;
 pub(super) use growing_horizon::growing_horizon_start;
 pub(super) use truncated::{truncated_start, truncated_steps};
 

@@ -22,7 +22,7 @@ use std::time::Duration;
 /// same step.
 const STEPS: [usize; 2] = [1 << 11, 1 << 12];
 /// Smallest number of samples per parameter.
-const READINGS: usize = 20;
+const SAMPLES: usize = 20;
 /// Iteration limit on the truncated record.
 const ITERATIONS: u64 = 20;
 /// Tolerance on the truncated record, smaller than the change by the rest of the record.
@@ -43,7 +43,7 @@ pub(in crate::solvers) fn truncated_steps(problem: &Problem) -> Option<usize> {
         && parameters > 0;
     let has_samples = |steps: &usize| {
         let count: usize = problem.channels().map(|c| c.count_within(*steps)).sum();
-        count >= READINGS * parameters
+        count >= SAMPLES * parameters
     };
     (STEPS.into_iter().find(has_samples)).filter(|_| suits)
 }
@@ -195,7 +195,7 @@ fn fit_part(
     short.stopping.tolerance = Some(TOLERANCE);
     (short.stopping.cost_ratio, short.stopping.gradient_ratio) = (None, None);
     let part = first_steps(problem, steps)?;
-    let found = watch.unseen(|watch| search(&part, start, &short, None, watch));
+    let found = watch.unreported(|watch| search(&part, start, &short, None, watch));
     let fit = found.ok()?;
     let clock = Instant::now();
     let parameters = fit.best.parameters.clone();

@@ -79,7 +79,7 @@ impl PassBand {
         let n = series.first()?.len();
         let h = self.spacing;
         let mut sub = Subproblem::new(n);
-        sub.stations = (0..n as u32).collect();
+        sub.elimination_order = (0..n as u32).collect();
         for i in 1..n - 1 {
             sub.residuals
                 .push([(i - 1, 1.0), (i, -2.0), (i + 1, 1.0)], 0.0);
@@ -94,7 +94,7 @@ impl PassBand {
             means.chain(std::iter::repeat_n(0.0, n)).collect()
         };
         let targets: Vec<Vec<f64>> = series.iter().map(target).collect();
-        let curves = sub.solve_plain_for(&targets)?;
+        let curves = sub.solve_equality_constrained_for(&targets)?;
         Some(curves.iter().map(|y| self.derivatives(y)).collect())
     }
 

@@ -190,7 +190,7 @@ fn differences(x: f64, first: usize, step: f64) -> [Vec<f64>; 3] {
 /// Displacement at the nodes.
 fn curve(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> Option<Vec<f64>> {
     let mut sub = Subproblem::new(nodes);
-    sub.stations = (0..nodes as u32).collect();
+    sub.elimination_order = (0..nodes as u32).collect();
     let mut count = 0.0;
     for plain in channels {
         for (i, (place, value)) in plain.channel.places().iter().zip(&plain.values).enumerate() {
@@ -264,7 +264,7 @@ fn smooth(sub: &Subproblem, nodes: usize, weight: f64) -> Option<Vec<f64>> {
         ];
         sub.residuals.push(row, 0.0);
     }
-    sub.solve_plain()
+    sub.solve_equality_constrained()
 }
 
 /// Nodes near the samples of the channel with the most samples.

@@ -70,7 +70,7 @@ fn smoothed(channel: &Channel) -> Option<Vec<f64>> {
 /// Minimises `|y - observed|^2 + weight |third differences of y|^2`.
 fn smooth(observed: &[f64], weight: f64) -> Option<Vec<f64>> {
     let mut sub = Subproblem::new(observed.len());
-    sub.stations = (0..observed.len() as u32).collect();
+    sub.elimination_order = (0..observed.len() as u32).collect();
     for (i, y) in observed.iter().enumerate() {
         sub.residuals.push([(i, 1.0)], *y);
     }
@@ -84,5 +84,5 @@ fn smooth(observed: &[f64], weight: f64) -> Option<Vec<f64>> {
         ];
         sub.residuals.push(row, 0.0);
     }
-    sub.solve_plain()
+    sub.solve_equality_constrained()
 }

@@ -13,7 +13,7 @@ const RISE: f64 = 0.05;
 #[derive(Debug, Clone, PartialEq)]
 pub enum MultistartFinding {
     /// No starting point converged to a minimum.
-    Nowhere,
+    NoMinimum,
     /// Number of converged starting points and of distinct minima.
     Points {
         /// Converged fits.
@@ -24,7 +24,7 @@ pub enum MultistartFinding {
         lowest: f64,
     },
     /// Connection of the two lowest minima by a path of nearly constant cost.
-    OneValley(bool),
+    Connected(bool),
     /// A minimum below the fit.
     Lower {
         /// Cost of the minimum.
@@ -66,7 +66,7 @@ impl Waterfall {
     ) -> Vec<MultistartFinding> {
         let costs = self.costs();
         let Some(lowest) = costs.first().copied() else {
-            return vec![MultistartFinding::Nowhere];
+            return vec![MultistartFinding::NoMinimum];
         };
         let mut findings = vec![MultistartFinding::Points {
             ended: self.order.len(),
@@ -78,7 +78,7 @@ impl Waterfall {
             if let (Some(a), Some(b)) = (of(first), of(second)) {
                 let paths = between(problem, &a.parameters, &b.parameters, PATH);
                 let rise = RISE * second.cost.max(first.cost);
-                findings.push(MultistartFinding::OneValley(paths.one_valley(rise)));
+                findings.push(MultistartFinding::Connected(paths.one_valley(rise)));
             }
         }
         // Differences of costs below this share of the zero-response misfit are rounding errors.

@@ -142,7 +142,7 @@ fn no_channel(file: &ModelFile, i: usize, spec: &ExperimentSpec) -> InputError {
             .expected("`data`, a CSV file with the samples"),
         _ => file
             .error_at(&format!("{key}.columns"), "this experiment has no data")
-            .found("columns of other things only")
+            .found("no column of a response")
             .expected("one or more of `displacement`, `velocity`, `acceleration`"),
     }
 }

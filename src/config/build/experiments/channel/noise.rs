@@ -64,7 +64,7 @@ pub(super) fn loss(file: &ModelFile, key: &str, of_kind: &Spec) -> Result<Loss, 
                         format!("`{name}` has no `{part}`"),
                     )
                     .found(format!("`{part}`"))
-                    .expected(format!("it beside `{owner}` only")));
+                    .expected(format!("`{part}` for `{owner}` only")));
             }
             Some(number) if number.0 <= 0.0 => {
                 return Err(file

@@ -74,6 +74,7 @@ pub(super) fn band(
             .error_at(&at, "filtering needs equally spaced samples without gaps")
             .found(match missing {
                 0 => "times that are not equally spaced".to_owned(),
+                1 => "1 missing sample".to_owned(),
                 count => format!("{count} missing samples"),
             })
             .expected("no `band`, or a window without gaps"));

@@ -252,7 +252,7 @@ impl<'a> Cost<'a> {
     fn assembled(&self, start: &[f64]) -> Subproblem {
         let problem = self.problem;
         let mut sub = Subproblem::new(problem.parameters());
-        sub.stations = problem.functions.first_nodes();
+        sub.elimination_order = problem.functions.first_nodes();
         sub.layout = StageLayout::of(&problem.functions);
         for (experiment, measured) in self.experiments() {
             let root = measured.weight.sqrt();

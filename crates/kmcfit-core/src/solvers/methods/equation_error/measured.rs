@@ -73,7 +73,7 @@ impl Measured {
             return Err(MissingMeasurement::FilteredDrive);
         }
         let kinematics = Kinematics::of(problem, experiment, scalars);
-        let kinematics = kinematics.ok_or(MissingMeasurement::Readings)?;
+        let kinematics = kinematics.ok_or(MissingMeasurement::Samples)?;
         let measured = Self::at_nodes(problem, experiment, &kinematics);
         let moves = measured.frequency > 0.0 && measured.frequency.is_finite();
         moves.then_some(measured).ok_or(MissingMeasurement::Motion)

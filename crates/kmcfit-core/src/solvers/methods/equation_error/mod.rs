@@ -65,7 +65,7 @@ pub(in crate::solvers) fn from_kinematics(
 ) -> Result<Vec<f64>, ConicStatus> {
     let start = &with_initial_states(problem, start, kinematics);
     let mut sub = Subproblem::new(problem.parameters());
-    sub.stations = problem.functions.first_nodes();
+    sub.elimination_order = problem.functions.first_nodes();
     sub.layout = StageLayout::of(&problem.functions);
     let mut experiments = Vec::new();
     for (experiment, states) in problem.experiments.iter().zip(kinematics) {
@@ -142,7 +142,9 @@ fn minimise(
     }
     let pull: Vec<f64> = metric.iter().map(|m| m * weight).collect();
     let moved = |z: &[f64]| problem.constraints.moved(start, z);
-    let plain = timed(&mut timings.linear_algebra, || sub.solve_plain());
+    let plain = timed(&mut timings.linear_algebra, || {
+        sub.solve_equality_constrained()
+    });
     if let Some(z) = plain {
         let parameters = moved(&z);
         let steps = parameters.iter().zip(start).map(|(t, s)| t - s);

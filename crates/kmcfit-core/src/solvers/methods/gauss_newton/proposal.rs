@@ -111,7 +111,7 @@ pub(super) fn propose(
     {
         return step;
     }
-    let plain = work.algebra(|| sub.solve_plain());
+    let plain = work.algebra(|| sub.solve_equality_constrained());
     let plain = plain.map(|z| (cost - sub.value(&z), z));
     if let Some((best, z)) = plain.filter(|(best, _)| is_sound(best)) {
         if sub.holds(&z, 0.1 * constraints::TOLERANCE)
@@ -127,7 +127,7 @@ pub(super) fn propose(
                 }
             }
             let near = 0.1 * constraints::TOLERANCE;
-            let held = work.algebra(|| sub.solve_held(z, near));
+            let held = work.algebra(|| sub.solve_active_set(z, near));
             let held = held.map(|z| (cost - sub.value(&z), z));
             if let Some((predicted, z)) = held
                 && predicted >= CLIPPED * best

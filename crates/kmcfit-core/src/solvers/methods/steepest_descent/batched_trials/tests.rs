@@ -2,7 +2,7 @@ use super::*;
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization};
 use crate::objective::GradientKind;
 use crate::record::{Channel, Experiment};
-use crate::simulate::Purpose;
+use crate::simulate::EngineMode;
 use crate::solvers::methods::steepest_descent::lengths;
 use crate::solvers::{FitSettings, Solver};
 use crate::system::{Grid, Method, State, System, Term};
@@ -76,7 +76,7 @@ fn steps_are_the_best_of_all_trials() {
             let mut evaluation = problem.workspace();
             let parameters = trial(before, length);
             let evaluated =
-                problem.evaluate_for(Purpose::Reproduction, &parameters, &mut evaluation);
+                problem.evaluate_for(EngineMode::Reference, &parameters, &mut evaluation);
             if evaluated.is_ok() && evaluation.cost < lowest.0 {
                 lowest = (evaluation.cost, length);
             }
@@ -91,7 +91,7 @@ fn steps_are_the_best_of_all_trials() {
 fn the_response_does_not_depend_on_the_stored_states() {
     let problem = problem();
     let mut expected = problem.workspace();
-    let evaluated = problem.evaluate_for(Purpose::Reproduction, &problem.start(), &mut expected);
+    let evaluated = problem.evaluate_for(EngineMode::Reference, &problem.start(), &mut expected);
     evaluated.expect("a motion");
     let mut found = problem.workspace();
     for states in [[[0.0; LANES]; 2], [[f64::NAN; LANES]; 2]] {

@@ -1,10 +1,11 @@
-//! Starting point from the measurements: the minimum of the equation error.
+//! Starting point from the measurements: the minimum over `theta` of the equation error
+//! `integral (m a + c v + k y - f)^2 dt`, with displacement, velocity and acceleration estimated from the samples.
 
 use crate::problem::Problem;
 use crate::solvers::methods::equation_error::equation_error;
 
 /// Minimum of the equation error; the start as given where it cannot be simulated.
-pub(in crate::solvers) fn data_start(problem: &Problem, start: &[f64]) -> Vec<f64> {
+pub(in crate::solvers) fn equation_error_start(problem: &Problem, start: &[f64]) -> Vec<f64> {
     let found = equation_error(problem, start).ok();
     let found = found.filter(|theta| problem.evaluate(theta).is_ok());
     found.unwrap_or_else(|| start.to_vec())

@@ -3,9 +3,9 @@
 use super::{Aligned, BlockColumn, HIGH, LANES};
 
 /// Largest number of rows of a block.
-pub(crate) const PIECE: usize = HIGH * LANES;
+pub(crate) const BLOCK_ROWS: usize = HIGH * LANES;
 
-/// Up to [`PIECE`] rows, column by column; entries below the last row are undefined.
+/// Up to [`BLOCK_ROWS`] rows, column by column; entries below the last row are undefined.
 #[derive(Default)]
 pub(crate) struct RowBlock {
     /// Index of the first row in the matrix.
@@ -60,7 +60,7 @@ impl RowBlock {
 
     /// Number of free rows.
     pub fn room(&self) -> usize {
-        PIECE - self.count.min(PIECE)
+        BLOCK_ROWS - self.count.min(BLOCK_ROWS)
     }
 
     /// True without free rows.
@@ -78,9 +78,9 @@ impl RowBlock {
         &self.columns[place].as_flattened()[..self.count]
     }
 
-    /// A column, with space for [`PIECE`] rows.
+    /// A column, with space for [`BLOCK_ROWS`] rows.
     #[inline(always)]
-    pub fn column_mut(&mut self, place: usize) -> &mut [f64; PIECE] {
+    pub fn column_mut(&mut self, place: usize) -> &mut [f64; BLOCK_ROWS] {
         let flat = self.columns[place].as_flattened_mut();
         flat.first_chunk_mut().expect("so many rows")
     }

@@ -1,4 +1,4 @@
-//! What one needs before and beside a fit: init, explain, schema, demo, --set, completions, man.
+//! Commands and options besides fits: init, explain, schema, demo, --set, completions, man.
 
 use crate::workbench::{MODEL, Workbench, column, readings, repository};
 use insta::assert_snapshot;
@@ -75,8 +75,8 @@ fn the_schema_is_printed() {
     assert!(printed == shipped);
 }
 
-/// Each starter model is read without a warning and its fit explains the record, where nothing but
-/// what can be seen in the table is needed for that.
+/// Each scaffolded model is read without a warning, and its fit explains the record if the table has all information that this
+/// needs.
 #[test]
 fn starters_can_be_fitted() {
     let bench = Workbench::with_shipped_models();
@@ -111,9 +111,9 @@ fn starters_can_be_fitted() {
     assert_eq!(schema["title"], "kmcfit model file");
 }
 
-/// Where clap says too little, its errors are those of the program.
+/// Errors of clap with too little detail are replaced by those of the program.
 #[test]
-fn arguments_that_are_no_numbers_and_commands_that_are_near() {
+fn invalid_numbers_and_misspelt_commands_have_messages() {
     let bench = Workbench::with_small_model();
     let (code, _, said) = bench.run(&["fti", "model.yaml"]);
     assert_eq!(code, 2);
@@ -138,7 +138,7 @@ fn arguments_that_are_no_numbers_and_commands_that_are_near() {
 }
 
 #[test]
-fn a_starter_says_what_was_found() {
+fn init_prints_the_properties_of_the_record() {
     let bench = Workbench::empty();
     let text = readings(201).replace("t_s,y_m", "Time [ms],Weg_mm");
     bench.write("run 1/my data.csv", &text);
@@ -196,7 +196,7 @@ fn a_starter_says_what_was_found() {
     bench.write("bare.csv", &text.replace("Time [ms],Weg_mm", "t,y"));
     let said = bench.run_to(0, &["init", "bare.csv"]);
     assert!(
-        said.contains("column `y`: displacement, m: the unit is a guess, please look\n"),
+        said.contains("column `y`: displacement, m: the unit is a guess, please check\n"),
         "{said}"
     );
     bench.write("empty.csv", "t_s,y_m\n0,\n1,\n2,\n");
@@ -216,7 +216,7 @@ fn a_starter_says_what_was_found() {
       found: 0.0
       expected: samples per second, a number from 1e-12 to 1e12
     ");
-    // The smallest number there is: its reciprocal is infinite.
+    // The smallest positive number: its reciprocal is infinite.
     let rate = ["init", "only.csv", "--sample-rate", "5e-324"];
     assert_snapshot!(bench.run(&rate).2, @"
     error: --sample-rate: invalid sampling rate
@@ -251,7 +251,7 @@ fn values_are_set() {
     assert_eq!(result["model"]["overrides"], serde_json::json!(sets));
     let page = bench.read("set/report.html");
     assert!(page.contains("kmcfit fit model.yaml --set fit.stop.iterations=3 --set"));
-    // The same as a model that says so itself.
+    // Equal to a model file with this value.
     let written = MODEL
         .replace("iterations: 5", "iterations: 3")
         .replace("{basis: nodal, start: 2.0}", "{fixed: 2.5}")
@@ -296,7 +296,7 @@ fn check_and_simulate_take_values_too() {
 }
 
 #[test]
-fn mistakes_in_what_is_set() {
+fn invalid_overrides_have_messages() {
     let bench = Workbench::with_small_model();
     let said = |set: &str| {
         let before = bench.contents();

@@ -1,14 +1,15 @@
-// Before measuring: what can a record show? One free decay, and the same with a shaker run.
+// Number of parameter combinations that a free decay determines, by itself and together with a shaker run; no measured
+// values are needed.
 
-use kmcfit_core::internals::identifiability::{Symmetry, structural_rank};
+use kmcfit_core::internals::identifiability::{ScaleFreedom, structural_rank};
 use kmcfit_core::{Builder, CoefficientSpec, Record};
 use kmcfit_core::{Excitation, Grid, Method, NodalCoefficients, State, System, Term};
 use std::error::Error;
 
-/// For one free record and for the pair: directions seen at most, and whether a factor of all functions
-/// stays free.
+/// Structural rank of the free record and of the pair, each with `true` if a common factor of all functions is
+/// undetermined.
 pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
-    // Any response will do: what can be counted depends on the records, not on what they read.
+    // The rank depends on inputs and sample times only, so the response of any system serves as the record.
     let grid = Grid::new(0.0, 20.0, 401).ok_or("a grid")?;
     let system = System {
         grid,
@@ -41,18 +42,18 @@ pub fn found() -> Result<[(usize, bool); 2], Box<dyn Error>> {
     let alone = Builder::new(parts()).record(free.clone()).build()?;
     let pair = Builder::new(parts()).record(free).record(forced).build()?;
     Ok([alone, pair].map(|problem| {
-        let seen = structural_rank(&problem);
-        (seen.rank_bound, seen.symmetry != Symmetry::None)
+        let rank = structural_rank(&problem);
+        (rank.rank_bound, rank.scale_freedom != ScaleFreedom::None)
     }))
 }
 
 pub fn main() -> Result<(), Box<dyn Error>> {
-    for (name, (seen, open)) in ["a free decay", "with a shaker run"]
+    for (name, (rank, open)) in ["a free decay", "with a shaker run"]
         .into_iter()
         .zip(found()?)
     {
-        let scale = if open { "free" } else { "fixed" };
-        println!("{name}: at most {seen} of 33 directions, common factor {scale}");
+        let scale = if open { "undetermined" } else { "determined" };
+        println!("{name}: at most {rank} of 33 parameter combinations; common factor {scale}");
     }
     Ok(())
 }

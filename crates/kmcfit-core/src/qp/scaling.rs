@@ -1,4 +1,5 @@
-//! Scaling of a program to coefficients near 1.
+//! Scaling of a program to coefficients near 1: variables `z_j / u_j`, rows and cones times a factor each, the cost times
+//! another.
 
 use super::kkt::ROUNDING;
 use super::{PrimalDual, Subproblem};
@@ -10,7 +11,7 @@ const ROUNDS: usize = 12;
 
 /// A program scaled by variables `z_j / units_j`, a factor for every row and cone, and a factor for half the cost. All factors are powers of
 /// two, which change no digit.
-pub struct Normalised {
+pub struct ScaledProgram {
     /// Scaled program.
     pub sub: Subproblem,
     units: Vec<f64>,
@@ -21,7 +22,7 @@ pub struct Normalised {
     cost: f64,
 }
 
-impl Normalised {
+impl ScaledProgram {
     /// Scales `original` so that the largest coefficients of every row and column (Ruiz), and the cost at zero, are near 1.
     pub fn new(original: &Subproblem) -> Self {
         let units = units(original);
@@ -188,7 +189,7 @@ mod tests {
         let mut sub = Subproblem::new(2);
         sub.equalities
             .push([(0, 1.0 / units[0]), (1, -1.0 / units[1])], 1.0);
-        let normalised = Normalised::new(&sub);
+        let normalised = ScaledProgram::new(&sub);
         let at = |z: f64| [(z + 1.0) * units[0], z * units[1]];
         assert!(normalised.resolves(&at(1e3)));
         assert!(!normalised.resolves(&at(1e12)));

@@ -1,4 +1,5 @@
-// The paper's record: what turns an optimum that matches the data into the system that made them.
+// The paper's record: smoothness, a monotone mass and a known stiffness select the true system among all that match the
+// record.
 
 use kmcfit::tables::Table;
 use kmcfit_core::CoefficientKind;
@@ -7,17 +8,17 @@ use kmcfit_core::{Builder, CoefficientSpec, Record};
 use kmcfit_core::{Constraint, Shape};
 use std::error::Error;
 
-/// The largest error of the mass (kg), whose truth is a line from 1 to 0.5.
+/// Largest error of the mass, kg; the true mass decreases linearly from 1 to 0.5 kg.
 pub fn found() -> Result<f64, Box<dyn Error>> {
     let table = Table::read("data/paper.csv")?;
     let record = Record::new("free decay")
         .from_state(3.3, 1.0)
         .displacement(table.column("t_s")?, table.column("y_m")?);
     let nodal = [
-        // Positive, and bent as little as the record lets it be.
+        // Positive, with the smallest curvature that matches the record.
         CoefficientSpec::nodal(2.0).min(0.05).tikhonov(2, 1e-3),
         CoefficientSpec::nodal(1.0).min(0.0).tikhonov(2, 1e-3),
-        // Free response shows ratios alone: one function must be known.
+        // A free response determines ratios only: one function must be known.
         CoefficientSpec::fixed(1.0),
     ];
     let problem = Builder::new(nodal)
@@ -39,6 +40,6 @@ pub fn found() -> Result<f64, Box<dyn Error>> {
 }
 
 pub fn main() -> Result<(), Box<dyn Error>> {
-    println!("the mass is right to {:.1e} kg", found()?);
+    println!("largest error of the mass: {:.1e} kg", found()?);
     Ok(())
 }

@@ -15,14 +15,14 @@ use kmcfit_core::internals::system::{
 
 /// Nodes from one sample to the next.
 const STRIDE: usize = 20;
-const READINGS: usize = 121;
+const SAMPLES: usize = 121;
 const STIFFNESS: f64 = 101.0;
 
-/// 40 periods with three samples each, and only the stiffness to be found. Differences of so few
-/// samples take 15 % off the acceleration, so the equation error has the period wrong by 7 %: a third
-/// of a period after an eighth of the record, three periods at its end. The start values are off by 13 %.
+/// 40 periods with three samples each, and only the stiffness estimated. Differences of so few samples underestimate the
+/// acceleration by 15 %, so the period by the equation error is wrong by 7 %: a third of a period after an eighth of the record,
+/// three periods at its end. The start values are wrong by 13 %.
 fn problem() -> Problem {
-    let nodes = STRIDE * (READINGS - 1) + 1;
+    let nodes = STRIDE * (SAMPLES - 1) + 1;
     let system = System {
         grid: Grid::new(0.0, common::DURATION, nodes).unwrap(),
         method: Method::Rk4,
@@ -35,7 +35,7 @@ fn problem() -> Problem {
     let response = system.forward(&truth, common::INITIAL, None).unwrap();
     let observed: Vec<f64> = response.displacement.into_iter().step_by(STRIDE).collect();
     let step = system.grid.step();
-    // Known to be free of noise: so few samples look like noise to a rule that does not know.
+    // The noise is given as zero; a rule that estimates it would treat so few samples as noise.
     let weighting = Weighting::Sigma(1e-8);
     let list = vec![
         CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
@@ -74,7 +74,7 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
     assert_eq!(names, ["start values", "equation error", "growing horizon"]);
     let silence = problem.zero_response_misfit();
     let costs: Vec<f64> = found.attempts.iter().map(|attempt| attempt.cost).collect();
-    // The first two end in minima that leave per cents of the record, the last at the answer.
+    // The first two end in minima with residuals of some per cent of the record, the last at the solution.
     assert!(
         costs[0] > 0.05 * silence && costs[1] > 0.05 * silence,
         "{costs:?} {silence}"
@@ -113,8 +113,8 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
     );
 }
 
-/// A hardening spring under two sines that set in at node `first`, in a record twenty times as long as the beginning
-/// that is looked at, seen every fourth step.
+/// A hardening spring under two sines that set in at node `first`, in a record twenty times as long as the truncated
+/// one, with a sample at every fourth step.
 fn long_record(first: usize) -> (Problem, [f64; 4]) {
     let nodes = 40_001;
     let system = System {
@@ -163,7 +163,7 @@ fn long_record(first: usize) -> (Problem, [f64; 4]) {
 }
 
 #[test]
-fn constants_of_a_long_record_are_first_fitted_to_its_first_steps() {
+fn constants_of_a_long_record_start_from_its_truncated_fit() {
     let (problem, truth) = long_record(0);
     let settings = FitSettings::default();
     let start = problem.start();
@@ -175,7 +175,7 @@ fn constants_of_a_long_record_are_first_fitted_to_its_first_steps() {
         .map(|attempt| attempt.start.name())
         .collect();
     assert_eq!(names, ["beginning of the record"]);
-    // Without noise its beginning tells the constants to the tolerance on it, and one step on all of it the rest.
+    // Without noise the truncated record determines the constants to its tolerance, and one step on the whole record gives the rest.
     assert!(
         found.history.len() * 2 < alone.history.len(),
         "{} {}",
@@ -219,7 +219,7 @@ fn a_fit_by_the_continuous_gradient_tries_all_starting_points() {
         method: Method::Midpoint,
         terms: vec![Term::Damping, Term::Stiffness],
     };
-    // What no oscillator does.
+    // A response that no oscillator has.
     let observed = (0..nodes).map(|i| ((i * i) as f64).sin()).collect();
     let weighting = Weighting::Integral {
         spacing: system.grid.step(),
