@@ -20,6 +20,7 @@ import functools
 import json
 import os
 import platform
+import random
 import re
 import shutil
 import statistics
@@ -33,7 +34,7 @@ import figures
 ROOT = Path(__file__).resolve().parent.parent
 WORK = ROOT / "target" / "race"
 SHARED = Path(os.environ.get("KMCFIT_SHARED", ROOT.parent / "shared"))
-ROWS = ["evaluation", "million", "paper", "lbfgs", "smooth", "scaling", "knots", "starts", "duffing", "start-up", "contention", "noisy"]
+ROWS = ["evaluation", "million", "paper", "lbfgs", "smooth", "scaling", "knots", "starts", "duffing", "start-up", "contention", "noisy", "noisy-500", "noisy-long", "bounded", "bounded-kinds", "bounded-long"]
 DURATION = 25.0
 SCALING = [2000, 8000, 40_000, 200_000]
 KNOTS = [4, 8, 16, 32, 64, 128, 256, 512, 1024]
@@ -340,7 +341,7 @@ def jax_rounds(race):
 
     def work():
         peer = peer_file("jax_nodal.py")
-        model = changed("paper-lbfgs", "lbfgs", [("cost_ratio: 1e-6", "cost_ratio: 1e-4")])
+        model = changed("paper-lbfgs", "lbfgs", [("cost_ratio: 1.0e-6", "cost_ratio: 1.0e-4")])
         steps, times, ours, fits = [], [], [], []
         for _ in race.rounds():
             out = python_peer(peer, ["numpy", "scipy", "jax", "optax"])
@@ -583,16 +584,152 @@ def contention(race, row):
     row.notes += [f"{name}: free {spread(free[name])}; pinned {spread(one[name])}" for name in models]
 
 
-def noisy(race, row):
-    """The path of weights of noisy.yaml: per weight the peer's cold or warm start, whichever is faster."""
-    peer = peer_file("casadi_noisy_path.py")
-    times, fits = {name: [] for name in THREADS}, []
+def noisy_data(nodes):
+    """The record of noisy.yaml on another grid: the paper's response, and Gaussian noise of 0.1 m with seed 1."""
+    if nodes == 2000:
+        return ROOT / "data" / "noisy.csv"
+    path = WORK / f"noisy-{nodes}.csv"
+    if not path.exists():
+        clean, _ = paper_data(nodes)
+        draw = random.Random(1)
+        with open(clean, newline="") as source, open(path, "w", newline="") as out:
+            rows = csv.reader(source)
+            writer = csv.writer(out)
+            writer.writerow(next(rows))
+            writer.writerows((t, repr(float(y) + draw.gauss(0.0, 0.1))) for t, y in rows)
+    return path
+
+
+def noisy_model(nodes, label="noisy", more=()):
+    """noisy.yaml on another grid, with its own readings."""
+    _, truth = paper_data(nodes)
+    data = (ROOT / "data").as_posix()
+    return changed(
+        "noisy",
+        f"{label}-{nodes}",
+        [
+            (f"{data}/noisy.csv", noisy_data(nodes).as_posix()),
+            (f"{data}/paper_truth.csv", truth.as_posix()),
+            ("nodes: 2000", f"nodes: {nodes}"),
+            *more,
+        ],
+    )
+
+
+def path_of_weights(race, row, nodes, peers, factor):
+    """A path of nine weights; per weight IPOPT's cold or warm start, whichever is faster, and FATROP's cold start."""
+    times, fits = {}, []
     for _ in race.rounds():
-        for name, one in THREADS.items():
-            out = python_peer(peer, ["numpy", "casadi"], ROOT / "data" / "noisy.csv", one_thread=one)
-            times[name] += found(r"path ([\d.]+)s", out)
-        fits.append(race.fit(ROOT / "models" / "noisy.yaml", "noisy"))
-    compare_fits(row, times, fits, 10)
+        for name, file in peers.items():
+            for threads, one in THREADS.items():
+                out = python_peer(peer_file(file), ["numpy", "casadi"], noisy_data(nodes), one_thread=one)
+                times.setdefault(f"{name}, {threads}", []).extend(found(r"path ([\d.]+)s", out))
+        fits.append(race.fit(noisy_model(nodes), f"noisy-{nodes}"))
+    compare_fits(row, times, fits, factor)
+
+
+PATH_PEERS = {"IPOPT": "casadi_noisy_path.py", "FATROP": "casadi_fatrop_noisy_path.py"}
+
+
+def noisy(race, row):
+    path_of_weights(race, row, 2000, PATH_PEERS, 10)
+
+
+def noisy_500(race, row):
+    path_of_weights(race, row, 500, PATH_PEERS, 10)
+
+
+def noisy_long(race, row):
+    """Cost per node against that on 2000 nodes; FATROP's path on 8000, where IPOPT fails."""
+    sizes = [2000, 8000] if race.quick else [2000, 8000, 40_000]
+    fits = {nodes: [] for nodes in sizes}
+    for _ in race.rounds():
+        for nodes in sizes:
+            fits[nodes].append(race.fit(noisy_model(nodes), f"noisy-{nodes}"))
+    time_of = {nodes: statistics.median(f["seconds"] for f in runs) for nodes, runs in fits.items()}
+    ratios = {nodes: time_of[nodes] / nodes / (time_of[2000] / 2000) for nodes in sizes}
+    row.peer_result = f"2000 nodes: {seconds(time_of[2000])}"
+    row.result = "; ".join(f"{nodes:,}: {seconds(time_of[nodes])}" for nodes in sizes[1:])
+    row.ratio = "; ".join(f"{ratios[nodes]:.3g}" for nodes in sizes[1:]) + " per node"
+    row.met = max(ratios.values()) <= 1.5 and all(f["outcome"]["status"] == "converged" for runs in fits.values() for f in runs)
+    row.notes += [f"{nodes:,} nodes: {described(runs[-1])}" for nodes, runs in fits.items()]
+    if not race.quick:
+        out = python_peer(peer_file(PATH_PEERS["FATROP"]), ["numpy", "casadi"], noisy_data(8000), one_thread=True)
+        row.notes.append(f"FATROP on 8000 nodes, one thread, one run: {seconds(found(r'path ([0-9.]+)s', out)[0])}")
+
+
+def bounded(race, row):
+    """Positive, smooth, normalised, without noise, against a structured interior point."""
+    peer = peer_file("casadi_fatrop.py")
+    ratios = []
+    for nodes in (2000, 8000):
+        times, fits = {name: [] for name in THREADS}, []
+        for _ in race.rounds():
+            for name, one in THREADS.items():
+                out = python_peer(peer, ["numpy", "casadi"], nodes, 1, one_thread=one)
+                times[name] += found(r"solve ([\d.]+)s", out)
+            fits.append(race.fit(smooth_model(nodes), f"smooth-{nodes}"))
+        _, fast = fastest(times)
+        ours, theirs = statistics.median(f["seconds"] for f in fits), statistics.median(fast)
+        ratios.append((nodes, ours, theirs))
+        row.notes += [f"{nodes} nodes, peer, {name}: {spread(runs)}" for name, runs in times.items()]
+        row.notes += [f"{nodes} nodes, kmcfit: {described(fits[-1])}"]
+    row.peer_result = row.peer + ": " + "; ".join(f"{n}: {seconds(t)}" for n, _, t in ratios)
+    row.result = "; ".join(f"{n}: {seconds(o)}" for n, o, _ in ratios)
+    row.ratio = "; ".join(share(o, t) for _, o, t in ratios)
+    row.met = all(o * 15 <= t for _, o, t in ratios)
+
+
+KINDS = {
+    "passive": [("  - {function: stiffness, at: 0.0, value: 1.0}", "  - {function: stiffness, at: 0.0, value: 1.0}\n  - {passive: true}")],
+    "damping ratio": [("  - {function: stiffness, at: 0.0, value: 1.0}", "  - {function: stiffness, at: 0.0, value: 1.0}\n  - {damping_ratio: {max: 0.02}}")],
+    "two records": [
+        (
+            "grid: {",
+            "  - name: second record\n    data: @data/paper_second.csv\n    columns: {time: t_s, displacement: y_m}\n"
+            "    sigma: {displacement: 0.1}\n    initial: {displacement: 0.0, velocity: 3.0}\ngrid: {",
+        )
+    ],
+}
+
+
+def bounded_kinds(race, row):
+    """noisy.yaml with further constraints and records, against itself."""
+    plain = statistics.median(race.fit(noisy_model(2000), "noisy-2000")["seconds"] for _ in race.rounds())
+    row.peer_result = f"{row.peer}: {seconds(plain)}"
+    results, ratios = [], []
+    for kind, changes in KINDS.items():
+        changes = [(old, new.replace("@data", (ROOT / "data").as_posix())) for old, new in changes]
+        model = noisy_model(2000, kind.replace(" ", "-"), changes)
+        fits = [race.fit(model, kind.replace(" ", "-")) for _ in race.rounds()]
+        ours = statistics.median(f["seconds"] for f in fits)
+        results.append(f"{kind}: {seconds(ours)}")
+        ratios.append(f"{ours / plain:.3g}")
+        row.notes.append(f"{kind}: {described(fits[-1])}")
+    row.result, row.ratio = "; ".join(results), "; ".join(ratios) + " times"
+
+
+def bounded_long(race, row):
+    """A bounded, smoothed fit with noise on 200,000 nodes: time per node, and memory."""
+    sizes = [2000, 20_000] if race.quick else [2000, 20_000, 200_000]
+    results = {}
+    for nodes in sizes:
+        model = noisy_model(nodes, "one-weight", [("weight: discrepancy", "weight: 1.0e6")])
+        out = WORK / "runs" / f"one-weight-{nodes}"
+        shutil.rmtree(out, ignore_errors=True)
+        process = subprocess.Popen([str(c) for c in (race.kmcfit, "fit", model, "--out", out, "--no-report")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        _, status, used = os.wait4(process.pid, 0)
+        if status != 0:
+            raise Skip(f"kmcfit fit on {nodes} nodes ended with {status}")
+        document = json.loads((out / "result.json").read_text())
+        results[nodes] = (document["seconds"], used.ru_maxrss / 1024)
+        row.notes.append(f"{nodes:,} nodes: {described({**document, 'wall': 0.0})}; {used.ru_maxrss / 1024:.0f} MB")
+    per_node = {nodes: elapsed / nodes for nodes, (elapsed, _) in results.items()}
+    most = max(sizes)
+    row.peer_result = f"{row.peer}: {seconds(results[2000][0])}"
+    row.result = f"{most:,}: {seconds(results[most][0])}, {results[most][1]:.0f} MB"
+    row.ratio = f"{per_node[most] / per_node[2000]:.3g} per node"
+    row.met = per_node[most] <= 1.5 * per_node[2000]
 
 
 def table(race):
@@ -609,7 +746,12 @@ def table(race):
         (Row("duffing", "forced, nonlinear, 65,000 samples, two sensors", "SciPy and Numba", "1/10"), duffing),
         (Row("start-up", "start-up", "", "--help 10 ms; fit of 100 readings 30 ms"), start_up),
         (Row("contention", "fits with one of two cores busy", "pinned to the other core", "1.1 times"), contention),
-        (Row("noisy", "noise, bounds, a path of nine weights, 2000 nodes", "CasADi and IPOPT", "1/10"), noisy),
+        (Row("noisy", "noise, bounds, a path of nine weights, 2000 nodes", "CasADi", "1/10"), noisy),
+        (Row("noisy-500", "the same on 500 nodes", "CasADi", "1/10"), noisy_500),
+        (Row("noisy-long", "the same on more nodes", "2000 nodes", "1.5 per node"), noisy_long),
+        (Row("bounded", "positive, smooth, normalised, without noise", "CasADi and FATROP", "1/15"), bounded),
+        (Row("bounded-kinds", "noisy with other constraints and records", "noisy", "none"), bounded_kinds),
+        (Row("bounded-long", "noise, bounds, one weight, 200,000 nodes", "2000 nodes", "1.5 per node; memory"), bounded_long),
     ]
 
 
