@@ -16,7 +16,7 @@ pub(super) struct CostToGo<A: Arithmetic, const X: usize, const W: usize> {
 }
 
 /// Most blocks of lanes of a row of states.
-const BLOCKS: usize = 2;
+pub(super) const BLOCKS: usize = 2;
 
 /// The lanes of block `b`.
 #[inline(always)]
@@ -27,7 +27,7 @@ pub(super) fn block(row: &[f64], b: usize) -> &Row {
 }
 
 /// The rows with 1 in one lane and 0 in the others.
-const UNITS: [Row; LANES] = {
+pub(super) const UNITS: [Row; LANES] = {
     let mut units = [[0.0; LANES]; LANES];
     let mut j = 0;
     while j < LANES {

@@ -31,8 +31,11 @@ const TO_THE_BOUND: f64 = 0.99;
 const NO_STEP: f64 = 1e-8;
 /// Iterations without halving the gap after which a search from the active rows ends, and one from the middle of the bounds.
 const PATIENCE: [u32; 2] = [5, 25];
-/// The gap at a start at active rows, relative to the decrease by a step that holds them.
+/// The gap at a start at active rows, relative to the geometric mean of the decrease by a step that holds them and of the complementarity
+/// of the estimated multipliers.
 const WARM_GAP: f64 = 0.3;
+/// Least decrease in that mean, relative to the complementarity.
+const LEAST_PROMISE: f64 = 1e-3;
 /// Distance within which a row counts as active there, relative to the largest one in units of the rows.
 const NEAR: f64 = 1e-4;
 
@@ -257,7 +260,10 @@ impl<'a, const X: usize, const W: usize> InteriorPoint<'a, X, W> {
         let gap = pairs
             .map(|(distance, m)| distance.max(0.0) * m)
             .sum::<f64>();
-        let mean = (WARM_GAP * self.promised_decrease().max(gap) / count).max(10.0 * least);
+        // Between the decrease by the step and the complementarity, which rows far from their bounds make too large.
+        let promised = self.promised_decrease().max(LEAST_PROMISE * gap);
+        let mean = WARM_GAP * (promised * promised.max(gap)).sqrt() / count;
+        let mean = mean.max(10.0 * least);
         self.bounds
             .start_at_active_rows(&distances, estimates, near, mean);
         self.cones.start(&values, &values, mean);

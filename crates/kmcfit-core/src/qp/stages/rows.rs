@@ -13,37 +13,81 @@ pub(super) struct StageRows {
     pub right: Vec<f64>,
 }
 
-/// A row before it is put into time order.
-pub(super) struct LooseRow {
-    pub stage: usize,
-    pub entries: Vec<(u8, f64)>,
-    pub right: f64,
+/// Rows before they are put into time order.
+#[derive(Default)]
+pub(super) struct LooseRows {
+    stages: Vec<u32>,
+    /// End of the entries of each row.
+    ends: Vec<u32>,
+    columns: Vec<u8>,
+    values: Vec<f64>,
+    right: Vec<f64>,
+}
+
+impl LooseRows {
+    /// Adds a row of a stage with the coefficients `xi` that `is_entry` chooses, times `factor`.
+    pub fn push<const W: usize>(
+        &mut self,
+        stage: usize,
+        xi: &[f64; W],
+        factor: f64,
+        right: f64,
+        is_entry: impl Fn(usize) -> bool,
+    ) {
+        for (j, a) in xi.iter().enumerate() {
+            if is_entry(j) {
+                self.columns.push(j as u8);
+                self.values.push(factor * a);
+            }
+        }
+        self.stages.push(stage as u32);
+        self.ends.push(self.columns.len() as u32);
+        self.right.push(right);
+    }
+
+    pub fn len(&self) -> usize {
+        self.stages.len()
+    }
+
+    /// The rows in time order, those of a stage in the order in which they were added, and the position of each before.
+    pub fn in_order(&self, stages: usize) -> (StageRows, Vec<u32>) {
+        let mut first = vec![0; stages + 1];
+        for stage in &self.stages {
+            first[*stage as usize + 1] += 1;
+        }
+        for i in 0..stages {
+            first[i + 1] += first[i];
+        }
+        let mut next = first.clone();
+        let mut order = vec![0; self.len()];
+        for (row, stage) in self.stages.iter().enumerate() {
+            let place = &mut next[*stage as usize];
+            order[*place as usize] = row as u32;
+            *place += 1;
+        }
+        let mut rows = StageRows {
+            stages: first,
+            rows: Vec::with_capacity(self.len() + 1),
+            columns: Vec::with_capacity(self.columns.len()),
+            values: Vec::with_capacity(self.values.len()),
+            right: Vec::with_capacity(self.len()),
+        };
+        rows.rows.push(0);
+        for row in &order {
+            let row = *row as usize;
+            let start = if row == 0 { 0 } else { self.ends[row - 1] };
+            let entries = start as usize..self.ends[row] as usize;
+            rows.columns
+                .extend_from_slice(&self.columns[entries.clone()]);
+            rows.values.extend_from_slice(&self.values[entries]);
+            rows.rows.push(rows.columns.len() as u32);
+            rows.right.push(self.right[row]);
+        }
+        (rows, order)
+    }
 }
 
 impl StageRows {
-    /// The rows in time order, and the position among `loose` of each.
-    pub fn in_order(loose: &[LooseRow], stages: usize) -> (Self, Vec<u32>) {
-        let mut order: Vec<u32> = (0..loose.len() as u32).collect();
-        // Stable: rows of a stage keep their order.
-        order.sort_by_key(|i| loose[*i as usize].stage);
-        let mut rows = Self {
-            rows: vec![0],
-            ..Self::default()
-        };
-        for (count, i) in order.iter().enumerate() {
-            let row = &loose[*i as usize];
-            rows.stages.resize(row.stage + 1, count as u32);
-            for (column, value) in &row.entries {
-                rows.columns.push(*column);
-                rows.values.push(*value);
-            }
-            rows.rows.push(rows.columns.len() as u32);
-            rows.right.push(row.right);
-        }
-        rows.stages.resize(stages + 1, loose.len() as u32);
-        (rows, order)
-    }
-
     pub fn len(&self) -> usize {
         self.right.len()
     }

@@ -1,7 +1,7 @@
 //! A subproblem as a control problem along time.
 
 use super::layout::{Place, StageLayout};
-use super::rows::{LooseRow, StageRows};
+use super::rows::{LooseRows, StageRows};
 use super::transitions::{NONE, Transitions};
 use crate::constraints::{Cone, Rows, TOLERANCE};
 use crate::qp::Subproblem;
@@ -276,19 +276,6 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         Some(0.0)
     }
 
-    /// Row `i` in the coordinates of its stage, and the constant that comes with it.
-    fn row(&self, rows: &Rows, i: usize) -> Option<(LooseRow, f64)> {
-        let stage = stage_of(rows, i, &self.places);
-        let (xi, constant) = self.row_at(stage, rows, i)?;
-        let entries = xi.iter().enumerate().filter(|(_, a)| **a != 0.0);
-        let row = LooseRow {
-            stage,
-            entries: entries.map(|(j, a)| (j as u8, *a)).collect(),
-            right: 0.0,
-        };
-        Some((row, constant))
-    }
-
     /// Coefficients of row `i` in the coordinates of a stage, and the constant that comes with it.
     fn row_at(&self, stage: usize, rows: &Rows, i: usize) -> Option<([f64; W], f64)> {
         let mut xi = [0.0; W];
@@ -307,18 +294,12 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
 
     /// The residuals, the proximal terms, and what holds the differences that act on no node.
     fn add_residuals(&mut self, sub: &Subproblem) -> Option<()> {
-        let mut loose = Vec::with_capacity(2 * sub.residuals.len());
-        for i in 0..sub.residuals.len() {
-            let (row, constant) = self.row(&sub.residuals, i)?;
-            let right = sub.residuals.right()[i] - constant;
-            loose.push(LooseRow { right, ..row });
-        }
+        let mut loose = LooseRows::default();
+        self.add_rows(&sub.residuals, &mut loose)?;
         let mut diagonal = |stage, column: usize, a| {
-            loose.push(LooseRow {
-                stage,
-                entries: vec![(column as u8, a)],
-                right: 0.0,
-            });
+            let mut xi = [0.0; W];
+            xi[column] = a;
+            loose.push(stage, &xi, 1.0, 0.0, |j| j == column);
         };
         for (j, d) in sub.proximal.iter().enumerate().filter(|(_, d)| **d != 0.0) {
             match self.places[j] {
@@ -330,20 +311,31 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         for (f, order) in self.orders.iter().enumerate() {
             (self.stages.saturating_sub(*order)..self.stages).for_each(|i| diagonal(i, X + f, 1.0));
         }
-        self.residuals = StageRows::in_order(&loose, self.stages).0;
+        self.residuals = loose.in_order(self.stages).0;
+        Some(())
+    }
+
+    /// Adds the rows, each at its stage.
+    fn add_rows(&self, rows: &Rows, loose: &mut LooseRows) -> Option<()> {
+        for i in 0..rows.len() {
+            let stage = stage_of(rows, i, &self.places);
+            let (xi, constant) = self.row_at(stage, rows, i)?;
+            loose.push(stage, &xi, 1.0, rows.right()[i] - constant, |j| {
+                xi[j] != 0.0
+            });
+        }
         Some(())
     }
 
     fn add_constraints(&mut self, sub: &Subproblem) -> Option<()> {
-        let mut loose = Vec::with_capacity(sub.inequalities.len());
+        let mut loose = LooseRows::default();
         let mut sides = Vec::with_capacity(sub.inequalities.len());
         for i in 0..sub.inequalities.len() {
-            let (row, constant) = self.row(&sub.inequalities, i)?;
-            let (lower, upper) = (
-                sub.inequalities.right()[i] - constant,
-                sub.upper[i] - constant,
-            );
-            if let Some(value) = self.known_value(&row) {
+            let stage = stage_of(&sub.inequalities, i, &self.places);
+            let (xi, constant) = self.row_at(stage, &sub.inequalities, i)?;
+            let lower = sub.inequalities.right()[i] - constant;
+            let upper = sub.upper[i] - constant;
+            if let Some(value) = self.known_value(stage, &xi) {
                 let slack = TOLERANCE * sub.inequalities.scale(i);
                 if value < lower - slack || value > upper + slack {
                     return None;
@@ -353,24 +345,14 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
             if lower >= upper || lower.is_nan() || upper.is_nan() {
                 return None;
             }
-            if upper.is_finite() {
-                loose.push(LooseRow {
-                    stage: row.stage,
-                    entries: row.entries.clone(),
-                    right: upper,
-                });
-                sides.push(Side { row: i, sign: 1.0 });
-            }
-            if lower.is_finite() {
-                loose.push(LooseRow {
-                    stage: row.stage,
-                    entries: row.entries.iter().map(|(j, a)| (*j, -a)).collect(),
-                    right: -lower,
-                });
-                sides.push(Side { row: i, sign: -1.0 });
+            for (sign, bound) in [(1.0, upper), (-1.0, -lower)] {
+                if bound.is_finite() {
+                    loose.push(stage, &xi, sign, bound, |j| xi[j] != 0.0);
+                    sides.push(Side { row: i, sign });
+                }
             }
         }
-        let (rows, order) = StageRows::in_order(&loose, self.stages);
+        let (rows, order) = loose.in_order(self.stages);
         self.constraints = rows;
         self.sides = order.iter().map(|i| sides[*i as usize]).collect();
         let scale = |side: &Side| sub.inequalities.scale(side.row);
@@ -386,35 +368,26 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         let stages: Vec<usize> = stages.collect();
         self.cone_order = (0..sub.cones.len()).collect();
         self.cone_order.sort_by_key(|k| stages[*k]);
-        let mut loose = Vec::new();
+        let mut loose = LooseRows::default();
         self.cone_rows.push(0);
         for k in &self.cone_order {
             let (cone, stage) = (&sub.cones[*k].rows, stages[*k]);
             let rows = (0..cone.len()).map(|i| self.row_at(stage, cone, i));
             let rows = rows.collect::<Option<Vec<_>>>()?;
-            let is_used = |j: &usize| rows.iter().any(|(xi, _)| xi[*j] != 0.0);
-            let columns: Vec<usize> = (0..W).filter(is_used).collect();
+            let is_used = |j: usize| rows.iter().any(|(xi, _)| xi[j] != 0.0);
             for (i, (xi, constant)) in rows.iter().enumerate() {
-                loose.push(LooseRow {
-                    stage,
-                    entries: columns.iter().map(|j| (*j as u8, xi[*j])).collect(),
-                    right: cone.right()[i] - constant,
-                });
+                loose.push(stage, xi, 1.0, cone.right()[i] - constant, is_used);
             }
             self.cone_rows.push(loose.len() as u32);
         }
-        self.cones = StageRows::in_order(&loose, self.stages).0;
+        self.cones = loose.in_order(self.stages).0;
         Some(())
     }
 
     fn add_absolute_values(&mut self, sub: &Subproblem) -> Option<()> {
-        let mut loose = Vec::with_capacity(sub.absolute.len());
-        for i in 0..sub.absolute.len() {
-            let (row, constant) = self.row(&sub.absolute, i)?;
-            let right = sub.absolute.right()[i] - constant;
-            loose.push(LooseRow { right, ..row });
-        }
-        let (rows, order) = StageRows::in_order(&loose, self.stages);
+        let mut loose = LooseRows::default();
+        self.add_rows(&sub.absolute, &mut loose)?;
+        let (rows, order) = loose.in_order(self.stages);
         self.absolute = rows;
         self.absolute_order = order.iter().map(|i| *i as usize).collect();
         let half = |i: &usize| 0.5 * sub.absolute_weights[*i];
@@ -422,11 +395,12 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
         Some(())
     }
 
-    /// The value of a row that speaks of known first states alone.
-    fn known_value(&self, row: &LooseRow) -> Option<f64> {
-        let terms = row.entries.iter().map(|(column, a)| {
-            let fixed = self.fixed.get(usize::from(*column)).copied().flatten()?;
-            (row.stage == 0).then_some(a * fixed)
+    /// The value of a row that acts on known first states alone.
+    fn known_value(&self, stage: usize, xi: &[f64; W]) -> Option<f64> {
+        let entries = xi.iter().enumerate().filter(|(_, a)| **a != 0.0);
+        let terms = entries.map(|(column, a)| {
+            let fixed = self.fixed.get(column).copied().flatten()?;
+            (stage == 0).then_some(a * fixed)
         });
         terms.sum()
     }

@@ -32,7 +32,9 @@ impl<const W: usize> Transitions<W> {
     pub fn forward<const X: usize>(&self, i: usize, xi: &[f64; W]) -> [f64; X] {
         let mut x = [0.0; X];
         for (x, row) in x.iter_mut().zip(self.step(i)) {
-            *x = dot(row, xi);
+            // The controls come last: they are known later than the states.
+            let controls: f64 = row[X..].iter().zip(&xi[X..]).map(|(a, u)| a * u).sum();
+            *x = dot(&row[..X], &xi[..X]) + controls;
         }
         for (k, next) in self.next.iter().enumerate() {
             let state = self.responses + k;
@@ -43,28 +45,11 @@ impl<const W: usize> Transitions<W> {
         }
         x
     }
-
-    /// Adds `F_i' p`.
-    #[inline(always)]
-    pub fn backward<const X: usize>(&self, i: usize, p: &[f64; X], out: &mut [f64; W]) {
-        for (p, row) in p.iter().zip(self.step(i)) {
-            for (out, a) in out.iter_mut().zip(row) {
-                *out += p * a;
-            }
-        }
-        for (k, next) in self.next.iter().enumerate() {
-            let state = self.responses + k;
-            out[state] += p[state];
-            if *next != NONE {
-                out[*next] += p[state];
-            }
-        }
-    }
 }
 
 /// The product of two vectors, in four sums side by side.
 #[inline(always)]
-pub(super) fn dot<const W: usize>(a: &[f64; W], b: &[f64; W]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     for (a, b) in a.chunks_exact(4).zip(b.chunks_exact(4)) {
         for k in 0..4 {
