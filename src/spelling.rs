@@ -102,7 +102,7 @@ pub(crate) fn number_in(text: &str) -> Option<String> {
         .rev()
         .find_map(|(end, _)| Some((finite(&text[..end])?, &text[end..])))?;
     rest.trim_start()
-        .starts_with(|c: char| c.is_alphabetic() || "°%".contains(c))
+        .starts_with(|c: char| c.is_alphabetic() || c == '°')
         .then(|| format!("write {value} alone, without a unit"))
 }
 

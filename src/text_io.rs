@@ -37,7 +37,7 @@ pub const LONGEST_LINE: usize = 1 << 20;
 ///
 /// # Errors
 ///
-/// When no such file, it is a folder, it cannot be read, it is longer than `limit`, or it
+/// If the file does not exist, it is a folder, it cannot be read, it is longer than `limit`, or it
 /// is not UTF-8 text.
 pub fn read_text(path: &Path, what: &str, limit: u64) -> Result<String, InputError> {
     let bytes = read_bytes(path, what, limit)?;
@@ -149,7 +149,7 @@ fn too_long(path: &Path, limit: u64) -> InputError {
     InputError::file(path, format!("the file is longer than {limit} bytes"))
 }
 
-/// Refuses a table with a line longer than any table has.
+/// Refuses a table with a line longer than `LONGEST_LINE`.
 ///
 /// # Errors
 ///
@@ -191,7 +191,7 @@ impl<'a> Lines<'a> {
     ///
     /// # Errors
     ///
-    /// When the file cannot be read, or the line is longer than any table has, or not UTF-8.
+    /// When the file cannot be read, or the line is longer than `LONGEST_LINE`, or not UTF-8.
     pub fn next(&mut self) -> Result<Option<&str>, InputError> {
         self.line.clear();
         let most = LONGEST_LINE as u64 + 2;

@@ -252,12 +252,14 @@ const VELOCITY: [Unit; 8] = [
     VOLT,
 ];
 
-const ACCELERATION: [Unit; 8] = [
+const ACCELERATION: [Unit; 10] = [
     unit("m/s²", &["ms-2", "m/s/s", "m/sec2"], 1.0, Linear),
     unit("mm/s²", &["mms-2", "mm/s/s", "mm/sec2"], 1e-3, Linear),
     unit("g", &["G", "gn", "g0"], GRAVITY, Linear),
     unit("mg", &["mG"], 1e-3 * GRAVITY, Linear),
     unit("gal", &["Gal", "cm/s2"], 1e-2, Linear),
+    unit("in/s²", &["ins-2", "in/s/s", "in/sec2"], INCH, Linear),
+    unit("ft/s²", &["fts-2", "ft/s/s", "ft/sec2"], FOOT, Linear),
     unit("rad/s²", &["rads-2", "rad/s/s"], 1.0, Angular),
     unit("deg/s²", &["degs-2", "deg/s/s"], DEGREE, Angular),
     VOLT,

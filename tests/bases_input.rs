@@ -148,7 +148,7 @@ fn knots() {
     };
     assert_snapshot!(message("{basis: piecewise-linear, start: 1}"), @"
     m.yaml:5:9: functions.mass: the basis `piecewise-linear` needs knots
-      expected: `knots`: an integer (so many, equally spaced), or a list of times in s
+      expected: `knots`: the number of equally spaced knots, or a list of times in s
     ");
     assert_snapshot!(knots("1"), @"
     m.yaml:5:52: functions.mass.knots: there are fewer than two knots
@@ -168,22 +168,22 @@ fn knots() {
     assert_snapshot!(knots("-3"), @"
     m.yaml:5:52: functions.mass.knots: a count cannot be negative
       found: the integer -3
-      expected: an integer (so many, equally spaced), or a list of times in s
+      expected: the number of equally spaced knots, or a list of times in s
     ");
     assert_snapshot!(knots("eleven"), @"
     m.yaml:5:52: functions.mass.knots: not an integer
       found: text `eleven`
-      expected: an integer (so many, equally spaced), or a list of times in s
+      expected: the number of equally spaced knots, or a list of times in s
     ");
     assert_snapshot!(knots("2.5"), @"
     m.yaml:5:52: functions.mass.knots: not an integer
       found: the floating-point number 2.5
-      expected: an integer (so many, equally spaced), or a list of times in s
+      expected: the number of equally spaced knots, or a list of times in s
     ");
     assert_snapshot!(knots("{count: 3}"), @"
     m.yaml:5:52: functions.mass.knots: not an integer
       found: a map
-      expected: an integer (so many, equally spaced), or a list of times in s
+      expected: the number of equally spaced knots, or a list of times in s
     ");
     assert_snapshot!(knots("[0, 5, 12]"), @"
     m.yaml:5:59: functions.mass.knots[2]: this knot lies outside the record
@@ -344,7 +344,7 @@ fn starts() {
     assert_snapshot!(message("{basis: polynomial, degree: 2, start: [1]}"), @"
     m.yaml:5:47: functions.mass.start: the list does not fit the basis
       found: 1 number for `polynomial`
-      expected: 3 numbers, the factors of t^0, t^1, … with t in s
+      expected: 3 numbers, the coefficients of t^0, t^1, … with t in s
     ");
     assert_snapshot!(message("{basis: nodal, start: [1, 2]}"), @"
     m.yaml:5:31: functions.mass.start: the list does not fit the basis
@@ -398,12 +398,12 @@ fn starts() {
 fn limits() {
     let with = |text: &str| message(&format!("{{basis: nodal, start: 1, {text}}}"));
     assert_snapshot!(with("min: 2, max: 1"), @"
-    m.yaml:5:39: functions.mass.min: the smallest value is above the largest
+    m.yaml:5:39: functions.mass.min: min is greater than max
       found: min 2 and max 1 at 0 s
       expected: min at most max at all times
     ");
     assert_snapshot!(with("min: 0.5, max: {data: m.csv, column: m_kg}"), @"
-    m.yaml:5:39: functions.mass.min: the smallest value is above the largest
+    m.yaml:5:39: functions.mass.min: min is greater than max
       found: min 0.5 and max 0.48000000000000004 at 6.5 s
       expected: min at most max at all times
     ");

@@ -264,7 +264,7 @@ fn invalid_parts_are_refused_with_their_key() {
         ),
         (
             mass(one().min(2.0).max(1.0)),
-            "functions.mass.min: the smallest value is above the largest",
+            "functions.mass.min: min is greater than max",
         ),
         (
             mass(CoefficientSpec::fixed(1.0).min(0.0)),

@@ -140,7 +140,7 @@ fn report_result(curves: &[GradientCheck]) -> u8 {
         .collect();
     if failed.is_empty() {
         print(&format!(
-            "the discrete gradient is exact: min error below {:.0e}\n",
+            "the discrete gradient is exact: smallest relative error below {:.0e}\n",
             GradientCheck::PASS
         ));
         return OK;

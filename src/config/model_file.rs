@@ -36,7 +36,7 @@ impl ModelFile {
     ///
     /// # Errors
     ///
-    /// When no such file, its path or its content is not UTF-8 text, or
+    /// If the file does not exist, its path or its content is not UTF-8 text, or
     /// [`parse`](Self::parse) finds a mistake.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
         let path = path.as_ref();
@@ -243,7 +243,7 @@ pub(super) fn check_path(path: &Path) -> Result<(), InputError> {
     match path.to_str() {
         Some(_) => Ok(()),
         None => Err(InputError::file(path, "the path of the model is not UTF-8")
-            .found("bytes that are no character")
+            .found("bytes that are not valid UTF-8")
             .expected("a path in UTF-8: the results name the model by its path")
             .hint("rename the file or its folder")),
     }

@@ -29,7 +29,7 @@ impl Scalar<'_> {
     pub fn describe(self) -> String {
         match self {
             Scalar::Nothing => "nothing".to_owned(),
-            Scalar::Bool(value) => format!("the truth value {value}"),
+            Scalar::Bool(value) => format!("the boolean {value}"),
             Scalar::Integer(value) => format!("the integer {value}"),
             Scalar::Float(value) if value.is_nan() => ".nan, which is not a number".to_owned(),
             Scalar::Float(value) if value.is_infinite() => "an infinite number".to_owned(),

@@ -259,7 +259,7 @@ impl Value for KnotSpec {
     const KIND: ValueType =
         ValueType::AnyOf(&[ValueType::Count, ValueType::List(&ValueType::Number)]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
-        let expected = "an integer (so many, equally spaced), or a list of times in s";
+        let expected = "the number of equally spaced knots, or a list of times in s";
         (Count::scalar(scalar).map(Self::Count))
             .map_err(|mistake| mistake.expecting(|_| expected.to_owned()))
     }

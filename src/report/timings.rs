@@ -15,9 +15,9 @@ pub struct TimingsSummary {
     pub forward: PartSummary,
     /// Adjoint solves of the fit: gradients.
     pub adjoint: PartSummary,
-    /// Tangent solves of the fit.
+    /// Tangent solves of the fit, and the step Jacobians that replace them for many parameters.
     pub tangent: PartSummary,
-    /// Quadratic programs of the fit, by Clarabel.
+    /// Quadratic programs of the fit, on stages or by Clarabel.
     pub qp: PartSummary,
     /// Assembly, factorisation and solution of Gauss-Newton steps; the recursion of L-BFGS; the equation error without
     /// its quadratic programs.
@@ -34,7 +34,7 @@ pub struct TimingsSummary {
     pub report: PartSummary,
     /// The rest: building the model, bookkeeping.
     pub other: PartSummary,
-    /// From the begin of the model building to the result.
+    /// From the start of model building to the result.
     pub total: PartSummary,
 }
 
@@ -137,7 +137,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_are_shown_only_if_not_zero() {
+    fn parts_without_a_count_leave_the_column_empty() {
         let part = |seconds, count| PartSummary { seconds, count };
         let timings = TimingsSummary {
             arithmetic: "scalar".into(),

@@ -375,12 +375,12 @@ fn shapes_and_ranges() {
       expected: one of: non-increasing, non-decreasing, convex, concave
     ");
     assert_snapshot!(message("[{function: mass, min: 2, max: 1}]"), @"
-    m.yaml:11:37: constraints[0].min: the smallest value is above the largest
+    m.yaml:11:37: constraints[0].min: min is greater than max
       found: min 2 and max 1 at 0 s
       expected: min at most max at all times
     ");
     assert_snapshot!(message("[{function: mass, min: 0.2, max: {data: c.csv, column: c}}]"), @"
-    m.yaml:11:37: constraints[0].min: the smallest value is above the largest
+    m.yaml:11:37: constraints[0].min: min is greater than max
       found: min 0.2 and max 0.1 at 0 s
       expected: min at most max at all times
     ");
@@ -395,7 +395,7 @@ fn shapes_and_ranges() {
       expected: one of the two, or both
     ");
     assert_snapshot!(message("[{function: mass, slope: {min: 1, max: 0}}]"), @"
-    m.yaml:11:45: constraints[0].slope.min: the smallest value is above the largest
+    m.yaml:11:45: constraints[0].slope.min: min is greater than max
       found: min 1 and max 0
       expected: min at most max
     ");
@@ -410,7 +410,7 @@ fn shapes_and_ranges() {
       expected: a number greater than 0
     ");
     assert_snapshot!(message("[{frequency: {min: 2, max: 1}}]"), @"
-    m.yaml:11:33: constraints[0].frequency.min: the smallest value is above the largest
+    m.yaml:11:33: constraints[0].frequency.min: min is greater than max
       found: min 2 and max 1
       expected: min at most max
     ");

@@ -227,7 +227,7 @@ fn numbers() {
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: true}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: not a number
-      found: the truth value true
+      found: the boolean true
       expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
     assert_snapshot!(changed("velocity: 1}", "velocity: }"), @"
@@ -410,7 +410,7 @@ fn wrong_kinds() {
     ");
     assert_snapshot!(changed("initial: {displacement: 3.3, velocity: 1}", "initial: true"), @"
     m.yaml:8:14: experiments[0].initial: wrong type of value
-      found: the truth value true
+      found: the boolean true
       expected: a map such as {displacement: 3.3, velocity: 1.0}, or `estimate`
     ");
     assert_snapshot!(changed("title: Linear mass decay", "title: {a: b}"), @"

@@ -160,7 +160,7 @@ fn basis(
         Some(KnotSpec::Times(times)) => Ok(builder::Knots::Times(numbers(times))),
         None => Err(missing(
             "knots",
-            "`knots`: an integer (so many, equally spaced), or a list of times in s",
+            "`knots`: the number of equally spaced knots, or a list of times in s",
         )),
     };
     Ok(match kind {

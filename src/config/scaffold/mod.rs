@@ -240,7 +240,7 @@ fn functions(columns: &ColumnAssignment, record: &RecordSummary) -> String {
     text += &match driven {
         true => commented(
             &format!("  mass:      {{basis: constant, start: {}}}", short(mass)),
-            "kg; the force shows it",
+            "kg; identifiable from the measured force",
         ),
         false => commented(
             "  mass:      {fixed: 1.0}",

@@ -41,12 +41,12 @@ fn outcome(run: &Measures) -> String {
     let scale = errors.mass_relative >= CLOSE;
     match (worst < CLOSE, scale, matched) {
         (true, false, _) => format!(
-            "true system recovered; relative error of k/m and c/m {}, of m {}",
+            "close to the true system: relative error of k/m and c/m {}, of m {}",
             percent(worst),
             percent(errors.mass_relative)
         ),
         (true, true, _) => format!(
-            "k/m and c/m recovered (error {}), but not the scale: error of m {}",
+            "k/m and c/m close to the true values (error {}), but not the scale: error of m {}",
             percent(worst),
             percent(errors.mass_relative)
         ),
@@ -55,7 +55,7 @@ fn outcome(run: &Measures) -> String {
             percent(worst)
         ),
         (false, _, false) => format!(
-            "response not fitted, true system not recovered: error of k/m or c/m {}",
+            "response not fitted, not close to the true system: error of k/m or c/m {}",
             percent(worst)
         ),
     }
@@ -86,14 +86,14 @@ fn on_the_truth(runs: &[Measures]) -> Vec<String> {
     let found: Vec<&&Measures> = found.collect();
     match (found.is_empty(), found.iter().find(with_scale)) {
         (true, _) if !known.is_empty() => {
-            sentences.push("No run recovers the true system.".into());
+            sentences.push("No run is close to the true system.".into());
         }
         (false, Some(first)) => sentences.push(format!(
-            "{} is the first run that recovers the true system with its scale.",
+            "{} is the first run close to the true system, including its scale.",
             first.name
         )),
         (false, None) => sentences.push(
-            "k/m and c/m are recovered; no record or constraint determines the scale of m, c and k.".into(),
+            "k/m and c/m are close to the true values in at least one run; the scale of m, c and k is not close in any of these.".into(),
         ),
         _ => {}
     }

@@ -303,7 +303,7 @@ pub(super) fn uncrossed(
     };
     match (0..grid.nodes()).find(|&i| min.at(i) > max.at(i)) {
         Some(i) => {
-            let problem = "the smallest value is above the largest";
+            let problem = "min is greater than max";
             let (min, max, time) = (min.at(i), max.at(i), grid.time(i));
             Err(BuildError::new(format!("{key}.min"), problem)
                 .found(format!("min {min} and max {max} at {time} s"))
@@ -393,7 +393,7 @@ fn listed(key: &str, basis: &Basis, values: &[f64], grid: &Grid) -> Result<Vec<f
         Basis::PiecewiseConstant { .. } => "one per cell between knots",
         Basis::PiecewiseLinear { .. } => "one per knot",
         Basis::BSpline { .. } => "one per basis function",
-        Basis::Polynomial { .. } => "the factors of t^0, t^1, … with t in s",
+        Basis::Polynomial { .. } => "the coefficients of t^0, t^1, … with t in s",
     };
     let count = |numbers: usize| match numbers {
         1 => "1 number".to_owned(),

@@ -37,7 +37,7 @@ impl Problem {
         let mut sizes = vec![0.0f64; self.functions.ranges().len()];
         for (which, assembly) in self.functions.coefficient_sets().iter().enumerate() {
             let nodal = evaluation.nodal_of(which);
-            // Mean square of the accelerations first, then of `phi` of each term.
+            // Index 0: sum of squares of the acceleration; index `j + 1`: of `phi` of term `j`, then of `phi` of each term.
             let root = |what: usize| -> f64 {
                 let own = self.experiments.iter().zip(&squares);
                 let own =

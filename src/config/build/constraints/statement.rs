@@ -340,10 +340,7 @@ impl ConstraintReader<'_> {
                     _ => "one of the two, or both",
                 })),
             (Some(low), Some(high)) if low > high => Err(self
-                .error(
-                    &format!("{key}.min"),
-                    "the smallest value is above the largest",
-                )
+                .error(&format!("{key}.min"), "min is greater than max")
                 .found(format!("min {low} and max {high}"))
                 .expected("min at most max")),
             _ => Ok((min, max)),
