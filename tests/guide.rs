@@ -160,7 +160,10 @@ fn links(line: &str) -> String {
     while let Some((before, label, target, after)) = next_link(rest) {
         text.push_str(before);
         let name = target.strip_suffix(".md").unwrap_or_default();
-        if PAGES.contains(&name) {
+        if name == "equations" {
+            // Part of the front page.
+            text.push_str(&format!("[{label}](crate)"));
+        } else if PAGES.contains(&name) {
             text.push_str(&format!("[{label}](crate::guide::{name})"));
         } else if target.starts_with("https://") || target.starts_with('#') {
             text.push_str(&format!("[{label}]({target})"));
