@@ -4,17 +4,18 @@
 //! `config/build/`, where the problem is built.
 
 mod experiment;
+mod functions;
 mod study;
 
 pub use experiment::*;
+pub use functions::*;
 pub use study::*;
 
 use crate::config::map::keys;
 
 use super::choice::choice;
 pub use super::values::{ColumnSpec, WeightRule};
-use super::values::{Count, Format, KnotSpec, Nodes, Number, NumberOrColumn, OneOrList};
-use super::values::{StartSpec, Text, Weight};
+use super::values::{Count, Format, Nodes, Number, NumberOrColumn, OneOrList, Text};
 
 keys! {
     /// A model: records of one system, its coefficient functions, and the settings of the fit.
@@ -82,198 +83,6 @@ choice! {
         Midpoint = "midpoint",
         /// Classical Runge-Kutta method, of order 4.
         Rk4 = "rk4",
-    }
-}
-
-keys! {
-    /// Coefficient functions of the system; mass, damping and stiffness are required.
-    pub struct FunctionsSpec = "functions", expecting "a map with the keys mass, damping, stiffness" {
-        /// Mass m(t).
-        mass: FunctionSpec, example "{basis: nodal, start: 2.0}", unit "kg";
-        /// Damping c(t), with the force c y'.
-        damping: FunctionSpec, example "{basis: constant, start: 1.0}", unit "N s/m";
-        /// Stiffness k(t), with the force k y.
-        stiffness: FunctionSpec, example "{fixed: 1.0}", unit "N/m";
-        /// Cubic stiffness k3(t), with the force k3 y^3.
-        cubic_stiffness: Option<FunctionSpec>,
-            example "{basis: constant, start: 0.0}",
-            unit "N/m^3",
-            default "none";
-        /// Quadratic damping c2(t), with the force c2 |y'| y'.
-        quadratic_damping: Option<FunctionSpec>,
-            example "{basis: constant, start: 0.0}",
-            unit "N s^2/m^2",
-            default "none";
-        /// Coulomb friction, with the force f y'/sqrt(y'^2 + width^2).
-        coulomb_friction: Option<FunctionSpec>,
-            example "{basis: constant, start: 0.5, width: 0.01}",
-            unit "N",
-            default "none";
-        /// Static force, which acts against positive y.
-        static_force: Option<FunctionSpec>, example "{fixed: 0.0}", unit "N", default "none";
-    }
-}
-
-keys! {
-    /// Coefficient functions of one experiment, in place of the shared ones.
-    pub struct OwnFunctionsSpec (Default) = "own_functions", expecting "a map such as {damping: {basis: constant, start: 1.0}}" {
-        /// Mass m(t) of this experiment.
-        mass: Option<FunctionSpec>, example "{basis: constant, start: 2.0}", unit "kg";
-        /// Damping c(t) of this experiment.
-        damping: Option<FunctionSpec>, example "{basis: constant, start: 1.0}", unit "N s/m";
-        /// Stiffness k(t) of this experiment.
-        stiffness: Option<FunctionSpec>, example "{basis: constant, start: 1.0}", unit "N/m";
-        /// Cubic stiffness, with the force k3 y^3.
-        cubic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^3";
-        /// Quadratic damping, with the force c2 |y'| y'.
-        quadratic_damping: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N s^2/m^2";
-        /// Coulomb friction, with the force f y'/sqrt(y'^2 + width^2).
-        coulomb_friction: Option<FunctionSpec>, example "{basis: constant, start: 0.5, width: 0.01}", unit "N";
-        /// Static force, which acts against positive y.
-        static_force: Option<FunctionSpec>, example "{fixed: 0.0}", unit "N";
-    }
-}
-
-keys! {
-    /// A coefficient function: estimated, with a basis and start values, or fixed.
-    pub struct FunctionSpec = "function", expecting "a map such as {basis: nodal, start: 2.0}" {
-        /// Basis of an estimated function, which defines its parameters.
-        basis: Option<Basis>,
-            example "piecewise-linear",
-            needs "`start`";
-        /// Knots of a piecewise function or spline: their number (equally spaced, ends included) or their times.
-        knots: Option<KnotSpec>,
-            example "11",
-            unit "s, of times",
-            range "2 or more, at most the number of nodes; times increase and include both ends of the record",
-            needs "`basis`: piecewise-constant, piecewise-linear or b-spline";
-        /// Degree of a polynomial.
-        degree: Option<Count>,
-            example "2",
-            needs "`basis: polynomial`";
-        /// Start values of the search: one number, one value per node, cell or knot, polynomial coefficients, or a column of
-        /// a file.
-        start: Option<StartSpec>,
-            example "2.0",
-            unit "that of the function",
-            range "greater than 0 for a mass",
-            needs "`basis`";
-        /// Fixed values, in place of `basis`.
-        fixed: Option<NumberOrColumn>,
-            example "1.0",
-            unit "that of the function",
-            range "greater than 0 for a mass",
-            needs "no `start`";
-        /// Lower bound.
-        min: Option<NumberOrColumn>,
-            example "0.05",
-            unit "that of the function",
-            default "none",
-            range "at most `max`",
-            needs "`basis`; method gauss-newton, projected-gradient or equation-error";
-        /// Upper bound.
-        max: Option<NumberOrColumn>,
-            example "10.0",
-            unit "that of the function",
-            default "none",
-            range "at least `min`",
-            needs "`basis`; method gauss-newton, projected-gradient or equation-error";
-        /// Penalty on the roughness, added to J; or a list of penalties.
-        penalty: Option<OneOrList<PenaltySpec>>,
-            example "{kind: tikhonov, order: 2, weight: 0.1}",
-            default "none",
-            needs "`basis`";
-        /// For Coulomb friction: velocity over which its sign is smoothed, well below the peak velocity of the
-        /// response.
-        width: Option<Number>,
-            example "0.01",
-            unit "m/s",
-            range "greater than 0",
-            needs "coulomb_friction, which requires it";
-    }
-}
-
-choice! {
-    /// Basis of a coefficient function.
-    pub enum Basis {
-        /// One parameter per node of the grid.
-        Nodal = "nodal",
-        /// One constant.
-        Constant = "constant",
-        /// One value per interval between knots.
-        PiecewiseConstant = "piecewise-constant",
-        /// One value per knot, linear in between.
-        PiecewiseLinear = "piecewise-linear",
-        /// Polynomial over the whole record.
-        Polynomial = "polynomial",
-        /// Cubic B-spline.
-        BSpline = "b-spline",
-    }
-}
-
-keys! {
-    /// Penalty on the roughness of a function p: `tikhonov`, weight times the integral of the squared derivative, or `tv`,
-    /// weight times the total variation, which permits jumps.
-    pub struct PenaltySpec = "penalty", expecting "a map such as {kind: tikhonov, order: 2, weight: 0.1}" {
-        /// Measure of roughness.
-        kind: PenaltyKind,
-            example "tikhonov",
-            needs "tv: method gauss-newton or equation-error";
-        /// For `tikhonov`: order of the derivative, 0 (difference from `reference`), 1 (slope) or 2 (curvature).
-        order: Option<Count>,
-            example "2",
-            range "0, 1 or 2",
-            needs "`kind: tikhonov`";
-        /// Weight of the penalty in J, or for `tikhonov` the rule that chooses it.
-        weight: Weight,
-            example "0.1",
-            unit "of J per unit of the measure",
-            range "0 or more",
-            needs "a rule: `kind: tikhonov` and method gauss-newton; discrepancy also `sigma`; period: order 1 or 2 and method equation-error";
-        /// For `tikhonov` of order 0: the reference values.
-        reference: Option<NumberOrColumn>,
-            example "1.0",
-            unit "that of the function",
-            default "0",
-            needs "`order: 0`";
-    }
-}
-
-choice! {
-    /// Measure of roughness.
-    pub enum PenaltyKind {
-        /// Integral of the squared derivative.
-        Tikhonov = "tikhonov",
-        /// Total variation.
-        TotalVariation = "tv",
-    }
-}
-
-impl FunctionSpec {
-    /// Names of the penalty on the total variation.
-    pub fn has_total_variation(&self) -> bool {
-        let mut penalties = self.penalty.iter().flat_map(|list| list.values());
-        penalties.any(|penalty| penalty.kind == PenaltyKind::TotalVariation)
-    }
-}
-
-choice! {
-    /// Name of a coefficient function.
-    pub type FunctionName = kmcfit_core::internals::functions::CoefficientKind {
-        /// Mass m(t).
-        Mass = "mass",
-        /// Damping c(t).
-        Damping = "damping",
-        /// Stiffness k(t).
-        Stiffness = "stiffness",
-        /// Cubic stiffness.
-        CubicStiffness = "cubic_stiffness",
-        /// Quadratic damping.
-        QuadraticDamping = "quadratic_damping",
-        /// Coulomb friction.
-        CoulombFriction = "coulomb_friction",
-        /// Static force.
-        Offset = "static_force",
     }
 }
 

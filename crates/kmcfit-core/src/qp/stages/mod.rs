@@ -9,6 +9,7 @@ mod interior_point;
 mod layout;
 mod riccati;
 mod rows;
+mod sizes;
 mod transcription;
 mod transitions;
 
@@ -19,7 +20,8 @@ pub use layout::{ResponseVariables, StageLayout};
 
 use super::sum::{Sum, add, distances};
 use super::{PrimalDual, Subproblem};
-use transcription::{Sizes, StageProgram};
+use sizes::Sizes;
+use transcription::StageProgram;
 
 /// A point from the stages.
 pub(super) struct StagePoint {

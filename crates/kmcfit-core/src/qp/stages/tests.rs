@@ -11,6 +11,8 @@ use rand_chacha::ChaCha8Rng;
 
 /// Programs in all, and the seed of the first; `KMCFIT_QP_SEED` gives others.
 const PROGRAMS: u64 = 500;
+/// Least number of programs that Clarabel solves too: 95 per cent; 489 is the least of the first five seeds.
+const COMPARED: u64 = 475;
 /// Programs that may be refused by both solvers: one of 4000 was.
 const REFUSALS: usize = 1;
 /// Excess of the cost over that of the other solver, relative to the larger of the cost and that at zero.
@@ -247,7 +249,7 @@ fn random_program(case: u64) -> (Subproblem, String) {
 
 #[test]
 fn bounded_programs_have_the_minimum_that_clarabel_finds() {
-    let (mut bounded, mut conic, mut with_jumps, mut refused) = (0, 0, 0, 0);
+    let (mut bounded, mut conic, mut with_jumps, mut refused, mut compared) = (0, 0, 0, 0, 0);
     for case in 0..PROGRAMS {
         let (sub, name) = random_program(case);
         let step = sub.step_on_stages(Subproblem::ITERATIONS);
@@ -266,6 +268,7 @@ fn bounded_programs_have_the_minimum_that_clarabel_finds() {
         if reference.status != ConicStatus::Solved {
             continue;
         }
+        compared += 1;
         let [found, least, rough] = [&on_stages, &reference, &step].map(|s| sub.value(&s.z));
         let scale = found.max(sub.value(&vec![0.0; sub.variables]));
         assert!(
@@ -292,6 +295,10 @@ fn bounded_programs_have_the_minimum_that_clarabel_finds() {
         conic += usize::from(on_stages.cone_multipliers.iter().any(|m| *m > 1e-6));
         with_jumps += usize::from(!sub.absolute.is_empty());
     }
+    assert!(
+        compared >= COMPARED,
+        "{compared} programs solved by Clarabel"
+    );
     assert!(refused <= REFUSALS, "{refused} programs refused");
     // The other programs have their minimum inside.
     assert!(bounded > 300, "{bounded} programs with active bounds");

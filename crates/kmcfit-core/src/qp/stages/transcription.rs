@@ -2,81 +2,10 @@
 
 use super::layout::{Place, StageLayout};
 use super::rows::{LooseRows, StageRows};
+use super::sizes::{Sizes, stage_of, stage_of_cone};
 use super::transitions::{NONE, Transitions};
-use crate::constraints::{Cone, Rows, TOLERANCE};
+use crate::constraints::{Rows, TOLERANCE};
 use crate::qp::Subproblem;
-
-/// Highest difference of a coefficient in the state.
-pub(super) const HIGHEST_ORDER: usize = 3;
-
-/// Number of states and controls that a subproblem needs, and the order of the differences of each history.
-pub(super) struct Sizes {
-    pub states: usize,
-    pub controls: usize,
-    orders: Vec<usize>,
-    places: Vec<Place>,
-}
-
-impl Sizes {
-    /// `None` if a row reaches over too many nodes, or an equality is no step of a response.
-    pub fn of(sub: &Subproblem, layout: &StageLayout) -> Option<Self> {
-        if layout.nodes < 2 {
-            return None;
-        }
-        let places = layout.places(sub.variables)?;
-        let mut orders = vec![1; layout.histories.len()];
-        let mut reach = |stage: usize, j: usize| {
-            if let Place::History(f, node) = places[j] {
-                orders[f] = orders[f].max(node - stage);
-            }
-        };
-        for rows in [
-            &sub.residuals,
-            &sub.absolute,
-            &sub.equalities,
-            &sub.inequalities,
-        ] {
-            for i in 0..rows.len() {
-                let stage = stage_of(rows, i, &places);
-                rows.row(i).for_each(|(j, _)| reach(stage, j));
-            }
-        }
-        for cone in &sub.cones {
-            let stage = stage_of_cone(cone, &places);
-            let rows = (0..cone.rows.len()).flat_map(|i| cone.rows.row(i));
-            rows.for_each(|(j, _)| reach(stage, j));
-        }
-        if orders.iter().any(|order| *order > HIGHEST_ORDER) {
-            return None;
-        }
-        Some(Self {
-            states: 2 * layout.responses.len()
-                + orders.iter().sum::<usize>()
-                + layout.constants.len(),
-            controls: orders.len(),
-            orders,
-            places,
-        })
-    }
-}
-
-/// The first node at which a variable of row `i` acts: constants act at all, and come into play only where there is nothing else.
-fn stage_of(rows: &Rows, i: usize, places: &[Place]) -> usize {
-    let entries = rows.row(i).filter(|(_, a)| *a != 0.0);
-    let nodes = entries.filter_map(|(j, _)| match places[j] {
-        Place::Constant(_) => None,
-        place => Some(place.node()),
-    });
-    nodes.min().unwrap_or(0)
-}
-
-/// The first node at which a variable of a cone acts.
-fn stage_of_cone(cone: &Cone, places: &[Place]) -> usize {
-    let rows = 0..cone.rows.len();
-    let occupied = rows.filter(|i| cone.rows.row(*i).any(|(_, a)| a != 0.0));
-    let stages = occupied.map(|i| stage_of(&cone.rows, i, places));
-    stages.min().unwrap_or(0)
-}
 
 /// The side of an inequality that a constraint row stands for.
 #[derive(Debug, Clone, Copy)]
