@@ -586,6 +586,7 @@ fn fit_warnings() -> Vec<FitWarning> {
         FitWarning::CoarseSteps { .. } => FitWarning::CoarseSteps { times: 3.25 },
         FitWarning::PoorFit => FitWarning::PoorFit,
         FitWarning::Coloured => FitWarning::Coloured,
+        FitWarning::Correlated => FitWarning::Correlated,
         FitWarning::Aliased { .. } => FitWarning::Aliased { per_period: 2.2, frequency: 45.25 },
         FitWarning::Negative { .. } => FitWarning::Negative { function: "stiffness".into() },
         FitWarning::NegligibleForce { .. } => FitWarning::NegligibleForce { experiment: "shaker".into() },

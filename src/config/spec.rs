@@ -5,10 +5,12 @@
 
 mod experiment;
 mod functions;
+mod noise;
 mod study;
 
 pub use experiment::*;
 pub use functions::*;
+pub use noise::*;
 pub use study::*;
 
 use crate::config::map::keys;

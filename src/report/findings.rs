@@ -73,6 +73,11 @@ pub fn warning(warning: &FitWarning) -> Finding {
              white noise"
                 .into()
         }
+        FitWarning::Correlated => {
+            "the residuals are autocorrelated: the confidence intervals assume correlated noise; a term missing from the model \
+             leaves such residuals too"
+                .into()
+        }
         FitWarning::Aliased {
             per_period,
             frequency,

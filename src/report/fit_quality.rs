@@ -1,9 +1,12 @@
 //! Fit quality in the result document: channels, nuisance parameters, validation records.
 
 use super::channel_view::ChannelView;
-use super::document::{ChannelSummary, IgnoredSummary, NuisanceParameter, ValidationSummary};
+use super::document::{
+    ChannelSummary, IgnoredSummary, NoiseSummary, NuisanceParameter, ValidationSummary,
+};
 use super::fit_assessment::ValidationRecord;
 use kmcfit_core::internals::assessment::{diagnostics, outliers, pattern};
+use kmcfit_core::internals::noise::{Correlation, CorrelationLaw};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Loss, Weighting};
@@ -35,14 +38,34 @@ pub fn channel(view: &ChannelView) -> ChannelSummary {
         fit_percent: diagnostics.fit_percent,
         sigma,
         sigma_estimated: matches!(channel.weighting(), Weighting::Estimated { .. }),
+        noise: channel.correlation().map(noise),
         robust: channel.loss() != Loss::Squares,
         pattern: pattern(channel, predicted),
         cost: channel.cost(predicted),
-        whiteness: diagnostics.whiteness.to_string(),
+        whiteness: match channel.correlation() {
+            None => diagnostics.whiteness.to_string(),
+            Some(_) => (diagnostics.whiteness.to_string()).replace("residuals", "innovations"),
+        },
         whiteness_p_value: (diagnostics.whiteness.p_value.is_finite())
             .then_some(diagnostics.whiteness.p_value),
         autocorrelation_band: diagnostics.band,
         autocorrelation: diagnostics.autocorrelation,
+    }
+}
+
+/// Estimated correlation of the noise of a channel.
+fn noise(correlation: &Correlation) -> NoiseSummary {
+    match correlation.law() {
+        CorrelationLaw::Autoregressive(process) => NoiseSummary {
+            coefficients: process.coefficients().to_vec(),
+            innovation_share: process.innovation_variance().sqrt(),
+            correlation_time: None,
+        },
+        CorrelationLaw::Exponential { time } => NoiseSummary {
+            coefficients: Vec::new(),
+            innovation_share: 1.0,
+            correlation_time: Some(*time),
+        },
     }
 }
 
@@ -52,6 +75,7 @@ pub fn scalars(
     evaluation: &Evaluation,
     covariance: Option<&DMatrix<f64>>,
 ) -> Vec<NuisanceParameter> {
+    let degrees = covariance.map(|_| problem.degrees_of_freedom(evaluation));
     let range = problem.functions.scalar_range();
     let list = problem.functions.scalars().iter().zip(range);
     list.zip(&evaluation.scalars)
@@ -60,6 +84,7 @@ pub fn scalars(
             unit: scalar.unit.clone(),
             value: *value,
             standard_error: covariance.map(|c| c[(index, index)].sqrt()),
+            degrees_of_freedom: (degrees.as_ref().map(|d| d[index])).filter(|d| d.is_finite()),
         })
         .collect()
 }

@@ -5,7 +5,6 @@ use super::suggestions;
 use crate::finding::Finding;
 use crate::number_format::significant;
 use kmcfit_core::internals::assessment::FunctionSummary;
-use kmcfit_core::internals::diagnostics::NORMAL_975;
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::solvers::StartStrategy;
@@ -133,8 +132,7 @@ fn estimate((name, f): (&str, &FunctionSummary)) -> String {
         Some(ClassificationKind::Fixed) => " (fixed)",
         _ => "",
     };
-    if let (Some(error), true) = (f.standard_error, f.min == f.max) {
-        let half = NORMAL_975 * error;
+    if let (Some(half), true) = (f.half_width(), f.min == f.max) {
         let [value, low, high] = [f.min, f.min - half, f.min + half].map(|x| resolved(x, half));
         return format!("{symbol} = {value} {unit} (95 % CI {low} to {high})");
     }
@@ -202,6 +200,9 @@ pub(super) fn write_channel(
     if let (Some(sigma), true) = (channel.sigma, channel.sigma_estimated) {
         writeln!(text, "  sigma estimated: {sigma:.4e} {}", channel.unit)?;
     }
+    if let Some(noise) = &channel.noise {
+        writeln!(text, "  {}", noise.sentence())?;
+    }
     // Without a sigma the residuals are not assumed to be noise.
     if channel.sigma.is_some() {
         writeln!(text, "  {}", channel.whiteness)?;
@@ -249,9 +250,8 @@ pub(super) fn write_nuisance_parameters(
 ) -> std::fmt::Result {
     for parameter in &document.nuisance_parameters {
         let (name, unit) = (&parameter.name, &parameter.unit);
-        match parameter.standard_error {
-            Some(error) => {
-                let half = NORMAL_975 * error;
+        match parameter.half_width() {
+            Some(half) => {
                 let (low, high) = (parameter.value - half, parameter.value + half);
                 let [value, low, high] = [parameter.value, low, high].map(|x| resolved(x, half));
                 writeln!(text, "{name} = {value} {unit} (95 % CI {low} to {high})")?;

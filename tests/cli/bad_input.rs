@@ -81,7 +81,7 @@ fn keys() {
     4 |   - colour: red
       |     ^^^^^^
       found: `colour`
-      expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, decimate, band, sigma, loss, sensors, force, base, initial, functions, validation
+      expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, decimate, band, sigma, loss, noise, sensors, force, base, initial, functions, validation
     ");
     assert_snapshot!(changed("    initial: {displacement: 1.0, velocity: 0.0}\n", ""), @"
     error: model.yaml:4:5: experiments[0]: the key `initial` is missing

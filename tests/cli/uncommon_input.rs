@@ -89,6 +89,12 @@ fn models() {
             )],
         ),
         changed("fit", &[(COLUMNS, &with("loss: {displacement: huber}"))]),
+        changed("fit", &[(COLUMNS, &with("noise: {displacement: {ar: 2}}"))]),
+        changed(
+            "fit",
+            &[(COLUMNS, &with("noise: {displacement: {ar: 13}}"))],
+        ),
+        changed("fit", &[(COLUMNS, &with("noise: {displacement: whit}"))]),
         changed(
             "fit",
             &[(
@@ -336,4 +342,12 @@ fn arguments() {
     bench.write("text/result.json", "no JSON\n");
     all.push(refused(&bench, &["compare", "text", "model.yaml"]));
     assert_snapshot!(all.join("\n"));
+}
+
+#[test]
+fn autoregressive_noise_of_irregular_samples_is_refused() {
+    let bench = Workbench::with_shipped_models();
+    let noise = "experiments.0.noise={displacement: {ar: 2}}";
+    let arguments = ["fit", "models/camera.yaml", "--set", noise];
+    assert_snapshot!(refused(&bench, &arguments));
 }

@@ -71,6 +71,7 @@ const BEYOND: &[(&str, &str)] = &[
         "camera",
         "experiments.0.loss={displacement: {name: student-t, degrees: 0}}",
     ),
+    ("camera", "experiments.0.noise={displacement: {ar: 13}}"),
     ("camera", "experiments.0.sensors={displacement: {gain: 0}}"),
     (
         "camera",

@@ -26,7 +26,7 @@ pub mod diagnostics {
     pub use crate::diagnostics::{
         NORMAL_975, ResidualDiagnostics, SIGNIFICANCE, UntestedReason, Whiteness, WhitenessResult,
         chi_square_one, normal_half_width, offset_and_drift, outlier_indices, rms, spread,
-        without_line,
+        student_half_width, without_line,
     };
 }
 pub mod functions {
@@ -58,10 +58,13 @@ pub mod problem {
 pub mod qp {
     pub use crate::qp::{ConicStatus, Kkt, ResponseVariables, StageLayout, Subproblem, project};
 }
+pub mod noise {
+    pub use crate::noise::{Correlation, CorrelationLaw, HIGHEST_ORDER, uninterrupted_runs};
+}
 pub mod record {
     pub use crate::record::{
-        BaseMotion, Channel, ChannelKind, Experiment, Input, Loss, Sensor, Waveform, Weighting,
-        integral_over,
+        BaseMotion, Channel, ChannelKind, Experiment, Input, Loss, NoiseModel, Sensor, Waveform,
+        Weighting, integral_over,
     };
 }
 pub mod signal {

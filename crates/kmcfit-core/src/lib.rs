@@ -15,8 +15,8 @@
 //!    equivalent and extreme systems, multistart, constancy test, bootstrap, prediction; `assessment`: tests of a fit.
 //! 9. `builder`: a problem in a few lines of Rust.
 //!
-//! Beside these, `diagnostics` has tests of residuals, `signal` interpolation, excitation, filters and spectra, `simd` vector
-//! arithmetic, `host` the services of the host and `threads` second threads.
+//! Beside these, `diagnostics` has tests of residuals, `noise` correlations of noise, `signal` interpolation, excitation, filters
+//! and spectra, `simd` vector arithmetic, `host` the services of the host and `threads` second threads.
 //!
 //! # Example
 //!
@@ -64,6 +64,7 @@ mod diagnostics;
 mod functions;
 mod host;
 mod identifiability;
+mod noise;
 mod objective;
 mod problem;
 mod qp;

@@ -1,5 +1,6 @@
 //! Keys of an experiment: data file, channels, sensors, input and initial state.
 
+use super::noise::NoisesSpec;
 use crate::config::map::keys;
 
 use super::{OwnFunctionsSpec, RangeSpec};
@@ -67,6 +68,11 @@ keys! {
         loss: Option<LossesSpec>,
             example "{displacement: huber}",
             default "squares",
+            needs "`sigma`";
+        /// Correlation of the noise in time.
+        noise: Option<NoisesSpec>,
+            example "{displacement: white}",
+            default "auto",
             needs "`sigma`";
         /// Sensor model: sample = gain * response + offset + drift * time.
         sensors: Option<SensorsSpec>, example "{acceleration: {offset: estimate}}", default "gain 1, offset 0";

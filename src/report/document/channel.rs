@@ -1,6 +1,8 @@
 //! Channels, nuisance parameters and validation records in the result document.
 
+use crate::number_format::significant;
 use kmcfit_core::internals::assessment::ResidualPattern;
+use kmcfit_core::internals::diagnostics::student_half_width;
 use kmcfit_core::internals::solvers::number_or_nan;
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +34,9 @@ pub struct ChannelSummary {
     /// True if sigma was estimated.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub sigma_estimated: bool,
+    /// Correlation of the noise, where it is correlated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<NoiseSummary>,
     /// True for a robust loss.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub robust: bool,
@@ -41,15 +46,45 @@ pub struct ChannelSummary {
     /// Contribution to J.
     #[serde(deserialize_with = "number_or_nan")]
     pub cost: f64,
-    /// Result of the test of whiteness, as text.
+    /// Result of the test of whiteness of the residuals, or of the innovations of correlated noise, as text.
     pub whiteness: String,
     /// p-value of the Ljung-Box test of whiteness; `null` if the test is not possible.
     pub whiteness_p_value: Option<f64>,
-    /// Autocorrelation of the residuals at lags 0, 1, ...
+    /// Autocorrelation of the residuals, or of the innovations, at lags 0, 1, ...
     pub autocorrelation: Vec<f64>,
     /// Bound on the autocorrelation of white noise, exceeded at 5 % of the lags.
     #[serde(deserialize_with = "number_or_nan")]
     pub autocorrelation_band: f64,
+}
+
+/// Correlation of the noise of a channel in time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NoiseSummary {
+    /// Coefficients `a_1, ..., a_p` of the autoregressive process `u_i = a_1 u_(i-1) + ... + a_p u_(i-p) + e_i`; empty for an
+    /// exponential correlation.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub coefficients: Vec<f64>,
+    /// Standard deviation of the innovations `e` relative to that of the noise.
+    pub innovation_share: f64,
+    /// Correlation time (s) of samples that are not equally spaced.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub correlation_time: Option<f64>,
+}
+
+impl NoiseSummary {
+    /// The noise in words.
+    pub(in crate::report) fn sentence(&self) -> String {
+        match self.correlation_time {
+            Some(time) => format!(
+                "noise correlated over {} s; the intervals account for it",
+                significant(time, 3)
+            ),
+            None => format!(
+                "noise AR({}); the intervals account for its correlation",
+                self.coefficients.len()
+            ),
+        }
+    }
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
@@ -79,6 +114,18 @@ pub struct NuisanceParameter {
     /// Standard error from the linearised fit, without constraints, penalties and priors; `null` if the samples do not
     /// determine all parameters.
     pub standard_error: Option<f64>,
+    /// Degrees of freedom of the t distribution of the estimate, where the noise was estimated with it; the normal distribution
+    /// otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub degrees_of_freedom: Option<f64>,
+}
+
+impl NuisanceParameter {
+    /// Half-width of the 95 % interval, where there is a standard error.
+    pub fn half_width(&self) -> Option<f64> {
+        let degrees = self.degrees_of_freedom.unwrap_or(f64::INFINITY);
+        Some(self.standard_error? * student_half_width(degrees))
+    }
 }
 
 /// A validation record.

@@ -3,7 +3,9 @@
 mod channel;
 mod search;
 
-pub use channel::{ChannelSummary, IgnoredSummary, NuisanceParameter, ValidationSummary};
+pub use channel::{
+    ChannelSummary, IgnoredSummary, NoiseSummary, NuisanceParameter, ValidationSummary,
+};
 pub use search::{AttemptSummary, PathSummary, WeightSummary};
 
 use crate::finding::Finding;

@@ -247,7 +247,7 @@ fn about_residuals(document: &ResultDocument) -> Option<Suggestion> {
     let is_coloured = |c: &ChannelSummary| {
         c.sigma.is_some()
             && c.fit_percent < EXACT
-            && c.whiteness_p_value.is_some_and(|p| p < PATTERN)
+            && (c.noise.is_some() || c.whiteness_p_value.is_some_and(|p| p < PATTERN))
     };
     let named = document.experiments.iter();
     let mut named = named.flat_map(|e| e.channels.iter().map(move |c| (e, c)));

@@ -84,11 +84,13 @@ fn tone(channel: &Channel, residuals: &[f64]) -> Option<ResidualPattern> {
         .then_some(ResidualPattern::Tone { frequency, beside })
 }
 
-/// Diagnostics of a channel's residuals; [`outliers`] count as missing.
+/// Diagnostics of a channel's residuals; [`outliers`] count as missing. Autocorrelation and whiteness are those of the
+/// innovations where the noise is correlated.
 pub fn diagnostics(channel: &Channel, predicted: &[f64]) -> ResidualDiagnostics {
-    let mut residuals: Vec<f64> = channel.residuals(predicted).collect();
+    let mut residuals = channel.innovations(predicted);
     let mut observed = channel.observed().to_vec();
-    for i in outliers(channel, &residuals) {
+    let missed: Vec<f64> = channel.residuals(predicted).collect();
+    for i in outliers(channel, &missed) {
         residuals[i] = f64::NAN;
         observed[i] = f64::NAN;
     }

@@ -1,6 +1,7 @@
 //! Summary of each coefficient function of a fit.
 
 use super::{FitAssessment, constant_probability, standard_error};
+use crate::diagnostics::student_half_width;
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction};
 use crate::identifiability::{ClassificationKind, is_negligible, is_unhindered};
@@ -39,6 +40,10 @@ pub struct FunctionSummary {
     /// all parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standard_error: Option<f64>,
+    /// Degrees of freedom of the t distribution of the estimate of a constant, where its noise was estimated with it; the normal
+    /// distribution otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub degrees_of_freedom: Option<f64>,
     /// p-value of a constant function under noise alone, for a converged least-squares fit with residuals compatible with noise, whose
     /// samples alone determine all parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -49,6 +54,14 @@ pub struct FunctionSummary {
     /// Root-mean-square error over the nodes, where the truth is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth_rms_error: Option<f64>,
+}
+
+impl FunctionSummary {
+    /// Half-width of the 95 % interval of a constant, where it has a standard error.
+    pub fn half_width(&self) -> Option<f64> {
+        let degrees = self.degrees_of_freedom.unwrap_or(f64::INFINITY);
+        Some(self.standard_error? * student_half_width(degrees))
+    }
 }
 
 /// Summaries of the functions of a fit, in their order; `truth` is the true system, where known.
@@ -78,6 +91,7 @@ pub fn function_summaries(
         });
         let errors = errors.as_ref();
         let rms = |e: &Vec<f64>| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt();
+        let error = standard_error(function, range.start, covariance);
         FunctionSummary {
             unit: function.quantity.unit().into(),
             min: values.iter().copied().fold(f64::INFINITY, f64::min),
@@ -91,7 +105,11 @@ pub fn function_summaries(
                 }
                 _ => None,
             },
-            standard_error: standard_error(function, range.start, covariance),
+            standard_error: error,
+            degrees_of_freedom: assessment
+                .filter(|_| error.is_some())
+                .map(|a| a.degrees_of_freedom[range.start])
+                .filter(|degrees| degrees.is_finite()),
             constant_p_value: free
                 .and_then(|covariance| constant_probability(problem, i, theta, covariance)),
             truth_max_error: errors.map(|e| e.iter().copied().fold(0.0, f64::max)),

@@ -32,6 +32,8 @@ pub struct FitAssessment {
     pub plausibility: Plausibility,
     /// Covariance of the parameters, where standard errors are meaningful.
     pub covariance: Option<DMatrix<f64>>,
+    /// Degrees of freedom of the estimate of each parameter ([`Problem::degrees_of_freedom`]).
+    pub degrees_of_freedom: Vec<f64>,
     /// Bands of functions and ratios, where standard errors are meaningful.
     pub bands: Option<Bands>,
     /// Classification of functions and ratios by their bands.
@@ -61,6 +63,7 @@ impl FitAssessment {
             statistics,
             plausibility,
             covariance: None,
+            degrees_of_freedom: vec![f64::INFINITY; problem.parameters()],
             bands: None,
             classifications: Vec::new(),
         };
@@ -73,6 +76,7 @@ impl FitAssessment {
             assessment.classifications = classify_functions(problem, &best.evaluation, &bands);
             assessment.bands = Some(bands);
             assessment.covariance = problem.covariance(&best.evaluation);
+            assessment.degrees_of_freedom = problem.degrees_of_freedom(&best.evaluation);
         }
         assessment
     }

@@ -76,6 +76,8 @@ pub enum FitWarning {
     PoorFit,
     /// The residuals are not white: standard errors are too small.
     Coloured,
+    /// The noise of a channel is estimated as correlated, and the intervals account for it.
+    Correlated,
     /// Systems of other frequencies match equally spaced samples as well: standard errors are unknown.
     Aliased {
         /// Samples per period.
@@ -128,7 +130,12 @@ impl Plausibility {
             .or_else(|| poor.then_some(FitWarning::PoorFit));
         let aliased = aliased(problem, evaluation);
         let errors_hold = unidentified.is_none() && unexplained.is_none() && aliased.is_none();
-        let optimistic = (errors_hold && coloured).then_some(FitWarning::Coloured);
+        let is_correlated = problem.channels().any(|c| c.correlation().is_some());
+        let optimistic = match (errors_hold, coloured, is_correlated) {
+            (true, true, _) => Some(FitWarning::Coloured),
+            (true, false, true) => Some(FitWarning::Correlated),
+            _ => None,
+        };
         let warnings = unexplained.into_iter().chain(optimistic).chain(aliased);
         Self {
             warnings: warnings.chain(implausible(problem, evaluation)).collect(),
@@ -158,8 +165,9 @@ fn residuals(problem: &Problem, evaluation: &Evaluation, reports_errors: bool) -
     for (channel, predicted) in problem.predicted(evaluation) {
         let found = diagnostics(channel, predicted);
         let is_judged = reports_errors || channel.weighting().sigma(0).is_some();
-        if is_judged && found.whiteness.p_value < CERTAIN && found.fit_percent < EXACT {
-            coloured = true;
+        let is_coloured = found.whiteness.p_value < CERTAIN && found.fit_percent < EXACT;
+        if is_judged && (is_coloured || channel.correlation().is_some()) {
+            coloured |= is_coloured;
             poor |= found.fit_percent < POOR;
         }
     }

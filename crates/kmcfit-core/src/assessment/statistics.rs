@@ -1,6 +1,7 @@
 //! Statistics of all channels together.
 
 use crate::diagnostics::{InformationCriteria, with_estimated_sigma, with_known_sigma};
+use crate::noise::Correlation;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::{Loss, Weighting};
@@ -39,6 +40,10 @@ pub fn statistics(problem: &Problem, evaluation: &Evaluation) -> FitStatistics {
         return summary;
     }
     let p = parameters as f64;
+    // Correlated noise adds log |R| to minus twice the logarithm of the likelihood, and its coefficients to the parameters.
+    let correlations = || problem.channels().filter_map(|c| c.correlation());
+    let determinant: f64 = correlations().map(Correlation::log_determinant).sum();
+    let all = p + correlations().map(|c| c.order() as f64).sum::<f64>();
     let sigma = |known: bool| {
         problem
             .channels()
@@ -46,15 +51,18 @@ pub fn statistics(problem: &Problem, evaluation: &Evaluation) -> FitStatistics {
     };
     let criteria: Option<InformationCriteria> = if sigma(true) {
         summary.reduced_chi_square = Some(evaluation.misfit / (samples as f64 - p));
-        with_known_sigma(evaluation.misfit, samples, p)
+        with_known_sigma(evaluation.misfit + determinant, samples, all)
     } else if sigma(false) && problem.channels().count() == 1 {
         let squares = problem
             .channels()
             .zip(evaluation.predictions.iter().flatten());
         let sum: f64 = squares
-            .flat_map(|(c, predicted)| c.residuals(predicted).map(|r| r * r).collect::<Vec<f64>>())
+            .flat_map(|(c, predicted)| c.innovations(predicted))
+            .map(|r| r * r)
             .sum();
-        with_estimated_sigma(sum, samples, p)
+        // n log(S |R|^(1/n)/n) = n log(S/n) + log |R|
+        let root = (determinant / samples as f64).exp();
+        with_estimated_sigma(sum * root, samples, all)
     } else {
         None
     };

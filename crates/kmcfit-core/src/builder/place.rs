@@ -154,7 +154,10 @@ impl Placement<'_> {
                     grid.start() + grid.duration()
                 ))
         })?;
-        let mut channel = channel.with_loss(spec.loss).with_sensor(sensor);
+        let mut channel = channel
+            .with_loss(spec.loss)
+            .with_noise_model(spec.noise)
+            .with_sensor(sensor);
         let input = &experiment.drive;
         if spec.kind == ChannelKind::Acceleration && experiment.excitation.is_some() {
             let around = |t: &f64| InputSample {

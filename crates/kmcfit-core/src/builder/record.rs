@@ -2,7 +2,7 @@
 
 use super::{BuildError, CoefficientSpec};
 use crate::functions::{CoefficientKind, Prior};
-use crate::record::{BaseMotion, ChannelKind, Input, Loss, Waveform, Weighting};
+use crate::record::{BaseMotion, ChannelKind, Input, Loss, NoiseModel, Waveform, Weighting};
 use crate::signal::{Interpolation, SecondOrder, Signal, median_spacing};
 
 /// A scalar that is known, or estimated together with the coefficient functions.
@@ -59,6 +59,8 @@ pub struct ChannelSpec {
     pub weighting: Option<Weighting>,
     /// Loss of a residual.
     pub loss: Loss,
+    /// Correlation of the noise; used with a sigma.
+    pub noise: NoiseModel,
     /// Gain, offset and drift.
     pub sensor: SensorSpec,
     /// Sections of a filter applied to samples and response.
@@ -79,6 +81,7 @@ impl ChannelSpec {
             values: values.to_vec(),
             weighting: None,
             loss: Loss::Squares,
+            noise: NoiseModel::default(),
             sensor: SensorSpec::default(),
             filter: Vec::new(),
             span: [end(times.first()), end(times.last())],

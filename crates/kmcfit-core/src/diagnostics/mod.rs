@@ -5,7 +5,7 @@
 mod autocorrelation;
 mod information;
 #[cfg(test)]
-mod noise;
+pub(crate) mod noise;
 mod pattern;
 mod quantiles;
 mod record;
@@ -17,7 +17,7 @@ pub use autocorrelation::{Autocorrelation, NORMAL_975, autocorrelation, default_
 pub use information::{InformationCriteria, with_estimated_sigma, with_known_sigma};
 pub(crate) use pattern::median_size;
 pub use pattern::{offset_and_drift, outlier_indices};
-pub use quantiles::{chi_square_one, normal_half_width};
+pub use quantiles::{chi_square_one, normal_half_width, student_half_width};
 pub use record::{ResidualDiagnostics, ResidualRecord};
 pub use residuals::{fit_percent, rms};
 pub use residuals::{spread, without_line};

@@ -1,6 +1,6 @@
 //! Confidence band of one function or ratio over time.
 
-use crate::diagnostics::NORMAL_975;
+use crate::diagnostics::student_half_width;
 
 /// Sides of the value on which a band extends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,6 +27,8 @@ pub struct Band {
     pub values: Vec<f64>,
     /// Standard errors; infinite where the value is not identifiable.
     pub standard_error: Vec<f64>,
+    /// Degrees of freedom of the t distribution of each value; infinite where the noise counts as known.
+    pub degrees: Vec<f64>,
     /// Sides of each value on which the band extends.
     pub sides: Vec<BandSide>,
     /// Half-width, in standard errors, of the simultaneous 95 % band, which contains the curve at all times;
@@ -50,6 +52,11 @@ impl Band {
 
     /// Pointwise 95 % band at index `i`.
     pub fn pointwise(&self, i: usize) -> [f64; 2] {
-        self.ends(i, NORMAL_975)
+        self.ends(i, student_half_width(self.degrees[i]))
+    }
+
+    /// Half-width of the pointwise 95 % band at index `i` on a side on which it extends.
+    pub fn half_width(&self, i: usize) -> f64 {
+        student_half_width(self.degrees[i]) * self.standard_error[i]
     }
 }

@@ -18,7 +18,9 @@
 use super::active::{ActiveRow, active_rows};
 use super::band::{Band, BandSide};
 use super::covariance::{CovarianceRoot, Information};
+use super::degrees::NoiseVariants;
 use super::directions::Directions;
+use super::ratios::{Ratio, damping_ratio, frequency, over_mass};
 use super::sensitivity::Sensitivity;
 use super::spans::{span_words, spans};
 use crate::objective::Evaluation;
@@ -28,7 +30,6 @@ use nalgebra::DMatrix;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use std::f64::consts::TAU;
 
 /// Largest number of parameters with a full covariance; beyond it, smooth directions are used.
 const MOST_PARAMETERS: usize = 800;
@@ -119,8 +120,10 @@ impl Bands {
         };
         let stride = problem.functions.nodes().div_ceil(MOST_NODES);
         let nodes: Vec<usize> = (0..problem.functions.nodes()).step_by(stride).collect();
+        let variants = NoiseVariants::of(problem, evaluation);
         let maker = Maker {
             problem,
+            variants: variants.as_ref(),
             times: nodes.iter().map(|i| problem.system.grid.time(*i)).collect(),
             nodes,
             factors: [&tight, &loose],
@@ -136,7 +139,9 @@ impl Bands {
             let function = problem.functions.get(f);
             let at_nodes = maker.nodes.iter().map(|i| values[f][*i]).collect();
             let unit = function.quantity.unit();
-            maker.band(function.name(), unit, at_nodes, linear, Some(f))
+            let entries = |i: usize| maker.entries(f, maker.nodes[i], 1.0);
+            let degrees = maker.degrees(&entries);
+            maker.band(function.name(), unit, at_nodes, linear, (degrees, Some(f)))
         });
         let functions = functions.collect();
         let undetermined = loose.undetermined.ncols();
@@ -191,6 +196,7 @@ fn notes(problem: &Problem, information: &Information, active: &[ActiveRow]) -> 
 
 struct Maker<'a> {
     problem: &'a Problem,
+    variants: Option<&'a NoiseVariants>,
     nodes: Vec<usize>,
     times: Vec<f64>,
     factors: [&'a CovarianceRoot; 2],
@@ -206,6 +212,23 @@ impl Maker<'_> {
         let first = functions.ranges()[f].start;
         let row = functions.get(f).design.row(i);
         self.directions.row(row.map(|(j, b)| (first + j, b)))
+    }
+
+    /// Entries of `factor` times the value of function `f` at node `i` in the parameters.
+    fn entries(&self, f: usize, i: usize, factor: f64) -> Vec<(usize, f64)> {
+        let functions = &self.problem.functions;
+        let first = functions.ranges()[f].start;
+        let row = functions.get(f).design.row(i);
+        row.map(|(j, b)| (first + j, factor * b)).collect()
+    }
+
+    /// Degrees of freedom of the values with these entries at each node of the band.
+    fn degrees(&self, entries: &dyn Fn(usize) -> Vec<(usize, f64)>) -> Vec<f64> {
+        let each = 0..self.nodes.len();
+        match self.variants {
+            None => each.map(|_| f64::INFINITY).collect(),
+            Some(variants) => each.map(|i| variants.degrees(&entries(i))).collect(),
+        }
     }
 
     fn function(&self, f: usize) -> LinearisedCurve {
@@ -240,7 +263,7 @@ impl Maker<'_> {
         unit: &str,
         values: Vec<f64>,
         linear: &LinearisedCurve,
-        function: Option<usize>,
+        (degrees, function): (Vec<f64>, Option<usize>),
     ) -> Band {
         let count = self.nodes.len();
         let error = |which: usize, i: usize| {
@@ -286,6 +309,7 @@ impl Maker<'_> {
             unit: unit.to_owned(),
             values,
             standard_error: errors,
+            degrees,
             sides,
             notes,
         }
@@ -367,7 +391,14 @@ impl Maker<'_> {
             };
             let (ratios, slopes): (Vec<_>, Vec<_>) = self.nodes.iter().map(at).unzip();
             let linear = combine(linearised, functions, &slopes);
-            self.band(name.into(), unit, ratios, &linear, None)
+            let entries = |i: usize| -> Vec<(usize, f64)> {
+                let pairs = functions.iter().zip(&slopes[i]);
+                pairs
+                    .flat_map(|(f, slope)| self.entries(*f, self.nodes[i], *slope))
+                    .collect()
+            };
+            let degrees = self.degrees(&entries);
+            self.band(name.into(), unit, ratios, &linear, (degrees, None))
         };
         let mut bands = Vec::new();
         bands.extend(stiffness.map(|k| band("k/m", "1/s^2", &[k, m], over_mass)));
@@ -378,34 +409,6 @@ impl Maker<'_> {
         }
         bands
     }
-}
-
-/// A ratio at a node: its value and its derivatives with respect to the coefficients.
-type Ratio = fn(&[f64]) -> (f64, Vec<f64>);
-
-/// `p/m`.
-fn over_mass(at: &[f64]) -> (f64, Vec<f64>) {
-    let ratio = at[0] / at[1];
-    (ratio, vec![1.0 / at[1], -ratio / at[1]])
-}
-
-/// `f = sqrt(k/m)/(2 pi)`: `df = f/2 (dk/k - dm/m)`.
-fn frequency(at: &[f64]) -> (f64, Vec<f64>) {
-    let frequency = (at[0] / at[1]).sqrt() / TAU;
-    let half = |p: f64| 0.5 * frequency / p;
-    (frequency, vec![half(at[0]), -half(at[1])])
-}
-
-/// `zeta = c/(2 sqrt(k m))`: `d zeta = dc/(2 sqrt(k m)) - zeta/2 (dk/k + dm/m)`.
-fn damping_ratio(at: &[f64]) -> (f64, Vec<f64>) {
-    let [c, k, m] = [at[0], at[1], at[2]];
-    let root = if k > 0.0 {
-        2.0 * (k * m).sqrt()
-    } else {
-        f64::NAN
-    };
-    let zeta = c / root;
-    (zeta, vec![1.0 / root, -0.5 * zeta / k, -0.5 * zeta / m])
 }
 
 /// Linear combination `sum_f slope_f(t) p_f(t)`, with slopes at each node.

@@ -3,7 +3,7 @@
 use super::band::Band;
 use super::bands::Bands;
 use super::spans::{span_words, spans};
-use crate::diagnostics::{NORMAL_975, median_size};
+use crate::diagnostics::median_size;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::system::Term;
@@ -109,7 +109,7 @@ pub fn is_negligible(value: f64, size: f64) -> bool {
 /// as a number where the band contains zero or the function is small relative to `size`.
 fn identified(name: &str, band: &Band, size: f64) -> String {
     let seen = || (0..band.values.len()).filter(|i| is_known(band, size, *i));
-    let half = NORMAL_975 * seen().fold(0.0f64, |most, i| most.max(band.standard_error[i]));
+    let half = seen().fold(0.0f64, |most, i| most.max(band.half_width(i)));
     let own = seen().fold(0.0f64, |most, i| most.max(band.values[i].abs()));
     let unit = &band.unit;
     if is_negligible(half.max(own), size) {
@@ -137,7 +137,7 @@ fn identified(name: &str, band: &Band, size: f64) -> String {
 
 /// True where the half-width of the band at node `i` is small enough for a function of this size.
 fn is_known(band: &Band, size: f64, i: usize) -> bool {
-    band.values[i].is_finite() && NORMAL_975 * band.standard_error[i] / size <= IDENTIFIED
+    band.values[i].is_finite() && band.half_width(i) / size <= IDENTIFIED
 }
 
 /// Classifies every function of the list, then `k/m` and `c/m`.
@@ -192,7 +192,7 @@ fn judge(times: &[f64], band: &Band, size: f64) -> Classification {
     let count = (0..times.len()).filter(|i| known(*i)).count();
     let share = count as f64 / times.len() as f64;
     if share >= MOST {
-        let relative = |i: usize| NORMAL_975 * band.standard_error[i] / size;
+        let relative = |i: usize| band.half_width(i) / size;
         let known = (0..times.len()).filter(|i| known(*i));
         return Classification::Identified {
             relative: known.map(relative).fold(0.0, f64::max),

@@ -58,17 +58,19 @@ impl Sensitivity {
         let (mut roots, mut residuals) = (Vec::new(), Vec::new());
         let mut has_sigma = Vec::new();
         for (channel, predicted) in problem.predicted(evaluation) {
-            for (i, r) in channel.residuals(predicted).enumerate() {
-                let root = channel.weight(i, r).sqrt();
-                roots.push(root);
-                residuals.push(root * r);
-                has_sigma.push(channel.weighting().is_sigma());
-            }
+            let majorant = channel.majorant(predicted);
+            roots.extend(majorant.roots);
+            residuals.extend(majorant.weighted);
+            has_sigma.extend(std::iter::repeat_n(
+                channel.weighting().is_sigma(),
+                channel.len(),
+            ));
         }
         let mut jacobian = match directions.is_coarse() {
             true => by_tangents(problem, evaluation, &directions, roots.len()),
             false => directions.of_jacobian(problem.predictions_jacobian(evaluation)),
         };
+        problem.whiten_rows(&mut jacobian);
         for mut column in jacobian.column_iter_mut() {
             (column.iter_mut().zip(&roots)).for_each(|(a, root)| *a *= root);
         }

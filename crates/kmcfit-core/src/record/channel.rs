@@ -1,6 +1,6 @@
 //! One channel of a record: the samples of one sensor.
 
-use super::{ChannelKind, Loss, Sensor, Weighting};
+use super::{ChannelKind, Loss, NoiseEstimate, NoiseModel, Sensor, Weighting};
 use crate::signal::{SecondOrder, zero_phase};
 use crate::system::{Excitation, Grid, InputSample, TimePoint};
 
@@ -19,6 +19,8 @@ pub struct Channel {
     unfiltered: Vec<f64>,
     weighting: Weighting,
     loss: Loss,
+    pub(super) noise_model: NoiseModel,
+    pub(super) noise: NoiseEstimate,
     sensor: Sensor,
     /// Forces and accelerations of the base at the samples, if given.
     around: Option<[Vec<f64>; 2]>,
@@ -59,6 +61,8 @@ impl Channel {
             unfiltered: Vec::new(),
             weighting,
             loss: Loss::Squares,
+            noise_model: NoiseModel::default(),
+            noise: NoiseEstimate::default(),
             sensor: Sensor::default(),
             around: None,
             base: Vec::new(),
@@ -179,7 +183,11 @@ impl Channel {
         let short = |list: &[f64]| list[..count.min(list.len())].to_vec();
         let mut weighting = self.weighting.clone();
         weighting.truncate(count);
+        let mut noise = self.noise.clone();
+        noise.correlation = noise.correlation.map(|c| c.first(count));
         let mut part = Self {
+            noise_model: self.noise_model,
+            noise,
             kind: self.kind,
             times: short(&self.times),
             places: self.places[..count.min(self.len())].to_vec(),

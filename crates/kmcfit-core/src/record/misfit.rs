@@ -21,11 +21,15 @@ impl Channel {
         pairs.zip(&self.observed()[samples]).map(|(y, o)| y - o)
     }
 
-    /// Misfit of the predictions: `integral r^2 dt`, in the square of the kind's unit times s, or `sum rho(r / sigma)`.
+    /// Misfit of the predictions: `integral r^2 dt`, in the square of the kind's unit times s, or `sum rho(r / sigma)`; for
+    /// correlated noise the sum over the innovations ([`Channel::innovations`]).
     ///
     /// The integral over equally spaced samples is summed in the paper's order, both ends first, because the paper's run depends on
     /// every bit. Long sums use SIMD.
     pub fn cost(&self, predicted: &[f64]) -> f64 {
+        if self.correlation().is_some() {
+            return self.correlated_cost(predicted);
+        }
         if let Weighting::Integral { spacing } = self.weighting() {
             let square = |i: usize| {
                 let r = predicted[i] - self.observed()[i];
@@ -52,6 +56,9 @@ impl Channel {
 
     /// Difference `cost(to) - cost(from)`, as `sum w (y' - y) (y' + y - 2 y_obs)`, which avoids the cancellation of two rounded costs.
     pub fn cost_difference(&self, from: &[f64], to: &[f64]) -> f64 {
+        if self.correlation().is_some() {
+            return self.correlated_difference(from, to);
+        }
         let pairs = from.iter().zip(to).zip(self.observed()).enumerate();
         let difference = |(i, ((y, moved), observed)): (usize, ((&f64, &f64), &f64))| match (
             self.loss(),
@@ -70,6 +77,9 @@ impl Channel {
 
     /// Weights of the inner samples and of both ends, for a sum of squares with equal inner weights.
     pub fn uniform_weights(&self) -> Option<[f64; 2]> {
+        if self.correlation().is_some() {
+            return None;
+        }
         match (self.weighting(), self.loss()) {
             (Weighting::Integral { spacing }, _) => Some([*spacing, 0.5 * spacing]),
             (Weighting::Sigma(sigma) | Weighting::Estimated { sigma }, Loss::Squares) => {
@@ -79,7 +89,8 @@ impl Channel {
         }
     }
 
-    /// Weight of the residual `r` of sample `i` in the least-squares problem `sum w r^2` with the gradient of the cost.
+    /// Weight of the residual `r` of sample `i` in the least-squares problem `sum w r^2` with the gradient of the cost, for
+    /// uncorrelated noise.
     pub fn weight(&self, i: usize, r: f64) -> f64 {
         let weight = self.weighting().weight(i, self.len());
         match (self.loss(), self.weighting().sigma(i)) {
@@ -90,6 +101,9 @@ impl Channel {
 
     /// Derivatives `dJ/d model = 2 w r` of all samples.
     pub fn slopes(&self, predicted: &[f64]) -> Vec<f64> {
+        if let Some(correlation) = self.correlation() {
+            return self.correlated_slopes(correlation, predicted);
+        }
         if let Some([inner, ends]) = self.uniform_weights() {
             let residuals = self.residuals(predicted);
             let mut slopes: Vec<f64> = residuals.map(|r| 2.0 * inner * r).collect();

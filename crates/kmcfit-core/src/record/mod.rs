@@ -6,6 +6,7 @@ mod input;
 mod kind;
 mod loss;
 mod misfit;
+mod noise;
 mod sensor;
 mod weighting;
 
@@ -15,6 +16,7 @@ pub use input::{BaseMotion, Input, Waveform};
 pub use kind::ChannelKind;
 pub use loss::Loss;
 pub use misfit::integral_over;
+pub use noise::{Majorant, NoiseEstimate, NoiseModel};
 pub use sensor::Sensor;
 pub use weighting::Weighting;
 

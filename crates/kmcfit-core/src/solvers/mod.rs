@@ -5,6 +5,7 @@
 
 mod active_set;
 mod checkpoint;
+mod correlation_estimation;
 mod evaluator;
 mod executor;
 mod fit;

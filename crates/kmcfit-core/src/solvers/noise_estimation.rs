@@ -1,6 +1,9 @@
-//! Estimation of sigmas from the residuals, in alternation with fits.
+//! Estimation of sigmas and correlations of the noise from the residuals, in alternation with fits.
 
 use super::checkpoint::Observer;
+use super::correlation_estimation::{
+    correlated, is_worse, may_correlate, movement, orders, refined,
+};
 use super::executor::search;
 use super::fit::{Fit, measured};
 use super::history::IterationRecord;
@@ -14,6 +17,13 @@ use crate::simulate::SimulationError;
 
 /// Largest number of rounds of fit and estimation.
 const ROUNDS: usize = 20;
+/// Largest number of rounds of fit and estimation of correlations, in the first of which their orders are chosen anew.
+const PASSES: usize = 15;
+const FREE_PASSES: usize = 5;
+/// Largest number of rounds of fit and restricted likelihood.
+const REFINEMENTS: usize = 3;
+/// Change of the parameters, in standard errors, below which correlations are at rest.
+const AT_REST: f64 = 0.01;
 /// Relative change of a sigma below which it has converged; chi-square changes by twice that.
 const SETTLED: f64 = 1e-6;
 /// Ratio of the standard deviation to the median absolute value, for Gaussian noise.
@@ -49,31 +59,112 @@ pub fn fit_with_noise_watched(
 ) -> Result<(Problem, Fit), SimulationError> {
     let mut problem = problem.clone();
     let mut found = search_from_starts(&problem, start, settings, watch)?;
-    let estimates = problem
-        .channels()
-        .any(|c| matches!(c.weighting(), Weighting::Estimated { .. }));
-    if !estimates {
-        let found = measured(&problem, found, settings);
-        return Ok((problem, found));
+    found = with_sigmas(&mut problem, found, settings, watch)?;
+    if may_correlate(&problem, settings) {
+        let white = (problem.clone(), found.clone());
+        found = with_correlations(&mut problem, found, settings, watch)?;
+        if is_worse(&problem, &found, &white.1) {
+            let (counts, timings, elapsed) = (found.counts, found.timings, found.elapsed);
+            (problem, found) = white;
+            (found.counts, found.timings, found.elapsed) = (counts, timings, elapsed);
+        }
+    }
+    let is_as_stated = !estimates_sigma(&problem) && orders(&problem).iter().all(|p| *p == 0);
+    // All costs refer to the final noise.
+    if let (false, Ok(evaluation)) = (is_as_stated, problem.evaluate(start)) {
+        found.initial_cost = evaluation.cost;
+    }
+    let found = measured(&problem, found, settings);
+    Ok((problem, found))
+}
+
+fn estimates_sigma(problem: &Problem) -> bool {
+    let mut channels = problem.channels();
+    channels.any(|c| matches!(c.weighting(), Weighting::Estimated { .. }))
+}
+
+/// True if the fit was ended from outside.
+fn is_ended(found: &Fit) -> bool {
+    let status = found.outcome.status;
+    matches!(status, Status::Interrupted | Status::TimeLimit)
+}
+
+/// Fit and estimation of the sigmas in alternation, until these converge.
+fn with_sigmas(
+    problem: &mut Problem,
+    mut found: Fit,
+    settings: &FitSettings,
+    watch: &mut Observer,
+) -> Result<Fit, SimulationError> {
+    if !estimates_sigma(problem) {
+        return Ok(found);
     }
     for _ in 0..ROUNDS {
-        let change = update(&mut problem, &found);
-        let ended = matches!(
-            found.outcome.status,
-            Status::Interrupted | Status::TimeLimit
-        );
-        let next = search(&problem, &found.best.parameters, settings, None, watch)?;
+        let change = update(problem, &found);
+        let ended = is_ended(&found);
+        let next = search(problem, &found.best.parameters, settings, None, watch)?;
         found = with_round(found, next, ended);
         if ended || change < SETTLED {
             break;
         }
     }
-    // All costs refer to the final sigmas.
-    if let Ok(evaluation) = problem.evaluate(start) {
-        found.initial_cost = evaluation.cost;
+    Ok(found)
+}
+
+/// Fit and estimation of the correlations in alternation, from the residuals by Burg's method until orders and parameters
+/// rest, then by restricted likelihood.
+fn with_correlations(
+    problem: &mut Problem,
+    mut found: Fit,
+    settings: &FitSettings,
+    watch: &mut Observer,
+) -> Result<Fit, SimulationError> {
+    for pass in 0..PASSES {
+        let next = correlated(problem, &found, pass >= FREE_PASSES);
+        let rests = orders(&next) == orders(problem);
+        if is_ended(&found) || (rests && orders(&next).iter().all(|p| *p == 0)) {
+            return Ok(found);
+        }
+        let moved;
+        (found, moved) = refitted(problem, next, found, settings, watch)?;
+        if rests && moved < AT_REST {
+            break;
+        }
     }
-    let found = measured(&problem, found, settings);
-    Ok((problem, found))
+    for _ in 0..REFINEMENTS {
+        let best = &found.best;
+        let next = refined(problem, &best.parameters, &best.evaluation);
+        let Some(next) = next.filter(|_| !is_ended(&found)) else {
+            break;
+        };
+        let moved;
+        (found, moved) = refitted(problem, next, found, settings, watch)?;
+        if moved < AT_REST {
+            break;
+        }
+    }
+    Ok(found)
+}
+
+/// Fit with the noise of `next`, which becomes the problem; also the largest change of a parameter in standard errors. Sigmas
+/// keep the values of `next` where these have a covariance, that is, are estimates of the restricted likelihood.
+fn refitted(
+    problem: &mut Problem,
+    next: Problem,
+    found: Fit,
+    settings: &FitSettings,
+    watch: &mut Observer,
+) -> Result<(Fit, f64), SimulationError> {
+    *problem = next;
+    let before = found.best.parameters.clone();
+    let fit = search(problem, &before, settings, None, watch)?;
+    let mut found = with_round(found, fit, false);
+    let is_refined = problem.channels().any(|c| !c.noise().covariance.is_empty());
+    if !is_refined {
+        found = with_sigmas(problem, found, settings, watch)?;
+    }
+    let moved = movement(problem, &before, &found);
+    Ok((found, moved))
 }
 
 /// The fit `found` continued by another round, `next`: the last point, with the work of both. Rounds that were `ended` from
@@ -121,7 +212,7 @@ fn update(problem: &mut Problem, found: &Fit) -> f64 {
 }
 
 fn spread(channel: &Channel, predicted: &[f64]) -> f64 {
-    let mut residuals: Vec<f64> = channel.residuals(predicted).collect();
+    let mut residuals = channel.innovations(predicted);
     match channel.loss() {
         Loss::Squares => rms(&residuals),
         Loss::Huber { .. } | Loss::StudentT { .. } => {

@@ -2,7 +2,7 @@
 //!
 //! Each replicate is a full refit (Gauss–Newton under the constraints, started at the optimum) to simulated samples, the
 //! predictions at the optimum plus noise. The parametric bootstrap draws normal noise with the standard deviation of each
-//! sample. The residual bootstrap draws residuals with replacement within each channel, after subtracting their mean and
+//! sample, correlated where the noise of the channel is. The residual bootstrap draws residuals with replacement within each channel, after subtracting their mean and
 //! multiplying them by `sqrt(n / (n - p))`. Priors and penalties are the same in every replicate.
 //!
 //! Source: B. Efron, R. J. Tibshirani, *An Introduction to the Bootstrap*, Chapman & Hall 1993,
@@ -11,7 +11,7 @@
 use super::functional::Linear;
 use super::parallel::map;
 use super::refit::settings;
-use super::simulate::{normal, sigmas, stream, with_samples};
+use super::simulate::{noise_of, normal, sigmas, stream, with_samples};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
@@ -110,7 +110,7 @@ pub fn bootstrap(
         let errors = match noise {
             ReplicateNoise::Parametric => {
                 let unit = normal(&mut random, sigmas.len());
-                unit.iter().zip(&sigmas).map(|(u, s)| u * s).collect()
+                noise_of(problem, &unit, &sigmas)
             }
             ReplicateNoise::Residual => drawn(problem, &evaluation, &mut random),
         };
@@ -131,7 +131,7 @@ pub fn bootstrap(
 }
 
 /// Noise drawn from the residuals of each channel, centred and widened. For samples with individual sigmas the normalised
-/// residuals (residual over sigma) are drawn.
+/// residuals (residual over sigma) are drawn, for correlated noise the innovations, which are then correlated again.
 fn drawn(problem: &Problem, evaluation: &Evaluation, random: &mut ChaCha8Rng) -> Vec<f64> {
     let samples = problem.sample_count() as f64;
     let freedom = (samples - problem.parameters() as f64).max(1.0);
@@ -139,13 +139,13 @@ fn drawn(problem: &Problem, evaluation: &Evaluation, random: &mut ChaCha8Rng) ->
     let mut all = Vec::with_capacity(problem.sample_count());
     for (channel, predicted) in problem.predicted(evaluation) {
         let sigma = |i: usize| channel.weighting().sigma(i).unwrap_or(1.0);
-        let residuals = channel.residuals(predicted).enumerate();
-        let units: Vec<f64> = residuals.map(|(i, r)| -r / sigma(i)).collect();
+        let innovations = channel.innovations(predicted).into_iter().enumerate();
+        let units: Vec<f64> = innovations.map(|(i, r)| -r / sigma(i)).collect();
         let mean = units.iter().sum::<f64>() / units.len() as f64;
-        for i in 0..units.len() {
-            let pick = units[random.random_range(0..units.len())];
-            all.push(wider * (pick - mean) * sigma(i));
-        }
+        let mut pick = || wider * (units[random.random_range(0..units.len())] - mean);
+        let picks: Vec<f64> = (0..units.len()).map(|_| pick()).collect();
+        let sigmas: Vec<f64> = (0..units.len()).map(sigma).collect();
+        all.extend(channel.noise_from(&picks, &sigmas));
     }
     all
 }

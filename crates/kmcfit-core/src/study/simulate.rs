@@ -31,6 +31,16 @@ pub fn sigmas(problem: &Problem, evaluation: &Evaluation) -> Vec<f64> {
     each.map(|sigma| sigma.unwrap_or(estimate)).collect()
 }
 
+/// Noise of every sample from independent numbers of unit variance, in the order of [`sigmas`], correlated as that of each channel.
+pub fn noise_of(problem: &Problem, unit: &[f64], sigmas: &[f64]) -> Vec<f64> {
+    let mut noise = Vec::with_capacity(unit.len());
+    for channel in problem.channels() {
+        let samples = noise.len()..noise.len() + channel.len();
+        noise.extend(channel.noise_from(&unit[samples.clone()], &sigmas[samples]));
+    }
+    noise
+}
+
 /// `count` standard normal numbers.
 pub fn normal(random: &mut ChaCha8Rng, count: usize) -> Vec<f64> {
     (0..count).map(|_| StandardNormal.sample(random)).collect()

@@ -207,6 +207,7 @@ fn channel(spec: &ExperimentSpec, raw: RawChannel) -> ChannelSpec {
         sensor: given.map(sensor).unwrap_or_default(),
         weighting: raw.weighting,
         loss: raw.loss,
+        noise: raw.noise,
         filter: raw.filter,
         span: raw.span,
         angular: raw.unit.is_angular(),

@@ -36,6 +36,28 @@ impl Problem {
         }
     }
 
+    /// [`Problem::predictions_jacobian`] with [`Problem::whiten_rows`].
+    pub(crate) fn whitened_jacobian(&self, evaluation: &Evaluation) -> DMatrix<f64> {
+        let mut jacobian = self.predictions_jacobian(evaluation);
+        self.whiten_rows(&mut jacobian);
+        jacobian
+    }
+
+    /// Whitens the rows (samples of all channels, in order) of channels with correlated noise
+    /// ([`Channel::whiten_rows`]).
+    pub(crate) fn whiten_rows(&self, rows: &mut DMatrix<f64>) {
+        let mut first = 0;
+        for channel in self.channels() {
+            let samples = first..first + channel.len();
+            first = samples.end;
+            if channel.correlation().is_some() {
+                for mut column in rows.column_iter_mut() {
+                    channel.whiten_rows(&mut column.as_mut_slice()[samples.clone()]);
+                }
+            }
+        }
+    }
+
     /// Jacobian by one tangent solve per column, for values near the limits of the floating-point range, where the order of
     /// operations determines what is finite.
     fn jacobian_by_columns(&self, evaluation: &Evaluation) -> DMatrix<f64> {
@@ -63,11 +85,13 @@ impl Problem {
         order
     }
 
-    /// True if the row blocks of [`Problem::each_row_block`] form the complete Jacobian: no sensor parameter is estimated, and no
-    /// channel is filtered.
+    /// True if the row blocks of [`Problem::each_row_block`] form the complete Jacobian: no sensor parameter is estimated, no
+    /// channel is filtered, and no noise is correlated.
     pub(crate) fn is_computed_by_blocks(&self) -> bool {
         let is_plain = |channel: &Channel| {
-            channel.filter().is_empty() && channel.sensor().indices().iter().all(Option::is_none)
+            channel.filter().is_empty()
+                && channel.correlation().is_none()
+                && channel.sensor().indices().iter().all(Option::is_none)
         };
         self.channels().all(is_plain)
     }

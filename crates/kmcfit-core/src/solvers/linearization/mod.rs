@@ -187,8 +187,8 @@ pub(super) fn robust_surplus(problem: &Problem, evaluation: &Evaluation) -> f64 
     let mut surplus = 0.0;
     for (channel, predicted) in problem.predicted(evaluation) {
         if channel.loss() != Loss::Squares {
-            let residuals = channel.residuals(predicted).enumerate();
-            let squares: f64 = residuals.map(|(i, r)| channel.weight(i, r) * r * r).sum();
+            let weighted = channel.majorant(predicted).weighted;
+            let squares: f64 = weighted.iter().map(|r| r * r).sum();
             surplus += channel.cost(predicted) - squares;
         }
     }

@@ -112,7 +112,7 @@ pub(super) fn of_whole_jacobian(
 ) -> Subproblem {
     let residuals = Residuals::at(problem, evaluation);
     let jacobian = timed(&mut timings.tangent, || {
-        problem.predictions_jacobian(evaluation)
+        problem.whitened_jacobian(evaluation)
     });
     timed(&mut timings.linear_algebra, || {
         let Residuals { roots, weighted } = &residuals;
@@ -131,10 +131,11 @@ pub(super) fn of_whole_jacobian(
     })
 }
 
-/// Weighted Jacobian `sqrt(w) dz/dtheta` (samples x parameters) for the predictions `z` of all channels.
+/// Weighted Jacobian `sqrt(w) dz/dtheta` (samples x parameters) for the predictions `z` of all channels, whitened where the
+/// noise is correlated.
 pub fn weighted_jacobian(problem: &Problem, evaluation: &Evaluation) -> DMatrix<f64> {
     let Residuals { roots, .. } = Residuals::at(problem, evaluation);
-    let mut jacobian = problem.predictions_jacobian(evaluation);
+    let mut jacobian = problem.whitened_jacobian(evaluation);
     for mut column in jacobian.column_iter_mut() {
         (column.iter_mut().zip(&roots)).for_each(|(a, root)| *a *= root);
     }

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 /// Weighted residuals of the samples of all channels.
 pub(super) struct Residuals {
-    /// Roots of the weights, `sqrt(w)`.
+    /// Roots of the weights, `sqrt(w)`; for correlated noise those of the whitened residuals.
     pub roots: Vec<f64>,
     /// Weighted residuals, `sqrt(w) r`.
     pub weighted: Vec<f64>,
@@ -35,9 +35,16 @@ impl Residuals {
         self.weighted.clear();
     }
 
-    /// Appends some samples of a channel.
+    /// Appends some samples of a channel, all of them for correlated noise.
     pub fn push(&mut self, channel: &Channel, predicted: &[f64], samples: Range<usize>) {
         let Self { roots, weighted } = self;
+        if channel.correlation().is_some() {
+            debug_assert_eq!(samples, 0..channel.len(), "whitening needs all samples");
+            let majorant = channel.majorant(predicted);
+            roots.extend(majorant.roots);
+            weighted.extend(majorant.weighted);
+            return;
+        }
         let first = roots.len();
         let residuals = || channel.residuals_of(predicted, samples.clone());
         match channel.uniform_weights() {

@@ -2,10 +2,11 @@
 //! with many parameters.
 
 use crate::constraints::Rows;
+use crate::noise::Correlation;
 use crate::objective::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
 use crate::qp::{ResponseVariables, StageLayout, Subproblem};
-use crate::record::{Channel, ChannelKind, Experiment};
+use crate::record::{Channel, ChannelKind, Experiment, Majorant, Weighting};
 use crate::signal::SecondOrder;
 use crate::simulate::reference::step_jacobians;
 use crate::simulate::{StepJacobian, Trajectory};
@@ -180,29 +181,64 @@ impl UnknownColumns<'_> {
                 entries.extend(index.map(|index| (self.scalar(index), factor)));
             }
         };
-        let residuals = channel.residuals(predicted).enumerate();
-        if channel.filter().is_empty() {
+        let Majorant { roots, weighted } = channel.majorant(predicted);
+        if channel.filter().is_empty() && channel.correlation().is_none() {
             let mut entries = Vec::new();
-            for (i, r) in residuals {
+            for (i, (root, r)) in roots.iter().zip(&weighted).enumerate() {
                 entries.clear();
                 row(i, &mut entries);
-                let root = channel.weight(i, r).sqrt();
                 let row = entries.iter().map(|(j, a)| (*j, root * a));
-                sub.residuals.push(row, -root * r);
+                sub.residuals.push(row, -r);
             }
-        } else {
-            let rows = (0..channel.len()).map(|i| {
-                let mut entries = Vec::new();
-                row(i, &mut entries);
-                entries
-            });
-            let filtered = add_filter(channel.filter(), rows.collect(), sub);
-            for ((i, r), index) in residuals.zip(filtered) {
-                let root = channel.weight(i, r).sqrt();
-                sub.residuals.push([(index, root)], -root * r);
-            }
+            return;
+        }
+        let rows = (0..channel.len()).map(|i| {
+            let mut entries = Vec::new();
+            row(i, &mut entries);
+            entries
+        });
+        let mut rows: Vec<Vec<(usize, f64)>> = rows.collect();
+        if !channel.filter().is_empty() {
+            let filtered = add_filter(channel.filter(), rows, sub);
+            rows = filtered.into_iter().map(|j| vec![(j, 1.0)]).collect();
+        }
+        if let Some(correlation) = channel.correlation() {
+            sub.layout = None;
+            rows = whitened(correlation, channel.weighting(), &rows);
+        }
+        for (row, (root, r)) in rows.iter().zip(roots.iter().zip(&weighted)) {
+            sub.residuals
+                .push(row.iter().map(|(j, a)| (*j, root * a)), -r);
         }
     }
+}
+
+/// Rows `W (rows/sigma)`: each is a combination of the rows of a sample and of some before it.
+fn whitened(
+    correlation: &Correlation,
+    weighting: &Weighting,
+    rows: &[Vec<(usize, f64)>],
+) -> Vec<Vec<(usize, f64)>> {
+    let mut out = vec![Vec::new(); rows.len()];
+    let scaled = |i: usize, factor: f64| {
+        let factor = factor / weighting.sigma(i).unwrap_or(1.0);
+        rows[i].iter().map(move |(j, a)| (*j, factor * a))
+    };
+    correlation.each_row(|i, coefficients, size| {
+        out[i].extend(scaled(i, size));
+        for (lag, a) in coefficients.iter().enumerate() {
+            out[i].extend(scaled(i - 1 - lag, -a * size));
+        }
+        out[i].sort_by_key(|(j, _)| *j);
+        out[i].dedup_by(|later, first| {
+            let is_same = later.0 == first.0;
+            if is_same {
+                first.1 += later.1;
+            }
+            is_same
+        });
+    });
+    out
 }
 
 /// Adds filtered changes of the predictions as unknowns and returns their columns. Each section is a recurrence, run forward

@@ -7,16 +7,18 @@ use super::column_samples::{self, ColumnRequest};
 use super::warning::DataWarning;
 use super::{ChannelNote, names};
 use crate::config::ModelFile;
-use crate::config::spec::{ColumnRef, ExperimentSpec, LossName, LossSpec, SensorSpec};
+use crate::config::spec::{
+    ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec, SensorSpec,
+};
 use crate::config::values::{ColumnId, ScalarOr, Sigma, Text};
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::units::{Quantity, Unit};
-use kmcfit_core::internals::record::{ChannelKind, Loss, Weighting};
+use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel, Weighting};
 use kmcfit_core::internals::signal::SecondOrder;
 use kmcfit_core::internals::signal::{even_spacing, median_spacing};
 use kmcfit_core::internals::system::Grid;
-use noise::{loss, weighting};
+use noise::{loss, noise_model, weighting};
 use sampling::{band, decimate, nearly_equal};
 
 /// Default name of the column of the displacement, for files without `columns`.
@@ -43,6 +45,8 @@ pub struct RawChannel {
     /// Sections of the band's filter.
     pub filter: Vec<SecondOrder>,
     pub loss: Loss,
+    /// Correlation of the noise.
+    pub noise: NoiseModel,
     pub unit: Unit,
     ignored: Vec<(usize, String)>,
     format: String,
@@ -72,6 +76,7 @@ struct Spec<'a> {
     unit: Option<&'a Text>,
     sigma: Option<&'a Sigma>,
     loss: Option<&'a ScalarOr<LossName, LossSpec>>,
+    noise: Option<&'a ScalarOr<CorrelationName, CorrelationSpec>>,
     sensor: Option<&'a SensorSpec>,
 }
 
@@ -91,6 +96,7 @@ fn spec_of(spec: &ExperimentSpec, kind: ChannelKind) -> Spec<'_> {
         unit: pick!(spec.units),
         sigma: pick!(spec.sigma),
         loss: pick!(spec.loss),
+        noise: pick!(spec.noise),
         sensor: pick!(spec.sensors),
     }
 }
@@ -147,7 +153,7 @@ fn no_channel(file: &ModelFile, i: usize, spec: &ExperimentSpec) -> InputError {
     }
 }
 
-/// Refuses a sigma, a loss or a sensor of a channel without a column.
+/// Refuses a sigma, a loss, a noise model or a sensor of a channel without a column.
 fn without_column(
     file: &ModelFile,
     i: usize,
@@ -159,6 +165,7 @@ fn without_column(
         ("sigma", spec.sigma.is_some()),
         ("units", spec.unit.is_some()),
         ("loss", spec.loss.is_some()),
+        ("noise", spec.noise.is_some()),
         ("sensors", spec.sensor.is_some()),
     ];
     match given.iter().find(|(_, given)| *given) {
@@ -227,6 +234,7 @@ fn read_one(
     let filter = band(file, &key, spec, spacing, missing)?;
     let weighting = weighting(file, &sigma_key, of_kind.sigma, sigmas, &values)?;
     let loss = loss(file, &key, of_kind)?;
+    let noise = noise_model(file, &key, of_kind, &times)?;
     Ok(RawChannel {
         kind,
         span,
@@ -238,6 +246,7 @@ fn read_one(
         weighting,
         filter,
         loss,
+        noise,
         unit: source.unit,
         ignored,
         format: source.format,

@@ -217,9 +217,12 @@ fn linear_misfit(problem: &Problem, evaluation: &Evaluation, delta: &[f64]) -> f
             let moved: Vec<f64> = predicted.iter().zip(change).map(|(z, d)| z + d).collect();
             misfit += channel.cost(&moved);
         } else {
-            let residuals = channel.residuals(predicted).zip(change).enumerate();
-            misfit += residuals
-                .map(|(i, (r, d))| channel.weight(i, r) * (r + d) * (r + d))
+            let majorant = channel.majorant(predicted);
+            let mut change = change.clone();
+            channel.whiten_rows(&mut change);
+            let rows = majorant.weighted.iter().zip(&majorant.roots).zip(&change);
+            misfit += rows
+                .map(|((r, root), d)| (r + root * d).powi(2))
                 .sum::<f64>();
         }
     }

@@ -1,0 +1,24 @@
+//! Correlation of measurement noise in time: autoregressive models, their estimation from residuals, and the whitening of
+//! residuals and Jacobians.
+//!
+//! The noise `u_i` of a channel has the standard deviation `sigma_i` and the correlation matrix `R` of
+//!
+//! ```text
+//! u_i/sigma_i = a_1 u_(i-1)/sigma_(i-1) + ... + a_p u_(i-p)/sigma_(i-p) + e_i      equally spaced samples, AR(p)
+//! R_ij = exp(-|t_i - t_j| / tau)                                                  other samples, AR(1) in continuous time
+//! ```
+//!
+//! With a lower triangular `W`, `W R W^T = I` ([`Correlation::whiten`]), minus twice the logarithm of the likelihood is
+//! `|W (r/sigma)|^2 + log |R| + sum log(2 pi sigma_i^2)`. All functions here are functions of numbers, independent of problems.
+
+mod autoregression;
+mod burg;
+mod correlation;
+mod exponential;
+mod restricted_likelihood;
+
+pub use autoregression::Autoregression;
+pub use burg::{HIGHEST_ORDER, burg, select_order};
+pub use correlation::{Correlation, CorrelationLaw, uninterrupted_runs};
+pub use exponential::select_exponential;
+pub use restricted_likelihood::{ChannelMoments, NoiseCoordinates, RestrictedLikelihood, STEP};

@@ -1,0 +1,416 @@
+//! Restricted maximum likelihood of the noise: standard deviations and correlations, from linearised residuals.
+//!
+//! With the whitened and weighted Jacobian `J_c` and residuals `r_c` of each channel `c`, minimise over the noise
+//!
+//! ```text
+//! f = sum_c (n_c log sigma_c^2 + log |R_c|) + min_d sum_c |J_c d + r_c|^2 + log |sum_c J_c^T J_c|
+//! ```
+//!
+//! The last term corrects for the parameters: residuals are whiter and smaller than the noise, most where noise is narrowband near
+//! a resonance, and the maximum of the plain likelihood is then biased (Harville 1977). Products of the rows at all lags are
+//! computed once, so that the cost of a step does not depend on the number of samples.
+
+use super::autoregression::Autoregression;
+use super::correlation::{Correlation, CorrelationLaw};
+use nalgebra::DMatrix;
+use std::ops::Range;
+
+/// Step of central differences in the coordinates.
+pub const STEP: f64 = 1e-3;
+/// Largest number of Newton steps; three or four suffice from Burg's estimate.
+const STEPS: usize = 12;
+/// Change of `f` below which the minimum is reached; a change of 1 is a standard error.
+const SETTLED: f64 = 1e-6;
+/// Largest step in a coordinate: the inverse hyperbolic tangent of a partial autocorrelation, or a logarithm.
+const LONGEST: f64 = 1.0;
+
+/// Coordinates of the noise of one channel, in which its likelihood is close to quadratic.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct NoiseCoordinates {
+    /// Logarithm of sigma relative to its reference value, where it is estimated.
+    pub log_sigma: Option<f64>,
+    /// Inverse hyperbolic tangents of the partial autocorrelations, or the logarithm of the correlation time.
+    pub law: Vec<f64>,
+}
+
+impl NoiseCoordinates {
+    fn of(estimates_sigma: bool, list: &[f64]) -> Self {
+        let first = usize::from(estimates_sigma);
+        Self {
+            log_sigma: estimates_sigma.then(|| list[0]),
+            law: list[first..].to_vec(),
+        }
+    }
+}
+
+/// Products of the rows of one channel from which its likelihood follows.
+pub struct ChannelMoments {
+    samples: usize,
+    estimates_sigma: bool,
+    start: Vec<f64>,
+    products: Products,
+}
+
+enum Products {
+    /// Uncorrelated: the Gram matrix.
+    White(DMatrix<f64>),
+    Autoregressive {
+        /// `sum_i x_(i-k) x_(i-l)^T` over the rows with `p` rows of their run before them, for `0 <= k, l <= p`.
+        lags: Vec<Vec<DMatrix<f64>>>,
+        /// First `p` rows of each run.
+        heads: Vec<DMatrix<f64>>,
+        /// Number of the other rows.
+        rest: usize,
+    },
+    Exponential {
+        rows: DMatrix<f64>,
+        times: Vec<f64>,
+    },
+}
+
+impl ChannelMoments {
+    /// Products of `rows` (samples x (parameters + 1): Jacobian, then residuals, both divided by the reference sigma and not
+    /// whitened) of a channel sampled at `times`; `correlation` is the start value, `None` for white noise.
+    pub fn new(
+        rows: &DMatrix<f64>,
+        times: &[f64],
+        correlation: Option<&Correlation>,
+        estimates_sigma: bool,
+    ) -> Self {
+        let (law, products) = match correlation.map(|c| (c, c.law())) {
+            None => (Vec::new(), Products::White(rows.tr_mul(rows))),
+            Some((_, CorrelationLaw::Exponential { time })) => {
+                let (rows, times) = (rows.clone(), times.to_vec());
+                (vec![time.ln()], Products::Exponential { rows, times })
+            }
+            Some((correlation, CorrelationLaw::Autoregressive(process))) => {
+                let products = autoregressive(rows, correlation, process.order());
+                (process.coordinates(), products)
+            }
+        };
+        let sigma = estimates_sigma.then_some(0.0);
+        Self {
+            samples: rows.nrows(),
+            estimates_sigma,
+            start: sigma.into_iter().chain(law).collect(),
+            products,
+        }
+    }
+
+    /// Gram matrix of the whitened rows at the coordinates `law`, and `log |R|`.
+    fn whitened(&self, law: &[f64]) -> (DMatrix<f64>, f64) {
+        match &self.products {
+            Products::White(gram) => (gram.clone(), 0.0),
+            Products::Exponential { rows, times } => {
+                let time = law[0].exp();
+                let law = CorrelationLaw::Exponential { time };
+                let Some(correlation) = Correlation::new(law, times) else {
+                    return (rows.tr_mul(rows), f64::NAN);
+                };
+                let mut whitened = rows.clone();
+                for (mut to, from) in whitened.column_iter_mut().zip(rows.column_iter()) {
+                    to.copy_from_slice(&correlation.whiten(from.as_slice()));
+                }
+                (whitened.tr_mul(&whitened), correlation.log_determinant())
+            }
+            Products::Autoregressive { lags, heads, rest } => {
+                let process = Autoregression::from_coordinates(law);
+                let variance = process.innovation_variance();
+                let minus = process.coefficients().iter().map(|a| -a);
+                let filter: Vec<f64> = std::iter::once(1.0).chain(minus).collect();
+                let mut gram = DMatrix::zeros(lags[0][0].nrows(), lags[0][0].nrows());
+                for (k, a) in filter.iter().enumerate() {
+                    for (l, b) in filter.iter().enumerate() {
+                        gram += &lags[k][l] * (a * b / variance);
+                    }
+                }
+                let mut determinant = *rest as f64 * variance.ln();
+                for head in heads {
+                    for i in 0..head.nrows() {
+                        let (coefficients, variance) = process.predictor(i);
+                        let mut row = head.row(i).into_owned();
+                        for (j, a) in coefficients.iter().enumerate() {
+                            row -= head.row(i - 1 - j) * *a;
+                        }
+                        gram += row.transpose() * &row / variance;
+                        determinant += variance.ln();
+                    }
+                }
+                (gram, determinant)
+            }
+        }
+    }
+}
+
+/// Products of the rows at all lags up to the order.
+fn autoregressive(rows: &DMatrix<f64>, correlation: &Correlation, order: usize) -> Products {
+    let product = |k: usize, l: usize| {
+        let mut sum = DMatrix::zeros(rows.ncols(), rows.ncols());
+        for run in correlation.runs() {
+            let count = run.len().saturating_sub(order);
+            let at = |lag: usize| rows.rows(run.start + order - lag, count);
+            if count > 0 {
+                sum += at(k).tr_mul(&at(l));
+            }
+        }
+        sum
+    };
+    let mut lags: Vec<Vec<DMatrix<f64>>> = Vec::with_capacity(order + 1);
+    for k in 0..=order {
+        let known = lags.iter().map(|row| row[k].transpose());
+        let known: Vec<DMatrix<f64>> = known.collect();
+        lags.push(
+            known
+                .into_iter()
+                .chain((k..=order).map(|l| product(k, l)))
+                .collect(),
+        );
+    }
+    let head = |run: &Range<usize>| rows.rows(run.start, run.len().min(order)).into_owned();
+    let rest = |run: &Range<usize>| run.len().saturating_sub(order);
+    Products::Autoregressive {
+        lags,
+        heads: correlation.runs().iter().map(head).collect(),
+        rest: correlation.runs().iter().map(rest).sum(),
+    }
+}
+
+/// Restricted likelihood of the noise of all channels.
+pub struct RestrictedLikelihood {
+    channels: Vec<ChannelMoments>,
+    /// Gram matrix of rows without noise parameters: priors and penalties.
+    known: DMatrix<f64>,
+}
+
+/// Estimated noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoiseFit {
+    /// Coordinates of each channel.
+    pub channels: Vec<NoiseCoordinates>,
+    /// Covariance of the coordinates of each channel, the inverse of its restricted information.
+    pub covariances: Vec<DMatrix<f64>>,
+}
+
+impl RestrictedLikelihood {
+    /// Likelihood of `channels`, with the Gram matrix `known` of rows of priors and penalties.
+    pub fn new(channels: Vec<ChannelMoments>, known: DMatrix<f64>) -> Self {
+        Self { channels, known }
+    }
+
+    fn start(&self) -> Vec<f64> {
+        let starts = self.channels.iter().map(|c| c.start.iter());
+        starts.flatten().copied().collect()
+    }
+
+    fn split(&self, at: &[f64]) -> Vec<NoiseCoordinates> {
+        let mut rest = at;
+        let each = self.channels.iter().map(|channel| {
+            let (own, further) = rest.split_at(channel.start.len());
+            rest = further;
+            NoiseCoordinates::of(channel.estimates_sigma, own)
+        });
+        each.collect()
+    }
+
+    /// `f` at the coordinates of all channels; NaN where the Gram matrix is not positive definite.
+    pub fn value(&self, at: &[f64]) -> f64 {
+        let mut gram = self.known.clone();
+        let mut constant = 0.0;
+        for (channel, noise) in self.channels.iter().zip(self.split(at)) {
+            let (own, determinant) = channel.whitened(&noise.law);
+            let log_sigma = noise.log_sigma.unwrap_or(0.0);
+            gram += own * (-2.0 * log_sigma).exp();
+            constant += 2.0 * channel.samples as f64 * log_sigma + determinant;
+        }
+        let q = gram.nrows() - 1;
+        let right = gram.view((0, q), (q, 1)).into_owned();
+        let squares = gram[(q, q)];
+        let Some(root) = gram.view((0, 0), (q, q)).into_owned().cholesky() else {
+            return f64::NAN;
+        };
+        let explained = right.dot(&root.solve(&right));
+        let log_determinant: f64 = root.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
+        constant + squares - explained + log_determinant
+    }
+
+    /// Minimum of `f` by Newton steps with central differences, and the covariance `2 H^-1` of the coordinates with the Hessian
+    /// `H`. `None` where there is nothing to estimate or the likelihood is not finite.
+    pub fn fit(&self) -> Option<NoiseFit> {
+        let mut at = self.start();
+        let mut value = self.value(&at);
+        if at.is_empty() || !value.is_finite() {
+            return None;
+        }
+        for _ in 0..STEPS {
+            let (gradient, hessian) = self.derivatives(&at, value);
+            let step = newton_step(&gradient, &hessian)?;
+            let longest = step.iter().fold(0.0f64, |most, s| most.max(s.abs()));
+            let mut length = (LONGEST / longest).min(1.0);
+            let mut settled = true;
+            for _ in 0..8 {
+                let trial: Vec<f64> = at.iter().zip(&step).map(|(z, s)| z + length * s).collect();
+                let lower = self.value(&trial);
+                if lower < value {
+                    settled = value - lower < SETTLED;
+                    (at, value) = (trial, lower);
+                    break;
+                }
+                length *= 0.5;
+            }
+            if settled {
+                break;
+            }
+        }
+        let (_, hessian) = self.derivatives(&at, value);
+        let covariance = positive(&hessian).try_inverse()? * 2.0;
+        let mut first = 0;
+        let blocks = self.channels.iter().map(|channel| {
+            let count = channel.start.len();
+            let block = covariance.view((first, first), (count, count));
+            first += count;
+            block.into_owned()
+        });
+        Some(NoiseFit {
+            covariances: blocks.collect(),
+            channels: self.split(&at),
+        })
+    }
+
+    fn derivatives(&self, at: &[f64], value: f64) -> (DMatrix<f64>, DMatrix<f64>) {
+        let n = at.len();
+        let moved = |changes: &[(usize, f64)]| {
+            let mut trial = at.to_vec();
+            changes.iter().for_each(|(j, by)| trial[*j] += by);
+            self.value(&trial)
+        };
+        let sides: Vec<[f64; 2]> = (0..n)
+            .map(|j| [STEP, -STEP].map(|h| moved(&[(j, h)])))
+            .collect();
+        let gradient = DMatrix::from_fn(n, 1, |j, _| (sides[j][0] - sides[j][1]) / (2.0 * STEP));
+        let mut hessian = DMatrix::zeros(n, n);
+        for j in 0..n {
+            hessian[(j, j)] = (sides[j][0] - 2.0 * value + sides[j][1]) / (STEP * STEP);
+            for k in 0..j {
+                let both = moved(&[(j, STEP), (k, STEP)]) + moved(&[(j, -STEP), (k, -STEP)]);
+                let alone = sides[j][0] + sides[j][1] + sides[k][0] + sides[k][1];
+                let mixed = (both - alone + 2.0 * value) / (2.0 * STEP * STEP);
+                hessian[(j, k)] = mixed;
+                hessian[(k, j)] = mixed;
+            }
+        }
+        (gradient, hessian)
+    }
+}
+
+/// Hessian with its eigenvalues replaced by their absolute values, at least 1e-3: a descent direction where it is indefinite.
+fn positive(hessian: &DMatrix<f64>) -> DMatrix<f64> {
+    if !hessian.iter().all(|x| x.is_finite()) {
+        return DMatrix::zeros(hessian.nrows(), hessian.ncols());
+    }
+    let mut eigen = hessian.clone().symmetric_eigen();
+    for value in eigen.eigenvalues.iter_mut() {
+        *value = value.abs().max(1e-3);
+    }
+    eigen.recompose()
+}
+
+fn newton_step(gradient: &DMatrix<f64>, hessian: &DMatrix<f64>) -> Option<Vec<f64>> {
+    let step = -(positive(hessian).try_inverse()? * gradient);
+    let is_finite = step.iter().all(|x| x.is_finite());
+    is_finite.then(|| step.as_slice().to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnostics::noise::auto_regression;
+
+    fn rows(columns: &[Vec<f64>]) -> DMatrix<f64> {
+        DMatrix::from_fn(columns[0].len(), columns.len(), |i, j| columns[j][i])
+    }
+
+    /// A constant in AR(1) noise at given coefficients: `f` from dense matrices.
+    #[test]
+    fn the_likelihood_agrees_with_dense_matrices() {
+        let n = 40;
+        let values = auto_regression(3, n, 0.6);
+        let ramp: Vec<f64> = (0..n).map(|i| i as f64 / n as f64).collect();
+        let x = rows(&[vec![1.0; n], ramp, values]);
+        let times: Vec<f64> = (0..n).map(|i| (i + 4 * (i / 25)) as f64).collect();
+        let process = Autoregression::new(vec![0.5, -0.3]).unwrap();
+        let lags = process.autocorrelation(n);
+        let law = CorrelationLaw::Autoregressive(process.clone());
+        let correlation = Correlation::new(law, &times).unwrap();
+        let moments = ChannelMoments::new(&x, &times, Some(&correlation), true);
+        let likelihood = RestrictedLikelihood::new(vec![moments], DMatrix::zeros(3, 3));
+        let log_sigma = 0.3f64;
+        let mut at = vec![log_sigma];
+        at.extend(process.coordinates());
+        let matrix = DMatrix::from_fn(n, n, |i, j| match (i < 25) == (j < 25) {
+            true => (2.0 * log_sigma).exp() * lags[i.abs_diff(j)],
+            false => 0.0,
+        });
+        let inverse = matrix.clone().try_inverse().unwrap();
+        let (j, r) = (x.columns(0, 2), x.columns(2, 1));
+        let information = j.transpose() * &inverse * j;
+        let solution = information.clone().try_inverse().unwrap() * j.transpose() * &inverse * r;
+        let left = r - j * solution;
+        let squares = (left.transpose() * &inverse * &left)[(0, 0)];
+        let expected = matrix.determinant().ln() + squares + information.determinant().ln();
+        assert!((likelihood.value(&at) - expected).abs() < 1e-9);
+    }
+
+    /// White noise of one channel with an estimated sigma: `sigma^2 = RSS/(n - q)`, of which the logarithm has the variance
+    /// `2/(n - q)`.
+    #[test]
+    fn the_sigma_of_white_noise_is_the_unbiased_one() {
+        let n = 60;
+        let ramp: Vec<f64> = (0..n).map(|i| i as f64 / n as f64).collect();
+        let x = rows(&[vec![1.0; n], ramp, auto_regression(5, n, 0.0)]);
+        let moments = ChannelMoments::new(&x, &[], None, true);
+        let likelihood = RestrictedLikelihood::new(vec![moments], DMatrix::zeros(3, 3));
+        let found = likelihood.fit().unwrap();
+        let (j, r) = (x.columns(0, 2).into_owned(), x.columns(2, 1).into_owned());
+        let left = &r - &j * j.clone().svd(true, true).solve(&r, 1e-14).unwrap();
+        let expected = 0.5 * (left.norm_squared() / (n - 2) as f64).ln();
+        assert!((found.channels[0].log_sigma.unwrap() - expected).abs() < 1e-4);
+        let variance = found.covariances[0][(0, 0)];
+        // For log sigma, a quarter of that of log sigma^2.
+        assert!((variance * 2.0 * (n - 2) as f64 - 1.0).abs() < 1e-3);
+    }
+
+    /// Mean of estimates from short records with two regressors: the restricted estimate is closer to the truth than Burg's.
+    #[test]
+    fn restricted_estimates_of_short_records_are_less_biased_than_burg_s() {
+        let (n, truth, seeds) = (60, 0.6, 200);
+        let sine = |i: usize, phase: f64| (0.2 * i as f64 + phase).sin();
+        let columns: Vec<Vec<f64>> = (0..6)
+            .map(|k| {
+                (0..n)
+                    .map(|i| sine(i * (k / 2 + 1), (k % 2) as f64))
+                    .collect()
+            })
+            .collect();
+        let times: Vec<f64> = (0..n).map(|i| i as f64).collect();
+        let (mut burg_mean, mut mean) = (0.0, 0.0);
+        for seed in 0..seeds {
+            let mut all = columns.clone();
+            let noise = auto_regression(seed, n, truth);
+            let (j, r) = (rows(&all), DMatrix::from_column_slice(n, 1, &noise));
+            let left = &r - &j * j.clone().svd(true, true).solve(&r, 1e-12).unwrap();
+            let process = super::super::burg(left.as_slice(), std::slice::from_ref(&(0..n)), 1);
+            burg_mean += process.partial()[0] / seeds as f64;
+            all.push(noise);
+            let law = CorrelationLaw::Autoregressive(process);
+            let correlation = Correlation::new(law, &times).unwrap();
+            let moments = ChannelMoments::new(&rows(&all), &times, Some(&correlation), true);
+            let found = RestrictedLikelihood::new(vec![moments], DMatrix::zeros(7, 7)).fit();
+            mean += found.unwrap().channels[0].law[0].tanh() / seeds as f64;
+        }
+        // The standard error of each mean is 0.1/sqrt(200) = 0.007; six sines take much of the low frequencies.
+        assert!(
+            (mean - truth).abs() < 0.5 * (burg_mean - truth).abs(),
+            "{mean} {burg_mean}"
+        );
+    }
+}
