@@ -88,7 +88,7 @@ pub use builder::{
 pub use constraints::{Constraint, Shape, TimeHistory};
 pub use functions::{CoefficientKind, Prior};
 pub use problem::{Problem, ProblemError};
-pub use record::{ChannelKind, Loss, Weighting};
+pub use record::{ChannelKind, Loss, NoiseModel, Weighting};
 pub use signal::{Interpolation, Signal};
 pub use system::{Excitation, Grid, Method, NodalCoefficients, State, System, Term};
 // Simulation and cost.
