@@ -3,12 +3,12 @@
 use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit::tables::Table;
 use kmcfit_core::internals::builder::{
-    BasisSpec, Builder, CoefficientSpec, Knots, Record, ScalarSpec, Start,
+    BasisSpec, Builder, ChannelSpec, CoefficientSpec, Knots, Record, ScalarSpec, Start,
 };
 use kmcfit_core::internals::constraints::{Constraint, Shape};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::Loss;
+use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel};
 use kmcfit_core::internals::system::Method;
 use std::path::Path;
 
@@ -169,6 +169,20 @@ fn invalid_parts_are_refused_with_their_key() {
                     .loss(Loss::Huber { threshold: 1.0 }),
             ),
             "experiments[0].loss.displacement: a robust loss needs a sigma to identify large residuals",
+        ),
+        (
+            Builder::new(system()).record(short().channel(ChannelSpec {
+                noise: NoiseModel::Autoregressive { order: 0 },
+                ..ChannelSpec::new(ChannelKind::Displacement, &times, &values)
+            })),
+            "experiments[0].noise.displacement.ar: the order of the noise is outside its range\n  found: 0",
+        ),
+        (
+            Builder::new(system()).record(short().channel(ChannelSpec {
+                noise: NoiseModel::Autoregressive { order: 1 },
+                ..ChannelSpec::new(ChannelKind::Displacement, &times, &values)
+            })),
+            "experiments[0].noise.displacement.ar: correlated noise needs a sigma",
         ),
         (
             Builder::new(system()).record(short().velocity(&times, &values)),

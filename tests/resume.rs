@@ -131,6 +131,20 @@ fn rounds_of_sigmas() {
     again_and_again("accelerometer", &[], 2);
 }
 
+/// The force as held between its samples leaves residuals that are fitted as correlated noise.
+#[test]
+fn rounds_of_correlations() {
+    let held = [("interpolation: cubic", "interpolation: hold")];
+    let (_, model) = model("duffing", &held);
+    let start = model.problem.start();
+    let mut watch = |_: &IterationRecord| {};
+    let mut watch = Observer::new(&mut watch);
+    let found = fit_with_noise_watched(&model.problem, &start, &model.settings, &mut watch);
+    let (problem, _) = found.expect("a motion");
+    assert!(problem.channels().any(|c| c.correlation().is_some()));
+    again_and_again("duffing", &held, 3);
+}
+
 /// The same with estimated sigmas, each of whose rounds uses the truncated start.
 #[test]
 fn the_beginning_of_a_long_record() {

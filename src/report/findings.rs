@@ -69,8 +69,8 @@ pub fn warning(warning: &FitWarning) -> Finding {
             "no confidence intervals: the residuals are large and autocorrelated".into()
         }
         FitWarning::Coloured => {
-            "the residuals are autocorrelated: the true confidence intervals are wider than those given, which assume \
-             white noise"
+            "the residuals are autocorrelated: the true confidence intervals are wider than those given, because the noise \
+             model neglects this correlation"
                 .into()
         }
         FitWarning::Correlated => {

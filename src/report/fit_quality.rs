@@ -69,13 +69,14 @@ fn noise(correlation: &Correlation) -> NoiseSummary {
     }
 }
 
-/// The nuisance parameters of a problem at a point, with standard errors from the covariance if available.
+/// The nuisance parameters of a problem at a point, with standard errors from the covariance if available, and the degrees of freedom of
+/// all parameters.
 pub fn scalars(
     problem: &Problem,
     evaluation: &Evaluation,
     covariance: Option<&DMatrix<f64>>,
+    degrees: &[f64],
 ) -> Vec<NuisanceParameter> {
-    let degrees = covariance.map(|_| problem.degrees_of_freedom(evaluation));
     let range = problem.functions.scalar_range();
     let list = problem.functions.scalars().iter().zip(range);
     list.zip(&evaluation.scalars)
@@ -84,7 +85,8 @@ pub fn scalars(
             unit: scalar.unit.clone(),
             value: *value,
             standard_error: covariance.map(|c| c[(index, index)].sqrt()),
-            degrees_of_freedom: (degrees.as_ref().map(|d| d[index])).filter(|d| d.is_finite()),
+            degrees_of_freedom: (degrees.get(index).copied())
+                .filter(|d| covariance.is_some() && d.is_finite()),
         })
         .collect()
 }
@@ -102,7 +104,9 @@ pub(super) fn validation(held: &ValidationRecord) -> ValidationSummary {
     match &held.found {
         Ok((problem, evaluation)) => {
             let covariance = problem.covariance(evaluation);
-            summary.nuisance_parameters = scalars(problem, evaluation, covariance.as_ref());
+            let degrees = problem.degrees_of_freedom(evaluation);
+            summary.nuisance_parameters =
+                scalars(problem, evaluation, covariance.as_ref(), &degrees);
         }
         Err(breakdown) => summary.failure = Some(breakdown.to_string()),
     }

@@ -122,7 +122,9 @@ impl FittedModel<'_> {
             nuisance_parameters: match self.is_simulated() {
                 true => {
                     let covariance = self.run_assessment.covariance();
-                    fit_quality::scalars(&model.problem, &fit.best.evaluation, covariance)
+                    let degrees = (self.run_assessment.assessment.as_ref())
+                        .map_or(&[][..], |a| &a.degrees_of_freedom);
+                    fit_quality::scalars(&model.problem, &fit.best.evaluation, covariance, degrees)
                 }
                 false => Vec::new(),
             },

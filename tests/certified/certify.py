@@ -692,6 +692,7 @@ def model(p, force):
         lines.append("    force: {interpolation: linear}")
     if p["sigma"] is not None:
         lines.append(f"    sigma: {{{p['channel']}: {p['sigma']}}}")
+        lines.append(f"    noise: {{{p['channel']}: white}}")
     lines.append("    initial: estimate" if p.get("estimate") else f"    initial: {{displacement: {y0}, velocity: {v0}}}")
     lines += [f"grid: {{nodes: {p['nodes']}, method: rk4}}", "functions:"]
     for term in TERMS:

@@ -59,12 +59,12 @@ pub mod qp {
     pub use crate::qp::{ConicStatus, Kkt, ResponseVariables, StageLayout, Subproblem, project};
 }
 pub mod noise {
-    pub use crate::noise::{Correlation, CorrelationLaw, HIGHEST_ORDER, uninterrupted_runs};
+    pub use crate::noise::{Correlation, CorrelationLaw};
 }
 pub mod record {
     pub use crate::record::{
-        BaseMotion, Channel, ChannelKind, Experiment, Input, Loss, NoiseModel, Sensor, Waveform,
-        Weighting, integral_over,
+        BaseMotion, Channel, ChannelKind, Experiment, Input, Loss, NoiseEstimate, NoiseModel,
+        Sensor, Waveform, Weighting, integral_over,
     };
 }
 pub mod signal {

@@ -5,9 +5,12 @@
 
 use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
 use kmcfit_core::internals::diagnostics::student_half_width;
-use kmcfit_core::internals::record::{ChannelKind, NoiseModel, Weighting};
-use kmcfit_core::internals::solvers::{FitSettings, fit_with_noise};
+use kmcfit_core::internals::noise::Correlation;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{ChannelKind, NoiseEstimate, NoiseModel, Weighting};
+use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
 use kmcfit_core::internals::system::Method;
+use nalgebra::DMatrix;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -116,41 +119,70 @@ struct Score {
     order: usize,
 }
 
-/// Fits to the data with noise of this law, one for each seed.
-fn scores(law: &Law, model: NoiseModel, seeds: u64) -> Vec<Score> {
-    let (times, force, clean) = data();
-    let size = (clean.iter().map(|y| y * y).sum::<f64>() / SAMPLES as f64).sqrt();
+/// The forced oscillator with samples of a displacement.
+fn problem(times: &[f64], samples: &[f64], weighting: Weighting, model: NoiseModel) -> Problem {
+    let (forced, force, _) = data();
+    let mut channel = ChannelSpec::new(ChannelKind::Displacement, times, samples);
+    channel.weighting = Some(weighting);
+    channel.noise = model;
+    let record = Record::new("forced")
+        .from_state(0.0, 0.0)
+        .force(&forced, &force)
+        .channel(channel);
+    Builder::new(TRUTH.map(|p| CoefficientSpec::constant(1.02 * p)))
+        .record(record)
+        .nodes(4 * (SAMPLES - 1) + 1)
+        .method(Method::Rk4)
+        .build()
+        .unwrap()
+}
+
+fn fitted(problem: &Problem) -> (Problem, Fit) {
+    let settings = FitSettings::default();
+    fit_with_noise(problem, &problem.start(), &settings, &mut |_| {}).unwrap()
+}
+
+/// Estimated correlation of the only channel.
+fn correlation(problem: &Problem) -> Option<&Correlation> {
+    problem.experiments[0].channels[0].correlation()
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    (values.iter().map(|y| y * y).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// Standardised errors and half-widths of a fit.
+fn score((problem, fit): &(Problem, Fit)) -> Score {
+    let evaluation = &fit.best.evaluation;
+    let covariance = problem.covariance(evaluation).unwrap();
+    let degrees = problem.degrees_of_freedom(evaluation);
+    let error = |j: usize| (fit.best.parameters[j] - TRUTH[j]) / covariance[(j, j)].sqrt();
+    Score {
+        errors: std::array::from_fn(error),
+        half_widths: std::array::from_fn(|j| student_half_width(degrees[j])),
+        order: correlation(problem).map_or(0, Correlation::order),
+    }
+}
+
+/// Fits to the data with noise of this law, one for each seed, of the samples `kept`.
+fn scores(law: &Law, model: NoiseModel, seeds: u64, kept: impl Fn(usize) -> bool) -> Vec<Score> {
+    let (times, _, clean) = data();
+    let size = root_mean_square(&clean);
     let each = (0..seeds).map(|seed| {
-        let pairs = clean.iter().zip(noise(seed, law));
-        let samples: Vec<f64> = pairs.map(|(y, e)| y + 0.03 * size * e).collect();
-        let mut channel = ChannelSpec::new(ChannelKind::Displacement, &times, &samples);
-        channel.weighting = Some(Weighting::Estimated { sigma: 0.05 * size });
-        channel.noise = model;
-        let record = Record::new("forced")
-            .from_state(0.0, 0.0)
-            .force(&times, &force)
-            .channel(channel);
-        let problem = Builder::new(TRUTH.map(|p| CoefficientSpec::constant(1.02 * p)))
-            .record(record)
-            .nodes(4 * (SAMPLES - 1) + 1)
-            .method(Method::Rk4)
-            .build()
-            .unwrap();
-        let settings = FitSettings::default();
-        let found = fit_with_noise(&problem, &problem.start(), &settings, &mut |_| {});
-        let (problem, fit) = found.unwrap();
-        let evaluation = &fit.best.evaluation;
-        let covariance = problem.covariance(evaluation).unwrap();
-        let degrees = problem.degrees_of_freedom(evaluation);
-        let error = |j: usize| (fit.best.parameters[j] - TRUTH[j]) / covariance[(j, j)].sqrt();
-        let channel = &problem.experiments[0].channels[0];
-        Score {
-            errors: std::array::from_fn(error),
-            half_widths: std::array::from_fn(|j| student_half_width(degrees[j])),
-            order: channel.correlation().map_or(0, |c| c.order()),
-        }
+        let noise = noise(seed, law);
+        let rows = (0..SAMPLES).filter(|i| kept(*i));
+        let (times, samples): (Vec<f64>, Vec<f64>) = rows
+            .map(|i| (times[i], clean[i] + 0.03 * size * noise[i]))
+            .unzip();
+        let weighting = Weighting::Estimated { sigma: 0.05 * size };
+        score(&fitted(&problem(&times, &samples, weighting, model)))
     });
     each.collect()
+}
+
+/// All samples.
+fn all(_: usize) -> bool {
+    true
 }
 
 /// Number of intervals that contain the truth, for m, c and k.
@@ -176,13 +208,13 @@ fn laws() -> Vec<(&'static str, Law)> {
 /// which those of one record are correlated, is within 91 to 98 %.
 #[test]
 fn intervals_hold_under_white_and_correlated_noise() {
-    let mut all = 0;
+    let mut sum = 0;
     for (name, law) in laws() {
-        let counts = inside(&scores(&law, NoiseModel::Auto, 40));
+        let counts = inside(&scores(&law, NoiseModel::Auto, 40, all));
         assert!(counts.iter().all(|c| *c >= 33), "{name}: {counts:?}");
-        all += counts.iter().sum::<usize>();
+        sum += counts.iter().sum::<usize>();
     }
-    let share = all as f64 / (40 * 3 * laws().len()) as f64;
+    let share = sum as f64 / (40 * 3 * laws().len()) as f64;
     assert!((0.91..=0.98).contains(&share), "{share}");
 }
 
@@ -191,11 +223,96 @@ fn intervals_hold_under_white_and_correlated_noise() {
 #[test]
 fn intervals_that_ignore_the_correlation_are_too_short() {
     let law = Law::Autoregressive(vec![0.8]);
-    let counts = inside(&scores(&law, NoiseModel::White, 40));
+    let counts = inside(&scores(&law, NoiseModel::White, 40, all));
     assert!(counts.iter().sum::<usize>() < 100, "{counts:?}");
-    let white = scores(&Law::Autoregressive(Vec::new()), NoiseModel::Auto, 40);
+    let white = scores(&Law::Autoregressive(Vec::new()), NoiseModel::Auto, 40, all);
     // An order above 0 is chosen with a probability of about 2 %.
     assert!(white.iter().filter(|s| s.order == 0).count() >= 36);
+}
+
+/// A gap of 100 samples, and 40 % of the samples missing at random positions, whose times are then irregular: AR(1) noise of
+/// 0.8 has the correlation time 0.05 s / -ln 0.8 = 0.224 s.
+#[test]
+fn intervals_hold_with_gaps_and_at_irregular_times() {
+    let law = Law::Autoregressive(vec![0.8]);
+    let gap = scores(&law, NoiseModel::Auto, 40, |i| !(400..500).contains(&i));
+    assert!(inside(&gap).iter().all(|c| *c >= 33), "{:?}", inside(&gap));
+    let drawn: Vec<bool> = white(5, 3, SAMPLES).iter().map(|x| *x > -0.25).collect();
+    let irregular = scores(&law, NoiseModel::Auto, 40, |i| drawn[i]);
+    let counts = inside(&irregular);
+    assert!(counts.iter().all(|c| *c >= 33), "{counts:?}");
+    assert!(irregular.iter().all(|s| s.order == 1));
+}
+
+/// A stated order is estimated as stated, here for white noise.
+#[test]
+fn a_stated_order_is_kept() {
+    let law = Law::Autoregressive(Vec::new());
+    let model = NoiseModel::Autoregressive { order: 3 };
+    let scores = scores(&law, model, 3, all);
+    assert!(scores.iter().all(|s| s.order == 3));
+}
+
+/// Residuals that need not be noise leave it uncorrelated: those of exact samples (rounded to 6 digits), of a stated sigma a tenth of
+/// the residuals, and of fewer than eight samples per parameter.
+#[test]
+fn residuals_that_need_not_be_noise_are_not_correlated() {
+    let (times, _, clean) = data();
+    let size = root_mean_square(&clean);
+    let law = Law::Autoregressive(vec![0.9]);
+    let spoilt = |share: f64| -> Vec<f64> {
+        let pairs = clean.iter().zip(noise(0, &law));
+        pairs.map(|(y, e)| y + share * size * e).collect()
+    };
+    let estimated = Weighting::Estimated { sigma: 0.05 * size };
+    let stated = |share: f64| Weighting::Sigma(share * size);
+    let cases = [
+        (1000, 1e-6, estimated.clone(), false),
+        (1000, 0.03, estimated.clone(), true),
+        (1000, 0.03, stated(0.03), true),
+        (1000, 0.03, stated(0.003), false),
+        (23, 0.03, estimated, false),
+    ];
+    for (count, share, weighting, is_correlated) in cases {
+        let samples = &spoilt(share)[..count];
+        let problem = problem(
+            &times[..count],
+            samples,
+            weighting.clone(),
+            NoiseModel::Auto,
+        );
+        let (found, _) = fitted(&problem);
+        assert_eq!(
+            correlation(&found).is_some(),
+            is_correlated,
+            "{share} {weighting:?}"
+        );
+    }
+}
+
+/// One sigma of white noise, with the variance `1/(2 (n - p))` of its logarithm: Student's t distribution with `n - p` degrees of
+/// freedom for every linear combination.
+#[test]
+fn white_noise_with_an_estimated_sigma_has_n_minus_p_degrees_of_freedom() {
+    let (times, _, clean) = data();
+    let weighting = Weighting::Estimated { sigma: 0.01 };
+    let problem = problem(&times, &clean, weighting, NoiseModel::White);
+    let left = (SAMPLES - 3) as f64;
+    let problem = problem
+        .with(|parts| {
+            let channel = &mut parts.experiments[0].channels[0];
+            let covariance = DMatrix::from_element(1, 1, 0.5 / left);
+            *channel = channel.clone().with_noise(NoiseEstimate {
+                correlation: None,
+                covariance,
+            });
+        })
+        .unwrap();
+    let evaluation = problem.evaluate(&problem.start()).unwrap();
+    for degrees in problem.degrees_of_freedom(&evaluation) {
+        // Central differences with a step of 1e-3 in the logarithm of sigma.
+        assert!((degrees / left - 1.0).abs() < 1e-5, "{degrees}");
+    }
 }
 
 #[test]
@@ -206,7 +323,7 @@ fn print_coverage() {
     println!("|---|---|---|---|---|---|");
     for (name, law) in laws() {
         for model in [NoiseModel::White, NoiseModel::Auto] {
-            let scores = scores(&law, model, SEEDS);
+            let scores = scores(&law, model, SEEDS, all);
             let percent = |c: usize| format!("{:.1} %", 100.0 * c as f64 / SEEDS as f64);
             let counts = inside(&scores).map(percent).join(" | ");
             // A t distributed error is brought to the normal distribution by the ratio of the half-widths.

@@ -74,9 +74,11 @@ impl FitAssessment {
             };
             let bands = Bands::at(problem, &best.parameters, &best.evaluation, &settings);
             assessment.classifications = classify_functions(problem, &best.evaluation, &bands);
+            assessment
+                .degrees_of_freedom
+                .clone_from(&bands.degrees_of_freedom);
             assessment.bands = Some(bands);
             assessment.covariance = problem.covariance(&best.evaluation);
-            assessment.degrees_of_freedom = problem.degrees_of_freedom(&best.evaluation);
         }
         assessment
     }

@@ -2,6 +2,7 @@
 
 use super::{BuildError, CoefficientSpec};
 use crate::functions::{CoefficientKind, Prior};
+use crate::noise::{HIGHEST_ORDER, uninterrupted_runs};
 use crate::record::{BaseMotion, ChannelKind, Input, Loss, NoiseModel, Waveform, Weighting};
 use crate::signal::{Interpolation, SecondOrder, Signal, median_spacing};
 
@@ -136,6 +137,34 @@ impl ChannelSpec {
             return Err(BuildError::new(format!("{record}.loss.{kind}"), problem)
                 .found("no `sigma`")
                 .expected(format!("`sigma: {{{kind}: …}}`")));
+        }
+        self.check_noise(&format!("{record}.noise.{kind}.ar"))
+    }
+
+    /// Error for autoregressive noise that the samples cannot have; `key` is that of the order.
+    fn check_noise(&self, key: &str) -> Result<(), BuildError> {
+        let NoiseModel::Autoregressive { order } = self.noise else {
+            return Ok(());
+        };
+        let kind = self.kind.name();
+        let error = |problem: &str| BuildError::new(key, problem);
+        if !(1..=HIGHEST_ORDER).contains(&order) {
+            return Err(error("the order of the noise is outside its range")
+                .found(order)
+                .expected(format!("an integer from 1 to {HIGHEST_ORDER}")));
+        }
+        if self.weighting.is_none() {
+            return Err(error("correlated noise needs a sigma")
+                .found(format!("no `sigma.{kind}`"))
+                .expected(format!(
+                    "`sigma: {{{kind}: …}}`: a number, a column, or `estimate`"
+                )));
+        }
+        if uninterrupted_runs(&self.times).is_none() {
+            let problem = "autoregressive noise needs equally spaced samples";
+            return Err(error(problem).found("irregular times").expected(
+                "`auto`, which uses an exponential correlation for irregular times, or `white`",
+            ));
         }
         Ok(())
     }

@@ -18,7 +18,7 @@
 use super::active::{ActiveRow, active_rows};
 use super::band::{Band, BandSide};
 use super::covariance::{CovarianceRoot, Information};
-use super::degrees::NoiseVariants;
+use super::degrees::{NoiseVariants, degrees_of_parameters};
 use super::directions::Directions;
 use super::ratios::{Ratio, damping_ratio, frequency, over_mass};
 use super::sensitivity::Sensitivity;
@@ -81,6 +81,8 @@ pub struct Bands {
     pub sigma: Option<f64>,
     /// Number of undetermined directions.
     pub undetermined: usize,
+    /// Degrees of freedom of the estimate of each parameter ([`Problem::degrees_of_freedom`]).
+    pub degrees_of_freedom: Vec<f64>,
     /// Notes on all bands.
     pub notes: Vec<String>,
 }
@@ -156,6 +158,7 @@ impl Bands {
             ratios: maker.ratios(&values, &linearised),
             sigma: tight.variance.map(f64::sqrt),
             undetermined,
+            degrees_of_freedom: degrees_of_parameters(problem, maker.variants),
             notes,
             times: maker.times,
         }

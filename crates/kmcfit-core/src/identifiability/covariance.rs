@@ -165,8 +165,8 @@ fn split(factorisation: &Factorisation) -> (DMatrix<f64>, DMatrix<f64>) {
 
 impl Problem {
     /// Covariance of the parameters at an evaluated point, from the linearised predictions: `(J^T W J)^-1` with
-    /// `W = 1/sigma^2` where the samples have a sigma (the Cramér–Rao bound for Gaussian noise), otherwise multiplied by the
-    /// mean square of the residuals. Penalties, constraints and priors are not included. `None` where a combination of
+    /// `W = 1/sigma^2`, or the inverse covariance matrix of correlated noise, where the samples have a sigma (the Cramér–Rao bound
+    /// for Gaussian noise), otherwise multiplied by the mean square of the residuals. Penalties, constraints and priors are not included. `None` where a combination of
     /// parameters is not identifiable, there are too many parameters, or the noise level is unknown.
     pub fn covariance(&self, evaluation: &Evaluation) -> Option<DMatrix<f64>> {
         let (n, samples) = (self.parameters(), self.sample_count());
@@ -174,22 +174,27 @@ impl Problem {
             return None;
         }
         let directions = Directions::new(self, evaluation, n, n);
-        let sensitivity = Sensitivity::along(self, evaluation, directions);
-        let factorisation = Factorisation::of(&sensitivity.jacobian);
-        let squares: f64 = sensitivity.residuals.iter().map(|r| r * r).sum();
-        let scale = match self.channels().all(|c| c.weighting().is_sigma()) {
-            true => 1.0,
-            false => squares / (samples - n) as f64,
-        };
-        // An exact fit gives no estimate of the noise.
-        (factorisation.rank == n && scale > 0.0).then(|| {
-            let root = factorisation.inverse_root();
-            let column = |z: &[f64]| DVector::from_vec(sensitivity.directions.to_parameters(z));
-            let columns: Vec<_> = root.column_iter().map(|z| column(z.as_slice())).collect();
-            let root = DMatrix::from_columns(&columns);
-            &root * root.transpose() * scale
-        })
+        covariance(self, &Sensitivity::along(self, evaluation, directions))
     }
+}
+
+/// [`Problem::covariance`] from the sensitivity along all parameters.
+pub(super) fn covariance(problem: &Problem, sensitivity: &Sensitivity) -> Option<DMatrix<f64>> {
+    let (samples, n) = sensitivity.jacobian.shape();
+    let factorisation = Factorisation::of(&sensitivity.jacobian);
+    let squares: f64 = sensitivity.residuals.iter().map(|r| r * r).sum();
+    let scale = match problem.channels().all(|c| c.weighting().is_sigma()) {
+        true => 1.0,
+        false => squares / (samples - n) as f64,
+    };
+    // An exact fit gives no estimate of the noise.
+    (factorisation.rank == n && scale > 0.0).then(|| {
+        let root = factorisation.inverse_root();
+        let column = |z: &[f64]| DVector::from_vec(sensitivity.directions.to_parameters(z));
+        let columns: Vec<_> = root.column_iter().map(|z| column(z.as_slice())).collect();
+        let root = DMatrix::from_columns(&columns);
+        &root * root.transpose() * scale
+    })
 }
 
 /// Rows `sqrt(weight) L` of a penalty along the directions, or their triangular factor where that has fewer rows.
@@ -210,7 +215,7 @@ fn roughness(problem: &Problem, penalty: &Penalty, directions: &Directions) -> D
 }
 
 /// Matrix `a` above `b`.
-pub(super) fn stacked(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn stacked(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(a.nrows() + b.nrows(), a.ncols());
     out.rows_mut(0, a.nrows()).copy_from(a);
     out.rows_mut(a.nrows(), b.nrows()).copy_from(b);

@@ -9,9 +9,13 @@
 //!
 //! degrees of freedom: `n - p` for one sigma alone (Satterthwaite 1946; Kenward and Roger 1997).
 
+use super::covariance::covariance;
+use super::directions::Directions;
+use super::sensitivity::Sensitivity;
 use crate::noise::STEP;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::record::Channel;
 use nalgebra::DMatrix;
 
 /// Covariances of the parameters with the noise moved along its coordinates.
@@ -30,26 +34,34 @@ struct ChannelVariants {
 impl NoiseVariants {
     /// Variants at an evaluated point; `None` where no noise was estimated with a covariance, or the parameters have none.
     pub fn of(problem: &Problem, evaluation: &Evaluation) -> Option<Self> {
-        let is_estimated = |c: &crate::record::Channel| !c.noise().covariance.is_empty();
+        let is_estimated = |c: &Channel| !c.noise().covariance.is_empty();
         if !problem.channels().any(is_estimated) {
             return None;
         }
         let here = problem.covariance(evaluation)?;
+        let n = problem.parameters();
+        let directions = Directions::new(problem, evaluation, n, n);
+        let jacobian = directions.of_jacobian(problem.predictions_jacobian(evaluation));
         let mut channels = Vec::new();
         for (e, experiment) in problem.experiments.iter().enumerate() {
             for (c, channel) in experiment.channels.iter().enumerate() {
-                let covariance = channel.noise().covariance.clone();
-                let side = |index: usize, step: f64| {
-                    let mut moved = problem.clone();
-                    moved.parts_mut().experiments[e].channels[c] =
-                        channel.with_moved_noise(index, step);
-                    moved.covariance(evaluation)
+                let mut moved = problem.clone();
+                let mut side = |index: usize, step: f64| {
+                    let noise = channel.with_moved_noise(index, step);
+                    moved.parts_mut().experiments[e].channels[c] = noise;
+                    let (directions, jacobian) = (directions.clone(), jacobian.clone());
+                    let sensitivity =
+                        Sensitivity::weighted(&moved, evaluation, directions, jacobian);
+                    covariance(&moved, &sensitivity)
                 };
                 let mut sides = Vec::new();
-                for index in 0..covariance.nrows() {
+                for index in 0..channel.noise().covariance.nrows() {
                     sides.push([side(index, STEP)?, side(index, -STEP)?]);
                 }
-                channels.push(ChannelVariants { sides, covariance });
+                channels.push(ChannelVariants {
+                    sides,
+                    covariance: channel.noise().covariance.clone(),
+                });
             }
         }
         Some(Self { here, channels })
@@ -90,11 +102,15 @@ impl Problem {
     /// Degrees of freedom of the estimate of each parameter: Student's t distribution gives their intervals. Infinite, for the
     /// normal distribution, where the noise counts as known.
     pub fn degrees_of_freedom(&self, evaluation: &Evaluation) -> Vec<f64> {
-        match NoiseVariants::of(self, evaluation) {
-            None => vec![f64::INFINITY; self.parameters()],
-            Some(variants) => (0..self.parameters())
-                .map(|j| variants.degrees(&[(j, 1.0)]))
-                .collect(),
-        }
+        degrees_of_parameters(self, NoiseVariants::of(self, evaluation).as_ref())
+    }
+}
+
+/// Degrees of freedom of the estimate of each parameter.
+pub(super) fn degrees_of_parameters(problem: &Problem, noise: Option<&NoiseVariants>) -> Vec<f64> {
+    let parameters = 0..problem.parameters();
+    match noise {
+        None => parameters.map(|_| f64::INFINITY).collect(),
+        Some(noise) => parameters.map(|j| noise.degrees(&[(j, 1.0)])).collect(),
     }
 }

@@ -39,6 +39,7 @@ pub use bands::{BandSettings, Bands};
 pub use classification::{
     Classification, ClassificationKind, FunctionClassification, classify_functions,
 };
+pub(crate) use covariance::stacked;
 pub use experiments::{
     CandidateChannel, CandidateExperiment, Gain, Ranked, rank_experiments, residual_spread,
 };

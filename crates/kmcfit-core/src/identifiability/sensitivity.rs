@@ -16,7 +16,8 @@ const MOST_WORK: f64 = 3.1e9;
 /// Number of smooth directions.
 const COARSE: usize = 600;
 
-/// Weighted Jacobian `sqrt(w_i) dz_i/dtheta . d_k` for all samples `i` and directions `k`.
+/// Weighted Jacobian `sqrt(w_i) dz_i/dtheta . d_k` for all samples `i` and directions `k`; for correlated noise the rows are
+/// whitened ([`Channel::whiten_rows`](crate::record::Channel::whiten_rows)).
 ///
 /// `w` are the weights of the samples: `1/sigma^2`, or the quadrature weights of the integral cost, for a robust loss
 /// those of its quadratic majorant. The directions `d_k` have natural sizes ([`Directions`]), so the entries are
@@ -55,6 +56,20 @@ impl Sensitivity {
 
     /// Along given directions.
     pub fn along(problem: &Problem, evaluation: &Evaluation, directions: Directions) -> Self {
+        let jacobian = match directions.is_coarse() {
+            true => by_tangents(problem, evaluation, &directions),
+            false => directions.of_jacobian(problem.predictions_jacobian(evaluation)),
+        };
+        Self::weighted(problem, evaluation, directions, jacobian)
+    }
+
+    /// Weights the derivatives `jacobian` of the predictions along the directions by the noise of the problem.
+    pub(super) fn weighted(
+        problem: &Problem,
+        evaluation: &Evaluation,
+        directions: Directions,
+        mut jacobian: DMatrix<f64>,
+    ) -> Self {
         let (mut roots, mut residuals) = (Vec::new(), Vec::new());
         let mut has_sigma = Vec::new();
         for (channel, predicted) in problem.predicted(evaluation) {
@@ -66,10 +81,6 @@ impl Sensitivity {
                 channel.len(),
             ));
         }
-        let mut jacobian = match directions.is_coarse() {
-            true => by_tangents(problem, evaluation, &directions, roots.len()),
-            false => directions.of_jacobian(problem.predictions_jacobian(evaluation)),
-        };
         problem.whiten_rows(&mut jacobian);
         for mut column in jacobian.column_iter_mut() {
             (column.iter_mut().zip(&roots)).for_each(|(a, root)| *a *= root);
@@ -104,9 +115,8 @@ fn by_tangents(
     problem: &Problem,
     evaluation: &Evaluation,
     directions: &Directions,
-    samples: usize,
 ) -> DMatrix<f64> {
-    let mut jacobian = DMatrix::zeros(samples, directions.len());
+    let mut jacobian = DMatrix::zeros(problem.sample_count(), directions.len());
     for k in 0..directions.len() {
         let changes = problem.predictions_tangent(evaluation, &directions.column(k));
         let all = changes.iter().flatten().flatten();

@@ -83,7 +83,6 @@ impl Autoregression {
     }
 
     /// Autocorrelations at the lags `0..count`.
-    #[cfg(test)]
     pub fn autocorrelation(&self, count: usize) -> Vec<f64> {
         let mut found = vec![1.0];
         for lag in 1..count {

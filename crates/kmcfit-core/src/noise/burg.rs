@@ -13,38 +13,46 @@ const SAMPLES_PER_COEFFICIENT: usize = 10;
 ///
 /// Source: Burg (1975), *Maximum entropy spectral analysis*; for interrupted records de Waele and Broersen (2000).
 pub fn burg(values: &[f64], runs: &[Range<usize>], order: usize) -> Autoregression {
-    Autoregression::new(partial_autocorrelations(values, runs, order)).unwrap_or_default()
+    let found = partial_autocorrelations(values, runs, order).into_iter();
+    Autoregression::new(found.map(|(phi, _)| phi).collect()).unwrap_or_default()
 }
 
-/// Process whose order, between 0 and `highest`, minimises the Bayesian information criterion `n log v_p + p log n`, with the
-/// relative variance `v_p` of the innovations.
+/// Process whose order, between 0 and `highest`, minimises the Bayesian information criterion `sum_k n_k log(1 - phi_k^2) + p log n`,
+/// with the number `n_k` of products from which the partial autocorrelation `phi_k` is estimated: `n - k` without interruptions.
 pub fn select_order(values: &[f64], runs: &[Range<usize>], highest: usize) -> Autoregression {
     let count: usize = runs.iter().map(Range::len).sum();
     let highest = highest.min(count / SAMPLES_PER_COEFFICIENT);
     let partial = partial_autocorrelations(values, runs, highest);
-    let samples = count as f64;
+    let penalty = (count as f64).ln();
     let (mut criterion, mut best) = (0.0, (0.0, 0));
-    for (k, phi) in partial.iter().enumerate() {
-        criterion += samples * (-phi * phi).ln_1p() + samples.ln();
+    for (k, (phi, products)) in partial.iter().enumerate() {
+        criterion += *products as f64 * (-phi * phi).ln_1p() + penalty;
         if criterion < best.0 {
             best = (criterion, k + 1);
         }
     }
-    Autoregression::new(partial[..best.1].to_vec()).unwrap_or_default()
+    let chosen = partial[..best.1].iter().map(|(phi, _)| *phi);
+    Autoregression::new(chosen.collect()).unwrap_or_default()
 }
 
-/// Partial autocorrelations of the orders `1..=order`, fewer where the prediction errors vanish.
-fn partial_autocorrelations(values: &[f64], runs: &[Range<usize>], order: usize) -> Vec<f64> {
+/// Partial autocorrelations of the orders `1..=order`, fewer where the prediction errors vanish, each with the number of products in
+/// its estimate.
+fn partial_autocorrelations(
+    values: &[f64],
+    runs: &[Range<usize>],
+    order: usize,
+) -> Vec<(f64, usize)> {
     let mut errors: Vec<[Vec<f64>; 2]> = (runs.iter())
         .map(|run| [values[run.clone()].to_vec(), values[run.clone()].to_vec()])
         .collect();
     let mut partial = Vec::with_capacity(order);
     for k in 1..=order {
-        let (mut product, mut squares) = (0.0, 0.0);
+        let (mut product, mut squares, mut count) = (0.0, 0.0, 0);
         for [forward, backward] in &errors {
             for i in k..forward.len() {
                 product += forward[i] * backward[i - 1];
                 squares += forward[i] * forward[i] + backward[i - 1] * backward[i - 1];
+                count += 1;
             }
         }
         let phi = 2.0 * product / squares;
@@ -52,7 +60,7 @@ fn partial_autocorrelations(values: &[f64], runs: &[Range<usize>], order: usize)
         if phi.is_nan() || phi.abs() >= 1.0 {
             break;
         }
-        partial.push(phi);
+        partial.push((phi, count));
         for [forward, backward] in &mut errors {
             for i in (k..forward.len()).rev() {
                 let (f, b) = (forward[i], backward[i - 1]);

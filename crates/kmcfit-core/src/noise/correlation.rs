@@ -1,10 +1,13 @@
 //! Correlation of the noise of one channel, and whitening.
 
 use super::autoregression::Autoregression;
+use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
 /// Largest deviation of a spacing of samples from the smallest one, as a share of it, for which samples are equally spaced.
 const UNEVEN: f64 = 0.01;
+/// Number of spacings across which noise counts as independent.
+const LONGEST_GAP: usize = 1000;
 
 /// Law of the correlation.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,10 +25,23 @@ pub enum CorrelationLaw {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correlation {
     law: CorrelationLaw,
-    /// Runs of samples; noise of different runs is independent.
+    /// Times of the samples, s.
+    times: Vec<f64>,
+    /// Runs of equally spaced samples without a gap; one run for the exponential law.
     runs: Vec<Range<usize>>,
-    /// Correlation of each sample with the one before it, for the exponential law.
-    links: Vec<f64>,
+    /// Predictors of samples that an ordinary predictor does not reach, in the order of the samples: of all but the first
+    /// for the exponential law, of the first `p` samples after each gap for an autoregressive one.
+    predictors: Vec<Predictor>,
+}
+
+/// Best linear predictor of one sample from those before it.
+#[derive(Debug, Clone, PartialEq)]
+struct Predictor {
+    sample: usize,
+    /// Coefficients of the samples before it, the last first.
+    coefficients: Vec<f64>,
+    /// Variance of its error, relative to that of the noise.
+    variance: f64,
 }
 
 /// Runs of equally spaced samples without a gap; `None` if the samples are not equally spaced apart from gaps.
@@ -57,30 +73,39 @@ pub fn uninterrupted_runs(times: &[f64]) -> Option<Vec<Range<usize>>> {
 impl Correlation {
     /// Correlation under `law` of samples at `times`.
     ///
-    /// Noise on both sides of a gap of equally spaced samples counts as independent. An autoregressive law of samples that are
+    /// After a gap of equally spaced samples each of the first `p` is predicted from the last `2 p + 1` samples before it, which is
+    /// exact for `p = 1` and neglects what earlier samples add otherwise (Vecchia 1988). An autoregressive law of samples that are
     /// not equally spaced gives `None`.
     pub fn new(law: CorrelationLaw, times: &[f64]) -> Option<Self> {
-        let (runs, links) = match &law {
-            CorrelationLaw::Autoregressive(_) => (uninterrupted_runs(times)?, Vec::new()),
+        let (runs, predictors) = match &law {
+            CorrelationLaw::Autoregressive(process) => {
+                let runs = uninterrupted_runs(times)?;
+                let predictors = predictors_after_gaps(process, &runs, times);
+                (runs, predictors)
+            }
             CorrelationLaw::Exponential { time } => {
-                let later = times
-                    .windows(2)
-                    .map(|pair| (-(pair[1] - pair[0]) / time).exp());
-                let links = std::iter::once(0.0).chain(later).collect();
-                (std::iter::once(0..times.len()).collect(), links)
+                let later = times.windows(2).enumerate().map(|(i, pair)| {
+                    let link = (-(pair[1] - pair[0]) / time).exp();
+                    Predictor {
+                        sample: i + 1,
+                        coefficients: vec![link],
+                        variance: (1.0 - link) * (1.0 + link),
+                    }
+                });
+                (std::iter::once(0..times.len()).collect(), later.collect())
             }
         };
-        Some(Self { law, runs, links })
+        Some(Self {
+            law,
+            times: times.to_vec(),
+            runs,
+            predictors,
+        })
     }
 
     /// Law of the correlation.
     pub fn law(&self) -> &CorrelationLaw {
         &self.law
-    }
-
-    /// Runs of samples; noise of different runs is independent.
-    pub fn runs(&self) -> &[Range<usize>] {
-        &self.runs
     }
 
     /// Number of estimated coefficients.
@@ -91,21 +116,45 @@ impl Correlation {
         }
     }
 
-    /// The same runs with an autoregressive process.
-    pub fn with_process(&self, process: Autoregression) -> Self {
-        Self {
-            law: CorrelationLaw::Autoregressive(process),
-            ..self.clone()
+    /// Coordinates of the law, in which its likelihood is close to quadratic: [`Autoregression::coordinates`], or the logarithm of the
+    /// correlation time.
+    pub fn coordinates(&self) -> Vec<f64> {
+        match &self.law {
+            CorrelationLaw::Autoregressive(process) => process.coordinates(),
+            CorrelationLaw::Exponential { time } => vec![time.ln()],
         }
     }
 
+    /// The correlation of the same samples at other coordinates of the law.
+    #[must_use]
+    pub fn at(&self, coordinates: &[f64]) -> Self {
+        let law = match &self.law {
+            CorrelationLaw::Autoregressive(_) => {
+                CorrelationLaw::Autoregressive(Autoregression::from_coordinates(coordinates))
+            }
+            CorrelationLaw::Exponential { .. } => CorrelationLaw::Exponential {
+                time: coordinates.iter().sum::<f64>().exp(),
+            },
+        };
+        // The samples are equally spaced as before.
+        Self::new(law, &self.times).unwrap_or_else(|| self.clone())
+    }
+
+    /// True for equally spaced samples without a gap, under an autoregressive law.
+    pub fn is_uninterrupted(&self) -> bool {
+        matches!(self.law, CorrelationLaw::Autoregressive(_)) && self.runs.len() == 1
+    }
+
     /// Correlation of the first `count` samples.
+    #[must_use]
     pub fn first(&self, count: usize) -> Self {
         let runs = self.runs.iter().filter(|run| run.start < count);
+        let predictors = self.predictors.iter().filter(|p| p.sample < count);
         Self {
             law: self.law.clone(),
+            times: self.times[..count.min(self.times.len())].to_vec(),
             runs: runs.map(|run| run.start..run.end.min(count)).collect(),
-            links: self.links.iter().copied().take(count).collect(),
+            predictors: predictors.cloned().collect(),
         }
     }
 
@@ -155,23 +204,61 @@ impl Correlation {
     /// Passes each row of `W` to `take`: the index `i` of its sample, the predictor's coefficients of the samples `i - 1, i - 2,
     /// ...`, and the factor `1/sqrt(v)` of the prediction error.
     pub fn each_row(&self, mut take: impl FnMut(usize, &[f64], f64)) {
+        let mut special = self.predictors.iter().peekable();
         for run in &self.runs {
             for i in run.clone() {
-                match &self.law {
-                    CorrelationLaw::Autoregressive(process) => {
-                        let (coefficients, variance) = process.predictor(i - run.start);
-                        take(i, coefficients, 1.0 / variance.sqrt());
+                let (coefficients, variance) = match (special.peek(), &self.law) {
+                    (Some(own), _) if own.sample == i => (&own.coefficients[..], own.variance),
+                    (_, CorrelationLaw::Autoregressive(process)) => {
+                        process.predictor(i - run.start)
                     }
-                    CorrelationLaw::Exponential { .. } if i == run.start => take(i, &[], 1.0),
-                    CorrelationLaw::Exponential { .. } => {
-                        let link = self.links[i];
-                        let variance = (1.0 - link) * (1.0 + link);
-                        take(i, &[link], 1.0 / variance.sqrt());
-                    }
-                }
+                    (_, CorrelationLaw::Exponential { .. }) => (&[][..], 1.0),
+                };
+                take(i, coefficients, 1.0 / variance.sqrt());
+                special.next_if(|own| own.sample == i);
             }
         }
     }
+}
+
+/// Predictors of the first samples after each gap.
+fn predictors_after_gaps(
+    process: &Autoregression,
+    runs: &[Range<usize>],
+    times: &[f64],
+) -> Vec<Predictor> {
+    let order = process.order();
+    let spacing = runs.iter().find(|run| run.len() > 1);
+    let Some(spacing) = spacing.map(|run| times[run.start + 1] - times[run.start]) else {
+        return Vec::new();
+    };
+    let reach = 2 * order + 1;
+    let lags = process.autocorrelation(LONGEST_GAP);
+    let mut predictors = Vec::new();
+    for pair in runs.windows(2) {
+        let run = &pair[1];
+        for sample in run.start..run.end.min(run.start + order) {
+            let place = |i: usize| ((times[sample] - times[i]) / spacing).round() as usize;
+            let before = (0..sample).rev().take(reach);
+            let before: Vec<usize> = before.map(place).take_while(|p| *p < lags.len()).collect();
+            predictors.extend(predictor(sample, &before, &lags));
+        }
+    }
+    predictors
+}
+
+/// Best linear predictor of a sample from those at the distances `before`, in spacings.
+fn predictor(sample: usize, before: &[usize], lags: &[f64]) -> Option<Predictor> {
+    let count = before.len();
+    let matrix = DMatrix::from_fn(count, count, |i, j| lags[before[i].abs_diff(before[j])]);
+    let right = DVector::from_fn(count, |i, _| lags[before[i]]);
+    let coefficients = matrix.cholesky()?.solve(&right);
+    let variance = 1.0 - coefficients.dot(&right);
+    (variance > 0.0).then(|| Predictor {
+        sample,
+        coefficients: coefficients.as_slice().to_vec(),
+        variance,
+    })
 }
 
 #[cfg(test)]
@@ -189,36 +276,41 @@ mod tests {
         w
     }
 
-    /// `W R W^T = I` with the correlation matrix from the autocorrelations, the determinant, the transpose and the inverse; with a
-    /// gap the matrix has two blocks.
+    /// `W R W^T = I` with the correlation matrix from the autocorrelations, the determinant, the transpose and the inverse, for
+    /// AR(3), for AR(1) with single samples missing, and for irregular times. For AR(3) with a gap the correlation of a sample after the
+    /// gap with those more than seven samples before it is neglected.
     #[test]
     fn whitening_is_a_root_of_the_inverse_correlation_matrix() {
         let n = 12;
-        let process = Autoregression::new(vec![0.7, -0.5, 0.2]).unwrap();
-        let lags = process.autocorrelation(n);
-        let times: Vec<f64> = (0..n).map(|i| 0.1 * (i + 3 * (i / 7)) as f64).collect();
-        let law = CorrelationLaw::Autoregressive(process);
-        let gap = Correlation::new(law, &times).unwrap();
-        assert_eq!(gap.runs(), [0..7, 7..12]);
+        let process = |partial: &[f64]| Autoregression::new(partial.to_vec()).unwrap();
+        let law = |partial: &[f64]| CorrelationLaw::Autoregressive(process(partial));
+        let even: Vec<f64> = (0..n).map(|i| 0.1 * i as f64).collect();
+        let missing: Vec<f64> = (0..n).map(|i| 0.1 * (i + i / 3) as f64).collect();
+        let gap: Vec<f64> = (0..n).map(|i| 0.1 * (i + 3 * (i / 7)) as f64).collect();
         let irregular: Vec<f64> = (0..n).map(|i| (i as f64).powf(1.3)).collect();
-        let time = 2.5;
-        let exponential = CorrelationLaw::Exponential { time };
-        let exponential = Correlation::new(exponential, &irregular).unwrap();
-        let block = |i: usize, j: usize| match (i < 7) == (j < 7) {
-            true => lags[i.abs_diff(j)],
-            false => 0.0,
-        };
-        let decay = |i: usize, j: usize| (-(irregular[i] - irregular[j]).abs() / time).exp();
-        let cases: [(Correlation, DMatrix<f64>); 2] = [
-            (gap, DMatrix::from_fn(n, n, block)),
-            (exponential, DMatrix::from_fn(n, n, decay)),
+        let third = [0.7, -0.5, 0.2];
+        let exponential = CorrelationLaw::Exponential { time: 2.5 };
+        let cases = [
+            (law(&third), &even, 1e-12),
+            (law(&[0.8]), &missing, 1e-12),
+            (law(&third), &gap, 1e-3),
+            (exponential, &irregular, 1e-12),
         ];
-        for (correlation, matrix) in cases {
+        for (law, times, tolerance) in cases {
+            let correlation = Correlation::new(law.clone(), times).unwrap();
+            let matrix = DMatrix::from_fn(n, n, |i, j| match &law {
+                CorrelationLaw::Autoregressive(process) => {
+                    let lag = ((times[i] - times[j]).abs() / 0.1).round() as usize;
+                    process.autocorrelation(lag + 1)[lag]
+                }
+                CorrelationLaw::Exponential { time } => (-(times[i] - times[j]).abs() / time).exp(),
+            });
             let w = whitening(&correlation, n);
             let unit = &w * &matrix * w.transpose();
-            assert!((unit - DMatrix::identity(n, n)).amax() < 1e-13);
+            let error = (unit - DMatrix::identity(n, n)).amax();
+            assert!(error < tolerance, "{law:?} {error}");
             let expected = matrix.determinant().ln();
-            assert!((correlation.log_determinant() - expected).abs() < 1e-12);
+            assert!((correlation.log_determinant() - expected).abs() < tolerance);
             let values: Vec<f64> = (0..n).map(|i| (1.7 * i as f64).sin()).collect();
             let transposed = w.transpose() * DMatrix::from_column_slice(n, 1, &values);
             for (a, b) in correlation
@@ -226,14 +318,19 @@ mod tests {
                 .iter()
                 .zip(&transposed)
             {
-                assert!((a - b).abs() < 1e-14);
+                assert!((a - b).abs() < 1e-13);
             }
             let back = correlation.colour(&correlation.whiten(&values));
             for (a, b) in back.iter().zip(&values) {
-                assert!((a - b).abs() < 1e-13);
+                assert!((a - b).abs() < 1e-12);
             }
             let part = correlation.first(9).whiten(&values[..9]);
             assert_eq!(part, correlation.whiten(&values)[..9]);
+            let same = correlation.at(&correlation.coordinates());
+            let pairs = same.whiten(&values);
+            for (a, b) in pairs.iter().zip(&correlation.whiten(&values)) {
+                assert!((a - b).abs() < 1e-12);
+            }
         }
         assert!(uninterrupted_runs(&irregular).is_none());
     }

@@ -11,9 +11,8 @@
 //! computed once, so that the cost of a step does not depend on the number of samples.
 
 use super::autoregression::Autoregression;
-use super::correlation::{Correlation, CorrelationLaw};
+use super::correlation::Correlation;
 use nalgebra::DMatrix;
-use std::ops::Range;
 
 /// Step of central differences in the coordinates.
 pub const STEP: f64 = 1e-3;
@@ -57,37 +56,31 @@ enum Products {
     Autoregressive {
         /// `sum_i x_(i-k) x_(i-l)^T` over the rows with `p` rows of their run before them, for `0 <= k, l <= p`.
         lags: Vec<Vec<DMatrix<f64>>>,
-        /// First `p` rows of each run.
-        heads: Vec<DMatrix<f64>>,
+        /// First `p` rows.
+        head: DMatrix<f64>,
         /// Number of the other rows.
         rest: usize,
     },
-    Exponential {
-        rows: DMatrix<f64>,
-        times: Vec<f64>,
-    },
+    /// Rows to be whitened anew at each point: with gaps, or at irregular times.
+    Rows(DMatrix<f64>, Correlation),
 }
 
 impl ChannelMoments {
     /// Products of `rows` (samples x (parameters + 1): Jacobian, then residuals, both divided by the reference sigma and not
-    /// whitened) of a channel sampled at `times`; `correlation` is the start value, `None` for white noise.
+    /// whitened) of a channel; `correlation` is the start value, `None` for white noise.
     pub fn new(
         rows: &DMatrix<f64>,
-        times: &[f64],
         correlation: Option<&Correlation>,
         estimates_sigma: bool,
     ) -> Self {
-        let (law, products) = match correlation.map(|c| (c, c.law())) {
-            None => (Vec::new(), Products::White(rows.tr_mul(rows))),
-            Some((_, CorrelationLaw::Exponential { time })) => {
-                let (rows, times) = (rows.clone(), times.to_vec());
-                (vec![time.ln()], Products::Exponential { rows, times })
+        let products = match correlation {
+            None => Products::White(rows.tr_mul(rows)),
+            Some(correlation) if correlation.is_uninterrupted() => {
+                autoregressive(rows, correlation.order())
             }
-            Some((correlation, CorrelationLaw::Autoregressive(process))) => {
-                let products = autoregressive(rows, correlation, process.order());
-                (process.coordinates(), products)
-            }
+            Some(correlation) => Products::Rows(rows.clone(), correlation.clone()),
         };
+        let law = correlation.map_or(Vec::new(), Correlation::coordinates);
         let sigma = estimates_sigma.then_some(0.0);
         Self {
             samples: rows.nrows(),
@@ -101,19 +94,15 @@ impl ChannelMoments {
     fn whitened(&self, law: &[f64]) -> (DMatrix<f64>, f64) {
         match &self.products {
             Products::White(gram) => (gram.clone(), 0.0),
-            Products::Exponential { rows, times } => {
-                let time = law[0].exp();
-                let law = CorrelationLaw::Exponential { time };
-                let Some(correlation) = Correlation::new(law, times) else {
-                    return (rows.tr_mul(rows), f64::NAN);
-                };
+            Products::Rows(rows, correlation) => {
+                let correlation = correlation.at(law);
                 let mut whitened = rows.clone();
                 for (mut to, from) in whitened.column_iter_mut().zip(rows.column_iter()) {
                     to.copy_from_slice(&correlation.whiten(from.as_slice()));
                 }
                 (whitened.tr_mul(&whitened), correlation.log_determinant())
             }
-            Products::Autoregressive { lags, heads, rest } => {
+            Products::Autoregressive { lags, head, rest } => {
                 let process = Autoregression::from_coordinates(law);
                 let variance = process.innovation_variance();
                 let minus = process.coefficients().iter().map(|a| -a);
@@ -125,16 +114,14 @@ impl ChannelMoments {
                     }
                 }
                 let mut determinant = *rest as f64 * variance.ln();
-                for head in heads {
-                    for i in 0..head.nrows() {
-                        let (coefficients, variance) = process.predictor(i);
-                        let mut row = head.row(i).into_owned();
-                        for (j, a) in coefficients.iter().enumerate() {
-                            row -= head.row(i - 1 - j) * *a;
-                        }
-                        gram += row.transpose() * &row / variance;
-                        determinant += variance.ln();
+                for i in 0..head.nrows() {
+                    let (coefficients, variance) = process.predictor(i);
+                    let mut row = head.row(i).into_owned();
+                    for (j, a) in coefficients.iter().enumerate() {
+                        row -= head.row(i - 1 - j) * *a;
                     }
+                    gram += row.transpose() * &row / variance;
+                    determinant += variance.ln();
                 }
                 (gram, determinant)
             }
@@ -142,36 +129,21 @@ impl ChannelMoments {
     }
 }
 
-/// Products of the rows at all lags up to the order.
-fn autoregressive(rows: &DMatrix<f64>, correlation: &Correlation, order: usize) -> Products {
-    let product = |k: usize, l: usize| {
-        let mut sum = DMatrix::zeros(rows.ncols(), rows.ncols());
-        for run in correlation.runs() {
-            let count = run.len().saturating_sub(order);
-            let at = |lag: usize| rows.rows(run.start + order - lag, count);
-            if count > 0 {
-                sum += at(k).tr_mul(&at(l));
-            }
-        }
-        sum
-    };
+/// Products of uninterrupted rows at all lags up to the order.
+fn autoregressive(rows: &DMatrix<f64>, order: usize) -> Products {
+    let rest = rows.nrows().saturating_sub(order);
+    let at = |lag: usize| rows.rows(order - lag, rest);
     let mut lags: Vec<Vec<DMatrix<f64>>> = Vec::with_capacity(order + 1);
     for k in 0..=order {
         let known = lags.iter().map(|row| row[k].transpose());
         let known: Vec<DMatrix<f64>> = known.collect();
-        lags.push(
-            known
-                .into_iter()
-                .chain((k..=order).map(|l| product(k, l)))
-                .collect(),
-        );
+        let further = (k..=order).map(|l| at(k).tr_mul(&at(l)));
+        lags.push(known.into_iter().chain(further).collect());
     }
-    let head = |run: &Range<usize>| rows.rows(run.start, run.len().min(order)).into_owned();
-    let rest = |run: &Range<usize>| run.len().saturating_sub(order);
     Products::Autoregressive {
         lags,
-        heads: correlation.runs().iter().map(head).collect(),
-        rest: correlation.runs().iter().map(rest).sum(),
+        head: rows.rows(0, rows.nrows() - rest).into_owned(),
+        rest,
     }
 }
 
@@ -322,6 +294,7 @@ fn newton_step(gradient: &DMatrix<f64>, hessian: &DMatrix<f64>) -> Option<Vec<f6
 
 #[cfg(test)]
 mod tests {
+    use super::super::correlation::CorrelationLaw;
     use super::*;
     use crate::diagnostics::noise::auto_regression;
 
@@ -329,26 +302,31 @@ mod tests {
         DMatrix::from_fn(columns[0].len(), columns.len(), |i, j| columns[j][i])
     }
 
-    /// A constant in AR(1) noise at given coefficients: `f` from dense matrices.
+    /// A line in AR(1) and AR(2) noise at given coefficients: `f` from dense matrices, without and with a gap.
     #[test]
     fn the_likelihood_agrees_with_dense_matrices() {
+        agrees_with_dense_matrices(&[0.5, -0.3], 0);
+        agrees_with_dense_matrices(&[0.5], 4);
+    }
+
+    fn agrees_with_dense_matrices(partial: &[f64], gap: usize) {
         let n = 40;
         let values = auto_regression(3, n, 0.6);
         let ramp: Vec<f64> = (0..n).map(|i| i as f64 / n as f64).collect();
         let x = rows(&[vec![1.0; n], ramp, values]);
-        let times: Vec<f64> = (0..n).map(|i| (i + 4 * (i / 25)) as f64).collect();
-        let process = Autoregression::new(vec![0.5, -0.3]).unwrap();
-        let lags = process.autocorrelation(n);
+        let times: Vec<f64> = (0..n).map(|i| (i + gap * (i / 25)) as f64).collect();
+        let process = Autoregression::new(partial.to_vec()).unwrap();
+        let lags = process.autocorrelation(n + gap);
         let law = CorrelationLaw::Autoregressive(process.clone());
         let correlation = Correlation::new(law, &times).unwrap();
-        let moments = ChannelMoments::new(&x, &times, Some(&correlation), true);
+        let moments = ChannelMoments::new(&x, Some(&correlation), true);
         let likelihood = RestrictedLikelihood::new(vec![moments], DMatrix::zeros(3, 3));
         let log_sigma = 0.3f64;
         let mut at = vec![log_sigma];
         at.extend(process.coordinates());
-        let matrix = DMatrix::from_fn(n, n, |i, j| match (i < 25) == (j < 25) {
-            true => (2.0 * log_sigma).exp() * lags[i.abs_diff(j)],
-            false => 0.0,
+        let place = |i: usize| i + gap * (i / 25);
+        let matrix = DMatrix::from_fn(n, n, |i, j| {
+            (2.0 * log_sigma).exp() * lags[place(i).abs_diff(place(j))]
         });
         let inverse = matrix.clone().try_inverse().unwrap();
         let (j, r) = (x.columns(0, 2), x.columns(2, 1));
@@ -367,7 +345,7 @@ mod tests {
         let n = 60;
         let ramp: Vec<f64> = (0..n).map(|i| i as f64 / n as f64).collect();
         let x = rows(&[vec![1.0; n], ramp, auto_regression(5, n, 0.0)]);
-        let moments = ChannelMoments::new(&x, &[], None, true);
+        let moments = ChannelMoments::new(&x, None, true);
         let likelihood = RestrictedLikelihood::new(vec![moments], DMatrix::zeros(3, 3));
         let found = likelihood.fit().unwrap();
         let (j, r) = (x.columns(0, 2).into_owned(), x.columns(2, 1).into_owned());
@@ -403,7 +381,7 @@ mod tests {
             all.push(noise);
             let law = CorrelationLaw::Autoregressive(process);
             let correlation = Correlation::new(law, &times).unwrap();
-            let moments = ChannelMoments::new(&rows(&all), &times, Some(&correlation), true);
+            let moments = ChannelMoments::new(&rows(&all), Some(&correlation), true);
             let found = RestrictedLikelihood::new(vec![moments], DMatrix::zeros(7, 7)).fit();
             mean += found.unwrap().channels[0].law[0].tanh() / seeds as f64;
         }

@@ -1,7 +1,7 @@
 //! Noise of a channel: model, estimated correlation, and whitening of residuals and of rows of the Jacobian.
 
 use super::{Channel, Loss, Weighting};
-use crate::noise::{Autoregression, Correlation, CorrelationLaw};
+use crate::noise::Correlation;
 use nalgebra::DMatrix;
 
 /// Model of the correlation of a channel's noise in time.
@@ -16,7 +16,7 @@ pub enum NoiseModel {
     Auto,
     /// Autoregressive of this order, for equally spaced samples with or without gaps.
     Autoregressive {
-        /// Order, at least 1.
+        /// Order, from 1 to [`HIGHEST_ORDER`](crate::noise::HIGHEST_ORDER).
         order: usize,
     },
 }
@@ -27,11 +27,9 @@ pub struct NoiseEstimate {
     /// Correlation; `None` for white noise.
     pub correlation: Option<Correlation>,
     /// Covariance of the estimated noise parameters: the logarithm of sigma where it is estimated, then the coordinates of
-    /// the correlation ([`Autoregression::coordinates`], or the logarithm of the correlation time). Without rows where the
+    /// the correlation ([`Correlation::coordinates`]). Without rows where the
     /// noise counts as known.
     pub covariance: DMatrix<f64>,
-    /// True where the innovations are not white, so that the covariance of the parameters is estimated from their products.
-    pub is_misspecified: bool,
 }
 
 /// Quadratic majorant `sum_i (root_i (e_i + de_i))^2` of a channel's misfit at a point: `e` are the residuals, whitened
@@ -92,21 +90,11 @@ impl Channel {
             (Weighting::Estimated { .. }, later) => later - 1,
             (_, index) => index,
         };
-        let Some(correlation) = &self.noise.correlation else {
-            return moved;
-        };
-        moved.noise.correlation = match correlation.law() {
-            CorrelationLaw::Autoregressive(process) => {
-                let mut coordinates = process.coordinates();
-                coordinates[index] += step;
-                let process = Autoregression::from_coordinates(&coordinates);
-                Some(correlation.with_process(process))
-            }
-            CorrelationLaw::Exponential { time } => {
-                let time = time * step.exp();
-                Correlation::new(CorrelationLaw::Exponential { time }, self.times())
-            }
-        };
+        moved.noise.correlation = moved.noise.correlation.map(|correlation| {
+            let mut coordinates = correlation.coordinates();
+            coordinates[index] += step;
+            correlation.at(&coordinates)
+        });
         moved
     }
 
@@ -216,6 +204,7 @@ impl Channel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::noise::{Autoregression, CorrelationLaw};
     use crate::record::ChannelKind;
     use crate::system::Grid;
 

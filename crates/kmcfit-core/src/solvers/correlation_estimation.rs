@@ -1,15 +1,18 @@
 //! Estimation of the correlation of noise from the residuals of a fit.
 
 use super::fit::Fit;
+use super::linearization::{add_penalties, add_priors};
 use super::settings::{FitSettings, Solver};
-use crate::identifiability::Factorisation;
+use crate::diagnostics::spread;
+use crate::identifiability::{Factorisation, stacked};
 use crate::noise::{
     Autoregression, ChannelMoments, Correlation, CorrelationLaw, HIGHEST_ORDER, NoiseCoordinates,
     RestrictedLikelihood, burg, select_exponential, select_order, uninterrupted_runs,
 };
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::record::{Channel, NoiseEstimate, NoiseModel, Weighting};
+use crate::qp::Subproblem;
+use crate::record::{Channel, Loss, NoiseEstimate, NoiseModel, Weighting};
 use crate::simd::sum::rms;
 use nalgebra::DMatrix;
 
@@ -44,36 +47,46 @@ fn asks(problem: &Problem, channel: &Channel) -> bool {
     }
 }
 
-/// The problem with correlations estimated from the residuals of `found`; with `is_frozen`, orders stay as they are.
-pub(super) fn correlated(problem: &Problem, found: &Fit, is_frozen: bool) -> Problem {
-    let mut next = problem.clone();
-    let judged: Vec<bool> = problem.channels().map(|c| asks(problem, c)).collect();
-    let mut judged = judged.into_iter();
-    let experiments = next.parts_mut().experiments.iter_mut();
-    for (experiment, predictions) in experiments.zip(&found.best.evaluation.predictions) {
-        for (channel, predicted) in experiment.channels.iter_mut().zip(predictions) {
-            if judged.next() == Some(true) {
-                let correlation = estimate(channel, predicted, is_frozen);
-                let noise = NoiseEstimate {
-                    correlation,
-                    ..NoiseEstimate::default()
-                };
-                *channel = channel.clone().with_noise(noise);
-            }
-        }
+/// The problem with correlations estimated from the residuals of `found`; with `is_frozen`, orders stay as they are. `None` where
+/// all noise is white and was so before.
+pub(super) fn correlated(problem: &Problem, found: &Fit, is_frozen: bool) -> Option<Problem> {
+    let channels = problem.predicted(&found.best.evaluation);
+    let estimated: Vec<Option<Correlation>> = channels
+        .map(|(channel, predicted)| match asks(problem, channel) {
+            true => estimate(channel, predicted, is_frozen),
+            false => None,
+        })
+        .collect();
+    if is_white(problem) && estimated.iter().all(Option::is_none) {
+        return None;
     }
-    next
+    let mut next = problem.clone();
+    let experiments = next.parts_mut().experiments.iter_mut();
+    let channels = experiments.flat_map(|e| &mut e.channels);
+    for (channel, correlation) in channels.zip(estimated) {
+        let noise = NoiseEstimate {
+            correlation,
+            ..NoiseEstimate::default()
+        };
+        *channel = channel.clone().with_noise(noise);
+    }
+    Some(next)
+}
+
+/// True if the noise of all channels is uncorrelated.
+pub(super) fn is_white(problem: &Problem) -> bool {
+    problem.channels().all(|c| c.correlation().is_none())
 }
 
 /// Correlation of the residuals of a channel; `None` for white ones.
 fn estimate(channel: &Channel, predicted: &[f64], is_frozen: bool) -> Option<Correlation> {
     let residuals: Vec<f64> = channel.residuals(predicted).collect();
-    if channel.noise_model() == NoiseModel::Auto && !are_noise(channel, &residuals) {
-        return None;
-    }
     let sigma = |i: usize| channel.weighting().sigma(i).unwrap_or(1.0);
     let each = residuals.iter().enumerate();
     let normalised: Vec<f64> = each.map(|(i, r)| r / sigma(i)).collect();
+    if channel.noise_model() == NoiseModel::Auto && !are_noise(channel, &residuals, &normalised) {
+        return None;
+    }
     let times = channel.times();
     let before = channel.correlation().map(Correlation::order);
     let process = match (uninterrupted_runs(times), channel.noise_model(), before) {
@@ -94,32 +107,26 @@ fn autoregressive(process: Autoregression, times: &[f64]) -> Option<Correlation>
     Correlation::new(law, times).filter(|c| c.order() > 0)
 }
 
-/// True if residuals are larger than rounding errors, small beside the variation of the samples, and consistent with a stated
-/// sigma.
-fn are_noise(channel: &Channel, residuals: &[f64]) -> bool {
-    let observed = channel.observed();
-    let mean = observed.iter().sum::<f64>() / observed.len() as f64;
-    let about: Vec<f64> = observed.iter().map(|y| y - mean).collect();
-    let share = rms(residuals) / rms(&about);
-    let is_stated = !matches!(channel.weighting(), Weighting::Estimated { .. });
-    let sigma = |i: usize| channel.weighting().sigma(i).unwrap_or(1.0);
-    let each = residuals.iter().enumerate();
-    let normalised: Vec<f64> = each.map(|(i, r)| r / sigma(i)).collect();
-    (NOISE[0]..NOISE[1]).contains(&share) && !(is_stated && rms(&normalised) > BEYOND_SIGMA)
+/// True if the residuals of a channel are larger than rounding errors, small beside the variation of the samples, and consistent
+/// with a stated sigma; `normalised` are the residuals over sigma.
+fn are_noise(channel: &Channel, residuals: &[f64], normalised: &[f64]) -> bool {
+    let share = rms(residuals) / spread(channel.observed());
+    let is_estimated = matches!(channel.weighting(), Weighting::Estimated { .. });
+    (NOISE[0]..NOISE[1]).contains(&share) && (is_estimated || rms(normalised) <= BEYOND_SIGMA)
 }
 
 /// True if the residuals of a channel with a chosen order are larger in `fit` than in the fit `white` with uncorrelated noise by more
 /// than noise explains: the correlation then stands for a term missing from the model.
 pub(super) fn is_worse(problem: &Problem, fit: &Fit, white: &Fit) -> bool {
-    let predictions = |of: &Fit| of.best.evaluation.predictions.concat();
-    let pairs = predictions(fit).into_iter().zip(predictions(white));
-    let mut channels = problem.channels().zip(pairs);
-    channels.any(|(channel, (now, before))| {
+    let now = problem.predicted(&fit.best.evaluation);
+    let before = white.best.evaluation.predictions.iter().flatten();
+    let mut channels = now.zip(before);
+    channels.any(|((channel, now), before)| {
         let size = |predicted: &[f64]| {
             let residuals: Vec<f64> = channel.residuals(predicted).collect();
             rms(&residuals)
         };
-        channel.noise_model() == NoiseModel::Auto && size(&now) > GROWTH * size(&before)
+        channel.noise_model() == NoiseModel::Auto && size(now) > GROWTH * size(before)
     })
 }
 
@@ -140,23 +147,24 @@ pub(super) fn movement(problem: &Problem, from: &[f64], found: &Fit) -> f64 {
 }
 
 /// The problem with sigmas and correlations of the largest restricted likelihood at an evaluated point, and their covariance;
-/// `None` with more than [`FEW_PARAMETERS`] parameters or where the likelihood has no maximum.
+/// `None` with more than [`FEW_PARAMETERS`] parameters, under a robust loss, or where the likelihood has no maximum.
 pub(super) fn refined(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
 ) -> Option<Problem> {
-    if problem.parameters() > FEW_PARAMETERS {
+    let is_robust = problem.channels().any(|c| c.loss() != Loss::Squares);
+    if problem.parameters() > FEW_PARAMETERS || is_robust {
         return None;
     }
-    let (moments, known) = moments(problem, theta, evaluation)?;
+    let (moments, known) = moments(problem, theta, evaluation);
     let found = RestrictedLikelihood::new(moments, known).fit()?;
     let mut next = problem.clone();
     let mut each = found.channels.iter().zip(found.covariances);
     for experiment in &mut next.parts_mut().experiments {
         for channel in &mut experiment.channels {
             let (coordinates, covariance) = each.next()?;
-            *channel = with_coordinates(channel, coordinates, covariance)?;
+            *channel = with_coordinates(channel, coordinates, covariance);
         }
     }
     Some(next)
@@ -168,67 +176,65 @@ fn moments(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
-) -> Option<(Vec<ChannelMoments>, DMatrix<f64>)> {
+) -> (Vec<ChannelMoments>, DMatrix<f64>) {
     let n = problem.parameters();
-    let jacobian = problem.predictions_jacobian(evaluation);
-    let mut rows = jacobian.insert_column(n, 0.0);
+    let mut rows = (problem.predictions_jacobian(evaluation)).insert_column(n, 0.0);
     let mut first = 0;
     for (channel, predicted) in problem.predicted(evaluation) {
-        let roots = channel.majorant(predicted).roots;
         for (i, r) in channel.residuals(predicted).enumerate() {
             rows[(first + i, n)] = r;
-            // Under a robust loss the innovations have weights; the samples take those of their own innovations.
-            let root = match (channel.correlation(), channel.weighting().sigma(i)) {
-                (Some(_), Some(sigma)) => roots[i] / sigma,
-                _ => roots[i],
-            };
-            rows.row_mut(first + i).iter_mut().for_each(|x| *x *= root);
+            let root = channel.weighting().weight(i, channel.len()).sqrt();
+            rows.row_mut(first + i).scale_mut(root);
         }
         first += channel.len();
     }
-    let mut rest = crate::qp::Subproblem::new(n);
-    super::linearization::add_penalties(problem, theta, &mut rest);
-    super::linearization::add_priors(problem, theta, &mut rest);
-    let rest = rest.residuals;
-    let mut known = DMatrix::zeros(rest.len(), n + 1);
-    for i in 0..rest.len() {
-        (rest.row(i)).for_each(|(j, a)| known[(i, j)] += a);
-        known[(i, n)] = -rest.right()[i];
-    }
-    // Columns of unit length first: parameters have different units.
-    let mut all = rows
-        .clone()
-        .resize_vertically(rows.nrows() + known.nrows(), 0.0);
-    all.rows_mut(rows.nrows(), known.nrows()).copy_from(&known);
-    let all = all.columns(0, n).into_owned();
-    let sizes: Vec<f64> = all
-        .column_iter()
-        .map(|c| c.norm().max(f64::MIN_POSITIVE))
-        .collect();
-    let scaled = DMatrix::from_fn(all.nrows(), n, |i, j| all[(i, j)] / sizes[j]);
-    let root = Factorisation::of(&scaled).inverse_root();
-    let q = root.ncols();
-    let mut map = DMatrix::zeros(n + 1, q + 1);
-    map.view_mut((0, 0), (n, q))
-        .copy_from(&DMatrix::from_fn(n, q, |i, j| root[(i, j)] / sizes[i]));
-    map[(n, q)] = 1.0;
+    let known = penalty_rows(problem, theta);
+    let map = determined(&stacked(&rows, &known));
     let rows = rows * &map;
     let known = known * &map;
     let mut first = 0;
-    let mut list = Vec::new();
-    for channel in problem.channels() {
+    let moments = problem.channels().map(|channel| {
         let own = rows.rows(first, channel.len()).into_owned();
         first += channel.len();
         let estimates = matches!(channel.weighting(), Weighting::Estimated { .. });
-        let correlation = channel.correlation();
-        list.push(ChannelMoments::new(
-            &own,
-            channel.times(),
-            correlation,
-            estimates,
-        ));
+        ChannelMoments::new(&own, channel.correlation(), estimates)
+    });
+    (moments.collect(), known.tr_mul(&known))
+}
+
+/// Rows of penalties and priors, with their residuals in the last column.
+fn penalty_rows(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
+    let n = problem.parameters();
+    let mut subproblem = Subproblem::new(n);
+    add_penalties(problem, theta, &mut subproblem);
+    add_priors(problem, theta, &mut subproblem);
+    let residuals = subproblem.residuals;
+    let mut rows = DMatrix::zeros(residuals.len(), n + 1);
+    for i in 0..residuals.len() {
+        (residuals.row(i)).for_each(|(j, a)| rows[(i, j)] += a);
+        rows[(i, n)] = -residuals.right()[i];
     }
-    Some((list, known.tr_mul(&known)))
+    rows
+}
+
+/// Map of the columns of `rows` to orthonormal combinations of all but the last, as far as the rows determine them, and the last
+/// column. The columns are first scaled to unit length, because parameters have different units.
+fn determined(rows: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = rows.ncols() - 1;
+    let mut scaled = rows.columns(0, n).into_owned();
+    let mut sizes = Vec::with_capacity(n);
+    for mut column in scaled.column_iter_mut() {
+        let size = column.norm().max(f64::MIN_POSITIVE);
+        column /= size;
+        sizes.push(size);
+    }
+    let root = Factorisation::of(&scaled).inverse_root();
+    let q = root.ncols();
+    DMatrix::from_fn(n + 1, q + 1, |i, j| match (i < n, j < q) {
+        (true, true) => root[(i, j)] / sizes[i],
+        (false, false) => 1.0,
+        _ => 0.0,
+    })
 }
 
 /// The channel with noise at `coordinates`, sigma relative to its present value.
@@ -236,7 +242,7 @@ fn with_coordinates(
     channel: &Channel,
     coordinates: &NoiseCoordinates,
     covariance: DMatrix<f64>,
-) -> Option<Channel> {
+) -> Channel {
     let mut next = channel.clone();
     if let (Weighting::Estimated { sigma }, Some(log)) =
         (channel.weighting(), coordinates.log_sigma)
@@ -244,24 +250,9 @@ fn with_coordinates(
         let sigma = sigma * log.exp();
         next = next.with_weighting(Weighting::Estimated { sigma });
     }
-    let times = channel.times();
-    let correlation = match channel.correlation().map(Correlation::law) {
-        None => None,
-        Some(CorrelationLaw::Autoregressive(_)) => {
-            let process = Autoregression::from_coordinates(&coordinates.law);
-            Some(autoregressive(process, times)?)
-        }
-        Some(CorrelationLaw::Exponential { .. }) => {
-            let time = coordinates.law.first()?.exp();
-            Some(Correlation::new(
-                CorrelationLaw::Exponential { time },
-                times,
-            )?)
-        }
-    };
-    Some(next.with_noise(NoiseEstimate {
+    let correlation = channel.correlation().map(|c| c.at(&coordinates.law));
+    next.with_noise(NoiseEstimate {
         correlation,
         covariance,
-        ..channel.noise().clone()
-    }))
+    })
 }

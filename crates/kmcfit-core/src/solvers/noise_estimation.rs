@@ -2,7 +2,7 @@
 
 use super::checkpoint::Observer;
 use super::correlation_estimation::{
-    correlated, is_worse, may_correlate, movement, orders, refined,
+    correlated, is_white, is_worse, may_correlate, movement, orders, refined,
 };
 use super::executor::search;
 use super::fit::{Fit, measured};
@@ -10,6 +10,7 @@ use super::history::IterationRecord;
 use super::settings::FitSettings;
 use super::start_strategy::search_from_starts;
 use super::termination::Status;
+use crate::host::Instant;
 use crate::problem::Problem;
 use crate::record::{Channel, Loss, Weighting};
 use crate::simd::sum::rms;
@@ -17,8 +18,9 @@ use crate::simulate::SimulationError;
 
 /// Largest number of rounds of fit and estimation.
 const ROUNDS: usize = 20;
-/// Largest number of rounds of fit and estimation of correlations, in the first of which their orders are chosen anew.
+/// Largest number of rounds of fit and estimation of correlations by Burg's method.
 const PASSES: usize = 15;
+/// Number of the first of these rounds, in which the orders are chosen anew.
 const FREE_PASSES: usize = 5;
 /// Largest number of rounds of fit and restricted likelihood.
 const REFINEMENTS: usize = 3;
@@ -61,15 +63,9 @@ pub fn fit_with_noise_watched(
     let mut found = search_from_starts(&problem, start, settings, watch)?;
     found = with_sigmas(&mut problem, found, settings, watch)?;
     if may_correlate(&problem, settings) {
-        let white = (problem.clone(), found.clone());
         found = with_correlations(&mut problem, found, settings, watch)?;
-        if is_worse(&problem, &found, &white.1) {
-            let (counts, timings, elapsed) = (found.counts, found.timings, found.elapsed);
-            (problem, found) = white;
-            (found.counts, found.timings, found.elapsed) = (counts, timings, elapsed);
-        }
     }
-    let is_as_stated = !estimates_sigma(&problem) && orders(&problem).iter().all(|p| *p == 0);
+    let is_as_stated = !estimates_sigma(&problem) && is_white(&problem);
     // All costs refer to the final noise.
     if let (false, Ok(evaluation)) = (is_as_stated, problem.evaluate(start)) {
         found.initial_cost = evaluation.cost;
@@ -112,29 +108,41 @@ fn with_sigmas(
 }
 
 /// Fit and estimation of the correlations in alternation, from the residuals by Burg's method until orders and parameters
-/// rest, then by restricted likelihood.
+/// rest, then by restricted likelihood. The fit with uncorrelated noise is returned where the correlations stand for a term missing
+/// from the model.
 fn with_correlations(
     problem: &mut Problem,
     mut found: Fit,
     settings: &FitSettings,
     watch: &mut Observer,
 ) -> Result<Fit, SimulationError> {
+    let mut white = None;
     for pass in 0..PASSES {
-        let next = correlated(problem, &found, pass >= FREE_PASSES);
+        let next = counted(&mut found, |found| {
+            correlated(problem, found, pass >= FREE_PASSES)
+        });
+        let Some(next) = next.filter(|_| !is_ended(&found)) else {
+            break;
+        };
+        white.get_or_insert_with(|| (problem.clone(), found.clone()));
         let rests = orders(&next) == orders(problem);
-        if is_ended(&found) || (rests && orders(&next).iter().all(|p| *p == 0)) {
-            return Ok(found);
-        }
         let moved;
         (found, moved) = refitted(problem, next, found, settings, watch)?;
         if rests && moved < AT_REST {
             break;
         }
     }
+    let Some((as_white, white)) = white else {
+        return Ok(found);
+    };
     for _ in 0..REFINEMENTS {
-        let best = &found.best;
-        let next = refined(problem, &best.parameters, &best.evaluation);
-        let Some(next) = next.filter(|_| !is_ended(&found)) else {
+        if is_ended(&found) || is_white(problem) {
+            break;
+        }
+        let next = counted(&mut found, |found| {
+            refined(problem, &found.best.parameters, &found.best.evaluation)
+        });
+        let Some(next) = next else {
             break;
         };
         let moved;
@@ -143,7 +151,30 @@ fn with_correlations(
             break;
         }
     }
+    if is_worse(problem, &found, &white) {
+        *problem = as_white;
+        return Ok(Fit {
+            outcome: match is_ended(&found) {
+                true => found.outcome,
+                false => white.outcome,
+            },
+            counts: found.counts,
+            timings: found.timings,
+            elapsed: found.elapsed,
+            ..white
+        });
+    }
     Ok(found)
+}
+
+/// Result of work whose time is added to that of the fit.
+fn counted<T>(found: &mut Fit, work: impl FnOnce(&Fit) -> T) -> T {
+    let clock = Instant::now();
+    let result = work(found);
+    let took = clock.elapsed();
+    found.timings.linear_algebra += took;
+    found.elapsed += took;
+    result
 }
 
 /// Fit with the noise of `next`, which becomes the problem; also the largest change of a parameter in standard errors. Sigmas

@@ -1,10 +1,12 @@
 use super::halves::Half;
 use super::*;
+use crate::builder::{Builder, CoefficientSpec, Record};
 use crate::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter,
 };
+use crate::noise::{Autoregression, Correlation, CorrelationLaw};
 use crate::objective::GradientKind;
-use crate::record::{Channel, ChannelKind, Experiment, Weighting};
+use crate::record::{Channel, ChannelKind, Experiment, NoiseEstimate, Weighting};
 use crate::solvers::checkpoint::{ExactF64s, MethodState};
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::methods::{GaussNewton, Step, StepRule};
@@ -212,4 +214,53 @@ fn a_long_record_is_fitted_by_the_continuous_gradient() {
     let (alone, together) = (threads::sharing(run), run());
     assert!(together.history == alone.history && !together.history.is_empty());
     assert_eq!(together.counts, alone.counts);
+}
+
+/// Under correlated noise the step with the states as unknowns is that of the whitened Jacobian, for displacements at nodes and
+/// accelerations between them.
+#[test]
+fn steps_under_correlated_noise_agree_with_and_without_states() {
+    let grid = Grid::new(0.0, 8.0, 161).expect("a grid");
+    let force: Vec<f64> = grid.times().iter().map(|t| (2.0 * t).sin()).collect();
+    let knots = CoefficientSpec::piecewise_linear(5, 4.0);
+    let constants = [1.2, 0.3].map(CoefficientSpec::constant);
+    let [mass, damping] = constants;
+    let between: Vec<f64> = grid.times().iter().take(150).map(|t| t + 0.02).collect();
+    let values = |times: &[f64]| -> Vec<f64> { times.iter().map(|t| 0.1 * t.cos()).collect() };
+    let record = Record::new("driven")
+        .from_state(0.1, 0.0)
+        .force(&grid.times(), &force)
+        .displacement(&grid.times(), &values(&grid.times()))
+        .sigma(0.05)
+        .acceleration(&between, &values(&between))
+        .sigma(0.05);
+    let mut problem = Builder::new([mass, damping, knots])
+        .record(record)
+        .grid(grid)
+        .build()
+        .expect("a problem");
+    for channel in &mut problem.parts_mut().experiments[0].channels {
+        let process = Autoregression::new(vec![0.8, -0.4]).expect("stationary");
+        let law = CorrelationLaw::Autoregressive(process);
+        let noise = NoiseEstimate {
+            correlation: Correlation::new(law, channel.times()),
+            ..NoiseEstimate::default()
+        };
+        *channel = channel.clone().with_noise(noise);
+    }
+    let evaluation = problem.evaluate(&problem.start()).expect("a motion");
+    let whole = of_whole_jacobian(&problem, &evaluation, &mut Timings::default());
+    let steps = structured::steps(&problem, &evaluation);
+    let with_states = structured::subproblem(&problem, &evaluation, &steps);
+    let [expected, found] = [whole, with_states].map(|sub| {
+        let step = sub.solve_equality_constrained().expect("one minimum");
+        step[..problem.parameters()].to_vec()
+    });
+    for (found, expected) in found.iter().zip(&expected) {
+        // Both are orthogonal eliminations of a Jacobian with a condition below 1e4.
+        assert!(
+            (found - expected).abs() <= 1e-9 * expected.abs().max(1e-3),
+            "{found} {expected}"
+        );
+    }
 }

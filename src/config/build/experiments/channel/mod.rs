@@ -234,7 +234,6 @@ fn read_one(
     let filter = band(file, &key, spec, spacing, missing)?;
     let weighting = weighting(file, &sigma_key, of_kind.sigma, sigmas, &values)?;
     let loss = loss(file, &key, of_kind)?;
-    let noise = noise_model(file, &key, of_kind, &times)?;
     Ok(RawChannel {
         kind,
         span,
@@ -246,7 +245,7 @@ fn read_one(
         weighting,
         filter,
         loss,
-        noise,
+        noise: noise_model(of_kind),
         unit: source.unit,
         ignored,
         format: source.format,

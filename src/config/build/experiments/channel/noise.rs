@@ -5,7 +5,6 @@ use crate::config::ModelFile;
 use crate::config::spec::{CorrelationName, LossName};
 use crate::config::values::{ScalarOr, Sigma};
 use crate::error::InputError;
-use kmcfit_core::internals::noise::{HIGHEST_ORDER, uninterrupted_runs};
 use kmcfit_core::internals::record::{Loss, NoiseModel, Weighting};
 
 /// Threshold of Huber's loss: 95 % efficiency for Gaussian noise.
@@ -90,42 +89,11 @@ pub(super) fn loss(file: &ModelFile, key: &str, of_kind: &Spec) -> Result<Loss, 
     })
 }
 
-/// Correlation of the noise of a channel with samples at `times`; `auto` by default.
-pub(super) fn noise_model(
-    file: &ModelFile,
-    key: &str,
-    of_kind: &Spec,
-    times: &[f64],
-) -> Result<NoiseModel, InputError> {
-    let name = of_kind.kind.name();
-    let own = format!("{key}.noise.{name}");
-    let order = match of_kind.noise {
-        None | Some(ScalarOr::Scalar(CorrelationName::Auto)) => return Ok(NoiseModel::Auto),
-        Some(ScalarOr::Scalar(CorrelationName::White)) => return Ok(NoiseModel::White),
-        Some(ScalarOr::Map(spec)) => spec.ar.0,
-    };
-    let own = format!("{own}.ar");
-    if !(1..=HIGHEST_ORDER).contains(&order) {
-        return Err(file
-            .error_at(&own, "the order of the noise is outside its range")
-            .found(order)
-            .expected(format!("an integer from 1 to {HIGHEST_ORDER}")));
-    }
-    if of_kind.sigma.is_none() {
-        return Err(file
-            .error_at(&own, "correlated noise needs a sigma")
-            .found(format!("no `sigma.{name}`"))
-            .expected(format!(
-                "`sigma: {{{name}: …}}`: a number, a column, or `estimate`"
-            )));
-    }
-    match uninterrupted_runs(times) {
-        Some(_) => Ok(NoiseModel::Autoregressive { order }),
-        None => Err(file
-            .error_at(&own, "autoregressive noise needs equally spaced samples")
-            .found("irregular times")
-            .expected(
-                "`auto`, which uses an exponential correlation for irregular times, or `white`",
-            )),
+/// Correlation of the noise of a channel; `auto` by default.
+pub(super) fn noise_model(of_kind: &Spec) -> NoiseModel {
+    match of_kind.noise {
+        None | Some(ScalarOr::Scalar(CorrelationName::Auto)) => NoiseModel::Auto,
+        Some(ScalarOr::Scalar(CorrelationName::White)) => NoiseModel::White,
+        Some(ScalarOr::Map(spec)) => NoiseModel::Autoregressive { order: spec.ar.0 },
     }
 }
