@@ -4,10 +4,10 @@
 use crate::config::DataWarning;
 use crate::report::findings;
 use crate::report::suggestions::{Suggestion, Suspect};
-use kmcfit_core::internals::assessment::{FitWarning, ResidualPattern, Unidentified};
+use kmcfit_core::internals::assessment::{CoarseBasis, FitWarning, ResidualPattern, Unidentified};
 use kmcfit_core::internals::builder::BuildNotice;
 use kmcfit_core::internals::diagnostics::{UntestedReason, Whiteness, WhitenessResult};
-use kmcfit_core::internals::identifiability::{Classification, FunctionClassification};
+use kmcfit_core::internals::identifiability::{Classification, Condition, FunctionClassification};
 use kmcfit_core::internals::problem::ProblemError;
 use kmcfit_core::internals::qp::ConicStatus;
 use kmcfit_core::internals::simulate::{Cause, SimulationError};
@@ -580,17 +580,33 @@ fn reasons() -> Vec<Reason> {
     all
 }
 
+fn coarse_basis(halves: Option<[f64; 2]>) -> CoarseBasis {
+    CoarseBasis {
+        index: 2,
+        function: "stiffness".into(),
+        p_value: 2.5e-4,
+        change: 0.13,
+        spans: vec![[3.0, 4.5]],
+        knots: halves.is_none().then_some(21),
+        halves,
+    }
+}
+
 fn fit_warnings() -> Vec<FitWarning> {
-    samples![
+    let mut all = samples![
         FitWarning::BeyondSigma { .. } => FitWarning::BeyondSigma { times: 7.5 },
         FitWarning::CoarseSteps { .. } => FitWarning::CoarseSteps { times: 3.25 },
         FitWarning::PoorFit => FitWarning::PoorFit,
         FitWarning::Coloured => FitWarning::Coloured,
         FitWarning::Correlated => FitWarning::Correlated,
+        FitWarning::CoarseBasis(_) => FitWarning::CoarseBasis(coarse_basis(None)),
         FitWarning::Aliased { .. } => FitWarning::Aliased { per_period: 2.2, frequency: 45.25 },
         FitWarning::Negative { .. } => FitWarning::Negative { function: "stiffness".into() },
         FitWarning::NegligibleForce { .. } => FitWarning::NegligibleForce { experiment: "shaker".into() },
-    ]
+    ];
+    let halves = coarse_basis(Some([1520.0, 1498.5]));
+    all.push(FitWarning::CoarseBasis(halves));
+    all
 }
 
 fn unidentified() -> Vec<Unidentified> {
@@ -630,6 +646,7 @@ fn whiteness() -> Vec<Whiteness> {
 fn classifications() -> Vec<FunctionClassification> {
     let all = samples![
         Classification::Identified { .. } => Classification::Identified { relative: 0.04 },
+        Classification::Conditional { .. } => Classification::Conditional { relative: 0.04, on: Condition::Smoothness },
         Classification::OnlyRatio(_) => Classification::OnlyRatio("k/m".into()),
         Classification::PartlyIdentified(_) => Classification::PartlyIdentified(vec![[0.0, 4.0]]),
         Classification::NotIdentified => Classification::NotIdentified,
@@ -688,6 +705,7 @@ fn suggestions() -> Vec<Suggestion> {
         Suggestion::LargerSigma { .. } => Suggestion::LargerSigma { times: 4.5, fit: 99.12 },
         Suggestion::NoiseLimited { .. } => Suggestion::NoiseLimited { channel: channel(), fit: 71.0, is_white: true },
         Suggestion::NoiseLimited { .. } => Suggestion::NoiseLimited { channel: channel(), fit: 71.0, is_white: false },
+        Suggestion::FinerBasis { .. } => Suggestion::FinerBasis { function: "stiffness".into() },
         Suggestion::MoreParameters { .. } => Suggestion::MoreParameters { absent: vec!["cubic", "friction"] },
         Suggestion::Constant { .. } => Suggestion::Constant { function: "damping".into(), p_value: 0.62 },
         Suggestion::StudyUnidentifiable { .. } => Suggestion::StudyUnidentifiable {

@@ -148,7 +148,7 @@ fn knots() {
     };
     assert_snapshot!(message("{basis: piecewise-linear, start: 1}"), @"
     m.yaml:5:9: functions.mass: the basis `piecewise-linear` needs knots
-      expected: `knots`: the number of equally spaced knots, or a list of times in s
+      expected: `knots`: `auto`, the number of equally spaced knots, or a list of times in s
     ");
     assert_snapshot!(knots("1"), @"
     m.yaml:5:52: functions.mass.knots: there are fewer than two knots
@@ -168,22 +168,22 @@ fn knots() {
     assert_snapshot!(knots("-3"), @"
     m.yaml:5:52: functions.mass.knots: a count cannot be negative
       found: the integer -3
-      expected: the number of equally spaced knots, or a list of times in s
+      expected: the number of equally spaced knots, a list of times in s, or `auto`
     ");
     assert_snapshot!(knots("eleven"), @"
     m.yaml:5:52: functions.mass.knots: not an integer
       found: text `eleven`
-      expected: the number of equally spaced knots, or a list of times in s
+      expected: the number of equally spaced knots, a list of times in s, or `auto`
     ");
     assert_snapshot!(knots("2.5"), @"
     m.yaml:5:52: functions.mass.knots: not an integer
       found: the floating-point number 2.5
-      expected: the number of equally spaced knots, or a list of times in s
+      expected: the number of equally spaced knots, a list of times in s, or `auto`
     ");
     assert_snapshot!(knots("{count: 3}"), @"
     m.yaml:5:52: functions.mass.knots: not an integer
       found: a map
-      expected: the number of equally spaced knots, or a list of times in s
+      expected: the number of equally spaced knots, a list of times in s, or `auto`
     ");
     assert_snapshot!(knots("[0, 5, 12]"), @"
     m.yaml:5:59: functions.mass.knots[2]: this knot lies outside the record

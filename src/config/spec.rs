@@ -221,6 +221,11 @@ keys! {
             example "clarabel",
             default "auto",
             needs "method gauss-newton or projected-gradient";
+        /// Test of the bases at the optimum against finer ones: twice as many knots, two halves for a constant.
+        refinement: Option<bool>,
+            example "false",
+            default "true",
+            needs "`sigma` in every experiment; a method other than equation-error";
         /// Number of step pairs that L-BFGS stores.
         memory: Option<Count>,
             example "20",

@@ -253,15 +253,23 @@ pub enum KnotSpec {
     Count(Count),
     /// Times, s.
     Times(Vec<Number>),
+    /// About 40 intervals, with a smoothness that the data choose.
+    Auto,
 }
 
 impl Value for KnotSpec {
-    const KIND: ValueType =
-        ValueType::AnyOf(&[ValueType::Count, ValueType::List(&ValueType::Number)]);
+    const KIND: ValueType = ValueType::AnyOf(&[
+        ValueType::Count,
+        ValueType::List(&ValueType::Number),
+        ValueType::Word("auto"),
+    ]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
-        let expected = "the number of equally spaced knots, or a list of times in s";
-        (Count::scalar(scalar).map(Self::Count))
-            .map_err(|mistake| mistake.expecting(|_| expected.to_owned()))
+        let expected = "the number of equally spaced knots, a list of times in s, or `auto`";
+        match scalar {
+            Scalar::Text("auto") => Ok(Self::Auto),
+            other => (Count::scalar(other).map(Self::Count))
+                .map_err(|mistake| mistake.expecting(|_| expected.to_owned())),
+        }
     }
     fn list<'de, A: SeqAccess<'de>>(list: A, report: &Report) -> Result<Self, A::Error> {
         report.elements(list).map(Self::Times)
@@ -277,6 +285,8 @@ choice! {
         LCurve = "l-curve",
         /// Generalised cross-validation.
         Gcv = "gcv",
+        /// Restricted maximum likelihood of noise and smoothness; each penalty has its own weight.
+        RestrictedLikelihood = "reml",
         /// Weight at which the function resolves changes within one dominant period of the response.
         Period = "period",
     }

@@ -3,8 +3,9 @@
 use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
 use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
 use kmcfit_core::internals::functions::Ratios;
+use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
-use kmcfit_core::internals::solvers::{PathPoint, WeightPath, WeightRule};
+use kmcfit_core::internals::solvers::{PathPoint, WeightPath};
 use kmcfit_core::internals::study::PredictedResponse;
 
 /// Number of samples beyond which the dots are smaller.
@@ -317,7 +318,7 @@ pub fn weight_path(path: &WeightPath) -> Figure {
         let values: Vec<f64> = path.points.iter().map(part).collect();
         let style = Style::new(colour).width(1.8);
         let dashes = [Dash::Dashed, Dash::Dotted, Dash::DashDot];
-        let picks = WeightRule::ALL.iter().zip(path.picks).zip(dashes);
+        let picks = WeightRule::OF_PATHS.iter().zip(path.picks).zip(dashes);
         let picks = picks.enumerate().filter_map(|(i, ((rule, pick), dash))| {
             let style = Style::nth(i + 1).dash(dash);
             Some(Mark::vertical(

@@ -1,9 +1,10 @@
 //! Findings and warnings about a fit, from the typed results of the core.
 
 use crate::finding::Finding;
-use kmcfit_core::internals::assessment::{FitWarning, Unidentified};
+use crate::number_format::significant;
+use kmcfit_core::internals::assessment::{CoarseBasis, FitWarning, Unidentified};
 use kmcfit_core::internals::identifiability::{
-    Classification, FunctionClassification, RankFinding,
+    Classification, FunctionClassification, RankFinding, span_words,
 };
 use kmcfit_core::internals::study::multistart;
 
@@ -21,6 +22,9 @@ pub fn classification(function: &FunctionClassification) -> Finding {
     let finding = finding.with("function", &function.name);
     match verdict {
         Classification::Identified { relative } => finding.with("relative_half_width", relative),
+        Classification::Conditional { relative, on } => finding
+            .with("relative_half_width", relative)
+            .with("condition", on),
         Classification::OnlyRatio(ratio) => finding.with("ratio", ratio),
         Classification::PartlyIdentified(spans) => finding.with("spans", spans),
         Classification::NotIdentified | Classification::Fixed => finding,
@@ -85,6 +89,7 @@ pub fn warning(warning: &FitWarning) -> Finding {
             "aliasing: with {per_period:.1} samples per period at {frequency:.3} Hz, systems of other natural frequencies \
              fit equally well; use a higher sampling rate or unequal intervals"
         ),
+        FitWarning::CoarseBasis(basis) => coarse_basis(basis),
         FitWarning::Negative { function } => {
             format!("the {function} is negative at most times: the system is not passive")
         }
@@ -93,6 +98,35 @@ pub fn warning(warning: &FitWarning) -> Finding {
         ),
     };
     Finding::of(warning, text)
+}
+
+fn p_in_words(p: f64) -> String {
+    match p < 1e-6 {
+        true => "p < 1e-6".to_owned(),
+        false => format!("p = {}", significant(p, 2)),
+    }
+}
+
+fn coarse_basis(basis: &CoarseBasis) -> String {
+    let CoarseBasis {
+        function, p_value, ..
+    } = basis;
+    let p = p_in_words(*p_value);
+    match (basis.halves, basis.knots) {
+        (Some([first, second]), _) => format!(
+            "the {function} is not constant: {} in the first half of the record, {} in the second (F test, {p})",
+            significant(first, 4),
+            significant(second, 4)
+        ),
+        (None, knots) => format!(
+            "the basis of the {function} is too coarse (F test, {p}): {} changes it by up to {:.0} % on {}",
+            knots.map_or("a finer one".to_owned(), |knots| format!(
+                "one of {knots} knots"
+            )),
+            100.0 * basis.change,
+            span_words(&basis.spans)
+        ),
+    }
 }
 
 /// A finding of a multistart search with this number of starting points.

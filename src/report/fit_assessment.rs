@@ -25,7 +25,8 @@ impl RunAssessment {
         let is_simulated = model.settings.solver != Solver::EquationError;
         let validation = model.validation.iter();
         Self {
-            assessment: is_simulated.then(|| FitAssessment::of(&model.problem, fit)),
+            assessment: is_simulated
+                .then(|| FitAssessment::of(&model.problem, fit, model.tests_bases)),
             validation: validation
                 .map(|out| ValidationRecord::of(model, fit, out))
                 .collect(),

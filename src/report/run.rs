@@ -5,7 +5,7 @@ use super::cost::{CostKind, cost_definition};
 use super::document::{
     ActiveSummary, AttemptSummary, ChannelSummary, ConstraintSummary, CostSummary, CountsSummary,
     ExperimentSummary, FORMAT, GradientSummary, ModelSummary, OutcomeSummary, PathSummary,
-    Prediction, ResultDocument, SlackSummary, WeightSummary,
+    PenaltySummary, Prediction, ResultDocument, SlackSummary, WeightSummary,
 };
 use super::fit_assessment::RunAssessment;
 use super::fit_quality;
@@ -15,11 +15,10 @@ use super::suggestions::suggestions;
 use super::timings::{OverheadTimings, TimingsSummary};
 use crate::config::{ChannelNote, Model};
 use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, Stage};
-use kmcfit_core::internals::functions::CoefficientFunction;
+use kmcfit_core::internals::functions::{CoefficientFunction, WeightRule};
 use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::solvers::{
-    ActiveGroup, Attempt, Fit, PathPoint, Solver, Status, WeightPath, WeightRule,
-    active_constraints, timed,
+    ActiveGroup, Attempt, Fit, PathPoint, Solver, Status, WeightPath, active_constraints, timed,
 };
 use kmcfit_core::internals::system::{Excitation, Term};
 use std::io;
@@ -111,6 +110,7 @@ impl FittedModel<'_> {
             constraints: self.constraint_summary(),
             identifiability: self.identifiability(),
             weights: self.weight_summary(),
+            penalties: self.penalty_summaries(),
             attempts: self.fit.attempts.iter().map(attempt_summary).collect(),
             experiments: self.experiment_summaries(),
             validation: self
@@ -211,7 +211,7 @@ impl FittedModel<'_> {
     fn weight_summary(&self) -> Option<WeightSummary> {
         let path = self.weights?;
         let rule = self.model.weight_rule.as_ref()?.rule;
-        let picks = WeightRule::ALL
+        let picks = WeightRule::OF_PATHS
             .iter()
             .zip(path.picks)
             .filter_map(|(rule, pick)| Some((rule.name().to_string(), path.points[pick?].weight)));
@@ -233,6 +233,22 @@ impl FittedModel<'_> {
             remark: path.remark.clone(),
             path: path.points.iter().map(point).collect(),
         })
+    }
+
+    fn penalty_summaries(&self) -> Vec<PenaltySummary> {
+        let problem = &self.model.problem;
+        let assessment = self.run_assessment.assessment.as_ref();
+        let effective = assessment.and_then(|a| a.effective_parameters.as_ref());
+        let each = problem.penalties.iter().enumerate();
+        let summaries = each.map(|(i, penalty)| PenaltySummary {
+            function: problem.functions.get(penalty.function).name(),
+            order: penalty.order,
+            weight: penalty.weight,
+            rule: penalty.rule.map(|rule| rule.name().to_owned()),
+            parameters: problem.functions.ranges()[penalty.function].len(),
+            effective_parameters: effective.map(|all| all[i]),
+        });
+        summaries.collect()
     }
 
     /// All coefficient functions with their nodal values, those of single experiments last.

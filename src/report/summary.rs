@@ -5,7 +5,7 @@ use super::suggestions;
 use crate::finding::Finding;
 use crate::number_format::significant;
 use kmcfit_core::internals::assessment::FunctionSummary;
-use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::internals::functions::{CoefficientKind, WeightRule};
 use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::solvers::StartStrategy;
 use std::fmt::Write;
@@ -355,6 +355,19 @@ pub(super) fn write_constraints(text: &mut String, document: &ResultDocument) ->
         )?;
         if let Some(remark) = &weights.remark {
             writeln!(text, "{remark}")?;
+        }
+    }
+    for penalty in &document.penalties {
+        let rule = penalty.rule.as_deref();
+        if rule == Some(WeightRule::RestrictedLikelihood.name()) {
+            let of = match penalty.effective_parameters {
+                Some(effective) => format!(
+                    ": {effective:.1} effective parameters of {}",
+                    penalty.parameters
+                ),
+                None => String::new(),
+            };
+            writeln!(text, "smoothness of {} by reml{of}", penalty.function)?;
         }
     }
     for slack in &document.constraints.slack {

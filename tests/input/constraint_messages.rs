@@ -226,6 +226,17 @@ fn penalties_and_rules() {
       found: no `sigma` in experiments[0]
       expected: `sigma` in every experiment, or `l-curve` or `gcv`, which do without
     ");
+    assert_snapshot!(said(&with("penalty: {kind: tikhonov, order: 2, weight: reml}")), @"
+    m.yaml:9:81: functions.damping.penalty.weight: the rule `reml` needs a likelihood of the samples
+      found: no `sigma` in experiments[0]
+      expected: `sigma` in every experiment, a number or `estimate`; or `l-curve` or `gcv`, which do without
+    ");
+    let automatic = with("").replace("knots: 5", "knots: auto");
+    assert_snapshot!(said(&automatic), @"
+    m.yaml:8:42: functions.mass.knots: automatic knots need a likelihood of the samples
+      found: no `sigma` in experiments[0]
+      expected: `sigma` in every experiment, a number or `estimate`; or a number of knots
+    ");
     assert_snapshot!(said(&with("penalty: [{kind: tikhonov, order: 2, weight: gcv}, {kind: tikhonov, order: 1, weight: l-curve}]")), @"
     m.yaml:9:123: functions.damping.penalty[1].weight: all weights chosen by a rule must have the same rule
       found: `l-curve` beside `gcv`

@@ -118,7 +118,7 @@ fn unknown_keys() {
     assert_snapshot!(changed("memory: 10", "12: 10"), @"
     m.yaml:22:3: fit: unknown key
       found: `12`
-      expected: one of: method, initial, gradient, qp, memory, stop
+      expected: one of: method, initial, gradient, qp, refinement, memory, stop
     ");
 }
 

@@ -3,10 +3,10 @@
 
 pub mod assessment {
     pub use crate::assessment::{
-        BEYOND_SIGMA, EXACT, FitAssessment, FitStatistics, FitWarning, FunctionSummary, POOR,
-        Plausibility, RECOVERED, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
-        constant_probability, diagnostics, function_summaries, is_same_truth, outliers, pattern,
-        standard_error,
+        BEYOND_SIGMA, BasisTest, CoarseBasis, EXACT, FitAssessment, FitStatistics, FitWarning,
+        FunctionSummary, POOR, Plausibility, RECOVERED, ResidualPattern, Roughness, StepCheck,
+        TruthErrors, Unidentified, constant_probability, diagnostics, function_summaries,
+        is_same_truth, outliers, pattern, standard_error,
     };
 }
 pub mod builder {
@@ -32,7 +32,7 @@ pub mod diagnostics {
 pub mod functions {
     pub use crate::functions::{
         Basis, CoefficientFunction, CoefficientKind, Design, Gram, Parameterization, Penalty,
-        Prior, Ratios, ScalarParameter, ScalarValue, TotalVariation, basis,
+        Prior, Ratios, ScalarParameter, ScalarValue, TotalVariation, WeightRule, basis,
     };
 }
 pub mod host {
@@ -41,10 +41,10 @@ pub mod host {
 pub mod identifiability {
     pub use crate::identifiability::{
         Band, BandSettings, BandSide, Bands, CandidateChannel, CandidateExperiment, Classification,
-        ClassificationKind, FunctionClassification, Gain, RankFinding, RankFindingKind, Ranked,
-        ResolvedDirection, ScaleFreedom, ScalingAmbiguity, Sensitivity, SingularSpectrum, anchors,
-        classify_functions, is_negligible, is_unhindered, rank_experiments, residual_spread,
-        structural_rank,
+        ClassificationKind, Condition, FunctionClassification, Gain, RankFinding, RankFindingKind,
+        Ranked, ResolvedDirection, ScaleFreedom, ScalingAmbiguity, Sensitivity, SingularSpectrum,
+        anchors, classify_functions, is_negligible, is_unhindered, rank_experiments,
+        residual_spread, span_words, structural_rank,
     };
 }
 pub mod objective {
@@ -90,9 +90,9 @@ pub mod solvers {
         ExactF64s, Fit, FitSettings, Initial, IterationEvent, IterationRecord, Measurements,
         MissingMeasurement, Observer, Optimality, PathPoint, QpSolver, Reason, Solver, SolverState,
         StartProjection, StartStrategy, Status, Stopping, UnsupportedRecord, WeightPath,
-        WeightRule, active_constraints, choose_weight, choose_weight_watched, equation_error,
-        estimate_states, fit, fit_from, fit_with_noise, fit_with_noise_watched, no_response,
-        number_or_nan, predict_validation, timed,
+        active_constraints, choose_weight, choose_weight_watched, equation_error, estimate_states,
+        fit, fit_from, fit_with_noise, fit_with_noise_watched, no_response, number_or_nan,
+        predict_validation, timed,
     };
 }
 pub mod study {

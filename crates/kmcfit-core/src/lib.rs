@@ -86,7 +86,7 @@ pub use builder::{
     SensorSpec, Start,
 };
 pub use constraints::{Constraint, Shape, TimeHistory};
-pub use functions::{CoefficientKind, Prior};
+pub use functions::{CoefficientKind, Prior, WeightRule};
 pub use problem::{Problem, ProblemError};
 pub use record::{ChannelKind, Loss, NoiseModel, Weighting};
 pub use signal::{Interpolation, Signal};
@@ -97,10 +97,10 @@ pub use simulate::{Cause, SimulationError, Trajectory};
 // Fits.
 pub use solvers::{
     Attempt, Fit, FitSettings, Initial, Optimality, Outcome, QpSolver, Reason, SolveCounts, Solver,
-    StartStrategy, Status, Stopping, Timings, WeightPath, WeightRule, choose_weight, fit,
+    StartStrategy, Status, Stopping, Timings, WeightPath, choose_weight, fit,
 };
 // Inference.
-pub use assessment::{FitAssessment, FitWarning, Unidentified};
+pub use assessment::{CoarseBasis, FitAssessment, FitWarning, Unidentified};
 pub use identifiability::{BandSettings, Bands, classify_functions, structural_rank};
 pub use study::{Profile, ProfileSettings, Target, profile};
 // Services of the host.

@@ -11,8 +11,7 @@ use kmcfit_core::internals::builder::{
     self, BasisSpec, CoefficientSpec, PenaltySpec, PenaltyWeight,
 };
 use kmcfit_core::internals::constraints::TimeHistory;
-use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::solvers;
+use kmcfit_core::internals::functions::{self, CoefficientKind};
 use kmcfit_core::internals::system::{Grid, NodalCoefficients};
 
 /// The function of a kind in a map with one key for each function.
@@ -158,9 +157,10 @@ fn basis(
     let knots = || match &spec.knots {
         Some(KnotSpec::Count(count)) => Ok(builder::Knots::Count(count.0)),
         Some(KnotSpec::Times(times)) => Ok(builder::Knots::Times(numbers(times))),
+        Some(KnotSpec::Auto) => Ok(builder::Knots::Auto),
         None => Err(missing(
             "knots",
-            "`knots`: the number of equally spaced knots, or a list of times in s",
+            "`knots`: `auto`, the number of equally spaced knots, or a list of times in s",
         )),
     };
     Ok(match kind {
@@ -228,10 +228,13 @@ fn penalty(
             Weight::Number(weight) => PenaltyWeight::Given(weight.0),
             Weight::Rule(WeightRule::Period) => PenaltyWeight::Period,
             Weight::Rule(WeightRule::Discrepancy) => {
-                PenaltyWeight::Rule(solvers::WeightRule::Discrepancy)
+                PenaltyWeight::Rule(functions::WeightRule::Discrepancy)
             }
-            Weight::Rule(WeightRule::LCurve) => PenaltyWeight::Rule(solvers::WeightRule::LCurve),
-            Weight::Rule(WeightRule::Gcv) => PenaltyWeight::Rule(solvers::WeightRule::Gcv),
+            Weight::Rule(WeightRule::LCurve) => PenaltyWeight::Rule(functions::WeightRule::LCurve),
+            Weight::Rule(WeightRule::Gcv) => PenaltyWeight::Rule(functions::WeightRule::Gcv),
+            Weight::Rule(WeightRule::RestrictedLikelihood) => {
+                PenaltyWeight::Rule(functions::WeightRule::RestrictedLikelihood)
+            }
         },
         reference: reference.transpose()?,
     })

@@ -41,6 +41,8 @@ pub struct Model {
     pub settings: FitSettings,
     /// Rule that chooses the weight of some penalties; their weight in `problem` is 1.
     pub weight_rule: Option<WeightSearch>,
+    /// True if the bases are tested against finer ones at the optimum.
+    pub tests_bases: bool,
     /// True coefficients at the nodes, if they are known.
     pub truth: Option<NodalCoefficients>,
     /// Notes for reports on the channels of each experiment.
@@ -208,7 +210,8 @@ pub fn build(file: &ModelFile, mode: BuildMode) -> Result<Model, InputError> {
     let (builder, notes) = builder(file, mode, &grid, solver, records)?;
     let about = |error| input_error(file, error);
     let mut built = builder.lower().map_err(about)?;
-    let searches = built.weight_search.is_some();
+    let searches =
+        built.weight_search.is_some() || built.problem.penalties.iter().any(|p| p.rule.is_some());
     let settings = fit::build(file, &built.problem, solver, searches)?;
     let given_start = built.problem.functions.start();
     // A simulation uses the functions as given.
@@ -238,6 +241,11 @@ pub fn build(file: &ModelFile, mode: BuildMode) -> Result<Model, InputError> {
         given_start,
         settings,
         weight_rule: built.weight_search,
+        tests_bases: spec
+            .fit
+            .as_ref()
+            .and_then(|fit| fit.refinement)
+            .unwrap_or(true),
         truth,
         notes: notes.into_iter().map(|(_, notes)| notes).collect(),
         validation: (built.validation.into_iter().zip(own))

@@ -16,10 +16,8 @@ use std::path::Path;
 
 /// Start value of the damping ratio: that of a lightly damped structure.
 const DAMPING_RATIO: f64 = 0.02;
-/// Periods of the response per knot of the stiffness: fewer do not determine a value.
-const PERIODS_PER_KNOT: f64 = 2.0;
-/// Most knots: enough for the course of the stiffness.
-const MOST_KNOTS: f64 = 11.0;
+/// Periods of the response below which the stiffness is constant: fewer do not show how it varies.
+const FEWEST_PERIODS: f64 = 4.0;
 
 /// Relative difference below which two sampling rates are equal.
 const SAME_RATE: f64 = 0.01;
@@ -256,15 +254,10 @@ fn functions(columns: &ColumnAssignment, record: &RecordSummary) -> String {
         "N s/m; starts at 2 % of critical",
     );
     let stiffness = short(mass * omega * omega);
-    let knots = (record.periods() / PERIODS_PER_KNOT)
-        .floor()
-        .min(MOST_KNOTS);
-    text += &match knots >= 2.0 {
+    text += &match record.periods() >= FEWEST_PERIODS {
         true => commented(
-            &format!(
-                "  stiffness: {{basis: piecewise-linear, knots: {knots}, start: {stiffness}}}"
-            ),
-            "N/m; free to change; basis: constant if it does not",
+            &format!("  stiffness: {{basis: b-spline, knots: auto, start: {stiffness}}}"),
+            "N/m; may vary, as smoothly as the record requires; basis: constant if it does not",
         ),
         false => commented(
             &format!("  stiffness: {{basis: constant, start: {stiffness}}}"),

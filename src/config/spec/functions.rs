@@ -62,12 +62,13 @@ keys! {
         basis: Option<Basis>,
             example "piecewise-linear",
             needs "`start`";
-        /// Knots of a piecewise function or spline: their number (equally spaced, ends included) or their times.
+        /// Knots of a piecewise function or spline: their number (equally spaced, ends included) or their times; `auto`: about
+        /// 40 intervals and, where no penalty is given, one on the curvature with the weight `reml` (for equation-error `period`).
         knots: Option<KnotSpec>,
             example "11",
             unit "s, of times",
             range "2 or more, at most the number of nodes; times increase and include both ends of the record",
-            needs "`basis`: piecewise-constant, piecewise-linear or b-spline";
+            needs "`basis`: piecewise-constant, piecewise-linear or b-spline; `auto` also `sigma` in every experiment, or method equation-error";
         /// Degree of a polynomial.
         degree: Option<Count>,
             example "2",
@@ -150,7 +151,7 @@ keys! {
             example "0.1",
             unit "of J per unit of the measure",
             range "0 or more",
-            needs "a rule: `kind: tikhonov` and method gauss-newton; discrepancy also `sigma`; period: order 1 or 2 and method equation-error";
+            needs "a rule: `kind: tikhonov` and method gauss-newton; discrepancy and reml also `sigma` (for reml a number or `estimate`); period: order 1 or 2 and method equation-error";
         /// For `tikhonov` of order 0: the reference values.
         reference: Option<NumberOrColumn>,
             example "1.0",

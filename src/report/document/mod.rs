@@ -6,7 +6,7 @@ mod search;
 pub use channel::{
     ChannelSummary, IgnoredSummary, NoiseSummary, NuisanceParameter, ValidationSummary,
 };
-pub use search::{AttemptSummary, PathSummary, WeightSummary};
+pub use search::{AttemptSummary, PathSummary, PenaltySummary, WeightSummary};
 
 use crate::finding::Finding;
 use crate::report::cost::CostKind;
@@ -61,6 +61,9 @@ pub struct ResultDocument {
     /// Choice of the penalty weight by a rule.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<WeightSummary>,
+    /// Penalties on the roughness of functions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub penalties: Vec<PenaltySummary>,
     /// Attempts from several starting points, in order.
     #[serde(default)]
     pub attempts: Vec<AttemptSummary>,

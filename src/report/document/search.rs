@@ -62,3 +62,22 @@ pub struct PathSummary {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<f64>,
 }
+
+/// A penalty on the roughness of a function.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PenaltySummary {
+    /// Name of the function.
+    pub function: String,
+    /// Order of the penalised derivative.
+    pub order: usize,
+    /// Weight of the squared integral in J.
+    pub weight: f64,
+    /// Rule that chose the weight; absent for a given one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rule: Option<String>,
+    /// Number of parameters of the function.
+    pub parameters: usize,
+    /// Effective number of these that the samples determine; absent with many parameters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub effective_parameters: Option<f64>,
+}

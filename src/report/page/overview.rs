@@ -119,6 +119,7 @@ fn estimates(document: &ResultDocument) -> String {
 fn verdict_in_words(verdict: Option<ClassificationKind>) -> &'static str {
     match verdict {
         Some(ClassificationKind::Identified) => "yes",
+        Some(ClassificationKind::Conditional) => "for this smoothness",
         Some(ClassificationKind::OnlyRatio) => "ratio only",
         Some(ClassificationKind::PartlyIdentified) => "partly",
         Some(ClassificationKind::NotIdentified) => "no",

@@ -405,7 +405,7 @@ fn status(ended: ExtremeStatus) -> ExtremeSearch {
 }
 
 fn predictions(model: &Model, at: Optimum, extremes: &[Extreme]) -> Vec<PredictionRecord> {
-    let covariance = at.problem.covariance(at.evaluation);
+    let covariance = at.problem.covariance_of_estimates(at.theta, at.evaluation);
     let free = model.predictions.iter().map(|state| {
         let (y, v) = (state.displacement, state.velocity);
         prediction::PredictionCase::free(format!("from y = {y} m, v = {v} m/s"), *state)

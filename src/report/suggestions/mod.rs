@@ -81,6 +81,11 @@ pub enum Suggestion {
         /// Force terms that the model lacks.
         absent: Vec<&'static str>,
     },
+    /// A finer basis for a function whose basis is too coarse.
+    FinerBasis {
+        /// Name of the function.
+        function: String,
+    },
     /// More parameters or terms for autocorrelated residuals.
     MoreParameters {
         /// Force terms that the model lacks.
@@ -132,7 +137,7 @@ fn typed(document: &ResultDocument) -> Vec<Suggestion> {
     let mut steps = Vec::new();
     steps.extend(about_ending(document));
     steps.extend(about_steps(document));
-    steps.extend(about_residuals(document));
+    steps.extend(about_bases(document).or_else(|| about_residuals(document)));
     if wanders(document) {
         steps.rotate_left(1);
     }
@@ -153,6 +158,16 @@ fn typed(document: &ResultDocument) -> Vec<Suggestion> {
     }
     steps.truncate(MOST);
     steps
+}
+
+/// The first function whose basis is too coarse.
+fn about_bases(document: &ResultDocument) -> Option<Suggestion> {
+    let warnings = &document.identifiability.warnings;
+    let coarse = warnings.iter().find(|w| w.kind == "coarse_basis")?;
+    let function = coarse.quantities.get("function")?.as_str()?;
+    Some(Suggestion::FinerBasis {
+        function: function.to_owned(),
+    })
 }
 
 /// The function whose constancy is not rejected at the level [`SIGNIFICANCE`], with the largest p-value.

@@ -54,6 +54,10 @@ impl fmt::Display for Suggestion {
                 }
                 write_suspect(f, suspect, &more_parameters(absent))
             }
+            Suggestion::FinerBasis { function } => write!(
+                f,
+                "let the {function} vary more freely (`basis: b-spline`, `knots: auto`); an error of the input and a missing force term, too, appear as a coefficient that varies"
+            ),
             Suggestion::MoreParameters { absent } => {
                 write!(f, "the residuals are autocorrelated: {}", more_parameters(absent))
             }
@@ -141,7 +145,7 @@ fn write_suspect(f: &mut fmt::Formatter<'_>, suspect: &Suspect, more: &str) -> f
 
 /// More parameters of the functions, and the terms that the model lacks.
 fn more_parameters(absent: &[&str]) -> String {
-    let functions = "use more parameters (`basis: piecewise-linear`, more `knots`)";
+    let functions = "let a coefficient vary (`basis: b-spline`, `knots: auto`)";
     let terms = absent
         .join(", ")
         .replace("friction", "friction with its width");

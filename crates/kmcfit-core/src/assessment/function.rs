@@ -45,7 +45,7 @@ pub struct FunctionSummary {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<f64>,
     /// p-value of a constant function under noise alone, for a converged least-squares fit with residuals compatible with noise, whose
-    /// samples alone determine all parameters.
+    /// samples alone determine all parameters, or penalties with weights chosen by restricted likelihood or cross-validation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub constant_p_value: Option<f64>,
     /// Largest error over the nodes, where the truth is known.
@@ -91,7 +91,9 @@ pub fn function_summaries(
         });
         let errors = errors.as_ref();
         let rms = |e: &Vec<f64>| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt();
-        let error = standard_error(function, range.start, covariance);
+        // Zero but for rounding where an equality holds the constant.
+        let error = standard_error(function, range.start, covariance)
+            .filter(|error| *error > f64::EPSILON * largest);
         FunctionSummary {
             unit: function.quantity.unit().into(),
             min: values.iter().copied().fold(f64::INFINITY, f64::min),
@@ -110,11 +112,22 @@ pub fn function_summaries(
                 .filter(|_| error.is_some())
                 .map(|a| a.degrees_of_freedom[range.start])
                 .filter(|degrees| degrees.is_finite()),
-            constant_p_value: free
-                .and_then(|covariance| constant_probability(problem, i, theta, covariance)),
+            constant_p_value: free.and_then(|covariance| {
+                let effective = effective(problem, i, assessment);
+                constant_probability(problem, i, theta, covariance, effective)
+            }),
             truth_max_error: errors.map(|e| e.iter().copied().fold(0.0, f64::max)),
             truth_rms_error: errors.map(rms),
         }
     };
     functions.map(summary).collect()
+}
+
+/// Effective number of parameters of a penalised function.
+fn effective(problem: &Problem, f: usize, assessment: Option<&FitAssessment>) -> Option<f64> {
+    let effective = assessment?.effective_parameters.as_ref()?;
+    let mut penalties = problem.penalties.iter().zip(effective);
+    penalties
+        .find(|(p, _)| p.function == f)
+        .map(|(_, effective)| *effective)
 }

@@ -5,6 +5,7 @@ mod constants;
 mod function;
 mod plausibility;
 mod recovery;
+mod refinement;
 mod statistics;
 mod step_check;
 
@@ -13,10 +14,13 @@ pub use constants::{constant_probability, standard_error};
 pub use function::{FunctionSummary, function_summaries};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
 pub use recovery::{RECOVERED, Roughness, TruthErrors, is_same_truth};
+pub use refinement::{BasisTest, CoarseBasis};
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
 
-use crate::identifiability::{BandSettings, Bands, FunctionClassification, classify_functions};
+use crate::identifiability::{
+    BandSettings, Bands, FunctionClassification, classify_functions, condition_on_bases,
+};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::{Fit, Status};
 use nalgebra::DMatrix;
@@ -34,6 +38,8 @@ pub struct FitAssessment {
     pub covariance: Option<DMatrix<f64>>,
     /// Degrees of freedom of the estimate of each parameter ([`Problem::degrees_of_freedom`]).
     pub degrees_of_freedom: Vec<f64>,
+    /// Effective number of parameters of the function of each penalty ([`Problem::effective_parameters`]), where there are penalties.
+    pub effective_parameters: Option<Vec<f64>>,
     /// Bands of functions and ratios, where standard errors are meaningful.
     pub bands: Option<Bands>,
     /// Classification of functions and ratios by their bands.
@@ -41,8 +47,9 @@ pub struct FitAssessment {
 }
 
 impl FitAssessment {
-    /// Assesses `fit`; covariance, bands and classifications for up to 64 parameters.
-    pub fn of(problem: &Problem, fit: &Fit) -> Self {
+    /// Assesses `fit`; covariance, bands and classifications for up to 64 parameters, and with `tests_bases` the test of the bases
+    /// against finer ones.
+    pub fn of(problem: &Problem, fit: &Fit, tests_bases: bool) -> Self {
         let best = &fit.best;
         let step_check = step_check(problem, &best.evaluation);
         let statistics = statistics(problem, &best.evaluation);
@@ -63,6 +70,7 @@ impl FitAssessment {
             statistics,
             plausibility,
             covariance: None,
+            effective_parameters: None,
             degrees_of_freedom: vec![f64::INFINITY; problem.parameters()],
             bands: None,
             classifications: Vec::new(),
@@ -73,12 +81,23 @@ impl FitAssessment {
                 ..BandSettings::default()
             };
             let bands = Bands::at(problem, &best.parameters, &best.evaluation, &settings);
+            let test = match tests_bases && !assessment.plausibility.is_coloured {
+                true => BasisTest::of(problem, &best.parameters, &best.evaluation),
+                false => BasisTest::default(),
+            };
             assessment.classifications = classify_functions(problem, &best.evaluation, &bands);
+            condition_on_bases(problem, &mut assessment.classifications, &test.doubtful);
+            let warnings = test.coarse.into_iter().map(FitWarning::CoarseBasis);
+            assessment.plausibility.warnings.extend(warnings);
             assessment
                 .degrees_of_freedom
                 .clone_from(&bands.degrees_of_freedom);
+            assessment.covariance = bands.covariance.clone();
+            if !problem.penalties.is_empty() {
+                assessment.effective_parameters =
+                    problem.effective_parameters(&best.parameters, &best.evaluation);
+            }
             assessment.bands = Some(bands);
-            assessment.covariance = problem.covariance(&best.evaluation);
         }
         assessment
     }

@@ -1,6 +1,7 @@
 //! Plausibility of a fit: conditions under which its optimum identifies no system, and warnings about its intervals.
 
 use super::channel::diagnostics;
+use super::refinement::CoarseBasis;
 use super::statistics::{FitStatistics, statistics};
 use super::step_check::{StepCheckOutcome, step_check};
 use crate::diagnostics::rms;
@@ -85,6 +86,8 @@ pub enum FitWarning {
         /// Identified natural frequency, Hz.
         frequency: f64,
     },
+    /// A finer basis fits significantly better: the intervals exclude the error of the basis.
+    CoarseBasis(CoarseBasis),
     /// A function is negative at most times, which violates passivity.
     Negative {
         /// Name of the function.

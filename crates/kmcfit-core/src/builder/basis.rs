@@ -16,6 +16,8 @@ pub enum Knots {
     Count(usize),
     /// Times of the knots, s: increasing, both ends of the record included.
     Times(Vec<f64>),
+    /// About 40 intervals, and a penalty on the curvature whose weight the data choose.
+    Auto,
 }
 
 /// Basis of a coefficient function, independent of the grid.
@@ -80,6 +82,8 @@ impl Knots {
         let count = match self {
             Knots::Count(count) => *count,
             Knots::Times(times) => times.len(),
+            // Replaced by a number before.
+            Knots::Auto => 0,
         };
         if count < 2 {
             return Err(BuildError::new(key, "there are fewer than two knots")
@@ -92,8 +96,8 @@ impl Knots {
                 .expected(format!("at most {most} knots")));
         }
         match self {
-            Knots::Count(_) => Ok(uniform_knots(grid, count)),
             Knots::Times(times) => listed(key, times, grid),
+            Knots::Count(_) | Knots::Auto => Ok(uniform_knots(grid, count)),
         }
     }
 }

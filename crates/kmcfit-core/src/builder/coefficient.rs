@@ -4,8 +4,7 @@ use super::BuildError;
 use super::basis::{BasisSpec, Knots};
 use crate::constraints::TimeHistory;
 use crate::functions::basis::from_physical_powers;
-use crate::functions::{Basis, CoefficientFunction, CoefficientKind};
-use crate::solvers::WeightRule;
+use crate::functions::{Basis, CoefficientFunction, CoefficientKind, WeightRule};
 use crate::system::Grid;
 
 /// Highest order of a penalised derivative.
@@ -189,6 +188,27 @@ impl CoefficientSpec {
     pub fn width(mut self, width: f64) -> Self {
         self.width = Some(width);
         self
+    }
+
+    /// Basis of an estimated function.
+    pub(super) fn basis(&self) -> Option<&BasisSpec> {
+        match &self.form {
+            CoefficientForm::Fixed(_) => None,
+            CoefficientForm::Estimated(basis, _) => Some(basis),
+        }
+    }
+
+    /// Sets the number of knots of a basis that has them.
+    pub(super) fn set_knots(&mut self, count: usize) {
+        if let CoefficientForm::Estimated(
+            BasisSpec::PiecewiseConstant(knots)
+            | BasisSpec::PiecewiseLinear(knots)
+            | BasisSpec::BSpline(knots),
+            _,
+        ) = &mut self.form
+        {
+            *knots = Knots::Count(count);
+        }
     }
 
     /// True if the function is estimated.

@@ -19,12 +19,17 @@ impl Builder {
     /// # Errors
     /// The first invalid part.
     pub fn lower(&self) -> Result<Built, BuildError> {
-        let coefficient_sets = self.coefficient_sets()?;
         self.check_records()?;
         let grid = match self.grid {
             Some(grid) => grid,
             None => self.grid_of_records()?,
         };
+        self.with_knots(&grid)?.on_grid(grid)
+    }
+
+    /// Lowers a specification without automatic parts.
+    fn on_grid(&self, grid: Grid) -> Result<Built, BuildError> {
+        let coefficient_sets = self.coefficient_sets()?;
         let mut notices = Vec::new();
         let functions = self.parameterization(&grid, &coefficient_sets, &mut notices)?;
         let system = System {

@@ -29,6 +29,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod automatic_knots;
 mod basis;
 mod coefficient;
 mod coefficient_sets;

@@ -3,10 +3,10 @@
 use super::coefficient::{PenaltySpec, PenaltyWeight, values_at_nodes};
 use super::{BuildError, BuildNotice, Builder};
 use crate::constraints::TimeHistory;
-use crate::functions::{Basis, Penalty, TotalVariation};
+use crate::functions::{Basis, Penalty, TotalVariation, WeightRule};
 use crate::problem::Problem;
 use crate::record::Weighting;
-use crate::solvers::{Measurements, WeightRule};
+use crate::solvers::Measurements;
 
 /// Penalty weights to be chosen by a rule.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,6 +70,11 @@ impl Builder {
                     continue;
                 }
                 if let PenaltyWeight::Rule(rule) = weight {
+                    penalty.rule = Some(rule);
+                }
+                if let PenaltyWeight::Rule(rule) = weight
+                    && rule != WeightRule::RestrictedLikelihood
+                {
                     let search = search.get_or_insert_with(|| WeightSearch {
                         rule,
                         penalties: Vec::new(),
@@ -124,19 +129,27 @@ impl Builder {
                 .found(format!("`{}` beside `{}`", rule.name(), first.rule.name()))
                 .expected("the same rule, or a number"));
         }
-        let mut records = self.records.iter().enumerate();
-        let without = records.find(|(_, record)| {
-            let mut weightings = record.channels.iter().map(|c| c.weighting.as_ref());
-            !record.validation && weightings.any(|w| w.is_none_or(is_unknown))
-        });
-        match without {
-            Some((i, _)) if rule == WeightRule::Discrepancy => Err(BuildError::new(
-                key,
+        let (found, problem, expected) = match rule {
+            WeightRule::Discrepancy => (
+                self.records.iter().position(|record| {
+                    let mut weightings = record.channels.iter().map(|c| c.weighting.as_ref());
+                    !record.validation && weightings.any(|w| w.is_none_or(is_unknown))
+                }),
                 "the rule `discrepancy` needs the noise of the samples",
-            )
-            .found(format!("no `sigma` in experiments[{i}]"))
-            .expected("`sigma` in every experiment, or `l-curve` or `gcv`, which do without")),
-            _ => Ok(()),
+                "`sigma` in every experiment, or `l-curve` or `gcv`, which do without",
+            ),
+            WeightRule::RestrictedLikelihood => (
+                self.without_likelihood(),
+                "the rule `reml` needs a likelihood of the samples",
+                "`sigma` in every experiment, a number or `estimate`; or `l-curve` or `gcv`, which do without",
+            ),
+            WeightRule::LCurve | WeightRule::Gcv => return Ok(()),
+        };
+        match found {
+            Some(i) => Err(BuildError::new(key, problem)
+                .found(format!("no `sigma` in experiments[{i}]"))
+                .expected(expected)),
+            None => Ok(()),
         }
     }
 }

@@ -19,7 +19,7 @@ pub use coefficient_kind::CoefficientKind;
 pub use design::Design;
 pub use gram::Gram;
 pub use parameterization::Parameterization;
-pub use penalty::Penalty;
+pub use penalty::{Penalty, WeightRule};
 pub use ratios::Ratios;
 pub use scalar::{Prior, ScalarParameter, ScalarValue};
 pub use total_variation::TotalVariation;

@@ -2,6 +2,40 @@
 
 use crate::rows::Rows;
 
+/// Rule that chooses the weight of a penalty from the data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WeightRule {
+    /// The largest weight with chi-square at most `n + 2 sqrt(2 n)` (Morozov).
+    Discrepancy,
+    /// Corner of misfit against roughness on logarithmic axes (Hansen).
+    LCurve,
+    /// Least generalised cross-validation score `n misfit / (n - dof)^2` (Golub, Heath, Wahba).
+    Gcv,
+    /// Largest restricted likelihood of noise and weights, each penalty with its own weight (Wood 2011).
+    RestrictedLikelihood,
+}
+
+impl WeightRule {
+    /// Rules that choose a point of a path of weights.
+    pub const OF_PATHS: [Self; 3] = [Self::Discrepancy, Self::LCurve, Self::Gcv];
+
+    /// Name in a model file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Discrepancy => "discrepancy",
+            Self::LCurve => "l-curve",
+            Self::Gcv => "gcv",
+            Self::RestrictedLikelihood => "reml",
+        }
+    }
+
+    /// True if intervals from the Hessian of the penalised misfit cover on average over the record; with the other rules
+    /// they hold for the chosen smoothness alone.
+    pub fn gives_coverage(self) -> bool {
+        matches!(self, Self::Gcv | Self::RestrictedLikelihood)
+    }
+}
+
 /// Penalty `weight * |L theta_j - target|^2` on one function `j`.
 ///
 /// For the roughness rows `L` of order `q` and no target this is `weight * integral (d^q p/dt^q)^2 dt`, independent of basis and
@@ -14,17 +48,20 @@ pub struct Penalty {
     pub order: usize,
     /// Weight, in the unit of J per unit of the integral.
     pub weight: f64,
+    /// Rule that chooses the weight; `None` for a given one.
+    pub rule: Option<WeightRule>,
     /// `L`, rows x parameters of the function, and the target.
     pub rows: Rows,
 }
 
 impl Penalty {
-    /// Roughness `rows` of order `order` with target zero.
+    /// Roughness `rows` of order `order` with target zero and a given weight.
     pub fn new(function: usize, order: usize, weight: f64, rows: Rows) -> Self {
         Self {
             function,
             order,
             weight,
+            rule: None,
             rows,
         }
     }

@@ -8,7 +8,15 @@
 //! ```
 //!
 //! which describes the scatter of the estimates between repetitions of the noise. It **excludes the smoothing bias**, the
-//! shift of the mean estimate caused by penalties. Priors of scalars count as measurements. Total-variation penalties and
+//! shift of the mean estimate caused by penalties. With weights of restricted likelihood or cross-validation it is
+//!
+//! ```text
+//! Cov = H^-1
+//! ```
+//!
+//! the covariance of a random function whose prior is the penalty. It includes the smoothing bias on average over the record
+//! (Wahba 1983; Nychka 1988): there a 95 % band holds the function at 95 % of the times, fewer where it bends most.
+//! Priors of scalars count as measurements. Total-variation penalties and
 //! the curvature of the predictions are neglected.
 //!
 //! Active rows hold with equality: the covariance is that in their null space. Where an active bound leaves a function no
@@ -17,14 +25,14 @@
 
 use super::active::{ActiveRow, active_rows};
 use super::band::{Band, BandSide};
-use super::covariance::{CovarianceRoot, Information};
+use super::covariance::{CovarianceRoot, Information, is_bayesian};
 use super::degrees::{NoiseVariants, degrees_of_parameters};
 use super::directions::Directions;
 use super::ratios::{Ratio, damping_ratio, frequency, over_mass};
 use super::sensitivity::Sensitivity;
 use super::spans::{span_words, spans};
 use crate::objective::Evaluation;
-use crate::problem::Problem;
+use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::system::Term;
 use nalgebra::DMatrix;
 use rand::SeedableRng;
@@ -81,6 +89,9 @@ pub struct Bands {
     pub sigma: Option<f64>,
     /// Number of undetermined directions.
     pub undetermined: usize,
+    /// Covariance of the parameters, with penalties, priors and equality constraints; `None` with many parameters and where a
+    /// combination is undetermined.
+    pub covariance: Option<DMatrix<f64>>,
     /// Degrees of freedom of the estimate of each parameter ([`Problem::degrees_of_freedom`]).
     pub degrees_of_freedom: Vec<f64>,
     /// Notes on all bands.
@@ -157,6 +168,10 @@ impl Bands {
             functions,
             ratios: maker.ratios(&values, &linearised),
             sigma: tight.variance.map(f64::sqrt),
+            covariance: match problem.parameters() {
+                1..=FEW_PARAMETERS => information.of_parameters(&loose),
+                _ => None,
+            },
             undetermined,
             degrees_of_freedom: degrees_of_parameters(problem, maker.variants),
             notes,
@@ -183,6 +198,11 @@ fn notes(problem: &Problem, information: &Information, active: &[ActiveRow]) -> 
         notes.push(
             "the bands describe the scatter of the estimates and exclude the smoothing bias"
                 .to_owned(),
+        );
+    }
+    if is_bayesian(problem) {
+        notes.push(
+            "the bands of smoothed functions cover on average over the record, less where a function bends most".to_owned(),
         );
     }
     if !problem.variations.is_empty() {

@@ -26,6 +26,13 @@ pub enum Classification {
         /// Largest half-width of the 95 % band, relative to the function's size.
         relative: f64,
     },
+    /// Determined under a condition alone, whose error the interval excludes.
+    Conditional {
+        /// Largest half-width of the 95 % band under the condition, relative to the function's size.
+        relative: f64,
+        /// Condition.
+        on: Condition,
+    },
     /// Not identified itself; the named ratio to the mass is.
     OnlyRatio(String),
     /// Identified on these spans of time, s.
@@ -41,6 +48,7 @@ impl Classification {
     pub fn kind(&self) -> ClassificationKind {
         match self {
             Self::Identified { .. } => ClassificationKind::Identified,
+            Self::Conditional { .. } => ClassificationKind::Conditional,
             Self::OnlyRatio(_) => ClassificationKind::OnlyRatio,
             Self::PartlyIdentified(_) => ClassificationKind::PartlyIdentified,
             Self::NotIdentified => ClassificationKind::NotIdentified,
@@ -52,6 +60,7 @@ impl Classification {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Identified { .. } => "identified",
+            Self::Conditional { .. } => "conditional",
             Self::OnlyRatio(_) => "only-ratio",
             Self::PartlyIdentified(_) => "partly-identified",
             Self::NotIdentified => "not-identified",
@@ -60,12 +69,23 @@ impl Classification {
     }
 }
 
+/// Condition of a conditional interval.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Condition {
+    /// The smoothness: the rule that chose the weight of the penalty gives no interval that includes the smoothing bias.
+    Smoothness,
+    /// The basis: a finer one fits significantly better.
+    Basis,
+}
+
 /// Kind of a [`Classification`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[allow(missing_docs)]
 pub enum ClassificationKind {
     Identified,
+    Conditional,
     OnlyRatio,
     PartlyIdentified,
     NotIdentified,
@@ -86,13 +106,69 @@ pub struct FunctionClassification {
 }
 
 impl FunctionClassification {
-    /// True where the classification limits what is known: partly, not, or only as a ratio identified.
+    fn depends_on_basis(&mut self) {
+        if let Classification::Identified { relative } = self.verdict {
+            let on = Condition::Basis;
+            self.sentence = on.sentence(&self.name, relative);
+            self.verdict = Classification::Conditional { relative, on };
+        }
+    }
+
+    /// True where the classification limits what is known: partly, not, only as a ratio, or only for the chosen smoothness
+    /// identified.
     pub fn is_open(&self) -> bool {
         match self.verdict {
             Classification::Identified { .. } | Classification::Fixed => false,
-            Classification::OnlyRatio(_)
+            Classification::Conditional { .. }
+            | Classification::OnlyRatio(_)
             | Classification::PartlyIdentified(_)
             | Classification::NotIdentified => true,
+        }
+    }
+}
+
+impl Condition {
+    fn sentence(self, name: &str, relative: f64) -> String {
+        let half = format!(
+            "95 % CI half-width at most {:.2} % of its size",
+            100.0 * relative
+        );
+        match self {
+            Self::Smoothness => format!(
+                "{name} is known for the chosen smoothness alone: {half}, without the smoothing bias"
+            ),
+            Self::Basis => format!(
+                "{name} is known for the chosen basis alone: {half}, but a finer basis fits significantly better"
+            ),
+        }
+    }
+}
+
+/// Makes classifications conditional on the basis for these functions, and for the ratios with them.
+pub(crate) fn condition_on_bases(
+    problem: &Problem,
+    classifications: &mut [FunctionClassification],
+    coarse: &[usize],
+) {
+    let assembly = problem.functions.coefficient_set(0);
+    let of = |term: Term| {
+        let place = problem.system.terms.iter().position(|t| *t == term);
+        place.map(|place| assembly[place + 1])
+    };
+    let functions = problem.functions.ranges().len();
+    for (index, classification) in classifications.iter_mut().enumerate() {
+        let numerator = match classification.name.as_str() {
+            _ if index < functions => Some(index),
+            "k/m" => of(Term::Stiffness),
+            _ => of(Term::Damping),
+        };
+        let mass = (index >= functions).then_some(assembly[0]);
+        if numerator
+            .into_iter()
+            .chain(mass)
+            .any(|f| coarse.contains(&f))
+        {
+            classification.depends_on_basis();
         }
     }
 }
@@ -179,12 +255,29 @@ pub fn classify_functions(
                 other => known(f).map_or(other, Classification::OnlyRatio),
             },
         };
+        let verdict = conditional(problem, verdict);
         classification(&band.name, verdict, band, sizes[f])
     });
     let functions: Vec<FunctionClassification> = functions.collect();
-    let ratios = (ratios.into_iter())
-        .filter_map(|(name, _, size, v)| Some(classification(name, v, bands.ratio(name)?, size)));
+    let ratios = (ratios.into_iter()).filter_map(|(name, _, size, verdict)| {
+        let verdict = conditional(problem, verdict);
+        Some(classification(name, verdict, bands.ratio(name)?, size))
+    });
     functions.into_iter().chain(ratios).collect()
+}
+
+/// Verdict on a function or ratio: conditional instead of identified where the weight of a penalty was chosen by a rule whose
+/// intervals exclude the smoothing bias, which is a bias of all estimates.
+fn conditional(problem: &Problem, verdict: Classification) -> Classification {
+    let mut rules = problem.penalties.iter().filter_map(|p| p.rule);
+    let is_biased = rules.any(|rule| !rule.gives_coverage());
+    match verdict {
+        Classification::Identified { relative } if is_biased => Classification::Conditional {
+            relative,
+            on: Condition::Smoothness,
+        },
+        other => other,
+    }
 }
 
 fn judge(times: &[f64], band: &Band, size: f64) -> Classification {
@@ -212,6 +305,7 @@ fn classification(
 ) -> FunctionClassification {
     let sentence = match &verdict {
         Classification::Identified { .. } => identified(name, band, size),
+        Classification::Conditional { relative, on } => on.sentence(name, *relative),
         Classification::OnlyRatio(ratio) => {
             format!("{name} itself is not identifiable; the ratio {ratio} is identified")
         }

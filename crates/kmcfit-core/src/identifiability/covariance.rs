@@ -1,14 +1,14 @@
 //! Covariance of the parameters from one factorisation of the weighted Jacobian, and the directions that the data leave
 //! undetermined. Standard errors ([`Problem::covariance`]) and bands ([`super::Bands`]) are computed from it.
 
-use super::active::ActiveRow;
+use super::active::{ActiveRow, active_rows};
 use super::directions::Directions;
 use super::factorisation::Factorisation;
 use super::sensitivity::Sensitivity;
-use crate::functions::Penalty;
+use crate::functions::{Penalty, WeightRule};
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 
 /// Information on the parameters, in scaled directions.
 pub(super) struct Information {
@@ -17,6 +17,9 @@ pub(super) struct Information {
     measured: DMatrix<f64>,
     /// Rows of penalties and violated soft constraints.
     pulled: DMatrix<f64>,
+    /// True with a penalty whose rule gives intervals that include the smoothing bias on average
+    /// ([`WeightRule::gives_coverage`](crate::functions::WeightRule::gives_coverage)).
+    is_bayesian: bool,
     /// Bound of the accumulated rounding error of a response as large as the largest sample.
     rounding: f64,
 }
@@ -63,6 +66,7 @@ impl Information {
         Self {
             measured,
             pulled,
+            is_bayesian: is_bayesian(problem),
             sensitivity,
             rounding: f64::EPSILON * largest * problem.system.grid.nodes() as f64,
         }
@@ -79,11 +83,12 @@ impl Information {
 
     /// True with penalties or violated soft constraints, where the covariance is a sandwich.
     pub fn is_pulled(&self) -> bool {
-        self.pulled.nrows() > 0
+        self.pulled.nrows() > 0 && !self.is_bayesian
     }
 
     /// Covariance with the rows `held` fixed: `H^+ M H^+` in the null space of these rows, with `H = J^T W J + R` and
-    /// `M = J^T W J` (`W` multiplied by the estimated variance for samples without sigma).
+    /// `M = J^T W J` (`W` multiplied by the estimated variance for samples without sigma); `H^+`, the Bayesian covariance, for
+    /// penalties whose rule gives coverage.
     pub fn factor(&self, held: &[&ActiveRow]) -> CovarianceRoot {
         let directions = &self.sensitivity.directions;
         let n = directions.len();
@@ -123,6 +128,13 @@ impl Information {
             }
         }
         let rank = inverse_root.ncols();
+        if self.is_bayesian && variance.is_none() {
+            return CovarianceRoot {
+                root: inverse_root,
+                undetermined,
+                variance,
+            };
+        }
         let root = match answers.nrows() >= rank && rank > 0 {
             true => &inverse_root * answers.qr().r().transpose(),
             false => &inverse_root * answers.transpose(),
@@ -132,6 +144,20 @@ impl Information {
             undetermined,
             variance,
         }
+    }
+
+    /// Covariance of the parameters from its root; `None` where a combination is undetermined or the noise is unknown.
+    pub fn of_parameters(&self, covariance: &CovarianceRoot) -> Option<DMatrix<f64>> {
+        let is_known = covariance.variance.is_none_or(|v| v > 0.0 && v.is_finite());
+        if covariance.undetermined.ncols() > 0 || !is_known || covariance.root.ncols() == 0 {
+            return None;
+        }
+        let directions = &self.sensitivity.directions;
+        let column =
+            |z: DVectorView<f64>| DVector::from_vec(directions.to_parameters(z.as_slice()));
+        let columns: Vec<_> = covariance.root.column_iter().map(column).collect();
+        let root = DMatrix::from_columns(&columns);
+        Some(&root * root.transpose())
     }
 
     /// Estimated variance `sum r^2 / (n - effective parameters)` of samples without sigma; infinite if the difference is not
@@ -157,6 +183,12 @@ impl Information {
     }
 }
 
+/// True if the intervals of a problem are Bayesian: some penalty has a rule that gives coverage.
+pub(super) fn is_bayesian(problem: &Problem) -> bool {
+    let rules = problem.penalties.iter().filter_map(|p| p.rule);
+    rules.into_iter().any(WeightRule::gives_coverage)
+}
+
 /// Root of the inverse, and basis of the undetermined combinations.
 fn split(factorisation: &Factorisation) -> (DMatrix<f64>, DMatrix<f64>) {
     let undetermined = factorisation.undetermined().into_owned();
@@ -175,6 +207,46 @@ impl Problem {
         }
         let directions = Directions::new(self, evaluation, n, n);
         covariance(self, &Sensitivity::along(self, evaluation, directions))
+    }
+}
+
+impl Problem {
+    /// Covariance of the estimates with penalties, priors and equality constraints: that of the bands ([`super::Bands`]). `None` with more
+    /// than [`FEW_PARAMETERS`] parameters, and where a combination of parameters is undetermined.
+    pub fn covariance_of_estimates(
+        &self,
+        theta: &[f64],
+        evaluation: &Evaluation,
+    ) -> Option<DMatrix<f64>> {
+        let n = self.parameters();
+        if n == 0 || n > FEW_PARAMETERS || self.sample_count() <= n {
+            return None;
+        }
+        let directions = Directions::new(self, evaluation, n, n);
+        let sensitivity = Sensitivity::along(self, evaluation, directions);
+        let active = active_rows(self, theta);
+        let equal: Vec<&ActiveRow> = active.iter().filter(|row| row.equality).collect();
+        let information = Information::new(self, theta, sensitivity);
+        information.of_parameters(&information.factor(&equal))
+    }
+
+    /// Effective number of parameters of each penalised function that the samples determine: those of the function minus
+    /// `w tr(H^-1 L^T L)`, for each penalty. `None` with more than [`FEW_PARAMETERS`] parameters.
+    pub fn effective_parameters(&self, theta: &[f64], evaluation: &Evaluation) -> Option<Vec<f64>> {
+        let n = self.parameters();
+        if n == 0 || n > FEW_PARAMETERS {
+            return None;
+        }
+        let directions = Directions::new(self, evaluation, n, n);
+        let sensitivity = Sensitivity::along(self, evaluation, directions);
+        let information = Information::new(self, theta, sensitivity);
+        let root = Factorisation::of(&information.rows()).inverse_root();
+        let directions = &information.sensitivity.directions;
+        let each = self.penalties.iter().map(|penalty| {
+            let count = self.functions.ranges()[penalty.function].len() as f64;
+            count - (roughness(self, penalty, directions) * &root).norm_squared()
+        });
+        Some(each.collect())
     }
 }
 

@@ -28,16 +28,27 @@ pub use classification::is_negligible;
 
 use crate::problem::Problem;
 
-/// True if the samples alone determine a point: the cost has no penalties, and no constraint is active.
+/// True if the covariance of the estimates is that of their errors: no constraint is active, and the cost has no terms besides the
+/// misfit and penalties whose rule gives coverage
+/// ([`WeightRule::gives_coverage`](crate::functions::WeightRule::gives_coverage)).
 pub fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
-    !problem.is_regularised() && active::active_rows(problem, theta).is_empty()
+    let mut unpenalised = problem.clone();
+    let penalties = &mut unpenalised.parts_mut().penalties;
+    penalties.retain(|penalty| !penalty.rule.is_some_and(|rule| rule.gives_coverage()));
+    !unpenalised.is_regularised() && !has_active_rows(problem, theta)
+}
+
+/// True if some constraint holds with equality at a point.
+pub(crate) fn has_active_rows(problem: &Problem, theta: &[f64]) -> bool {
+    !active::active_rows(problem, theta).is_empty()
 }
 
 pub use anchors::anchors;
 pub use band::{Band, BandSide};
 pub use bands::{BandSettings, Bands};
+pub(crate) use classification::condition_on_bases;
 pub use classification::{
-    Classification, ClassificationKind, FunctionClassification, classify_functions,
+    Classification, ClassificationKind, Condition, FunctionClassification, classify_functions,
 };
 pub(crate) use covariance::stacked;
 pub use experiments::{
@@ -46,4 +57,6 @@ pub use experiments::{
 pub(crate) use factorisation::Factorisation;
 pub use scaling_ambiguity::ScalingAmbiguity;
 pub use sensitivity::{ResolvedDirection, Sensitivity, SingularSpectrum};
+pub use spans::span_words;
+pub(crate) use spans::spans;
 pub use structural_rank::{RankFinding, RankFindingKind, ScaleFreedom, structural_rank};

@@ -1,7 +1,7 @@
 //! Intervals of time and their text.
 
 /// Intervals of time, s, over consecutive nodes for which `holds` is true.
-pub(super) fn spans(times: &[f64], holds: impl Fn(usize) -> bool) -> Vec<[f64; 2]> {
+pub(crate) fn spans(times: &[f64], holds: impl Fn(usize) -> bool) -> Vec<[f64; 2]> {
     let mut spans: Vec<[f64; 2]> = Vec::new();
     let mut open = false;
     for (i, &t) in times.iter().enumerate() {
@@ -23,7 +23,7 @@ pub(super) fn spans(times: &[f64], holds: impl Fn(usize) -> bool) -> Vec<[f64; 2
 const MOST_SPANS: usize = 4;
 
 /// Intervals as text.
-pub(super) fn span_words(spans: &[[f64; 2]]) -> String {
+pub fn span_words(spans: &[[f64; 2]]) -> String {
     let word = |&[from, to]: &[f64; 2]| match from == to {
         true => format!("t = {from:.3} s"),
         false => format!("[{from:.3}, {to:.3}] s"),

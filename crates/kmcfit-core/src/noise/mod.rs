@@ -15,10 +15,12 @@ mod autoregression;
 mod burg;
 mod correlation;
 mod exponential;
+mod penalty_moments;
 mod restricted_likelihood;
 
 pub use autoregression::Autoregression;
 pub use burg::{HIGHEST_ORDER, burg, select_order};
 pub use correlation::{Correlation, CorrelationLaw, uninterrupted_runs};
 pub use exponential::select_exponential;
+pub use penalty_moments::PenaltyMoments;
 pub use restricted_likelihood::{ChannelMoments, NoiseCoordinates, RestrictedLikelihood, STEP};

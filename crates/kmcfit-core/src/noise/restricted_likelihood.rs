@@ -9,9 +9,13 @@
 //! The last term corrects for the parameters: residuals are whiter and smaller than the noise, most where noise is narrowband near
 //! a resonance, and the maximum of the plain likelihood is then biased (Harville 1977). Products of the rows at all lags are
 //! computed once, so that the cost of a step does not depend on the number of samples.
+//!
+//! Penalties `w_j |L_j (theta + d)|^2` with estimated weights `w_j` join the squares and the determinant, and `f` has the further
+//! terms `- rank(L_j) log w_j`: a penalty is the prior of a random function (Wahba 1983; Wood 2011).
 
 use super::autoregression::Autoregression;
 use super::correlation::Correlation;
+use super::penalty_moments::PenaltyMoments;
 use nalgebra::DMatrix;
 
 /// Step of central differences in the coordinates.
@@ -147,31 +151,71 @@ fn autoregressive(rows: &DMatrix<f64>, order: usize) -> Products {
     }
 }
 
-/// Restricted likelihood of the noise of all channels.
+/// Restricted likelihood of the noise of all channels, and of weights of penalties.
 pub struct RestrictedLikelihood {
     channels: Vec<ChannelMoments>,
-    /// Gram matrix of rows without noise parameters: priors and penalties.
+    /// Gram matrix of rows without noise parameters: priors, and penalties of given weights.
     known: DMatrix<f64>,
+    /// Penalties whose weights are coordinates.
+    penalties: Vec<PenaltyMoments>,
+    /// For each penalty of an estimated weight its logarithm, where it is as good as infinite; such penalties stand in `known`.
+    infinite: Vec<Option<f64>>,
 }
 
-/// Estimated noise.
+/// Estimated noise and weights.
 #[derive(Debug, Clone, PartialEq)]
-pub struct NoiseFit {
+pub struct RestrictedFit {
     /// Coordinates of each channel.
     pub channels: Vec<NoiseCoordinates>,
     /// Covariance of the coordinates of each channel, the inverse of its restricted information.
     pub covariances: Vec<DMatrix<f64>>,
+    /// Logarithms of the weights of the penalties.
+    pub log_weights: Vec<f64>,
 }
 
 impl RestrictedLikelihood {
-    /// Likelihood of `channels`, with the Gram matrix `known` of rows of priors and penalties.
+    /// Likelihood of `channels`, with the Gram matrix `known` of rows of priors and of penalties with given weights.
     pub fn new(channels: Vec<ChannelMoments>, known: DMatrix<f64>) -> Self {
-        Self { channels, known }
+        Self {
+            channels,
+            known,
+            penalties: Vec::new(),
+            infinite: Vec::new(),
+        }
+    }
+
+    /// Adds penalties whose weights are estimated, with start values at the noise of the start.
+    #[must_use]
+    pub fn with_penalties(mut self, mut penalties: Vec<PenaltyMoments>) -> Self {
+        let mut gram = self.known.clone();
+        for channel in &self.channels {
+            let noise = NoiseCoordinates::of(channel.estimates_sigma, &channel.start);
+            gram += channel.whitened(&noise.law).0;
+        }
+        for (penalty, is_finite) in PenaltyMoments::start(&mut penalties, &gram) {
+            self.infinite.push(match is_finite {
+                true => None,
+                false => {
+                    self.known += &penalty.gram * penalty.log_weight.exp();
+                    Some(penalty.log_weight)
+                }
+            });
+            if is_finite {
+                self.penalties.push(penalty.clone());
+            }
+        }
+        self
     }
 
     fn start(&self) -> Vec<f64> {
-        let starts = self.channels.iter().map(|c| c.start.iter());
-        starts.flatten().copied().collect()
+        let noise = self.channels.iter().flat_map(|c| c.start.iter().copied());
+        let weights = self.penalties.iter().map(|p| p.log_weight);
+        noise.chain(weights).collect()
+    }
+
+    /// Number of coordinates of the channels; those of the penalties follow.
+    fn noise_coordinates(&self) -> usize {
+        self.channels.iter().map(|c| c.start.len()).sum()
     }
 
     fn split(&self, at: &[f64]) -> Vec<NoiseCoordinates> {
@@ -184,7 +228,7 @@ impl RestrictedLikelihood {
         each.collect()
     }
 
-    /// `f` at the coordinates of all channels; NaN where the Gram matrix is not positive definite.
+    /// `f` at the coordinates of all channels and the logarithms of the weights; NaN where the Gram matrix is not positive definite.
     pub fn value(&self, at: &[f64]) -> f64 {
         let mut gram = self.known.clone();
         let mut constant = 0.0;
@@ -193,6 +237,11 @@ impl RestrictedLikelihood {
             let log_sigma = noise.log_sigma.unwrap_or(0.0);
             gram += own * (-2.0 * log_sigma).exp();
             constant += 2.0 * channel.samples as f64 * log_sigma + determinant;
+        }
+        let weights = &at[self.noise_coordinates()..];
+        for (penalty, log_weight) in self.penalties.iter().zip(weights) {
+            gram += &penalty.gram * log_weight.exp();
+            constant -= penalty.rank as f64 * log_weight;
         }
         let q = gram.nrows() - 1;
         let right = gram.view((0, q), (q, 1)).into_owned();
@@ -207,11 +256,14 @@ impl RestrictedLikelihood {
 
     /// Minimum of `f` by Newton steps with central differences, and the covariance `2 H^-1` of the coordinates with the Hessian
     /// `H`. `None` where there is nothing to estimate or the likelihood is not finite.
-    pub fn fit(&self) -> Option<NoiseFit> {
+    pub fn fit(&self) -> Option<RestrictedFit> {
         let mut at = self.start();
         let mut value = self.value(&at);
-        if at.is_empty() || !value.is_finite() {
+        if at.is_empty() && self.infinite.is_empty() || !value.is_finite() {
             return None;
+        }
+        if at.is_empty() {
+            return Some(self.result(&at, &DMatrix::zeros(0, 0)));
         }
         for _ in 0..STEPS {
             let (gradient, hessian) = self.derivatives(&at, value);
@@ -235,6 +287,11 @@ impl RestrictedLikelihood {
         }
         let (_, hessian) = self.derivatives(&at, value);
         let covariance = positive(&hessian).try_inverse()? * 2.0;
+        Some(self.result(&at, &covariance))
+    }
+
+    /// The estimate at the coordinates, with their covariance.
+    fn result(&self, at: &[f64], covariance: &DMatrix<f64>) -> RestrictedFit {
         let mut first = 0;
         let blocks = self.channels.iter().map(|channel| {
             let count = channel.start.len();
@@ -242,10 +299,16 @@ impl RestrictedLikelihood {
             first += count;
             block.into_owned()
         });
-        Some(NoiseFit {
-            covariances: blocks.collect(),
-            channels: self.split(&at),
-        })
+        let covariances = blocks.collect();
+        let mut estimated = at[self.noise_coordinates()..].iter();
+        let log_weights = self.infinite.iter();
+        RestrictedFit {
+            covariances,
+            channels: self.split(at),
+            log_weights: log_weights
+                .filter_map(|infinite| infinite.or_else(|| estimated.next().copied()))
+                .collect(),
+        }
     }
 
     fn derivatives(&self, at: &[f64], value: f64) -> (DMatrix<f64>, DMatrix<f64>) {
@@ -336,6 +399,70 @@ mod tests {
         let squares = (left.transpose() * &inverse * &left)[(0, 0)];
         let expected = matrix.determinant().ln() + squares + information.determinant().ln();
         assert!((likelihood.value(&at) - expected).abs() < 1e-9);
+    }
+
+    /// A penalty is a random effect: `y = X a + Z u + e` with `u ~ N(0, 1/w)` has the covariance `V = sigma^2 + Z Z^T/w`, and `f`
+    /// differs from `log |V| + log |X^T V^-1 X| + y^T (V^-1 - V^-1 X (X^T V^-1 X)^-1 X^T V^-1) y` by a constant.
+    #[test]
+    fn the_likelihood_with_a_penalty_is_that_of_a_random_effect() {
+        let (n, effects) = (30, 5);
+        let ramp: Vec<f64> = (0..n).map(|i| i as f64 / n as f64).collect();
+        let mut columns = vec![vec![1.0; n], ramp];
+        for k in 0..effects {
+            columns.push(
+                (0..n)
+                    .map(|i| ((k + 1) as f64 * 0.7 * i as f64).sin())
+                    .collect(),
+            );
+        }
+        let fixed = rows(&columns[..2]);
+        let random = rows(&columns[2..]);
+        let effect = |i: usize| columns[2][i] - 0.8 * columns[4][i] + 0.6 * columns[5][i];
+        let values: Vec<f64> = (auto_regression(7, n, 0.4).iter().enumerate())
+            .map(|(i, e)| effect(i) + 0.3 * e)
+            .collect();
+        columns.push(values.clone());
+        let moments = ChannelMoments::new(&rows(&columns), None, true);
+        let mut gram = DMatrix::zeros(effects + 3, effects + 3);
+        (2..2 + effects).for_each(|i| gram[(i, i)] = 1.0);
+        let q = columns.len();
+        let penalty = PenaltyMoments {
+            gram,
+            rank: effects,
+            log_weight: 0.0,
+        };
+        let likelihood = RestrictedLikelihood::new(vec![moments], DMatrix::zeros(q, q))
+            .with_penalties(vec![penalty]);
+        assert_eq!(likelihood.penalties.len(), 1);
+        let y = DMatrix::from_column_slice(n, 1, &values);
+        let marginal = |log_sigma: f64, log_weight: f64| {
+            let noise = DMatrix::identity(n, n) * (2.0 * log_sigma).exp();
+            let v = noise + &random * random.transpose() * (-log_weight).exp();
+            let inverse = v.clone().try_inverse().unwrap();
+            let information = fixed.transpose() * &inverse * &fixed;
+            let projected = &inverse
+                * &fixed
+                * information.clone().try_inverse().unwrap()
+                * fixed.transpose()
+                * &inverse;
+            let squares = (y.transpose() * (inverse - projected) * &y)[(0, 0)];
+            v.determinant().ln() + information.determinant().ln() + squares
+        };
+        let reference = likelihood.value(&[0.0, 0.0]) - marginal(0.0, 0.0);
+        for at in [[0.2, 1.0], [-0.5, 3.0], [0.1, -2.0]] {
+            let difference = likelihood.value(&at) - marginal(at[0], at[1]);
+            assert!(
+                (difference - reference).abs() < 1e-9,
+                "{difference} {reference}"
+            );
+        }
+        // The estimate is a minimum of both.
+        let found = likelihood.fit().unwrap();
+        let at = [found.channels[0].log_sigma.unwrap(), found.log_weights[0]];
+        let least = marginal(at[0], at[1]);
+        for step in [[0.05, 0.0], [-0.05, 0.0], [0.0, 0.05], [0.0, -0.05]] {
+            assert!(marginal(at[0] + step[0], at[1] + step[1]) > least);
+        }
     }
 
     /// White noise of one channel with an estimated sigma: `sigma^2 = RSS/(n - q)`, of which the logarithm has the variance

@@ -1,20 +1,15 @@
 //! Estimation of the correlation of noise from the residuals of a fit.
 
 use super::fit::Fit;
-use super::linearization::{add_penalties, add_priors};
 use super::settings::{FitSettings, Solver};
 use crate::diagnostics::spread;
-use crate::identifiability::{Factorisation, stacked};
 use crate::noise::{
-    Autoregression, ChannelMoments, Correlation, CorrelationLaw, HIGHEST_ORDER, NoiseCoordinates,
-    RestrictedLikelihood, burg, select_exponential, select_order, uninterrupted_runs,
+    Autoregression, Correlation, CorrelationLaw, HIGHEST_ORDER, burg, select_exponential,
+    select_order, uninterrupted_runs,
 };
-use crate::objective::Evaluation;
-use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::qp::Subproblem;
-use crate::record::{Channel, Loss, NoiseEstimate, NoiseModel, Weighting};
+use crate::problem::Problem;
+use crate::record::{Channel, NoiseEstimate, NoiseModel, Weighting};
 use crate::simd::sum::rms;
-use nalgebra::DMatrix;
 
 /// Smallest number of samples per parameter for which an order is chosen: with fewer, the residuals are much whiter than the
 /// noise.
@@ -144,115 +139,4 @@ pub(super) fn movement(problem: &Problem, from: &[f64], found: &Fit) -> f64 {
     let pairs = from.iter().zip(&found.best.parameters).enumerate();
     let moved = pairs.map(|(j, (a, b))| (a - b).abs() / covariance[(j, j)].sqrt());
     moved.fold(0.0, f64::max)
-}
-
-/// The problem with sigmas and correlations of the largest restricted likelihood at an evaluated point, and their covariance;
-/// `None` with more than [`FEW_PARAMETERS`] parameters, under a robust loss, or where the likelihood has no maximum.
-pub(super) fn refined(
-    problem: &Problem,
-    theta: &[f64],
-    evaluation: &Evaluation,
-) -> Option<Problem> {
-    let is_robust = problem.channels().any(|c| c.loss() != Loss::Squares);
-    if problem.parameters() > FEW_PARAMETERS || is_robust {
-        return None;
-    }
-    let (moments, known) = moments(problem, theta, evaluation);
-    let found = RestrictedLikelihood::new(moments, known).fit()?;
-    let mut next = problem.clone();
-    let mut each = found.channels.iter().zip(found.covariances);
-    for experiment in &mut next.parts_mut().experiments {
-        for channel in &mut experiment.channels {
-            let (coordinates, covariance) = each.next()?;
-            *channel = with_coordinates(channel, coordinates, covariance);
-        }
-    }
-    Some(next)
-}
-
-/// Moments of all channels, and the Gram matrix of priors and penalties, in the combinations of parameters that the rows
-/// determine, normalised.
-fn moments(
-    problem: &Problem,
-    theta: &[f64],
-    evaluation: &Evaluation,
-) -> (Vec<ChannelMoments>, DMatrix<f64>) {
-    let n = problem.parameters();
-    let mut rows = (problem.predictions_jacobian(evaluation)).insert_column(n, 0.0);
-    let mut first = 0;
-    for (channel, predicted) in problem.predicted(evaluation) {
-        for (i, r) in channel.residuals(predicted).enumerate() {
-            rows[(first + i, n)] = r;
-            let root = channel.weighting().weight(i, channel.len()).sqrt();
-            rows.row_mut(first + i).scale_mut(root);
-        }
-        first += channel.len();
-    }
-    let known = penalty_rows(problem, theta);
-    let map = determined(&stacked(&rows, &known));
-    let rows = rows * &map;
-    let known = known * &map;
-    let mut first = 0;
-    let moments = problem.channels().map(|channel| {
-        let own = rows.rows(first, channel.len()).into_owned();
-        first += channel.len();
-        let estimates = matches!(channel.weighting(), Weighting::Estimated { .. });
-        ChannelMoments::new(&own, channel.correlation(), estimates)
-    });
-    (moments.collect(), known.tr_mul(&known))
-}
-
-/// Rows of penalties and priors, with their residuals in the last column.
-fn penalty_rows(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
-    let n = problem.parameters();
-    let mut subproblem = Subproblem::new(n);
-    add_penalties(problem, theta, &mut subproblem);
-    add_priors(problem, theta, &mut subproblem);
-    let residuals = subproblem.residuals;
-    let mut rows = DMatrix::zeros(residuals.len(), n + 1);
-    for i in 0..residuals.len() {
-        (residuals.row(i)).for_each(|(j, a)| rows[(i, j)] += a);
-        rows[(i, n)] = -residuals.right()[i];
-    }
-    rows
-}
-
-/// Map of the columns of `rows` to orthonormal combinations of all but the last, as far as the rows determine them, and the last
-/// column. The columns are first scaled to unit length, because parameters have different units.
-fn determined(rows: &DMatrix<f64>) -> DMatrix<f64> {
-    let n = rows.ncols() - 1;
-    let mut scaled = rows.columns(0, n).into_owned();
-    let mut sizes = Vec::with_capacity(n);
-    for mut column in scaled.column_iter_mut() {
-        let size = column.norm().max(f64::MIN_POSITIVE);
-        column /= size;
-        sizes.push(size);
-    }
-    let root = Factorisation::of(&scaled).inverse_root();
-    let q = root.ncols();
-    DMatrix::from_fn(n + 1, q + 1, |i, j| match (i < n, j < q) {
-        (true, true) => root[(i, j)] / sizes[i],
-        (false, false) => 1.0,
-        _ => 0.0,
-    })
-}
-
-/// The channel with noise at `coordinates`, sigma relative to its present value.
-fn with_coordinates(
-    channel: &Channel,
-    coordinates: &NoiseCoordinates,
-    covariance: DMatrix<f64>,
-) -> Channel {
-    let mut next = channel.clone();
-    if let (Weighting::Estimated { sigma }, Some(log)) =
-        (channel.weighting(), coordinates.log_sigma)
-    {
-        let sigma = sigma * log.exp();
-        next = next.with_weighting(Weighting::Estimated { sigma });
-    }
-    let correlation = channel.correlation().map(|c| c.at(&coordinates.law));
-    next.with_noise(NoiseEstimate {
-        correlation,
-        covariance,
-    })
 }

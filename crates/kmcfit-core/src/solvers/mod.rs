@@ -17,7 +17,9 @@ mod methods;
 mod no_response;
 mod noise_estimation;
 mod optimality;
+mod probed_weights;
 mod reason;
+mod restricted_estimation;
 mod settings;
 mod solve_counts;
 mod start_projection;
@@ -26,6 +28,7 @@ mod starts;
 mod state_estimation;
 mod termination;
 mod timings;
+mod traces;
 mod validation;
 mod weight_path;
 
@@ -51,7 +54,7 @@ pub use state_estimation::estimate_states;
 pub use termination::{Outcome, Status, Stopping};
 pub use timings::{Timings, timed};
 pub use validation::predict_validation;
-pub use weight_path::{PathPoint, WeightPath, WeightRule, choose_weight, choose_weight_watched};
+pub use weight_path::{PathPoint, WeightPath, choose_weight, choose_weight_watched};
 
 use crate::problem::Problem;
 use crate::simulate::SimulationError;

@@ -1,17 +1,20 @@
-//! Estimation of sigmas and correlations of the noise from the residuals, in alternation with fits.
+//! Estimation of sigmas and correlations of the noise and of penalty weights, in alternation with fits.
 
 use super::checkpoint::Observer;
 use super::correlation_estimation::{
-    correlated, is_white, is_worse, may_correlate, movement, orders, refined,
+    correlated, is_white, is_worse, may_correlate, movement, orders,
 };
 use super::executor::search;
 use super::fit::{Fit, measured};
 use super::history::IterationRecord;
+use super::probed_weights::probed;
+use super::restricted_estimation::{estimates_weights, refined, start_weights};
 use super::settings::FitSettings;
 use super::start_strategy::search_from_starts;
 use super::termination::Status;
+use super::timings::Timings;
 use crate::host::Instant;
-use crate::problem::Problem;
+use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, Loss, Weighting};
 use crate::simd::sum::rms;
 use crate::simulate::SimulationError;
@@ -24,6 +27,10 @@ const PASSES: usize = 15;
 const FREE_PASSES: usize = 5;
 /// Largest number of rounds of fit and restricted likelihood.
 const REFINEMENTS: usize = 3;
+/// Largest number of rounds of fit and estimation of penalty weights.
+const WEIGHT_ROUNDS: usize = 40;
+/// Change of the logarithm of a weight below which weights are at rest; its standard error is about 0.5.
+const WEIGHTS_AT_REST: f64 = 0.02;
 /// Change of the parameters, in standard errors, below which correlations are at rest.
 const AT_REST: f64 = 0.01;
 /// Relative change of a sigma below which it has converged; chi-square changes by twice that.
@@ -37,6 +44,9 @@ const MEDIAN_TO_SIGMA: f64 = 1.4826;
 /// sigmas.
 ///
 /// With a robust loss, sigma describes the majority of the samples: it follows from the median absolute residual.
+///
+/// Weights of the rule [`WeightRule::RestrictedLikelihood`](crate::functions::WeightRule::RestrictedLikelihood) are estimated
+/// together with the noise; the returned problem has them.
 ///
 /// # Errors
 /// As [`fit`](super::fit()).
@@ -60,12 +70,19 @@ pub fn fit_with_noise_watched(
     watch: &mut Observer,
 ) -> Result<(Problem, Fit), SimulationError> {
     let mut problem = problem.clone();
+    let chooses = estimates_weights(&problem);
+    if chooses {
+        start_weights(&mut problem, start);
+    }
     let mut found = search_from_starts(&problem, start, settings, watch)?;
-    found = with_sigmas(&mut problem, found, settings, watch)?;
+    found = match chooses {
+        true => with_weights(&mut problem, found, settings, watch)?,
+        false => with_sigmas(&mut problem, found, settings, watch)?,
+    };
     if may_correlate(&problem, settings) {
         found = with_correlations(&mut problem, found, settings, watch)?;
     }
-    let is_as_stated = !estimates_sigma(&problem) && is_white(&problem);
+    let is_as_stated = !estimates_sigma(&problem) && is_white(&problem) && !chooses;
     // All costs refer to the final noise.
     if let (false, Ok(evaluation)) = (is_as_stated, problem.evaluate(start)) {
         found.initial_cost = evaluation.cost;
@@ -96,7 +113,7 @@ fn with_sigmas(
         return Ok(found);
     }
     for _ in 0..ROUNDS {
-        let change = update(problem, &found);
+        let change = update(problem, &found, |_| true);
         let ended = is_ended(&found);
         let next = search(problem, &found.best.parameters, settings, None, watch)?;
         found = with_round(found, next, ended);
@@ -105,6 +122,48 @@ fn with_sigmas(
         }
     }
     Ok(found)
+}
+
+/// Fit and estimation of weights and sigmas in alternation, until these rest.
+fn with_weights(
+    problem: &mut Problem,
+    mut found: Fit,
+    settings: &FitSettings,
+    watch: &mut Observer,
+) -> Result<Fit, SimulationError> {
+    update(problem, &found, |_| true);
+    for _ in 0..WEIGHT_ROUNDS {
+        if is_ended(&found) {
+            break;
+        }
+        let next = match problem.parameters() > FEW_PARAMETERS {
+            true => counted(&mut found, |found| {
+                probed(problem, found, &mut Timings::default())
+            }),
+            false => counted(&mut found, |found| {
+                refined(problem, &found.best.parameters, &found.best.evaluation)
+            }),
+        };
+        let Some(next) = next else {
+            break;
+        };
+        let change = weight_change(problem, &next);
+        *problem = next;
+        let sigmas = update(problem, &found, |c| c.loss() != Loss::Squares);
+        let fit = search(problem, &found.best.parameters, settings, None, watch)?;
+        found = with_round(found, fit, false);
+        if change.max(sigmas) < WEIGHTS_AT_REST {
+            break;
+        }
+    }
+    Ok(found)
+}
+
+/// Largest change of the logarithm of a weight.
+fn weight_change(before: &Problem, after: &Problem) -> f64 {
+    let pairs = before.penalties.iter().zip(&after.penalties);
+    let changes = pairs.map(|(a, b)| (b.weight / a.weight).ln().abs());
+    changes.fold(0.0, f64::max)
 }
 
 /// Fit and estimation of the correlations in alternation, from the residuals by Burg's method until orders and parameters
@@ -217,8 +276,8 @@ fn with_round(found: Fit, next: Fit, ended: bool) -> Fit {
     }
 }
 
-/// Sets the sigmas of the residuals; returns the largest relative change.
-fn update(problem: &mut Problem, found: &Fit) -> f64 {
+/// Sets the sigmas of the residuals of the channels `which`; returns the largest relative change.
+fn update(problem: &mut Problem, found: &Fit, which: impl Fn(&Channel) -> bool) -> f64 {
     let samples = problem.sample_count() as f64;
     let share = (problem.parameters() as f64 / samples).min(0.5);
     let mut largest = 0.0f64;
@@ -228,6 +287,9 @@ fn update(problem: &mut Problem, found: &Fit) -> f64 {
             let Weighting::Estimated { sigma: before } = *channel.weighting() else {
                 continue;
             };
+            if !which(channel) {
+                continue;
+            }
             let sigma = spread(channel, predicted) / (1.0 - share).sqrt();
             // Samples that are fitted exactly still need a scale.
             let sigma = sigma.max(f64::EPSILON * rms(channel.observed()));

@@ -4,43 +4,17 @@ use super::checkpoint::Observer;
 use super::executor::search;
 use super::fit::{Attempt, Fit, measured};
 use super::history::IterationRecord;
-use super::iterate::Iterate;
-use super::linearization::{Linearization, linearisation_tangents, linearise};
+use super::linearization::linearisation_tangents;
 use super::settings::FitSettings;
 use super::solve_counts::SolveCounts;
 use super::start_strategy::search_from_starts;
 use super::termination::{Outcome, Status};
-use super::timings::{Timings, timed};
+use super::timings::Timings;
+use super::traces::{SEED, Traces};
+use crate::functions::WeightRule;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::time::Duration;
-
-/// Rule for the choice of the weight.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum WeightRule {
-    /// The largest weight with chi-square at most `n + 2 sqrt(2 n)` (Morozov).
-    Discrepancy,
-    /// Corner of misfit against roughness on logarithmic axes (Hansen).
-    LCurve,
-    /// Least generalised cross-validation score `n misfit / (n - dof)^2` (Golub, Heath, Wahba).
-    Gcv,
-}
-
-impl WeightRule {
-    /// All rules.
-    pub const ALL: [Self; 3] = [Self::Discrepancy, Self::LCurve, Self::Gcv];
-
-    /// Name in a model file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Discrepancy => "discrepancy",
-            Self::LCurve => "l-curve",
-            Self::Gcv => "gcv",
-        }
-    }
-}
 
 /// Fit at one weight.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,7 +40,7 @@ pub struct PathPoint {
 pub struct WeightPath {
     /// Fits, by falling weight.
     pub points: Vec<PathPoint>,
-    /// Index chosen by each rule of [`WeightRule::ALL`]; `None` where a rule chooses none.
+    /// Index chosen by each rule of [`WeightRule::OF_PATHS`]; `None` where a rule chooses none.
     pub picks: [Option<usize>; 3],
     /// Index of the point whose weight is used.
     pub chosen: usize,
@@ -88,10 +62,6 @@ const LARGEST: f64 = 1e4;
 /// Decades of the path, and points per decade.
 const DECADES: f64 = 8.0;
 const PER_DECADE: f64 = 1.0;
-/// Number of random vectors of the trace estimate (Hutchinson); its error is about sqrt(2 dof / 16).
-const PROBES: usize = 16;
-/// Seed of those vectors.
-const SEED: u64 = 1;
 
 impl Problem {
     /// The problem with the weights of the penalties `which` multiplied by `factor`.
@@ -159,7 +129,7 @@ pub fn choose_weight_watched(
         l_curve(&points),
         gcv(&points),
     ];
-    let index = WeightRule::ALL
+    let index = WeightRule::OF_PATHS
         .iter()
         .position(|r| *r == rule)
         .and_then(|i| picks[i]);
@@ -239,7 +209,10 @@ impl WeightPathSearch<'_, '_> {
         let n = problem.sample_count() as f64;
         self.counts.tangent += linearisation_tangents(&problem);
         let timings = &mut self.timings;
-        let compute = || vec![degrees_of_freedom(&problem, &found, timings)];
+        let compute = || {
+            let traces = Traces::at(&problem, &found, timings);
+            vec![traces.of_samples(timings).unwrap_or(f64::NAN)]
+        };
         let degrees_of_freedom = self.watch.numbers(1, &|| false, compute)[0];
         Ok(PathPoint {
             weight,
@@ -298,46 +271,6 @@ fn roughness(problem: &Problem, which: &[usize], theta: &[f64]) -> f64 {
     penalties
         .map(|p| p.roughness(&theta[ranges[p.function].clone()]))
         .sum()
-}
-
-/// Trace of the matrix that maps samples to fitted values, estimated with random signs.
-fn degrees_of_freedom(problem: &Problem, found: &Fit, timings: &mut Timings) -> f64 {
-    let Iterate {
-        parameters,
-        evaluation,
-        ..
-    } = &found.best;
-    let fresh = Linearization::Fresh;
-    let (mut sub, samples) = linearise(problem, parameters, evaluation, &fresh, timings);
-    // The linearisation at the end has no proximal term.
-    sub.proximal.fill(0.0);
-    let rows = sub.residuals.len();
-    let mut random = ChaCha8Rng::seed_from_u64(SEED);
-    let mut sign = || if random.random_bool(0.5) { 1.0 } else { -1.0 };
-    let probes: Vec<Vec<f64>> = (0..PROBES)
-        .map(|_| {
-            (0..rows)
-                .map(|i| if i < samples { sign() } else { 0.0 })
-                .collect()
-        })
-        .collect();
-    sub.homogeneous();
-    let solutions = timed(&mut timings.linear_algebra, || {
-        sub.solve_equality_constrained_for(&probes)
-    });
-    let Some(solutions) = solutions else {
-        return f64::NAN;
-    };
-    let traces = solutions.iter().zip(&probes).map(|(z, probe)| {
-        let fitted = sub.residuals.multiply(z);
-        fitted
-            .iter()
-            .zip(probe)
-            .take(samples)
-            .map(|(a, b)| a * b)
-            .sum::<f64>()
-    });
-    traces.sum::<f64>() / PROBES as f64
 }
 
 fn discrepancy(problem: &Problem, points: &[PathPoint]) -> Option<usize> {

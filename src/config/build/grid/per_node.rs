@@ -83,6 +83,7 @@ fn free_values((_, spec): &Given) -> FreeValues {
     let knots = match &spec.knots {
         Some(KnotSpec::Count(count)) => count.0,
         Some(KnotSpec::Times(times)) => times.len(),
+        Some(KnotSpec::Auto) => FEW_PARAMETERS - 2,
         None => 0,
     };
     let count = match spec.basis {

@@ -1,0 +1,100 @@
+//! Automatic knots: a spline that is richer than the data need, and a penalty whose weight they choose.
+
+use super::basis::{BasisSpec, Knots};
+use super::coefficient::{CoefficientSpec, PenaltySpec, PenaltyWeight};
+use super::{BuildError, Builder, Record};
+use crate::functions::WeightRule;
+use crate::problem::FEW_PARAMETERS;
+use crate::record::Weighting;
+use crate::system::Grid;
+
+/// Number of intervals: with a penalty, more change neither estimate nor interval.
+const INTERVALS: usize = 40;
+/// Samples per interval.
+const SAMPLES_PER_INTERVAL: usize = 10;
+/// Parameters left to the other functions, initial states and sensors, of those for which covariances are computed.
+const OTHERS: usize = 12;
+/// Order of the penalised derivative.
+const ORDER: usize = 2;
+
+impl Builder {
+    /// The specification with automatic knots replaced by their number; functions without a penalty are given one on their
+    /// curvature, with a weight by restricted likelihood, or for the equation error by the period.
+    pub(super) fn with_knots(&self, grid: &Grid) -> Result<Self, BuildError> {
+        let automatic = self
+            .entries()
+            .into_iter()
+            .filter(|e| e.spec.has_automatic_knots());
+        let keys: Vec<String> = automatic.map(|e| format!("{}.knots", e.key)).collect();
+        let mut next = self.clone();
+        let Some(key) = keys.first() else {
+            return Ok(next);
+        };
+        let weight = match (self.is_equation_error(), self.without_likelihood()) {
+            (true, _) => PenaltyWeight::Period,
+            (false, None) => PenaltyWeight::Rule(WeightRule::RestrictedLikelihood),
+            (false, Some(record)) => {
+                let problem = "automatic knots need a likelihood of the samples";
+                return Err(BuildError::new(key, problem)
+                    .found(format!("no `sigma` in experiments[{record}]"))
+                    .expected(
+                        "`sigma` in every experiment, a number or `estimate`; or a number of knots",
+                    ));
+            }
+        };
+        let samples: usize = (self.records.iter())
+            .flat_map(|record| &record.channels)
+            .map(|channel| channel.times.len())
+            .sum();
+        let room = (FEW_PARAMETERS - OTHERS) / keys.len();
+        let most = grid.nodes().saturating_sub(5).min(room.saturating_sub(3));
+        let intervals = INTERVALS
+            .min(samples / SAMPLES_PER_INTERVAL)
+            .min(most)
+            .max(1);
+        let own = next.records.iter_mut().flat_map(|r| &mut r.coefficients);
+        for (_, spec) in next.coefficients.iter_mut().chain(own) {
+            if spec.has_automatic_knots() {
+                spec.set_knots(intervals + 1);
+                if spec.penalties.is_empty() {
+                    spec.penalties.push(PenaltySpec::Tikhonov {
+                        order: ORDER,
+                        weight,
+                        reference: None,
+                    });
+                }
+            }
+        }
+        Ok(next)
+    }
+
+    /// The first record with a channel without standard deviation, validation records excepted.
+    pub(super) fn without_likelihood(&self) -> Option<usize> {
+        let is_without = |record: &Record| {
+            let mut weightings = record.channels.iter().map(|c| c.weighting.as_ref());
+            !record.validation && weightings.any(|w| !w.is_some_and(Weighting::is_sigma))
+        };
+        match self.simulation {
+            true => None,
+            false => self.records.iter().position(is_without),
+        }
+    }
+}
+
+impl CoefficientSpec {
+    fn has_automatic_knots(&self) -> bool {
+        self.basis().and_then(BasisSpec::knots) == Some(&Knots::Auto)
+    }
+}
+
+impl BasisSpec {
+    /// Knots of a basis that has them.
+    fn knots(&self) -> Option<&Knots> {
+        match self {
+            Self::PiecewiseConstant(knots)
+            | Self::PiecewiseLinear(knots)
+            | Self::BSpline(knots) => Some(knots),
+            Self::Nodal | Self::Constant | Self::Polynomial { .. } => None,
+        }
+    }
+}

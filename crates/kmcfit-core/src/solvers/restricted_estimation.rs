@@ -1,0 +1,236 @@
+//! Sigmas, correlations and penalty weights of the largest restricted likelihood ([`RestrictedLikelihood`]), from the
+//! linearisation at the optimum of a fit.
+
+use super::linearization::{add_penalties, add_priors};
+use crate::functions::{Penalty, WeightRule};
+use crate::identifiability::{Factorisation, stacked};
+use crate::noise::{ChannelMoments, NoiseCoordinates, PenaltyMoments, RestrictedLikelihood};
+use crate::objective::Evaluation;
+use crate::problem::{FEW_PARAMETERS, Problem};
+use crate::qp::Subproblem;
+use crate::record::{Channel, Loss, NoiseEstimate, Weighting};
+use nalgebra::DMatrix;
+
+/// Time over which a function may change under the start value of its penalty, as a share of the record.
+const SMOOTHING_SHARE: f64 = 0.1;
+
+/// True if the weight of a penalty is estimated by restricted likelihood.
+pub(super) fn is_estimated(penalty: &Penalty) -> bool {
+    penalty.rule == Some(WeightRule::RestrictedLikelihood)
+}
+
+/// True if the weight of some penalty is estimated by restricted likelihood.
+pub(super) fn estimates_weights(problem: &Problem) -> bool {
+    problem.penalties.iter().any(is_estimated)
+}
+
+/// Sets the estimated weights to start values: the information of the samples on the level of the function equals that of the
+/// penalty on changes over the time `tau`, a tenth of the record: `w = |J 1|^2 tau^(2 order) / T`.
+pub(super) fn start_weights(problem: &mut Problem, start: &[f64]) {
+    let Ok(evaluation) = problem.evaluate(start) else {
+        return;
+    };
+    let grid = &problem.system.grid;
+    let duration = (grid.nodes() - 1) as f64 * grid.step();
+    let weights: Vec<f64> = (problem.penalties.iter())
+        .map(|penalty| {
+            let function = problem.functions.get(penalty.function);
+            let Some(basis) = function.basis.as_ref().filter(|_| is_estimated(penalty)) else {
+                return penalty.weight;
+            };
+            let mut along = vec![0.0; problem.parameters()];
+            let range = problem.functions.ranges()[penalty.function].clone();
+            along[range].copy_from_slice(&basis.constant(grid, 1.0));
+            let information = information(problem, &evaluation, &along);
+            let time = SMOOTHING_SHARE * duration;
+            let weight = information * time.powi(2 * penalty.order as i32) / duration;
+            match weight.is_finite() && weight > 0.0 {
+                true => weight,
+                false => penalty.weight,
+            }
+        })
+        .collect();
+    let penalties = problem.parts_mut().penalties.iter_mut();
+    for (penalty, weight) in penalties.zip(weights) {
+        penalty.weight = weight;
+    }
+}
+
+/// Weighted sum of squares of the changes of the predictions along a direction, with uncorrelated noise.
+fn information(problem: &Problem, evaluation: &Evaluation, along: &[f64]) -> f64 {
+    let changes = problem.predictions_tangent(evaluation, along);
+    let channels = problem.channels().zip(changes.iter().flatten());
+    let each = channels.map(|(channel, changes)| {
+        let weight = |i: usize| channel.weighting().weight(i, channel.len());
+        let squares = changes.iter().enumerate().map(|(i, z)| weight(i) * z * z);
+        squares.sum::<f64>()
+    });
+    each.sum()
+}
+
+/// The problem with sigmas, correlations and weights of the largest restricted likelihood at an evaluated point, and the
+/// covariance of the noise. A robust loss keeps the noise of its channel. `None` with more than [`FEW_PARAMETERS`] parameters, or
+/// where nothing is to be estimated or the likelihood has no maximum.
+pub(super) fn refined(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+) -> Option<Problem> {
+    if problem.parameters() > FEW_PARAMETERS {
+        return None;
+    }
+    let found = likelihood(problem, theta, evaluation).fit()?;
+    let mut next = problem.clone();
+    let parts = next.parts_mut();
+    let channels = parts.experiments.iter_mut().flat_map(|e| &mut e.channels);
+    for (channel, noise) in channels.zip(found.channels.iter().zip(found.covariances)) {
+        if channel.loss() == Loss::Squares {
+            *channel = with_coordinates(channel, noise.0, noise.1);
+        }
+    }
+    let penalties = parts.penalties.iter_mut().filter(|p| is_estimated(p));
+    for (penalty, log_weight) in penalties.zip(&found.log_weights) {
+        penalty.weight = log_weight.exp();
+    }
+    Some(next)
+}
+
+/// Likelihood of the noise and the weights, in the combinations of parameters that the rows determine, normalised.
+fn likelihood(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> RestrictedLikelihood {
+    let known = known_rows(problem, theta);
+    let penalties: Vec<(&Penalty, DMatrix<f64>)> = (problem.penalties.iter())
+        .filter(|p| is_estimated(p))
+        .map(|p| (p, rows_of(problem, theta, p)))
+        .collect();
+    let rows = residual_rows(problem, evaluation);
+    let weighted = penalties.iter().map(|(p, rows)| rows * p.weight.sqrt());
+    let all = weighted.fold(stacked(&rows, &known), |all, more| stacked(&all, &more));
+    let map = determined(&all);
+    let (rows, known) = (rows * &map, known * &map);
+    let mut first = 0;
+    let moments = problem.channels().map(|channel| {
+        let own = rows.rows(first, channel.len()).into_owned();
+        first += channel.len();
+        let is_robust = channel.loss() != Loss::Squares;
+        let estimates = matches!(channel.weighting(), Weighting::Estimated { .. }) && !is_robust;
+        // The rows of a robust loss are those of its majorant, whitened.
+        let correlation = channel.correlation().filter(|_| !is_robust);
+        ChannelMoments::new(&own, correlation, estimates)
+    });
+    let moments = moments.collect();
+    let penalties = penalties.into_iter().map(|(penalty, rows)| {
+        let rank = Factorisation::of(&rows.columns(0, rows.ncols() - 1).into_owned()).rank;
+        let rows = rows * &map;
+        PenaltyMoments {
+            gram: rows.tr_mul(&rows),
+            rank,
+            log_weight: penalty.weight.ln(),
+        }
+    });
+    RestrictedLikelihood::new(moments, known.tr_mul(&known)).with_penalties(penalties.collect())
+}
+
+/// Weighted Jacobian of the samples with their residuals in the last column; whitened only under a robust loss.
+fn residual_rows(problem: &Problem, evaluation: &Evaluation) -> DMatrix<f64> {
+    let n = problem.parameters();
+    let mut rows = (problem.predictions_jacobian(evaluation)).insert_column(n, 0.0);
+    let mut first = 0;
+    for (channel, predicted) in problem.predicted(evaluation) {
+        let count = channel.len();
+        if channel.loss() == Loss::Squares {
+            for (i, r) in channel.residuals(predicted).enumerate() {
+                rows[(first + i, n)] = r;
+                let root = channel.weighting().weight(i, count).sqrt();
+                rows.row_mut(first + i).scale_mut(root);
+            }
+        } else {
+            let mut own = rows.rows(first, count).into_owned();
+            for mut column in own.column_iter_mut() {
+                channel.whiten_rows(column.as_mut_slice());
+            }
+            let majorant = channel.majorant(predicted);
+            for (i, (root, r)) in majorant.roots.iter().zip(&majorant.weighted).enumerate() {
+                own.row_mut(i).scale_mut(*root);
+                own[(i, n)] = *r;
+            }
+            rows.rows_mut(first, count).copy_from(&own);
+        }
+        first += count;
+    }
+    rows
+}
+
+/// Rows of priors and of penalties with given weights, with their residuals in the last column.
+fn known_rows(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
+    let mut given = problem.clone();
+    given.parts_mut().penalties.retain(|p| !is_estimated(p));
+    let mut subproblem = Subproblem::new(problem.parameters());
+    add_penalties(&given, theta, &mut subproblem);
+    add_priors(problem, theta, &mut subproblem);
+    dense(&subproblem, problem.parameters())
+}
+
+/// Rows of a penalty without its weight, with their residuals in the last column.
+fn rows_of(problem: &Problem, theta: &[f64], penalty: &Penalty) -> DMatrix<f64> {
+    let n = problem.parameters();
+    let range = problem.functions.ranges()[penalty.function].clone();
+    let residuals = penalty.residuals(&theta[range.clone()]);
+    let mut rows = DMatrix::zeros(residuals.len(), n + 1);
+    for (i, r) in residuals.iter().enumerate() {
+        let entries = penalty.rows.row(i);
+        entries.for_each(|(j, a)| rows[(i, range.start + j)] += a);
+        rows[(i, n)] = *r;
+    }
+    rows
+}
+
+/// Residual rows of a subproblem of `n` variables, with their residuals at zero in the last column.
+fn dense(subproblem: &Subproblem, n: usize) -> DMatrix<f64> {
+    let residuals = &subproblem.residuals;
+    let mut rows = DMatrix::zeros(residuals.len(), n + 1);
+    for i in 0..residuals.len() {
+        (residuals.row(i)).for_each(|(j, a)| rows[(i, j)] += a);
+        rows[(i, n)] = -residuals.right()[i];
+    }
+    rows
+}
+
+/// Map of the columns of `rows` to orthonormal combinations of all but the last, as far as the rows determine them, and the last
+/// column. The columns are first scaled to unit length, because parameters have different units.
+fn determined(rows: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = rows.ncols() - 1;
+    let mut scaled = rows.columns(0, n).into_owned();
+    let mut sizes = Vec::with_capacity(n);
+    for mut column in scaled.column_iter_mut() {
+        let size = column.norm().max(f64::MIN_POSITIVE);
+        column /= size;
+        sizes.push(size);
+    }
+    let root = Factorisation::of(&scaled).inverse_root();
+    let q = root.ncols();
+    DMatrix::from_fn(n + 1, q + 1, |i, j| match (i < n, j < q) {
+        (true, true) => root[(i, j)] / sizes[i],
+        (false, false) => 1.0,
+        _ => 0.0,
+    })
+}
+
+/// The channel with noise at `coordinates`, sigma relative to its present value.
+fn with_coordinates(
+    channel: &Channel,
+    coordinates: &NoiseCoordinates,
+    covariance: DMatrix<f64>,
+) -> Channel {
+    let mut next = channel.clone();
+    if let (Weighting::Estimated { sigma }, Some(log)) =
+        (channel.weighting(), coordinates.log_sigma)
+    {
+        let sigma = sigma * log.exp();
+        next = next.with_weighting(Weighting::Estimated { sigma });
+    }
+    let correlation = channel.correlation().map(|c| c.at(&coordinates.law));
+    next.with_noise(NoiseEstimate {
+        correlation,
+        covariance,
+    })
+}
