@@ -89,6 +89,6 @@ mod tests {
         assert_eq!(at(0.6), 2.0);
         // A line has no minimum.
         assert_eq!(at(0.0), 2.0);
-        assert_eq!(secant(1.0, -3.0, 2.0, -1.0), 2.5);
+        assert_eq!(secant(1.0, -3.0, 3.0, -1.0), 4.0);
     }
 }
