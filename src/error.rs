@@ -117,8 +117,8 @@ impl InputError {
         Self::new(Location::Line { file, line, column }, problem)
     }
 
-    /// An error in a text file behind some text.
-    pub fn behind(file: impl AsRef<Path>, text: &str, problem: impl Into<String>) -> Self {
+    /// An error in a text file at the character that follows `text`, the beginning of the file.
+    pub fn after(file: impl AsRef<Path>, text: &str, problem: impl Into<String>) -> Self {
         let line = 1 + text.matches('\n').count();
         let column = 1 + text.chars().rev().take_while(|&c| c != '\n').count();
         Self::line(file, line, column, problem)

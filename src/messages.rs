@@ -311,7 +311,7 @@ fn problems(source: &str) -> Vec<String> {
         "InputError::argument(",
         "InputError::line(",
         "InputError::file(",
-        "InputError::behind(",
+        "InputError::after(",
         "BuildError::new(",
         ".refused(",
     ];
@@ -460,6 +460,7 @@ fn notices() -> Vec<BuildNotice> {
             key: "functions.mass.penalty".into(), basis: "constant",
         },
         BuildNotice::Measurement { .. } => BuildNotice::Measurement { remark: "(a note of the state estimation)".into() },
+        BuildNotice::MassMayVanish { .. } => BuildNotice::MassMayVanish { key: "functions.mass.min".into() },
         BuildNotice::StartMoved { .. } => BuildNotice::StartMoved { constraint: "mass >= 0.05".into() },
     ]
 }

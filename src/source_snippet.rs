@@ -165,28 +165,51 @@ fn bracket_end(text: &[char], start: usize) -> usize {
     text.len()
 }
 
-/// The field of a row that was `found`, if one and only one has this text; else the whole row.
+/// The field of a row that was `found`, if one and only one has this text or is this number; else the whole row.
 fn field(text: &[char], found: &str) -> [usize; 2] {
-    let whole = [0, text.len()];
     let quoted = found
         .split_once('`')
         .and_then(|(_, rest)| rest.split_once('`'));
-    let Some((wanted, _)) = quoted else {
-        return whole;
+    let mut places: Vec<[usize; 2]> = match quoted {
+        Some((wanted, _)) => places_of(text, wanted),
+        None => {
+            let number: Option<f64> = found.split(' ').next().and_then(|n| n.parse().ok());
+            let is_found = |[start, end]: &[usize; 2]| {
+                let field: String = text[*start..*end].iter().collect();
+                number.is_some() && field.parse().ok() == number
+            };
+            fields(text).into_iter().filter(is_found).collect()
+        }
     };
-    let wanted: Vec<char> = wanted.chars().collect();
-    let edge = |c: Option<&char>| c.is_none_or(|c| ",;\" ".contains(*c));
-    let is_here = |&i: &usize| {
-        let after = i + wanted.len();
-        text[i..].starts_with(&wanted)
-            && edge(i.checked_sub(1).and_then(|b| text.get(b)))
-            && edge(text.get(after))
-    };
-    let mut places = (0..text.len()).filter(is_here);
-    match (wanted.is_empty(), places.next(), places.next()) {
-        (false, Some(only), None) => [only, only + wanted.len()],
-        _ => whole,
+    match (places.pop(), places.is_empty()) {
+        (Some(only), true) => only,
+        _ => [0, text.len()],
     }
+}
+
+/// True for a character between two fields, and at the ends of a row.
+fn is_edge(c: Option<&char>) -> bool {
+    c.is_none_or(|c| ",;\" ".contains(*c))
+}
+
+/// Start and end of every place in a row that has the text of one or several fields.
+fn places_of(text: &[char], wanted: &str) -> Vec<[usize; 2]> {
+    let wanted: Vec<char> = wanted.chars().collect();
+    let is_here = |&i: &usize| {
+        !wanted.is_empty()
+            && text[i..].starts_with(&wanted)
+            && is_edge(i.checked_sub(1).and_then(|b| text.get(b)))
+            && is_edge(text.get(i + wanted.len()))
+    };
+    let starts = (0..text.len()).filter(is_here);
+    starts.map(|i| [i, i + wanted.len()]).collect()
+}
+
+/// Start and end of the fields of a row.
+fn fields(text: &[char]) -> Vec<[usize; 2]> {
+    let edges: Vec<usize> = (0..=text.len()).filter(|i| is_edge(text.get(*i))).collect();
+    let starts = std::iter::once(0).chain(edges.iter().map(|edge| edge + 1));
+    starts.zip(edges.iter()).map(|(a, b)| [a, *b]).collect()
 }
 
 #[cfg(test)]

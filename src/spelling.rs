@@ -1,5 +1,7 @@
 //! Suggestions for unknown words, by edit distance to the known ones.
 
+use crate::number_format::significant;
+
 /// Longest word that is compared; longer ones are no slip of the finger.
 const LONGEST_WORD: usize = 64;
 
@@ -75,6 +77,17 @@ fn distance(word: &str, candidate: &str) -> Option<usize> {
     stem.then_some(edits)
 }
 
+/// Correction of a text that is a misspelt integer.
+pub(crate) fn integer_in(text: &str) -> Option<String> {
+    let digits = text.trim().replace([',', '_', ' ', '\''], "");
+    let is_grouped = text.contains(',') && digits.bytes().all(|b| b.is_ascii_digit());
+    match is_grouped {
+        // A comma separates decimals or thousands.
+        true => Some("write the integer in digits alone, without a comma".to_owned()),
+        false => number_in(text),
+    }
+}
+
 /// Correction of a text that is a misspelt number.
 pub(crate) fn number_in(text: &str) -> Option<String> {
     let text = text.trim();
@@ -88,6 +101,10 @@ pub(crate) fn number_in(text: &str) -> Option<String> {
         } else {
             "the number is too large".to_owned()
         });
+    }
+    if let Some(percent) = text.strip_suffix('%').and_then(|text| finite(text.trim())) {
+        let value = significant(percent / 100.0, 12);
+        return Some(format!("percent is not accepted: write {value}"));
     }
     if let Some(value) = finite(&text.replace(['_', ' ', '\''], "")) {
         return Some(format!("write {value}"));

@@ -21,14 +21,14 @@ pub const LONGEST_TABLE: u64 = 1 << 32;
 
 /// Memory that a file's text takes for each of its bytes: itself, and a copy in another encoding or with
 /// other delimiters.
-const TEXT: u64 = 2;
+const BYTES_PER_BYTE: u64 = 2;
 
 /// Memory of a JSON document per byte of its text: the text, and its values as a tree and as a struct. A list of short
 /// numbers, the longest of the results, takes half of it.
 pub const JSON: u64 = 64;
 
-/// Longest line of a table, in bytes: hundreds of columns take a hundredth of it. A longer one is no
-/// table, and would be taken apart into more fields than there is memory for.
+/// Longest line of a table, bytes, about a hundred times that of a table with hundreds of columns. It limits the memory
+/// for the fields of one line.
 pub const LONGEST_LINE: usize = 1 << 20;
 
 /// Reads a text file of at most `limit` bytes; a byte order mark is dropped.
@@ -75,8 +75,8 @@ pub fn read_bytes(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>, InputE
     if length > limit {
         return Err(too_long(path, limit).expected(what));
     }
-    memory::check_file(path, length.saturating_mul(TEXT))?;
-    // At once: bytes that grow leave their smaller selves behind in memory that costs time to get.
+    memory::check_file(path, length.saturating_mul(BYTES_PER_BYTE))?;
+    // One allocation: a vector that grows is copied several times.
     let mut bytes = Vec::new();
     // A failed reservation is reported by the read.
     let _ = bytes.try_reserve_exact(usize::try_from(length).unwrap_or(0));
@@ -266,11 +266,11 @@ fn unreadable(path: &Path, what: &str, error: &std::io::Error) -> InputError {
     }
     InputError::file(path, "no such file")
         .expected(what)
-        .hint_if(neighbour(path))
+        .hint_if(similar_name(path))
 }
 
 /// Remedy for a missing file: a missing folder, or a similar file name.
-fn neighbour(path: &Path) -> Option<String> {
+fn similar_name(path: &Path) -> Option<String> {
     let folder = match path.parent() {
         Some(folder) if folder.as_os_str().is_empty() => Path::new("."),
         Some(folder) => folder,
@@ -301,7 +301,7 @@ fn utf8(path: &Path, bytes: Vec<u8>) -> Result<String, InputError> {
             let before = String::from_utf8_lossy(&error.as_bytes()[..good]).into_owned();
             let byte = error.as_bytes().get(good).copied().unwrap_or_default();
             Err(
-                InputError::behind(path, &before, "the file is not UTF-8 text")
+                InputError::after(path, &before, "the file is not UTF-8 text")
                     .found(format!("the byte 0x{byte:02x}"))
                     .hint(if utf16 {
                         "it looks like UTF-16: save it as UTF-8"

@@ -9,7 +9,7 @@ fn shipped(name: &str, values: &[&str]) -> Model {
     let path = format!("{}/models/{name}.yaml", env!("CARGO_MANIFEST_DIR"));
     let texts: Vec<String> = values.iter().map(|text| (*text).to_string()).collect();
     let overrides = Override::parse_all(&texts).expect("values");
-    let file = ModelFile::read_with(path, &overrides).expect("a file");
+    let file = ModelFile::read_with_overrides(path, &overrides).expect("a file");
     build(&file, BuildMode::Fit).expect("a model")
 }
 

@@ -112,7 +112,7 @@ fn fitted(problem: &Value, start: usize, more: &[&str]) -> Result<Accuracy, Stri
     keys.extend(more.iter().map(|key| (*key).to_owned()));
     let overrides = Override::parse_all(&keys).expect("keys");
     let path = folder().join(format!("{name}.yaml"));
-    let file = ModelFile::read_with(path, &overrides).map_err(|e| e.to_string())?;
+    let file = ModelFile::read_with_overrides(path, &overrides).map_err(|e| e.to_string())?;
     let model = build(&file, BuildMode::Fit).map_err(|e| e.to_string())?;
     let start = model.problem.start();
     let (problem_with_sigma, fit) =

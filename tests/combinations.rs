@@ -36,7 +36,7 @@ const METHODS: [&str; 6] = [
 ];
 
 /// A forced record of all channels.
-fn readings() -> String {
+fn sample_table() -> String {
     let grid = Grid::new(0.0, 9.0, NODES).unwrap();
     let system = System {
         grid,
@@ -92,7 +92,7 @@ fit: {{method: {method}{stop}}}
 /// Number of fits by status, for all these functions with every channel and method.
 fn outcomes(all: impl Iterator<Item = Vec<String>>) -> String {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("data.csv"), readings()).unwrap();
+    std::fs::write(folder.path().join("data.csv"), sample_table()).unwrap();
     let mut outcomes: BTreeMap<(&str, String), usize> = BTreeMap::new();
     for functions in all {
         for channel in CHANNELS {

@@ -75,7 +75,7 @@ fn random_function(grid: &Grid, seed: u64) -> StageSamples {
 }
 
 /// Samples of a sensor of `kind` at every node, of a system initially at rest.
-fn readings(
+fn sample_table(
     system: &System,
     device: &NodalCoefficients,
     excitation: &Excitation,
@@ -154,7 +154,7 @@ fn shaken(seed: u64, list: Vec<CoefficientFunction>) -> (Problem, Vec<f64>) {
         force: Some(random_function(&system.grid, seed)),
         base: None,
     };
-    let channel = readings(&system, &device, &excitation, ChannelKind::Acceleration);
+    let channel = sample_table(&system, &device, &excitation, ChannelKind::Acceleration);
     let experiment = Experiment::free("shaken", REST, NODES).with_channel(channel);
     (problem_of(system, list, experiment), k)
 }
@@ -211,7 +211,7 @@ fn driven(kind: ChannelKind, excitation: Excitation, mass: Option<f64>) -> Probl
         mass: vec![2.0; NODES],
         coefficients: vec![vec![1.5; NODES], vec![300.0; NODES]],
     };
-    let channel = readings(&system, &device, &excitation, kind);
+    let channel = sample_table(&system, &device, &excitation, kind);
     let experiment = Experiment::free("driven", REST, NODES)
         .with_excitation(excitation)
         .with_channel(channel);
@@ -311,7 +311,7 @@ fit: {{method: equation-error}}
     }
     let middle = median(errors.iter().map(|e| e.abs()).collect());
     println!(
-        "DROPBEAR: median {middle:.4} Hz, rms {:.4} Hz over {} readings, {seconds:.3} s, J {:?}",
+        "DROPBEAR: median {middle:.4} Hz, rms {:.4} Hz over {} samples, {seconds:.3} s, J {:?}",
         rms(&errors),
         errors.len(),
         (found.initial_cost, evaluation.cost, evaluation.misfit)
@@ -510,7 +510,7 @@ fn records_without_an_equation_error_fail() {
         mass: vec![2.0; NODES],
         coefficients: vec![vec![1.5; NODES], vec![300.0; NODES]],
     };
-    let channel = readings(&system, &device, &excitation, ChannelKind::Velocity);
+    let channel = sample_table(&system, &device, &excitation, ChannelKind::Velocity);
     let experiment = Experiment::free("driven", REST, NODES)
         .with_excitation(excitation)
         .with_channel(channel);
@@ -521,12 +521,12 @@ fn records_without_an_equation_error_fail() {
 
 fn read(model: &str, reading: fn(f64) -> f64, count: usize) -> Result<Model, String> {
     let folder = tempfile::tempdir().unwrap();
-    let mut readings = String::from("t_s,y_m\n");
+    let mut samples = String::from("t_s,y_m\n");
     for i in 0..count {
         let t = i as f64 / 20.0;
-        readings.push_str(&format!("{t},{}\n", reading(t)));
+        samples.push_str(&format!("{t},{}\n", reading(t)));
     }
-    std::fs::write(folder.path().join("readings.csv"), readings).unwrap();
+    std::fs::write(folder.path().join("samples.csv"), samples).unwrap();
     let said = |error: kmcfit::error::InputError| {
         let shown = format!("{}/", folder.path().display());
         error.to_string().replace(&shown, "")
@@ -539,7 +539,7 @@ fn model(damping: &str, fit: &str) -> String {
     format!(
         "format: 1
 experiments:
-  - data: readings.csv
+  - data: samples.csv
     initial: {{displacement: 1, velocity: 0}}
 functions:
   mass: {{fixed: 1}}
@@ -715,10 +715,10 @@ fn half_of_a_short_record_is_left() {
     let mut problem = driven(ChannelKind::Acceleration, excitation, None);
     let grid = problem.system.grid;
     let period = TAU / (300.0_f64 / 2.0).sqrt();
-    let readings = (3.0 * period / grid.step()) as usize;
+    let samples = (3.0 * period / grid.step()) as usize;
     let channel = &problem.experiments[0].channels[0];
-    let (times, values) = (channel.times()[..readings].to_vec(), channel.observed());
-    let values = values[..readings].to_vec();
+    let (times, values) = (channel.times()[..samples].to_vec(), channel.observed());
+    let values = values[..samples].to_vec();
     let weighting = Weighting::Integral {
         spacing: grid.step(),
     };
@@ -728,5 +728,5 @@ fn half_of_a_short_record_is_left() {
             parts.experiments[0].channels = vec![short];
         })
         .unwrap();
-    assert_eq!(left_out(&problem), [readings / 4; 2]);
+    assert_eq!(left_out(&problem), [samples / 4; 2]);
 }

@@ -39,10 +39,10 @@ fit: {{method: lbfgs, stop: {{iterations: 200, tolerance: 1e-9}}}}
     };
     assert!((mass / 134.46 - 1.0).abs() < 5e-3, "{mass}");
     assert!((damping / 4.238 - 1.0).abs() < 5e-3, "{damping}");
-    let readings = &model.problem.experiments[0].channels[0];
+    let samples = &model.problem.experiments[0].channels[0];
     let motion = &run.best.evaluation.predictions[0][0];
-    let squares: f64 = readings.residuals(motion).map(|r| r * r).sum();
-    let rms = (squares / readings.len() as f64).sqrt().to_degrees();
+    let squares: f64 = samples.residuals(motion).map(|r| r * r).sum();
+    let rms = (squares / samples.len() as f64).sqrt().to_degrees();
     assert!((rms - 0.337).abs() < 5e-4, "{rms}");
 }
 

@@ -40,6 +40,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     announce(&model);
     if arguments.no_gradient || model.problem.functions.parameters() == 0 {
         print(&describe(&model));
+        print("the model and its data are valid\n");
         return Ok(OK);
     }
     // Errors in the input come before any output.

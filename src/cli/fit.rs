@@ -88,7 +88,7 @@ pub(super) fn resume(
     printed: &Printed,
 ) -> Result<u8, CommandError> {
     let path = heading.inputs.first().cloned().unwrap_or_default();
-    let file = ModelFile::read_with(path, &Override::parse_all(&heading.overrides)?)?;
+    let file = ModelFile::read_with_overrides(path, &Override::parse_all(&heading.overrides)?)?;
     let now = Heading::of_model("fit", &file, heading.figures, heading.checkpoint);
     fit(&file, &now, place, printed, true)
 }

@@ -39,6 +39,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
                 .into(),
         );
     }
+    if arguments.data.is_dir() {
+        return Err(InputError::file(&arguments.data, "this is a folder")
+            .expected("a record (CSV or another text table)")
+            .into());
+    }
     let out = match &arguments.out {
         Some(out) => out.clone(),
         None => arguments.data.with_extension("yaml"),

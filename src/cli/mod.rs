@@ -92,16 +92,19 @@ pub fn main() -> ExitCode {
     interrupt::ignore_file_size_signal();
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
-        Err(error) => match arguments::no_number(&error) {
-            Some(error) => {
-                complain(&error);
-                return ExitCode::from(BAD_INPUT);
-            }
-            None => {
-                let error = arguments::with_near_command(error, &Arguments::command());
-                return ExitCode::from(output::print_usage(&error));
-            }
-        },
+        Err(error) => {
+            let command = std::env::args_os().nth(1);
+            let command = command.as_ref().and_then(|word| word.to_str());
+            return ExitCode::from(
+                match arguments::input_error(&error, &Arguments::command(), command) {
+                    Some(error) => {
+                        complain(&error);
+                        BAD_INPUT
+                    }
+                    None => output::print_usage(&error),
+                },
+            );
+        }
     };
     provide_host();
     if let Err(error) = check_arithmetic().and_then(|()| crate::memory::check_base()) {

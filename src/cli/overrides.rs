@@ -20,7 +20,7 @@ impl Overrides {
 
     /// A model file with the overrides.
     pub fn read(&self, model: &Path) -> Result<ModelFile, InputError> {
-        ModelFile::read_with(model, &self.parse()?)
+        ModelFile::read_with_overrides(model, &self.parse()?)
     }
 
     /// Rejects overrides for inputs other than a model file.

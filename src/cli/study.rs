@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         let run = Run::open(&arguments.model)?;
         let mut overrides = Override::parse_all(&run.document.model.overrides)?;
         overrides.extend(arguments.set.parse()?);
-        let file = ModelFile::read_with(&run.document.model.file, &overrides)?;
+        let file = ModelFile::read_with_overrides(&run.document.model.file, &overrides)?;
         return run_in(&file, &out, arguments.json, threads, false);
     }
     match Sequence::read(&arguments.model)? {
@@ -84,7 +84,7 @@ pub(super) fn resume(
     match Sequence::read(&model)? {
         Some(sequence) => run_sequence(&model, &sequence, folder, as_json, true),
         None => {
-            let file = ModelFile::read_with(&model, &Override::parse_all(&overrides)?)?;
+            let file = ModelFile::read_with_overrides(&model, &Override::parse_all(&overrides)?)?;
             run_in(&file, folder, as_json, threads, true)
         }
     }

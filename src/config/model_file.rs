@@ -13,6 +13,9 @@ use crate::text_io::read_text;
 /// Expected contents of a model file, for messages.
 const MODEL_FILE: &str = "a model file (YAML)";
 
+/// File name extensions of tables of samples.
+const TABLE_EXTENSIONS: [&str; 4] = ["csv", "tsv", "txt", "dat"];
+
 /// Most experiments. Each reads its own files, so a short text could need more memory than is available.
 const MOST_EXPERIMENTS: usize = 2000;
 
@@ -42,16 +45,27 @@ impl ModelFile {
         let path = path.as_ref();
         check_path(path)?;
         let text = read_text(path, MODEL_FILE, LONGEST_MODEL)?;
-        Self::parse(path, text)
+        let is_table = (path.extension().and_then(|extension| extension.to_str()))
+            .is_some_and(|extension| TABLE_EXTENSIONS.contains(&extension));
+        Self::parse(path, text).map_err(|error| match is_table {
+            true => error.hint(format!(
+                "for a record, `kmcfit init {}` writes a model file",
+                path.display()
+            )),
+            false => error,
+        })
     }
 
     /// Reads a model file and applies overrides.
     ///
     /// # Errors
     ///
-    /// As [`read`](Self::read) and [`with`](Self::with).
-    pub fn read_with(path: impl AsRef<Path>, overrides: &[Override]) -> Result<Self, InputError> {
-        Self::read(path)?.with(overrides)
+    /// As [`read`](Self::read) and [`with_overrides`](Self::with_overrides).
+    pub fn read_with_overrides(
+        path: impl AsRef<Path>,
+        overrides: &[Override],
+    ) -> Result<Self, InputError> {
+        Self::read(path)?.with_overrides(overrides)
     }
 
     /// Applies overrides one after another.
@@ -59,7 +73,7 @@ impl ModelFile {
     /// # Errors
     ///
     /// When a key is unknown or its value has the wrong type; the location is the override.
-    pub fn with(mut self, overrides: &[Override]) -> Result<Self, InputError> {
+    pub fn with_overrides(mut self, overrides: &[Override]) -> Result<Self, InputError> {
         for change in overrides {
             let unreadable = |error: serde_yaml::Error| {
                 InputError::new(
@@ -105,7 +119,7 @@ impl ModelFile {
     /// functions:
     ///   mass: {basis: nodal, start: 2.0}
     ///   damping: {basis: constant, start: 1.0}
-    ///   stiffness: {basis: constant, fixed: 1.0}
+    ///   stiffness: {fixed: 1.0}
     /// ")?;
     /// assert_eq!(model.spec.experiments.len(), 1);
     /// let error = model.error_at("functions.mass.start", "the mass must be smaller");

@@ -6,7 +6,7 @@ use super::choice::{choice, choose};
 use super::key::ValueType;
 use super::map::keys;
 use super::reader::{Mistake, Report, Scalar, Value, ValueVisitor};
-use crate::spelling::{did_you_mean, number_in};
+use crate::spelling::{did_you_mean, integer_in, number_in};
 use crate::text_io::one_of;
 use serde::de::{Deserializer, MapAccess, SeqAccess};
 use std::fmt;
@@ -66,11 +66,11 @@ impl Value for Count {
             }
             Scalar::Integer(value) => usize::try_from(value)
                 .map(Self)
-                .map_err(|_| refused("the count is too large")),
+                .map_err(|_| refused("the number is too large")),
             Scalar::Float(value) if value.fract() == 0.0 && (0.0..1e15).contains(&value) => {
                 Err(refused("not an integer").suggest(Some(format!("write {value}"))))
             }
-            Scalar::Text(text) => Err(refused("not an integer").suggest(number_in(text))),
+            Scalar::Text(text) => Err(refused("not an integer").suggest(integer_in(text))),
             _ => Err(refused("not an integer")),
         }
     }
@@ -430,8 +430,7 @@ impl<T: Value> Value for OneOrList<T> {
     const KIND: ValueType = ValueType::AnyOf(&[T::KIND, ValueType::List(&T::KIND)]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
         if let ValueType::Map(_) = T::KIND {
-            let problem = "wrong type of value";
-            return Err(scalar.refused(problem, "a map, or a list of maps"));
+            return Err(scalar.wrong_kind("a map, or a list of maps"));
         }
         (T::scalar(scalar).map(Self::One))
             .map_err(|mistake| mistake.expecting(|one| format!("{one}, or a list of them")))

@@ -10,6 +10,9 @@ use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::solvers::StartStrategy;
 use std::fmt::Write;
 
+/// Ratio of the largest to the smallest value above which the largest alone is stated.
+const MANY_TIMES: f64 = 1e4;
+
 /// The summary: status, estimates, fit, identifiability, warnings, suggestions, then tables.
 pub fn summary(document: &ResultDocument) -> String {
     let mut text = String::new();
@@ -138,13 +141,17 @@ fn estimate((name, f): (&str, &FunctionSummary)) -> String {
     }
     let (range, span) = match f.identified_range {
         Some(range) if f.verdict == Some(ClassificationKind::PartlyIdentified) => {
-            (range, " where identified")
+            (range, " where it is identified")
         }
         _ => ([f.min, f.max], " over the record"),
     };
     let [low, high] = range.map(short);
     match low == high {
         true => format!("{symbol} = {low} {unit}{fixed}"),
+        // A coefficient at or near a lower limit of zero.
+        _ if range[0] >= 0.0 && range[1] > MANY_TIMES * range[0] => {
+            format!("{symbol} = at most {high} {unit}{span}{fixed}")
+        }
         false => format!("{symbol} = {low} to {high} {unit}{span}{fixed}"),
     }
 }
@@ -268,7 +275,7 @@ pub(super) fn iterations(document: &ResultDocument) -> String {
     if let Some(weights) = &document.weights {
         let fits = count(weights.path.len(), "weight");
         let before = weights.iterations();
-        return format!("{last} after {before} along a path of {fits}");
+        return format!("{last}, {before} along the path of {fits} before");
     }
     if document.attempts.len() < 2 {
         return last;

@@ -53,7 +53,7 @@ pub fn decode(path: &Path, bytes: Vec<u8>) -> Result<(String, Encoding), InputEr
         }
     };
     match text.find('\0') {
-        Some(at) => Err(InputError::behind(path, &text[..at], "the file is not text")
+        Some(at) => Err(InputError::after(path, &text[..at], "the file is not text")
             .found("the byte 0x00")
             .hint("is it a binary file, or UTF-16 without a byte order mark? Save it as text in UTF-8")),
         None => Ok((text, encoding)),

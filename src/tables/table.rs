@@ -55,7 +55,7 @@ impl Table {
     ///
     /// When there is no such file, it is not text, or [`parse`](Self::parse) fails.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
-        Self::read_with(path, &TableFormat::default())
+        Self::read_with_overrides(path, &TableFormat::default())
     }
 
     /// Reads a table of a given format from a file.
@@ -63,7 +63,10 @@ impl Table {
     /// # Errors
     ///
     /// When there is no such file, it is not text, or [`parse_with`](Self::parse_with) fails.
-    pub fn read_with(path: impl AsRef<Path>, format: &TableFormat) -> Result<Self, InputError> {
+    pub fn read_with_overrides(
+        path: impl AsRef<Path>,
+        format: &TableFormat,
+    ) -> Result<Self, InputError> {
         let path = path.as_ref();
         Self::from_bytes(path, read_bytes(path, TABLE, LONGEST_TABLE)?, format)
     }

@@ -1,6 +1,6 @@
 //! Invalid input: exit code 2, a message with location and problem, no file written.
 
-use crate::workbench::{MODEL, Workbench, readings};
+use crate::workbench::{MODEL, Workbench, sample_table};
 use insta::{Settings, assert_snapshot};
 
 /// Message of a command that rejects its input and writes no file.
@@ -32,18 +32,18 @@ fn changed(from: &str, to: &str) -> String {
 }
 
 /// The message about the small model with other samples.
-fn with_readings(text: &str) -> String {
+fn with_samples(text: &str) -> String {
     let bench = Workbench::with_small_model();
-    bench.write("readings.csv", text);
+    bench.write("samples.csv", text);
     message(&bench)
 }
 
 /// The samples with a row, counted from 1, replaced.
 fn with_row(row: usize, by: &str) -> String {
-    let text = readings(21);
+    let text = sample_table(21);
     let lines = text.lines().enumerate();
     let lines: Vec<&str> = lines.map(|(i, l)| if i == row { by } else { l }).collect();
-    with_readings(&(lines.join("\n") + "\n"))
+    with_samples(&(lines.join("\n") + "\n"))
 }
 
 #[test]
@@ -97,7 +97,7 @@ fn keys() {
       | ^^^^^^^^^
       expected: for instance `mass: {basis: nodal, start: 2.0}`
     ");
-    assert_snapshot!(changed("    data: readings.csv\n", ""), @"
+    assert_snapshot!(changed("    data: samples.csv\n", ""), @"
     error: model.yaml:4:5: experiments[0]: this experiment has no data
       |
     4 |   - name: free decay
@@ -241,6 +241,20 @@ fn meaning() {
     10 |   mass:      {basis: nodal, start: 2.0, fixed: 2.0}
        |                                    ^^^
       expected: either `fixed` or `start`
+    ");
+    assert_snapshot!(changed("start: 2.0", "fixed: 2.0"), @"
+    error: model.yaml:10:22: functions.mass.basis: a fixed function has no basis
+       |
+    10 |   mass:      {basis: nodal, fixed: 2.0}
+       |                      ^^^^^
+      expected: either `fixed`, or `basis` with `start`
+    ");
+    assert_snapshot!(changed("fit:", "study: {noise: residual}\nfit:"), @"
+    error: model.yaml:13:16: study.noise: this key has no effect alone
+       |
+    13 | study: {noise: residual}
+       |                ^^^^^^^^
+      expected: `bootstrap` beside it
     ");
     assert_snapshot!(changed("basis: nodal, start: 2.0", "basis: nodal"), @"
     error: model.yaml:10:14: functions.mass: this function has neither a start nor a fixed value
@@ -406,45 +420,44 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
 
 #[test]
 fn readings_files() {
-    assert_snapshot!(changed("data: readings.csv", "data: reading.csv"), @"
+    assert_snapshot!(changed("data: samples.csv", "data: reading.csv"), @"
     error: model.yaml:5:11: experiments[0].data: reading.csv: no such file
       |
     5 |     data: reading.csv
       |           ^^^^^^^^^^^
       expected: a CSV file with one row of column names and rows of numbers
-      hint: did you mean `readings.csv`?
     ");
-    assert_snapshot!(changed("data: readings.csv", "data: data/readings.csv"), @"
-    error: model.yaml:5:11: experiments[0].data: data/readings.csv: no such file
+    assert_snapshot!(changed("data: samples.csv", "data: data/samples.csv"), @"
+    error: model.yaml:5:11: experiments[0].data: data/samples.csv: no such file
       |
-    5 |     data: data/readings.csv
-      |           ^^^^^^^^^^^^^^^^^
+    5 |     data: data/samples.csv
+      |           ^^^^^^^^^^^^^^^^
       expected: a CSV file with one row of column names and rows of numbers
       hint: the folder data does not exist
     ");
-    assert_snapshot!(changed("data: readings.csv", "data: ."), @"
+    assert_snapshot!(changed("data: samples.csv", "data: ."), @"
     error: model.yaml:5:11: experiments[0].data: .: this is a folder, not a file
       |
     5 |     data: .
       |           ^
       expected: a CSV file with one row of column names and rows of numbers
     ");
-    assert_snapshot!(with_readings(""), @"
-    error: model.yaml:5:11: experiments[0].data: readings.csv: the file is empty
+    assert_snapshot!(with_samples(""), @"
+    error: model.yaml:5:11: experiments[0].data: samples.csv: the file is empty
       |
-    5 |     data: readings.csv
-      |           ^^^^^^^^^^^^
+    5 |     data: samples.csv
+      |           ^^^^^^^^^^^
       expected: a CSV file with one row of column names and rows of numbers
     ");
-    assert_snapshot!(with_readings("t_s,y_m\n"), @"
-    error: model.yaml:5:11: experiments[0].data: readings.csv: the file has no data
+    assert_snapshot!(with_samples("t_s,y_m\n"), @"
+    error: model.yaml:5:11: experiments[0].data: samples.csv: the file has no data
       |
-    5 |     data: readings.csv
-      |           ^^^^^^^^^^^^
+    5 |     data: samples.csv
+      |           ^^^^^^^^^^^
       found: a row of column names only
       expected: a CSV file with one row of column names and rows of numbers
     ");
-    assert_snapshot!(with_readings(&readings(2)), @"
+    assert_snapshot!(with_samples(&sample_table(2)), @"
     error: model.yaml:6:40: experiments[0].columns.displacement: too few samples
       |
     6 |     columns: {time: t_s, displacement: y_m}
@@ -452,7 +465,7 @@ fn readings_files() {
       found: 2 samples
       expected: at least 3
     ");
-    assert_snapshot!(with_readings("t_s,y_m\n0,1\n"), @"
+    assert_snapshot!(with_samples("t_s,y_m\n0,1\n"), @"
     error: model.yaml:6:40: experiments[0].columns.displacement: too few samples
       |
     6 |     columns: {time: t_s, displacement: y_m}
@@ -461,7 +474,7 @@ fn readings_files() {
       expected: at least 3
     ");
     assert_snapshot!(changed("displacement: y_m", "displacement: y_mm"), @"
-    error: model.yaml:6:40: experiments[0].columns.displacement: readings.csv: there is no such column
+    error: model.yaml:6:40: experiments[0].columns.displacement: samples.csv: there is no such column
       |
     6 |     columns: {time: t_s, displacement: y_mm}
       |                                        ^^^^
@@ -470,7 +483,7 @@ fn readings_files() {
       hint: did you mean `y_m`?
     ");
     assert_snapshot!(changed("time: t_s", "time: seconds"), @"
-    error: model.yaml:6:21: experiments[0].columns.time: readings.csv: there is no such column
+    error: model.yaml:6:21: experiments[0].columns.time: samples.csv: there is no such column
       |
     6 |     columns: {time: seconds, displacement: y_m}
       |                     ^^^^^^^
@@ -482,7 +495,7 @@ fn readings_files() {
 #[test]
 fn rows() {
     assert_snapshot!(with_row(17, "1.6,off"), @"
-    error: readings.csv:18: row 17, column `y_m`: not a number
+    error: samples.csv:18: row 17, column `y_m`: not a number
        |
     18 | 1.6,off
        |     ^^^
@@ -490,7 +503,7 @@ fn rows() {
       expected: a finite number, or an empty field for a missing sample
     ");
     assert_snapshot!(with_row(17, "1.6"), @"
-    error: readings.csv:18: row 17: the row does not fit the column names
+    error: samples.csv:18: row 17: the row does not fit the column names
        |
     18 | 1.6
        | ^^^
@@ -498,18 +511,18 @@ fn rows() {
       expected: 2 fields, one per column
     ");
     assert_snapshot!(with_row(17, "1.4,0.1"), @"
-    error: readings.csv:18: row 17, column `t_s`: the times do not increase
+    error: samples.csv:18: row 17, column `t_s`: the times do not increase
        |
     18 | 1.4,0.1
-       | ^^^^^^^
+       | ^^^
       found: 1.4 after 1.5 in line 17
       expected: a time greater than 1.5
     ");
     assert_snapshot!(with_row(17, "1.5,0.1"), @"
-    error: readings.csv:18: row 17, column `t_s`: two rows with the same time
+    error: samples.csv:18: row 17, column `t_s`: two rows with the same time
        |
     18 | 1.5,0.1
-       | ^^^^^^^
+       | ^^^
       found: 1.5 after 1.5 in line 17
       expected: a time greater than 1.5
     ");
@@ -565,13 +578,14 @@ fn model_files() {
       expected: a model file (YAML)
       hint: did you mean `model.yaml`?
     ");
-    assert_snapshot!(refused(&bench, &["simulate", "readings.csv"]), @"
-    error: readings.csv:1:1: wrong type of value
+    assert_snapshot!(refused(&bench, &["simulate", "samples.csv"]), @"
+    error: samples.csv:1:1: wrong type of value
       |
     1 | t_s,y_m
       | ^^^^^^^
       found: text `t_s,y_m 0,1 0.1,0.9851037084132392 0.2,0…`
       expected: a map with the keys format, experiments, functions, fit, …
+      hint: for a record, `kmcfit init samples.csv` writes a model file
     ");
     bench.write("empty.yaml", "");
     assert_snapshot!(refused(&bench, &["check", "empty.yaml"]), @"
@@ -615,20 +629,14 @@ fn simulate_arguments() {
     let bench = Workbench::with_small_model();
     let with = |more: &[&str]| refused(&bench, &[&["simulate", "model.yaml"], more].concat());
     assert_snapshot!(with(&["--noise", "0.1"]), @"
-    error: the following required arguments were not provided:
-      --seed <SEED>
-
-    Usage: kmcfit simulate --noise <SIGMA> --seed <SEED> <MODEL>
-
-    For more information, try '--help'.
+    error: kmcfit simulate: --seed <SEED> is missing
+      expected: kmcfit simulate [OPTIONS] <MODEL>
+      hint: `kmcfit simulate --help` lists the arguments
     ");
     assert_snapshot!(with(&["--seed", "1"]), @"
-    error: the following required arguments were not provided:
-      --noise <SIGMA>
-
-    Usage: kmcfit simulate --seed <SEED> --noise <SIGMA> <MODEL>
-
-    For more information, try '--help'.
+    error: kmcfit simulate: --noise <SIGMA> is missing
+      expected: kmcfit simulate [OPTIONS] <MODEL>
+      hint: `kmcfit simulate --help` lists the arguments
     ");
     assert_snapshot!(with(&["--noise=-1", "--seed", "1"]), @"
     error: --noise: invalid standard deviation
@@ -650,7 +658,7 @@ fn simulate_arguments() {
       found: `many`
       expected: a whole number, 0 or greater
     ");
-    bench.write("model.yaml", &MODEL.replace("    data: readings.csv\n", ""));
+    bench.write("model.yaml", &MODEL.replace("    data: samples.csv\n", ""));
     assert_snapshot!(with(&[]), @"
     error: model.yaml:7:7: grid: the duration is missing
       |
@@ -710,12 +718,9 @@ fn predict_arguments() {
       expected: the folder of a finished run, as written by `kmcfit fit`
     ");
     assert_snapshot!(refused(&bench, &["predict", "run"]), @"
-    error: the following required arguments were not provided:
-      --initial <Y,V>
-
-    Usage: kmcfit predict --initial <Y,V> <RUN>
-
-    For more information, try '--help'.
+    error: kmcfit predict: --initial <Y,V> is missing
+      expected: kmcfit predict [OPTIONS] --initial <Y,V> <RUN>
+      hint: `kmcfit predict --help` lists the arguments
     ");
     bench.write("other/result.json", "{}");
     assert_snapshot!(from("other", "1,0"), @"

@@ -31,7 +31,8 @@ fn without_gradient_it_only_reads() {
     assert_eq!(
         stdout,
         "free decay: 21 samples of the displacement in m (UTF-8; separated by commas; decimal point; \
-         column names in line 1)\nSmall: 21 nodes over 2 s (midpoint), 43 parameters, lbfgs\n"
+         column names in line 1)\nSmall: 21 nodes over 2 s (midpoint), 43 parameters, lbfgs\n\
+         the model and its data are valid\n"
     );
     assert_eq!(bench.contents(), before);
 }

@@ -1,6 +1,6 @@
 //! Commands and options besides fits: init, explain, schema, demo, --set, completions, man.
 
-use crate::workbench::{MODEL, Workbench, column, readings, repository};
+use crate::workbench::{MODEL, Workbench, column, repository, sample_table};
 use insta::assert_snapshot;
 use serde_json::Value;
 
@@ -58,9 +58,9 @@ fn keys_are_explained() {
     let (code, stdout, stderr) = bench.run(&["explain", "fit.stop.tolerence"]);
     assert_eq!((code, stdout.as_str()), (2, ""));
     assert_snapshot!(stderr, @"
-    error: KEY: no such key
+    error: explain: unknown key
       found: `fit.stop.tolerence`
-      expected: a key of a model file; `kmcfit explain` lists the top-level keys
+      expected: a key of a model file, such as `sigma` or `functions.mass`; `kmcfit explain` lists the top-level keys
       hint: did you mean `fit.stop.tolerance`?
     ");
     let stderr = bench.run(&["explain", "nods"]).2;
@@ -111,16 +111,120 @@ fn starters_can_be_fitted() {
     assert_eq!(schema["title"], "kmcfit model file");
 }
 
-/// Errors of clap with too little detail are replaced by those of the program.
+/// Errors of arguments have the form of all input errors.
 #[test]
-fn invalid_numbers_and_misspelt_commands_have_messages() {
+fn invalid_arguments_have_found_expected_and_hint() {
     let bench = Workbench::with_small_model();
-    let (code, _, said) = bench.run(&["fti", "model.yaml"]);
-    assert_eq!(code, 2);
-    assert!(
-        said.contains("a similar subcommand exists: 'fit'"),
-        "{said}"
-    );
+    let lines: [&[&str]; 15] = [
+        &["fti", "model.yaml"],
+        &["--jsn"],
+        &["fit"],
+        &["compare"],
+        &["fit", "model.yaml", "--jsn"],
+        &["fit", "model.yaml", "other.yaml"],
+        &["fit", "model.yaml", "--out"],
+        &["fit", "model.yaml", "--out", "a", "--out", "b"],
+        &["fit", "model.yaml", "--json", "--plot"],
+        &["simulate", "model.yaml", "--noise", "5%"],
+        &["simulate", "model.yaml", "--noise", "0.1"],
+        &["completions", "tcsh"],
+        &["fit", "samples.csv"],
+        &["init", "."],
+        &["explain", "functions.penalty"],
+    ];
+    let mut all = String::new();
+    for arguments in lines {
+        let (code, stdout, said) = bench.run(arguments);
+        assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?}");
+        all += &format!("$ kmcfit {}\n{said}\n", arguments.join(" "));
+    }
+    assert_snapshot!(all, @"
+    $ kmcfit fti model.yaml
+    error: kmcfit: unknown command
+      found: `fti`
+      expected: one of: fit, simulate, check, predict, compare, study, resume, init, explain, schema, demo, completions, man
+      hint: did you mean `fit`?
+
+    $ kmcfit --jsn
+    error: kmcfit: unknown argument
+      found: `--jsn`
+      expected: kmcfit <COMMAND>
+      hint: `kmcfit --help` lists the arguments
+
+    $ kmcfit fit
+    error: kmcfit fit: <MODEL> is missing
+      expected: kmcfit fit [OPTIONS] <MODEL>
+      hint: `kmcfit fit --help` lists the arguments
+
+    $ kmcfit compare
+    error: kmcfit compare: <MODEL|RUN>... is missing
+      expected: kmcfit compare [OPTIONS] <MODEL|RUN>...
+      hint: `kmcfit compare --help` lists the arguments
+
+    $ kmcfit fit model.yaml --jsn
+    error: kmcfit fit: unknown argument
+      found: `--jsn`
+      expected: one of: --out, --set, --json, --no-report, --timings, --plot, --checkpoint
+      hint: did you mean `--json`?
+
+    $ kmcfit fit model.yaml other.yaml
+    error: kmcfit fit: unknown argument
+      found: `other.yaml`
+      expected: kmcfit fit [OPTIONS] <MODEL>
+      hint: `kmcfit fit --help` lists the arguments
+
+    $ kmcfit fit model.yaml --out
+    error: --out: the value is missing
+      expected: --out <OUT>
+
+    $ kmcfit fit model.yaml --out a --out b
+    error: --out: given more than once
+      expected: this argument at most once
+
+    $ kmcfit fit model.yaml --json --plot
+    error: --json: cannot be combined with `--plot`
+      expected: one of the two
+
+    $ kmcfit simulate model.yaml --noise 5%
+    error: --noise: not a number
+      found: `5%`
+      expected: a number
+      hint: percent is not accepted: write 0.05
+
+    $ kmcfit simulate model.yaml --noise 0.1
+    error: kmcfit simulate: --seed <SEED> is missing
+      expected: kmcfit simulate [OPTIONS] <MODEL>
+      hint: `kmcfit simulate --help` lists the arguments
+
+    $ kmcfit completions tcsh
+    error: <SHELL>: invalid value
+      found: `tcsh`
+      expected: one of: bash, elvish, fish, powershell, zsh
+
+    $ kmcfit fit samples.csv
+    error: samples.csv:1:1: wrong type of value
+      |
+    1 | t_s,y_m
+      | ^^^^^^^
+      found: text `t_s,y_m 0,1 0.1,0.9851037084132392 0.2,0…`
+      expected: a map with the keys format, experiments, functions, fit, …
+      hint: for a record, `kmcfit init samples.csv` writes a model file
+
+    $ kmcfit init .
+    error: .: this is a folder
+      expected: a record (CSV or another text table)
+
+    $ kmcfit explain functions.penalty
+    error: explain: unknown key
+      found: `functions.penalty`
+      expected: a key of a model file, such as `sigma` or `functions.mass`; `kmcfit explain` lists the top-level keys
+      hint: did you mean `functions.mass.penalty`?
+    ");
+}
+
+#[test]
+fn invalid_numbers_have_messages() {
+    let bench = Workbench::with_small_model();
     let (code, _, said) = bench.run(&["fit", "model.yaml", "--checkpoint", "often"]);
     assert_eq!(code, 2);
     assert_snapshot!(said, @"
@@ -140,7 +244,7 @@ fn invalid_numbers_and_misspelt_commands_have_messages() {
 #[test]
 fn init_prints_the_properties_of_the_record() {
     let bench = Workbench::empty();
-    let text = readings(201).replace("t_s,y_m", "Time [ms],Weg_mm");
+    let text = sample_table(201).replace("t_s,y_m", "Time [ms],Weg_mm");
     bench.write("run 1/my data.csv", &text);
     assert_snapshot!(bench.run_to(0, &["init", "run 1/my data.csv"]), @"
     run 1/my data.csv
@@ -168,11 +272,11 @@ fn init_prints_the_properties_of_the_record() {
         initial: estimate                             # or {displacement: …, velocity: …} in m and m/s
     grid: {nodes: auto}                               # chosen from the spectrum of the record
     functions:
-      mass:      {fixed: 1.0}                         # kg; WRITE YOURS: without a force only k/m and c/m show
-      damping:   {basis: constant, start: 40.11}      # N s/m; starts at 2 % of critical
-      stiffness: {basis: constant, start: 1006000}    # N/m; the record is short for one that changes
+      mass:      {fixed: 1.0}                         # kg; ASSUMED, enter your own: without a measured force only k/m and c/m are identifiable
+      damping:   {basis: constant, start: 40.11}      # N s/m; start value: 2 % of critical damping
+      stiffness: {basis: constant, start: 1006000}    # N/m; the record is too short to show a variation
     # truth: {data: truth.csv}                        # the true functions, where they are known
-    fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1e-8}}
+    fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1.0e-8}}
     "#);
     let again = bench.run(&["init", "run 1/my data.csv"]);
     assert_eq!(again.0, 2);
@@ -196,7 +300,7 @@ fn init_prints_the_properties_of_the_record() {
     bench.write("bare.csv", &text.replace("Time [ms],Weg_mm", "t,y"));
     let said = bench.run_to(0, &["init", "bare.csv"]);
     assert!(
-        said.contains("column `y`: displacement, m: the unit is a guess, please check\n"),
+        said.contains("column `y`: displacement, m; the unit is assumed, please check\n"),
         "{said}"
     );
     bench.write("empty.csv", "t_s,y_m\n0,\n1,\n2,\n");

@@ -14,7 +14,7 @@ fn model(title: &str, nodes: usize, functions: &str, fit: &str) -> String {
 title: {title}
 experiments:
   - name: free decay
-    data: readings.csv
+    data: samples.csv
     columns: {{time: t_s, displacement: y_m}}
     initial: {{displacement: 1.0, velocity: 0.5}}
 grid: {{nodes: {nodes}, method: midpoint}}
@@ -58,7 +58,7 @@ const LOOSE: &str = "{method: lbfgs, stop: {iterations: 400, cost_ratio: 1e-6}}"
 fn bench() -> Workbench {
     let bench = Workbench::empty();
     bench.write("device.yaml", DEVICE);
-    bench.run_to(0, &["simulate", "device.yaml", "--out", "readings.csv"]);
+    bench.run_to(0, &["simulate", "device.yaml", "--out", "samples.csv"]);
     bench.write(
         "truth.csv",
         "t_s,mass_kg,damping_N_s_per_m,stiffness_N_per_m\n0,1,0.1,1\n10,1,0.1,1\n",
@@ -307,7 +307,7 @@ fn models_and_finished_runs() {
 fn equal_names() {
     let bench = bench();
     for folder in ["a", "b"] {
-        for file in ["constants.yaml", "readings.csv", "truth.csv"] {
+        for file in ["constants.yaml", "samples.csv", "truth.csv"] {
             bench.write(&format!("{folder}/{file}"), &bench.read(file));
         }
     }
@@ -491,7 +491,7 @@ fn a_run_without_motion() {
 #[test]
 fn noise_and_no_truth() {
     let bench = bench();
-    let noise = ["--noise", "0.05", "--seed", "1", "--out", "readings.csv"];
+    let noise = ["--noise", "0.05", "--seed", "1", "--out", "samples.csv"];
     bench.run_to(0, &[&["simulate", "device.yaml"][..], &noise].concat());
     let loose = "{method: lbfgs, stop: {iterations: 100, tolerance: 1e-10}}";
     let noisy = model("Noisy", 200, CONSTANTS, loose).replace(

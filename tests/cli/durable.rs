@@ -415,7 +415,7 @@ fn names_that_look_like_paths() {
     bench.run(&["fit", "...yaml"]);
     bench.run(&["compare", "...yaml", "--out", "side"]);
     for name in bench.contents().keys() {
-        let known = ["model.yaml", "readings.csv", "...yaml", "runs", "side"];
+        let known = ["model.yaml", "samples.csv", "...yaml", "runs", "side"];
         let inside = ["runs/run", "side/"]
             .iter()
             .any(|folder| name.starts_with(folder));

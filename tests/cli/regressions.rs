@@ -1,12 +1,12 @@
 //! Regression tests, one for each mistake found in use.
 
-use crate::workbench::{MODEL, Workbench, readings};
+use crate::workbench::{MODEL, Workbench, sample_table};
 
 fn bench(from: &str, to: &str) -> Workbench {
     let bench = Workbench::empty();
     assert!(MODEL.contains(from), "{from}");
     bench.write("model.yaml", &MODEL.replace(from, to));
-    bench.write("readings.csv", &readings(21));
+    bench.write("samples.csv", &sample_table(21));
     bench
 }
 
@@ -54,8 +54,8 @@ fn figures_of_an_older_run_go_with_it() {
 #[test]
 fn a_cost_that_overflows_is_an_outcome() {
     let bench = Workbench::with_small_model();
-    let spoiled = readings(21).replacen("\n1,", "\n1,1e300\n#", 1);
-    bench.write("readings.csv", &spoiled);
+    let spoiled = sample_table(21).replacen("\n1,", "\n1,1e300\n#", 1);
+    bench.write("samples.csv", &spoiled);
     let (code, _, stderr) = bench.run(&["fit", "model.yaml"]);
     assert_eq!(code, 3, "{stderr}");
     assert!(
@@ -75,7 +75,7 @@ fn without_iterations_or_tests_the_default_tolerance_holds() {
 fn simulate_does_not_write_over_the_samples_of_the_model() {
     let bench = Workbench::with_small_model();
     let before = bench.contents();
-    let (code, _, stderr) = bench.run(&["simulate", "model.yaml", "--out", "./readings.csv"]);
+    let (code, _, stderr) = bench.run(&["simulate", "model.yaml", "--out", "./samples.csv"]);
     assert_eq!(code, 2);
     assert!(
         stderr.contains("this file is an input of the model"),
@@ -88,7 +88,7 @@ fn simulate_does_not_write_over_the_samples_of_the_model() {
 fn a_start_that_fits_exactly_is_converged_and_has_nothing_to_check() {
     let bench = Workbench::with_small_model();
     bench.run_to(0, &["simulate", "model.yaml", "--out", "exact.csv"]);
-    bench.write("exact.yaml", &MODEL.replace("readings.csv", "exact.csv"));
+    bench.write("exact.yaml", &MODEL.replace("samples.csv", "exact.csv"));
     bench.run_to(0, &["fit", "exact.yaml"]);
     assert_eq!(status(&bench, "runs/exact"), "converged");
     let stdout = bench.run_to(0, &["check", "exact.yaml"]);

@@ -7,7 +7,7 @@ use serde_json::Value;
 const EVERYTHING: &str = "format: 1
 title: Every term
 experiments:
-  - data: readings.csv
+  - data: samples.csv
     initial: {displacement: 1.0, velocity: 0.5}
 grid: {nodes: 401, method: rk4}
 functions:
@@ -43,7 +43,7 @@ functions:
   stiffness: {fixed: 1.0}
 ";
     bench.write("device.yaml", device);
-    bench.run_to(0, &["simulate", "device.yaml", "--out", "readings.csv"]);
+    bench.run_to(0, &["simulate", "device.yaml", "--out", "samples.csv"]);
     bench
 }
 
@@ -163,7 +163,7 @@ fn the_kind_of_the_cost_follows_the_sigmas() {
     let with = "    sigma: {displacement: 0.1}\n    initial";
     let all = EVERYTHING.replace("    initial", with);
     assert_eq!(fitted(&bench, &all)["model"]["cost_kind"], "chi-square");
-    let second = "  - {data: readings.csv, initial: {displacement: 1.0, velocity: 0.5}}\ngrid";
+    let second = "  - {data: samples.csv, initial: {displacement: 1.0, velocity: 0.5}}\ngrid";
     let some = all.replace("grid", second);
     let result = fitted(&bench, &some);
     assert_eq!(result["model"]["cost_kind"], "mixed");
@@ -219,14 +219,14 @@ fn violated_soft_constraints_are_in_the_result_and_the_summary() {
 #[test]
 fn a_coarse_fit_starts_a_finer_one() {
     let bench = bench();
-    let noise = ["--noise", "0.02", "--seed", "3", "--out", "readings.csv"];
+    let noise = ["--noise", "0.02", "--seed", "3", "--out", "samples.csv"];
     bench.run_to(0, &[&["simulate", "device.yaml"][..], &noise].concat());
     let model = |knots: usize, start: [&str; 3]| {
         let [mass, damping, stiffness] = start;
         format!(
             "format: 1
 experiments:
-  - data: readings.csv
+  - data: samples.csv
     initial: {{displacement: 1.0, velocity: 0.5}}
 grid: {{method: rk4}}
 functions:
@@ -301,7 +301,11 @@ fit: {{stop: {{iterations: 100, tolerance: 1e-12}}}}
     let starts: Vec<&Value> = attempts.iter().map(|attempt| &attempt["start"]).collect();
     assert_eq!(
         starts,
-        ["start values", "equation error", "growing horizon"]
+        [
+            "start values",
+            "equation error",
+            "growing part of the record"
+        ]
     );
     let costs: Vec<f64> = attempts
         .iter()
@@ -309,7 +313,11 @@ fit: {{stop: {{iterations: 100, tolerance: 1e-12}}}}
         .collect();
     assert!(costs[2] < 1e-12 * costs[0].min(costs[1]), "{costs:?}");
     assert_eq!(number(&result["cost"]["final"]), costs[2]);
-    for start in ["start values", "equation error", "growing horizon"] {
+    for start in [
+        "start values",
+        "equation error",
+        "growing part of the record",
+    ] {
         assert!(
             summary.contains(&format!("\nattempt from the {start}: J ")),
             "{summary}"

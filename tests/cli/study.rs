@@ -10,7 +10,7 @@ format: 1
 title: Studied
 experiments:
   - name: free decay
-    data: readings.csv
+    data: samples.csv
     sigma: {displacement: 0.02}
     initial: {displacement: 1.0, velocity: estimate}
 functions:
@@ -45,7 +45,7 @@ fn bench() -> Workbench {
         let y = (-0.1 * t).exp() * (1.99 * t).cos() + noise;
         text += &format!("{t},{y}\n");
     }
-    bench.write("readings.csv", &text);
+    bench.write("samples.csv", &text);
     bench
 }
 
@@ -223,7 +223,7 @@ fn a_record_at_rest() {
     for i in 0..101 {
         text += &format!("{},0\n", 0.1 * f64::from(i));
     }
-    bench.write("readings.csv", &text);
+    bench.write("samples.csv", &text);
     let model = MODEL
         .replace(
             "displacement: 1.0, velocity: estimate",

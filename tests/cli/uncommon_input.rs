@@ -1,7 +1,7 @@
 //! Messages about rare mistakes in models, tables and arguments: exit code 2, one message each, no file written. The list
 //! of all messages (`tests/snapshots/kmcfit__messages__messages.snap`) takes them from here.
 
-use crate::workbench::{MODEL, Workbench, readings};
+use crate::workbench::{MODEL, Workbench, sample_table};
 use insta::assert_snapshot;
 
 /// The message of a command that is refused.
@@ -25,7 +25,7 @@ fn changed(command: &str, changes: &[(&str, &str)]) -> String {
     refused(&bench, &[command, "model.yaml"])
 }
 
-const DATA: &str = "    data: readings.csv\n";
+const DATA: &str = "    data: samples.csv\n";
 const COLUMNS: &str = "    columns: {time: t_s, displacement: y_m}\n";
 const DAMPING: &str = "{basis: constant, start: 1.0}";
 const STIFFNESS: &str = "stiffness: {basis: nodal, start: 1.0}";
@@ -179,7 +179,7 @@ fn models() {
             "fit",
             &[(
                 second,
-                "  - name: free decay\n    data: readings.csv\n    columns: {time: t_s, displacement: y_m}\n    initial: {displacement: 1.0, velocity: 0.0}\ngrid: {nodes: 21}",
+                "  - name: free decay\n    data: samples.csv\n    columns: {time: t_s, displacement: y_m}\n    initial: {displacement: 1.0, velocity: 0.0}\ngrid: {nodes: 21}",
             )],
         ),
     ];
@@ -188,7 +188,7 @@ fn models() {
 
 #[test]
 fn own_functions() {
-    let second = "  - name: second\n    data: readings.csv\n    columns: {time: t_s, displacement: y_m}\n    initial: {displacement: 1.0, velocity: 0.0}\n    functions: {damping: {basis: constant, start: 1.0}}\ngrid: {nodes: 21";
+    let second = "  - name: second\n    data: samples.csv\n    columns: {time: t_s, displacement: y_m}\n    initial: {displacement: 1.0, velocity: 0.0}\n    functions: {damping: {basis: constant, start: 1.0}}\ngrid: {nodes: 21";
     let own = "    functions: {damping: {basis: constant, start: 1.0}}\n    initial:";
     let all = [
         changed(
@@ -210,7 +210,7 @@ fn own_functions() {
 fn roles_of_experiments() {
     let second = |keys: &str| {
         format!(
-            "  - name: second\n    data: readings.csv\n    columns: {{time: t_s, displacement: y_m}}\n    \
+            "  - name: second\n    data: samples.csv\n    columns: {{time: t_s, displacement: y_m}}\n    \
              initial: {{displacement: 1.0, velocity: 0.0}}\n    {keys}\ngrid: {{nodes: 21"
         )
     };
@@ -245,7 +245,7 @@ fn tables() {
         bench.write("model.yaml", model);
         refused(&bench, &["fit", "model.yaml"])
     };
-    let uneven = readings(21).replace("\n0.1,", "\n0.13,");
+    let uneven = sample_table(21).replace("\n0.1,", "\n0.13,");
     let row = |(i, line): (usize, &str)| match i {
         6 => "0.5,
 "
@@ -255,7 +255,7 @@ fn tables() {
 "
         ),
     };
-    let gap: String = readings(21).lines().enumerate().map(row).collect();
+    let gap: String = sample_table(21).lines().enumerate().map(row).collect();
     let line = |key: &str| MODEL.replacen(COLUMNS, &format!("{COLUMNS}    {key}\n"), 1);
     let wide = format!(
         "{}\n{}\n",
@@ -266,11 +266,11 @@ fn tables() {
     bench.write("minutes.csv", &minutes);
     let column = MODEL.replacen("start: 2.0", "start: {data: minutes.csv, column: c}", 1);
     let all = [
-        with("readings.csv", &uneven, &line("decimate: 2")),
-        with("readings.csv", &uneven, &line("band: {max: 2.0}")),
-        with("readings.csv", &gap, &line("band: {max: 2.0}")),
-        with("readings.csv", &wide, MODEL),
-        with("readings.csv", &readings(21), &column),
+        with("samples.csv", &uneven, &line("decimate: 2")),
+        with("samples.csv", &uneven, &line("band: {max: 2.0}")),
+        with("samples.csv", &gap, &line("band: {max: 2.0}")),
+        with("samples.csv", &wide, MODEL),
+        with("samples.csv", &sample_table(21), &column),
     ];
     assert_snapshot!(all.join("\n"));
 }

@@ -13,7 +13,7 @@ format: 1
 title: Small
 experiments:
   - name: free decay
-    data: readings.csv
+    data: samples.csv
     columns: {time: t_s, displacement: y_m}
     initial: {displacement: 1.0, velocity: 0.0}
 grid: {nodes: 21, method: midpoint}
@@ -62,7 +62,7 @@ impl Workbench {
     pub fn with_small_model() -> Self {
         let bench = Self::empty();
         bench.write("model.yaml", MODEL);
-        bench.write("readings.csv", &readings(21));
+        bench.write("samples.csv", &sample_table(21));
         bench
     }
 
@@ -143,7 +143,7 @@ fn collect(root: &Path, below: &Path, found: &mut BTreeMap<String, String>) {
 }
 
 /// `rows` samples of a decaying cosine, 0.1 s apart.
-pub fn readings(rows: usize) -> String {
+pub fn sample_table(rows: usize) -> String {
     let mut text = String::from("t_s,y_m\n");
     for i in 0..rows {
         let t = i as f64 / 10.0;

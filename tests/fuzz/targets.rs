@@ -87,9 +87,9 @@ fn workshop() -> &'static Workshop {
         for name in ["data", "models", "run", "fit", "study"] {
             fs::create_dir(folder.path().join(name)).expect("a folder");
         }
-        for entry in fs::read_dir(shipped).expect("the folder of readings") {
+        for entry in fs::read_dir(shipped).expect("the folder of samples") {
             let path = entry.expect("an entry").path();
-            let text = fs::read(&path).expect("readings");
+            let text = fs::read(&path).expect("samples");
             let lines: Vec<&[u8]> = text.split_inclusive(|b| *b == b'\n').take(LINES).collect();
             let name = path.file_name().expect("a name");
             fs::write(folder.path().join("data").join(name), lines.concat()).expect("room");
@@ -227,7 +227,7 @@ pub fn yaml(bytes: &[u8]) -> Verdict {
     };
     file.data_files();
     let change = Override::parse("title=x").expect("an override");
-    match file.with(&[change]) {
+    match file.with_overrides(&[change]) {
         Err(error) => told(&error),
         Ok(file) => {
             file.data_files();
@@ -249,7 +249,7 @@ pub fn overrides(bytes: &[u8]) -> Verdict {
         Ok(change) => change,
         Err(error) => return told(&error),
     };
-    match file.with(&[change]) {
+    match file.with_overrides(&[change]) {
         Err(error) => told(&error),
         Ok(file) => {
             file.data_files();
@@ -345,8 +345,8 @@ fn columns(table: &Table) {
         assert_eq!(table.find(&ColumnName::Number(index + 1)), Ok(index));
         table.unit(index);
         let _ = table.check_stated_unit(index);
-        if let Ok(readings) = table.samples(index) {
-            assert_eq!(readings.len(), table.rows());
+        if let Ok(samples) = table.samples(index) {
+            assert_eq!(samples.len(), table.rows());
         }
     }
     for name in table.headers().iter().take(20) {

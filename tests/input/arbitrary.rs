@@ -133,8 +133,8 @@ fn read_table_with(bytes: &[u8], format: &TableFormat) {
         for index in 0..table.width() {
             assert_eq!(table.find(&ColumnName::Number(index + 1)), Ok(index));
             table.unit(index);
-            if let Ok(readings) = table.samples(index) {
-                assert_eq!(readings.len(), table.rows());
+            if let Ok(samples) = table.samples(index) {
+                assert_eq!(samples.len(), table.rows());
             }
         }
         assert!(table.values(table.width()).is_err());

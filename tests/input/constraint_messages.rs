@@ -10,7 +10,7 @@ fn text(constraints: &str) -> String {
     format!(
         "format: 1
 experiments:
-  - data: readings.csv
+  - data: samples.csv
     initial: {{displacement: 1, velocity: 0}}
 grid: {{nodes: 21, method: midpoint}}
 title: T
@@ -25,14 +25,14 @@ constraints: {constraints}
 
 fn read(text: &str) -> Result<Model, String> {
     let folder = tempfile::tempdir().unwrap();
-    let mut readings = String::from("t_s,y_m\n");
+    let mut samples = String::from("t_s,y_m\n");
     let mut column = String::from("t_s,c\n");
     for i in 0..21 {
         let t = f64::from(i) / 10.0;
-        readings.push_str(&format!("{t},{}\n", t.cos()));
+        samples.push_str(&format!("{t},{}\n", t.cos()));
         column.push_str(&format!("{t},{}\n", 0.1 + 0.1 * t * t));
     }
-    std::fs::write(folder.path().join("readings.csv"), readings).unwrap();
+    std::fs::write(folder.path().join("samples.csv"), samples).unwrap();
     std::fs::write(folder.path().join("c.csv"), column).unwrap();
     let said = |error: kmcfit::error::InputError| {
         let shown = format!("{}/", folder.path().display());

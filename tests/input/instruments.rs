@@ -200,9 +200,9 @@ fn encodings_are_read() {
 #[test]
 fn missing_samples_are_nan() {
     let table = table("t;y\n0;1,5\n1;\n2;NaN\n3;NA\n4;n/a\n5;-\n6;null\n7;#N/A\n8;2,5\n");
-    let readings = table.samples(1).unwrap();
-    assert_eq!((readings[0], readings[8]), (1.5, 2.5));
-    assert!(readings[1..8].iter().all(|y| y.is_nan()));
+    let samples = table.samples(1).unwrap();
+    assert_eq!((samples[0], samples[8]), (1.5, 2.5));
+    assert!(samples[1..8].iter().all(|y| y.is_nan()));
     assert!(table.values(1).is_err());
     assert_eq!(table.values(0).unwrap(), table.samples(0).unwrap());
 }

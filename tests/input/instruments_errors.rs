@@ -12,7 +12,7 @@ fn with(text: &str, format: &TableFormat) -> String {
     error.unwrap_err().to_string()
 }
 
-fn readings(text: &str, index: usize) -> String {
+fn sample_table(text: &str, index: usize) -> String {
     parsed(text).samples(index).unwrap_err().to_string()
 }
 
@@ -50,24 +50,24 @@ fn columns() {
 
 #[test]
 fn fields() {
-    assert_snapshot!(readings("t;y\n0;1,5\n1;off\n", 1), @"
+    assert_snapshot!(sample_table("t;y\n0;1,5\n1;off\n", 1), @"
     t.csv:3: row 2, column `y`: not a number
       found: `off`
       expected: a finite number, or an empty field for a missing sample
     ");
-    assert_snapshot!(readings("t;y\n0;1,5\n1;1.5\n", 1), @"
+    assert_snapshot!(sample_table("t;y\n0;1,5\n1;1.5\n", 1), @"
     t.csv:2: row 1, column `y`: not a number
       found: `1,5`
       expected: a finite number, or an empty field for a missing sample
       hint: write numbers with a decimal point, not a comma
     ");
-    assert_snapshot!(readings("t,y\n0,1.5\n1,-inf\n", 1), @"
+    assert_snapshot!(sample_table("t,y\n0,1.5\n1,-inf\n", 1), @"
     t.csv:3: row 2, column `y`: not a finite number
       found: `-inf`
       expected: a finite number, or an empty field for a missing sample
       hint: leave the field empty for a missing sample or an overload
     ");
-    assert_snapshot!(readings("0,1.5\n1,off\n", 1), @"
+    assert_snapshot!(sample_table("0,1.5\n1,off\n", 1), @"
     t.csv:2: row 2, column `2`: not a number
       found: `off`
       expected: a finite number, or an empty field for a missing sample

@@ -27,7 +27,7 @@ fn base() -> ModelFile {
 
 fn set(model: ModelFile, path: &str, value: &str) -> Result<ModelFile, String> {
     let change = Override::parse(&format!("{path}={value}")).map_err(|e| e.to_string())?;
-    model.with(&[change]).map_err(|e| e.to_string())
+    model.with_overrides(&[change]).map_err(|e| e.to_string())
 }
 
 /// The whole model with `value` at a path, as JSON.

@@ -159,7 +159,7 @@ fn is_refused(model: &str, setting: &str) -> bool {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("models/{model}.yaml"));
     let file = ModelFile::read(path).expect(model);
     let change = Override::parse(setting).expect(setting);
-    let file = file.with(&[change]).expect(setting);
+    let file = file.with_overrides(&[change]).expect(setting);
     let mode = match file.spec.experiments.iter().any(|e| e.data.is_some()) {
         true => BuildMode::Fit,
         false => BuildMode::Simulate { nodes: None },

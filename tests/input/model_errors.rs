@@ -288,7 +288,7 @@ fn counts() {
       expected: an integer, or `auto`
     ");
     assert_snapshot!(changed("nodes: 2000", "nodes: 99999999999999999999"), @"
-    m.yaml:12:15: grid.nodes: the count is too large
+    m.yaml:12:15: grid.nodes: the number is too large
       found: the integer 99999999999999999999
       expected: an integer, or `auto`
     ");

@@ -14,7 +14,7 @@ const MODEL: &str = "format: 1
 title: TITLE
 experiments:
   - name: NAME
-    data: readings.csv
+    data: samples.csv
     sigma: {displacement: 0.02}
     initial: {displacement: 1.0, velocity: 0.0}
 grid: {nodes: 201}
@@ -62,7 +62,7 @@ impl Pages {
         pages.write("device.yaml", DEVICE);
         pages.write("plain.yaml", &model("A plain run"));
         pages.write("hostile.yaml", &model(HOSTILE));
-        let noise = ["--noise", "0.02", "--seed", "5", "--out", "readings.csv"];
+        let noise = ["--noise", "0.02", "--seed", "5", "--out", "samples.csv"];
         pages.run(&[&["simulate", "device.yaml"][..], &noise].concat());
         pages.run(&["fit", "plain.yaml"]);
         pages.run(&["fit", "hostile.yaml"]);

@@ -128,7 +128,7 @@ fn a_report_is_complete() {
         "kmcfit fit plain.yaml",
         env!("CARGO_PKG_VERSION"),
         "Buchta",
-        "readings.csv",
+        "samples.csv",
         "truth.csv",
         "basis: polynomial",
     ] {
@@ -210,7 +210,7 @@ fn hostile_texts_are_texts() {
 #[test]
 fn long_records_make_small_pages() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let readings: String = (0..65_000)
+    let samples: String = (0..65_000)
         .map(|i| {
             let t = f64::from(i) * 0.01;
             let spike = if i == 40_000 { 5.0 } else { 0.0 };
@@ -218,14 +218,14 @@ fn long_records_make_small_pages() {
         })
         .collect();
     std::fs::write(
-        folder.path().join("readings.csv"),
-        "t_s,y_m\n".to_string() + &readings,
+        folder.path().join("samples.csv"),
+        "t_s,y_m\n".to_string() + &samples,
     )
     .expect("a file");
     let model = "format: 1
 title: Long
 experiments:
-  - {data: readings.csv, sigma: {displacement: 0.1}, initial: {displacement: 1.0, velocity: 0.0}}
+  - {data: samples.csv, sigma: {displacement: 0.1}, initial: {displacement: 1.0, velocity: 0.0}}
 functions:
   mass: {basis: piecewise-linear, knots: 20, start: 1.0}
   damping: {basis: constant, start: 0.0}
@@ -252,13 +252,10 @@ fit: {stop: {iterations: 2}}
     let channel = channel.expect("the figure");
     assert!(text_of(channel).contains("thinned for display"));
     let data = numbers(channel);
-    let readings = data["panels"][0]["marks"][0]["y"]
+    let samples = data["panels"][0]["marks"][0]["y"]
         .as_array()
         .expect("numbers");
-    let largest = readings
-        .iter()
-        .filter_map(Value::as_f64)
-        .fold(0.0, f64::max);
+    let largest = samples.iter().filter_map(Value::as_f64).fold(0.0, f64::max);
     assert!(largest > 4.0, "the spike is lost: {largest}");
 }
 

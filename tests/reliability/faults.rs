@@ -109,7 +109,7 @@ pub fn few() -> String {
 fn bench() -> Workbench {
     let bench = Workbench::with_small_model();
     bench.write("few.yaml", &few());
-    bench.write("other.csv", &bench.read("readings.csv"));
+    bench.write("other.csv", &bench.read("samples.csv"));
     bench.run_to(0, &["fit", "model.yaml", "--out", "done"]);
     // Killed while it writes its results.
     let fit = ["fit", "model.yaml", "--out", "killed", "--checkpoint", "0"];

@@ -22,9 +22,9 @@ fn refused(bench: &Workbench, arguments: &[&str], about: &str) -> String {
 #[test]
 fn a_project_folder_keeps_its_files() {
     let bench = Workbench::with_small_model();
-    let model = MODEL.replace("data: readings.csv", "data: channels/paper.csv");
+    let model = MODEL.replace("data: samples.csv", "data: channels/paper.csv");
     bench.write("model.yaml", &model);
-    bench.write("channels/paper.csv", &bench.read("readings.csv"));
+    bench.write("channels/paper.csv", &bench.read("samples.csv"));
     bench.write("channels/other.csv", "t_s,y_m\n0,1\n");
     bench.write("figures/my_drawing.svg", "<svg/>");
     let before = tree(&bench.path(""));

@@ -21,7 +21,7 @@ const COMMANDS: [&[&str]; 10] = [
     &["compare", "model.yaml", "done", "--out", OUT],
     &["compare", "done", "done", "--out", OUT],
     &["simulate", "model.yaml", "--out", "out/history.csv"],
-    &["init", "readings.csv", "--out", "out/model.yaml"],
+    &["init", "samples.csv", "--out", "out/model.yaml"],
     &["resume", OUT],
     &["study", "few.yaml", "--out", OUT, "--threads", "1"],
 ];

@@ -15,7 +15,7 @@ fn program(bench: &Workbench, arguments: &[&str]) -> Command {
 /// A model with a warning, so that there is a message before the fit.
 fn bench() -> Workbench {
     let bench = Workbench::with_small_model();
-    bench.write("wrong.yaml", &MODEL.replace("readings.csv", "nowhere.csv"));
+    bench.write("wrong.yaml", &MODEL.replace("samples.csv", "nowhere.csv"));
     let mut child = program(&bench, &["fit", "model.yaml", "--out", "killed"]);
     drop(child.output());
     bench

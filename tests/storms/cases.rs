@@ -110,11 +110,11 @@ pub fn cases() -> Vec<Case> {
         },
         Case {
             times: times(5, 0.5),
-            ..calm("five readings")
+            ..calm("five samples")
         },
         Case {
             spoil: |_, _| "1".into(),
-            ..calm("constant readings")
+            ..calm("constant samples")
         },
         Case {
             spoil: |_, _| "0".into(),
@@ -127,7 +127,7 @@ pub fn cases() -> Vec<Case> {
         Case {
             times: times(11, 3.0),
             grid: "{nodes: 601}",
-            ..calm("too few readings per period")
+            ..calm("too few samples per period")
         },
         case("amplitude 1e-12", with(|d| d.begin = 1e-12)),
         case("amplitude 1e12", with(|d| d.begin = 1e12)),
@@ -149,14 +149,14 @@ pub fn cases() -> Vec<Case> {
         },
         Case {
             spoil: |_, _| "NaN".into(),
-            ..calm("no reading at all")
+            ..calm("no sample at all")
         },
         Case {
             spoil: |i, y| match i {
                 100 => plain(i, y),
                 _ => "NaN".into(),
             },
-            ..calm("one reading")
+            ..calm("one sample")
         },
         Case {
             times: [
@@ -166,7 +166,7 @@ pub fn cases() -> Vec<Case> {
             ]
             .concat(),
             grid: "{nodes: 201}",
-            ..calm("readings at one node")
+            ..calm("samples at one node")
         },
         at_pace("nanoseconds", 1e-9),
         at_pace("thirty years", 1e9),
@@ -210,7 +210,7 @@ impl Case {
             ),
         };
         format!(
-            "format: 1\ntitle: Storm\nexperiments:\n  - {{data: readings.csv, {sigma}initial: {{displacement: \
+            "format: 1\ntitle: Storm\nexperiments:\n  - {{data: samples.csv, {sigma}initial: {{displacement: \
              {:e}, velocity: 0.0}}}}\ngrid: {}\nfunctions:\n  mass: {{basis: constant, start: \
              {mass:e}}}\n  damping: {{basis: constant, start: {damping:e}}}\n  stiffness: {{fixed: \
              {:e}}}\nfit: {{method: {method}{stop}}}\n",
@@ -220,7 +220,7 @@ impl Case {
     }
 
     /// The table of samples.
-    pub fn readings(&self) -> String {
+    pub fn sample_table(&self) -> String {
         let row = |(i, t): (usize, &f64)| {
             let y = (self.spoil)(i, self.device.at(*t));
             format!("{t:.12e},{y}\n")

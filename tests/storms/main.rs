@@ -38,7 +38,7 @@ fn run(case: &Case, method: &str) -> End {
     let folder = tempfile::tempdir().expect("a folder");
     let place = folder.path();
     fs::write(place.join("model.yaml"), case.model(method)).expect("room");
-    fs::write(place.join("readings.csv"), case.readings()).expect("room");
+    fs::write(place.join("samples.csv"), case.sample_table()).expect("room");
     let output = Command::new(env!("CARGO_BIN_EXE_kmcfit"))
         .current_dir(place)
         .args(["fit", "model.yaml", "--no-report", "--out", "run"])
@@ -134,7 +134,7 @@ fn verdict(case: &Case, end: &End) -> String {
 
 /// Records from which almost no parameter combination is identifiable.
 const BLIND: [&str; 4] = [
-    "constant readings",
+    "constant samples",
     "nothing moves",
     "an outlier of 1e9",
     "sigma 1e300",

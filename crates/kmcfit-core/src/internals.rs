@@ -25,8 +25,8 @@ pub mod constraints {
 pub mod diagnostics {
     pub use crate::diagnostics::{
         NORMAL_975, ResidualDiagnostics, SIGNIFICANCE, UntestedReason, Whiteness, WhitenessResult,
-        chi_square_one, normal_half_width, offset_and_drift, outlier_indices, rms, spread,
-        student_half_width, without_line,
+        chi_square_one, detrended, normal_half_width, offset_and_drift, outlier_indices, rms,
+        standard_deviation, student_half_width,
     };
 }
 pub mod functions {
@@ -44,8 +44,9 @@ pub mod identifiability {
         ClassificationKind, Condition, FunctionClassification, Gain, RankFinding, RankFindingKind,
         Ranked, ResolvedDirection, ScaleFreedom, ScalingAmbiguity, Sensitivity, SingularSpectrum,
         anchors, classify_functions, is_negligible, is_unhindered, rank_experiments,
-        residual_spread, span_words, structural_rank,
+        residual_spread, structural_rank,
     };
+    pub use crate::spans::span_words;
 }
 pub mod objective {
     pub use crate::objective::{

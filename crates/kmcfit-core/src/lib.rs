@@ -74,6 +74,7 @@ mod signal;
 mod simd;
 mod simulate;
 mod solvers;
+mod spans;
 mod study;
 mod system;
 mod threads;

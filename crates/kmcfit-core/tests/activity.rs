@@ -67,7 +67,7 @@ fn an_active_bound_on_the_damping_ratio_is_reported_with_its_multiplier() {
         panic!("{active:?}");
     };
     assert!(cap.name.contains("damping ratio"), "{}", cap.name);
-    assert!(!cap.pushed.is_empty(), "{cap:?}");
+    assert!(!cap.binding.is_empty(), "{cap:?}");
     let expected = 0.2 * found.best.gradient.euclidean[0].abs();
     // The accuracy of the quadratic program.
     assert!(
@@ -123,7 +123,7 @@ fn a_bound_on_one_parameter_is_reported_with_its_multiplier() {
             panic!("{active:?}");
         };
         assert_eq!(bound.name, "-2 c >= -0.8");
-        assert!(!bound.pushed.is_empty(), "{bound:?}");
+        assert!(!bound.binding.is_empty(), "{bound:?}");
         let expected = 0.5 * found.best.gradient.euclidean[0].abs();
         // Exact up to the distance of the parameter from its bound.
         assert!(
@@ -203,9 +203,9 @@ fn multipliers_of_bounds_on_one_parameter_are_those_of_a_program() {
                 let off = (one.multiplier - other.multiplier).abs();
                 assert!(off < 1e-4 * most, "{sigma}: {one:?} {other:?}");
                 assert_eq!((&one.name, &one.spans), (&other.name, &other.spans));
-                assert_eq!(one.pushed, other.pushed, "{sigma}: {one:?} {other:?}");
+                assert_eq!(one.binding, other.binding, "{sigma}: {one:?} {other:?}");
                 let is_nearest = !one.name.contains("less near");
-                assert_eq!(!one.pushed.is_empty(), is_nearest, "{one:?}");
+                assert_eq!(!one.binding.is_empty(), is_nearest, "{one:?}");
             }
             groups.reverse();
         }
@@ -226,7 +226,7 @@ fn a_bound_with_a_gradient_away_from_it_is_not_active() {
                 panic!("{active:?}");
             };
             assert_eq!((touched.rows, touched.multiplier), (1, 0.0), "{touched:?}");
-            assert!(touched.pushed.is_empty());
+            assert!(touched.binding.is_empty());
         }
     }
 }
@@ -274,7 +274,7 @@ fn a_bound_on_a_sum_is_reported_with_its_multiplier() {
     let [sum] = active.as_slice() else {
         panic!("{active:?}");
     };
-    assert!(!sum.pushed.is_empty(), "{sum:?}");
+    assert!(!sum.binding.is_empty(), "{sum:?}");
     let cost = |cap: f64| best(cap).1.evaluation.cost;
     let h = 1e-3;
     let expected = (cost(1.5 - h) - cost(1.5 + h)) / (2.0 * h);
@@ -331,7 +331,7 @@ fn the_significance_of_a_multiplier_does_not_depend_on_units() {
             let [cap] = active.as_slice() else {
                 panic!("{active:?}");
             };
-            assert_eq!(!cap.pushed.is_empty(), counts, "{share} {unit} {cap:?}");
+            assert_eq!(!cap.binding.is_empty(), counts, "{share} {unit} {cap:?}");
         }
     }
 }
@@ -371,7 +371,7 @@ fn the_significance_of_a_cone_is_relative_to_its_whole_bound() {
         };
         let gain = 0.01 * (1.0 + at.parameters[1]) * cap.multiplier;
         let counts = gain > 1e-6 * at.evaluation.cost;
-        assert_eq!(!cap.pushed.is_empty(), counts, "{max} {gain} {cap:?}");
+        assert_eq!(!cap.binding.is_empty(), counts, "{max} {gain} {cap:?}");
         seen[usize::from(counts)] += 1;
     }
     assert!(seen.iter().all(|n| *n > 2), "{seen:?}");

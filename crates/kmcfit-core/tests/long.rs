@@ -225,7 +225,7 @@ fn few_displacements_in_a_period_need_states_and_functions_at_once() {
     };
     // Four times fewer samples: errors twice as large.
     let last = check(&line(&system().grid), sample, 2e-3);
-    assert_eq!(last, ["motion of the samples"; 2]);
+    assert_eq!(last, ["collocation"; 2]);
 }
 
 /// Between samples, between nodes, without a displacement.
@@ -237,7 +237,7 @@ fn few_irregular_accelerations_need_states_and_functions_at_once() {
         ..ChannelSpec::every_node(ChannelKind::Acceleration)
     };
     let last = check(&spline(&system().grid), sample, 2e-3);
-    assert_eq!(last, ["motion of the samples"; 2]);
+    assert_eq!(last, ["collocation"; 2]);
 }
 
 /// With so much noise that smoothing removes part of the response.
@@ -248,5 +248,5 @@ fn twenty_per_cent_of_noise_give_the_stiffness_to_two_per_cent() {
         ..ChannelSpec::every_node(ChannelKind::Displacement)
     };
     let last = check(&spline(&system().grid), sample, 2e-2);
-    assert_eq!(last, ["motion of the samples"; 2]);
+    assert_eq!(last, ["collocation"; 2]);
 }

@@ -71,7 +71,14 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
         .map(|attempt| attempt.start.name())
         .collect();
     println!("{:#?}", found.attempts);
-    assert_eq!(names, ["start values", "equation error", "growing horizon"]);
+    assert_eq!(
+        names,
+        [
+            "start values",
+            "equation error",
+            "growing part of the record"
+        ]
+    );
     let silence = problem.zero_response_misfit();
     let costs: Vec<f64> = found.attempts.iter().map(|attempt| attempt.cost).collect();
     // The first two end in minima with residuals of some per cent of the record, the last at the solution.
@@ -247,5 +254,5 @@ fn a_fit_by_the_continuous_gradient_tries_all_starting_points() {
     };
     let found = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
     let names: Vec<&str> = found.attempts.iter().map(|r| r.start.name()).collect();
-    assert!(names.contains(&"growing horizon"), "{names:?}");
+    assert!(names.contains(&"growing part of the record"), "{names:?}");
 }

@@ -72,7 +72,12 @@ pub(super) fn specification(
                 .error_at(&format!("{key}.start"), "a fixed function has no start")
                 .expected("either `fixed` or `start`"));
         }
-        (Some(fixed), None, _) => {
+        (Some(_), None, Some(_)) => {
+            return Err(file
+                .error_at(&format!("{key}.basis"), "a fixed function has no basis")
+                .expected("either `fixed`, or `basis` with `start`"));
+        }
+        (Some(fixed), None, None) => {
             CoefficientSpec::known(history(file, grid, &format!("{key}.fixed"), fixed)?)
         }
         (None, None, _) => {

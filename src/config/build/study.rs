@@ -168,6 +168,32 @@ fn check(file: &ModelFile, spec: &StudySpec) -> Result<(), InputError> {
             .found(level.0)
             .expected("a number greater than 0, in the unit of J"));
     }
+    for (key, is_given, needed, is_there) in [
+        (
+            "noise",
+            spec.noise.is_some(),
+            "bootstrap",
+            spec.bootstrap.is_some(),
+        ),
+        (
+            "spread",
+            spec.spread.is_some(),
+            "starts",
+            spec.starts.is_some(),
+        ),
+        (
+            "merge_tolerance",
+            spec.merge_tolerance.is_some(),
+            "starts",
+            spec.starts.is_some(),
+        ),
+    ] {
+        if is_given && !is_there {
+            return Err(file
+                .error_at(&format!("study.{key}"), "this key has no effect alone")
+                .expected(format!("`{needed}` beside it")));
+        }
+    }
     let limits = [
         ("starts", spec.starts, 1, MOST_STARTS),
         (
@@ -367,8 +393,8 @@ fn candidate(
     let mut experiment = Experiment::free(spec.name.0.clone(), initial, nodes);
     if let Some(force) = &spec.force {
         let force = Some(Waveform::Shape(experiments::shape(file, key, force)?));
-        experiment.drive = Input { force, base: None };
-        experiment.excitation = Some(experiment.drive.on(grid, nodes));
+        experiment.input = Input { force, base: None };
+        experiment.excitation = Some(experiment.input.on(grid, nodes));
     }
     let kind = spec.channel.unwrap_or(ChannelKind::Displacement);
     let weighting = match (spec.sigma, problem.channels().next()) {

@@ -1,7 +1,7 @@
 //! `kmcfit explain`: documentation of a key as text.
 
 use super::{Found, MODEL, ValueType, all};
-use crate::error::{InputError, Location};
+use crate::error::InputError;
 use crate::spelling::did_you_mean;
 use crate::text_io::quote;
 use std::fmt::Write;
@@ -51,9 +51,9 @@ fn without_positions(path: &str) -> String {
 }
 
 fn unknown(name: &str, wanted: &str, keys: &[Found]) -> InputError {
-    let error = InputError::new(Location::Argument("KEY".into()), "no such key")
+    let error = InputError::argument("explain", "unknown key")
         .found(quote(name))
-        .expected("a key of a model file; `kmcfit explain` lists the top-level keys");
+        .expected("a key of a model file, such as `sigma` or `functions.mass`; `kmcfit explain` lists the top-level keys");
     let last = wanted.rsplit('.').next().unwrap_or_default();
     let paths = || keys.iter().flat_map(|f| f.paths.iter().map(String::as_str));
     let names = || keys.iter().map(|f| f.key.name);

@@ -4,7 +4,7 @@ use super::quoted;
 use crate::error::InputError;
 use crate::tables::{Table, increasing_at};
 use crate::units::{Quantity, Unit};
-use kmcfit_core::internals::diagnostics::spread;
+use kmcfit_core::internals::diagnostics::standard_deviation;
 
 /// Role of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,6 +44,9 @@ const FOREIGN: [&str; 18] = [
 const MUCH: f64 = 3.0;
 /// Longest name that is compared as a single letter with a number or unit: `y1`.
 const LONGEST_LETTER: usize = 2;
+
+/// Remedy for a column of times that cannot be used.
+const OTHER_TIMES: &str = "correct the times in the file; `--sample-rate HZ` replaces them if the samples are equally spaced";
 
 impl Role {
     /// Its key in the model file.
@@ -119,7 +122,7 @@ impl ColumnAssignment {
                 Err(error) => match known(table, i).map(|column| column.role) {
                     Some(Role::Time) if sample_rate.is_some() => {}
                     Some(Role::Time) => {
-                        return Err(error.hint("without this column: `--sample-rate HZ`"));
+                        return Err(error.hint(OTHER_TIMES));
                     }
                     Some(_) => return Err(error),
                     None => {}
@@ -162,7 +165,7 @@ impl ColumnAssignment {
         let size = |c: &UsedColumn| -> Result<f64, InputError> {
             let samples = table.samples(c.index)?.iter().copied();
             let samples: Vec<f64> = samples.filter(|x| x.is_finite()).collect();
-            Ok(c.unit.factor() * spread(&samples))
+            Ok(c.unit.factor() * standard_deviation(&samples))
         };
         let there = &self.used[place];
         let alike = column.has_unit == there.has_unit
@@ -241,21 +244,36 @@ impl ColumnAssignment {
         format!("{{{}}}", pairs.collect::<Vec<_>>().join(", "))
     }
 
-    /// The units that the model file must state, as a YAML map.
+    /// The units that the model file states, as a YAML map: those that the file does not state in a recognised form.
     pub fn units(&self) -> Option<String> {
-        let assumed = self.used.iter().filter(|c| c.state_unit);
-        let pairs: Vec<String> = assumed
+        let pairs: Vec<String> = (self.used.iter())
+            .filter(|c| c.state_unit || !c.has_unit)
             .map(|c| format!("{}: {}", c.role.key(), quoted(c.unit.symbol())))
             .collect();
         (!pairs.is_empty()).then(|| format!("{{{}}}", pairs.join(", ")))
     }
 
+    /// The comment on these units.
+    pub fn units_comment(&self) -> String {
+        let assumed: Vec<&str> = (self.used.iter())
+            .filter(|c| !c.has_unit)
+            .map(|c| c.role.key())
+            .collect();
+        match assumed.is_empty() {
+            true => "converted to SI".to_owned(),
+            false => format!(
+                "ASSUMED, the file does not state a known unit: {}",
+                assumed.join(", ")
+            ),
+        }
+    }
+
     /// One sentence for each column: its role and unit.
     pub fn in_words(&self, table: &Table) -> Vec<String> {
         let said = |c: &UsedColumn| {
-            let guess = match (c.guessed, c.has_unit || c.role == Role::Time) {
-                (true, _) => ": a guess, please check",
-                (false, false) => ": the unit is a guess, please check",
+            let guess = match (c.guessed, c.has_unit) {
+                (true, _) => "; quantity and unit are assumed, please check",
+                (false, false) => "; the unit is assumed, please check",
                 (false, true) => "",
             };
             let role = c.role.key().replace('_', " of the ");
@@ -299,7 +317,7 @@ fn time(table: &Table, numeric: &[usize]) -> Result<UsedColumn, InputError> {
         && let Err(error) = increasing_at(table, *index)
         && !numeric.iter().filter(increases).any(|i| is_time(&i))
     {
-        return Err(error.hint("without this column: `--sample-rate HZ`"));
+        return Err(error.hint(OTHER_TIMES));
     }
     let named = numeric.iter().filter(increases).find(is_time);
     match named.or_else(|| numeric.iter().find(increases)) {

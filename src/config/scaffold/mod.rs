@@ -128,7 +128,7 @@ fn text(
             "the true functions, where they are known",
         )
         + &commented(
-            "fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1e-8}}",
+            "fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1.0e-8}}",
             "",
         )
 }
@@ -155,7 +155,7 @@ fn keys(
             "by name or by number from 1",
         ),
         ("    sample_rate", sample_rate.map(|r| r.to_string()), "Hz"),
-        ("    units", columns.units(), "converted to SI"),
+        ("    units", columns.units(), &columns.units_comment()),
         (
             "    window",
             record.begins.map(|begins| format!("{{min: {begins}}}")),
@@ -206,7 +206,7 @@ fn sensors(
     if columns.has(Role::Acceleration) {
         sensors.push((
             "acceleration: {offset: estimate}",
-            "accelerometers have one; leave it out if yours has none",
+            "accelerometers usually have an offset; remove the line if yours has none",
         ));
     }
     // A static force can cause the offset of a displacement.
@@ -238,11 +238,11 @@ fn functions(columns: &ColumnAssignment, record: &RecordSummary) -> String {
     text += &match driven {
         true => commented(
             &format!("  mass:      {{basis: constant, start: {}}}", short(mass)),
-            "kg; identifiable from the measured force",
+            "kg; identifiable, because the force is measured",
         ),
         false => commented(
             "  mass:      {fixed: 1.0}",
-            "kg; WRITE YOURS: without a force only k/m and c/m show",
+            "kg; ASSUMED, enter your own: without a measured force only k/m and c/m are identifiable",
         ),
     };
     let damping = 2.0 * DAMPING_RATIO * mass * omega;
@@ -251,17 +251,17 @@ fn functions(columns: &ColumnAssignment, record: &RecordSummary) -> String {
             "  damping:   {{basis: constant, start: {}}}",
             short(damping)
         ),
-        "N s/m; starts at 2 % of critical",
+        "N s/m; start value: 2 % of critical damping",
     );
     let stiffness = short(mass * omega * omega);
     text += &match record.periods() >= FEWEST_PERIODS {
         true => commented(
             &format!("  stiffness: {{basis: b-spline, knots: auto, start: {stiffness}}}"),
-            "N/m; may vary, as smoothly as the record requires; basis: constant if it does not",
+            "N/m; varies smoothly; for a constant write {basis: constant, start: …}",
         ),
         false => commented(
             &format!("  stiffness: {{basis: constant, start: {stiffness}}}"),
-            "N/m; the record is short for one that changes",
+            "N/m; the record is too short to show a variation",
         ),
     };
     text
@@ -275,10 +275,14 @@ fn commented(line: &str, comment: &str) -> String {
     }
 }
 
-/// Four significant digits.
+/// Four significant digits. A power of ten has a decimal point, without which YAML 1.1 reads a text.
 fn short(x: f64) -> String {
     let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
-    format!("{rounded:?}").trim_end_matches(".0").to_owned()
+    let text = format!("{rounded:?}");
+    match text.split_once('e') {
+        Some((digits, power)) if !digits.contains('.') => format!("{digits}.0e{power}"),
+        _ => text.trim_end_matches(".0").to_owned(),
+    }
 }
 
 /// A text quoted for YAML where necessary, also inside a list or map.

@@ -5,7 +5,7 @@ use super::columns::{ColumnAssignment, Role, UsedColumn};
 use crate::error::InputError;
 use crate::tables::{Table, increasing_at};
 use kmcfit_core::internals::diagnostics::{
-    offset_and_drift, outlier_indices, spread, without_line,
+    detrended, offset_and_drift, outlier_indices, standard_deviation,
 };
 use kmcfit_core::internals::signal::{Spectrum, onset};
 use kmcfit_core::internals::system::round_time;
@@ -76,13 +76,13 @@ impl RecordSummary {
         let spacing = median(&spacings);
         let force = channel(Role::Force).map(|c| in_si(table, c)).transpose()?;
         let drives = [Role::Force, Role::BaseAcceleration, Role::BaseDisplacement];
-        let drive = drives.into_iter().find_map(channel);
-        let drive = drive.map(|c| in_si(table, c)).transpose()?;
+        let input = drives.into_iter().find_map(channel);
+        let input = input.map(|c| in_si(table, c)).transpose()?;
         let missing = times.len() - pairs.len();
         let outliers = remove_outliers(&mut pairs);
         let values = values_of(&pairs);
         // The excitation can set in late as well.
-        let begins = match drive {
+        let begins = match input {
             Some(_) => None,
             None => onset(&values, spacing),
         };
@@ -92,7 +92,7 @@ impl RecordSummary {
         let beside_line = beside_line(pairs).and_then(|pairs| frequency(&pairs, spacing));
         let beside_line = beside_line.filter(|f| f * duration >= DRIFT_PERIODS);
         Ok(Self {
-            between: between(&drive.unwrap_or_default()),
+            between: between(&input.unwrap_or_default()),
             samples: pairs.len(),
             missing,
             channel: (column.role, column.unit.factor()),
@@ -106,9 +106,9 @@ impl RecordSummary {
             drifts: beside_line.is_some(),
             force: force.map(|mut force| {
                 force.retain(|x| x.is_finite());
-                spread(&force)
+                standard_deviation(&force)
             }),
-            response: spread(&values_of(pairs)),
+            response: standard_deviation(&values_of(pairs)),
             power,
         })
     }
@@ -174,21 +174,21 @@ fn beside_line(pairs: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
     if line <= DRIFT * (1.0 - mean) {
         return None;
     }
-    let left = without_line(&times, &values);
+    let left = detrended(&times, &values);
     Some(times.into_iter().zip(left).collect())
 }
 
 /// Interpolation that predicts every second sample of an excitation best from the others.
-fn between(drive: &[f64]) -> &'static str {
-    let steps: Vec<bool> = drive.windows(2).map(|pair| pair[0] != pair[1]).collect();
+fn between(input: &[f64]) -> &'static str {
+    let steps: Vec<bool> = input.windows(2).map(|pair| pair[0] != pair[1]).collect();
     let jumps = steps.iter().filter(|moves| **moves).count();
     let run = steps.windows(2).filter(|pair| pair[0] && pair[1]).count();
     // A hammer impact extends over several samples.
-    if jumps > 0 && run == 0 && (jumps as f64) < MOST_JUMPS * drive.len() as f64 {
+    if jumps > 0 && run == 0 && (jumps as f64) < MOST_JUMPS * input.len() as f64 {
         return "hold";
     }
     let (mut line, mut cubic) = (0.0, 0.0);
-    for x in drive.windows(7) {
+    for x in input.windows(7) {
         let near = 0.5 * (x[2] + x[4]);
         let far = 0.5 * (x[0] + x[6]);
         line += (x[3] - near).powi(2);
@@ -257,5 +257,5 @@ fn median(values: &[f64]) -> f64 {
 
 fn off_centre(pairs: &[(f64, f64)]) -> bool {
     let mean = pairs.iter().map(|(_, value)| value).sum::<f64>() / pairs.len() as f64;
-    mean.abs() > spread(&values_of(pairs))
+    mean.abs() > standard_deviation(&values_of(pairs))
 }

@@ -33,7 +33,7 @@ fn outcome(run: &Measures) -> String {
             false => "response not fitted; true system not known".into(),
         };
     };
-    let worst = errors.worst_ratio();
+    let worst = errors.largest_ratio_error();
     let percent = |share: f64| match share < 1e-4 {
         true => format!("{:.0e} %", 100.0 * share),
         false => format!("{:.2} %", 100.0 * share),
@@ -63,7 +63,7 @@ fn outcome(run: &Measures) -> String {
 
 /// Largest relative error of k/m and c/m; `None` if the true system is not known.
 fn ratio_error(run: &Measures) -> Option<f64> {
-    run.errors.as_ref().map(TruthErrors::worst_ratio)
+    run.errors.as_ref().map(TruthErrors::largest_ratio_error)
 }
 
 /// Sentences on the true system: the smallest misfit of a wrong parameter set, and the first run that recovers the system.

@@ -102,7 +102,7 @@ pub(super) fn verdict(response: &ResponseFit, errors: Option<&TruthErrors>) -> S
     if errors.within(RECOVERED) {
         let mut text = format!(
             "true system recovered: relative error of k/m and c/m at most {}",
-            size(errors.worst_ratio())
+            size(errors.largest_ratio_error())
         );
         if errors.mass_relative >= RECOVERED {
             let off = percent(errors.mass_relative);

@@ -10,6 +10,9 @@ use crate::number_format::significant;
 /// Most extremes that are listed because their search did not converge.
 const MOST_LISTED: usize = 6;
 
+/// Width of a range below which its ends are equal to machine precision, relative to the larger one.
+const NEGLIGIBLE: f64 = 1e-12;
+
 /// The study as text: a heading for each analysis and its sentences.
 pub fn text(study: &StudyDocument) -> String {
     let mut text = format!("{}\n", study.title);
@@ -33,12 +36,13 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
         (
             "Fit",
             lines(study.fit.as_slice(), |fit| {
-                format!(
-                    "{}: {}; J = {:.6e}",
-                    fit.status.name(),
-                    fit.reason,
-                    fit.cost
-                )
+                let penalty = fit.cost - fit.misfit;
+                let parts = match penalty > 1e-6 * fit.cost {
+                    true => format!(" (misfit {:.6e}, penalties {penalty:.2e})", fit.misfit),
+                    false => String::new(),
+                };
+                let (status, reason) = (fit.status.name(), &fit.reason);
+                format!("{status}: {reason}; J = {:.6e}{parts}", fit.cost)
             }),
         ),
         (
@@ -56,12 +60,15 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
         ("Data-consistent extremes", extremes(study)),
         (
             "Equivalent systems",
-            lines(&study.equivalent_systems, |e| {
-                format!(
-                    "{}: response equal to the fit's within {:.1e} of the largest displacement",
-                    e.name, e.response_error
-                )
-            }),
+            (study.equivalent_systems.iter())
+                .filter(|e| e.response_error > 0.0)
+                .map(|e| {
+                    format!(
+                        "{}: the response differs from that of the fit by at most {:.1e} of the largest displacement",
+                        e.name, e.response_error
+                    )
+                })
+                .collect(),
         ),
         (
             "Fits from random starting points",
@@ -125,7 +132,7 @@ fn extremes(study: &StudyDocument) -> Vec<String> {
     );
     if !study.extremes.is_empty() && !study.roughness_limited {
         lines.push(
-            "no penalty limits the roughness of these systems: without constraints the extremes are the bounds"
+            "no penalty limits the roughness of these systems: their extremes are those of the constraints, or of the search range"
                 .into(),
         );
     }
@@ -147,6 +154,14 @@ fn widest(e: &ExtremesRecord) -> String {
     let width = |i: &usize| e.high[*i] - e.low[*i];
     let widest = (0..e.times.len().min(e.low.len())).max_by(|a, b| width(a).total_cmp(&width(b)));
     let widest = widest.unwrap_or(0);
+    if width(&widest) <= NEGLIGIBLE * e.high[widest].abs().max(e.low[widest].abs()) {
+        return format!(
+            "{}: {} {} to machine precision: the fit reproduces the samples exactly",
+            e.name,
+            significant(e.high[widest], 6),
+            e.unit
+        );
+    }
     format!(
         "{}: {} to {} {} at {} s, where the range is widest (misfit limit {:.4e})",
         e.name,
@@ -173,11 +188,15 @@ fn interval(b: &BootstrapRecord) -> String {
 
 fn prediction(p: &PredictionRecord) -> String {
     match &p.furthest {
+        Some(furthest) if furthest.difference == 0.0 => format!(
+            "{}: the extreme systems have the response of the fit",
+            p.name
+        ),
         Some(furthest) => format!(
-            "{}: differs by up to {} m for the system with the {}",
+            "{}: the response of the system with the {} differs from the fit's by up to {} m",
             p.name,
-            significant(furthest.difference, 4),
-            furthest.name
+            furthest.name,
+            significant(furthest.difference, 4)
         ),
         None => format!("{}: no extreme systems to compare with", p.name),
     }

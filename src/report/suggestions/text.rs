@@ -63,22 +63,14 @@ impl fmt::Display for Suggestion {
             }
             Suggestion::Constant { function, p_value } => write!(
                 f,
-                "a constant {function} is not rejected (Wald test, p = {}): use `basis: constant`",
+                "a constant {function} is not rejected (Wald test, p = {}): use `basis: constant` without `knots` and `penalty`",
                 significant(*p_value, 1)
             ),
-            Suggestion::StudyUnidentifiable {
-                parameters,
-                rank_bound,
-                can_be_simpler,
-            } => {
-                write!(
-                    f,
-                    "at most {rank_bound} of {parameters} parameter combinations are identifiable: "
-                )?;
+            Suggestion::StudyUnidentifiable { can_be_simpler, .. } => {
                 if *can_be_simpler {
                     f.write_str("use fewer parameters (`knots`) or add a `penalty`; ")?;
                 }
-                f.write_str("`kmcfit study` lists the identifiable ones")
+                f.write_str("`kmcfit study` lists the identifiable parameter combinations")
             }
             Suggestion::Study => f.write_str(
                 "`kmcfit study` computes profiles, extremes and, with `study.candidates`, the most informative next experiment",

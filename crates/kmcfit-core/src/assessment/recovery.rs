@@ -63,7 +63,7 @@ impl TruthErrors {
     }
 
     /// Larger of the relative errors of `k/m` and `c/m`.
-    pub fn worst_ratio(&self) -> f64 {
+    pub fn largest_ratio_error(&self) -> f64 {
         self.k_over_m_relative.max(self.c_over_m_relative)
     }
 

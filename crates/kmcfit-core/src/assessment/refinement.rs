@@ -10,12 +10,13 @@
 //! has an F distribution. A nonlinear refit gives the same verdict at several times the cost. The test is of no use where residuals
 //! are far from noise, and for an estimate that a constraint holds; there it is left out.
 
-use crate::diagnostics::{rms, spread};
+use crate::diagnostics::{rms, standard_deviation};
 use crate::functions::{Basis, CoefficientFunction, Parameterization};
-use crate::identifiability::{Factorisation, has_active_rows, spans};
+use crate::identifiability::{Factorisation, has_active_rows};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::solvers::weighted_jacobian;
+use crate::spans::spans;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -82,7 +83,7 @@ impl BasisTest {
 fn applies(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> bool {
     let is_noise = problem.predicted(evaluation).all(|(channel, predicted)| {
         let residuals: Vec<f64> = channel.residuals(predicted).collect();
-        rms(&residuals) > EXACT * spread(channel.observed())
+        rms(&residuals) > EXACT * standard_deviation(channel.observed())
     });
     let is_likelihood = problem.channels().all(|c| c.weighting().is_sigma());
     problem.parameters() > 0 && is_likelihood && is_noise && !has_active_rows(problem, theta)

@@ -61,8 +61,12 @@ impl Builder {
         let key = &constraint.key;
         let grid = problem.system.grid;
         constraint.check()?;
-        if let Constraint::Bounds { min, max, .. } = &constraint.statement {
+        if let Constraint::Bounds { of, min, max } = &constraint.statement {
             uncrossed(key, min.as_ref(), max.as_ref(), &grid)?;
+            let lowest = min.as_ref().map(TimeHistory::least);
+            if *of == CoefficientKind::Mass && lowest.is_some_and(|least| least <= 0.0) {
+                notices.push(BuildNotice::MassMayVanish { key: key.clone() });
+            }
         }
         let statement = &constraint.statement;
         let rows = statement.build_for(&grid, &problem.functions, constraint.coefficient_set);

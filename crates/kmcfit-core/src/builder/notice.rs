@@ -33,6 +33,11 @@ pub enum BuildNotice {
         /// Note.
         remark: String,
     },
+    /// A lower limit of the mass at which the mass can be zero.
+    MassMayVanish {
+        /// Key.
+        key: String,
+    },
     /// The start was projected onto the constraints.
     StartMoved {
         /// Constraint with the largest violation.
@@ -59,6 +64,10 @@ impl fmt::Display for BuildNotice {
                 "{key} has no effect: this derivative of a {basis} function is zero"
             ),
             Self::Measurement { remark } => f.write_str(remark),
+            Self::MassMayVanish { key } => write!(
+                f,
+                "{key} allows a mass of zero, for which the equation of motion has no solution: use a limit above zero"
+            ),
             Self::StartMoved { constraint } => {
                 write!(
                     f,

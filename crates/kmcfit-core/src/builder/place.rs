@@ -75,7 +75,7 @@ impl Placement<'_> {
         experiment.initial_parameters = estimated;
         experiment.coefficient_set = self.coefficient_set;
         experiment.excitation = (input != Input::default()).then(|| input.on(self.grid, nodes));
-        experiment.drive = input;
+        experiment.input = input;
         let compared = match self.simulation {
             true => &[][..],
             false => &record.channels,
@@ -158,7 +158,7 @@ impl Placement<'_> {
             .with_loss(spec.loss)
             .with_noise_model(spec.noise)
             .with_sensor(sensor);
-        let input = &experiment.drive;
+        let input = &experiment.input;
         if spec.kind == ChannelKind::Acceleration && experiment.excitation.is_some() {
             let around = |t: &f64| InputSample {
                 force: input.force_at(*t),

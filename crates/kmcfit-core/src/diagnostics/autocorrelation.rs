@@ -5,11 +5,11 @@
 /// With more lags the Ljung–Box statistic has a heavier tail than chi-square: with a quarter of 200 samples it rejects white noise
 /// in 8.5 % of cases instead of 5 %; with this rule in 4 to 7 %, for 20 to 3000 samples (10,000 simulated sequences each).
 pub fn default_lags(count: usize) -> usize {
-    (count / READINGS_PER_LAG).min(MOST_LAGS)
+    (count / SAMPLES_PER_LAG).min(MOST_LAGS)
 }
 
 /// Samples per lag in [`default_lags`].
-const READINGS_PER_LAG: usize = 10;
+const SAMPLES_PER_LAG: usize = 10;
 /// Largest number of lags in [`default_lags`], for readable figures.
 const MOST_LAGS: usize = 50;
 
@@ -73,8 +73,8 @@ impl Autocorrelation {
         self.values.len().saturating_sub(1)
     }
 
-    /// True if a value is nonzero, so that correlations are defined.
-    pub fn varies(&self) -> bool {
+    /// True if a value of the sequence is nonzero, so that the correlations are defined.
+    pub fn is_defined(&self) -> bool {
         self.values.first().is_some_and(|r| *r > 0.0)
     }
 
@@ -190,8 +190,8 @@ mod tests {
 
     #[test]
     fn nothing_to_correlate() {
-        assert!(!autocorrelation(&[0.0; 9], 3).varies());
-        assert!(!autocorrelation(&[f64::NAN; 9], 3).varies());
+        assert!(!autocorrelation(&[0.0; 9], 3).is_defined());
+        assert!(!autocorrelation(&[f64::NAN; 9], 3).is_defined());
         let empty = autocorrelation(&[], 3);
         assert_eq!((empty.lags(), empty.count), (0, 0));
         // Every other value missing: no pair one apart.

@@ -19,8 +19,8 @@ pub(crate) use pattern::median_size;
 pub use pattern::{offset_and_drift, outlier_indices};
 pub use quantiles::{chi_square_one, normal_half_width, student_half_width};
 pub use record::{ResidualDiagnostics, ResidualRecord};
+pub use residuals::{detrended, standard_deviation};
 pub use residuals::{fit_percent, rms};
-pub use residuals::{spread, without_line};
 pub use whiteness::{
     FEWEST_SAMPLES, SIGNIFICANCE, UntestedReason, Whiteness, WhitenessResult, whiteness,
 };

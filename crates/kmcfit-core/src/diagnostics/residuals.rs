@@ -54,22 +54,22 @@ fn norm(values: impl Iterator<Item = f64> + Clone) -> f64 {
 }
 
 /// Standard deviation, 0 for no values.
-pub fn spread(values: &[f64]) -> f64 {
+pub fn standard_deviation(values: &[f64]) -> f64 {
     let n = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / n;
     (values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n).sqrt()
 }
 
 /// Values minus their straight line over the times.
-pub fn without_line(times: &[f64], values: &[f64]) -> Vec<f64> {
+pub fn detrended(times: &[f64], values: &[f64]) -> Vec<f64> {
     let n = values.len() as f64;
     let [middle, level] = [times, values].map(|x| x.iter().sum::<f64>() / n);
-    let (mut along, mut spread) = (0.0, 0.0);
+    let (mut along, mut squares) = (0.0, 0.0);
     for (t, y) in times.iter().zip(values) {
         along += (t - middle) * (y - level);
-        spread += (t - middle) * (t - middle);
+        squares += (t - middle) * (t - middle);
     }
-    let slope = along / spread;
+    let slope = along / squares;
     let pairs = times.iter().zip(values);
     pairs
         .map(|(t, y)| y - (level + slope * (t - middle)))
@@ -136,8 +136,8 @@ mod tests {
             .zip(wiggle)
             .map(|(t, w)| 3.0 + 0.5 * t + w)
             .collect();
-        assert_eq!(without_line(&times, &values), wiggle);
-        assert_eq!(spread(&wiggle), (14.0f64 / 5.0).sqrt());
-        assert_eq!(spread(&[]), 0.0);
+        assert_eq!(detrended(&times, &values), wiggle);
+        assert_eq!(standard_deviation(&wiggle), (14.0f64 / 5.0).sqrt());
+        assert_eq!(standard_deviation(&[]), 0.0);
     }
 }

@@ -74,7 +74,7 @@ pub fn whiteness(autocorrelation: &Autocorrelation, step: f64, fitted: usize) ->
     let share_outside = outside.count() as f64 / lags.len().max(1) as f64;
     let reason = if autocorrelation.count < FEWEST_SAMPLES {
         Some(UntestedReason::FewSamples)
-    } else if !autocorrelation.varies() {
+    } else if !autocorrelation.is_defined() {
         Some(UntestedReason::NoResiduals)
     } else {
         (lags.len() <= fitted).then_some(UntestedReason::FewLags)

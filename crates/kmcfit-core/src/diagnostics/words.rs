@@ -10,16 +10,18 @@ impl fmt::Display for Whiteness {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let p = Probability(self.p_value);
         let over = match self.verdict {
-            WhitenessResult::White => return write!(f, "the residuals look white ({p})"),
+            WhitenessResult::White => {
+                return write!(f, "no significant autocorrelation of the residuals ({p})");
+            }
             WhitenessResult::Untested(reason) => {
                 return write!(f, "the residuals were not tested: {reason}");
             }
-            WhitenessResult::CorrelatedOver(time) => format!("over {} s", short(time)),
-            WhitenessResult::CorrelatedAt(time) => format!("at a distance of {} s", short(time)),
+            WhitenessResult::CorrelatedOver(time) => format!("up to a lag of {} s", short(time)),
+            WhitenessResult::CorrelatedAt(time) => format!("at a lag of {} s", short(time)),
         };
         write!(
             f,
-            "the residuals are not white: correlated {over} ({p}): \
+            "the residuals are autocorrelated {over} ({p}): \
              the model is incomplete or the noise is coloured"
         )
     }
@@ -84,12 +86,15 @@ mod tests {
             share_outside: 0.0,
             verdict: WhitenessResult::White,
         };
-        assert_eq!(white.to_string(), "the residuals look white (p = 0.43)");
+        assert_eq!(
+            white.to_string(),
+            "no significant autocorrelation of the residuals (p = 0.43)"
+        );
         let sine: Vec<f64> = (0..600).map(|i| (f64::from(i) * 0.4).sin()).collect();
         // Its autocorrelation is a cosine: cos 1.2 = 0.36 is outside the band of 0.08, cos 1.6 inside.
         assert_eq!(
             test(&sine).to_string(),
-            "the residuals are not white: correlated over 0.3 s (p < 1e-6): \
+            "the residuals are autocorrelated up to a lag of 0.3 s (p < 1e-6): \
              the model is incomplete or the noise is coloured"
         );
         let at = Whiteness {
@@ -99,7 +104,7 @@ mod tests {
         };
         assert_eq!(
             at.to_string(),
-            "the residuals are not white: correlated at a distance of 1.5 s (p = 0.012): \
+            "the residuals are autocorrelated at a lag of 1.5 s (p = 0.012): \
              the model is incomplete or the noise is coloured"
         );
     }

@@ -2,10 +2,10 @@
 
 use super::band::Band;
 use super::bands::Bands;
-use super::spans::{span_words, spans};
 use crate::diagnostics::median_size;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::spans::{span_words, spans};
 use crate::system::Term;
 use serde::{Deserialize, Serialize};
 
@@ -130,15 +130,15 @@ impl FunctionClassification {
 impl Condition {
     fn sentence(self, name: &str, relative: f64) -> String {
         let half = format!(
-            "95 % CI half-width at most {:.2} % of its size",
-            100.0 * relative
+            "95 % CI half-width at most {} of its size",
+            percent(relative)
         );
         match self {
             Self::Smoothness => format!(
-                "{name} is known for the chosen smoothness alone: {half}, without the smoothing bias"
+                "{name} is identified conditionally on the smoothness: {half}; the interval excludes the smoothing bias"
             ),
             Self::Basis => format!(
-                "{name} is known for the chosen basis alone: {half}, but a finer basis fits significantly better"
+                "{name} is identified conditionally on the basis: {half}; a finer basis fits significantly better"
             ),
         }
     }
@@ -205,10 +205,17 @@ fn identified(name: &str, band: &Band, size: f64) -> String {
         () if is_negligible(share, 1.0) => {
             return format!("{name} is identified to machine precision");
         }
-        () if share < 1e-4 => format!("{:.0e} %", 100.0 * share),
-        () => format!("{:.2} %", 100.0 * share),
+        () => percent(share),
     };
     format!("{name} is identified: 95 % CI half-width at most {share} of its largest value")
+}
+
+/// A share in per cent with two decimals; a small one in powers of ten.
+fn percent(share: f64) -> String {
+    match share < 1e-4 {
+        true => format!("{:.0e} %", 100.0 * share),
+        false => format!("{:.2} %", 100.0 * share),
+    }
 }
 
 /// True where the half-width of the band at node `i` is small enough for a function of this size.

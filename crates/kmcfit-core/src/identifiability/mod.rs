@@ -22,7 +22,6 @@ mod factorisation;
 mod ratios;
 mod scaling_ambiguity;
 mod sensitivity;
-mod spans;
 mod structural_rank;
 pub use classification::is_negligible;
 
@@ -57,6 +56,4 @@ pub use experiments::{
 pub(crate) use factorisation::Factorisation;
 pub use scaling_ambiguity::ScalingAmbiguity;
 pub use sensitivity::{ResolvedDirection, Sensitivity, SingularSpectrum};
-pub use spans::span_words;
-pub(crate) use spans::spans;
 pub use structural_rank::{RankFinding, RankFindingKind, ScaleFreedom, structural_rank};

@@ -33,15 +33,16 @@ impl Problem {
         let squares: Vec<Vec<f64>> = (evaluation.trajectories.iter())
             .map(|response| squares(response, terms, step))
             .collect();
-        let any_read = self.experiments.iter().any(Experiment::is_read);
+        let any_has_samples = self.experiments.iter().any(Experiment::has_samples);
         let mut sizes = vec![0.0f64; self.functions.ranges().len()];
         for (which, assembly) in self.functions.coefficient_sets().iter().enumerate() {
             let nodal = evaluation.nodal_of(which);
             // Index 0: sum of squares of the acceleration; index `j + 1`: of `phi` of term `j`, then of `phi` of each term.
             let root = |what: usize| -> f64 {
                 let own = self.experiments.iter().zip(&squares);
-                let own =
-                    own.filter(|(e, _)| e.coefficient_set == which && (e.is_read() || !any_read));
+                let own = own.filter(|(e, _)| {
+                    e.coefficient_set == which && (e.has_samples() || !any_has_samples)
+                });
                 own.map(|(_, squares)| squares[what]).sum::<f64>().sqrt()
             };
             let mass = size_of(&nodal.mass);
@@ -198,7 +199,7 @@ mod tests {
 
     /// One period of `y = size cos(w t)` with m = 1 and k = w^2 and a negligible cubic stiffness, and a second response of
     /// three times the size, with or without samples.
-    fn swinging(size: f64, other_is_read: bool) -> Problem {
+    fn swinging(size: f64, other_has_samples: bool) -> Problem {
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
         let record = |name: &str, size: f64| {
             let samples: Vec<f64> = times
@@ -217,7 +218,7 @@ mod tests {
             .record(record("large", 3.0 * size))
             .build()
             .unwrap();
-        if !other_is_read {
+        if !other_has_samples {
             problem.parts_mut().experiments[1].channels.clear();
         }
         problem

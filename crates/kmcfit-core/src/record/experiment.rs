@@ -15,7 +15,7 @@ pub struct Experiment {
     /// Excitation on the grid; `None` for a free response.
     pub excitation: Option<Excitation>,
     /// Input from which the excitation was sampled; empty where the excitation was given on the grid.
-    pub drive: Input,
+    pub input: Input,
     /// Number of nodes of the response; a record may be shorter than the grid.
     pub nodes: usize,
     /// Index of the coefficient set in
@@ -33,7 +33,7 @@ impl Experiment {
             initial,
             initial_parameters: [None; 2],
             excitation: None,
-            drive: Input::default(),
+            input: Input::default(),
             nodes,
             coefficient_set: 0,
             channels: Vec::new(),
@@ -72,8 +72,8 @@ impl Experiment {
         let excitation = self
             .excitation
             .as_ref()
-            .map(|old| match self.drive == Input::default() {
-                false => self.drive.on(grid, nodes),
+            .map(|old| match self.input == Input::default() {
+                false => self.input.on(grid, nodes),
                 true => old.halved(),
             });
         Some(Self {
@@ -90,7 +90,7 @@ impl Experiment {
     }
 
     /// True with samples.
-    pub fn is_read(&self) -> bool {
+    pub fn has_samples(&self) -> bool {
         !self.channels.is_empty()
     }
 

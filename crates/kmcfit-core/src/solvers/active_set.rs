@@ -4,6 +4,7 @@ use crate::constraints::{Cone, ConeGroup, RowGroup};
 use crate::problem::Problem;
 use crate::qp::{StageLayout, Subproblem};
 use crate::solvers::iterate::Iterate;
+use crate::spans::span_words;
 
 /// Largest distance from the bound of an active row, relative to its scale; larger than the accuracy with which a quadratic
 /// program satisfies an active row.
@@ -24,8 +25,10 @@ pub struct ActiveGroup {
     pub rows: usize,
     /// Spans of time on which rows are active, s.
     pub spans: Vec<[f64; 2]>,
+    /// True for equalities alone.
+    pub is_equality: bool,
     /// Spans on which relaxing the bound lowers J significantly, s.
-    pub pushed: Vec<[f64; 2]>,
+    pub binding: Vec<[f64; 2]>,
     /// Sum of the absolute multipliers of the rows: decrease of J per unit by which all bounds are relaxed.
     pub multiplier: f64,
 }
@@ -33,34 +36,19 @@ pub struct ActiveGroup {
 impl ActiveGroup {
     /// The active rows as a sentence.
     pub fn sentence(&self) -> String {
-        let list = |spans: &[[f64; 2]]| -> String {
-            let words: Vec<String> = spans.iter().take(MOST_SPANS).map(span).collect();
-            let more = spans.len().saturating_sub(MOST_SPANS);
-            match more {
-                0 => words.join(", "),
-                1 => format!("{} and 1 more span", words.join(", ")),
-                _ => format!("{} and {more} more spans", words.join(", ")),
-            }
-        };
-        match self.pushed.as_slice() {
-            [] => format!(
-                "`{}` is active without a significant multiplier on {}",
-                self.name,
-                list(&self.spans)
+        let name = &self.name;
+        match (self.is_equality, self.binding.as_slice()) {
+            (true, []) => format!("`{name}` has no significant effect on the fit"),
+            (true, binding) => format!("`{name}` limits the fit at {}", span_words(binding)),
+            (false, []) => format!(
+                "`{name}` is active on {}, without a significant effect on the fit",
+                span_words(&self.spans)
             ),
-            pushed => format!("the data push against `{}` on {}", self.name, list(pushed)),
+            (false, binding) => format!(
+                "`{name}` is active and limits the fit on {}",
+                span_words(binding)
+            ),
         }
-    }
-}
-
-/// Largest number of spans in a sentence.
-const MOST_SPANS: usize = 4;
-
-fn span(&[from, to]: &[f64; 2]) -> String {
-    if from == to {
-        format!("t = {from:.3}")
-    } else {
-        format!("[{from:.3}, {to:.3}]")
     }
 }
 
@@ -86,27 +74,31 @@ pub fn active_constraints(problem: &Problem, point: &Iterate) -> Vec<ActiveGroup
     let groups = constraints.groups.iter().zip(near).enumerate();
     let rows = groups.map(|(g, (group, rows))| {
         let multiplier = |i: usize| multipliers.as_ref().map_or(0.0, |m| m.rows[g][i].abs());
-        let pushed = |&i: &usize| counts(group.scale(i, &point.parameters), multiplier(i));
-        let pushed: Vec<usize> = rows.iter().copied().filter(pushed).collect();
+        let is_binding = |&i: &usize| counts(group.scale(i, &point.parameters), multiplier(i));
+        let binding: Vec<usize> = rows.iter().copied().filter(is_binding).collect();
         ActiveGroup {
             name: group.name.clone(),
+            is_equality: rows
+                .iter()
+                .all(|&i| group.upper[i] == group.rows.right()[i]),
             rows: rows.len(),
-            spans: spans(&group.times, &rows),
-            pushed: spans(&group.times, &pushed),
+            spans: joined_spans(&group.times, &rows),
+            binding: joined_spans(&group.times, &binding),
             multiplier: rows.iter().map(|&i| multiplier(i)).sum(),
         }
     });
     let groups = constraints.cones.iter().zip(near_cones).enumerate();
     let cones = groups.map(|(g, (group, cones))| {
         let multiplier = |i: usize| multipliers.as_ref().map_or(0.0, |m| m.cones[g][i].abs());
-        let pushed = |&i: &usize| counts(bound(&group.cones[i], point), multiplier(i));
-        let pushed: Vec<usize> = cones.iter().copied().filter(pushed).collect();
+        let is_binding = |&i: &usize| counts(bound(&group.cones[i], point), multiplier(i));
+        let binding: Vec<usize> = cones.iter().copied().filter(is_binding).collect();
         let times: Vec<[f64; 2]> = group.times.iter().map(|t| [*t, *t]).collect();
         ActiveGroup {
             name: group.name.clone(),
+            is_equality: false,
             rows: cones.len(),
-            spans: spans(&times, &cones),
-            pushed: spans(&times, &pushed),
+            spans: joined_spans(&times, &cones),
+            binding: joined_spans(&times, &binding),
             multiplier: cones.iter().map(|&i| multiplier(i)).sum(),
         }
     });
@@ -132,7 +124,7 @@ fn near_rows(group: &RowGroup, point: &Iterate) -> Vec<usize> {
 }
 
 /// Joins the time spans of consecutive rows.
-fn spans(times: &[[f64; 2]], rows: &[usize]) -> Vec<[f64; 2]> {
+fn joined_spans(times: &[[f64; 2]], rows: &[usize]) -> Vec<[f64; 2]> {
     let mut joined: Vec<[f64; 2]> = Vec::new();
     let mut last = None;
     for &i in rows {

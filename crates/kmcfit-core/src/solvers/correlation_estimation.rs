@@ -2,7 +2,7 @@
 
 use super::fit::Fit;
 use super::settings::{FitSettings, Solver};
-use crate::diagnostics::spread;
+use crate::diagnostics::standard_deviation;
 use crate::noise::{
     Autoregression, Correlation, CorrelationLaw, HIGHEST_ORDER, burg, select_exponential,
     select_order, uninterrupted_runs,
@@ -105,7 +105,7 @@ fn autoregressive(process: Autoregression, times: &[f64]) -> Option<Correlation>
 /// True if the residuals of a channel are larger than rounding errors, small beside the variation of the samples, and consistent
 /// with a stated sigma; `normalised` are the residuals over sigma.
 fn are_noise(channel: &Channel, residuals: &[f64], normalised: &[f64]) -> bool {
-    let share = rms(residuals) / spread(channel.observed());
+    let share = rms(residuals) / standard_deviation(channel.observed());
     let is_estimated = matches!(channel.weighting(), Weighting::Estimated { .. });
     (NOISE[0]..NOISE[1]).contains(&share) && (is_estimated || rms(normalised) <= BEYOND_SIGMA)
 }

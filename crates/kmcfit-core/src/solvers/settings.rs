@@ -83,8 +83,8 @@ impl StartStrategy {
             Self::Truncated { .. } => "beginning of the record",
             Self::StartValues => "start values",
             Self::EquationError => "equation error",
-            Self::GrowingHorizon => "growing horizon",
-            Self::Collocation => "motion of the samples",
+            Self::GrowingHorizon => "growing part of the record",
+            Self::Collocation => "collocation",
             Self::Continued => "best of these, continued",
         }
     }

@@ -311,8 +311,8 @@ fn remark(
 ) -> Option<String> {
     match (rule, index) {
         (WeightRule::Discrepancy, Some(0)) => Some(
-                "every weight on the path explains the samples, so the largest is chosen: the data require no \
-                 roughness"
+                "even the largest weight on the path leaves residuals of the size of the noise, and is chosen: the data \
+                 require no roughness"
                 .into(),
         ),
         (WeightRule::Discrepancy, None) => {

@@ -136,7 +136,7 @@ fn table(
         file.error_at(experiment, "this experiment has no data")
             .expected("`data`, a CSV file with the samples")
     })?;
-    Table::read_with(file.resolve(&data.0), &format(spec))
+    Table::read_with_overrides(file.resolve(&data.0), &format(spec))
         .map_err(|error| about_format(file, experiment, error))
         .map_err(asked_for(file, &key))
 }

@@ -6,7 +6,7 @@ use crate::config::ModelFile;
 use crate::config::spec::{ExperimentSpec, InitialSpec};
 use crate::config::values::{NumberOrEstimate, ScalarOr};
 use crate::finding::Finding;
-use kmcfit_core::internals::diagnostics::{outlier_indices, spread, without_line};
+use kmcfit_core::internals::diagnostics::{detrended, outlier_indices, standard_deviation};
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::signal::{Interpolation, Signal, Spectrum, clipped, onset};
 use kmcfit_core::internals::system::round_time;
@@ -27,7 +27,7 @@ const SUSPICIOUS: [(f64, &str); 8] = [
 /// the response has more than one frequency.
 const NEAR: f64 = 1.5;
 /// Two channels have opposite signs if their correlation is below minus this.
-const AGAINST: f64 = 0.7;
+const OPPOSITE: f64 = 0.7;
 /// Fewest periods of the response, and fewest samples per period, for a comparison of signs: a monotone decay has an
 /// acceleration of the sign of its displacement, and differences of coarse samples have any sign.
 const FEWEST_PERIODS: f64 = 3.0;
@@ -35,13 +35,13 @@ const FEWEST_IN_A_PERIOD: f64 = 4.0;
 
 /// Warnings about the record of experiment `i`.
 pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord) -> Vec<Finding> {
-    let mut warnings = sizes(spec, record);
-    warnings.extend(signs(spec, record));
-    warnings.extend(record.channels.iter().filter_map(range));
+    let mut warnings = unit_factors(spec, record);
+    warnings.extend(opposite_signs(spec, record));
+    warnings.extend(record.channels.iter().filter_map(saturation));
     warnings.extend(record.channels.iter().filter_map(|c| outliers(spec, c)));
     // The equation error simulates no response from an initial state.
     if !is_equation_error(file) {
-        warnings.extend(stillness(spec, record));
+        warnings.extend(rest_before_motion(spec, record));
     }
     let name = file.experiment_name(i);
     let place = format!("experiments[{i}] ({name})");
@@ -49,7 +49,7 @@ pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord)
 }
 
 /// Channels of one response, or a sample and the given state, that disagree by a [`SUSPICIOUS`] factor.
-fn sizes(spec: &ExperimentSpec, record: &RawRecord) -> Vec<DataWarning> {
+fn unit_factors(spec: &ExperimentSpec, record: &RawRecord) -> Vec<DataWarning> {
     let mut found = Vec::new();
     let mut add = |ratio: f64, quantity: String| {
         let near = |f: f64| ratio / f < NEAR && f / ratio < NEAR;
@@ -83,7 +83,8 @@ fn sizes(spec: &ExperimentSpec, record: &RawRecord) -> Vec<DataWarning> {
         };
         let omega = TAU * spectrum.dominant();
         let orders = pair[1] as i32 - pair[0] as i32;
-        let ratio = spread(&high.values) / (omega.powi(orders) * spread(&low.values));
+        let ratio = standard_deviation(&high.values)
+            / (omega.powi(orders) * standard_deviation(&low.values));
         if ratio.is_finite() && ratio > 0.0 {
             let [low, high] = pair.map(ChannelKind::name);
             add(ratio, format!("the {high} relative to the {low}"));
@@ -93,17 +94,17 @@ fn sizes(spec: &ExperimentSpec, record: &RawRecord) -> Vec<DataWarning> {
 }
 
 /// Pairs of channels of one response with opposite signs.
-fn signs(spec: &ExperimentSpec, record: &RawRecord) -> Vec<DataWarning> {
+fn opposite_signs(spec: &ExperimentSpec, record: &RawRecord) -> Vec<DataWarning> {
     let channels = &record.channels;
     let pairs = (channels.iter().enumerate())
         .flat_map(|(place, high)| channels[..place].iter().map(move |low| (low, high)));
-    let against = pairs.filter(|(low, high)| {
-        let turned = turn(spec, low.kind).zip(turn(spec, high.kind));
-        turned.is_some_and(|(one, other)| {
-            one * other * together(low, high).unwrap_or_default() < -AGAINST
+    let opposite = pairs.filter(|(low, high)| {
+        let gains = gain_sign(spec, low.kind).zip(gain_sign(spec, high.kind));
+        gains.is_some_and(|(one, other)| {
+            one * other * correlation_with_estimate(low, high).unwrap_or_default() < -OPPOSITE
         })
     });
-    let warnings = against.map(|(low, high)| DataWarning::OppositeSign {
+    let warnings = opposite.map(|(low, high)| DataWarning::OppositeSign {
         high: high.kind.name(),
         low: low.kind.name(),
     });
@@ -111,7 +112,7 @@ fn signs(spec: &ExperimentSpec, record: &RawRecord) -> Vec<DataWarning> {
 }
 
 /// Sign of a sensor's gain; `None` if the gain is estimated.
-fn turn(spec: &ExperimentSpec, kind: ChannelKind) -> Option<f64> {
+fn gain_sign(spec: &ExperimentSpec, kind: ChannelKind) -> Option<f64> {
     let sensors = spec.sensors.as_ref();
     let sensor = sensors.and_then(|sensors| match kind {
         ChannelKind::Displacement => sensors.displacement.as_ref(),
@@ -127,7 +128,7 @@ fn turn(spec: &ExperimentSpec, kind: ChannelKind) -> Option<f64> {
 
 /// Correlation of the samples of `high` with their estimate from `low`: its slope, or for an acceleration and a
 /// displacement the negative displacement, as for a harmonic response. `None` for too few periods or samples.
-fn together(low: &RawChannel, high: &RawChannel) -> Option<f64> {
+fn correlation_with_estimate(low: &RawChannel, high: &RawChannel) -> Option<f64> {
     let frequency = Spectrum::of(&high.values, high.median_spacing)?.dominant();
     let duration = high.times[high.times.len() - 1] - high.times[0];
     if frequency * duration < FEWEST_PERIODS
@@ -142,25 +143,25 @@ fn together(low: &RawChannel, high: &RawChannel) -> Option<f64> {
     )?;
     let around = low.times.windows(3).zip(low.values.windows(3));
     let inside = around.filter(|(t, _)| values.covers(t[1], t[1]));
-    let (mut times, mut said, mut read) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut times, mut estimated, mut measured) = (Vec::new(), Vec::new(), Vec::new());
     for (t, y) in inside {
         times.push(t[1]);
-        read.push(values.value(t[1]));
-        said.push(match high.kind as i32 - low.kind as i32 {
+        measured.push(values.value(t[1]));
+        estimated.push(match high.kind as i32 - low.kind as i32 {
             1 => (y[2] - y[0]) / (t[2] - t[0]),
             _ => -y[1],
         });
     }
     // Sensors drift.
-    let [said, read] = [said, read].map(|values| without_line(&times, &values));
+    let [estimated, measured] = [estimated, measured].map(|values| detrended(&times, &values));
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let correlation =
-        product(&said, &read) / (product(&said, &said) * product(&read, &read)).sqrt();
+    let correlation = product(&estimated, &measured)
+        / (product(&estimated, &estimated) * product(&measured, &measured)).sqrt();
     correlation.is_finite().then_some(correlation)
 }
 
 /// A free record that begins at rest, before the release or the impact.
-fn stillness(spec: &ExperimentSpec, record: &RawRecord) -> Option<DataWarning> {
+fn rest_before_motion(spec: &ExperimentSpec, record: &RawRecord) -> Option<DataWarning> {
     if !record.excitation.is_empty() || spec.force.is_some() || spec.base.is_some() {
         return None;
     }
@@ -201,7 +202,7 @@ fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<DataWarning> 
 }
 
 /// Many samples at one extreme value: saturation of the sensor.
-fn range(channel: &RawChannel) -> Option<DataWarning> {
+fn saturation(channel: &RawChannel) -> Option<DataWarning> {
     let (samples, level) = clipped(&channel.values)?;
     Some(DataWarning::Saturation {
         channel: channel.kind.name(),

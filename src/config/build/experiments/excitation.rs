@@ -13,27 +13,27 @@ use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, Swe
 /// Excitation of an experiment, as samples or shapes.
 #[derive(Default)]
 pub struct RawExcitation {
-    drive: Input,
+    input: Input,
 }
 
 impl RawExcitation {
     /// True for a free response.
     pub fn is_empty(&self) -> bool {
-        self.drive.force.is_none() && self.drive.base.is_none()
+        self.input.force.is_none() && self.input.base.is_none()
     }
 
     /// Force and motion of the base.
     pub fn into_input(self) -> Input {
-        self.drive
+        self.input
     }
 
     /// Sampling interval of equally spaced samples, s.
     pub fn spacing(&self) -> Option<f64> {
-        let force = match &self.drive.force {
+        let force = match &self.input.force {
             Some(Waveform::Samples(signal)) => Some(signal),
             _ => None,
         };
-        let base = match &self.drive.base {
+        let base = match &self.input.base {
             Some(BaseMotion::Acceleration(signal) | BaseMotion::Displacement(signal)) => {
                 Some(signal)
             }
@@ -85,8 +85,8 @@ pub fn read(
         }
     };
     let base = base(file, i, spec, warnings)?;
-    let drive = Input { force, base };
-    Ok(RawExcitation { drive })
+    let input = Input { force, base };
+    Ok(RawExcitation { input })
 }
 
 fn base(

@@ -1,10 +1,10 @@
 //! Common scale of a group of functions: intervals on which it is free, and the constraints and penalties that determine it.
 
 use super::super::components::{Component, given_words};
-use super::super::spans::{span_words, spans};
 use super::{RankFinding, RankFindingKind, ScaleFreedom};
 use crate::functions::{Basis, CoefficientFunction};
 use crate::problem::Problem;
+use crate::spans::{span_words, spans};
 
 /// Number of knots from which a basis follows a slowly varying `s(t)` closely.
 const MANY_KNOTS: usize = 5;
@@ -86,7 +86,7 @@ impl CommonScale {
             let sentence = match (self.free_functions, given.as_slice()) {
                 (0, _) => format!("the scale of {symbols} is fixed: none of them is estimated"),
                 (_, []) => format!("a measured force determines the scale of {symbols}"),
-                (_, given) => format!("the scale of {symbols} is that of {}", given_words(given)),
+                (_, given) => format!("the scale of {symbols} follows from {}", given_words(given)),
             };
             let kind = RankFindingKind::ScaleIdentified;
             return (ScaleFreedom::None, RankFinding { kind, sentence });
@@ -229,12 +229,12 @@ fn scale_sentence(
 ) -> String {
     match left {
         ScaleFreedom::None => format!(
-            "{where_free}: the records do not determine the scale of {symbols}; {} it",
+            "{where_free}: the scale of {symbols} follows from {} alone",
             match (reference, held, smooth) {
-                (true, ..) => "a reference determines",
-                (_, true, true) => "a constraint on a value or mean and a penalty determine",
-                (_, true, false) => "a constraint on a value or mean determines",
-                _ => "a penalty and the force at other times determine",
+                (true, ..) => "a reference",
+                (_, true, true) => "a penalty and a constraint on a value or mean",
+                (_, true, false) => "a constraint on a value or mean",
+                _ => "a penalty and the force at other times",
             }
         ),
         ScaleFreedom::ConstantFactor => format!(

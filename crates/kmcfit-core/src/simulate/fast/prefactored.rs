@@ -80,7 +80,7 @@ const STAGES: usize = 4;
 #[repr(align(64))]
 struct Rates {
     kinds: [Row; MOST_TERMS],
-    drive: Row,
+    input: Row,
 }
 
 /// Contributions of the acceleration of a stage.
@@ -95,7 +95,7 @@ struct StageRates {
 const NOTHING: StageRates = {
     let rates = Rates {
         kinds: [[0.0; LANES]; MOST_TERMS],
-        drive: [0.0; LANES],
+        input: [0.0; LANES],
     };
     StageRates {
         next: rates,
@@ -254,10 +254,10 @@ fn prepare_drive<A: Arithmetic, const S: usize>(
     for (s, stage) in stages.iter_mut().enumerate().take(S) {
         let q = tableau.position[s] as usize;
         let push = force[q] * per_mass[q];
-        let drive = push - base[q];
+        let input = push - base[q];
         let [next, end] = factors(tableau, equation.dt, s);
-        stage.next.drive = (drive * Eight::splat(arithmetic, next)).row();
-        stage.end.drive = (drive * Eight::splat(arithmetic, end)).row();
+        stage.next.input = (input * Eight::splat(arithmetic, next)).row();
+        stage.end.input = (input * Eight::splat(arithmetic, end)).row();
     }
 }
 
@@ -297,15 +297,15 @@ fn step<const S: usize>(
             y_end += end * v_s;
             let rates = &stage.end;
             v_end =
-                phi.damped(rates, there, l, v_end) + phi.pushed(rates, there, l, rates.drive[l]);
+                phi.damped(rates, there, l, v_end) + phi.pushed(rates, there, l, rates.input[l]);
         }
         if s + 1 < S {
             y_s = *y + next * v_s;
             let rates = &stage.next;
-            let drive = rates.drive[l];
+            let input = rates.input[l];
             let pushed = match s {
-                0 => *v + phi.pushed(rates, there, l, drive),
-                _ => phi.pushed(rates, there, l, *v + drive),
+                0 => *v + phi.pushed(rates, there, l, input),
+                _ => phi.pushed(rates, there, l, *v + input),
             };
             v_s = phi.damped(rates, there, l, pushed);
         }
@@ -382,8 +382,8 @@ mod tests {
             method: Method::Rk4,
             terms: vec![Term::Damping, Term::Stiffness, Term::CubicStiffness],
         };
-        let drive: Vec<f64> = (0..41).map(|i| (0.3 * f64::from(i)).sin()).collect();
-        let excitation = Excitation::force_at_nodes(&drive);
+        let input: Vec<f64> = (0..41).map(|i| (0.3 * f64::from(i)).sin()).collect();
+        let excitation = Excitation::force_at_nodes(&input);
         let initial = State {
             displacement: 0.4,
             velocity: -0.2,
@@ -404,11 +404,11 @@ mod tests {
                 coefficients: vec![values(1, 0.3), values(2, 5.0), values(3, 2.0)],
             };
             let zeros = || Trajectory::zeros(41);
-            let (mut fast, mut plain, drive) = (zeros(), zeros(), Some(&excitation));
+            let (mut fast, mut plain, input) = (zeros(), zeros(), Some(&excitation));
             Engine::Prefactored
-                .forward_into(&system, &nodal, initial, drive, &mut fast)
+                .forward_into(&system, &nodal, initial, input, &mut fast)
                 .expect("a motion");
-            reference::forward_into(&system, &nodal, initial, drive, &mut plain).expect("a motion");
+            reference::forward_into(&system, &nodal, initial, input, &mut plain).expect("a motion");
             let pairs = (fast.displacement.iter().zip(&plain.displacement))
                 .chain(fast.velocity.iter().zip(&plain.velocity));
             for (fast, plain) in pairs {

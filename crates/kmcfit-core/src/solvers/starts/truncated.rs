@@ -113,7 +113,7 @@ fn first_steps_of(experiment: &Experiment, steps: usize) -> Experiment {
         initial: experiment.initial,
         initial_parameters: experiment.initial_parameters,
         excitation,
-        drive: Input::default(),
+        input: Input::default(),
         nodes: experiment.nodes.min(steps + 1),
         coefficient_set: experiment.coefficient_set,
         channels: channels.filter_map(|c| c.within(steps)).collect(),

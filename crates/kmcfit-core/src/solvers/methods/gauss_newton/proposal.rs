@@ -101,9 +101,9 @@ pub(super) fn propose(
         let solution = work.program(|| sub.solve_within(iterations));
         return of_program(work, sub, point, &solution, 0.0);
     }
-    // Where noise pushes against bounds they mostly stay active, and the stages take no longer than one plain step.
-    let is_pushed = cost > NOISE * work.problem().zero_response_misfit();
-    if is_pushed
+    // Bounds that noisy data make active mostly stay active, and the stages take no longer than one plain step.
+    let is_noisy = cost > NOISE * work.problem().zero_response_misfit();
+    if is_noisy
         && sub.layout.is_some()
         && sub.is_active_at_zero(ACTIVE)
         && let Some((solution, excess)) = work.program(|| sub.step_on_stages(iterations))

@@ -1,7 +1,7 @@
 //! Intervals of time and their text.
 
 /// Intervals of time, s, over consecutive nodes for which `holds` is true.
-pub(crate) fn spans(times: &[f64], holds: impl Fn(usize) -> bool) -> Vec<[f64; 2]> {
+pub fn spans(times: &[f64], holds: impl Fn(usize) -> bool) -> Vec<[f64; 2]> {
     let mut spans: Vec<[f64; 2]> = Vec::new();
     let mut open = false;
     for (i, &t) in times.iter().enumerate() {
@@ -31,8 +31,8 @@ pub fn span_words(spans: &[[f64; 2]]) -> String {
     let words: Vec<String> = spans.iter().take(MOST_SPANS).map(word).collect();
     match spans.len().saturating_sub(MOST_SPANS) {
         0 => words.join(", "),
-        1 => format!("{} and 1 more span", words.join(", ")),
-        more => format!("{} and {more} more spans", words.join(", ")),
+        1 => format!("{} and 1 further interval", words.join(", ")),
+        more => format!("{} and {more} further intervals", words.join(", ")),
     }
 }
 
