@@ -293,15 +293,24 @@ fn the_continuous_gradient_converges_to_the_discrete_one() {
     }
 }
 
-/// A system with initial mass other than 1, nonzero damping, and not at rest.
-fn initial_gradients(nodes: usize) -> [State; 2] {
-    let system = common::system(nodes, Method::Midpoint);
+/// Gradients with respect to the initial state, continuous and discrete, of a system with initial mass other than 1, nonzero
+/// damping, and not at rest; with cubic stiffness and quadratic damping if asked for.
+fn initial_gradients(nodes: usize, is_nonlinear: bool) -> [State; 2] {
+    let mut system = common::system(nodes, Method::Midpoint);
     let times = system.grid.times();
     let of = |f: fn(f64) -> f64| -> Vec<f64> { times.iter().map(|t| f(*t)).collect() };
-    let nodal = NodalCoefficients {
+    let mut nodal = NodalCoefficients {
         mass: of(|t| 2.5 + 0.4 * (0.5 * t).sin()),
         coefficients: vec![of(|t| 0.3 + 0.01 * t), of(|t| 1.5 - 0.2 * (0.3 * t).cos())],
     };
+    if is_nonlinear {
+        system.terms.push(Term::CubicStiffness);
+        system.terms.push(Term::QuadraticDamping);
+        nodal
+            .coefficients
+            .push(of(|t| 0.2 + 0.05 * (0.4 * t).sin()));
+        nodal.coefficients.push(of(|t| 0.02 + 0.001 * t));
+    }
     let response = system.forward(&nodal, common::INITIAL, None).unwrap();
     let observed = of(|t| (0.7 * t).cos());
     let weights = trapezoid_weights(nodes, system.grid.step());
@@ -319,10 +328,9 @@ fn initial_gradients(nodes: usize) -> [State; 2] {
 }
 
 /// Of order 2, as the stepper.
-#[test]
-fn the_continuous_gradient_of_the_initial_state_converges_to_the_discrete_one() {
+fn assert_initial_gradients_converge(is_nonlinear: bool, limit: f64) {
     let errors = [2000, 4000, 8000].map(|nodes| {
-        let [found, exact] = initial_gradients(nodes);
+        let [found, exact] = initial_gradients(nodes, is_nonlinear);
         [
             (found.displacement / exact.displacement - 1.0).abs(),
             (found.velocity / exact.velocity - 1.0).abs(),
@@ -332,6 +340,46 @@ fn the_continuous_gradient_of_the_initial_state_converges_to_the_discrete_one() 
         for pair in errors.windows(2) {
             assert!(pair[1][which] < 0.3 * pair[0][which], "{errors:?}");
         }
-        assert!(errors[2][which] < 1e-5, "{errors:?}");
+        assert!(errors[2][which] < limit, "{errors:?}");
     }
+}
+
+#[test]
+fn the_continuous_gradient_of_the_initial_state_converges_to_the_discrete_one() {
+    assert_initial_gradients_converge(false, 1e-5);
+}
+
+#[test]
+fn the_continuous_gradient_of_a_nonlinear_system_converges_to_the_discrete_one() {
+    // The cubic stiffness raises the frequency at the start by half, so the steps are longer by comparison.
+    assert_initial_gradients_converge(true, 3e-5);
+}
+
+/// The error falls in proportion to the step from the first steps on, so the check continues, with two steps per decade, until it
+/// is small enough.
+#[test]
+fn a_gradient_check_continues_with_smaller_steps_while_the_error_falls() {
+    let problem = common::paper_problem(1000, [2.0, 1.0, 1.0]);
+    let theta = problem.functions.start();
+    let first: Vec<f64> = (4..8).map(|i| 10f64.powf(-0.5 * f64::from(i))).collect();
+    let check = problem
+        .check_gradient(&theta, GradientKind::Discrete, &first)
+        .unwrap();
+    assert!(check.passes(), "{:?}", check.error);
+    assert_eq!(check.step.len(), 14);
+    for (i, (step, error)) in check.step.iter().zip(&check.error).enumerate() {
+        let expected = 10f64.powf(-0.5 * (4 + i) as f64);
+        assert!((step / expected - 1.0).abs() < 1e-14, "{:?}", check.step);
+        // Next order of the expansion at the longest step, and rounding at the shortest.
+        assert!(
+            (error / (9.5 * step) - 1.0).abs() < 0.2,
+            "{:?}",
+            check.error
+        );
+    }
+    // The continuous gradient has an error floor, at which smaller steps are of no use.
+    let (kind, steps) = (GradientKind::Continuous, [1e-6, 1e-7, 1e-8, 1e-9]);
+    let check = problem.check_gradient(&theta, kind, &steps).unwrap();
+    assert!(!check.passes());
+    assert_eq!(check.step, steps);
 }

@@ -6,11 +6,16 @@ mod common;
 use common::synthetic::Truth;
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::basis::uniform_knots;
-use kmcfit_core::internals::functions::{Basis, CoefficientFunction, CoefficientKind, Penalty};
+use kmcfit_core::internals::functions::{
+    Basis, CoefficientFunction, CoefficientKind, Parameterization, Penalty,
+};
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{Channel, ChannelKind, Weighting};
-use kmcfit_core::internals::solvers::equation_error;
-use kmcfit_core::internals::system::{Excitation, Method, NodalCoefficients, Term};
+use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
+use kmcfit_core::internals::solvers::{FitSettings, Measurements, Solver, equation_error, fit};
+use kmcfit_core::internals::system::{
+    Excitation, Grid, Method, NodalCoefficients, State, System, Term,
+};
+use std::f64::consts::TAU;
 
 const NODES: usize = 401;
 const START: f64 = 2.0;
@@ -245,4 +250,119 @@ fn the_start_of_a_damping_has_no_part_in_the_smoothing() {
     let other = start(10.0, 1e2);
     // The pull towards the start, which is 1e-9 of the equation.
     assert!(most(&other, &smoothed) < 1e-5, "{other:?} {smoothed:?}");
+}
+
+/// Two records of cosines with a known mass and constant damping and stiffness: amplitudes 0.7 and 1.1, periods of 100 and 50
+/// samples of 0.01 s. Without the two at each end, from which no derivatives follow, the samples are whole periods.
+const COSINES: [(f64, f64); 2] = [(0.7, 1.0), (1.1, 0.5)];
+
+fn cosines() -> Problem {
+    let nodes = 504;
+    let grid = Grid::new(0.0, 5.03, nodes).unwrap();
+    let list = vec![
+        CoefficientFunction::constant(CoefficientKind::Mass, 1.0, nodes),
+        CoefficientFunction::constant(CoefficientKind::Damping, 0.5, nodes),
+        CoefficientFunction::constant(CoefficientKind::Stiffness, 50.0, nodes),
+    ];
+    let functions = Parameterization::new(list, nodes, grid.step()).unwrap();
+    let record = |(amplitude, period): (f64, f64)| {
+        let cosine = |t: &f64| amplitude * (TAU * t / period).cos();
+        let samples = grid.times().iter().map(cosine).collect();
+        // Samples without noise are not smoothed.
+        let weighting = Weighting::Sigma(1e-9);
+        let channel = Channel::displacement_at_nodes(samples, 1, weighting, &grid);
+        Experiment::free("cosine", State::default(), nodes).with_channel(channel)
+    };
+    let system = System {
+        grid,
+        method: Method::Rk4,
+        terms: vec![Term::Damping, Term::Stiffness],
+    };
+    Problem::new(system, functions, COSINES.map(record).to_vec()).unwrap()
+}
+
+/// `sum_i mean(phi_i^2) T^(2 order)` with the mean period T, where `phi` is y'', y' and y for m, c and k.
+#[test]
+fn the_weight_of_the_rule_period_is_that_of_harmonic_responses() {
+    let problem = cosines();
+    let measurements = Measurements::of(&problem).unwrap();
+    let mean_period = COSINES.iter().map(|(_, period)| period).sum::<f64>() / 2.0;
+    for (index, derivative) in [2, 1, 0].into_iter().enumerate() {
+        let square = |(amplitude, period): &(f64, f64)| {
+            0.5 * (amplitude * (TAU / period).powi(derivative)).powi(2)
+        };
+        let squares: f64 = COSINES.iter().map(square).sum();
+        for order in 0..3 {
+            let expected = squares * mean_period.powi(2 * order);
+            let found = measurements.period_weight(&problem, index, order as usize);
+            // Differences of order 4 of 50 samples per period, (TAU/50)^4/30 = 8e-6, in up to six factors.
+            assert!(
+                (found / expected - 1.0).abs() < 6.0 * 8.4e-6,
+                "{found} {expected}"
+            );
+        }
+    }
+}
+
+/// Accelerations `a` of a cosine, between nodes, of a system with a stiffness `1 + DELTA` times that of the cosine: the equation of
+/// motion predicts `(1 + DELTA) a` of the part `H` of the sample that passes the filter, and the rest of the sample.
+#[test]
+fn an_acceleration_is_predicted_by_the_equation_of_motion() {
+    const DELTA: f64 = 0.3;
+    const MASS: f64 = 2.5;
+    let (nodes, frequency) = (4001, TAU);
+    let grid = Grid::new(0.0, 40.0, nodes).unwrap();
+    let stiffness = MASS * frequency * frequency * (1.0 + DELTA);
+    let list = vec![
+        CoefficientFunction::fixed(CoefficientKind::Mass, vec![MASS; nodes]),
+        CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.0; nodes]),
+        CoefficientFunction::constant(CoefficientKind::Stiffness, stiffness, nodes),
+    ];
+    let functions = Parameterization::new(list, nodes, grid.step()).unwrap();
+    let times: Vec<f64> = grid.times()[..nodes - 1]
+        .iter()
+        .map(|t| t + 0.003)
+        .collect();
+    let samples: Vec<f64> = times.iter().map(|t| (frequency * t).cos()).collect();
+    let weighting = Weighting::Integral { spacing: 0.01 };
+    let kind = ChannelKind::Acceleration;
+    let channel = Channel::new(kind, times, samples.clone(), weighting, &grid, nodes).unwrap();
+    let record = Experiment::free("cosine", State::default(), nodes).with_channel(channel);
+    let system = System {
+        grid,
+        method: Method::Rk4,
+        terms: vec![Term::Damping, Term::Stiffness],
+    };
+    let mut problem = Problem::new(system, functions, vec![record]).unwrap();
+    let mut group = RowGroup::new("stiffness");
+    group.push([(0, 1.0)], [stiffness; 2], [0.0, 40.0]);
+    problem = problem
+        .with(|parts| parts.constraints.groups.push(group))
+        .unwrap();
+    let settings = FitSettings {
+        solver: Solver::EquationError,
+        ..FitSettings::default()
+    };
+    let fit = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
+    let predicted = &fit.best.evaluation.predictions[0][0];
+    // The first and the last sample have no state and are their own predictions.
+    let last = samples.len() - 1;
+    assert_eq!(predicted[0], samples[0]);
+    assert_eq!(predicted[last], samples[last]);
+    let squares: f64 = predicted
+        .iter()
+        .zip(&samples)
+        .map(|(p, s)| (p - s).powi(2))
+        .sum();
+    let misfit = 0.01 * MASS * MASS * squares;
+    assert!((misfit / fit.best.evaluation.misfit - 1.0).abs() < 1e-12);
+    // The corner is at half the dominant frequency, which the ends of the record change by less than a per mille, and H by a
+    // fifth of that.
+    let passed = 1.0 / (1.0 + 0.5f64.powi(4));
+    // Ten periods from both ends, where the transients of the filter have decayed to 1e-10.
+    for i in 1000..3000 {
+        let expected = samples[i] * (1.0 + passed * DELTA);
+        let off = (predicted[i] - expected).abs();
+        assert!(off < 1e-4, "{i}: {} {expected}", predicted[i]);
+    }
 }

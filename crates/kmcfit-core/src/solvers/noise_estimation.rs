@@ -212,18 +212,24 @@ fn with_correlations(
     }
     if is_worse(problem, &found, &white) {
         *problem = as_white;
-        return Ok(Fit {
-            outcome: match is_ended(&found) {
-                true => found.outcome,
-                false => white.outcome,
-            },
-            counts: found.counts,
-            timings: found.timings,
-            elapsed: found.elapsed,
-            ..white
-        });
+        return Ok(without_correlations(found, white));
     }
     Ok(found)
+}
+
+/// The fit `white` with uncorrelated noise, from which the rejected fit `found` continued, with the work of `found`, which includes
+/// that of `white`. A fit that was ended from outside keeps that outcome.
+fn without_correlations(found: Fit, white: Fit) -> Fit {
+    Fit {
+        outcome: match is_ended(&found) {
+            true => found.outcome,
+            false => white.outcome,
+        },
+        counts: found.counts,
+        timings: found.timings,
+        elapsed: found.elapsed,
+        ..white
+    }
 }
 
 /// Result of work whose time is added to that of the fit.
@@ -324,10 +330,7 @@ mod tests {
     use crate::system::Grid;
     use std::time::Duration;
 
-    /// The work and time of both rounds, the initial values of the first, and the point of the second.
-    #[test]
-    fn a_fit_with_another_round_has_the_work_of_both() {
-        crate::host::provide_clock();
+    fn problem() -> Problem {
         let times = Grid::new(0.0, 10.0, 101).unwrap().times();
         let samples: Vec<f64> = times.iter().map(|t| t.cos()).collect();
         let record = Record::new("free decay")
@@ -338,12 +341,22 @@ mod tests {
             CoefficientSpec::constant(0.5),
             CoefficientSpec::constant(2.0),
         ];
-        let problem = Builder::new(parts).record(record).build().unwrap();
-        let settings = FitSettings {
+        Builder::new(parts).record(record).build().unwrap()
+    }
+
+    fn settings() -> FitSettings {
+        FitSettings {
             solver: Solver::SteepestDescent,
             stopping: Stopping::exactly(2),
             ..FitSettings::default()
-        };
+        }
+    }
+
+    /// The work and time of both rounds, the initial values of the first, and the point of the second.
+    #[test]
+    fn a_fit_with_another_round_has_the_work_of_both() {
+        crate::host::provide_clock();
+        let (problem, settings) = (problem(), settings());
         let mut first = fit_from(&problem, &problem.start(), &settings).unwrap();
         let next = fit_from(&problem, &first.best.parameters, &settings).unwrap();
         first.timings.start = Duration::from_secs(3600);
@@ -361,6 +374,28 @@ mod tests {
             assert_eq!(whole.snapshots, first.snapshots);
             assert_eq!(whole.best.parameters, next.best.parameters);
             assert_eq!(whole.initial_cost, next.initial_cost);
+        }
+    }
+
+    /// The point and history of the fit with uncorrelated noise, and the work of the rounds that were rejected.
+    #[test]
+    fn a_rejected_correlation_leaves_its_work() {
+        let (problem, settings) = (problem(), settings());
+        let mut white = fit_from(&problem, &problem.start(), &settings).unwrap();
+        white.elapsed = Duration::from_secs(1);
+        white.timings.adjoint = Duration::from_secs(1);
+        let next = fit_from(&problem, &white.best.parameters, &settings).unwrap();
+        let mut found = with_round(white.clone(), next, false);
+        assert_ne!(found.best.parameters, white.best.parameters);
+        for status in [Status::Completed, Status::TimeLimit] {
+            found.outcome.status = status;
+            let fit = without_correlations(found.clone(), white.clone());
+            assert_eq!(fit.best.parameters, white.best.parameters);
+            assert_eq!(fit.history, white.history);
+            assert_eq!(fit.counts, found.counts);
+            assert_eq!(fit.timings, found.timings);
+            assert_eq!(fit.elapsed, found.elapsed);
+            assert_eq!(fit.outcome.status, status);
         }
     }
 }

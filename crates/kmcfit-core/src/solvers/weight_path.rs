@@ -337,6 +337,9 @@ fn remark(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::builder::{Builder, CoefficientSpec, Record};
+    use crate::solvers::{fit, fit_from};
+    use crate::system::Grid;
 
     /// Points of a path with these natural logarithms of misfit and roughness.
     fn path(places: impl IntoIterator<Item = [f64; 2]>) -> Vec<PathPoint> {
@@ -398,5 +401,50 @@ mod tests {
         let places: Vec<_> = std::iter::once([0.0, 0.0]).chain(steps).collect();
         let corner = l_curve(&path(places)).expect("a corner");
         assert!((3..=5).contains(&corner), "{corner}");
+    }
+
+    /// Two fits along the path: the first from the start, the second from the result of the first. Each has the tangents of its
+    /// linearisation for the degrees of freedom in addition.
+    #[test]
+    fn the_work_of_a_path_is_that_of_its_fits_and_traces() {
+        crate::host::provide_clock();
+        let times = Grid::new(0.0, 10.0, 101).unwrap().times();
+        let samples: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let record = Record::new("free decay")
+            .from_state(1.0, 0.0)
+            .displacement(&times, &samples)
+            .sigma(0.1);
+        let parts = [
+            CoefficientSpec::fixed(1.0),
+            CoefficientSpec::constant(0.1),
+            CoefficientSpec::piecewise_linear(5, 1.2).tikhonov(2, 1.0),
+        ];
+        let problem = Builder::new(parts).record(record).build().unwrap();
+        let (settings, start) = (FitSettings::default(), problem.start());
+        let weighted = [10.0, 1.0].map(|factor| problem.with_penalty_factor(&[0], factor));
+        let first = fit(&weighted[0], &start, &settings, &mut |_| {}).unwrap();
+        let second = fit_from(&weighted[1], &first.best.parameters, &settings).unwrap();
+        let mut expected = first.counts + second.counts;
+        expected.tangent += 2 * problem.parameters() as u64;
+        let mut observe = |_: &IterationRecord| {};
+        let mut search = WeightPathSearch {
+            problem: &problem,
+            settings,
+            which: &[0],
+            watch: &mut Observer::new(&mut observe),
+            from: start,
+            last: None,
+            attempts: Vec::new(),
+            counts: SolveCounts::default(),
+            timings: Timings::default(),
+            elapsed: Duration::ZERO,
+        };
+        for (factor, fit) in [(10.0, &first), (1.0, &second)] {
+            let point = search.visit(factor).unwrap();
+            assert_eq!(point.parameters, fit.best.parameters);
+            assert_eq!(point.iterations, fit.history.len() as u64);
+        }
+        assert_eq!(search.counts, expected);
+        assert!(!search.elapsed.is_zero());
     }
 }

@@ -7,6 +7,8 @@ use crate::functions::{
 use crate::noise::{Autoregression, Correlation, CorrelationLaw};
 use crate::objective::GradientKind;
 use crate::record::{Channel, ChannelKind, Experiment, NoiseEstimate, Weighting};
+use crate::signal::low_pass;
+use crate::simulate::fast::sensitivities::TILE;
 use crate::solvers::checkpoint::{ExactF64s, MethodState};
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::methods::{GaussNewton, Step, StepRule};
@@ -78,6 +80,18 @@ fn long_problem(knots: Option<u32>) -> Problem {
     };
     let functions = functions.with_scalars(vec![speed]);
     Problem::new(system, functions, vec![record]).unwrap()
+}
+
+/// The second half begins where a tile of the first ends, and the halves differ by less than two tiles. A short record has no
+/// middle.
+#[test]
+fn the_middle_of_a_long_record_is_the_last_end_of_a_tile_in_its_first_half() {
+    let problem = long_problem(None);
+    let half = (problem.experiments[0].nodes - 1) / 2;
+    let middle = problem.middle().expect("one long record");
+    assert!(middle.is_multiple_of(TILE), "{middle}");
+    assert!((0..TILE).contains(&(half - middle)), "{middle} of {half}");
+    assert_eq!(short_problem().middle(), None);
 }
 
 /// The joined halves agree with the reduction of the whole record and with the adjoint: for few parameters, and for numbers
@@ -216,10 +230,8 @@ fn a_long_record_is_fitted_by_the_continuous_gradient() {
     assert_eq!(together.counts, alone.counts);
 }
 
-/// Under correlated noise the step with the states as unknowns is that of the whitened Jacobian, for displacements at nodes and
-/// accelerations between them.
-#[test]
-fn steps_under_correlated_noise_agree_with_and_without_states() {
+/// A driven oscillator with displacements at nodes and accelerations between them, and seven parameters.
+fn short_problem() -> Problem {
     let grid = Grid::new(0.0, 8.0, 161).expect("a grid");
     let force: Vec<f64> = grid.times().iter().map(|t| (2.0 * t).sin()).collect();
     let knots = CoefficientSpec::piecewise_linear(5, 4.0);
@@ -234,24 +246,19 @@ fn steps_under_correlated_noise_agree_with_and_without_states() {
         .sigma(0.05)
         .acceleration(&between, &values(&between))
         .sigma(0.05);
-    let mut problem = Builder::new([mass, damping, knots])
+    Builder::new([mass, damping, knots])
         .record(record)
         .grid(grid)
         .build()
-        .expect("a problem");
-    for channel in &mut problem.parts_mut().experiments[0].channels {
-        let process = Autoregression::new(vec![0.8, -0.4]).expect("stationary");
-        let law = CorrelationLaw::Autoregressive(process);
-        let noise = NoiseEstimate {
-            correlation: Correlation::new(law, channel.times()),
-            ..NoiseEstimate::default()
-        };
-        *channel = channel.clone().with_noise(noise);
-    }
+        .expect("a problem")
+}
+
+/// The step with the states as unknowns is that of the whole Jacobian.
+fn assert_steps_agree_with_and_without_states(problem: &Problem) {
     let evaluation = problem.evaluate(&problem.start()).expect("a motion");
-    let whole = of_whole_jacobian(&problem, &evaluation, &mut Timings::default());
-    let steps = structured::steps(&problem, &evaluation);
-    let with_states = structured::subproblem(&problem, &evaluation, &steps);
+    let whole = of_whole_jacobian(problem, &evaluation, &mut Timings::default());
+    let steps = structured::steps(problem, &evaluation);
+    let with_states = structured::subproblem(problem, &evaluation, &steps);
     let [expected, found] = [whole, with_states].map(|sub| {
         let step = sub.solve_equality_constrained().expect("one minimum");
         step[..problem.parameters()].to_vec()
@@ -263,4 +270,31 @@ fn steps_under_correlated_noise_agree_with_and_without_states() {
             "{found} {expected}"
         );
     }
+}
+
+/// Under correlated noise the step is that of the whitened Jacobian.
+#[test]
+fn steps_under_correlated_noise_agree_with_and_without_states() {
+    let mut problem = short_problem();
+    for channel in &mut problem.parts_mut().experiments[0].channels {
+        let process = Autoregression::new(vec![0.8, -0.4]).expect("stationary");
+        let law = CorrelationLaw::Autoregressive(process);
+        let noise = NoiseEstimate {
+            correlation: Correlation::new(law, channel.times()),
+            ..NoiseEstimate::default()
+        };
+        *channel = channel.clone().with_noise(noise);
+    }
+    assert_steps_agree_with_and_without_states(&problem);
+}
+
+/// The recurrences of a filter of two sections, forward and backward, are the filter of each column of the Jacobian.
+#[test]
+fn steps_from_filtered_channels_agree_with_and_without_states() {
+    let mut problem = short_problem();
+    let filter = low_pass(4, 3.0, 20.0).expect("a filter");
+    for channel in &mut problem.parts_mut().experiments[0].channels {
+        *channel = channel.clone().with_filter(filter.clone());
+    }
+    assert_steps_agree_with_and_without_states(&problem);
 }

@@ -210,3 +210,57 @@ fn fit_part(
         evaluating: clock.elapsed(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::functions::CoefficientKind;
+    use crate::record::{Channel, Weighting};
+    use crate::system::{Method, State, Term};
+
+    /// A free decay with two constants, and a sample at every node `0, stride, 2 stride, ...`.
+    fn free_decay(nodes: usize, stride: usize) -> Problem {
+        let grid = Grid::new(0.0, 40.0, nodes).expect("a grid");
+        let list = vec![
+            CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
+            CoefficientFunction::constant(CoefficientKind::Damping, 0.1, nodes),
+            CoefficientFunction::constant(CoefficientKind::Stiffness, 20.0, nodes),
+        ];
+        let functions = Parameterization::new(list, nodes, grid.step()).expect("functions");
+        let samples = vec![0.0; nodes.div_ceil(stride)];
+        let weighting = Weighting::Sigma(1.0);
+        let channel = Channel::displacement_at_nodes(samples, stride, weighting, &grid);
+        let start = State {
+            displacement: 1.0,
+            velocity: 0.0,
+        };
+        let record = Experiment::free("decay", start, nodes).with_channel(channel);
+        let system = System {
+            grid,
+            method: Method::Rk4,
+            terms: vec![Term::Damping, Term::Stiffness],
+        };
+        Problem::new(system, functions, vec![record]).expect("a problem")
+    }
+
+    /// Two parameters need 40 samples. The first sample is at node 0, so `n` steps have `ceil(n / stride)` of them.
+    #[test]
+    fn the_truncated_record_has_2048_steps_or_4096_if_samples_are_few() {
+        let long = LONG_RECORD_STEPS + 1;
+        let cases = [
+            (4, Some(2048)),
+            (52, Some(2048)),
+            (53, Some(4096)),
+            (105, Some(4096)),
+            (106, None),
+        ];
+        for (stride, steps) in cases {
+            assert_eq!(
+                truncated_steps(&free_decay(long, stride)),
+                steps,
+                "{stride}"
+            );
+        }
+        assert_eq!(truncated_steps(&free_decay(LONG_RECORD_STEPS, 4)), None);
+    }
+}

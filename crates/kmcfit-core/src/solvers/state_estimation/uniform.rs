@@ -86,3 +86,45 @@ fn smooth(observed: &[f64], weight: f64) -> Option<Vec<f64>> {
     }
     sub.solve_equality_constrained()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::system::Grid;
+
+    /// Differences of five samples are exact for polynomials of degree 4, for any step and number of steps between samples.
+    #[test]
+    fn states_of_a_quartic_are_exact() {
+        let quartic = |t: f64| {
+            [
+                0.5 - t + 0.3 * t.powi(2) + 0.2 * t.powi(3) - 0.1 * t.powi(4),
+                -1.0 + 0.6 * t + 0.6 * t.powi(2) - 0.4 * t.powi(3),
+                0.6 + 1.2 * t - 1.2 * t.powi(2),
+            ]
+        };
+        for (step, stride) in [(0.1, 1), (0.05, 3), (0.02, 8)] {
+            let nodes = 10 * stride + 1;
+            let grid = Grid::new(0.0, step * (nodes - 1) as f64, nodes).expect("a grid");
+            let times: Vec<f64> = (0..=10).map(|i| grid.time(i * stride)).collect();
+            let samples: Vec<f64> = times.iter().map(|t| quartic(*t)[0]).collect();
+            // Samples without noise are not smoothed.
+            let weighting = Weighting::Sigma(1e-9);
+            let channel = Channel::displacement_at_nodes(samples, stride, weighting, &grid);
+            let found = kinematics(&channel, stride, grid.step()).expect("enough samples");
+            let inner: Vec<usize> = (2..9).map(|i| i * stride).collect();
+            assert_eq!(found.nodes, inner);
+            // A rounding error of a sample of size 1, divided by the square of the spacing of at least 0.1.
+            let is_close = |found: f64, exact: f64| (found - exact).abs() < 1e-12;
+            let states = found.y.iter().zip(&found.v).zip(&found.a);
+            for (((y, v), a), node) in states.zip(inner) {
+                let [exact_y, exact_v, exact_a] = quartic(grid.time(node));
+                assert!(is_close(*y, exact_y), "y {y} {exact_y}");
+                assert!(is_close(*v, exact_v), "v {v} {exact_v}");
+                assert!(is_close(*a, exact_a), "a {a} {exact_a}");
+            }
+            let initial = found.initial.expect("a sample at the first node");
+            let [y, v, _] = quartic(0.0);
+            assert!(is_close(initial.displacement, y) && is_close(initial.velocity, v));
+        }
+    }
+}

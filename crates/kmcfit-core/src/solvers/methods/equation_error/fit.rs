@@ -346,3 +346,87 @@ impl<'a> Cost<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, CoefficientSpec, Record};
+    use crate::system::Grid;
+
+    /// Accelerations at every fifth quarter of a step under a motion of the base, and displacements at the nodes under a force.
+    fn problem() -> Problem {
+        let grid = Grid::new(0.0, 10.0, 201).expect("a grid");
+        let nodes = grid.times();
+        let spaced: Vec<f64> = (0..=160).map(|i| 0.0625 * f64::from(i)).collect();
+        let at = |times: &[f64], f: fn(f64) -> f64| -> Vec<f64> {
+            times.iter().map(|t| f(*t)).collect()
+        };
+        let shaken = Record::new("shaken")
+            .base_acceleration(&nodes, &at(&nodes, |t| (1.1 * t).sin()))
+            .acceleration(&spaced, &at(&spaced, |t| (2.0 * t).cos()))
+            .sigma(0.1);
+        let driven = Record::new("driven")
+            .force(&nodes, &at(&nodes, |t| (1.5 * t).sin()))
+            .displacement(&nodes, &at(&nodes, |t| 0.3 * (1.5 * t).cos()))
+            .sigma(0.1);
+        let parts = [
+            CoefficientSpec::constant(1.3),
+            CoefficientSpec::piecewise_linear(3, 0.2).tikhonov(1, 0.7),
+            CoefficientSpec::piecewise_linear(4, 5.0).tikhonov(2, 0.4),
+        ];
+        let builder = Builder::new(parts).record(shaken).record(driven).grid(grid);
+        builder.build().expect("a problem")
+    }
+
+    /// Parameters near the start, different for each `seed`.
+    fn near_start(problem: &Problem, seed: usize) -> Vec<f64> {
+        let start = problem.start().into_iter().enumerate();
+        let factor = |j: usize| 1.0 + 0.4 * ((3 * seed + j) as f64).sin();
+        start.map(|(j, p)| p * factor(j)).collect()
+    }
+
+    /// The cost is a square of the parameters, so central differences have rounding errors alone.
+    #[test]
+    fn the_gradient_is_that_of_the_cost_at_nodes_and_between() {
+        let problem = problem();
+        let measurements = Measurements::of(&problem).expect("two responses");
+        let cost = Cost {
+            problem: &problem,
+            measurements: &measurements,
+        };
+        let theta = near_start(&problem, 1);
+        let gradient = cost.gradient(&theta).euclidean;
+        let size = gradient.iter().fold(0.0f64, |m, g| m.max(g.abs()));
+        for (j, found) in gradient.iter().enumerate() {
+            let step = 0.5 * theta[j];
+            let at = |step: f64| {
+                let mut moved = theta.clone();
+                moved[j] += step;
+                cost.point(moved).evaluation.cost
+            };
+            let difference = (at(step) - at(-step)) / (2.0 * step);
+            let off = (found - difference).abs();
+            assert!(off <= 1e-12 * size, "{j}: {found} {difference}");
+        }
+    }
+
+    #[test]
+    fn the_assembled_squares_are_the_cost() {
+        let problem = problem();
+        let measurements = Measurements::of(&problem).expect("two responses");
+        let cost = Cost {
+            problem: &problem,
+            measurements: &measurements,
+        };
+        for seed in 0..3 {
+            let [from, to] = [seed, seed + 1].map(|seed| near_start(&problem, seed));
+            let step: Vec<f64> = to.iter().zip(&from).map(|(to, from)| to - from).collect();
+            let found = cost.assembled(&from).value(&step);
+            let expected = cost.point(to).evaluation.cost;
+            assert!(
+                (found - expected).abs() <= 1e-12 * expected,
+                "{found} {expected}"
+            );
+        }
+    }
+}

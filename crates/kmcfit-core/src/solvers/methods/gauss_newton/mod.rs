@@ -242,3 +242,31 @@ fn subproblem(
     }
     sub
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The damping falls by ten above the share of a good step and rises by three below that of a poor one; at and between both
+    /// shares it stays.
+    #[test]
+    fn the_damping_follows_the_share_of_the_predicted_decrease() {
+        let cases = [
+            (0.1, 3.0),
+            (0.3, 1.0),
+            (0.5, 1.0),
+            (0.7, 1.0),
+            (0.8, 0.1),
+            (1.5, 0.1),
+        ];
+        for (gain, factor) in cases {
+            let mut method = GaussNewton::default();
+            method.learn(gain);
+            let off = (method.damping / (factor * FIRST_DAMPING) - 1.0).abs();
+            assert!(off <= f64::EPSILON, "{gain}: {}", method.damping);
+        }
+        let mut method = GaussNewton::default();
+        (0..20).for_each(|_| method.learn(1.0));
+        assert_eq!(method.damping, LEAST_DAMPING);
+    }
+}
