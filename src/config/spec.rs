@@ -15,9 +15,10 @@ pub use study::*;
 
 use crate::config::map::keys;
 
+use super::alternatives::OneOrList;
 use super::choice::choice;
 pub use super::values::{ColumnSpec, WeightRule};
-use super::values::{Count, Format, Nodes, Number, NumberOrColumn, OneOrList, Text};
+use super::values::{Count, Format, Nodes, Number, NumberOrColumn, Text};
 
 keys! {
     /// A model: records of one system, its coefficient functions, and the settings of the fit.

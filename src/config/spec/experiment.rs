@@ -4,8 +4,9 @@ use super::noise::NoisesSpec;
 use crate::config::map::keys;
 
 use super::{OwnFunctionsSpec, RangeSpec};
+use crate::config::alternatives::ScalarOr;
 use crate::config::choice::choice;
-use crate::config::values::{ColumnId, Count, Estimate, Number, NumberOrEstimate, ScalarOr};
+use crate::config::values::{ColumnId, Count, Estimate, Number, NumberOrEstimate};
 use crate::config::values::{Sigma, Text};
 
 keys! {

@@ -1,10 +1,9 @@
 //! Keys of the coefficient functions.
 
+use crate::config::alternatives::OneOrList;
 use crate::config::choice::choice;
 use crate::config::map::keys;
-use crate::config::values::{
-    Count, KnotSpec, Number, NumberOrColumn, OneOrList, StartSpec, Weight,
-};
+use crate::config::values::{Count, KnotSpec, Number, NumberOrColumn, StartSpec, Weight};
 
 keys! {
     /// Coefficient functions of the system; mass, damping and stiffness are required.

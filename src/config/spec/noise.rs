@@ -1,8 +1,9 @@
 //! Keys of the correlation of noise.
 
+use crate::config::alternatives::ScalarOr;
 use crate::config::choice::choice;
 use crate::config::map::keys;
-use crate::config::values::{Count, ScalarOr};
+use crate::config::values::Count;
 
 keys! {
     /// Correlation of the noise of each channel.

@@ -3,8 +3,9 @@
 use crate::config::map::keys;
 
 use super::{ForceSpec, FunctionName, StateSpec};
+use crate::config::alternatives::OneOrList;
 use crate::config::choice::choice;
-use crate::config::values::{Count, Number, NumberOrColumn, OneOrList, Text};
+use crate::config::values::{Count, Number, NumberOrColumn, Text};
 
 keys! {
     /// Analyses of `kmcfit study`.

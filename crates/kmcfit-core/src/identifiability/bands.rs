@@ -25,7 +25,8 @@
 
 use super::active::{ActiveRow, active_rows};
 use super::band::{Band, BandSide};
-use super::covariance::{CovarianceRoot, Information, is_bayesian};
+use super::band_notes::notes;
+use super::covariance::{CovarianceRoot, Information};
 use super::degrees::{NoiseVariants, degrees_of_parameters};
 use super::directions::Directions;
 use super::ratios::{Ratio, damping_ratio, frequency, over_mass};
@@ -183,38 +184,6 @@ impl Bands {
     pub fn ratio(&self, name: &str) -> Option<&Band> {
         self.ratios.iter().find(|b| b.name == name)
     }
-}
-
-/// Notes on all bands: neglected contributions and active bounds.
-fn notes(problem: &Problem, information: &Information, active: &[ActiveRow]) -> Vec<String> {
-    let mut notes = Vec::new();
-    if information.sensitivity().directions.is_coarse() {
-        notes.push(
-            "the model has many parameters: the bands are those of smooth changes and neglect rougher ones"
-                .to_owned(),
-        );
-    }
-    if information.is_pulled() {
-        notes.push(
-            "the bands describe the scatter of the estimates and exclude the smoothing bias"
-                .to_owned(),
-        );
-    }
-    if is_bayesian(problem) {
-        notes.push(
-            "the bands of smoothed functions cover on average over the record, less where a function bends most".to_owned(),
-        );
-    }
-    if !problem.variations.is_empty() {
-        notes.push("the bands neglect the total-variation penalty".to_owned());
-    }
-    let bounds = active.iter().filter(|r| !r.equality);
-    let mut names: Vec<&str> = bounds.map(|r| r.name.as_str()).collect();
-    names.dedup();
-    if !names.is_empty() {
-        notes.push(format!("bounds are active: {}", names.join(", ")));
-    }
-    notes
 }
 
 struct Maker<'a> {

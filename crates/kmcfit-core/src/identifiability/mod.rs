@@ -11,6 +11,7 @@ mod active;
 mod anchors;
 mod band;
 mod band_curves;
+mod band_notes;
 mod bands;
 mod classification;
 mod components;

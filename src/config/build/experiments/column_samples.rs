@@ -2,9 +2,10 @@
 
 use super::unit::QuantityColumn;
 use crate::config::ModelFile;
+use crate::config::alternatives::ScalarOr;
 use crate::config::build::asked_for;
 use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, SourceSpec};
-use crate::config::values::{ColumnId, ScalarOr, Text};
+use crate::config::values::{ColumnId, Text};
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::tables::{ColumnName, SAMPLE_RATES, Table, TableFormat, increasing_at};

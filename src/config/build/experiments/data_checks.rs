@@ -3,8 +3,9 @@
 use super::warning::DataWarning;
 use super::{RawChannel, RawRecord, is_equation_error};
 use crate::config::ModelFile;
+use crate::config::alternatives::ScalarOr;
 use crate::config::spec::{ExperimentSpec, InitialSpec};
-use crate::config::values::{NumberOrEstimate, ScalarOr};
+use crate::config::values::NumberOrEstimate;
 use crate::finding::Finding;
 use kmcfit_core::internals::diagnostics::{detrended, outlier_indices, standard_deviation};
 use kmcfit_core::internals::record::ChannelKind;

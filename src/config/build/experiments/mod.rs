@@ -9,8 +9,9 @@ mod warning;
 
 use super::{BuildMode, functions};
 use crate::config::ModelFile;
+use crate::config::alternatives::ScalarOr;
 use crate::config::spec::{EstimateValue, ExperimentSpec, FitMethod, InitialSpec, SensorSpec};
-use crate::config::values::{Estimate, NumberOrEstimate, ScalarOr};
+use crate::config::values::{Estimate, NumberOrEstimate};
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::tables::resample;

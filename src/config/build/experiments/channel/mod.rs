@@ -7,10 +7,11 @@ use super::column_samples::{self, ColumnRequest};
 use super::warning::DataWarning;
 use super::{ChannelNote, names};
 use crate::config::ModelFile;
+use crate::config::alternatives::ScalarOr;
 use crate::config::spec::{
     ColumnRef, CorrelationName, CorrelationSpec, ExperimentSpec, LossName, LossSpec, SensorSpec,
 };
-use crate::config::values::{ColumnId, ScalarOr, Sigma, Text};
+use crate::config::values::{ColumnId, Sigma, Text};
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::units::{Quantity, Unit};

@@ -2,8 +2,9 @@
 
 use super::Spec;
 use crate::config::ModelFile;
+use crate::config::alternatives::ScalarOr;
 use crate::config::spec::{CorrelationName, LossName};
-use crate::config::values::{ScalarOr, Sigma};
+use crate::config::values::Sigma;
 use crate::error::InputError;
 use kmcfit_core::internals::record::{Loss, NoiseModel, Weighting};
 
