@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Finds import cycles between the modules of a Rust crate, at every level of folders.
+"""Finds import cycles between the modules of a Rust crate, at every level of folders, and compares the imports with the map.
 
 Usage: .ci/imports.py FOLDER...          the src folders of crates, e.g. src crates/kmcfit-core/src
 
@@ -7,12 +7,17 @@ Two modules that stand side by side in a folder form a cycle if each imports the
 others beside them; what a module imports is what any file below it imports. A module may use what its parent declares,
 and a parent its children: the cycles looked for are those among siblings. Tests are left out. For each cycle the
 imports that make it are printed; the exit code is 1 if there is one.
+
+In the tables of docs/architecture.md a module may import only modules of its own row and of rows above; every module stands in a
+row. Violations are printed and counted too.
 """
 
 import re
 import sys
 from collections import defaultdict
 from pathlib import Path
+
+MAP = Path(__file__).resolve().parent.parent / "docs" / "architecture.md"
 
 
 def without_noise(text):
@@ -116,9 +121,36 @@ def cycles(edges):
     return result
 
 
+def rows_of_map(text):
+    """For each module of the map, as a path, the number of its row: the first column of every table row."""
+    rows = {}
+    for number, line in enumerate(re.findall(r"^\| (`[^|]*) \|", text, flags=re.M)):
+        for name in re.findall(r"`([\w/.]+)`", line):
+            rows.setdefault(tuple(name.removesuffix(".rs").strip("/").split("/")), number)
+    return rows
+
+
+def violations(root, rows):
+    """Imports of modules of rows below, and modules without a row."""
+    row = lambda module: next((rows[module[:n]] for n in range(len(module), 0, -1) if module[:n] in rows), None)
+    found = set()
+    for source, target, path in imports(root):
+        if source[:1] in ((), ("lib",)):
+            continue
+        for module in (source, target):
+            # `simulate` itself joins its parts, which have rows of their own.
+            if row(module) is None and not any(known[: len(module)] == module for known in rows):
+                found.add(f"{root}: {'::'.join(module)} has no row in {MAP}")
+        if None not in (row(source), row(target)) and row(target) > row(source):
+            found.add(f"{root}: {'::'.join(source)} imports {'::'.join(target)}, of a row below ({path})")
+    return sorted(found)
+
+
 def main(roots):
-    count = 0
+    count, wrong = 0, []
+    rows = rows_of_map(MAP.read_text(encoding="utf-8"))
     for root in map(Path, roots):
+        wrong += violations(root, rows)
         levels = defaultdict(lambda: defaultdict(lambda: defaultdict(set)))
         for source, target, path in imports(root):
             shared = 0
@@ -141,8 +173,9 @@ def main(roots):
                         files = sorted(edges[a][b])
                         more = f" and {len(files) - 2} more" if len(files) > 2 else ""
                         print(f"    {a} -> {b}   ({', '.join(files[:2])}{more})")
-    print(f"{count} cycles")
-    return 1 if count else 0
+    print(*wrong, sep="\n", end="\n" if wrong else "")
+    print(f"{count} cycles; {len(wrong)} imports or modules against the map")
+    return 1 if count or wrong else 0
 
 
 if __name__ == "__main__":

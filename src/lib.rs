@@ -28,7 +28,7 @@ pub mod finding;
 pub mod guide;
 mod memory;
 #[cfg(test)]
-mod messages;
+mod message_list_tests;
 mod number_format;
 pub mod report;
 pub mod results;

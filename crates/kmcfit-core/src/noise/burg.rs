@@ -1,12 +1,7 @@
-//! Estimation of autoregressive processes by Burg's method, and choice of their order.
+//! Estimation of the coefficients of autoregressive processes by Burg's method.
 
 use super::autoregression::Autoregression;
 use std::ops::Range;
-
-/// Highest order that is tried.
-pub const HIGHEST_ORDER: usize = 12;
-/// Smallest number of samples per coefficient.
-const SAMPLES_PER_COEFFICIENT: usize = 10;
 
 /// Autoregressive process of order `order` of the values, which are uninterrupted within each of `runs`, by Burg's method: each
 /// partial autocorrelation minimises the sum of squares of forward and backward prediction errors over all runs.
@@ -17,27 +12,9 @@ pub fn burg(values: &[f64], runs: &[Range<usize>], order: usize) -> Autoregressi
     Autoregression::new(found.map(|(phi, _)| phi).collect()).unwrap_or_default()
 }
 
-/// Process whose order, between 0 and `highest`, minimises the Bayesian information criterion `sum_k n_k log(1 - phi_k^2) + p log n`,
-/// with the number `n_k` of products from which the partial autocorrelation `phi_k` is estimated: `n - k` without interruptions.
-pub fn select_order(values: &[f64], runs: &[Range<usize>], highest: usize) -> Autoregression {
-    let count: usize = runs.iter().map(Range::len).sum();
-    let highest = highest.min(count / SAMPLES_PER_COEFFICIENT);
-    let partial = partial_autocorrelations(values, runs, highest);
-    let penalty = (count as f64).ln();
-    let (mut criterion, mut best) = (0.0, (0.0, 0));
-    for (k, (phi, products)) in partial.iter().enumerate() {
-        criterion += *products as f64 * (-phi * phi).ln_1p() + penalty;
-        if criterion < best.0 {
-            best = (criterion, k + 1);
-        }
-    }
-    let chosen = partial[..best.1].iter().map(|(phi, _)| *phi);
-    Autoregression::new(chosen.collect()).unwrap_or_default()
-}
-
 /// Partial autocorrelations of the orders `1..=order`, fewer where the prediction errors vanish, each with the number of products in
 /// its estimate.
-fn partial_autocorrelations(
+pub(super) fn partial_autocorrelations(
     values: &[f64],
     runs: &[Range<usize>],
     order: usize,
@@ -76,25 +53,6 @@ fn partial_autocorrelations(
 mod tests {
     use super::*;
     use crate::diagnostics::noise::auto_regression;
-
-    #[test]
-    fn the_order_of_white_noise_is_0_and_of_ar_1_noise_1() {
-        let (mut white, mut coloured) = (0, 0);
-        let seeds = 100;
-        for seed in 0..seeds {
-            let run = 0..1000;
-            let runs = std::slice::from_ref(&run);
-            white +=
-                usize::from(select_order(&auto_regression(seed, 1000, 0.0), runs, 12).order() == 0);
-            let found = select_order(&auto_regression(seed, 1000, 0.8), runs, 12);
-            // The standard error of a coefficient is sqrt((1 - 0.64)/1000) = 0.019.
-            assert!((found.coefficients()[0] - 0.8).abs() < 0.15, "{found:?}");
-            coloured += usize::from(found.order() == 1);
-        }
-        // A further coefficient is taken where a chi-square exceeds log 1000 = 6.9: with probability 0.9 % each, about 2 %
-        // over all orders, binomially distributed.
-        assert!(white >= 93 && coloured >= 93, "{white} {coloured}");
-    }
 
     /// Also, values of zero have no correlation.
     #[test]

@@ -15,12 +15,14 @@ mod autoregression;
 mod burg;
 mod correlation;
 mod exponential;
+mod order;
 mod penalty_moments;
 mod restricted_likelihood;
 
 pub use autoregression::Autoregression;
-pub use burg::{HIGHEST_ORDER, burg, select_order};
+pub use burg::burg;
 pub use correlation::{Correlation, CorrelationLaw, uninterrupted_runs};
 pub use exponential::select_exponential;
+pub use order::{HIGHEST_ORDER, select_order};
 pub use penalty_moments::PenaltyMoments;
 pub use restricted_likelihood::{ChannelMoments, NoiseCoordinates, RestrictedLikelihood, STEP};

@@ -7,7 +7,7 @@ use super::correlation_estimation::{
 use super::executor::search;
 use super::fit::{Fit, measured};
 use super::history::IterationRecord;
-use super::probed_weights::probed;
+use super::reml_by_traces::with_reml_weights;
 use super::restricted_estimation::{estimates_weights, refined, start_weights};
 use super::settings::FitSettings;
 use super::start_strategy::search_from_starts;
@@ -138,7 +138,7 @@ fn with_weights(
         }
         let next = match problem.parameters() > FEW_PARAMETERS {
             true => counted(&mut found, |found| {
-                probed(problem, found, &mut Timings::default())
+                with_reml_weights(problem, found, &mut Timings::default())
             }),
             false => counted(&mut found, |found| {
                 refined(problem, &found.best.parameters, &found.best.evaluation)

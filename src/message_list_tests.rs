@@ -1,5 +1,5 @@
 //! The list of all messages: every error that a test asserts, and every variant of warnings, findings, suggestions and
-//! outcomes. `tests/snapshots/kmcfit__messages__messages.snap` is this list; it is read as a whole when a message changes.
+//! outcomes. `tests/snapshots/kmcfit__message_list_tests__messages.snap` is this list; it is read as a whole when a message changes.
 
 use crate::config::DataWarning;
 use crate::report::findings;
@@ -185,7 +185,7 @@ fn section(list: &mut String, title: &str, messages: impl IntoIterator<Item = St
 
 /// True for the list of this module.
 fn is_list(file: &Path) -> bool {
-    file.ends_with("kmcfit__messages__messages.snap")
+    file.ends_with("kmcfit__message_list_tests__messages.snap")
 }
 
 fn read(file: &Path) -> String {
@@ -218,7 +218,7 @@ fn sources(folder: &str) -> Vec<PathBuf> {
 fn asserted_errors() -> Vec<String> {
     let mut found = BTreeSet::new();
     for file in sources("tests") {
-        if file.ends_with("kmcfit__messages__messages.snap") {
+        if file.ends_with("kmcfit__message_list_tests__messages.snap") {
             continue;
         }
         let text = fs::read_to_string(root().join(&file)).expect("a source");
@@ -391,7 +391,7 @@ fn formats(folder: &str, call: &str) -> BTreeSet<String> {
     let mut found = BTreeSet::new();
     for file in sources(folder)
         .iter()
-        .filter(|file| !file.ends_with("messages.rs"))
+        .filter(|file| !file.ends_with("message_list_tests.rs"))
     {
         let text = read(file);
         let tested = text.find("#[cfg(test)]").unwrap_or(text.len());

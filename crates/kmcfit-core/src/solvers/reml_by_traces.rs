@@ -1,4 +1,4 @@
-//! Penalty weights of the largest restricted likelihood for many parameters, with traces estimated by random vectors.
+//! Penalty weights by restricted maximum likelihood (REML) for more than 64 parameters, with traces estimated by random vectors.
 //!
 //! The step is that of [`PenaltyMoments`](crate::noise::PenaltyMoments): `w_j |L_j b|^2 = rank(L_j) - w_j tr(H^-1 L_j^T L_j)`, repeated
 //! in one linearisation, with estimated sigmas changed by the factor `(misfit / (n - effective parameters))^(1/2)`.
@@ -19,9 +19,13 @@ const LONGEST: f64 = 5.0;
 /// Effective number of parameters beyond the null space of a penalty below which its weight is not raised.
 const NO_FREEDOM: f64 = 0.1;
 
-/// The problem with weights and sigmas of larger restricted likelihood in the linearisation at the optimum `found`; `None` where
-/// the Hessian is singular.
-pub(super) fn probed(problem: &Problem, found: &Fit, timings: &mut Timings) -> Option<Problem> {
+/// Returns a copy of the problem with the weights and sigmas that maximise the restricted likelihood linearised at the optimum
+/// `found`; `None` if the Hessian is singular.
+pub(super) fn with_reml_weights(
+    problem: &Problem,
+    found: &Fit,
+    timings: &mut Timings,
+) -> Option<Problem> {
     let mut next = problem.clone();
     for _ in 0..STEPS {
         if step(&mut next, found, timings)? < SETTLED {
