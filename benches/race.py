@@ -34,7 +34,7 @@ import figures
 ROOT = Path(__file__).resolve().parent.parent
 WORK = ROOT / "target" / "race"
 SHARED = Path(os.environ.get("KMCFIT_SHARED", ROOT.parent / "shared"))
-ROWS = ["evaluation", "million", "paper", "lbfgs", "smooth", "scaling", "knots", "starts", "duffing", "start-up", "contention", "noisy", "noisy-500", "noisy-long", "bounded", "bounded-kinds", "bounded-long"]
+ROWS = ["evaluation", "million", "paper", "lbfgs", "smooth", "scaling", "knots", "starts", "duffing", "start-up", "contention", "noisy", "noisy-500", "noisy-long", "noisy-costs", "bounded", "bounded-kinds", "bounded-long", "defaults"]
 DURATION = 25.0
 SCALING = [2000, 8000, 40_000, 200_000]
 KNOTS = [4, 8, 16, 32, 64, 128, 256, 512, 1024]
@@ -159,12 +159,13 @@ class Race:
     def evaluation(self, nodes, one_core=True):
         return self.measure("evaluation", nodes, 0.3 if self.quick else 1.0, one_core=one_core)
 
-    def fit(self, model, name, threads=None, report=False):
+    def fit(self, model, name, threads=None, report=False, overrides=()):
         """Fits a model, on so many threads or as many as the program likes; its result document, with the
         wall clock of the process. The first process after some seconds without one waits for fresh memory on
         some machines, which peers that run for long do not show: the same fit before it is not measured."""
         out = WORK / "runs" / name
         command = [self.kmcfit, "fit", model, "--out", out] + ([] if report else ["--no-report"])
+        command += [word for override in overrides for word in ("--set", override)]
         if threads is not None and self.knows_threads():
             command += ["--threads", threads]
         try:
@@ -653,9 +654,33 @@ def noisy_long(race, row):
     row.ratio = "; ".join(f"{ratios[nodes]:.3g}" for nodes in sizes[1:]) + " per node"
     row.met = max(ratios.values()) <= 1.5 and all(f["outcome"]["status"] == "converged" for runs in fits.values() for f in runs)
     row.notes += [f"{nodes:,} nodes: {described(runs[-1])}" for nodes, runs in fits.items()]
-    if not race.quick:
-        out = python_peer(peer_file(PATH_PEERS["FATROP"]), ["numpy", "casadi"], noisy_data(8000), one_thread=True)
-        row.notes.append(f"FATROP on 8000 nodes, one thread, one run: {seconds(found(r'path ([0-9.]+)s', out)[0])}")
+    for nodes in sizes[1:] if not race.quick else []:
+        try:
+            out = python_peer(peer_file(PATH_PEERS["FATROP"]), ["numpy", "casadi"], noisy_data(nodes), one_thread=True)
+            row.notes.append(f"FATROP on {nodes:,} nodes, one thread, one run: {seconds(found(r'path ([0-9.]+)s', out)[0])}")
+        except Skip as reason:
+            row.notes.append(f"FATROP on {nodes:,} nodes: {reason}")
+
+
+def noisy_costs(race, row):
+    """J of every weight of the path, with a stopping tolerance of 1e-9, against an independent solution."""
+    sizes = [500] if race.quick else [500, 2000, 8000, 40_000]
+    worst = {}
+    for nodes in sizes:
+        fit = race.fit(noisy_model(nodes, "costs", [("tolerance: 1.0e-5", "tolerance: 1.0e-9")]), f"costs-{nodes}")
+        path = fit["weights"]["path"]
+        peer = ROOT / "benches" / "peers" / "noisy_costs.py"
+        out = python_peer(peer, ["casadi"], noisy_data(nodes), *(repr(point["weight"]) for point in path))
+        theirs = [float(j) for j in re.findall(r" J (\S+) ", out)]
+        ours = [point["misfit"] + point["weight"] * point["roughness"] for point in path]
+        if len(theirs) != len(ours):
+            raise Skip(f"its peer solved {len(theirs)} of {len(ours)} weights on {nodes} nodes")
+        excess = [(a - b) / b for a, b in zip(ours, theirs)]
+        worst[nodes] = max(excess, key=abs)
+        row.notes.append(f"{nodes:,} nodes, {seconds(fit['seconds'])}, relative excess of J: " + ", ".join(f"{e:.0e}" for e in excess))
+    row.result = "; ".join(f"{nodes:,} nodes: {value:.0e}" for nodes, value in worst.items())
+    row.ratio = f"{max(map(abs, worst.values())):.0e}"
+    row.met = max(worst.values()) <= 1e-9
 
 
 def bounded(race, row):
@@ -732,6 +757,41 @@ def bounded_long(race, row):
     row.met = per_node[most] <= 1.5 * per_node[2000]
 
 
+def without_tests(name):
+    """A shipped model with white noise and without the test of its bases, if that changes the model."""
+    text = (ROOT / "models" / f"{name}.yaml").read_text(encoding="utf-8")
+    overrides = ["fit.refinement=false"]
+    for i, experiment in enumerate(re.split(r"^  - ", text.split("experiments:")[1].split("\ngrid:")[0], flags=re.M)[1:]):
+        channels = re.search(r"sigma: *\{([^}]*)\}", experiment)
+        kinds = re.findall(r"(displacement|velocity|acceleration)", channels.group(1)) if channels else []
+        overrides += [f"experiments.{i}.noise.{kind}=white" for kind in dict.fromkeys(kinds)]
+    return overrides
+
+
+def defaults(race, row):
+    """Every shipped model as it is, against white noise and no test of its bases: times of the whole command without reports."""
+    worst, total = [], {"as shipped": 0.0, "plain": 0.0}
+    for path in sorted((ROOT / "models").glob("*.yaml")):
+        name = path.stem
+        if "sequence:" in path.read_text(encoding="utf-8"):
+            continue
+        times = {"as shipped": [], "plain": []}
+        for _ in race.rounds():
+            for way, overrides in (("as shipped", []), ("plain", without_tests(name))):
+                fit = race.fit(path, f"defaults-{name}", overrides=overrides)
+                times[way].append(fit["timings"]["total"]["seconds"])
+        middle = {way: statistics.median(values) for way, values in times.items()}
+        worst.append((middle["as shipped"] / middle["plain"], name, middle))
+        for way in total:
+            total[way] += middle[way]
+    worst.sort(reverse=True)
+    row.peer_result = f"{row.peer}: {seconds(total['plain'])}"
+    row.result = f"{seconds(total['as shipped'])} for all {len(worst)} models"
+    row.ratio = f"{worst[0][0]:.3g} times at most ({worst[0][1]})"
+    row.met = worst[0][0] <= 2.0
+    row.notes += [f"{name}: {seconds(m['as shipped'])}, {seconds(m['plain'])} plain, {ratio:.3g} times" for ratio, name, m in worst]
+
+
 def table(race):
     """The rows of the issue: what, peer, target, and the function that fills them."""
     return [
@@ -749,9 +809,11 @@ def table(race):
         (Row("noisy", "noise, bounds, a path of nine weights, 2000 nodes", "CasADi", "1/10"), noisy),
         (Row("noisy-500", "the same on 500 nodes", "CasADi", "1/10"), noisy_500),
         (Row("noisy-long", "the same on more nodes", "2000 nodes", "1.5 per node"), noisy_long),
+        (Row("noisy-costs", "J of every weight of that path", "CasADi and FATROP", "1e-9 above it"), noisy_costs),
         (Row("bounded", "positive, smooth, normalised, without noise", "CasADi and FATROP", "1/15"), bounded),
         (Row("bounded-kinds", "noisy with other constraints and records", "noisy", "none"), bounded_kinds),
         (Row("bounded-long", "noise, bounds, one weight, 200,000 nodes", "2000 nodes", "1.5 per node; memory"), bounded_long),
+        (Row("defaults", "the shipped models with their intervals and tests", "white noise, no test of bases", "2 times"), defaults),
     ]
 
 
