@@ -3,8 +3,8 @@
 use super::SimulatedRecord;
 use crate::record::{Channel, ChannelKind};
 use crate::simd::{Arithmetic, Eight, Kernel, LANES, Row};
+use crate::simulate::fast::lane_reads;
 use crate::simulate::fast::nodal_observations::{Accelerations, NodalObservations};
-use crate::simulate::fast::padded_loads;
 use crate::simulate::{CoefficientGradient, Trajectory};
 use crate::system::{Excitation, FUNCTIONS};
 
@@ -23,7 +23,7 @@ impl Channel {
         i: usize,
     ) -> [Eight<A>; 2] {
         if let Some(around) = self.surroundings() {
-            return [0, 1].map(|part| padded_loads::eight(arithmetic, &around[part], i));
+            return [0, 1].map(|part| lane_reads::eight(arithmetic, &around[part], i));
         }
         let mut rows = [[0.0; LANES]; 2];
         if excitation.is_some() {
@@ -77,7 +77,7 @@ impl Kernel for Predict<'_> {
             channel.accelerations(arithmetic, view, from, &mut observed);
             let mut value = Eight::load(arithmetic, &observed.value);
             if !channel.base().is_empty() {
-                value += padded_loads::eight(arithmetic, channel.base(), from);
+                value += lane_reads::eight(arithmetic, channel.base(), from);
             }
             let mut row = (factor * value).row();
             if (offset, drift) != (0.0, 0.0) {
