@@ -19,7 +19,7 @@ mod noise_estimation;
 mod optimality;
 mod probed_weights;
 mod reason;
-mod restricted_estimation;
+mod reml;
 mod settings;
 mod solve_counts;
 mod start_projection;

@@ -8,7 +8,7 @@ use super::executor::search;
 use super::fit::{Fit, measured};
 use super::history::IterationRecord;
 use super::probed_weights::probed;
-use super::restricted_estimation::{estimates_weights, refined, start_weights};
+use super::reml::{estimates_weights, refined, start_weights};
 use super::settings::FitSettings;
 use super::start_strategy::search_from_starts;
 use super::termination::Status;
