@@ -43,12 +43,12 @@ impl NodalObservations<'_> {
         &self,
         arithmetic: A,
         i: usize,
-        around: [Eight<A>; 2],
+        inputs: [Eight<A>; 2],
         out: &mut Accelerations,
     ) {
         let terms = self.system.terms.as_slice();
         with_known!(terms, terms, TERMS => {
-            self.of_terms::<A, TERMS>(arithmetic, terms, i, around, out);
+            self.of_terms::<A, TERMS>(arithmetic, terms, i, inputs, out);
         });
     }
 
