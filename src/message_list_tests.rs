@@ -168,7 +168,7 @@ const UNTESTED: [&str; 27] = [
     "the grid cannot be chosen without samples",
     "the functions of a basis are linearly dependent on the grid",
     "the reference cannot be projected onto this basis",
-    "the samples do not lie on the grid",
+    "samples lie outside the time span of the grid",
     "the {} of the base is not known",
 ];
 

@@ -4,7 +4,7 @@
 //! syntax, spelling and type are reported here with file, line, column and key. [`build()`] checks the values against
 //! each other and reports errors at the line of a key by [`ModelFile::error_at`].
 
-mod alternatives;
+pub mod alternatives;
 mod build;
 mod choice;
 mod expansion;

@@ -4,7 +4,7 @@ use super::channel_view::ChannelView;
 use super::cost::{CostKind, cost_definition};
 use super::document::{
     ActiveSummary, AttemptSummary, ChannelSummary, ConstraintSummary, CostSummary, CountsSummary,
-    ExperimentSummary, FORMAT, GradientSummary, ModelSummary, OutcomeSummary, PathSummary,
+    ExperimentSummary, FORMAT, GradientSummary, ModelSummary, OutcomeSummary, PathPointSummary,
     PenaltySummary, Prediction, ResultDocument, SlackSummary, WeightSummary,
 };
 use super::fit_assessment::RunAssessment;
@@ -215,7 +215,7 @@ impl FittedModel<'_> {
             .iter()
             .zip(path.picks)
             .filter_map(|(rule, pick)| Some((rule.name().to_string(), path.points[pick?].weight)));
-        let point = |p: &PathPoint| PathSummary {
+        let point = |p: &PathPoint| PathPointSummary {
             weight: p.weight,
             iterations: p.iterations,
             misfit: p.misfit,

@@ -431,9 +431,9 @@ fn shapes_and_ranges() {
       expected: `max`, as in {max: 0.2}
     ");
     assert_snapshot!(message("[{damping_ratio: {min: 0.1}}]"), @"
-    m.yaml:11:37: constraints[0].damping_ratio.min: a damping ratio has no lower bound
+    m.yaml:11:37: constraints[0].damping_ratio.min: a lower bound on the damping ratio is not supported
       found: 0.1
-      expected: `max` alone: a lower bound is not a convex constraint
+      expected: `max` alone, because a lower bound is not a convex constraint
     ");
     assert_snapshot!(message("[{damping_ratio: {max: 0}}]"), @"
     m.yaml:11:37: constraints[0].damping_ratio.max: this limit must be positive
@@ -465,12 +465,12 @@ fn values_at_times() {
       expected: both, as in {function: stiffness, at: 0.0, value: 1.0}
     ");
     assert_snapshot!(message("[{function: mass, at: 3, value: 1}]"), @"
-    m.yaml:11:36: constraints[0].at: this time lies outside the record
+    m.yaml:11:36: constraints[0].at: this time lies outside the grid
       found: 3
       expected: a time from 0 s to 2 s
     ");
     assert_snapshot!(message("[{function: mass, at: [0, -1], value: 1}]"), @"
-    m.yaml:11:40: constraints[0].at[1]: this time lies outside the record
+    m.yaml:11:40: constraints[0].at[1]: this time lies outside the grid
       found: -1
       expected: a time from 0 s to 2 s
     ");

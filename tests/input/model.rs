@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use kmcfit::config::ModelFile;
+use kmcfit::config::alternatives::ScalarOr;
 use kmcfit::config::spec::{
     Basis, FitMethod, Gradient, InitialSpec, PenaltyKind, PenaltySpec, StepMethod, WeightRule,
 };
 use kmcfit::config::values::{
-    ColumnId, Count, KnotSpec, Nodes, Number, NumberOrColumn, NumberOrEstimate, ScalarOr, Sigma,
-    StartSpec, Weight,
+    ColumnId, Count, KnotSpec, Nodes, Number, NumberOrColumn, NumberOrEstimate, Sigma, StartSpec,
+    Weight,
 };
 
 pub const FULL: &str = "\

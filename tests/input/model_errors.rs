@@ -555,13 +555,14 @@ fn limits_of_the_yaml_crate_are_reported() {
         "displacement: &a 1, velocity: &a 2",
     );
     let read = ModelFile::parse("m.yaml", twice.clone()).unwrap();
-    let kmcfit::config::values::ScalarOr::Map(state) = &read.spec.experiments[0].initial else {
+    let kmcfit::config::alternatives::ScalarOr::Map(state) = &read.spec.experiments[0].initial
+    else {
         panic!("a state")
     };
     let two = kmcfit::config::values::NumberOrEstimate::Number(kmcfit::config::Number(2.0));
     assert_eq!(
         state.velocity,
-        kmcfit::config::values::ScalarOr::Scalar(two)
+        kmcfit::config::alternatives::ScalarOr::Scalar(two)
     );
     assert_snapshot!(message(&format!("{twice}predict:\n  - {{displacement: &b 7, velocity: *a}}\n")), @"
     m.yaml:3:45: duplicate anchor

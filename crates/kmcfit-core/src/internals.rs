@@ -4,9 +4,9 @@
 pub mod assessment {
     pub use crate::assessment::{
         BEYOND_SIGMA, BasisTest, CoarseBasis, EXACT, FitAssessment, FitStatistics, FitWarning,
-        FunctionSummary, POOR, Plausibility, RECOVERED, ResidualPattern, Roughness, StepCheck,
-        TruthErrors, Unidentified, constant_probability, diagnostics, function_summaries,
-        is_same_truth, outliers, pattern, standard_error,
+        FunctionSummary, POOR, Plausibility, RECOVERY_TOLERANCE, ResidualPattern, Roughness,
+        StepCheck, TruthErrors, Unidentified, constant_probability, diagnostics,
+        function_summaries, is_same_truth, outliers, pattern, standard_error,
     };
 }
 pub mod builder {

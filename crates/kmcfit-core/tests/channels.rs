@@ -219,7 +219,7 @@ impl Case {
             );
             let channel = channel
                 .unwrap()
-                .with_surroundings(around.collect())
+                .with_inputs_at_samples(around.collect())
                 .with_base(samples.fixed_in_space.clone())
                 .with_loss(samples.loss)
                 .with_sensor(Sensor {

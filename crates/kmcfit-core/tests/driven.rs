@@ -147,7 +147,7 @@ fn base_and_relative_motion_together_have_the_transmissibility() {
                     let times: Vec<f64> = settled.iter().map(|i| grid.time(*i)).collect();
                     let relative = settled.iter().map(|i| {
                         let place = TimePoint::node(*i, nodes);
-                        let around = excitation.around(place);
+                        let around = excitation.input_at(place);
                         let sensed = reference::observe(
                             &system,
                             kind,

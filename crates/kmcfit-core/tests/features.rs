@@ -181,7 +181,7 @@ impl ChannelSpec {
             drift: value(2),
         });
         if !self.around.is_empty() {
-            channel = channel.with_surroundings(self.around.clone());
+            channel = channel.with_inputs_at_samples(self.around.clone());
         }
         if !self.base.is_empty() {
             channel = channel.with_base(self.base.clone());

@@ -1,6 +1,6 @@
 //! Constraints of a model file, as constraints of the builder.
 
-mod statement;
+mod entry;
 
 use crate::config::ModelFile;
 use crate::error::InputError;
@@ -24,8 +24,8 @@ pub(super) fn add(
     }
     for (i, spec) in list.iter().enumerate() {
         let soft = spec.soft.map(|weight| weight.0);
-        for (key, statement) in statement::read(file, grid, &format!("constraints[{i}]"), spec)? {
-            builder = builder.constraint(key, statement, soft);
+        for (key, constraint) in entry::read(file, grid, &format!("constraints[{i}]"), spec)? {
+            builder = builder.constraint(key, constraint, soft);
         }
     }
     Ok(builder)

@@ -1,18 +1,19 @@
-//! Visitor of one key of a map.
+//! Reads one key of a YAML mapping, compares it with the key being located, and can stop parsing there by raising an error
+//! whose position is that of the key.
 
 use crate::config::reader::{Scalar, scalar_visits};
 use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use std::cell::Cell;
 use std::fmt;
 
-/// Compares a key with the wanted one; optionally stops reading there.
+/// Returns true if the key equals `wanted`; `None` matches no key.
 pub(super) struct KeySeed<'a> {
     pub wanted: Option<&'a str>,
-    /// Flag to set before reading stops at the wanted key; `None` to continue past it.
-    pub stop: Option<&'a Cell<bool>>,
+    /// Flag to set before parsing stops at the wanted key; `None` to continue past it.
+    pub stop_flag: Option<&'a Cell<bool>>,
 }
 
-/// The error that stops reading at the goal; sets `hit` to distinguish it from errors of syntax.
+/// Returns the error that ends parsing at the located key or value, and sets `hit` so that it is not taken for a syntax error.
 pub(super) fn stop<E: Error>(hit: &Cell<bool>) -> E {
     hit.set(true);
     E::custom("found")
@@ -27,10 +28,10 @@ impl<'de> DeserializeSeed<'de> for KeySeed<'_> {
 }
 
 impl KeySeed<'_> {
-    /// A key that is not a text never matches.
+    /// Compares a scalar key; keys that are not strings never match.
     fn scalar<E: Error>(self, key: Scalar<'_>) -> Result<bool, E> {
         let same = matches!(key, Scalar::Text(key) if self.wanted == Some(key));
-        match self.stop.filter(|_| same) {
+        match self.stop_flag.filter(|_| same) {
             Some(hit) => Err(stop(hit)),
             None => Ok(same),
         }

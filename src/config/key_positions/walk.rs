@@ -95,7 +95,7 @@ impl<'de> Visitor<'de> for Walk<'_> {
         let mut occurrence = 0;
         while let Some(same) = map.next_key_seed(KeySeed {
             wanted,
-            stop: match self.goal {
+            stop_flag: match self.goal {
                 Goal::Key { occurrence: goal } if rest.is_empty() && goal == occurrence + 1 => {
                     Some(self.hit)
                 }

@@ -5,7 +5,7 @@ use super::verdict::{ResponseFit, verdict};
 use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::document::Prediction;
-use kmcfit_core::internals::assessment::{RECOVERED, Roughness, TruthErrors};
+use kmcfit_core::internals::assessment::{RECOVERY_TOLERANCE, Roughness, TruthErrors};
 use kmcfit_core::internals::solvers::Status;
 use serde::Serialize;
 
@@ -84,7 +84,7 @@ impl Measures {
             reason: document.outcome.reason.clone(),
             verdict: verdict(&response, errors.as_ref()),
             is_matched: response.is_matched(),
-            is_true_system: errors.as_ref().map(|e| e.within(RECOVERED)),
+            is_true_system: errors.as_ref().map(|e| e.within(RECOVERY_TOLERANCE)),
             method: document.model.method.clone(),
             nodes: document.model.nodes,
             parameters: document.model.parameters,

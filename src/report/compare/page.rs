@@ -8,7 +8,7 @@ use super::{CLOSE, Comparison, MATCHED};
 use crate::report::chart::{Style, sample};
 use crate::report::page as shell;
 use crate::report::text::{escape, prose};
-use kmcfit_core::internals::assessment::RECOVERED;
+use kmcfit_core::internals::assessment::RECOVERY_TOLERANCE;
 
 pub(super) fn page(comparison: &Comparison) -> String {
     let count = comparison.measures.len() + comparison.left_out.len();
@@ -73,9 +73,10 @@ fn lead(comparison: &Comparison) -> String {
 fn notes() -> String {
     format!(
         "Errors are maxima over the nodes of each run's grid. The true system counts as recovered if the errors \
-         of k/m and c/m are below {RECOVERED:e} of their largest true values (c/m: of critical damping if the true \
-         system is undamped), as close if they are below {} %. A response without sigma counts as fitted if the rms \
-         residual is at most {} % of the rms response. Without a force only k/m and c/m are identifiable.",
+         of k/m and c/m are below {RECOVERY_TOLERANCE:e} of their largest true values (c/m: of critical damping \
+         if the true system is undamped), as close if they are below {} %. A response without sigma counts as \
+         fitted if the rms residual is at most {} % of the rms response. Without a force only k/m and c/m are \
+         identifiable.",
         100.0 * CLOSE,
         100.0 * MATCHED
     )

@@ -3,7 +3,7 @@
 use super::run::ComparedRun;
 use super::{CLOSE, MATCHED, ROUNDING};
 use crate::report::cost::CostKind;
-use kmcfit_core::internals::assessment::{RECOVERED, TruthErrors};
+use kmcfit_core::internals::assessment::{RECOVERY_TOLERANCE, TruthErrors};
 use std::fmt;
 
 /// Smallest fit, per cent, of a response that counts as fitted, if sigma was estimated.
@@ -99,12 +99,12 @@ pub(super) fn verdict(response: &ResponseFit, errors: Option<&TruthErrors>) -> S
     let Some(errors) = errors else {
         return format!("{response}; true system not known");
     };
-    if errors.within(RECOVERED) {
+    if errors.within(RECOVERY_TOLERANCE) {
         let mut text = format!(
             "true system recovered: relative error of k/m and c/m at most {}",
             size(errors.largest_ratio_error())
         );
-        if errors.mass_relative >= RECOVERED {
+        if errors.mass_relative >= RECOVERY_TOLERANCE {
             let off = percent(errors.mass_relative);
             text += &format!("; m, c and k are scaled by a common factor (error of m {off})");
         }
@@ -143,15 +143,15 @@ fn residual_share(run: &ComparedRun) -> f64 {
 /// Errors of `k/m` and `c/m` that exceed the tolerance.
 fn distances(errors: &TruthErrors) -> String {
     let stiffness = format!("error of k/m {}", percent(errors.k_over_m_relative));
-    let of = if errors.undamped {
+    let of = if errors.relative_to_critical {
         " of critical damping"
     } else {
         ""
     };
     let damping = format!("error of c/m {}{of}", percent(errors.c_over_m_relative));
-    if errors.c_over_m_relative < RECOVERED {
+    if errors.c_over_m_relative < RECOVERY_TOLERANCE {
         stiffness
-    } else if errors.k_over_m_relative < RECOVERED {
+    } else if errors.k_over_m_relative < RECOVERY_TOLERANCE {
         damping
     } else {
         format!("{stiffness}, {damping}")

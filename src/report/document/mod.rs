@@ -1,12 +1,12 @@
 //! The result document of a run, `result.json`. Its keys are stable.
 
 mod channel;
-mod search;
+mod fit_summaries;
 
 pub use channel::{
     ChannelSummary, IgnoredSummary, NoiseSummary, NuisanceParameter, ValidationSummary,
 };
-pub use search::{AttemptSummary, PathSummary, PenaltySummary, WeightSummary};
+pub use fit_summaries::{AttemptSummary, PathPointSummary, PenaltySummary, WeightSummary};
 
 use crate::finding::Finding;
 use crate::report::cost::CostKind;

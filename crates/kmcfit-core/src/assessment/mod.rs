@@ -13,7 +13,7 @@ pub use channel::{ResidualPattern, diagnostics, outliers, pattern};
 pub use constants::{constant_probability, standard_error};
 pub use function::{FunctionSummary, function_summaries};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
-pub use recovery::{RECOVERED, Roughness, TruthErrors, is_same_truth};
+pub use recovery::{RECOVERY_TOLERANCE, Roughness, TruthErrors, is_same_truth};
 pub use refinement::{BasisTest, CoarseBasis};
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};

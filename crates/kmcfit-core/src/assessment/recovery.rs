@@ -1,16 +1,19 @@
-//! Errors of an identified system against the true one, and roughness of its functions.
+//! Errors of an identified system relative to the known true system, roughness of the identified coefficients, and a test
+//! whether two true systems are the same.
 
 use crate::functions::Ratios;
 use crate::system::{Grid, NodalCoefficients};
 use serde::Serialize;
 
-/// Largest relative error of `k/m` and `c/m` of a recovered system: well above the errors of steppers and stopping tests, well
-/// below the resolution of a figure.
-pub const RECOVERED: f64 = 1e-3;
-/// Largest relative difference of equal true systems on two grids.
+/// Relative error of `k/m` and `c/m` below which a system counts as recovered, dimensionless: above the errors of time
+/// integration and early stopping, below what is visible in a plot.
+pub const RECOVERY_TOLERANCE: f64 = 1e-3;
+/// Largest difference of two true systems that count as the same, relative to the largest value of either function,
+/// dimensionless.
 const SAME_TRUTH: f64 = 2e-3;
 
-/// Largest errors over the nodes.
+/// Largest absolute errors over all nodes, in SI units (for a rotation with kg m² in place of kg, and so on), and relative to
+/// true values, dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TruthErrors {
     /// Error of the mass, kg.
@@ -27,11 +30,12 @@ pub struct TruthErrors {
     pub mass_relative: f64,
     /// Error of `k/m`, relative to the largest true `|k/m|`.
     pub k_over_m_relative: f64,
-    /// Error of `c/m`, relative to the largest true `|c/m|`; relative to critical damping `2 sqrt(k/m)` where the former is below
-    /// [`RECOVERED`] of the latter.
+    /// Error of `c/m`, dimensionless: relative to the largest true `|c/m|`, or to the critical value `2 sqrt(max |k/m|)` (1/s) if
+    /// the true `|c/m|` is everywhere below [`RECOVERY_TOLERANCE`] times that value, i.e. for a damping ratio below about 0.001.
     pub c_over_m_relative: f64,
-    /// True if `c_over_m_relative` is relative to critical damping.
-    pub undamped: bool,
+    /// True if `c_over_m_relative` is relative to the critical value because the true damping is negligible.
+    #[serde(rename = "undamped")]
+    pub relative_to_critical: bool,
 }
 
 impl TruthErrors {
@@ -43,8 +47,8 @@ impl TruthErrors {
         let mass = largest_error(&nodal.mass, &truth.mass);
         let stiffness_scale = largest(&real.k_over_m);
         let critical = 2.0 * stiffness_scale.sqrt();
-        let undamped = largest(&real.c_over_m) < RECOVERED * critical;
-        let damping_scale = match undamped {
+        let relative_to_critical = largest(&real.c_over_m) < RECOVERY_TOLERANCE * critical;
+        let damping_scale = match relative_to_critical {
             true => critical,
             false => largest(&real.c_over_m),
         };
@@ -58,7 +62,7 @@ impl TruthErrors {
             mass_relative: relative(mass, largest(&truth.mass)),
             k_over_m_relative: relative(k_over_m, stiffness_scale),
             c_over_m_relative: relative(c_over_m, damping_scale),
-            undamped,
+            relative_to_critical,
         }
     }
 
@@ -77,7 +81,7 @@ fn largest(f: &[f64]) -> f64 {
     f.iter().map(|x| x.abs()).fold(0.0, f64::max)
 }
 
-/// Largest absolute error; infinite where a ratio is not finite because the mass is zero.
+/// Returns the largest absolute difference; a difference that is NaN, e.g. 0/0 at zero mass, counts as infinite.
 fn largest_error(found: &[f64], truth: &[f64]) -> f64 {
     let distance = |(a, b): (&f64, &f64)| {
         let distance = (a - b).abs();
@@ -90,14 +94,16 @@ fn largest_error(found: &[f64], truth: &[f64]) -> f64 {
     found.iter().zip(truth).map(distance).fold(0.0, f64::max)
 }
 
-/// Roughness integrals of the functions by finite differences of nodal values, independent of the basis.
+/// Roughness by finite differences of nodal values, independent of the basis: `integral (m'')^2 dt` over the interior nodes,
+/// `integral (c')^2 dt` and `integral (k')^2 dt` over the steps. The mass uses the second derivative because the true mass of
+/// the paper falls linearly, and thus has zero roughness, as the constant true damping and stiffness.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Roughness {
-    /// Integral `integral (m'')^2 dt`, kg^2/s^3.
+    /// Roughness of the mass, `integral (m'')^2 dt`, kg^2/s^3.
     pub mass: f64,
-    /// Integral `integral (c')^2 dt`, N^2 s/m^2.
+    /// Roughness of the damping, `integral (c')^2 dt`, N^2 s/m^2.
     pub damping: f64,
-    /// Integral `integral (k')^2 dt`, N^2/(m^2 s).
+    /// Roughness of the stiffness, `integral (k')^2 dt`, N^2/(m^2 s).
     pub stiffness: f64,
 }
 
@@ -120,7 +126,8 @@ impl Roughness {
     }
 }
 
-/// True if two true systems agree at the nodes of the second grid within the span of the first.
+/// Returns true if every function of the second system differs, at the nodes of its grid within the span of the first grid,
+/// from the linearly interpolated first by at most [`SAME_TRUTH`] times the larger maximum; also true if no node lies there.
 pub fn is_same_truth(
     (one, grid): (&NodalCoefficients, &Grid),
     (other, other_grid): (&NodalCoefficients, &Grid),
@@ -129,8 +136,8 @@ pub fn is_same_truth(
     let close = |f: &[f64], g: &[f64]| {
         let size = f.iter().chain(g).map(|x| x.abs()).fold(0.0, f64::max);
         times.iter().zip(g).all(|(t, value)| {
-            let place = (t - grid.start()) / grid.step();
-            interpolate(f, place).is_none_or(|x| (x - value).abs() <= SAME_TRUTH * size)
+            let index = (t - grid.start()) / grid.step();
+            interpolate(f, index).is_none_or(|x| (x - value).abs() <= SAME_TRUTH * size)
         })
     };
     one.functions()
@@ -138,14 +145,14 @@ pub fn is_same_truth(
         .all(|(f, g)| close(f, g))
 }
 
-/// Linear interpolation between nodes; `None` outside.
-fn interpolate(f: &[f64], place: f64) -> Option<f64> {
-    let i = place.floor();
+/// Interpolates linearly at the fractional node index `index`; `None` before the first node and from the last node on.
+fn interpolate(f: &[f64], index: f64) -> Option<f64> {
+    let i = index.floor();
     if i < 0.0 || i + 1.0 >= f.len() as f64 {
         return None;
     }
-    let (i, share) = (i as usize, place - i);
-    Some(f[i] + share * (f[i + 1] - f[i]))
+    let (i, fraction) = (i as usize, index - i);
+    Some(f[i] + fraction * (f[i + 1] - f[i]))
 }
 
 #[cfg(test)]
@@ -160,7 +167,7 @@ mod tests {
         }
     }
 
-    /// For m = t^2 on [0, 1], (m'')^2 = 4 at the inner nodes.
+    /// For m = 1 + t^2 on [0, 1], (m'')^2 = 4 at the 999 interior nodes.
     #[test]
     fn roughness_of_a_parabola() {
         let step = 1e-3;
@@ -177,7 +184,7 @@ mod tests {
         let truth = nodal(&[1.0, 0.5, 0.8], 0.1, 1.0);
         let doubled = nodal(&[2.0, 1.0, 1.6], 0.2, 2.0);
         let errors = TruthErrors::of(&doubled, &truth);
-        assert!(errors.within(RECOVERED) && !errors.undamped);
+        assert!(errors.within(RECOVERY_TOLERANCE) && !errors.relative_to_critical);
         assert_eq!(errors.mass_relative, 1.0);
     }
 
@@ -185,15 +192,15 @@ mod tests {
     fn negligible_damping_is_compared_with_critical_damping() {
         let truth = nodal(&[1.0, 1.0], 0.0, 1.0);
         let errors = TruthErrors::of(&nodal(&[1.0, 1.0], 0.02, 1.0), &truth);
-        assert!(errors.undamped);
+        assert!(errors.relative_to_critical);
         assert!((errors.c_over_m_relative - 0.01).abs() < 1e-15);
-        assert!(!errors.within(RECOVERED));
+        assert!(!errors.within(RECOVERY_TOLERANCE));
     }
 
     #[test]
     fn a_system_without_mass_is_not_recovered() {
         let truth = nodal(&[1.0, 1.0], 0.0, 1.0);
         let errors = TruthErrors::of(&nodal(&[1.0, 0.0], 0.0, 1.0), &truth);
-        assert!(!errors.within(RECOVERED));
+        assert!(!errors.within(RECOVERY_TOLERANCE));
     }
 }

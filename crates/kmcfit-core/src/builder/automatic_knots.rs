@@ -74,7 +74,7 @@ impl Builder {
             let mut weightings = record.channels.iter().map(|c| c.weighting.as_ref());
             !record.validation && weightings.any(|w| !w.is_some_and(Weighting::is_sigma))
         };
-        match self.simulation {
+        match self.is_simulation {
             true => None,
             false => self.records.iter().position(is_without),
         }

@@ -2,7 +2,7 @@
 
 use super::coefficient_sets::CoefficientSets;
 use super::constraints::of_bounds;
-use super::place::Placement;
+use super::experiment::ExperimentBuilder;
 use super::{BuildError, BuildNotice, Builder, Built, Record, identifiable};
 use crate::functions::Parameterization;
 use crate::problem::Problem;
@@ -41,19 +41,19 @@ impl Builder {
         let mut validation = Vec::new();
         let mut experiments = Vec::new();
         for (i, record) in self.records.iter().enumerate() {
-            let placement = Placement {
+            let builder = ExperimentBuilder {
                 key: format!("experiments[{i}]"),
                 record,
                 grid: &grid,
                 coefficient_set: coefficient_sets.of_record[i],
                 is_equation_error: self.is_equation_error(),
-                simulation: self.simulation,
+                is_simulation: self.is_simulation,
             };
             if record.validation {
                 let mut own = Vec::new();
-                validation.push((placement.experiment(&mut own)?, own));
+                validation.push((builder.build(&mut own)?, own));
             } else {
-                experiments.push(placement.experiment(&mut scalars)?);
+                experiments.push(builder.build(&mut scalars)?);
             }
         }
         let problem = Problem::new(system, functions.with_scalars(scalars), experiments);
@@ -200,7 +200,7 @@ impl Builder {
         problem: &Problem,
         notices: &mut Vec<BuildNotice>,
     ) -> Result<Option<Measurements>, BuildError> {
-        if !self.is_equation_error() || self.simulation {
+        if !self.is_equation_error() || self.is_simulation {
             return Ok(None);
         }
         let measurements = Measurements::of(problem).map_err(|unsuited| {

@@ -35,11 +35,11 @@ mod coefficient;
 mod coefficient_sets;
 mod constraints;
 mod error;
+mod experiment;
 mod identifiable;
 mod lowering;
 mod notice;
 mod penalties;
-mod place;
 mod record;
 
 pub use basis::{BasisSpec, Knots};
@@ -67,7 +67,7 @@ pub struct Builder {
     grid: Option<Grid>,
     method: Method,
     solver: Solver,
-    simulation: bool,
+    is_simulation: bool,
     constraints: Vec<ConstraintSpec>,
 }
 
@@ -116,7 +116,7 @@ impl Builder {
             grid: None,
             method: Method::Rk4,
             solver: Solver::GaussNewton,
-            simulation: false,
+            is_simulation: false,
             constraints: Vec::new(),
         }
     }
@@ -194,7 +194,7 @@ impl Builder {
     /// Builds a problem for simulation: channels define the length and start of a record and are not compared.
     #[must_use]
     pub fn simulation(mut self) -> Self {
-        self.simulation = true;
+        self.is_simulation = true;
         self
     }
 

@@ -33,7 +33,7 @@ pub struct NoiseCoordinates {
     /// Logarithm of sigma relative to its reference value, where it is estimated.
     pub log_sigma: Option<f64>,
     /// Inverse hyperbolic tangents of the partial autocorrelations, or the logarithm of the correlation time.
-    pub law: Vec<f64>,
+    pub correlation_parameters: Vec<f64>,
 }
 
 impl NoiseCoordinates {
@@ -41,7 +41,7 @@ impl NoiseCoordinates {
         let first = usize::from(estimates_sigma);
         Self {
             log_sigma: estimates_sigma.then(|| list[0]),
-            law: list[first..].to_vec(),
+            correlation_parameters: list[first..].to_vec(),
         }
     }
 }
@@ -84,22 +84,22 @@ impl ChannelMoments {
             }
             Some(correlation) => Products::Rows(rows.clone(), correlation.clone()),
         };
-        let law = correlation.map_or(Vec::new(), Correlation::coordinates);
+        let correlation_parameters = correlation.map_or(Vec::new(), Correlation::coordinates);
         let sigma = estimates_sigma.then_some(0.0);
         Self {
             samples: rows.nrows(),
             estimates_sigma,
-            start: sigma.into_iter().chain(law).collect(),
+            start: sigma.into_iter().chain(correlation_parameters).collect(),
             products,
         }
     }
 
-    /// Gram matrix of the whitened rows at the coordinates `law`, and `log |R|`.
-    fn whitened(&self, law: &[f64]) -> (DMatrix<f64>, f64) {
+    /// Gram matrix of the whitened rows at `correlation_parameters`, and `log |R|`.
+    fn whitened(&self, correlation_parameters: &[f64]) -> (DMatrix<f64>, f64) {
         match &self.products {
             Products::White(gram) => (gram.clone(), 0.0),
             Products::Rows(rows, correlation) => {
-                let correlation = correlation.at(law);
+                let correlation = correlation.at(correlation_parameters);
                 let mut whitened = rows.clone();
                 for (mut to, from) in whitened.column_iter_mut().zip(rows.column_iter()) {
                     to.copy_from_slice(&correlation.whiten(from.as_slice()));
@@ -107,7 +107,7 @@ impl ChannelMoments {
                 (whitened.tr_mul(&whitened), correlation.log_determinant())
             }
             Products::Autoregressive { lags, head, rest } => {
-                let process = Autoregression::from_coordinates(law);
+                let process = Autoregression::from_coordinates(correlation_parameters);
                 let variance = process.innovation_variance();
                 let minus = process.coefficients().iter().map(|a| -a);
                 let filter: Vec<f64> = std::iter::once(1.0).chain(minus).collect();
@@ -190,7 +190,7 @@ impl RestrictedLikelihood {
         let mut gram = self.known.clone();
         for channel in &self.channels {
             let noise = NoiseCoordinates::of(channel.estimates_sigma, &channel.start);
-            gram += channel.whitened(&noise.law).0;
+            gram += channel.whitened(&noise.correlation_parameters).0;
         }
         for (penalty, is_finite) in PenaltyMoments::start(&mut penalties, &gram) {
             self.infinite.push(match is_finite {
@@ -233,7 +233,7 @@ impl RestrictedLikelihood {
         let mut gram = self.known.clone();
         let mut constant = 0.0;
         for (channel, noise) in self.channels.iter().zip(self.split(at)) {
-            let (own, determinant) = channel.whitened(&noise.law);
+            let (own, determinant) = channel.whitened(&noise.correlation_parameters);
             let log_sigma = noise.log_sigma.unwrap_or(0.0);
             gram += own * (-2.0 * log_sigma).exp();
             constant += 2.0 * channel.samples as f64 * log_sigma + determinant;
@@ -510,7 +510,7 @@ mod tests {
             let correlation = Correlation::new(law, &times).unwrap();
             let moments = ChannelMoments::new(&rows(&all), Some(&correlation), true);
             let found = RestrictedLikelihood::new(vec![moments], DMatrix::zeros(7, 7)).fit();
-            mean += found.unwrap().channels[0].law[0].tanh() / seeds as f64;
+            mean += found.unwrap().channels[0].correlation_parameters[0].tanh() / seeds as f64;
         }
         // The standard error of each mean is 0.1/sqrt(200) = 0.007; six sines take much of the low frequencies.
         assert!(

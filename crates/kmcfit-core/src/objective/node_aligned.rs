@@ -3,8 +3,8 @@
 use super::SimulatedRecord;
 use crate::record::{Channel, ChannelKind};
 use crate::simd::{Arithmetic, Eight, Kernel, LANES, Row};
+use crate::simulate::fast::lane_reads;
 use crate::simulate::fast::nodal_observations::{Accelerations, NodalObservations};
-use crate::simulate::fast::padded_loads;
 use crate::simulate::{CoefficientGradient, Trajectory};
 use crate::system::{Excitation, FUNCTIONS};
 
@@ -16,22 +16,22 @@ impl Channel {
 
     /// Force and acceleration of the base at eight samples from sample `i`; undefined beyond the last sample.
     #[inline(always)]
-    fn around_eight<A: Arithmetic>(
+    fn inputs_at_eight<A: Arithmetic>(
         &self,
         arithmetic: A,
         excitation: Option<&Excitation>,
         i: usize,
     ) -> [Eight<A>; 2] {
-        if let Some(around) = self.surroundings() {
-            return [0, 1].map(|part| padded_loads::eight(arithmetic, &around[part], i));
+        if let Some(inputs) = self.inputs_at_samples() {
+            return [0, 1].map(|part| lane_reads::eight(arithmetic, &inputs[part], i));
         }
         let mut rows = [[0.0; LANES]; 2];
         if excitation.is_some() {
             let [forces, bases] = &mut rows;
             let lanes = forces.iter_mut().zip(bases).enumerate();
             for (l, (force, base)) in lanes.take(self.len() - i) {
-                let around = self.around_sample(excitation, i + l);
-                (*force, *base) = (around.force, around.base);
+                let input = self.input_at_sample(excitation, i + l);
+                (*force, *base) = (input.force, input.base);
             }
         }
         rows.map(|row| Eight::load(arithmetic, &row))
@@ -51,8 +51,8 @@ impl Channel {
             nodal: view.nodal,
             states: view.response,
         };
-        let around = self.around_eight(arithmetic, view.excitation, i);
-        nodes.accelerations(arithmetic, i, around, observed);
+        let inputs = self.inputs_at_eight(arithmetic, view.excitation, i);
+        nodes.accelerations(arithmetic, i, inputs, observed);
     }
 }
 
@@ -77,7 +77,7 @@ impl Kernel for Predict<'_> {
             channel.accelerations(arithmetic, view, from, &mut observed);
             let mut value = Eight::load(arithmetic, &observed.value);
             if !channel.base().is_empty() {
-                value += padded_loads::eight(arithmetic, channel.base(), from);
+                value += lane_reads::eight(arithmetic, channel.base(), from);
             }
             let mut row = (factor * value).row();
             if (offset, drift) != (0.0, 0.0) {

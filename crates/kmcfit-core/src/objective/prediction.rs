@@ -19,7 +19,7 @@ impl Channel {
             view.excitation,
             view.response,
             self.places()[i],
-            self.around_sample(view.excitation, i),
+            self.input_at_sample(view.excitation, i),
         );
         if let Some(base) = self.base().get(i) {
             sensed.value += base;

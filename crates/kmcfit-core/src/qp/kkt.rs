@@ -3,7 +3,7 @@
 //! The status of a solver refers to its own iterates, tests and scaling. Here the Karush–Kuhn–Tucker conditions are computed from the data
 //! of the program, each in a unit that is independent of the units of rows, variables and cost.
 
-use super::sum::{Sum, add, distances};
+use super::dot2::{CompensatedSum, add_transposed_product, residuals};
 use super::{PrimalDual, Subproblem};
 use crate::constraints::{Rows, TOLERANCE};
 
@@ -82,12 +82,12 @@ impl Subproblem {
         let mut candidate = candidate.clone();
         candidate.project_multipliers(self);
         let z = &candidate.z;
-        let residuals = distances(&self.residuals, z);
+        let residuals = residuals(&self.residuals, z);
         let at_zero = self.value(&vec![0.0; self.variables]) - self.constant;
         let joined = self.joined_sizes(z);
         let scale = self.cost_scale(z, &joined, at_zero);
         let natural = self.natural_scales(z, &joined, scale);
-        let mut gradient = vec![Sum::default(); self.variables];
+        let mut gradient = vec![CompensatedSum::default(); self.variables];
         for ((sum, d), z) in gradient.iter_mut().zip(&self.proximal).zip(z) {
             sum.add_product(*d, *z);
         }
@@ -97,13 +97,13 @@ impl Subproblem {
             (&self.equalities, &candidate.equalities),
             (&self.inequalities, &candidate.inequalities),
         ] {
-            add(&mut gradient, rows, factors);
+            add_transposed_product(&mut gradient, rows, factors);
         }
         for (cone, multipliers) in self.cones.iter().zip(&candidate.cones) {
             let negative: Vec<f64> = multipliers.iter().map(|c| -c).collect();
-            add(&mut gradient, &cone.rows, &negative);
+            add_transposed_product(&mut gradient, &cone.rows, &negative);
         }
-        let gradient: Vec<f64> = gradient.iter().map(Sum::total).collect();
+        let gradient: Vec<f64> = gradient.iter().map(CompensatedSum::total).collect();
         let within = gradient.iter().zip(&natural);
         let within = within.map(|(r, x)| (r * x) * (r * x)).sum::<f64>().sqrt();
         let near = gradient.iter().zip(&self.proximal);
@@ -201,10 +201,10 @@ impl Subproblem {
 
     fn add_rows(&self, candidate: &PrimalDual, natural: &[f64], sums: &mut RowResiduals) {
         let z = &candidate.z;
-        for (i, distance) in distances(&self.equalities, z).into_iter().enumerate() {
+        for (i, residual) in residuals(&self.equalities, z).into_iter().enumerate() {
             let right = self.equalities.right()[i];
             let size = terms(&self.equalities, i, natural).max(right.abs());
-            sums.violate(distance.abs(), size, candidate.equalities[i]);
+            sums.violate(residual.abs(), size, candidate.equalities[i]);
         }
         let values = self.inequalities.multiply(z);
         for (i, value) in values.iter().enumerate() {
@@ -225,7 +225,7 @@ impl Subproblem {
                 sums.complementarity += (multiplier * (bound - value)).abs();
             }
         }
-        for (i, jump) in distances(&self.absolute, z).into_iter().enumerate() {
+        for (i, jump) in residuals(&self.absolute, z).into_iter().enumerate() {
             let half = 0.5 * self.absolute_weights[i];
             let lost = half - candidate.absolute[i] * jump.signum();
             sums.complementarity += lost.max(0.0) * jump.abs();

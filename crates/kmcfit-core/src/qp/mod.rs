@@ -7,6 +7,7 @@
 mod chain;
 mod clarabel;
 mod contradiction;
+mod dot2;
 mod few_variables;
 mod kkt;
 mod ldl;
@@ -17,7 +18,6 @@ mod scaling;
 mod solve;
 mod stages;
 mod subproblem;
-mod sum;
 
 pub use kkt::Kkt;
 pub use primal_dual::PrimalDual;

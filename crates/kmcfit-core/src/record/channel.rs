@@ -22,8 +22,8 @@ pub struct Channel {
     pub(super) noise_model: NoiseModel,
     pub(super) noise: NoiseEstimate,
     sensor: Sensor,
-    /// Forces and accelerations of the base at the samples, if given.
-    around: Option<[Vec<f64>; 2]>,
+    /// Forces (N) and base accelerations (m/s^2) at the samples, if given.
+    inputs_at_samples: Option<[Vec<f64>; 2]>,
     base: Vec<f64>,
     filter: Vec<SecondOrder>,
     /// True if sample `i` lies on node `i`.
@@ -64,7 +64,7 @@ impl Channel {
             noise_model: NoiseModel::default(),
             noise: NoiseEstimate::default(),
             sensor: Sensor::default(),
-            around: None,
+            inputs_at_samples: None,
             base: Vec::new(),
             filter: Vec::new(),
         })
@@ -109,17 +109,17 @@ impl Channel {
         self
     }
 
-    /// Sets force and acceleration of the base at the times of the samples, on which accelerations depend; otherwise both are linear
-    /// over each step.
+    /// Sets force (N) and base acceleration (m/s^2) at the samples, on which accelerations depend; otherwise both are linear over
+    /// each step.
     ///
     /// # Panics
     /// If there is not one for each sample.
     #[must_use]
-    pub fn with_surroundings(mut self, around: Vec<InputSample>) -> Self {
-        assert_eq!(around.len(), self.times.len(), "one for each sample");
-        let forces = around.iter().map(|a| a.force).collect();
-        let bases = around.iter().map(|a| a.base).collect();
-        self.around = Some([forces, bases]);
+    pub fn with_inputs_at_samples(mut self, inputs: Vec<InputSample>) -> Self {
+        assert_eq!(inputs.len(), self.times.len(), "one for each sample");
+        let forces = inputs.iter().map(|input| input.force).collect();
+        let bases = inputs.iter().map(|input| input.base).collect();
+        self.inputs_at_samples = Some([forces, bases]);
         self
     }
 
@@ -196,7 +196,8 @@ impl Channel {
             weighting,
             loss: self.loss,
             sensor: self.sensor,
-            around: (self.around.as_ref()).map(|parts| parts.each_ref().map(|p| short(p))),
+            inputs_at_samples: (self.inputs_at_samples.as_ref())
+                .map(|parts| parts.each_ref().map(|p| short(p))),
             base: short(&self.base),
             filter: self.filter.clone(),
             on_every_node: self.on_every_node,
@@ -283,14 +284,14 @@ impl Channel {
         &self.filter
     }
 
-    /// Force and acceleration of the base at sample `i`: as given, or linear over the step.
-    pub(crate) fn around_sample(&self, excitation: Option<&Excitation>, i: usize) -> InputSample {
-        match (&self.around, excitation) {
+    /// Force and base acceleration at sample `i`: as given, or linear over the step.
+    pub(crate) fn input_at_sample(&self, excitation: Option<&Excitation>, i: usize) -> InputSample {
+        match (&self.inputs_at_samples, excitation) {
             (Some([forces, bases]), _) => InputSample {
                 force: forces[i],
                 base: bases[i],
             },
-            (None, Some(excitation)) => excitation.around(self.places[i]),
+            (None, Some(excitation)) => excitation.input_at(self.places[i]),
             (None, None) => InputSample::default(),
         }
     }
@@ -330,10 +331,10 @@ impl Channel {
         self.on_every_node
     }
 
-    /// Forces and accelerations of the base at the samples, if given.
+    /// Forces (N) and base accelerations (m/s^2) at the samples, if given.
     #[inline(always)]
-    pub(crate) fn surroundings(&self) -> Option<&[Vec<f64>; 2]> {
-        self.around.as_ref()
+    pub(crate) fn inputs_at_samples(&self) -> Option<&[Vec<f64>; 2]> {
+        self.inputs_at_samples.as_ref()
     }
 
     /// Filtered series of values at the samples.

@@ -7,8 +7,8 @@ use super::correlation_estimation::{
 use super::executor::search;
 use super::fit::{Fit, measured};
 use super::history::IterationRecord;
+use super::reml::{estimates_weights, refined, start_weights};
 use super::reml_by_traces::with_reml_weights;
-use super::restricted_estimation::{estimates_weights, refined, start_weights};
 use super::settings::FitSettings;
 use super::start_strategy::search_from_starts;
 use super::termination::Status;

@@ -4,7 +4,7 @@
 //! in one linearisation, with estimated sigmas changed by the factor `(misfit / (n - effective parameters))^(1/2)`.
 
 use super::fit::Fit;
-use super::restricted_estimation::is_estimated;
+use super::reml::is_estimated;
 use super::timings::Timings;
 use super::traces::Traces;
 use crate::problem::Problem;

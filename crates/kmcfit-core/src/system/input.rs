@@ -97,7 +97,7 @@ impl Excitation {
     }
 
     /// Force and base acceleration at a point, linear between the ends of its step.
-    pub fn around(&self, place: TimePoint) -> InputSample {
+    pub fn input_at(&self, place: TimePoint) -> InputSample {
         let at = |part: &Option<StageSamples>| {
             part.as_ref().map_or(0.0, |p| {
                 let [left, _, right] = p.0[place.step];

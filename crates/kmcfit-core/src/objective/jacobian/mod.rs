@@ -163,12 +163,12 @@ fn sweep(
     steps: Range<usize>,
     take: &mut impl FnMut(RowBlock) -> RowBlock,
 ) -> Vec<[f64; 2]> {
-    let moving = SensitivityLayout::new(&problem.functions, order, experiment);
+    let layout = SensitivityLayout::new(&problem.functions, order, experiment);
     let is_later = steps.start > 0;
     let places = order.len() + 2 * usize::from(is_later);
     let mut tangents = match is_later {
-        false => moving.tangents(),
-        true => moving.tangents_from_any_state(),
+        false => layout.tangents(),
+        true => layout.tangents_from_any_state(),
     };
     let mut readers = Vec::with_capacity(experiment.channels.len());
     for channel in &experiment.channels {
@@ -194,7 +194,7 @@ fn sweep(
     let mut last = 0;
     while from < steps.end {
         let to = (from + TILE).min(steps.end);
-        moving.fill(&mut tangents, from, from == steps.start);
+        layout.set_perturbations(&mut tangents, from, from == steps.start);
         tangents.advance(base, from..to);
         for (reader, block) in &mut readers {
             while reader.read(&tangents, from..to, block) {

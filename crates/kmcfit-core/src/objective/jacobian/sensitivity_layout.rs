@@ -1,43 +1,53 @@
-//! Layout of forward sensitivities: assignment of parameters to groups of eight directions (lanes).
+//! Assigns each estimated parameter, i.e. each Jacobian column, to a group of eight columns and a SIMD lane, and supplies the
+//! perturbations dp/dtheta of the coefficient functions.
 
 use crate::functions::{Design, Parameterization};
 use crate::record::Experiment;
 use crate::simd::LANES;
 use crate::simulate::fast::sensitivities::{ConstantPerturbation, Slot, TILE_NODES, Tangents};
 
-/// Estimated functions of an experiment's coefficient set and the columns of their parameters.
+/// Functions of the coefficient set of one experiment, with the group and lane of each of their parameters.
 pub(super) struct SensitivityLayout<'a> {
-    parts: Vec<FunctionLayout<'a>>,
+    functions: Vec<FunctionLayout<'a>>,
+    /// Pairs of column group and function, by group, then function.
     slots: Vec<Slot>,
+    /// Number of groups of eight columns.
     groups: usize,
-    /// Estimated initial states, as pairs of state and column.
-    seeds: Vec<(usize, usize)>,
+    /// Estimated initial states as (0 for displacement or 1 for velocity, column).
+    initial_states: Vec<(usize, usize)>,
     /// Number of columns.
-    places: usize,
+    columns: usize,
 }
 
+/// One function of the coefficient set.
 struct FunctionLayout<'a> {
+    /// Basis values `b_j(t_i)`, nodes x parameters of the function.
     design: &'a Design,
-    /// Slots of the groups of the function.
+    /// Indices into the slots (pairs of column group and function) of this function.
     slots: Vec<usize>,
-    /// Slot and lane of each parameter.
+    /// Index of the slot, and lane, of each parameter.
     lanes: Vec<(usize, usize)>,
-    constant: bool,
+    /// True if the function is equal at all nodes for every parameter value.
+    is_constant: bool,
 }
 
 impl<'a> SensitivityLayout<'a> {
-    /// Layout for the parameters `order` of the columns, [`LANES`] columns per group.
+    /// Lays out the sensitivities for one experiment; `order[column]` is the parameter of a column ([`Problem::places`]), and
+    /// [`LANES`] consecutive columns form a group.
+    ///
+    /// [`Problem::places`]: crate::problem::Problem::places
     pub fn new(functions: &'a Parameterization, order: &[usize], experiment: &Experiment) -> Self {
-        let mut places = vec![0; order.len()];
-        for (place, j) in order.iter().enumerate() {
-            places[*j] = place;
+        let mut column_of = vec![0; order.len()];
+        for (column, j) in order.iter().enumerate() {
+            column_of[*j] = column;
         }
         let scalars = functions.scalar_range().start;
         let estimated = experiment.initial_parameters.into_iter().enumerate();
-        let seeds = estimated.filter_map(|(state, index)| Some((state, places[scalars + index?])));
+        let initial_states =
+            estimated.filter_map(|(state, index)| Some((state, column_of[scalars + index?])));
         let assembly = functions.coefficient_set(experiment.coefficient_set);
         let slot_of = |function: usize, j: usize| Slot {
-            group: places[j] / LANES,
+            group: column_of[j] / LANES,
             function,
         };
         let mut slots: Vec<Slot> = (assembly.iter().enumerate())
@@ -49,65 +59,69 @@ impl<'a> SensitivityLayout<'a> {
         let find = |slot: Slot| {
             slots.partition_point(|s| (s.group, s.function) < (slot.group, slot.function))
         };
-        let part = |(function, &f): (usize, &usize)| {
+        let layout = |(function, &f): (usize, &usize)| {
             let design = &functions.get(f).design;
-            let lane = |j: usize| (find(slot_of(function, j)), places[j] % LANES);
+            let lane = |j: usize| (find(slot_of(function, j)), column_of[j] % LANES);
             let own = (0..slots.len()).filter(|s| slots[*s].function == function);
             FunctionLayout {
                 design,
                 slots: own.collect(),
                 lanes: functions.ranges()[f].clone().map(lane).collect(),
-                constant: functions.is_constant(f),
+                is_constant: functions.is_constant(f),
             }
         };
         Self {
-            parts: assembly.iter().enumerate().map(part).collect(),
-            seeds: seeds.collect(),
+            functions: assembly.iter().enumerate().map(layout).collect(),
+            initial_states: initial_states.collect(),
             slots,
             groups: order.len().div_ceil(LANES),
-            places: order.len(),
+            columns: order.len(),
         }
     }
 
+    /// Returns tangents that start with unit derivatives with respect to the estimated initial states, and zero otherwise.
     pub fn tangents(&self) -> Tangents {
         let mut initial = vec![[[0.0; LANES]; 2]; self.groups];
-        for &(state, place) in &self.seeds {
-            initial[place / LANES][state][place % LANES] = 1.0;
+        for &(state, column) in &self.initial_states {
+            initial[column / LANES][state][column % LANES] = 1.0;
         }
         Tangents::new(self.slots.clone(), &initial)
     }
 
-    /// Tangents from an arbitrary initial state, which has two columns behind the others.
+    /// Returns tangents that start at a later step; two further columns after the others are the derivatives with respect to
+    /// displacement and velocity at that step.
     pub fn tangents_from_any_state(&self) -> Tangents {
-        let mut initial = vec![[[0.0; LANES]; 2]; (self.places + 2).div_ceil(LANES)];
-        for (place, state) in (self.places..).zip([0, 1]) {
-            initial[place / LANES][state][place % LANES] = 1.0;
+        let mut initial = vec![[[0.0; LANES]; 2]; (self.columns + 2).div_ceil(LANES)];
+        for (column, state) in (self.columns..).zip([0, 1]) {
+            initial[column / LANES][state][column % LANES] = 1.0;
         }
         Tangents::new(self.slots.clone(), &initial)
     }
 
-    /// Sets the perturbations of the functions in the tile that starts at node `first`; `is_first` marks the first tile.
-    pub fn fill(&self, tangents: &mut Tangents, first: usize, is_first: bool) {
-        for part in &self.parts {
-            if !part.constant {
-                part.slots.iter().for_each(|slot| tangents.rest(*slot));
-                part.fill(tangents, first);
+    /// Writes the basis values b_j(t_i) at the nodes of the tile starting at node `first` into the lanes of their parameters;
+    /// constant functions are written in the first tile only, for which `is_first` is true.
+    pub fn set_perturbations(&self, tangents: &mut Tangents, first: usize, is_first: bool) {
+        for function in &self.functions {
+            if !function.is_constant {
+                (function.slots.iter()).for_each(|slot| tangents.clear(*slot));
+                function.set_perturbations(tangents, first);
             } else if is_first {
-                part.hold(tangents);
+                function.set_constant(tangents);
             }
         }
     }
 }
 
 impl FunctionLayout<'_> {
-    /// Sets the perturbation of a constant function, equal at all nodes.
-    fn hold(&self, tangents: &mut Tangents) {
+    /// Writes the perturbation of a constant function, equal at all nodes.
+    fn set_constant(&self, tangents: &mut Tangents) {
         for ((_, value), &(slot, lane)) in self.design.row(0).zip(&self.lanes) {
-            tangents.hold(slot, ConstantPerturbation { lane, value });
+            tangents.set_constant(slot, ConstantPerturbation { lane, value });
         }
     }
 
-    fn fill(&self, tangents: &mut Tangents, first: usize) {
+    /// Writes the basis values at the nodes of the tile starting at node `first` into the lanes of their parameters.
+    fn set_perturbations(&self, tangents: &mut Tangents, first: usize) {
         let mut set = |node: usize, parameter: usize, value: f64| {
             let (slot, lane) = self.lanes[parameter];
             tangents.changes_mut(slot)[node][lane] = value;

@@ -18,7 +18,7 @@ mod tests;
 
 pub use layout::{ResponseVariables, StageLayout};
 
-use super::sum::{Sum, add, distances};
+use super::dot2::{CompensatedSum, add_transposed_product, residuals};
 use super::{PrimalDual, Subproblem};
 use sizes::Sizes;
 use transcription::StageProgram;
@@ -105,21 +105,21 @@ impl Subproblem {
 
     /// Gradient of the Lagrangian of half the cost without the equalities.
     fn gradient(&self, point: &PrimalDual) -> Vec<f64> {
-        let mut gradient = vec![Sum::default(); self.variables];
+        let mut gradient = vec![CompensatedSum::default(); self.variables];
         for ((sum, d), z) in gradient.iter_mut().zip(&self.proximal).zip(&point.z) {
             sum.add_product(*d, *z);
         }
-        add(
+        add_transposed_product(
             &mut gradient,
             &self.residuals,
-            &distances(&self.residuals, &point.z),
+            &residuals(&self.residuals, &point.z),
         );
-        add(&mut gradient, &self.inequalities, &point.inequalities);
-        add(&mut gradient, &self.absolute, &point.absolute);
+        add_transposed_product(&mut gradient, &self.inequalities, &point.inequalities);
+        add_transposed_product(&mut gradient, &self.absolute, &point.absolute);
         for (cone, multipliers) in self.cones.iter().zip(&point.cones) {
             let negative: Vec<f64> = multipliers.iter().map(|c| -c).collect();
-            add(&mut gradient, &cone.rows, &negative);
+            add_transposed_product(&mut gradient, &cone.rows, &negative);
         }
-        gradient.iter().map(Sum::total).collect()
+        gradient.iter().map(CompensatedSum::total).collect()
     }
 }

@@ -1,6 +1,6 @@
 //! Continuous adjoint (Eq. 13) with its coefficients computed eight steps at a time.
 
-use super::padded_loads::places;
+use super::lane_reads::stage_values;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::reference::{Adjoint, AdjointEquation};
 
@@ -85,7 +85,7 @@ impl Kernel for Sweep<'_> {
 /// Values at the right nodes of the eight steps from `first` on, and means with those at the left nodes.
 #[inline(always)]
 fn right_and_middle<A: Arithmetic>(arithmetic: A, f: &[f64], first: usize) -> [Eight<A>; 2] {
-    let [_, middle, right] = places(arithmetic, f, first);
+    let [_, middle, right] = stage_values(arithmetic, f, first);
     [right, middle]
 }
 

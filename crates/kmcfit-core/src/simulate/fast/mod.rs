@@ -6,8 +6,8 @@
 pub(crate) mod blocks;
 pub(crate) mod continuous_adjoint;
 mod elements;
+pub(crate) mod lane_reads;
 pub(crate) mod nodal_observations;
-pub(crate) mod padded_loads;
 pub(crate) mod prefactored;
 pub(crate) mod sensitivities;
 pub(crate) mod simd_adjoint;

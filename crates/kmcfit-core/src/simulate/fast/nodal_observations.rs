@@ -2,7 +2,7 @@
 //! [`observe`](crate::simulate::reference::observe()) to some machine precisions.
 
 use super::elements::with_known;
-use super::padded_loads;
+use super::lane_reads;
 use crate::simd::{Arithmetic, Eight, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::system::{FUNCTIONS, MOST_TERMS, NodalCoefficients, System, Term};
@@ -43,12 +43,12 @@ impl NodalObservations<'_> {
         &self,
         arithmetic: A,
         i: usize,
-        around: [Eight<A>; 2],
+        inputs: [Eight<A>; 2],
         out: &mut Accelerations,
     ) {
         let terms = self.system.terms.as_slice();
         with_known!(terms, terms, TERMS => {
-            self.of_terms::<A, TERMS>(arithmetic, terms, i, around, out);
+            self.of_terms::<A, TERMS>(arithmetic, terms, i, inputs, out);
         });
     }
 
@@ -62,24 +62,24 @@ impl NodalObservations<'_> {
         out: &mut Accelerations,
     ) {
         let (zero, one) = (Eight::splat(arithmetic, 0.0), Eight::splat(arithmetic, 1.0));
-        let y = padded_loads::eight(arithmetic, &self.states.displacement, i);
-        let v = padded_loads::eight(arithmetic, &self.states.velocity, i);
-        let per_mass = one / padded_loads::eight(arithmetic, &self.nodal.mass, i);
-        let minus_per_mass = -per_mass;
+        let y = lane_reads::eight(arithmetic, &self.states.displacement, i);
+        let v = lane_reads::eight(arithmetic, &self.states.velocity, i);
+        let inverse_mass = one / lane_reads::eight(arithmetic, &self.nodal.mass, i);
+        let minus_inverse_mass = -inverse_mass;
         let mut push = force;
         let [mut by_y, mut by_v] = [zero; 2];
         for (j, term) in terms.iter().enumerate().take(TERMS) {
             let p = &self.nodal.coefficients[j];
-            let p = padded_loads::eight(arithmetic, p, i);
+            let p = lane_reads::eight(arithmetic, p, i);
             let response = term.respond(arithmetic, y, v);
             push = push - p * response.phi;
-            out.functions[j + 1] = (response.phi * minus_per_mass).row();
+            out.functions[j + 1] = (response.phi * minus_inverse_mass).row();
             by_y = response.by_y.taken_from(by_y, p);
             by_v = response.by_v.taken_from(by_v, p);
         }
-        let inertia = push * per_mass;
-        out.functions[0] = (inertia * minus_per_mass).row();
-        out.states = [(by_y * per_mass).row(), (by_v * per_mass).row()];
+        let inertia = push * inverse_mass;
+        out.functions[0] = (inertia * minus_inverse_mass).row();
+        out.states = [(by_y * inverse_mass).row(), (by_v * inverse_mass).row()];
         out.value = (inertia - base).row();
     }
 }

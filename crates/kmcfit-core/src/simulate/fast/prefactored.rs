@@ -4,7 +4,7 @@
 //! eight steps at a time. A step then consists of products and sums, ordered for short chains of dependent operations: the
 //! velocity of a stage follows by four operations from the displacement of the previous one.
 
-use super::padded_loads;
+use super::lane_reads;
 use crate::simd::{self, Arithmetic, Eight, Kernel, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
@@ -139,8 +139,8 @@ impl PrefactoredForward<'_> {
         there: [bool; MOST_TERMS],
     ) {
         let nodal = self.equation.nodal;
-        let is_constant = |j: usize| padded_loads::is_constant(&nodal.coefficients[j]);
-        let has_constant_mass = padded_loads::is_constant(&nodal.mass);
+        let is_constant = |j: usize| lane_reads::is_constant(&nodal.coefficients[j]);
+        let has_constant_mass = lane_reads::is_constant(&nodal.mass);
         let mut steady = [false; MOST_TERMS];
         for (steady, kind) in steady.iter_mut().zip(&self.kinds) {
             *steady = has_constant_mass && kind.is_some_and(is_constant);
@@ -152,12 +152,12 @@ impl PrefactoredForward<'_> {
         (response.displacement[0], response.velocity[0]) = (y, v);
         let mut from = 0;
         while from < steps {
-            let per_mass = padded_loads::per_mass(arithmetic, &nodal.mass, from);
+            let inverse_mass = lane_reads::inverse_mass(arithmetic, &nodal.mass, from);
             prepare_drive(
                 arithmetic,
                 tableau,
                 &self.equation,
-                &per_mass,
+                &inverse_mass,
                 from,
                 &mut stages,
             );
@@ -173,7 +173,7 @@ impl PrefactoredForward<'_> {
                         tableau,
                         self.equation.dt,
                         values,
-                        &per_mass,
+                        &inverse_mass,
                         from,
                         k,
                         &mut stages,
@@ -214,14 +214,14 @@ fn prepare<A: Arithmetic, const S: usize>(
     tableau: &Tableau<S>,
     dt: f64,
     values: &[f64],
-    per_mass: &[Eight<A>; 3],
+    inverse_mass: &[Eight<A>; 3],
     i: usize,
     kind: usize,
     stages: &mut [StageRates; STAGES],
 ) {
-    let mut p = padded_loads::places(arithmetic, values, i);
-    for (p, per_mass) in p.iter_mut().zip(per_mass) {
-        *p = *p * *per_mass;
+    let mut p = lane_reads::stage_values(arithmetic, values, i);
+    for (p, inverse_mass) in p.iter_mut().zip(inverse_mass) {
+        *p = *p * *inverse_mass;
     }
     for (s, stage) in stages.iter_mut().enumerate().take(S) {
         let [next, end] = factors(tableau, dt, s);
@@ -237,23 +237,23 @@ fn prepare_drive<A: Arithmetic, const S: usize>(
     arithmetic: A,
     tableau: &Tableau<S>,
     equation: &EquationOfMotion,
-    per_mass: &[Eight<A>; 3],
+    inverse_mass: &[Eight<A>; 3],
     i: usize,
     stages: &mut [StageRates; STAGES],
 ) {
-    let force = padded_loads::stepwise(
+    let force = lane_reads::stage_samples(
         arithmetic,
         equation.excitation.and_then(|e| e.force.as_ref()),
         i,
     );
-    let base = padded_loads::stepwise(
+    let base = lane_reads::stage_samples(
         arithmetic,
         equation.excitation.and_then(|e| e.base.as_ref()),
         i,
     );
     for (s, stage) in stages.iter_mut().enumerate().take(S) {
         let q = tableau.position[s] as usize;
-        let push = force[q] * per_mass[q];
+        let push = force[q] * inverse_mass[q];
         let input = push - base[q];
         let [next, end] = factors(tableau, equation.dt, s);
         stage.next.input = (input * Eight::splat(arithmetic, next)).row();

@@ -107,7 +107,7 @@ impl Tangents {
     }
 
     /// Marks a slot's function as unperturbed in the next tile.
-    pub fn rest(&mut self, slot: usize) {
+    pub fn clear(&mut self, slot: usize) {
         if self.moves[slot] {
             self.changes[slot].fill([0.0; LANES]);
             self.moves[slot] = false;
@@ -121,7 +121,7 @@ impl Tangents {
     }
 
     /// Sets an equal perturbation of a slot's function at all nodes, along one direction.
-    pub fn hold(&mut self, slot: usize, steady: ConstantPerturbation) {
+    pub fn set_constant(&mut self, slot: usize, steady: ConstantPerturbation) {
         let mut row = [0.0; LANES];
         row[steady.lane] = steady.value;
         self.changes_mut(slot).fill(row);

@@ -1,7 +1,7 @@
 //! Linearisation of eight steps at a time about a known response.
 
 use super::elements::with_known;
-use super::padded_loads;
+use super::lane_reads;
 use crate::simd::{Arithmetic, Eight, LANES, Row};
 use crate::simulate::Trajectory;
 use crate::simulate::reference::equation::EquationOfMotion;
@@ -43,17 +43,17 @@ pub(super) struct RequestedDerivatives {
 
 /// Values of a function at the three [`StagePosition`]s of eight steps.
 #[derive(Clone, Copy)]
-struct Places<A: Arithmetic>([Eight<A>; 3]);
+struct StageValues<A: Arithmetic>([Eight<A>; 3]);
 
-impl<A: Arithmetic> Places<A> {
+impl<A: Arithmetic> StageValues<A> {
     #[inline(always)]
     fn of(arithmetic: A, values: &[f64], i: usize) -> Self {
-        Self(padded_loads::places(arithmetic, values, i))
+        Self(lane_reads::stage_values(arithmetic, values, i))
     }
 
     #[inline(always)]
-    fn stepwise(arithmetic: A, part: Option<&StageSamples>, i: usize) -> Self {
-        Self(padded_loads::stepwise(arithmetic, part, i))
+    fn samples(arithmetic: A, samples: Option<&StageSamples>, i: usize) -> Self {
+        Self(lane_reads::stage_samples(arithmetic, samples, i))
     }
 
     #[inline(always)]
@@ -118,17 +118,21 @@ impl<A: Arithmetic, const S: usize, const TERMS: usize> StageDerivatives<A, S, T
         i: usize,
     ) -> Self {
         let zero = Eight::splat(arithmetic, 0.0);
-        let per_mass = Places(padded_loads::per_mass(arithmetic, &equation.nodal.mass, i));
+        let inverse_mass = StageValues(lane_reads::inverse_mass(
+            arithmetic,
+            &equation.nodal.mass,
+            i,
+        ));
         let input = equation.excitation;
-        let force = Places::stepwise(arithmetic, input.and_then(|e| e.force.as_ref()), i);
-        let base = Places::stepwise(arithmetic, input.and_then(|e| e.base.as_ref()), i);
-        let mut functions = [Places([zero; 3]); TERMS];
+        let force = StageValues::samples(arithmetic, input.and_then(|e| e.force.as_ref()), i);
+        let base = StageValues::samples(arithmetic, input.and_then(|e| e.base.as_ref()), i);
+        let mut functions = [StageValues([zero; 3]); TERMS];
         let coefficients = equation.nodal.coefficients.iter().take(terms.len());
-        for (places, values) in functions.iter_mut().zip(coefficients) {
-            *places = Places::of(arithmetic, values, i);
+        for (stage_values, values) in functions.iter_mut().zip(coefficients) {
+            *stage_values = StageValues::of(arithmetic, values, i);
         }
-        let y0 = padded_loads::eight(arithmetic, &response.displacement, i);
-        let v0 = padded_loads::eight(arithmetic, &response.velocity, i);
+        let y0 = lane_reads::eight(arithmetic, &response.displacement, i);
+        let v0 = lane_reads::eight(arithmetic, &response.velocity, i);
         let [mut v, mut a] = [[zero; S]; 2];
         let mut stages = Self {
             by_y: [zero; S],
@@ -147,22 +151,22 @@ impl<A: Arithmetic, const S: usize, const TERMS: usize> StageDerivatives<A, S, T
                 }
             }
             v[s] = v_s;
-            let per_mass = per_mass.at(position);
-            let minus_per_mass = -per_mass;
+            let inverse_mass = inverse_mass.at(position);
+            let minus_inverse_mass = -inverse_mass;
             let mut push = force.at(position);
             for (j, term) in terms.iter().enumerate().take(TERMS) {
                 let p = functions[j].at(position);
                 let response = term.respond(arithmetic, y_s, v_s);
                 push = push - p * response.phi;
-                stages.by_function[s][j] = response.phi * minus_per_mass;
+                stages.by_function[s][j] = response.phi * minus_inverse_mass;
                 stages.by_y[s] = response.by_y.taken_from(stages.by_y[s], p);
                 stages.by_v[s] = response.by_v.taken_from(stages.by_v[s], p);
             }
-            let inertia = push * per_mass;
+            let inertia = push * inverse_mass;
             a[s] = inertia - base.at(position);
-            stages.by_y[s] = stages.by_y[s] * per_mass;
-            stages.by_v[s] = stages.by_v[s] * per_mass;
-            stages.by_mass[s] = inertia * minus_per_mass;
+            stages.by_y[s] = stages.by_y[s] * inverse_mass;
+            stages.by_v[s] = stages.by_v[s] * inverse_mass;
+            stages.by_mass[s] = inertia * minus_inverse_mass;
         }
         stages
     }

@@ -256,7 +256,7 @@ fn sensitivities(case: &Case, response: &Trajectory, holds: bool) -> [Trajectory
         for slot in 0..functions {
             if holds {
                 if let (0, Some(value)) = (first, case.numbers.get(slot)) {
-                    tangents.hold(
+                    tangents.set_constant(
                         slot,
                         ConstantPerturbation {
                             lane: slot,

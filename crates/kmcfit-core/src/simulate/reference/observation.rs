@@ -55,7 +55,7 @@ impl Observation {
 
 /// Observes `kind` at `place` of the response `states`.
 ///
-/// `around` is the force and the acceleration of the base at that time; `excitation` is that of the whole response.
+/// `input` is the force and the acceleration of the base at that time; `excitation` is that of the whole response.
 /// Accelerations are those of `y`, relative to the base.
 ///
 /// # Panics
@@ -67,7 +67,7 @@ pub fn observe(
     excitation: Option<&Excitation>,
     states: &Trajectory,
     place: TimePoint,
-    around: InputSample,
+    input: InputSample,
 ) -> Observation {
     let equation = EquationOfMotion {
         terms: &system.terms,
@@ -81,7 +81,7 @@ pub fn observe(
         ChannelKind::Acceleration => {
             let y = displacement(equation.dt, states, place);
             let v = velocity(equation, states, place);
-            acceleration(equation, place.step, place.fraction, around, &y, &v)
+            acceleration(equation, place.step, place.fraction, input, &y, &v)
         }
     }
 }
@@ -123,7 +123,7 @@ fn velocity(equation: EquationOfMotion, states: &Trajectory, place: TimePoint) -
             let at_end = |right: usize| {
                 let position = [StagePosition::Left, StagePosition::Right][right];
                 let part = |p: &Option<StageSamples>| p.as_ref().map_or(0.0, |p| p.at(i, position));
-                let around = equation
+                let input = equation
                     .excitation
                     .map_or(InputSample::default(), |e| InputSample {
                         force: part(&e.force),
@@ -133,7 +133,7 @@ fn velocity(equation: EquationOfMotion, states: &Trajectory, place: TimePoint) -
                 let speed = Observation::state(2 * right + 1, v[i + right]);
                 (
                     speed,
-                    acceleration(equation, i, right as f64, around, &here, &speed),
+                    acceleration(equation, i, right as f64, input, &here, &speed),
                 )
             };
             let [(v0, a0), (v1, a1)] = [at_end(0), at_end(1)];
@@ -151,7 +151,7 @@ fn acceleration(
     equation: EquationOfMotion,
     i: usize,
     x: f64,
-    around: InputSample,
+    input: InputSample,
     y: &Observation,
     v: &Observation,
 ) -> Observation {
@@ -161,7 +161,7 @@ fn acceleration(
         x => f[i] * (1.0 - x) + f[i + 1] * x,
     };
     let mass = blend(&equation.nodal.mass);
-    let mut inertia = around.force / mass;
+    let mut inertia = input.force / mass;
     let (mut by_y, mut by_v) = (0.0, 0.0);
     let mut by_function = [0.0; FUNCTIONS];
     for (j, (term, p)) in equation
@@ -188,6 +188,6 @@ fn acceleration(
             *f += share * slope;
         }
     }
-    sensed.value = inertia - around.base;
+    sensed.value = inertia - input.base;
     sensed
 }

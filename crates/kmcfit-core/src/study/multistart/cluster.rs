@@ -1,4 +1,5 @@
-//! Clusters of local minima: minima with the same ratios to the mass and the same responses.
+//! Groups converged minima whose `c/m`, `k/m` (and further coefficients over m) and displacements agree within a
+//! tolerance.
 
 use super::Waterfall;
 use crate::objective::Evaluation;
@@ -8,13 +9,15 @@ use crate::solvers::Status;
 /// Distance between two minima, dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distance {
-    /// Largest root mean square difference of a ratio `p/m`, relative to its natural size.
+    /// Largest RMS difference over the nodes of any coefficient divided by the mass (`c/m`, `k/m`, …), relative to the quotient
+    /// of their natural scales ([`Problem::natural_scales`]) at the first point.
     pub ratios: f64,
-    /// Root mean square difference of the displacements, relative to their own.
+    /// RMS displacement difference over all nodes and experiments, divided by the RMS displacement of the first point,
+    /// dimensionless.
     pub responses: f64,
 }
 
-/// Minima within the tolerance of each other.
+/// Minima within the tolerance of the one with the lowest cost.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cluster {
     /// Indices of the runs, by rising cost.
@@ -52,7 +55,7 @@ impl Waterfall {
     }
 }
 
-/// Distance between two points.
+/// Returns the distance from evaluation `a` to evaluation `b`, scaled by `a`. A difference that is NaN counts as infinite.
 pub fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> Distance {
     let natural = problem.natural_scales(a);
     let mut ratios = 0.0f64;
@@ -61,10 +64,7 @@ pub fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> Distance {
         for (j, (p, q)) in one.coefficients.iter().zip(&two.coefficients).enumerate() {
             let size = natural[assembly[j + 1]] / natural[assembly[0]];
             let changes = (0..p.len()).map(|i| p[i] / one.mass[i] - q[i] / two.mass[i]);
-            let change = rms(changes);
-            if change > 0.0 {
-                ratios = ratios.max(change / size);
-            }
+            ratios = ratios.max(relative(rms(changes), size));
         }
     }
     let pairs = a.trajectories.iter().zip(&b.trajectories);
@@ -76,14 +76,37 @@ pub fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> Distance {
         .trajectories
         .iter()
         .flat_map(|t| t.displacement.iter().copied());
-    let (change, own) = (rms(changes), rms(own));
     Distance {
         ratios,
-        responses: if change > 0.0 { change / own } else { 0.0 },
+        responses: relative(rms(changes), rms(own)),
+    }
+}
+
+/// Returns `change / size`: zero if `change` is zero, infinite if the quotient is NaN.
+fn relative(change: f64, size: f64) -> f64 {
+    let quotient = change / size;
+    match change {
+        0.0 => 0.0,
+        _ if quotient.is_nan() => f64::INFINITY,
+        _ => quotient,
     }
 }
 
 fn rms(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0usize), |(s, n), v| (s + v * v, n + 1));
     (sum / count.max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_difference_that_is_not_a_number_is_infinite() {
+        assert_eq!(relative(3.0, 2.0), 1.5);
+        assert_eq!(relative(0.0, 0.0), 0.0);
+        assert_eq!(relative(1.0, 0.0), f64::INFINITY);
+        assert_eq!(relative(f64::NAN, 1.0), f64::INFINITY);
+        assert_eq!(relative(f64::INFINITY, f64::INFINITY), f64::INFINITY);
+    }
 }

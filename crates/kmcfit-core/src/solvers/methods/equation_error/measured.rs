@@ -89,8 +89,8 @@ impl Measured {
         let (values, _) = unsensed(channel, scalars);
         let band = PassBand::of(&values, spacing)?;
         let excitation = experiment.excitation.as_ref();
-        let around = (0..channel.len()).map(|i| channel.around_sample(excitation, i));
-        let (force, base): (Vec<f64>, Vec<f64>) = around.map(|s| (s.force, s.base)).unzip();
+        let inputs = (0..channel.len()).map(|i| channel.input_at_sample(excitation, i));
+        let (force, base): (Vec<f64>, Vec<f64>) = inputs.map(|s| (s.force, s.base)).unzip();
         let sensed = |part: Vec<f64>| match channel.filter() {
             [] => part,
             filter => zero_phase(filter, &part),

@@ -1,5 +1,5 @@
-//! Sigmas, correlations and penalty weights of the largest restricted likelihood ([`RestrictedLikelihood`]), from the
-//! linearisation at the optimum of a fit.
+//! Estimates noise standard deviations, noise correlations and penalty weights by restricted maximum likelihood (REML,
+//! [`RestrictedLikelihood`]) from the linearisation at the optimum of a fit.
 
 use super::linearization::{add_penalties, add_priors};
 use crate::functions::{Penalty, WeightRule};
@@ -11,7 +11,7 @@ use crate::qp::Subproblem;
 use crate::record::{Channel, Loss, NoiseEstimate, Weighting};
 use nalgebra::DMatrix;
 
-/// Time over which a function may change under the start value of its penalty, as a share of the record.
+/// Ratio `tau/T` of the smoothing time of the initial penalty weight to the duration of the grid, dimensionless.
 const SMOOTHING_SHARE: f64 = 0.1;
 
 /// True if the weight of a penalty is estimated by restricted likelihood.
@@ -24,8 +24,12 @@ pub(super) fn estimates_weights(problem: &Problem) -> bool {
     problem.penalties.iter().any(is_estimated)
 }
 
-/// Sets the estimated weights to start values: the information of the samples on the level of the function equals that of the
-/// penalty on changes over the time `tau`, a tenth of the record: `w = |J 1|^2 tau^(2 order) / T`.
+/// Sets each weight estimated by restricted likelihood to `w = |A u|^2 tau^(2q) / T`.
+///
+/// `A` is the sqrt-weighted Jacobian of the predictions, `u` the parameters of the constant function 1, `q` the order of the
+/// penalty, `T` the duration of the grid (s), and `tau = T/10` ([`SMOOTHING_SHARE`]). With this weight, a uniform unit change of
+/// the function costs as much misfit as a derivative of order `q` of size `1/tau^q` throughout the grid (a unit change over `tau`)
+/// costs penalty. Weights are left as they are if the simulation at `start` fails or the formula gives no positive finite number.
 pub(super) fn start_weights(problem: &mut Problem, start: &[f64]) {
     let Ok(evaluation) = problem.evaluate(start) else {
         return;
@@ -56,21 +60,26 @@ pub(super) fn start_weights(problem: &mut Problem, start: &[f64]) {
     }
 }
 
-/// Weighted sum of squares of the changes of the predictions along a direction, with uncorrelated noise.
+/// Returns `sum w_i z_i^2`, in units of J, where `z` is the derivative of the predictions along `along`; noise correlation and
+/// robust losses are ignored.
 fn information(problem: &Problem, evaluation: &Evaluation, along: &[f64]) -> f64 {
-    let changes = problem.predictions_tangent(evaluation, along);
-    let channels = problem.channels().zip(changes.iter().flatten());
-    let each = channels.map(|(channel, changes)| {
+    let derivatives = problem.predictions_tangent(evaluation, along);
+    let channels = problem.channels().zip(derivatives.iter().flatten());
+    let each = channels.map(|(channel, derivatives)| {
         let weight = |i: usize| channel.weighting().weight(i, channel.len());
-        let squares = changes.iter().enumerate().map(|(i, z)| weight(i) * z * z);
+        let squares = derivatives
+            .iter()
+            .enumerate()
+            .map(|(i, z)| weight(i) * z * z);
         squares.sum::<f64>()
     });
     each.sum()
 }
 
-/// The problem with sigmas, correlations and weights of the largest restricted likelihood at an evaluated point, and the
-/// covariance of the noise. A robust loss keeps the noise of its channel. `None` with more than [`FEW_PARAMETERS`] parameters, or
-/// where nothing is to be estimated or the likelihood has no maximum.
+/// Returns a copy of the problem with the noise parameters and penalty weights that maximise the restricted likelihood
+/// linearised at `theta`; each channel stores the covariance of its noise coordinates. Channels with a robust loss keep their
+/// noise parameters. `None` with more than [`FEW_PARAMETERS`] parameters, if nothing is to be estimated, or if the likelihood has
+/// no maximum.
 pub(super) fn refined(
     problem: &Problem,
     theta: &[f64],
@@ -95,7 +104,8 @@ pub(super) fn refined(
     Some(next)
 }
 
-/// Likelihood of the noise and the weights, in the combinations of parameters that the rows determine, normalised.
+/// Builds the restricted likelihood of noise and weights in the q parameter combinations determined by data, priors and
+/// penalties, scaled so that their Gram matrix (at the current weights) is the identity.
 fn likelihood(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> RestrictedLikelihood {
     let known = known_rows(problem, theta);
     let penalties: Vec<(&Penalty, DMatrix<f64>)> = (problem.penalties.iter())
@@ -113,7 +123,8 @@ fn likelihood(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Rest
         first += channel.len();
         let is_robust = channel.loss() != Loss::Squares;
         let estimates = matches!(channel.weighting(), Weighting::Estimated { .. }) && !is_robust;
-        // The rows of a robust loss are those of its majorant, whitened.
+        // For a robust loss the rows are already whitened and weighted by its quadratic majorant, so no correlation is applied
+        // here.
         let correlation = channel.correlation().filter(|_| !is_robust);
         ChannelMoments::new(&own, correlation, estimates)
     });
@@ -130,7 +141,8 @@ fn likelihood(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Rest
     RestrictedLikelihood::new(moments, known.tr_mul(&known)).with_penalties(penalties.collect())
 }
 
-/// Weighted Jacobian of the samples with their residuals in the last column; whitened only under a robust loss.
+/// Returns samples x (n+1) rows `sqrt(w_i) [dprediction_i/dtheta, r_i]` with `r` = prediction minus sample; rows of channels with
+/// a robust loss are whitened and reweighted.
 fn residual_rows(problem: &Problem, evaluation: &Evaluation) -> DMatrix<f64> {
     let n = problem.parameters();
     let mut rows = (problem.predictions_jacobian(evaluation)).insert_column(n, 0.0);
@@ -160,7 +172,8 @@ fn residual_rows(problem: &Problem, evaluation: &Evaluation) -> DMatrix<f64> {
     rows
 }
 
-/// Rows of priors and of penalties with given weights, with their residuals in the last column.
+/// Returns the rows of priors and of penalties with fixed weights as a rows x (n+1) matrix; the last column is their residual at
+/// `theta`.
 fn known_rows(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
     let mut given = problem.clone();
     given.parts_mut().penalties.retain(|p| !is_estimated(p));
@@ -170,7 +183,7 @@ fn known_rows(problem: &Problem, theta: &[f64]) -> DMatrix<f64> {
     dense(&subproblem, problem.parameters())
 }
 
-/// Rows of a penalty without its weight, with their residuals in the last column.
+/// Returns the rows of a penalty without its weight as a rows x (n+1) matrix; the last column is their residual at `theta`.
 fn rows_of(problem: &Problem, theta: &[f64], penalty: &Penalty) -> DMatrix<f64> {
     let n = problem.parameters();
     let range = problem.functions.ranges()[penalty.function].clone();
@@ -184,7 +197,7 @@ fn rows_of(problem: &Problem, theta: &[f64], penalty: &Penalty) -> DMatrix<f64> 
     rows
 }
 
-/// Residual rows of a subproblem of `n` variables, with their residuals at zero in the last column.
+/// Returns the residual rows as a dense rows x (n+1) matrix; the last column is the residual at `z = 0`, i.e. `-b`.
 fn dense(subproblem: &Subproblem, n: usize) -> DMatrix<f64> {
     let residuals = &subproblem.residuals;
     let mut rows = DMatrix::zeros(residuals.len(), n + 1);
@@ -195,8 +208,8 @@ fn dense(subproblem: &Subproblem, n: usize) -> DMatrix<f64> {
     rows
 }
 
-/// Map of the columns of `rows` to orthonormal combinations of all but the last, as far as the rows determine them, and the last
-/// column. The columns are first scaled to unit length, because parameters have different units.
+/// Returns the (n+1) x (q+1) matrix `M` for which the first q columns of `rows * M` are orthonormal and the last column is
+/// unchanged; q is the rank of the n parameter columns, scaled to unit length because parameters have different units.
 fn determined(rows: &DMatrix<f64>) -> DMatrix<f64> {
     let n = rows.ncols() - 1;
     let mut scaled = rows.columns(0, n).into_owned();
@@ -215,7 +228,8 @@ fn determined(rows: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// The channel with noise at `coordinates`, sigma relative to its present value.
+/// Returns the channel with the noise of `coordinates`: sigma is multiplied by `exp(log_sigma)`, and the correlation model takes
+/// the parameters `correlation_parameters`.
 fn with_coordinates(
     channel: &Channel,
     coordinates: &NoiseCoordinates,
@@ -228,7 +242,7 @@ fn with_coordinates(
         let sigma = sigma * log.exp();
         next = next.with_weighting(Weighting::Estimated { sigma });
     }
-    let correlation = channel.correlation().map(|c| c.at(&coordinates.law));
+    let correlation = (channel.correlation()).map(|c| c.at(&coordinates.correlation_parameters));
     next.with_noise(NoiseEstimate {
         correlation,
         covariance,

@@ -1,4 +1,5 @@
-//! Attempts from several starting points, and the weight path, in the result document.
+//! Entries of the result document on the fit from each starting point, the path of penalty weights, and each roughness
+//! penalty.
 
 use kmcfit_core::internals::solvers::Status;
 use serde::{Deserialize, Serialize};
@@ -7,36 +8,38 @@ use std::collections::BTreeMap;
 /// A fit from one starting point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AttemptSummary {
-    /// Starting point.
+    /// Name of the start strategy.
     pub start: String,
-    /// J at its start; absent if the start has no response.
+    /// J at the starting point: m² s without sigma, chi-square with sigma, N² s for the equation error (see
+    /// [`cost_kind`](super::ModelSummary::cost_kind)); absent if not finite.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initial_cost: Option<f64>,
-    /// J at its end; absent if the start has no response.
+    /// J at the end, in the same unit; absent if not finite.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost: Option<f64>,
     /// Number of iterations.
     pub iterations: u64,
-    /// Status at its end.
+    /// Status at the end.
     pub status: Status,
 }
 
 /// Choice of the weight of a penalty by a rule.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WeightSummary {
-    /// The rule of the model file.
+    /// Name of the rule that the model file sets.
     pub rule: String,
-    /// The weight used.
+    /// Weight used for the fit.
     pub weight: f64,
-    /// Weight that each rule chooses on the path; absent for a rule without a choice.
+    /// Weight chosen on the path by each rule, keyed by rule name (`discrepancy`, `l-curve`, `gcv`); rules that choose none are
+    /// omitted.
     pub picks: BTreeMap<String, f64>,
-    /// Seed of the random vectors behind the degrees of freedom.
+    /// Seed of the random probe vectors used to estimate the effective degrees of freedom.
     pub seed: u64,
     /// Remark on the choice.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
     /// Fits along the path, in order of decreasing weight.
-    pub path: Vec<PathSummary>,
+    pub path: Vec<PathPointSummary>,
 }
 
 impl WeightSummary {
@@ -48,17 +51,18 @@ impl WeightSummary {
 
 /// One fit along the path of weights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PathSummary {
-    /// Weight.
+pub struct PathPointSummary {
+    /// Weight: factor on the penalties of the path.
     pub weight: f64,
     /// Iterations of this fit, summed over its starting points.
     #[serde(default)]
     pub iterations: u64,
-    /// Misfit.
+    /// Misfit: part of J from the samples.
     pub misfit: f64,
-    /// `sum |L theta - target|^2` of the penalties on the path.
+    /// Unweighted penalty `|L theta - target|^2` with `L` the roughness rows (for target 0 the integral of the squared
+    /// derivative), summed over the penalties on the path.
     pub roughness: f64,
-    /// Effective number of parameters that the data determine; absent if not computed.
+    /// Effective number of parameters that the data determine; absent if not finite.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<f64>,
 }
@@ -70,14 +74,15 @@ pub struct PenaltySummary {
     pub function: String,
     /// Order of the penalised derivative.
     pub order: usize,
-    /// Weight of the squared integral in J.
+    /// Weight in J of `|L theta - target|^2`.
     pub weight: f64,
-    /// Rule that chose the weight; absent for a given one.
+    /// Name of the rule that chose the weight; absent if the weight is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rule: Option<String>,
     /// Number of parameters of the function.
     pub parameters: usize,
-    /// Effective number of these that the samples determine; absent with many parameters.
+    /// Effective number of the function's parameters that the samples determine; absent if not computed, e.g. with more than
+    /// 64 parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub effective_parameters: Option<f64>,
 }

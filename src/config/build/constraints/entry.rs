@@ -1,4 +1,7 @@
-//! Conversion of one map of `constraints` into constraints of the builder.
+//! Reads one entry of `constraints` into one or more constraints, each with its key for error messages.
+//!
+//! Units: bounds, means and values in the unit of the function, slopes in that unit per s, integrals in that unit times s, times in s,
+//! frequencies in Hz, ratios in the unit of the first function per that of the second; damping ratios are dimensionless.
 
 use crate::config::ModelFile;
 use crate::config::build::functions::history;
@@ -7,10 +10,7 @@ use crate::config::values::{Number, NumberOrColumn};
 use crate::error::InputError;
 use kmcfit_core::internals::constraints::{Constraint, Shape, TimeHistory};
 use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::system::Grid;
-
-/// Distance of a time outside the record, in steps, up to which it counts as the end of the record.
-const SAME_TIME: f64 = 1e-6;
+use kmcfit_core::internals::system::{Grid, TimePoint};
 
 /// Kind of a constraint, by its key.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,7 +73,7 @@ impl ConstraintKey {
     }
 }
 
-/// One map of `constraints` and its key.
+/// One entry of `constraints` and its key.
 struct ConstraintReader<'a> {
     file: &'a ModelFile,
     grid: &'a Grid,
@@ -81,7 +81,7 @@ struct ConstraintReader<'a> {
     spec: &'a ConstraintSpec,
 }
 
-/// The constraints of the map at `key`, each with the key that states it.
+/// Returns the constraints of the entry at `key`, each with its key for error messages.
 pub(super) fn read(
     file: &ModelFile,
     grid: &Grid,
@@ -95,14 +95,8 @@ pub(super) fn read(
         spec,
     };
     let kind = reader.kind()?;
-    reader.belongs_together(kind)?;
-    if kind == ConstraintKey::Values {
-        return reader.fixed_values();
-    }
-    if kind == ConstraintKey::Shape {
-        return reader.shapes();
-    }
-    Ok(vec![(key.to_owned(), reader.statement(kind)?)])
+    reader.check_companions(kind)?;
+    reader.constraints(kind)
 }
 
 impl ConstraintReader<'_> {
@@ -117,7 +111,7 @@ impl ConstraintReader<'_> {
         }
     }
 
-    /// The kind of the map: exactly one of its keys must be given.
+    /// Returns the kind of the constraint; keys of exactly one kind must be given.
     fn kind(&self) -> Result<ConstraintKey, InputError> {
         let given: Vec<ConstraintKey> = (ConstraintKey::ALL.iter().map(|(kind, _)| *kind))
             .filter(|kind| kind.is_given(self.spec))
@@ -137,7 +131,8 @@ impl ConstraintReader<'_> {
         }
     }
 
-    fn belongs_together(&self, kind: ConstraintKey) -> Result<(), InputError> {
+    /// Checks that `function` and `ratio` are given where the kind needs them, and only there.
+    fn check_companions(&self, kind: ConstraintKey) -> Result<(), InputError> {
         match (kind.is_about_one_function(), self.spec.function) {
             (true, None) => {
                 return Err(self
@@ -168,16 +163,20 @@ impl ConstraintReader<'_> {
         }
     }
 
-    fn of(&self) -> CoefficientKind {
-        // Kinds without a function do not use it.
+    /// Returns the constrained function. [`Self::check_companions`] has rejected kinds that need a function and lack one; for the
+    /// others the value is unused.
+    fn target_function(&self) -> CoefficientKind {
         self.spec.function.unwrap_or(CoefficientKind::Mass)
     }
 
-    fn statement(&self, kind: ConstraintKey) -> Result<Constraint, InputError> {
+    /// Returns the constraints of one entry: several for a list of shapes or of times, one for any other kind.
+    fn constraints(&self, kind: ConstraintKey) -> Result<Vec<(String, Constraint)>, InputError> {
         let spec = self.spec;
-        let of = self.of();
+        let of = self.target_function();
         let number = |given: Option<Number>| given.map_or(0.0, |n| n.0);
-        Ok(match kind {
+        let constraint = match kind {
+            ConstraintKey::Shape => return self.shapes(),
+            ConstraintKey::Values => return self.fixed_values(),
             ConstraintKey::Bounds => Constraint::Bounds {
                 of,
                 min: self.bound("min", spec.min.as_ref())?,
@@ -203,7 +202,7 @@ impl ConstraintReader<'_> {
                 Constraint::Frequency { min, max }
             }
             ConstraintKey::DampingRatio => self.damping_ratio()?,
-            ConstraintKey::Passive | ConstraintKey::Shape | ConstraintKey::Values => {
+            ConstraintKey::Passive => {
                 if spec.passive == Some(false) {
                     return Err(self
                         .error("passive", "this constraint has no effect")
@@ -212,7 +211,8 @@ impl ConstraintReader<'_> {
                 }
                 Constraint::Passive
             }
-        })
+        };
+        Ok(vec![(self.key.to_owned(), constraint)])
     }
 
     fn bound(
@@ -229,12 +229,12 @@ impl ConstraintReader<'_> {
             return Ok(Vec::new());
         };
         self.not_empty("shape", shapes.values().len(), "at least one shape")?;
-        let statement = |(i, &shape): (usize, &Shape)| {
+        let constraint = |(i, &shape): (usize, &Shape)| {
             let key = format!("{}.shape{}", self.key, shapes.place(i));
-            let of = self.of();
+            let of = self.target_function();
             (key, Constraint::Shape { of, shape })
         };
-        Ok(shapes.values().iter().enumerate().map(statement).collect())
+        Ok(shapes.values().iter().enumerate().map(constraint).collect())
     }
 
     fn fixed_values(&self) -> Result<Vec<(String, Constraint)>, InputError> {
@@ -261,26 +261,27 @@ impl ConstraintReader<'_> {
                 .expected("as many values as times, or one for all"));
         }
         let (start, end) = (self.grid.start(), self.grid.time(self.grid.nodes() - 1));
-        let slack = SAME_TIME * self.grid.step();
-        let statement = |(i, time): (usize, &Number)| {
+        // A time outside the grid within this distance (s) counts as its end.
+        let slack = TimePoint::SAME_TIME * self.grid.step();
+        let constraint = |(i, time): (usize, &Number)| {
             let below = format!("at{}", at.place(i));
             if time.0 < start - slack || time.0 > end + slack {
                 return Err(self
-                    .error(&below, "this time lies outside the record")
+                    .error(&below, "this time lies outside the grid")
                     .found(time.0)
                     .expected(format!(
                         "a time from {start} s to {} s",
                         self.grid.round_time(end)
                     )));
             }
-            let held = Constraint::Value {
-                of: self.of(),
+            let fixed = Constraint::Value {
+                of: self.target_function(),
                 at: time.0.clamp(start, end),
                 value: values[i.min(values.len() - 1)].0,
             };
-            Ok((self.below(&below), held))
+            Ok((self.below(&below), fixed))
         };
-        times.iter().enumerate().map(statement).collect()
+        times.iter().enumerate().map(constraint).collect()
     }
 
     fn equal(&self) -> Result<Constraint, InputError> {
@@ -310,14 +311,17 @@ impl ConstraintReader<'_> {
         let range = self.spec.damping_ratio.as_ref();
         if let Some(min) = range.and_then(|r| r.min) {
             return Err(self
-                .error("damping_ratio.min", "a damping ratio has no lower bound")
+                .error(
+                    "damping_ratio.min",
+                    "a lower bound on the damping ratio is not supported",
+                )
                 .found(min.0)
-                .expected("`max` alone: a lower bound is not a convex constraint"));
+                .expected("`max` alone, because a lower bound is not a convex constraint"));
         }
         let (_, max) = self.range("damping_ratio", range)?;
         let Some(max) = self.positive("damping_ratio.max", max)? else {
             return Err(self
-                .error("damping_ratio", "the cap is missing")
+                .error("damping_ratio", "the upper limit is missing")
                 .expected("`max`, as in {max: 0.2}"));
         };
         Ok(Constraint::DampingRatio { max })

@@ -1,9 +1,10 @@
-//! Loads of eight neighbouring nodal or stage values into SIMD lanes, padded at the end of the data.
+//! Reads eight consecutive nodal values, or the stage values of eight consecutive steps, into the SIMD lanes; past the end
+//! of the data the last value is repeated.
 
 use crate::simd::{Arithmetic, Eight, LANES, Row, window};
 use crate::system::StageSamples;
 
-/// Values `i` to `i + 7`; lanes beyond the end repeat the last value.
+/// Returns the values `i` to `i + 7`; lanes past the end repeat the last value.
 #[inline(always)]
 pub(crate) fn eight<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> Eight<A> {
     let inside = values.get(i..).and_then(<[f64]>::first_chunk::<LANES>);
@@ -13,43 +14,48 @@ pub(crate) fn eight<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> E
     }
 }
 
-/// Values of a function at the left ends, middles and right ends of the steps `i` to `i + 7`.
+/// Returns nodal values at the left end, middle (mean of both ends) and right end of steps `i` to `i + 7`, one step per lane.
 #[inline(always)]
-pub(crate) fn places<A: Arithmetic>(arithmetic: A, values: &[f64], i: usize) -> [Eight<A>; 3] {
+pub(crate) fn stage_values<A: Arithmetic>(
+    arithmetic: A,
+    values: &[f64],
+    i: usize,
+) -> [Eight<A>; 3] {
     let left = eight(arithmetic, values, i);
     let right = eight(arithmetic, values, i + 1);
     [left, (right + left) * Eight::splat(arithmetic, 0.5), right]
 }
 
-/// Inverse mass at the stages of [`places`]; by a single division where the mass is constant.
+/// Returns 1/m (1/kg) at the left end, middle and right end of steps `i` to `i + 7`; the middle is the inverse of the mean
+/// mass. If the mass is constant over these steps, 1/m is computed once.
 #[inline(always)]
-pub(crate) fn per_mass<A: Arithmetic>(arithmetic: A, mass: &[f64], i: usize) -> [Eight<A>; 3] {
+pub(crate) fn inverse_mass<A: Arithmetic>(arithmetic: A, mass: &[f64], i: usize) -> [Eight<A>; 3] {
     let steps = &mass[i..mass.len().min(i + LANES + 1)];
     if is_constant(steps) {
         return [Eight::splat(arithmetic, 1.0 / steps[0]); 3];
     }
-    let mut places = places(arithmetic, mass, i);
-    for place in &mut places {
-        *place = Eight::splat(arithmetic, 1.0) / *place;
+    let mut stages = stage_values(arithmetic, mass, i);
+    for stage in &mut stages {
+        *stage = Eight::splat(arithmetic, 1.0) / *stage;
     }
-    places
+    stages
 }
 
-/// True if all values are equal.
+/// Returns true if all values are equal.
 #[inline(always)]
 pub(crate) fn is_constant(values: &[f64]) -> bool {
     values.iter().fold(true, |same, x| same & (*x == values[0]))
 }
 
-/// Stage values of the steps `i` to `i + 7` at left ends, middles and right ends; zero for `None`. Lanes beyond the end
-/// repeat the last step.
+/// Returns force (N) or base acceleration (m/s²) at the left end, middle and right end of steps `i` to `i + 7`; zero if
+/// there is none. Lanes past the end repeat the last step.
 #[inline(always)]
-pub(crate) fn stepwise<A: Arithmetic>(
+pub(crate) fn stage_samples<A: Arithmetic>(
     arithmetic: A,
-    part: Option<&StageSamples>,
+    samples: Option<&StageSamples>,
     i: usize,
 ) -> [Eight<A>; 3] {
-    let Some(steps) = part.map(StageSamples::values) else {
+    let Some(steps) = samples.map(StageSamples::values) else {
         return [Eight::splat(arithmetic, 0.0); 3];
     };
     let inside = steps.get(i..).and_then(<[_]>::first_chunk::<LANES>);

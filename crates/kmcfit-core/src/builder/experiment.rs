@@ -1,4 +1,5 @@
-//! Experiments of a problem: records on the grid, with their scalar parameters.
+//! Builds the experiments of a problem from records: initial state, force and base motion, sensors, and the scalar parameters
+//! to be estimated.
 
 use super::BuildError;
 use super::record::{ChannelSpec, Record, ScalarSpec, SensorSpec};
@@ -8,31 +9,38 @@ use crate::record::{Channel, ChannelKind, Experiment, Input, Sensor, Weighting, 
 use crate::signal::{even_spacing, median_spacing};
 use crate::system::{Grid, InputSample, State, TimePoint};
 
-/// A record to be placed on a grid.
-pub(super) struct Placement<'a> {
-    /// Key.
+/// Record and settings from which an experiment is built.
+pub(super) struct ExperimentBuilder<'a> {
+    /// Key of the experiment in the model file, e.g. `experiments[0]`, for error messages.
     pub key: String,
+    /// Record with the samples.
     pub record: &'a Record,
+    /// Grid of the problem.
     pub grid: &'a Grid,
     /// Index of the coefficient set.
     pub coefficient_set: usize,
     /// True if the fit minimises the equation error.
     pub is_equation_error: bool,
-    /// True to omit the channels, for a simulation.
-    pub simulation: bool,
+    /// True if only the response is wanted: no channels are built, and the samples define the span and start values only.
+    pub is_simulation: bool,
 }
 
-/// A scalar to be created.
+/// A scalar that may be fixed or estimated.
 struct PendingScalar<'a> {
+    /// Key in the model file, for error messages.
     key: String,
+    /// Name in the results.
     name: String,
+    /// SI unit; empty if dimensionless.
     unit: &'a str,
+    /// Initial value if neither a start nor a prior is given.
     start: f64,
-    size: f64,
+    /// Typical magnitude of a change, in `unit`; 1 if zero.
+    scale: f64,
 }
 
 impl PendingScalar<'_> {
-    /// Known value, or a new parameter added to `scalars`.
+    /// Returns the fixed value, or a new parameter added to `scalars`.
     fn value(
         self,
         spec: ScalarSpec,
@@ -54,16 +62,16 @@ impl PendingScalar<'_> {
             name: self.name,
             unit: self.unit.to_owned(),
             start: start.or(prior.map(|p| p.mean)).unwrap_or(self.start),
-            size: if self.size > 0.0 { self.size } else { 1.0 },
+            size: if self.scale > 0.0 { self.scale } else { 1.0 },
             prior,
         });
         Ok(ScalarValue::Estimated(scalars.len() - 1))
     }
 }
 
-impl Placement<'_> {
-    /// Creates the experiment; its estimated parameters are added to `scalars`.
-    pub fn experiment(&self, scalars: &mut Vec<ScalarParameter>) -> Result<Experiment, BuildError> {
+impl ExperimentBuilder<'_> {
+    /// Builds the experiment; its estimated parameters are added to `scalars`.
+    pub fn build(&self, scalars: &mut Vec<ScalarParameter>) -> Result<Experiment, BuildError> {
         let record = self.record;
         let input = record.inputs(&self.key)?;
         let nodes = match record.span() {
@@ -76,7 +84,7 @@ impl Placement<'_> {
         experiment.coefficient_set = self.coefficient_set;
         experiment.excitation = (input != Input::default()).then(|| input.on(self.grid, nodes));
         experiment.input = input;
-        let compared = match self.simulation {
+        let compared = match self.is_simulation {
             true => &[][..],
             false => &record.channels,
         };
@@ -87,18 +95,21 @@ impl Placement<'_> {
         Ok(experiment)
     }
 
-    /// Initial state, and the scalar parameters of its estimated components.
+    /// Returns the initial state, and the scalar parameters of its estimated components.
+    ///
+    /// The lowest derivative measured sets the scales of displacement (m or rad) and velocity (m/s or rad/s). The displacement
+    /// starts at the first displacement sample, not corrected for sensor gain and offset, else 0; the velocity starts at 0. The
+    /// builder later replaces these starts by states estimated from the samples, where there are any.
     fn initial(
         &self,
         scalars: &mut Vec<ScalarParameter>,
     ) -> Result<(State, [Option<usize>; 2]), BuildError> {
         let channels = &self.record.channels;
-        // The channel nearest to a displacement gives the sizes.
-        let nearest = channels.iter().min_by_key(|c| c.kind);
-        let sizes = nearest.map_or([1.0; 2], |c| {
+        let lowest = channels.iter().min_by_key(|c| c.kind);
+        let scales = lowest.map_or([1.0; 2], |c| {
             state_scales(c.kind, &c.values, median_spacing(&c.times))
         });
-        let displacement = nearest.filter(|c| c.kind == ChannelKind::Displacement);
+        let displacement = lowest.filter(|c| c.kind == ChannelKind::Displacement);
         let starts = [displacement.map_or(0.0, |c| c.values[0]), 0.0];
         let angular = channels.iter().any(|c| c.angular);
         let kinds = [ChannelKind::Displacement, ChannelKind::Velocity];
@@ -110,7 +121,7 @@ impl Placement<'_> {
                 name: format!("initial {} of {}", kind.name(), self.record.name),
                 unit: kind.unit_of(angular),
                 start: starts[q],
-                size: sizes[q],
+                scale: scales[q],
             };
             match scalar.value(self.record.initial[q], scalars)? {
                 ScalarValue::Known(number) => state[q] = number,
@@ -128,6 +139,7 @@ impl Placement<'_> {
         Ok((state, estimated))
     }
 
+    /// Builds one channel, with the inputs and the base motion at its samples.
     fn channel(
         &self,
         spec: &ChannelSpec,
@@ -135,7 +147,7 @@ impl Placement<'_> {
         scalars: &mut Vec<ScalarParameter>,
     ) -> Result<Channel, BuildError> {
         let (grid, times) = (self.grid, &spec.times);
-        // The paper's integral for equally spaced times.
+        // Without sigma the misfit is `integral r^2 dt` by the trapezoid rule (Buchta, Eq. 1), also for unequally spaced times.
         let weighting = match (&spec.weighting, even_spacing(times)) {
             (Some(weighting), _) => weighting.clone(),
             (None, Some(spacing)) => Weighting::Integral { spacing },
@@ -146,7 +158,7 @@ impl Placement<'_> {
         let nodes = experiment.nodes;
         let channel = Channel::new(spec.kind, times.clone(), values, weighting, grid, nodes);
         let channel = channel.ok_or_else(|| {
-            BuildError::new("grid", "the samples do not lie on the grid")
+            BuildError::new("grid", "samples lie outside the time span of the grid")
                 .found(format!("samples until {} s", times[times.len() - 1]))
                 .expected(format!(
                     "a grid from {} s to {} s",
@@ -160,11 +172,11 @@ impl Placement<'_> {
             .with_sensor(sensor);
         let input = &experiment.input;
         if spec.kind == ChannelKind::Acceleration && experiment.excitation.is_some() {
-            let around = |t: &f64| InputSample {
+            let input_at = |t: &f64| InputSample {
                 force: input.force_at(*t),
                 base: input.base_acceleration_at(*t),
             };
-            channel = channel.with_surroundings(times.iter().map(around).collect());
+            channel = channel.with_inputs_at_samples(times.iter().map(input_at).collect());
         }
         if let Some(base) = self.base_motion(spec, input)? {
             channel = channel.with_base(base);
@@ -175,7 +187,8 @@ impl Placement<'_> {
         Ok(channel)
     }
 
-    /// Motion of the base at the times of a sensor that measures absolute motion.
+    /// Returns the base motion (in the unit of the channel, one value per sample) to be added to the relative response; `None` for
+    /// a relative sensor or a fixed base. Accelerometers are absolute by default.
     fn base_motion(
         &self,
         spec: &ChannelSpec,
@@ -204,6 +217,7 @@ impl Placement<'_> {
         })
     }
 
+    /// Returns gain, offset (in the unit of the channel) and drift (per s) of a sensor.
     fn sensor(
         &self,
         channel: &ChannelSpec,
@@ -219,25 +233,26 @@ impl Placement<'_> {
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;
         let squares = values.iter().map(|v| (v - mean) * (v - mean));
-        let size = (squares.sum::<f64>() / count).sqrt();
+        let deviation = (squares.sum::<f64>() / count).sqrt();
         let unit = channel.kind.unit_of(channel.angular);
         let per_second = format!("{unit}/s");
         let key = format!("{}.sensors.{kind}", self.key);
         let mut value =
-            |part: &str, spec: Option<ScalarSpec>, unit, [usual, start, size]: [f64; 3]| {
+            |part: &str, spec: Option<ScalarSpec>, unit, [default, start, scale]: [f64; 3]| {
                 let scalar = PendingScalar {
                     key: format!("{key}.{part}"),
                     name: format!("{part} of the {kind} of {}", self.record.name),
                     unit,
                     start,
-                    size,
+                    scale,
                 };
-                scalar.value(spec.unwrap_or(ScalarSpec::Known(usual)), scalars)
+                scalar.value(spec.unwrap_or(ScalarSpec::Known(default)), scalars)
             };
         let sensor = Sensor {
             gain: value("gain", gain, "", [1.0; 3])?,
-            offset: value("offset", offset, unit, [0.0, mean, size])?,
-            drift: value("drift", drift, &per_second, [0.0, 0.0, size])?,
+            offset: value("offset", offset, unit, [0.0, mean, deviation])?,
+            // Scale of the drift: the standard deviation of the samples per 1 s.
+            drift: value("drift", drift, &per_second, [0.0, 0.0, deviation])?,
         };
         if sensor.gain == ScalarValue::Known(0.0) {
             let problem = "the gain of a sensor must not be 0";
@@ -255,7 +270,7 @@ impl Placement<'_> {
     }
 }
 
-/// Number of nodes of a response until `end`.
+/// Number of nodes of a response until the time `end`, s.
 fn nodes_until(grid: &Grid, end: f64) -> usize {
     let steps = (end - grid.start()) / grid.step();
     let steps = (steps - TimePoint::SAME_TIME).ceil().max(0.0);
