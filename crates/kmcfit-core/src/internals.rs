@@ -64,8 +64,8 @@ pub mod noise {
 }
 pub mod record {
     pub use crate::record::{
-        BaseMotion, Channel, ChannelKind, Experiment, Input, Loss, NoiseEstimate, NoiseModel,
-        Sensor, Waveform, Weighting, integral_over,
+        BaseMotion, Channel, ChannelKind, Experiment, Input, InputError, InputErrorKind, Loss,
+        NoiseEstimate, NoiseModel, Sensor, Waveform, Weighting, integral_over,
     };
 }
 pub mod signal {
@@ -106,8 +106,8 @@ pub mod study {
 }
 pub mod system {
     pub use crate::system::{
-        Excitation, Grid, InputSample, Method, NodalCoefficients, StageSamples, State, System,
-        SystemTangent, Term, TimePoint, quadrature, round_time,
+        Excitation, Grid, InputQuantity, InputSample, Method, NodalCoefficients, StageSamples,
+        State, System, SystemTangent, Term, TimePoint, quadrature, round_time,
     };
 }
 pub mod threads {

@@ -89,9 +89,9 @@ pub use builder::{
 pub use constraints::{Constraint, Shape, TimeHistory};
 pub use functions::{CoefficientKind, Prior, WeightRule};
 pub use problem::{Problem, ProblemError};
-pub use record::{ChannelKind, Loss, NoiseModel, Weighting};
+pub use record::{ChannelKind, InputErrorKind, Loss, NoiseModel, Weighting};
 pub use signal::{Interpolation, Signal};
-pub use system::{Excitation, Grid, Method, NodalCoefficients, State, System, Term};
+pub use system::{Excitation, Grid, InputQuantity, Method, NodalCoefficients, State, System, Term};
 // Simulation and cost.
 pub use objective::{Evaluation, Gradient, GradientError, GradientKind};
 pub use simulate::{Cause, SimulationError, Trajectory};

@@ -83,6 +83,7 @@ impl ExperimentBuilder<'_> {
         experiment.initial_parameters = estimated;
         experiment.coefficient_set = self.coefficient_set;
         experiment.excitation = (input != Input::default()).then(|| input.on(self.grid, nodes));
+        experiment.input_error = record.error_of(&input, &self.key)?;
         experiment.input = input;
         let compared = match self.is_simulation {
             true => &[][..],

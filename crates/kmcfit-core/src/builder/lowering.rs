@@ -3,7 +3,7 @@
 use super::coefficient_sets::CoefficientSets;
 use super::constraints::of_bounds;
 use super::experiment::ExperimentBuilder;
-use super::{BuildError, BuildNotice, Builder, Built, Record, identifiable};
+use super::{BuildError, BuildNotice, Builder, Built, Record, identifiable, input_error};
 use crate::functions::Parameterization;
 use crate::problem::Problem;
 use crate::signal::even_spacing;
@@ -71,6 +71,7 @@ impl Builder {
             self.add(constraint, &mut problem, &mut rows, &mut notices)?;
         }
         identifiable::check(&problem)?;
+        input_error::check(&problem, self.solver)?;
         self.start_at_samples(&mut problem);
         Ok(Built {
             problem,

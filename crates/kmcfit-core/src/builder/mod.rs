@@ -37,6 +37,7 @@ mod constraints;
 mod error;
 mod experiment;
 mod identifiable;
+mod input_error;
 mod lowering;
 mod notice;
 mod penalties;

@@ -1,10 +1,14 @@
 //! Specification of one record: initial state, input and channels.
 
+use super::input_error::InputErrorSpec;
 use super::{BuildError, CoefficientSpec};
 use crate::functions::{CoefficientKind, Prior};
 use crate::noise::{HIGHEST_ORDER, uninterrupted_runs};
-use crate::record::{BaseMotion, ChannelKind, Input, Loss, NoiseModel, Waveform, Weighting};
+use crate::record::{
+    BaseMotion, ChannelKind, Input, InputErrorKind, Loss, NoiseModel, Waveform, Weighting,
+};
 use crate::signal::{Interpolation, SecondOrder, Signal, median_spacing};
+use crate::system::InputQuantity;
 
 /// A scalar that is known, or estimated together with the coefficient functions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -181,6 +185,7 @@ pub struct Record {
     pub(super) channels: Vec<ChannelSpec>,
     pub(super) coefficients: Vec<(CoefficientKind, CoefficientSpec)>,
     pub(super) validation: bool,
+    pub(super) input_error: Option<InputErrorSpec>,
     input: Input,
     force: Option<[Vec<f64>; 2]>,
     base: Option<[Vec<f64>; 2]>,
@@ -196,6 +201,7 @@ impl Record {
             channels: Vec::new(),
             coefficients: Vec::new(),
             validation: false,
+            input_error: None,
             input: Input::default(),
             force: None,
             base: None,
@@ -235,6 +241,22 @@ impl Record {
     #[must_use]
     pub fn interpolation(mut self, interpolation: Interpolation) -> Self {
         self.interpolation = interpolation;
+        self
+    }
+
+    /// States independent errors of standard deviation `sigma` (SI unit) of the samples of an input.
+    #[must_use]
+    pub fn input_error(
+        mut self,
+        quantity: InputQuantity,
+        kind: InputErrorKind,
+        sigma: f64,
+    ) -> Self {
+        self.input_error = Some(InputErrorSpec {
+            quantity,
+            kind,
+            sigma,
+        });
         self
     }
 

@@ -1,8 +1,10 @@
 //! Correlation of the noise of one channel, and whitening.
 
 use super::autoregression::Autoregression;
+use super::input_errors::InputErrors;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Largest deviation of a spacing of samples from the smallest one, as a share of it, for which samples are equally spaced.
 const UNEVEN: f64 = 0.01;
@@ -19,6 +21,8 @@ pub enum CorrelationLaw {
         /// Correlation time, s.
         time: f64,
     },
+    /// White noise plus the response to errors of the input, relative to the white noise; the response is that of a known system.
+    InputErrors(Arc<InputErrors>),
 }
 
 /// Correlation of the noise of one channel.
@@ -94,6 +98,9 @@ impl Correlation {
                 });
                 (std::iter::once(0..times.len()).collect(), later.collect())
             }
+            CorrelationLaw::InputErrors(_) => {
+                (std::iter::once(0..times.len()).collect(), Vec::new())
+            }
         };
         Some(Self {
             law,
@@ -113,6 +120,15 @@ impl Correlation {
         match &self.law {
             CorrelationLaw::Autoregressive(process) => process.order(),
             CorrelationLaw::Exponential { .. } => 1,
+            CorrelationLaw::InputErrors(_) => 0,
+        }
+    }
+
+    /// The errors of the input, where these correlate the noise.
+    pub fn input_errors(&self) -> Option<&InputErrors> {
+        match &self.law {
+            CorrelationLaw::InputErrors(errors) => Some(errors),
+            _ => None,
         }
     }
 
@@ -122,6 +138,7 @@ impl Correlation {
         match &self.law {
             CorrelationLaw::Autoregressive(process) => process.coordinates(),
             CorrelationLaw::Exponential { time } => vec![time.ln()],
+            CorrelationLaw::InputErrors(_) => Vec::new(),
         }
     }
 
@@ -135,6 +152,7 @@ impl Correlation {
             CorrelationLaw::Exponential { .. } => CorrelationLaw::Exponential {
                 time: coordinates.iter().sum::<f64>().exp(),
             },
+            CorrelationLaw::InputErrors(_) => return self.clone(),
         };
         // The samples are equally spaced as before.
         Self::new(law, &self.times).unwrap_or_else(|| self.clone())
@@ -150,8 +168,14 @@ impl Correlation {
     pub fn first(&self, count: usize) -> Self {
         let runs = self.runs.iter().filter(|run| run.start < count);
         let predictors = self.predictors.iter().filter(|p| p.sample < count);
+        let law = match &self.law {
+            CorrelationLaw::InputErrors(errors) => {
+                CorrelationLaw::InputErrors(Arc::new(errors.first(count)))
+            }
+            law => law.clone(),
+        };
         Self {
-            law: self.law.clone(),
+            law,
             times: self.times[..count.min(self.times.len())].to_vec(),
             runs: runs.map(|run| run.start..run.end.min(count)).collect(),
             predictors: predictors.cloned().collect(),
@@ -160,6 +184,9 @@ impl Correlation {
 
     /// `W values`, of unit variance and uncorrelated for values of unit variance with this correlation.
     pub fn whiten(&self, values: &[f64]) -> Vec<f64> {
+        if let Some(errors) = self.input_errors() {
+            return errors.whiten(values);
+        }
         let mut out = values.to_vec();
         self.each_row(|i, coefficients, size| {
             let earlier = values[..i].iter().rev();
@@ -171,6 +198,9 @@ impl Correlation {
 
     /// `W^T values`.
     pub fn whiten_transpose(&self, values: &[f64]) -> Vec<f64> {
+        if let Some(errors) = self.input_errors() {
+            return errors.whiten_transpose(values);
+        }
         let mut out = vec![0.0; values.len()];
         self.each_row(|i, coefficients, size| {
             let scaled = size * values[i];
@@ -185,6 +215,9 @@ impl Correlation {
 
     /// `W^-1 values`: noise with this correlation from independent values of unit variance.
     pub fn colour(&self, values: &[f64]) -> Vec<f64> {
+        if let Some(errors) = self.input_errors() {
+            return errors.colour(values);
+        }
         let mut out = values.to_vec();
         self.each_row(|i, coefficients, size| {
             let earlier = out[..i].iter().rev();
@@ -196,6 +229,9 @@ impl Correlation {
 
     /// `log |R|`.
     pub fn log_determinant(&self) -> f64 {
+        if let Some(errors) = self.input_errors() {
+            return errors.log_determinant();
+        }
         let mut sum = 0.0;
         self.each_row(|_, _, size| sum -= 2.0 * size.ln());
         sum
@@ -204,6 +240,17 @@ impl Correlation {
     /// Passes each row of `W` to `take`: the index `i` of its sample, the predictor's coefficients of the samples `i - 1, i - 2,
     /// ...`, and the factor `1/sqrt(v)` of the prediction error.
     pub fn each_row(&self, mut take: impl FnMut(usize, &[f64], f64)) {
+        if let Some(errors) = self.input_errors() {
+            // Dense rows: for few samples.
+            for i in 0..self.times.len() {
+                let mut unit = vec![0.0; self.times.len()];
+                unit[i] = 1.0;
+                let row = errors.whiten_transpose(&unit);
+                let earlier: Vec<f64> = row[..i].iter().rev().map(|a| -a / row[i]).collect();
+                take(i, &earlier, row[i]);
+            }
+            return;
+        }
         let mut special = self.predictors.iter().peekable();
         for run in &self.runs {
             for i in run.clone() {
@@ -212,7 +259,7 @@ impl Correlation {
                     (_, CorrelationLaw::Autoregressive(process)) => {
                         process.predictor(i - run.start)
                     }
-                    (_, CorrelationLaw::Exponential { .. }) => (&[][..], 1.0),
+                    _ => (&[][..], 1.0),
                 };
                 take(i, coefficients, 1.0 / variance.sqrt());
                 special.next_if(|own| own.sample == i);
@@ -304,6 +351,7 @@ mod tests {
                     process.autocorrelation(lag + 1)[lag]
                 }
                 CorrelationLaw::Exponential { time } => (-(times[i] - times[j]).abs() / time).exp(),
+                CorrelationLaw::InputErrors(_) => unreachable!("tested beside the filter"),
             });
             let w = whitening(&correlation, n);
             let unit = &w * &matrix * w.transpose();

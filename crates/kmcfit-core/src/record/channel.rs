@@ -2,7 +2,7 @@
 
 use super::{ChannelKind, Loss, NoiseEstimate, NoiseModel, Sensor, Weighting};
 use crate::signal::{SecondOrder, zero_phase};
-use crate::system::{Excitation, Grid, InputSample, TimePoint};
+use crate::system::{Excitation, Grid, InputQuantity, InputSample, TimePoint};
 
 /// The samples of one sensor.
 ///
@@ -24,6 +24,7 @@ pub struct Channel {
     sensor: Sensor,
     /// Forces (N) and base accelerations (m/s^2) at the samples, if given.
     inputs_at_samples: Option<[Vec<f64>; 2]>,
+    /// Added to the response; empty if zero.
     base: Vec<f64>,
     filter: Vec<SecondOrder>,
     /// True if sample `i` lies on node `i`.
@@ -160,6 +161,30 @@ impl Channel {
         let pairs = predicted.iter().zip(&filtered);
         self.observed = pairs.map(|(y, e)| y + e).collect();
         self.unfiltered.clear();
+        self
+    }
+
+    /// The channel with changes of the input at its samples (N, or m/s^2), and of the response that is compared with its samples:
+    /// `changes` are subtracted from the response in the unit of the kind.
+    ///
+    /// # Panics
+    /// If there is not one of each for every sample.
+    #[must_use]
+    pub fn with_input_change(
+        mut self,
+        quantity: InputQuantity,
+        inputs: &[f64],
+        changes: &[f64],
+    ) -> Self {
+        assert_eq!(inputs.len(), self.len(), "one for each sample");
+        assert_eq!(changes.len(), self.len(), "one for each sample");
+        if let Some(parts) = &mut self.inputs_at_samples {
+            let part = &mut parts[usize::from(quantity == InputQuantity::BaseAcceleration)];
+            part.iter_mut().zip(inputs).for_each(|(a, b)| *a += b);
+        }
+        self.base.resize(self.observed.len(), 0.0);
+        let pairs = self.base.iter_mut().zip(changes);
+        pairs.for_each(|(base, change)| *base -= change);
         self
     }
 

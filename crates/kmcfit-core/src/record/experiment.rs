@@ -1,6 +1,6 @@
 //! Experiments: input, initial state and channels of one record.
 
-use super::{Channel, Input};
+use super::{Channel, Input, InputError};
 use crate::system::{Excitation, Grid, State};
 
 /// One record of a system.
@@ -16,6 +16,8 @@ pub struct Experiment {
     pub excitation: Option<Excitation>,
     /// Input from which the excitation was sampled; empty where the excitation was given on the grid.
     pub input: Input,
+    /// Errors of the input, if stated.
+    pub input_error: Option<InputError>,
     /// Number of nodes of the response; a record may be shorter than the grid.
     pub nodes: usize,
     /// Index of the coefficient set in
@@ -34,6 +36,7 @@ impl Experiment {
             initial_parameters: [None; 2],
             excitation: None,
             input: Input::default(),
+            input_error: None,
             nodes,
             coefficient_set: 0,
             channels: Vec::new(),

@@ -3,6 +3,7 @@
 mod channel;
 mod experiment;
 mod input;
+mod input_error;
 mod kind;
 mod loss;
 mod misfit;
@@ -13,6 +14,7 @@ mod weighting;
 pub use channel::Channel;
 pub use experiment::Experiment;
 pub use input::{BaseMotion, Input, Waveform};
+pub use input_error::{InputError, InputErrorKind};
 pub use kind::ChannelKind;
 pub use loss::Loss;
 pub use misfit::integral_over;

@@ -7,11 +7,12 @@ use super::correlation_estimation::{
 use super::executor::search;
 use super::fit::{Fit, measured};
 use super::history::IterationRecord;
+use super::input_errors::{has_input_errors, with_input_errors};
 use super::reml::{estimates_weights, refined, start_weights};
 use super::reml_by_traces::with_reml_weights;
+use super::rounds::{is_ended, with_round};
 use super::settings::FitSettings;
 use super::start_strategy::search_from_starts;
-use super::termination::Status;
 use super::timings::Timings;
 use crate::host::Instant;
 use crate::problem::{FEW_PARAMETERS, Problem};
@@ -79,7 +80,9 @@ pub fn fit_with_noise_watched(
         true => with_weights(&mut problem, found, settings, watch)?,
         false => with_sigmas(&mut problem, found, settings, watch)?,
     };
-    if may_correlate(&problem, settings) {
+    if has_input_errors(&problem) {
+        found = with_input_errors(&mut problem, found, settings, watch)?;
+    } else if may_correlate(&problem, settings) {
         found = with_correlations(&mut problem, found, settings, watch)?;
     }
     let is_as_stated = !estimates_sigma(&problem) && is_white(&problem) && !chooses;
@@ -94,12 +97,6 @@ pub fn fit_with_noise_watched(
 fn estimates_sigma(problem: &Problem) -> bool {
     let mut channels = problem.channels();
     channels.any(|c| matches!(c.weighting(), Weighting::Estimated { .. }))
-}
-
-/// True if the fit was ended from outside.
-fn is_ended(found: &Fit) -> bool {
-    let status = found.outcome.status;
-    matches!(status, Status::Interrupted | Status::TimeLimit)
 }
 
 /// Fit and estimation of the sigmas in alternation, until these converge.
@@ -263,25 +260,6 @@ fn refitted(
     Ok((found, moved))
 }
 
-/// The fit `found` continued by another round, `next`: the last point, with the work of both. Rounds that were `ended` from
-/// outside have not converged, whatever the status of the last fit.
-fn with_round(found: Fit, next: Fit, ended: bool) -> Fit {
-    let next = next.with_work_of(found.counts, found.timings, found.elapsed);
-    Fit {
-        attempts: found.attempts,
-        history: match next.history.is_empty() {
-            true => found.history,
-            false => next.history,
-        },
-        snapshots: found.snapshots,
-        outcome: match ended {
-            true => found.outcome,
-            false => next.outcome,
-        },
-        ..next
-    }
-}
-
 /// Sets the sigmas of the residuals of the channels `which`; returns the largest relative change.
 fn update(problem: &mut Problem, found: &Fit, which: impl Fn(&Channel) -> bool) -> f64 {
     let samples = problem.sample_count() as f64;
@@ -326,7 +304,7 @@ fn spread(channel: &Channel, predicted: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::builder::{Builder, CoefficientSpec, Record};
-    use crate::solvers::{Solver, Stopping, fit_from};
+    use crate::solvers::{Solver, Status, Stopping, fit_from};
     use crate::system::Grid;
     use std::time::Duration;
 

@@ -110,10 +110,49 @@ impl Excitation {
         }
     }
 
+    /// The excitation with values at the nodes, linear between them, added to one of its quantities.
+    #[must_use]
+    pub fn plus(&self, quantity: InputQuantity, nodes: &[f64]) -> Self {
+        let mut sum = self.clone();
+        let part = match quantity {
+            InputQuantity::Force => &mut sum.force,
+            InputQuantity::BaseAcceleration => &mut sum.base,
+        };
+        let added = StageSamples::linear(nodes);
+        *part = Some(match part {
+            None => added,
+            Some(part) => {
+                let pairs = part.0.iter().zip(&added.0);
+                let step = |(a, b): (&[f64; 3], &[f64; 3])| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+                StageSamples(pairs.map(step).collect())
+            }
+        });
+        sum
+    }
+
     /// True if the excitation covers a response over `nodes` nodes.
     pub(crate) fn covers(&self, nodes: usize) -> bool {
         let parts = [&self.force, &self.base];
         parts.into_iter().flatten().all(|p| p.steps() + 1 >= nodes)
+    }
+}
+
+/// A quantity that excites a system.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InputQuantity {
+    /// Force, N.
+    Force,
+    /// Acceleration of the base, m/s^2.
+    BaseAcceleration,
+}
+
+impl InputQuantity {
+    /// Name, that of its column in a model file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Force => "force",
+            Self::BaseAcceleration => "base_acceleration",
+        }
     }
 }
 

@@ -16,7 +16,7 @@ pub(crate) use integrator::{MIDPOINT, RK4, StagePosition, Tableau};
 pub use coefficients::{NodalCoefficients, State, SystemTangent};
 pub use elements::{MOST_TERMS, Term};
 pub use grid::{Grid, TimePoint, round_time};
-pub use input::{Excitation, InputSample, StageSamples};
+pub use input::{Excitation, InputQuantity, InputSample, StageSamples};
 pub use integrator::Method;
 
 /// Largest number of functions of a system: the mass and one per term.

@@ -3,7 +3,8 @@
 use super::equation::{EquationOfMotion, Stages, advance};
 use crate::simulate::Trajectory;
 use crate::system::{
-    Excitation, MIDPOINT, Method, NodalCoefficients, RK4, StagePosition, State, System, Tableau,
+    Excitation, InputQuantity, MIDPOINT, Method, NodalCoefficients, RK4, StagePosition, State,
+    System, Tableau,
 };
 
 /// Change of the state `(y, v)` at the right node of a step.
@@ -29,6 +30,7 @@ enum Seed {
     Displacement,
     Velocity,
     Function(usize, StagePosition),
+    Input(InputQuantity, StagePosition),
 }
 
 /// Linearises all steps about the node states `states`, which need not satisfy the equation of motion.
@@ -46,6 +48,41 @@ pub fn step_jacobians(
             .collect(),
         Method::Rk4 => steps.map(|i| step(&RK4, equation, states, i)).collect(),
     }
+}
+
+/// Derivatives of the state at the right node of every step with respect to displacement and velocity at the left node, and with
+/// respect to the input `quantity` at the left and at the right node, between which it is linear.
+pub fn input_derivatives(
+    system: &System,
+    nodal: &NodalCoefficients,
+    excitation: Option<&Excitation>,
+    states: &Trajectory,
+    quantity: InputQuantity,
+) -> Vec<[[StateChange; 2]; 2]> {
+    let equation = EquationOfMotion::new(system, nodal, excitation, states.nodes());
+    let steps = 0..states.nodes() - 1;
+    match system.method {
+        Method::Midpoint => steps
+            .map(|i| state_and_input(&MIDPOINT, equation, states, i, quantity))
+            .collect(),
+        Method::Rk4 => steps
+            .map(|i| state_and_input(&RK4, equation, states, i, quantity))
+            .collect(),
+    }
+}
+
+fn state_and_input<const S: usize>(
+    tableau: &Tableau<S>,
+    equation: EquationOfMotion,
+    states: &Trajectory,
+    i: usize,
+    quantity: InputQuantity,
+) -> [[StateChange; 2]; 2] {
+    let base = equation.stages(tableau, i, states.displacement[i], states.velocity[i]);
+    let by_state = [Seed::Displacement, Seed::Velocity];
+    let ends = [StagePosition::Left, StagePosition::Right];
+    let by_input = ends.map(|end| Seed::Input(quantity, end));
+    [by_state, by_input].map(|seeds| seeds.map(|seed| column(tableau, equation, i, &base, seed)))
 }
 
 fn step<const S: usize>(
@@ -84,7 +121,7 @@ fn column<const S: usize>(
     let (dy, dv) = match seed {
         Seed::Displacement => (1.0, 0.0),
         Seed::Velocity => (0.0, 1.0),
-        Seed::Function(..) => (0.0, 0.0),
+        Seed::Function(..) | Seed::Input(..) => (0.0, 0.0),
     };
     let mut change = Stages {
         y: [dy; S],
@@ -105,7 +142,11 @@ fn column<const S: usize>(
                 position.share(node) * equation.absolute(i, position, base.a[s])
             }
             Seed::Function(f, node) => position.share(node) * equation.terms[f - 1].phi(y, v),
-            _ => 0.0,
+            Seed::Input(InputQuantity::Force, node) => -position.share(node),
+            Seed::Input(InputQuantity::BaseAcceleration, node) => {
+                position.share(node) * partials.mass
+            }
+            Seed::Displacement | Seed::Velocity => 0.0,
         };
         change.a[s] =
             partials.da_dy * change.y[s] + partials.da_dv * change.v[s] - force / partials.mass;

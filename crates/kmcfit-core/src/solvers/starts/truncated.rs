@@ -114,6 +114,7 @@ fn first_steps_of(experiment: &Experiment, steps: usize) -> Experiment {
         initial_parameters: experiment.initial_parameters,
         excitation,
         input: Input::default(),
+        input_error: None,
         nodes: experiment.nodes.min(steps + 1),
         coefficient_set: experiment.coefficient_set,
         channels: channels.filter_map(|c| c.within(steps)).collect(),

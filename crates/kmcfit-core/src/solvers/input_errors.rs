@@ -1,0 +1,228 @@
+//! Fits with errors of the input: errors in variables for a noisy sensor, generalised least squares for an unmeasured drive.
+//!
+//! With the residuals `r` of the measured input, the derivatives `G` of the samples with respect to the input samples, the sigmas
+//! `s` of the input and `S` of the channel, the samples have the covariance `C = S^2 I + s^2 G G^T`.
+//!
+//! - *Unmeasured drive*: `r^T C^-1 r` with `C` held, renewed at each solution until the parameters rest. This estimate is unbiased
+//!   (Berkson 1950).
+//! - *Noisy sensor*: the errors of the input are estimated too, `eta = s^2 G^T C^-1 r`, and the response is linearised about the
+//!   input `f + eta`: the minimum of `r^T C^-1 r` over the parameters, with the derivatives of `C`. It needs no `log |C|`, which would
+//!   add the bias that these derivatives remove (Fuller 1987, Söderström 2007). The response to `eta` by the same linearisation
+//!   is subtracted, so that the residuals stay those of the measured input.
+
+use super::checkpoint::Observer;
+use super::correlation_estimation::movement;
+use super::executor::search;
+use super::fit::Fit;
+use super::rounds::{is_ended, with_round};
+use super::settings::FitSettings;
+use crate::noise::{Correlation, CorrelationLaw, InputErrors, InputRow, InputStep};
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::record::{
+    Channel, ChannelKind, Input, InputError, InputErrorKind, NoiseEstimate, Weighting,
+};
+use crate::simulate::SimulationError;
+use crate::simulate::reference::input_derivatives;
+use crate::system::InputQuantity;
+use std::sync::Arc;
+
+/// Largest number of rounds of fit and estimation.
+const ROUNDS: usize = 20;
+/// Change of the parameters, in standard errors, below which they are at rest.
+const AT_REST: f64 = 0.01;
+/// Largest factor by which a sigma changes in one estimation, and the halvings of the interval of its logarithm.
+const WIDEST: f64 = 1e3;
+const HALVINGS: usize = 30;
+
+/// True if the input of some experiment has errors of a stated sigma.
+pub(super) fn has_input_errors(problem: &Problem) -> bool {
+    let mut experiments = problem.experiments.iter();
+    experiments.any(|e| e.input_error.is_some())
+}
+
+/// Continues `found` with the errors of the input; `problem` receives the noise, and for noisy sensors the estimated input.
+pub(super) fn with_input_errors(
+    problem: &mut Problem,
+    mut found: Fit,
+    settings: &FitSettings,
+    watch: &mut Observer,
+) -> Result<Fit, SimulationError> {
+    let mut measured = problem.clone();
+    for _ in 0..ROUNDS {
+        if is_ended(&found) {
+            break;
+        }
+        let before = found.best.parameters.clone();
+        let evaluation = measured.evaluate(&before)?;
+        *problem = with_errors_at(&mut measured, &evaluation);
+        let fit = search(problem, &before, settings, None, watch)?;
+        found = with_round(found, fit, false);
+        if movement(problem, &before, &found) < AT_REST {
+            break;
+        }
+    }
+    Ok(found)
+}
+
+/// The problem with the covariance of its samples and, for noisy sensors, with the estimated input, at an evaluated point of the problem
+/// with the measured input, whose estimated sigmas are renewed.
+fn with_errors_at(measured: &mut Problem, evaluation: &Evaluation) -> Problem {
+    let share = (measured.parameters() as f64 / measured.sample_count() as f64).min(0.5);
+    let effects: Vec<Option<InputErrors>> = (0..measured.experiments.len())
+        .map(|e| effect(measured, evaluation, e))
+        .collect();
+    for (e, effect) in effects.iter().enumerate() {
+        if let Some(effect) = effect {
+            let predicted = &evaluation.predictions[e][0];
+            let channel = &mut measured.parts_mut().experiments[e].channels[0];
+            *channel = with_sigma(channel, effect, predicted, share);
+        }
+    }
+    let mut next = measured.clone();
+    for (e, effect) in effects.into_iter().enumerate() {
+        let Some(effect) = effect else { continue };
+        let gain = gain(measured, evaluation, e);
+        let grid = next.system.grid;
+        let experiment = &mut next.parts_mut().experiments[e];
+        let Some(error) = experiment.input_error.clone() else {
+            continue;
+        };
+        let channel = &mut experiment.channels[0];
+        let sigma = sigma_of(channel);
+        let effect = relative(&effect, sigma);
+        if error.kind == InputErrorKind::Sensor {
+            let residuals = channel.residuals(&evaluation.predictions[e][0]);
+            let normalised: Vec<f64> = residuals.map(|r| -r / sigma).collect();
+            let inputs = effect.smoothed(&normalised, error.times.len());
+            let is_absolute = error.quantity == InputQuantity::BaseAcceleration
+                && channel.kind() == ChannelKind::Acceleration
+                && !channel.base().is_empty();
+            let here: Vec<f64> = (channel.times().iter())
+                .map(|t| error.at(&inputs, *t))
+                .collect();
+            let changes = effect.response(&inputs).into_iter().zip(&here);
+            let changes: Vec<f64> = changes
+                .map(|(z, own)| z * sigma / gain - if is_absolute { *own } else { 0.0 })
+                .collect();
+            *channel = channel
+                .clone()
+                .with_input_change(error.quantity, &here, &changes);
+            let nodes: Vec<f64> = (0..experiment.nodes)
+                .map(|i| error.at(&inputs, grid.time(i)))
+                .collect();
+            let excitation = experiment.excitation.take().unwrap_or_default();
+            experiment.excitation = Some(excitation.plus(error.quantity, &nodes));
+            // The excitation is no longer that of the samples.
+            experiment.input = Input::default();
+        }
+        let channel = &mut experiment.channels[0];
+        let law = CorrelationLaw::InputErrors(Arc::new(effect));
+        let noise = NoiseEstimate {
+            correlation: Correlation::new(law, channel.times()),
+            ..NoiseEstimate::default()
+        };
+        *channel = channel.clone().with_noise(noise);
+    }
+    next
+}
+
+/// Sigma of a channel with one sigma for all samples.
+fn sigma_of(channel: &Channel) -> f64 {
+    channel.weighting().sigma(0).unwrap_or(1.0)
+}
+
+/// The effect of errors of the input in units of sigma, from that in units of the samples.
+fn relative(effect: &InputErrors, sigma: f64) -> InputErrors {
+    effect.scaled(1.0 / sigma)
+}
+
+fn gain(problem: &Problem, evaluation: &Evaluation, e: usize) -> f64 {
+    let [gain, ..] = problem.experiments[e].channels[0]
+        .sensor()
+        .values(&evaluation.scalars);
+    gain
+}
+
+/// Effect of the errors of the input of experiment `e` on the samples of its channel, in the unit of the samples; `None` without errors
+/// or channel.
+fn effect(problem: &Problem, evaluation: &Evaluation, e: usize) -> Option<InputErrors> {
+    let experiment = &problem.experiments[e];
+    let error = experiment.input_error.as_ref()?;
+    let channel = experiment.channels.first()?;
+    Some(effect_of(problem, evaluation, e, channel, error))
+}
+
+/// Effect of errors of the input of experiment `e` on the samples of a channel, in the unit of the samples.
+pub(super) fn effect_of(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    e: usize,
+    channel: &Channel,
+    error: &InputError,
+) -> InputErrors {
+    let view = problem.view(evaluation, e);
+    let derivatives = input_derivatives(
+        view.system,
+        view.nodal,
+        view.excitation,
+        view.response,
+        error.quantity,
+    );
+    let steps: Vec<InputStep> = derivatives
+        .into_iter()
+        .map(|[state, input]| InputStep { state, input })
+        .collect();
+    let [gain, ..] = channel.sensor().values(view.scalars);
+    let is_acceleration = channel.kind() == ChannelKind::Acceleration;
+    let rows: Vec<InputRow> = (0..channel.len())
+        .map(|j| {
+            let place = channel.places()[j];
+            let (i, x) = (place.step, place.fraction);
+            let by_input = match error.quantity {
+                _ if !is_acceleration => 0.0,
+                InputQuantity::Force => {
+                    let mass = &view.nodal.mass;
+                    1.0 / (mass[i] * (1.0 - x) + mass[i + 1] * x)
+                }
+                // The sensor of absolute motion adds the acceleration of the base that the relative one loses.
+                InputQuantity::BaseAcceleration if channel.base().is_empty() => -1.0,
+                InputQuantity::BaseAcceleration => 0.0,
+            };
+            InputRow {
+                step: i,
+                states: channel.sensed(view, j).states.map(|a| gain * a),
+                input: [gain * by_input * (1.0 - x), gain * by_input * x],
+            }
+        })
+        .collect();
+    let places = error.places(&problem.system.grid, steps.len() + 1);
+    InputErrors::new(error.sigma, &steps, &places, &rows)
+}
+
+/// The channel with an estimated sigma at which `r^T C^-1 r` is the number of samples less the share of the parameters; a stated
+/// sigma stays.
+fn with_sigma(channel: &Channel, effect: &InputErrors, predicted: &[f64], share: f64) -> Channel {
+    let Weighting::Estimated { sigma } = *channel.weighting() else {
+        return channel.clone();
+    };
+    let residuals: Vec<f64> = channel.residuals(predicted).collect();
+    let target = (1.0 - share) * residuals.len() as f64;
+    let excess = |sigma: f64| {
+        let normalised: Vec<f64> = residuals.iter().map(|r| r / sigma).collect();
+        let whitened = relative(effect, sigma).whiten(&normalised);
+        whitened.iter().map(|e| e * e).sum::<f64>() - target
+    };
+    let (mut low, mut high) = ((sigma / WIDEST).ln(), (sigma * WIDEST).ln());
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        match excess(middle.exp()) > 0.0 {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    let sigma = (0.5 * (low + high)).exp();
+    channel
+        .clone()
+        .with_weighting(Weighting::Estimated { sigma })
+}

@@ -1,0 +1,197 @@
+//! Coverage of 95 % intervals with errors of the force: constants m, c, k of a forced oscillator of 1 Hz, 50 cycles, N = 1000,
+//! 1 % noise of the displacement; data by an independent integrator. Seeds are 0, 1, 2, ...
+//!
+//! `.ci/long input` counts 200 seeds.
+
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::record::{ChannelKind, InputErrorKind, NoiseModel, Weighting};
+use kmcfit_core::internals::solvers::{Fit, FitSettings, Status, fit_with_noise};
+use kmcfit_core::internals::system::{InputQuantity, Method};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::f64::consts::TAU;
+
+const SPACING: f64 = 0.05;
+const SAMPLES: usize = 1000;
+/// Steps of the data's integrator per sample: 400 per cycle, an error of 1e-8.
+const SUBSTEPS: usize = 20;
+
+/// Mass (kg), damping (N s/m) and stiffness (N/m) of a damping ratio.
+fn truth(ratio: f64) -> [f64; 3] {
+    [2.0, 2.0 * ratio * TAU * 2.0, TAU * TAU * 2.0]
+}
+
+fn white(seed: u64, stream: u64) -> Vec<f64> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(stream);
+    (0..SAMPLES)
+        .map(|_| StandardNormal.sample(&mut random))
+        .collect()
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|y| y * y).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// Broadband force at the samples, N.
+fn force() -> Vec<f64> {
+    let mut smooth = 0.0;
+    let each = white(99, 2).into_iter().map(|e| {
+        smooth = 0.7 * smooth + e;
+        10.0 * smooth
+    });
+    each.collect()
+}
+
+/// Displacements by the fourth-order method of Runge and Kutta under a force that is linear between its samples.
+fn response([m, c, k]: [f64; 3], force: &[f64]) -> Vec<f64> {
+    let slope = |y: f64, v: f64, f: f64| [v, (f - c * v - k * y) / m];
+    let (mut y, mut v) = (0.0, 0.0);
+    let mut samples = vec![y];
+    let h = SPACING / SUBSTEPS as f64;
+    for pair in force.windows(2) {
+        for s in 0..SUBSTEPS {
+            let at =
+                |part: f64| pair[0] + (s as f64 + part) / SUBSTEPS as f64 * (pair[1] - pair[0]);
+            let a = slope(y, v, at(0.0));
+            let b = slope(y + 0.5 * h * a[0], v + 0.5 * h * a[1], at(0.5));
+            let d = slope(y + 0.5 * h * b[0], v + 0.5 * h * b[1], at(0.5));
+            let e = slope(y + h * d[0], v + h * d[1], at(1.0));
+            y += h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * d[0] + e[0]);
+            v += h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * d[1] + e[1]);
+        }
+        samples.push(y);
+    }
+    samples
+}
+
+/// A case: share of the noise in the force, damping ratio, what the noise is, and as what the fit treats it.
+#[derive(Debug, Clone, Copy)]
+struct Case {
+    share: f64,
+    ratio: f64,
+    is: InputErrorKind,
+    stated: Option<InputErrorKind>,
+}
+
+fn fitted(case: Case, seed: u64) -> (Problem, Fit) {
+    let truth = truth(case.ratio);
+    let known = force();
+    let size = case.share * rms(&known);
+    let noise = white(seed, 3);
+    let disturbed: Vec<f64> = known
+        .iter()
+        .zip(&noise)
+        .map(|(f, e)| f + size * e)
+        .collect();
+    let (acting, measured) = match case.is {
+        InputErrorKind::Sensor => (&known, &disturbed),
+        InputErrorKind::Drive => (&disturbed, &known),
+    };
+    let clean = response(truth, acting);
+    let sigma = 0.01 * rms(&clean);
+    let samples: Vec<f64> = (clean.iter().zip(white(seed, 4)))
+        .map(|(y, e)| y + sigma * e)
+        .collect();
+    let times: Vec<f64> = (0..SAMPLES).map(|i| SPACING * i as f64).collect();
+    let mut channel = ChannelSpec::new(ChannelKind::Displacement, &times, &samples);
+    channel.weighting = Some(Weighting::Sigma(sigma));
+    channel.noise = NoiseModel::White;
+    let mut record = Record::new("forced")
+        .from_state(0.0, 0.0)
+        .force(&times, measured)
+        .channel(channel);
+    if let Some(kind) = case.stated {
+        record = record.input_error(InputQuantity::Force, kind, size);
+    }
+    let problem = Builder::new(truth.map(|p| CoefficientSpec::constant(1.02 * p)))
+        .record(record)
+        .nodes(2 * (SAMPLES - 1) + 1)
+        .method(Method::Rk4)
+        .build()
+        .unwrap();
+    let settings = FitSettings::default();
+    fit_with_noise(&problem, &problem.start(), &settings, &mut |_| {}).unwrap()
+}
+
+/// Standardised errors of m, c and k, one for each seed.
+fn errors(case: Case, seeds: u64) -> Vec<[f64; 3]> {
+    let each = (0..seeds).map(|seed| {
+        let (problem, fit) = fitted(case, seed);
+        assert_eq!(fit.outcome.status, Status::Converged, "{case:?} {seed}");
+        let covariance = problem.covariance(&fit.best.evaluation).unwrap();
+        let truth = truth(case.ratio);
+        std::array::from_fn(|j| (fit.best.parameters[j] - truth[j]) / covariance[(j, j)].sqrt())
+    });
+    each.collect()
+}
+
+/// Counts of intervals that hold, and means of the standardised errors.
+fn summary(errors: &[[f64; 3]]) -> ([usize; 3], [f64; 3]) {
+    let holds = |j: usize| errors.iter().filter(|e| e[j].abs() <= 1.96).count();
+    let mean = |j: usize| errors.iter().map(|e| e[j]).sum::<f64>() / errors.len() as f64;
+    (std::array::from_fn(holds), std::array::from_fn(mean))
+}
+
+fn cases() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for is in [InputErrorKind::Sensor, InputErrorKind::Drive] {
+        for ratio in [0.01, 0.03] {
+            for share in [0.01, 0.05, 0.1] {
+                cases.push(Case {
+                    share,
+                    ratio,
+                    is,
+                    stated: Some(is),
+                });
+            }
+        }
+    }
+    cases
+}
+
+/// With coverage of 95 %, fewer than 15 of 20 intervals hold with a probability of 0.03 %.
+#[test]
+fn intervals_hold_with_errors_of_the_force() {
+    for case in cases().into_iter().filter(|case| case.share > 0.01) {
+        let (counts, _) = summary(&errors(case, 20));
+        assert!(counts.iter().all(|c| *c >= 15), "{case:?}: {counts:?}");
+    }
+}
+
+/// The same noise without its sigma: most intervals miss the truth, so that the test above detects a fit that ignores it.
+#[test]
+fn intervals_that_ignore_errors_of_the_force_are_too_short() {
+    let case = Case {
+        share: 0.1,
+        ratio: 0.03,
+        is: InputErrorKind::Sensor,
+        stated: None,
+    };
+    let (counts, _) = summary(&errors(case, 20));
+    assert!(counts.iter().sum::<usize>() < 30, "{counts:?}");
+}
+
+/// Counts of 200 seeds, as a table.
+#[test]
+#[ignore = "minutes: .ci/long"]
+fn coverage_of_200_seeds() {
+    println!(
+        "| errors of the force | damping ratio | share | m | c | k | mean error of m, c, k, standard errors |"
+    );
+    println!("|---|---|---|---|---|---|---|");
+    for case in cases() {
+        let seeds = 200;
+        let (counts, means) = summary(&errors(case, seeds));
+        let [m, c, k] = counts.map(|n| format!("{:.1} %", 100.0 * n as f64 / seeds as f64));
+        let [a, b, d] = means;
+        println!(
+            "| {:?} | {} | {} % | {m} | {c} | {k} | {a:.2}, {b:.2}, {d:.2} |",
+            case.is,
+            case.ratio,
+            100.0 * case.share
+        );
+    }
+}
