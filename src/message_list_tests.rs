@@ -601,6 +601,12 @@ fn fit_warnings() -> Vec<FitWarning> {
         FitWarning::Coloured => FitWarning::Coloured,
         FitWarning::Correlated => FitWarning::Correlated,
         FitWarning::CoarseBasis(_) => FitWarning::CoarseBasis(coarse_basis(None)),
+        FitWarning::DisturbedInput { .. } => FitWarning::DisturbedInput {
+            experiment: "shaker".into(), input: "force".into(), sigma: 0.701, share: 0.052,
+        },
+        FitWarning::ContradictedInputSigma { .. } => FitWarning::ContradictedInputSigma {
+            experiment: "shaker".into(), input: "base_acceleration".into(), given: 0.1, likely: 0.048,
+        },
         FitWarning::Aliased { .. } => FitWarning::Aliased { per_period: 2.2, frequency: 45.25 },
         FitWarning::Negative { .. } => FitWarning::Negative { function: "stiffness".into() },
         FitWarning::NegligibleForce { .. } => FitWarning::NegligibleForce { experiment: "shaker".into() },
@@ -706,6 +712,7 @@ fn suggestions() -> Vec<Suggestion> {
         Suggestion::LargerSigma { .. } => Suggestion::LargerSigma { times: 4.5, fit: 99.12 },
         Suggestion::NoiseLimited { .. } => Suggestion::NoiseLimited { channel: channel(), fit: 71.0, is_white: true },
         Suggestion::NoiseLimited { .. } => Suggestion::NoiseLimited { channel: channel(), fit: 71.0, is_white: false },
+        Suggestion::StateInputSigma { .. } => Suggestion::StateInputSigma { input: "force".into(), sigma: 0.701 },
         Suggestion::FinerBasis { .. } => Suggestion::FinerBasis { function: "stiffness".into() },
         Suggestion::MoreParameters { .. } => Suggestion::MoreParameters { absent: vec!["cubic", "friction"] },
         Suggestion::Constant { .. } => Suggestion::Constant { function: "damping".into(), p_value: 0.62 },

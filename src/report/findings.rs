@@ -90,6 +90,31 @@ pub fn warning(warning: &FitWarning) -> Finding {
              fit equally well; use a higher sampling rate or unequal intervals"
         ),
         FitWarning::CoarseBasis(basis) => coarse_basis(basis),
+        FitWarning::DisturbedInput {
+            experiment,
+            input,
+            share,
+            ..
+        } => {
+            let input = input.replace('_', " ");
+            format!(
+                "a disturbance enters through the equation of motion of {experiment}: noise of the {input} sensor ({} of the {input} \
+                 would explain the residuals), an unmeasured drive, or a missing term; the confidence intervals exclude it",
+                super::suggestions::percent(100.0 * share, 1)
+            )
+        }
+        FitWarning::ContradictedInputSigma {
+            experiment,
+            input,
+            given,
+            likely,
+        } => format!(
+            "the stated sigma of the {} of {experiment}, {} {unit}, is contradicted by the residuals: {} {unit} is most likely",
+            input.replace('_', " "),
+            significant(*given, 3),
+            significant(*likely, 3),
+            unit = if input == "force" { "N" } else { "m/s²" }
+        ),
         FitWarning::Negative { function } => {
             format!("the {function} is negative at most times: the system is not passive")
         }

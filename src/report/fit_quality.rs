@@ -60,11 +60,19 @@ fn noise(correlation: &Correlation) -> NoiseSummary {
             coefficients: process.coefficients().to_vec(),
             innovation_share: process.innovation_variance().sqrt(),
             correlation_time: None,
+            input_errors: false,
         },
         CorrelationLaw::Exponential { time } => NoiseSummary {
             coefficients: Vec::new(),
             innovation_share: 1.0,
             correlation_time: Some(*time),
+            input_errors: false,
+        },
+        CorrelationLaw::InputErrors(_) => NoiseSummary {
+            coefficients: Vec::new(),
+            innovation_share: 1.0,
+            correlation_time: None,
+            input_errors: true,
         },
     }
 }

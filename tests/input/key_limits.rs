@@ -64,6 +64,10 @@ const BEYOND: &[(&str, &str)] = &[
     ("hammer-and-shaker", "experiments.2.sigma={acceleration: 0}"),
     ("linear-mass", "experiments.0.sigma={displacement: 0}"),
     (
+        "paper-forced",
+        "experiments.0.sigma={displacement: 1, force: {value: 0, kind: sensor}}",
+    ),
+    (
         "camera",
         "experiments.0.loss={displacement: {name: huber, threshold: 0}}",
     ),
@@ -146,6 +150,14 @@ const ALONE: &[(&str, &str)] = &[
     ("linear-mass", "experiments.0.base={interpolation: cubic}"),
     ("linear-mass", "experiments.0.validation=true"),
     ("linear-mass", "experiments.0.sigma={velocity: 1}"),
+    (
+        "linear-mass",
+        "experiments.0.sigma={displacement: 1, force: {value: 1, kind: sensor}}",
+    ),
+    (
+        "linear-mass",
+        "experiments.0.sigma={displacement: 1, base_acceleration: {value: 1, kind: drive}}",
+    ),
     (
         "camera",
         "experiments.0.sensors={displacement: {absolute: true}}",

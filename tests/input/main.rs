@@ -3,6 +3,7 @@
 
 mod arbitrary;
 mod constraint_messages;
+mod input_errors;
 mod instruments;
 mod instruments_errors;
 mod key_documentation;

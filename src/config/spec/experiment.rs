@@ -1,6 +1,6 @@
 //! Keys of an experiment: data file, channels, sensors, input and initial state.
 
-use super::noise::NoisesSpec;
+use super::noise::{InputSigmaSpec, NoisesSpec};
 use crate::config::map::keys;
 
 use super::{OwnFunctionsSpec, RangeSpec};
@@ -218,6 +218,14 @@ keys! {
             unit "m/s^2",
             range "greater than 0",
             needs "the channel";
+        /// Independent errors of the samples of the force.
+        force: Option<InputSigmaSpec>,
+            example "{value: 0.5, kind: sensor}",
+            needs "`columns.force`, one channel with one sigma, at most 64 parameters";
+        /// Independent errors of the samples of the acceleration of the base.
+        base_acceleration: Option<InputSigmaSpec>,
+            example "{value: 0.02, kind: sensor}",
+            needs "`columns.base_acceleration`, one channel with one sigma, at most 64 parameters";
     }
 }
 

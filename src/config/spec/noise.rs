@@ -1,9 +1,9 @@
-//! Keys of the correlation of noise.
+//! Keys of the correlation of noise and of the errors of inputs.
 
 use crate::config::alternatives::ScalarOr;
 use crate::config::choice::choice;
 use crate::config::map::keys;
-use crate::config::values::Count;
+use crate::config::values::{Count, Number};
 
 keys! {
     /// Correlation of the noise of each channel.
@@ -32,5 +32,25 @@ choice! {
         Auto = "auto",
         /// Uncorrelated.
         White = "white",
+    }
+}
+
+keys! {
+    /// Independent errors of the samples of an input.
+    pub struct InputSigmaSpec = "input-sigma", expecting "a map such as {value: 0.5, kind: sensor}" {
+        /// Standard deviation, in N or m/s^2.
+        value: Number, example "0.5", range "greater than 0";
+        /// What the errors are errors of.
+        kind: InputErrorName, example "sensor";
+    }
+}
+
+choice! {
+    /// What the errors of an input are errors of.
+    pub enum InputErrorName {
+        /// Noise of the sensor of the input: the system received the true input, which differs from the samples.
+        Sensor = "sensor",
+        /// Unmeasured part of the drive: the system received the samples and further, independent input.
+        Drive = "drive",
     }
 }

@@ -69,12 +69,18 @@ pub struct NoiseSummary {
     /// Correlation time (s) of samples that are not equally spaced.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correlation_time: Option<f64>,
+    /// True if the correlation is that of the response to stated errors of the input.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub input_errors: bool,
 }
 
 impl NoiseSummary {
     /// The noise in words.
     pub(in crate::report) fn sentence(&self) -> String {
         match self.correlation_time {
+            _ if self.input_errors => {
+                "the intervals account for the errors of the input".to_owned()
+            }
             Some(time) => format!(
                 "noise correlated over {} s; the intervals account for it",
                 significant(time, 3)

@@ -81,6 +81,13 @@ pub enum Suggestion {
         /// Force terms that the model lacks.
         absent: Vec<&'static str>,
     },
+    /// The sigma of a measured input whose errors explain the residuals.
+    StateInputSigma {
+        /// The input, as its column in the model file.
+        input: String,
+        /// Likely sigma, in its SI unit.
+        sigma: f64,
+    },
     /// A finer basis for a function whose basis is too coarse.
     FinerBasis {
         /// Name of the function.
@@ -137,6 +144,7 @@ fn typed(document: &ResultDocument) -> Vec<Suggestion> {
     let mut steps = Vec::new();
     steps.extend(about_ending(document));
     steps.extend(about_steps(document));
+    steps.extend(about_inputs(document));
     steps.extend(about_bases(document).or_else(|| about_residuals(document)));
     if wanders(document) {
         steps.rotate_left(1);
@@ -167,6 +175,15 @@ fn about_bases(document: &ResultDocument) -> Option<Suggestion> {
     let function = coarse.quantities.get("function")?.as_str()?;
     Some(Suggestion::FinerBasis {
         function: function.to_owned(),
+    })
+}
+
+fn about_inputs(document: &ResultDocument) -> Option<Suggestion> {
+    let warnings = &document.identifiability.warnings;
+    let disturbed = warnings.iter().find(|w| w.kind == "disturbed_input")?;
+    Some(Suggestion::StateInputSigma {
+        input: disturbed.quantities.get("input")?.as_str()?.to_owned(),
+        sigma: disturbed.quantities.get("sigma")?.as_f64()?,
     })
 }
 
@@ -262,15 +279,16 @@ fn about_residuals(document: &ResultDocument) -> Option<Suggestion> {
     let is_coloured = |c: &ChannelSummary| {
         c.sigma.is_some()
             && c.fit_percent < EXACT
-            && (c.noise.is_some() || c.whiteness_p_value.is_some_and(|p| p < PATTERN))
+            && (c.noise.as_ref().is_some_and(|noise| !noise.input_errors)
+                || c.whiteness_p_value.is_some_and(|p| p < PATTERN))
     };
     let named = document.experiments.iter();
     let mut named = named.flat_map(|e| e.channels.iter().map(move |c| (e, c)));
     let poor = |c: &ChannelSummary| c.fit_percent.is_finite() && c.fit_percent < POOR;
     let Some((record, channel)) = named.find(|(_, channel)| poor(channel)) else {
         let absent = absent(document);
-        return channels()
-            .any(is_coloured)
+        let is_explained = about_inputs(document).is_some();
+        return (!is_explained && channels().any(is_coloured))
             .then_some(Suggestion::MoreParameters { absent });
     };
     let fit = channel.fit_percent;

@@ -54,6 +54,12 @@ impl fmt::Display for Suggestion {
                 }
                 write_suspect(f, suspect, &more_parameters(absent))
             }
+            Suggestion::StateInputSigma { input, sigma } => write!(
+                f,
+                "state the errors of the {}: `sigma: {{{input}: {{value: {}, kind: sensor}}}}` for noise of its sensor, `kind: drive` for an unmeasured drive; or add a missing force term",
+                input.replace('_', " "),
+                significant(*sigma, 2)
+            ),
             Suggestion::FinerBasis { function } => write!(
                 f,
                 "let the {function} vary more freely (`basis: b-spline`, `knots: auto`); an error of the input and a missing force term, too, appear as a coefficient that varies"

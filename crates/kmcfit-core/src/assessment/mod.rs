@@ -3,6 +3,7 @@
 mod channel;
 mod constants;
 mod function;
+mod input_disturbance;
 mod plausibility;
 mod recovery;
 mod refinement;
@@ -20,6 +21,7 @@ pub use step_check::{StepCheck, StepCheckOutcome, step_check};
 
 use crate::identifiability::{
     BandSettings, Bands, FunctionClassification, classify_functions, condition_on_bases,
+    condition_on_inputs,
 };
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::{Fit, Status};
@@ -87,6 +89,9 @@ impl FitAssessment {
             };
             assessment.classifications = classify_functions(problem, &best.evaluation, &bands);
             condition_on_bases(problem, &mut assessment.classifications, &test.doubtful);
+            if assessment.plausibility.is_disturbed {
+                condition_on_inputs(&mut assessment.classifications);
+            }
             let warnings = test.coarse.into_iter().map(FitWarning::CoarseBasis);
             assessment.plausibility.warnings.extend(warnings);
             assessment

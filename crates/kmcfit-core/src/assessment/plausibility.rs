@@ -1,6 +1,7 @@
 //! Plausibility of a fit: conditions under which its optimum identifies no system, and warnings about its intervals.
 
 use super::channel::diagnostics;
+use super::input_disturbance::input_warnings;
 use super::refinement::CoarseBasis;
 use super::statistics::{FitStatistics, statistics};
 use super::step_check::{StepCheckOutcome, step_check};
@@ -88,6 +89,28 @@ pub enum FitWarning {
     },
     /// A finer basis fits significantly better: the intervals exclude the error of the basis.
     CoarseBasis(CoarseBasis),
+    /// The residuals are those of errors of a measured input, or of a term missing from the equation of motion.
+    DisturbedInput {
+        /// Name of the experiment.
+        experiment: String,
+        /// The input, as its column in the model file.
+        input: String,
+        /// Sigma of errors of the input that leave such residuals, in its SI unit.
+        sigma: f64,
+        /// The same relative to the input, root mean square.
+        share: f64,
+    },
+    /// The residuals contradict the stated sigma of an input.
+    ContradictedInputSigma {
+        /// Name of the experiment.
+        experiment: String,
+        /// The input, as its column in the model file.
+        input: String,
+        /// Stated sigma, in the SI unit of the input.
+        given: f64,
+        /// Sigma of the largest likelihood, in the SI unit of the input.
+        likely: f64,
+    },
     /// A function is negative at most times, which violates passivity.
     Negative {
         /// Name of the function.
@@ -111,6 +134,8 @@ pub struct Plausibility {
     pub errors_hold: bool,
     /// True if the residuals of a channel are certainly not white, so that standard errors are too small.
     pub is_coloured: bool,
+    /// True if the residuals are those of errors of a measured input or of a missing term, which the intervals exclude.
+    pub is_disturbed: bool,
 }
 
 impl Plausibility {
@@ -133,18 +158,31 @@ impl Plausibility {
             .or_else(|| poor.then_some(FitWarning::PoorFit));
         let aliased = aliased(problem, evaluation);
         let errors_hold = unidentified.is_none() && unexplained.is_none() && aliased.is_none();
-        let is_correlated = problem.channels().any(|c| c.correlation().is_some());
+        let inputs = match errors_hold && reports_errors {
+            true => input_warnings(problem, evaluation),
+            false => Vec::new(),
+        };
+        let is_disturbed = (inputs.iter()).any(|w| matches!(w, FitWarning::DisturbedInput { .. }));
+        // Stated errors of an input, and those that the residuals show, explain the correlation.
+        let is_estimated =
+            |c: &Channel| c.correlation().is_some_and(|c| c.input_errors().is_none());
+        let is_correlated = !is_disturbed && problem.channels().any(is_estimated);
         let optimistic = match (errors_hold, coloured, is_correlated) {
             (true, true, _) => Some(FitWarning::Coloured),
             (true, false, true) => Some(FitWarning::Correlated),
             _ => None,
         };
-        let warnings = unexplained.into_iter().chain(optimistic).chain(aliased);
+        let warnings = unexplained
+            .into_iter()
+            .chain(inputs)
+            .chain(optimistic)
+            .chain(aliased);
         Self {
             warnings: warnings.chain(implausible(problem, evaluation)).collect(),
             unidentified,
             errors_hold,
             is_coloured: coloured,
+            is_disturbed,
         }
     }
 

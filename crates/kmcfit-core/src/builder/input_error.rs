@@ -130,7 +130,7 @@ pub(super) fn check(problem: &Problem, solver: Solver) -> Result<(), BuildError>
     if matches!(solver, Solver::SteepestDescent | Solver::EquationError) {
         let text = "the method does not use errors of an input";
         return Err(BuildError::new(key, text)
-            .found("`steepest-descent` or `equation-error`")
+            .found(format!("`{}`", solver.name()))
             .expected(
                 "`gauss-newton`, `projected-gradient` or `lbfgs`, or no sigma of the input",
             ));

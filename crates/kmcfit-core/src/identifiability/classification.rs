@@ -77,6 +77,8 @@ pub enum Condition {
     Smoothness,
     /// The basis: a finer one fits significantly better.
     Basis,
+    /// The measured input and the terms of the equation of motion: the residuals are those of errors of the input or of a missing term.
+    Input,
 }
 
 /// Kind of a [`Classification`].
@@ -106,9 +108,9 @@ pub struct FunctionClassification {
 }
 
 impl FunctionClassification {
-    fn depends_on_basis(&mut self) {
+    /// Makes an identified function conditional.
+    fn depends_on(&mut self, on: Condition) {
         if let Classification::Identified { relative } = self.verdict {
-            let on = Condition::Basis;
             self.sentence = on.sentence(&self.name, relative);
             self.verdict = Classification::Conditional { relative, on };
         }
@@ -140,8 +142,16 @@ impl Condition {
             Self::Basis => format!(
                 "{name} is identified conditionally on the basis: {half}; a finer basis fits significantly better"
             ),
+            Self::Input => format!(
+                "{name} is identified conditionally on an exact input: {half}; the residuals show a disturbance of the equation of motion"
+            ),
         }
     }
+}
+
+/// Makes all identified functions conditional on the measured input.
+pub(crate) fn condition_on_inputs(classifications: &mut [FunctionClassification]) {
+    (classifications.iter_mut()).for_each(|each| each.depends_on(Condition::Input));
 }
 
 /// Makes classifications conditional on the basis for these functions, and for the ratios with them.
@@ -168,7 +178,7 @@ pub(crate) fn condition_on_bases(
             .chain(mass)
             .any(|f| coarse.contains(&f))
         {
-            classification.depends_on_basis();
+            classification.depends_on(Condition::Basis);
         }
     }
 }

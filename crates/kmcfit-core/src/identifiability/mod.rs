@@ -46,10 +46,10 @@ pub(crate) fn has_active_rows(problem: &Problem, theta: &[f64]) -> bool {
 pub use anchors::anchors;
 pub use band::{Band, BandSide};
 pub use bands::{BandSettings, Bands};
-pub(crate) use classification::condition_on_bases;
 pub use classification::{
     Classification, ClassificationKind, Condition, FunctionClassification, classify_functions,
 };
+pub(crate) use classification::{condition_on_bases, condition_on_inputs};
 pub(crate) use covariance::stacked;
 pub use experiments::{
     CandidateChannel, CandidateExperiment, Gain, Ranked, rank_experiments, residual_spread,

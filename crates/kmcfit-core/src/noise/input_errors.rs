@@ -65,6 +65,8 @@ struct Transition {
 #[derive(Debug, Clone, PartialEq)]
 struct Row {
     step: usize,
+    /// Transition from the row before, and the covariance of the noise that enters; `None` within the same step.
+    advance: Option<(Matrix, Matrix)>,
     derivatives: State,
     gain: State,
     /// Variance of the innovation.
@@ -95,6 +97,7 @@ impl InputErrors {
             let (before, after) = (right * (1.0 - fraction), right * fraction);
             Row {
                 step: row.step,
+                advance: None,
                 derivatives: State::from([c, d, before, after, a, b, left]),
                 gain: State::zeros(),
                 variance: 1.0,
@@ -106,8 +109,27 @@ impl InputErrors {
             transitions,
             first: places[0].0,
         };
+        errors.join();
         errors.filter();
         errors
+    }
+
+    /// Joins the transitions between rows, so that the filter takes one step for each sample, whatever the number of nodes.
+    fn join(&mut self) {
+        let mut next = 0;
+        for row in &mut self.rows {
+            if next > row.step {
+                continue;
+            }
+            let (mut matrix, mut covariance) = (Matrix::identity(), Matrix::zeros());
+            for step in &self.transitions[next..=row.step] {
+                matrix = step.matrix * matrix;
+                covariance = step.matrix * covariance * step.matrix.transpose()
+                    + step.noise * step.noise.transpose();
+            }
+            row.advance = Some((matrix, covariance));
+            next = row.step + 1;
+        }
     }
 
     /// Sets the gains and variances by the Riccati recursion.
@@ -115,16 +137,14 @@ impl InputErrors {
         let mut covariance = Matrix::zeros();
         covariance[(2, 2)] = self.sigma * self.sigma;
         covariance[(3, 3)] = self.sigma * self.sigma;
-        let mut rows = self.rows.iter_mut().peekable();
-        for (i, step) in self.transitions.iter().enumerate() {
-            covariance = step.matrix * covariance * step.matrix.transpose()
-                + step.noise * step.noise.transpose();
-            while let Some(row) = rows.next_if(|row| row.step == i) {
-                let column = covariance * row.derivatives;
-                row.variance = 1.0 + row.derivatives.dot(&column);
-                row.gain = column / row.variance;
-                covariance -= row.gain * column.transpose();
+        for row in &mut self.rows {
+            if let Some((matrix, noise)) = &row.advance {
+                covariance = matrix * covariance * matrix.transpose() + noise;
             }
+            let column = covariance * row.derivatives;
+            row.variance = 1.0 + row.derivatives.dot(&column);
+            row.gain = column / row.variance;
+            covariance -= row.gain * column.transpose();
         }
     }
 
@@ -137,8 +157,14 @@ impl InputErrors {
     #[must_use]
     pub fn with_sigma(&self, sigma: f64) -> Self {
         let mut errors = self.clone();
+        let ratio = sigma / self.sigma;
         for step in &mut errors.transitions {
-            step.noise *= sigma / self.sigma;
+            step.noise *= ratio;
+        }
+        for row in &mut errors.rows {
+            if let Some((_, noise)) = &mut row.advance {
+                *noise *= ratio * ratio;
+            }
         }
         errors.sigma = sigma;
         errors.filter();
@@ -167,15 +193,12 @@ impl InputErrors {
     /// Passes each row with the state before its update to `take`, which returns the innovation.
     fn run(&self, mut take: impl FnMut(usize, &Row, f64) -> f64) {
         let mut state = State::zeros();
-        let mut next = 0;
-        for (i, step) in self.transitions.iter().enumerate() {
-            state = step.matrix * state;
-            while next < self.rows.len() && self.rows[next].step == i {
-                let row = &self.rows[next];
-                let innovation = take(next, row, row.derivatives.dot(&state));
-                state += row.gain * innovation;
-                next += 1;
+        for (j, row) in self.rows.iter().enumerate() {
+            if let Some((matrix, _)) = &row.advance {
+                state = matrix * state;
             }
+            let innovation = take(j, row, row.derivatives.dot(&state));
+            state += row.gain * innovation;
         }
     }
 
@@ -205,15 +228,12 @@ impl InputErrors {
     pub fn whiten_transpose(&self, values: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; values.len()];
         let mut adjoint = State::zeros();
-        let mut last = self.rows.len();
-        for (i, step) in self.transitions.iter().enumerate().rev() {
-            while last > 0 && self.rows[last - 1].step == i {
-                last -= 1;
-                let row = &self.rows[last];
-                out[last] = values[last] / row.variance.sqrt() + row.gain.dot(&adjoint);
-                adjoint -= row.derivatives * out[last];
+        for (j, row) in self.rows.iter().enumerate().rev() {
+            out[j] = values[j] / row.variance.sqrt() + row.gain.dot(&adjoint);
+            adjoint -= row.derivatives * out[j];
+            if let Some((matrix, _)) = &row.advance {
+                adjoint = matrix.tr_mul(&adjoint);
             }
-            adjoint = step.matrix.tr_mul(&adjoint);
         }
         out
     }

@@ -58,7 +58,7 @@ mod tests {
             sigma: 1.0,
             times: vec![0.0, 1.0, 3.0],
         };
-        let grid = Grid::new(-0.5, 3.5, 9).unwrap();
+        let grid = Grid::new(-0.5, 4.0, 9).unwrap();
         let places = error.places(&grid, 9);
         let expected = [
             (0, 0.0),

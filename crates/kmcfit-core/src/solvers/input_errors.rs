@@ -14,7 +14,7 @@ use super::checkpoint::Observer;
 use super::correlation_estimation::movement;
 use super::executor::search;
 use super::fit::Fit;
-use super::rounds::{is_ended, with_round};
+use super::rounds::{counted, is_ended, with_round};
 use super::settings::FitSettings;
 use crate::noise::{Correlation, CorrelationLaw, InputErrors, InputRow, InputStep};
 use crate::objective::Evaluation;
@@ -55,7 +55,7 @@ pub(super) fn with_input_errors(
         }
         let before = found.best.parameters.clone();
         let evaluation = measured.evaluate(&before)?;
-        *problem = with_errors_at(&mut measured, &evaluation);
+        *problem = counted(&mut found, |_| with_errors_at(&mut measured, &evaluation));
         let fit = search(problem, &before, settings, None, watch)?;
         found = with_round(found, fit, false);
         if movement(problem, &before, &found) < AT_REST {
@@ -150,11 +150,11 @@ fn effect(problem: &Problem, evaluation: &Evaluation, e: usize) -> Option<InputE
     let experiment = &problem.experiments[e];
     let error = experiment.input_error.as_ref()?;
     let channel = experiment.channels.first()?;
-    Some(effect_of(problem, evaluation, e, channel, error))
+    Some(input_error_effect(problem, evaluation, e, channel, error))
 }
 
 /// Effect of errors of the input of experiment `e` on the samples of a channel, in the unit of the samples.
-pub(super) fn effect_of(
+pub(crate) fn input_error_effect(
     problem: &Problem,
     evaluation: &Evaluation,
     e: usize,

@@ -41,6 +41,7 @@ pub use checkpoint::{
 pub use executor::fit_from;
 pub use fit::{Attempt, Fit};
 pub use history::{IterationRecord, number_or_nan};
+pub(crate) use input_errors::input_error_effect;
 pub use iterate::Iterate;
 pub(crate) use linearization::{add_penalties, add_priors, linear_predictions, weighted_jacobian};
 pub use methods::equation_error::{Measurements, equation_error};

@@ -10,11 +10,10 @@ use super::history::IterationRecord;
 use super::input_errors::{has_input_errors, with_input_errors};
 use super::reml::{estimates_weights, refined, start_weights};
 use super::reml_by_traces::with_reml_weights;
-use super::rounds::{is_ended, with_round};
+use super::rounds::{counted, is_ended, with_round};
 use super::settings::FitSettings;
 use super::start_strategy::search_from_starts;
 use super::timings::Timings;
-use crate::host::Instant;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, Loss, Weighting};
 use crate::simd::sum::rms;
@@ -227,16 +226,6 @@ fn without_correlations(found: Fit, white: Fit) -> Fit {
         elapsed: found.elapsed,
         ..white
     }
-}
-
-/// Result of work whose time is added to that of the fit.
-fn counted<T>(found: &mut Fit, work: impl FnOnce(&Fit) -> T) -> T {
-    let clock = Instant::now();
-    let result = work(found);
-    let took = clock.elapsed();
-    found.timings.linear_algebra += took;
-    found.elapsed += took;
-    result
 }
 
 /// Fit with the noise of `next`, which becomes the problem; also the largest change of a parameter in standard errors. Sigmas

@@ -2,6 +2,7 @@
 
 use super::fit::Fit;
 use super::termination::Status;
+use crate::host::Instant;
 
 /// True if the fit was ended from outside.
 pub(super) fn is_ended(found: &Fit) -> bool {
@@ -26,4 +27,14 @@ pub(super) fn with_round(found: Fit, next: Fit, ended: bool) -> Fit {
         },
         ..next
     }
+}
+
+/// Result of work whose time is added to that of the fit.
+pub(super) fn counted<T>(found: &mut Fit, work: impl FnOnce(&Fit) -> T) -> T {
+    let clock = Instant::now();
+    let result = work(found);
+    let took = clock.elapsed();
+    found.timings.linear_algebra += took;
+    found.elapsed += took;
+    result
 }

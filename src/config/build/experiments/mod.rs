@@ -10,7 +10,10 @@ mod warning;
 use super::{BuildMode, functions};
 use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
-use crate::config::spec::{EstimateValue, ExperimentSpec, FitMethod, InitialSpec, SensorSpec};
+use crate::config::spec::{
+    EstimateValue, ExperimentSpec, FitMethod, InitialSpec, InputErrorName, InputSigmaSpec,
+    SensorSpec,
+};
 use crate::config::values::{Estimate, NumberOrEstimate};
 use crate::error::InputError;
 use crate::finding::Finding;
@@ -20,8 +23,8 @@ pub(super) use channel::RawChannel;
 use excitation::RawExcitation;
 use kmcfit_core::internals::builder::{self, ChannelSpec, ScalarSpec, listed};
 use kmcfit_core::internals::functions::{Prior, ScalarParameter};
-use kmcfit_core::internals::record::{ChannelKind, Experiment, Weighting};
-use kmcfit_core::internals::system::Grid;
+use kmcfit_core::internals::record::{ChannelKind, Experiment, InputErrorKind, Weighting};
+use kmcfit_core::internals::system::{Grid, InputQuantity};
 
 pub(super) use excitation::shape;
 #[cfg(test)]
@@ -166,6 +169,13 @@ pub(super) fn specification(
         let own = functions::specification(file, grid, &key, given)?;
         found = found.coefficient(kind, own);
     }
+    if let Some((quantity, error)) = input_sigma(file, i)? {
+        let kind = match error.kind {
+            InputErrorName::Sensor => InputErrorKind::Sensor,
+            InputErrorName::Drive => InputErrorKind::Drive,
+        };
+        found = found.input_error(quantity, kind, error.value.0);
+    }
     let mut notes = Vec::new();
     if let Some(mut record) = record {
         found = found.input(record.excitation.into_input());
@@ -178,6 +188,28 @@ pub(super) fn specification(
         }
     }
     Ok((found, notes))
+}
+
+/// Stated errors of the input of experiment `i`, at most of one.
+fn input_sigma(
+    file: &ModelFile,
+    i: usize,
+) -> Result<Option<(InputQuantity, &InputSigmaSpec)>, InputError> {
+    let Some(sigma) = &file.spec.experiments[i].sigma else {
+        return Ok(None);
+    };
+    match (&sigma.force, &sigma.base_acceleration) {
+        (Some(_), Some(_)) => {
+            let key = format!("experiments[{i}].sigma.base_acceleration");
+            Err(file
+                .error_at(&key, "errors are supported for one input")
+                .found("`force` and `base_acceleration`")
+                .expected("one of the two"))
+        }
+        (Some(force), None) => Ok(Some((InputQuantity::Force, force))),
+        (None, Some(base)) => Ok(Some((InputQuantity::BaseAcceleration, base))),
+        (None, None) => Ok(None),
+    }
 }
 
 /// A number that is fixed or estimated.

@@ -1,0 +1,207 @@
+//! Errors of a measured input: is a stated sigma that of the residuals, and where none is stated, do the residuals show a
+//! disturbance that enters through the equation of motion?
+//!
+//! The residuals `r` of a channel have under noise of the channel and errors of the input, with the ratio `rho` of their sigmas,
+//!
+//! ```text
+//! -2 log L(rho) = n log(r^T R^-1 r / n) + log |R| + n (log 2 pi + 1),    R = I + rho^2 G G^T
+//! ```
+//!
+//! with the derivatives `G` of the samples with respect to the input samples. This likelihood is compared with that of the
+//! autoregressive noise of the fit by the Bayesian information criterion. A noisy sensor, an unmeasured drive and a term missing
+//! from the equation leave such residuals alike.
+
+use super::FitWarning;
+use super::channel::diagnostics;
+use crate::diagnostics::{SIGNIFICANCE, standard_deviation};
+use crate::noise::{Correlation, InputErrors};
+use crate::objective::Evaluation;
+use crate::problem::{FEW_PARAMETERS, Problem};
+use crate::record::{
+    BaseMotion, Channel, Experiment, InputError, InputErrorKind, Loss, NoiseModel, Waveform,
+};
+use crate::signal::Signal;
+use crate::simd::sum::rms;
+use crate::solvers::input_error_effect;
+use crate::system::InputQuantity;
+
+/// Ratio of a stated sigma to the likely one, or its inverse, above which it is contradicted.
+const CONTRADICTED: f64 = 1.3;
+/// Quantile of chi-square with one degree of freedom, of probability 99 %: difference of `-2 log L` that noise explains.
+const SIGNIFICANT: f64 = 6.635;
+/// Difference of the criteria from which the evidence for a disturbance is very strong (Kass and Raftery 1995).
+const EVIDENCE: f64 = 10.0;
+/// Residuals that may be noise, as a share of the variation of the samples.
+const NOISE: [f64; 2] = [1e-4, 0.5];
+/// Range of the ratio of an input's sigma to the input itself in the search.
+const SHARES: [f64; 2] = [1e-4, 1.0];
+/// Steps of the search over the logarithm of a ratio: it ends within 3 %.
+const STEPS: usize = 15;
+/// Number of samples from the beginning of a record that are compared: an estimate from so many is certain enough.
+const MOST_SAMPLES: usize = 20_000;
+
+/// Warnings about the inputs of all experiments.
+pub(super) fn input_warnings(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
+    if problem.parameters() > FEW_PARAMETERS {
+        return Vec::new();
+    }
+    let each = (0..problem.experiments.len()).filter_map(|e| warning(problem, evaluation, e));
+    each.collect()
+}
+
+fn warning(problem: &Problem, evaluation: &Evaluation, e: usize) -> Option<FitWarning> {
+    let experiment = &problem.experiments[e];
+    let [channel] = experiment.channels.as_slice() else {
+        return None;
+    };
+    let residuals: Vec<f64> = channel.residuals(&evaluation.predictions[e][0]).collect();
+    let share = rms(&residuals) / standard_deviation(channel.observed());
+    if !(NOISE[0]..NOISE[1]).contains(&share) {
+        return None;
+    }
+    match &experiment.input_error {
+        Some(error) => contradicted(experiment, channel, &residuals, error),
+        None => disturbed(problem, evaluation, e, &residuals),
+    }
+}
+
+/// Warning where a stated sigma of the input is contradicted by the residuals.
+fn contradicted(
+    experiment: &Experiment,
+    channel: &Channel,
+    residuals: &[f64],
+    error: &InputError,
+) -> Option<FitWarning> {
+    let effect = channel.correlation().and_then(Correlation::input_errors)?;
+    let count = residuals.len().min(MOST_SAMPLES);
+    let sigma = channel.weighting().sigma(0)?;
+    let normalised: Vec<f64> = residuals[..count].iter().map(|r| r / sigma).collect();
+    let effect = effect.first(count);
+    // With the sigma of the channel as it is.
+    let minus_two_log = |ratio: f64| {
+        let errors = effect.with_sigma(ratio * effect.sigma());
+        let squares: f64 = errors.whiten(&normalised).iter().map(|e| e * e).sum();
+        squares + errors.log_determinant()
+    };
+    let (ratio, least) = minimum(minus_two_log, [0.1, 10.0]);
+    let is_significant = minus_two_log(1.0) - least > SIGNIFICANT;
+    let is_far = !(1.0 / CONTRADICTED..=CONTRADICTED).contains(&ratio);
+    (is_significant && is_far).then(|| FitWarning::ContradictedInputSigma {
+        experiment: experiment.name.clone(),
+        input: error.quantity.name().to_owned(),
+        given: error.sigma,
+        likely: ratio * error.sigma,
+    })
+}
+
+/// Warning where errors of the measured input explain the residuals better than the noise of the channel.
+fn disturbed(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    e: usize,
+    residuals: &[f64],
+) -> Option<FitWarning> {
+    let experiment = &problem.experiments[e];
+    let channel = &experiment.channels[0];
+    let is_judged = channel.weighting().is_sigma()
+        && channel.loss() == Loss::Squares
+        && channel.filter().is_empty()
+        && channel.noise_model() == NoiseModel::Auto
+        && (channel.correlation().is_some() || !is_white(channel, &evaluation.predictions[e][0]));
+    let (quantity, signal) = measured(experiment).filter(|_| is_judged)?;
+    let size = rms(signal.values());
+    let error = InputError {
+        quantity,
+        kind: InputErrorKind::Sensor,
+        sigma: size,
+        times: signal.times().to_vec(),
+    };
+    let count = residuals.len().min(MOST_SAMPLES);
+    let residuals = &residuals[..count];
+    let n = count as f64;
+    let as_noise = match channel.correlation() {
+        None => n * mean_square(residuals).ln(),
+        Some(correlation) => {
+            let correlation = correlation.first(count);
+            let innovations = correlation.whiten(residuals);
+            let order = correlation.order() as f64;
+            n * mean_square(&innovations).ln() + correlation.log_determinant() + order * n.ln()
+        }
+    };
+    // In units of the residuals, so that ratios of sigmas are of the order of 1.
+    let unit = rms(residuals);
+    let effect = input_error_effect(problem, evaluation, e, channel, &error).scaled(1.0 / unit);
+    let effect: InputErrors = effect.first(count);
+    let normalised: Vec<f64> = residuals.iter().map(|r| r / unit).collect();
+    let minus_two_log = |share: f64| {
+        // The sigma of the channel is profiled: the ratio of both sigmas is the share over that of the channel.
+        let errors = effect.with_sigma(share * size);
+        n * (unit * unit * mean_square(&errors.whiten(&normalised))).ln() + errors.log_determinant()
+    };
+    let (share, least) = minimum(minus_two_log, SHARES);
+    let as_disturbance = least + n.ln();
+    let scale = mean_square(&effect.with_sigma(share * size).whiten(&normalised)).sqrt();
+    (as_noise - as_disturbance > EVIDENCE).then(|| FitWarning::DisturbedInput {
+        experiment: experiment.name.clone(),
+        input: quantity.name().to_owned(),
+        sigma: share * scale * size,
+        share: share * scale,
+    })
+}
+
+/// True for residuals without significant autocorrelation, which leave no evidence of a disturbance.
+fn is_white(channel: &Channel, predicted: &[f64]) -> bool {
+    diagnostics(channel, predicted).whiteness.p_value >= SIGNIFICANCE
+}
+
+/// The measured input of an experiment, where there is one.
+fn measured(experiment: &Experiment) -> Option<(InputQuantity, &Signal)> {
+    match (&experiment.input.force, &experiment.input.base) {
+        (Some(Waveform::Samples(signal)), None) => Some((InputQuantity::Force, signal)),
+        (None, Some(BaseMotion::Acceleration(signal))) => {
+            Some((InputQuantity::BaseAcceleration, signal))
+        }
+        _ => None,
+    }
+}
+
+fn mean_square(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
+}
+
+/// Minimum of a function of a positive number between two ends, by golden sections of the logarithm.
+fn minimum(value: impl Fn(f64) -> f64, ends: [f64; 2]) -> (f64, f64) {
+    let golden = 0.5 * (5f64.sqrt() - 1.0);
+    let [mut low, mut high] = ends.map(f64::ln);
+    let mut left = high - golden * (high - low);
+    let mut right = low + golden * (high - low);
+    let (mut at_left, mut at_right) = (value(left.exp()), value(right.exp()));
+    for _ in 0..STEPS {
+        if at_left < at_right {
+            (high, right, at_right) = (right, left, at_left);
+            left = high - golden * (high - low);
+            at_left = value(left.exp());
+        } else {
+            (low, left, at_left) = (left, right, at_right);
+            right = low + golden * (high - low);
+            at_right = value(right.exp());
+        }
+    }
+    match at_left < at_right {
+        true => (left.exp(), at_left),
+        false => (right.exp(), at_right),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 15 golden sections leave `9.2 * 0.618^15 = 0.007` of the logarithm of a range of 10^4.
+    #[test]
+    fn the_minimum_of_a_parabola_of_the_logarithm_is_found() {
+        let (place, value) = minimum(|x: f64| (x / 0.03).ln().powi(2) + 5.0, SHARES);
+        assert!((place / 0.03).ln().abs() < 0.01, "{place}");
+        assert!((value - 5.0).abs() < 1e-4);
+    }
+}
