@@ -56,9 +56,9 @@ impl fmt::Display for Suggestion {
             }
             Suggestion::StateInputSigma { input, sigma } => write!(
                 f,
-                "state the errors of the {}: `sigma: {{{input}: {{value: {}, kind: sensor}}}}` for noise of its sensor, `kind: drive` for an unmeasured drive; or add a missing force term",
-                input.replace('_', " "),
-                significant(*sigma, 2)
+                "check the interpolation of the {quantity}; state its errors: `sigma: {{{input}: {{value: {}, kind: sensor}}}}` for noise of its sensor, `kind: drive` for an unmeasured drive; or add a missing force term",
+                significant(*sigma, 2),
+                quantity = input.replace('_', " ")
             ),
             Suggestion::FinerBasis { function } => write!(
                 f,
