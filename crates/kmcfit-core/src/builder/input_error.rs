@@ -1,23 +1,12 @@
-//! Errors of an input: specification, and the conditions under which they can be taken into account.
+//! Errors of an input, and the conditions under which they can be taken into account.
 
 use super::BuildError;
 use super::record::{ChannelSpec, Record};
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::record::{
-    BaseMotion, Input, InputError, InputErrorKind, Loss, NoiseModel, Waveform, Weighting,
-};
+use crate::record::{BaseMotion, Input, InputError, Loss, NoiseModel, Waveform, Weighting};
 use crate::signal::{Interpolation, Signal};
 use crate::solvers::Solver;
 use crate::system::InputQuantity;
-
-/// Specification of independent errors of the samples of an input.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct InputErrorSpec {
-    pub quantity: InputQuantity,
-    pub kind: InputErrorKind,
-    /// Standard deviation, in the SI unit of the input.
-    pub sigma: f64,
-}
 
 impl Record {
     /// Errors of the input of the record with the key `record`; `input` is its input.

@@ -1,6 +1,5 @@
 //! Specification of one record: initial state, input and channels.
 
-use super::input_error::InputErrorSpec;
 use super::{BuildError, CoefficientSpec};
 use crate::functions::{CoefficientKind, Prior};
 use crate::noise::{HIGHEST_ORDER, uninterrupted_runs};
@@ -172,6 +171,15 @@ impl ChannelSpec {
         }
         Ok(())
     }
+}
+
+/// Specification of independent errors of the samples of an input.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct InputErrorSpec {
+    pub quantity: InputQuantity,
+    pub kind: InputErrorKind,
+    /// Standard deviation, in the SI unit of the input.
+    pub sigma: f64,
 }
 
 /// One record of the response, in SI units; corresponds to an entry of `experiments` in a model file.

@@ -112,7 +112,7 @@ impl Excitation {
 
     /// The excitation with values at the nodes, linear between them, added to one of its quantities.
     #[must_use]
-    pub fn plus(&self, quantity: InputQuantity, nodes: &[f64]) -> Self {
+    pub(crate) fn plus(&self, quantity: InputQuantity, nodes: &[f64]) -> Self {
         let mut sum = self.clone();
         let part = match quantity {
             InputQuantity::Force => &mut sum.force,
