@@ -4,6 +4,7 @@
 mod common;
 
 use common::synthetic::{Truth, cramer_rao, rms, run, settings, with_noise};
+use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization, ScalarParameter, ScalarValue,
@@ -17,6 +18,7 @@ use kmcfit_core::internals::system::{
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::f64::consts::TAU;
 
 const NODES: usize = 201;
 const DURATION: f64 = 12.0;
@@ -617,4 +619,52 @@ fn standard_errors_and_bands_agree() {
     }
     let ratio = bands.ratio("k/m").expect("a stiffness");
     assert!(ratio.standard_error.iter().all(|e| e.is_finite()));
+}
+
+/// A free decay with exact samples (closed form), fitted with 100 steps a period: the estimates are off by the discretisation
+/// error, and the standard errors of the bands are these shifts, from steps of half the length. The sigma adds a thousandth of them.
+#[test]
+fn intervals_contain_the_shift_by_the_time_steps() {
+    let (damping, stiffness) = (0.1f64, TAU * TAU);
+    let times: Vec<f64> = (0..=1000).map(|i| 0.01 * f64::from(i)).collect();
+    let frequency = (stiffness - 0.25 * damping * damping).sqrt();
+    let decay = |t: &f64| {
+        let phase = frequency * t;
+        (-0.5 * damping * t).exp() * (phase.cos() + 0.5 * damping / frequency * phase.sin())
+    };
+    let samples: Vec<f64> = times.iter().map(decay).collect();
+    for (method, least) in [(Method::Midpoint, 1e-3), (Method::Rk4, 1e-8)] {
+        let record = Record::new("decay")
+            .from_state(1.0, 0.0)
+            .displacement(&times, &samples)
+            .sigma(least * 1e-3);
+        let parts = [
+            CoefficientSpec::fixed(1.0),
+            CoefficientSpec::constant(0.12),
+            CoefficientSpec::constant(38.0),
+        ];
+        let problem = Builder::new(parts)
+            .record(record)
+            .nodes(times.len())
+            .method(method)
+            .build()
+            .unwrap();
+        let fit = problem.fit().unwrap();
+        let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);
+        let bands = Bands::at(&problem, theta, evaluation, &BandSettings::default());
+        for (j, truth) in [damping, stiffness].into_iter().enumerate() {
+            let error = (theta[j] - truth).abs();
+            let share = bands.functions[j + 1].standard_error[0] / error;
+            // The amplitude converges by one order faster than the phase, (3/4)^-1 7/8 = 1.17 for the midpoint rule, and the
+            // phase error of half the step, 0.03 rad, adds its square to the damping.
+            let most = [2.0, 1.1][j];
+            assert!(
+                (0.9..most).contains(&share),
+                "{method:?} {j}: {share} of {error}"
+            );
+            let covariance = bands.covariance.as_ref().unwrap();
+            let same = covariance[(j, j)].sqrt() / bands.functions[j + 1].standard_error[0];
+            assert!((same - 1.0).abs() < 1e-9, "{same}");
+        }
+    }
 }

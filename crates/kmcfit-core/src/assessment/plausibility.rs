@@ -29,6 +29,8 @@ pub const BEYOND_SIGMA: f64 = 3.0;
 const CERTAIN: f64 = 1e-6;
 /// NRMSE fit, per cent, above which the residuals are rounding errors of the samples.
 pub const EXACT: f64 = 99.99;
+/// Fit, in per cent, from which residuals are rounding errors.
+const ROUNDED: f64 = 100.0 - 1e-7;
 /// Likelihood ratio above which white noise would be matched equally well.
 const CHANCE: f64 = 1e-3;
 /// Share of its natural scale below which a negative function counts as zero.
@@ -206,7 +208,7 @@ fn residuals(problem: &Problem, evaluation: &Evaluation, reports_errors: bool) -
     for (channel, predicted) in problem.predicted(evaluation) {
         let found = diagnostics(channel, predicted);
         let is_judged = reports_errors || channel.weighting().sigma(0).is_some();
-        let is_coloured = found.whiteness.p_value < CERTAIN && found.fit_percent < EXACT;
+        let is_coloured = found.whiteness.p_value < CERTAIN && found.fit_percent < ROUNDED;
         if is_judged && (is_coloured || channel.correlation().is_some()) {
             coloured |= is_coloured;
             poor |= found.fit_percent < POOR;

@@ -55,6 +55,7 @@ pub fn step_check(problem: &Problem, evaluation: &Evaluation) -> StepCheckOutcom
             .observed()
             .iter()
             .fold(0.0f64, |m, y| m.max(y.abs()));
+        let change = change.iter().fold(0.0f64, |m, d| m.max(d.abs()));
         let share = |of: f64| if change == 0.0 { 0.0 } else { change / of };
         summary.change_per_residual = summary.change_per_residual.max(share(rms));
         summary.change_per_sample = summary.change_per_sample.max(share(largest));

@@ -122,7 +122,8 @@ impl Bands {
         let smooth = affordable.min(MOST_SMOOTH);
         let directions = Directions::new(problem, evaluation, MOST_PARAMETERS, smooth);
         let sensitivity = Sensitivity::along(problem, evaluation, directions);
-        let information = Information::new(problem, theta, sensitivity);
+        let information =
+            Information::new(problem, theta, sensitivity).with_step_error(problem, evaluation);
         let active = active_rows(problem, theta);
         let equal: Vec<&ActiveRow> = active.iter().filter(|r| r.equality).collect();
         let bounded = active.iter().any(|r| !r.equality);

@@ -5,6 +5,7 @@ use super::active::{ActiveRow, active_rows};
 use super::directions::Directions;
 use super::factorisation::Factorisation;
 use super::sensitivity::Sensitivity;
+use super::step_error::step_error;
 use crate::functions::{Penalty, WeightRule};
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
@@ -22,6 +23,8 @@ pub(super) struct Information {
     is_bayesian: bool,
     /// Bound of the accumulated rounding error of a response as large as the largest sample.
     rounding: f64,
+    /// Discretisation error of the weighted predictions, where it is included.
+    step_error: Option<DVector<f64>>,
 }
 
 /// Covariance root, `Cov = F F^T` on determined directions and zero on the others.
@@ -69,7 +72,22 @@ impl Information {
             is_bayesian: is_bayesian(problem),
             sensitivity,
             rounding: f64::EPSILON * largest * problem.system.grid.nodes() as f64,
+            step_error: None,
         }
+    }
+
+    /// Includes the discretisation error of the time steps.
+    pub fn with_step_error(mut self, problem: &Problem, evaluation: &Evaluation) -> Self {
+        self.step_error = step_error(problem, evaluation, &self.sensitivity.roots);
+        self
+    }
+
+    /// The shift of the estimates by the discretisation error, as a column of the covariance root.
+    fn shift(&self, inverse_root: &DMatrix<f64>) -> Option<DVector<f64>> {
+        let error = self.step_error.as_ref()?;
+        // Priors, the last rows, have no such error.
+        let moments = self.measured.rows(0, error.len()).tr_mul(error);
+        Some(-(inverse_root * inverse_root.tr_mul(&moments)))
     }
 
     /// Rows of samples, priors and penalties, stacked.
@@ -113,6 +131,7 @@ impl Information {
                 (free * root, free * undetermined)
             }
         };
+        let shift = self.shift(&inverse_root);
         let mut answers = &self.measured * &inverse_root;
         let variance = self.variance(&answers);
         if let Some(variance) = variance {
@@ -130,7 +149,7 @@ impl Information {
         let rank = inverse_root.ncols();
         if self.is_bayesian && variance.is_none() {
             return CovarianceRoot {
-                root: inverse_root,
+                root: with_column(inverse_root, shift),
                 undetermined,
                 variance,
             };
@@ -140,7 +159,7 @@ impl Information {
             false => &inverse_root * answers.transpose(),
         };
         CovarianceRoot {
-            root,
+            root: with_column(root, shift),
             undetermined,
             variance,
         }
@@ -180,6 +199,18 @@ impl Information {
             () if squares == 0.0 => self.rounding.powi(2),
             () => squares / left,
         })
+    }
+}
+
+fn with_column(root: DMatrix<f64>, column: Option<DVector<f64>>) -> DMatrix<f64> {
+    match column {
+        None => root,
+        Some(column) => {
+            let last = root.ncols();
+            let mut wider = root.insert_column(last, 0.0);
+            wider.set_column(last, &column);
+            wider
+        }
     }
 }
 

@@ -23,6 +23,7 @@ mod factorisation;
 mod ratios;
 mod scaling_ambiguity;
 mod sensitivity;
+mod step_error;
 mod structural_rank;
 pub use classification::is_negligible;
 

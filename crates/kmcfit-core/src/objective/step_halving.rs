@@ -12,8 +12,8 @@ pub struct Refined {
     pub step: f64,
     /// Misfit on half the step.
     pub misfit: f64,
-    /// Largest change of a prediction for each experiment and channel, in the SI unit of the channel.
-    pub changes: Vec<Vec<f64>>,
+    /// Changes of the predictions of each experiment and channel, in the SI unit of the channel.
+    pub changes: Vec<Vec<Vec<f64>>>,
 }
 
 impl Problem {
@@ -62,8 +62,7 @@ impl Problem {
             for (channel, before) in experiment.channels.iter().zip(&evaluation.predictions[e]) {
                 let after = channel.predict(view);
                 refined.misfit += channel.cost(&after);
-                let change = |most: f64, (a, b): (&f64, &f64)| most.max((a - b).abs());
-                changes.push(after.iter().zip(before).fold(0.0, change));
+                changes.push(after.iter().zip(before).map(|(a, b)| a - b).collect());
             }
             refined.changes.push(changes);
         }

@@ -1,0 +1,46 @@
+//! Discretisation error of the time steps in the estimates.
+//!
+//! The predictions on half the step, `z_(h/2)`, give by extrapolation (Richardson) the error of those on the whole step, and a
+//! linearised fit the shift of the estimates that it causes:
+//!
+//! ```text
+//! e = (z_(h/2) - z_h) 2^p / (2^p - 1),    delta = -H^+ J^T W e
+//! ```
+//!
+//! with the order `p` of the stepper. The shift is one more column of the root of the covariance, `Cov + delta delta^T`, so that every
+//! interval derived from it contains the shift.
+
+use crate::diagnostics::rms;
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use nalgebra::DVector;
+
+/// Residuals below this share of the discretisation error are those of samples that were simulated with the same steps.
+const SAME_STEPS: f64 = 1e-6;
+
+/// Weighted and whitened discretisation error of all predictions, in the rows of [`Sensitivity`](super::Sensitivity) with the roots
+/// `roots`; `None` where half the step cannot be simulated or the samples were simulated with the same steps.
+pub(super) fn step_error(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    roots: &[f64],
+) -> Option<DVector<f64>> {
+    let halved = problem.on_half_step(evaluation).ok()??;
+    let order = 2f64.powi(problem.system.method.order() as i32);
+    let factor = order / (order - 1.0);
+    let mut error = Vec::with_capacity(roots.len());
+    let mut is_of_these_steps = true;
+    let pairs = problem
+        .predicted(evaluation)
+        .zip(halved.changes.into_iter().flatten());
+    for ((channel, predicted), mut changes) in pairs {
+        let residuals: Vec<f64> = channel.residuals(predicted).collect();
+        is_of_these_steps &= rms(&residuals) < SAME_STEPS * rms(&changes);
+        channel.whiten_rows(&mut changes);
+        error.extend(changes);
+    }
+    let error = error.iter().zip(roots).map(|(e, root)| factor * root * e);
+    let error = DVector::from_iterator(roots.len(), error);
+    let is_known = error.iter().all(|e| e.is_finite());
+    (is_known && !is_of_these_steps).then_some(error)
+}
