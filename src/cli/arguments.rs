@@ -152,9 +152,7 @@ impl Context<'_> {
             () if source.is::<ParseFloatError>() => {
                 error("not a number", "a number").hint_if(number_in(&found))
             }
-            () if source.is::<ParseIntError>() => {
-                error("not a number", "a whole number, 0 or greater")
-            }
+            () if source.is::<ParseIntError>() => error("not a number", "an integer, 0 or more"),
             () => error("invalid value", &source.to_string()),
         })
     }

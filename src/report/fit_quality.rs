@@ -38,7 +38,7 @@ pub fn channel(view: &ChannelView) -> ChannelSummary {
         fit_percent: diagnostics.fit_percent,
         sigma,
         sigma_estimated: matches!(channel.weighting(), Weighting::Estimated { .. }),
-        noise: channel.correlation().map(noise),
+        noise: channel.correlation().and_then(noise),
         robust: channel.loss() != Loss::Squares,
         pattern: pattern(channel, predicted),
         cost: channel.cost(predicted),
@@ -53,19 +53,20 @@ pub fn channel(view: &ChannelView) -> ChannelSummary {
     }
 }
 
-/// Estimated correlation of the noise of a channel.
-fn noise(correlation: &Correlation) -> NoiseSummary {
+/// Estimated correlation of the noise of a channel; `None` for one that follows from errors of the input.
+fn noise(correlation: &Correlation) -> Option<NoiseSummary> {
     match correlation.law() {
-        CorrelationLaw::Autoregressive(process) => NoiseSummary {
+        CorrelationLaw::Autoregressive(process) => Some(NoiseSummary {
             coefficients: process.coefficients().to_vec(),
             innovation_share: process.innovation_variance().sqrt(),
             correlation_time: None,
-        },
-        CorrelationLaw::Exponential { time } => NoiseSummary {
+        }),
+        CorrelationLaw::Exponential { time } => Some(NoiseSummary {
             coefficients: Vec::new(),
             innovation_share: 1.0,
             correlation_time: Some(*time),
-        },
+        }),
+        CorrelationLaw::InputErrors(_) => None,
     }
 }
 

@@ -475,7 +475,7 @@ fn a_resumption_that_is_refused() {
     std::fs::write(bench.path("run/fit.journal"), older).expect("room");
     let older_version = refused(&bench);
     assert!(
-        older_version.contains("this fit was begun by another version of kmcfit"),
+        older_version.contains("this fit was started by another version of kmcfit"),
         "{older_version}"
     );
     bench.write(

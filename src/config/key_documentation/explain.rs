@@ -4,6 +4,7 @@ use super::{Found, MODEL, ValueType, all};
 use crate::error::InputError;
 use crate::spelling::did_you_mean;
 use crate::text_io::quote;
+use std::collections::HashSet;
 use std::fmt::Write;
 
 /// Most further paths of a key that are listed.
@@ -68,6 +69,8 @@ fn entry(found: &Found, wanted: &str) -> String {
     let mut paths: Vec<&str> = found.paths.iter().map(String::as_str).collect();
     // The requested path first, then the shortest.
     paths.sort_by_key(|path| (*path != wanted, path.matches('.').count()));
+    let mut known = HashSet::new();
+    paths.retain(|path| known.insert(*path));
     let mut text = format!("{}\n  {}\n", paths[0], key.text);
     let mut row = |name: &str, value: &str| {
         // Writing to a String cannot fail.

@@ -22,7 +22,7 @@ pub(super) fn page(comparison: &Comparison) -> String {
         body += "<h2>Conclusions</h2>\n";
         body += &shell::list(&conclusions(&comparison.measures));
     }
-    body += "<h2>What each run means</h2>\n";
+    body += "<h2>Summary of each run</h2>\n";
     for (i, run) in comparison.measures.iter().enumerate() {
         body += &card(run, style(i));
     }

@@ -5,7 +5,7 @@ use super::{
     SensitivityRecord, StudyDocument,
 };
 use crate::finding::Finding;
-use crate::number_format::significant;
+use crate::number_format::{resolved, significant};
 
 /// Most extremes that are listed because their search did not converge.
 const MOST_LISTED: usize = 6;
@@ -130,7 +130,8 @@ fn extremes(study: &StudyDocument) -> Vec<String> {
             .take(MOST_LISTED)
             .map(|s| format!("{}: {}", s.name, search(s.status))),
     );
-    if !study.extremes.is_empty() && !study.roughness_limited {
+    let mut systems = study.extremes.iter().flat_map(|e| &e.systems);
+    if !study.roughness_limited && systems.any(|s| s.status == ExtremeSearch::RangeLimit) {
         lines.push(
             "no penalty limits the roughness of these systems: their extremes are those of the constraints, or of the search range"
                 .into(),
@@ -162,26 +163,29 @@ fn widest(e: &ExtremesRecord) -> String {
             e.unit
         );
     }
+    let [low, high] = ends([e.low[widest], e.high[widest]]);
+    let is_constant = |values: &[f64]| values.iter().all(|x| *x == values[0]);
+    let at = match is_constant(&e.low) && is_constant(&e.high) {
+        true => String::new(),
+        false => format!(" at {} s, where the range is widest", e.times[widest]),
+    };
     format!(
-        "{}: {} to {} {} at {} s, where the range is widest (misfit limit {:.4e})",
-        e.name,
-        significant(e.low[widest], 6),
-        significant(e.high[widest], 6),
-        e.unit,
-        e.times[widest],
-        e.misfit_limit
+        "{}: {low} to {high} {}{at} (misfit limit {:.4e})",
+        e.name, e.unit, e.misfit_limit
     )
+}
+
+/// The ends of an interval with three digits of its half-width.
+fn ends([low, high]: [f64; 2]) -> [String; 2] {
+    resolved([low, high], 0.05 * (high - low))
 }
 
 fn interval(b: &BootstrapRecord) -> String {
     match b.interval {
-        Some([low, high]) => format!(
-            "{}: {} to {} {}",
-            b.name,
-            significant(low, 6),
-            significant(high, 6),
-            b.unit
-        ),
+        Some(interval) => {
+            let [low, high] = ends(interval);
+            format!("{}: {low} to {high} {}", b.name, b.unit)
+        }
         None => format!("{}: too few refits converged", b.name),
     }
 }

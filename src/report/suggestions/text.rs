@@ -2,6 +2,7 @@
 
 use super::{Suggestion, Suspect, percent};
 use crate::number_format::significant;
+use crate::report::findings::times_in_words;
 use kmcfit_core::internals::assessment::ResidualPattern;
 use kmcfit_core::internals::solvers::Solver;
 use std::fmt;
@@ -33,7 +34,8 @@ impl fmt::Display for Suggestion {
             } => write_pattern(f, channel, *has_sigma, pattern),
             Suggestion::LargerSigma { times, fit } => write!(
                 f,
-                "sigma is too small: the residuals are {times:.1} times sigma although the fit is {}; use `sigma: estimate`",
+                "sigma is too small: the residuals are {} times sigma although the fit is {}; use `sigma: estimate`",
+                times_in_words(*times),
                 percent(*fit, 2)
             ),
             Suggestion::NoiseLimited {
