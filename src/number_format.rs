@@ -2,6 +2,14 @@
 
 pub(crate) use kmcfit_core::internals::number_format::significant;
 
+/// A ratio with one decimal, or four significant digits if it is large.
+pub(crate) fn times_in_words(times: f64) -> String {
+    match times < 1e3 {
+        true => format!("{times:.1}"),
+        false => significant(times, 4),
+    }
+}
+
 /// Numbers in one notation and with equal decimals, as many as a half-width resolves: two digits of it.
 pub(crate) fn resolved<const N: usize>(numbers: [f64; N], half: f64) -> [String; N] {
     let order = |x: f64| x.abs().log10().floor();

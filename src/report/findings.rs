@@ -1,7 +1,7 @@
 //! Findings and warnings about a fit, from the typed results of the core.
 
 use crate::finding::Finding;
-use crate::number_format::significant;
+use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::{CoarseBasis, FitWarning, Unidentified};
 use kmcfit_core::internals::identifiability::{
     Classification, FunctionClassification, RankFinding, span_words,
@@ -100,14 +100,6 @@ pub fn warning(warning: &FitWarning) -> Finding {
         ),
     };
     Finding::of(warning, text)
-}
-
-/// A ratio with one decimal, or four significant digits if it is large.
-pub(super) fn times_in_words(times: f64) -> String {
-    match times < 1e3 {
-        true => format!("{times:.1}"),
-        false => significant(times, 4),
-    }
 }
 
 fn p_in_words(p: f64) -> String {

@@ -237,7 +237,7 @@ fn invalid_numbers_have_messages() {
     assert_snapshot!(said, @"
     error: --nodes: not a number
       found: `many`
-      expected: a whole number, 0 or greater
+      expected: an integer, 0 or more
     ");
 }
 

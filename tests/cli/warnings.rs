@@ -309,7 +309,7 @@ fn a_starter_shows_where_times_do_not_increase() {
     let (code, _, stderr) = bench.run(&["init", "record.csv"]);
     assert_eq!(code, 2);
     assert_snapshot!(stderr, @"
-    error: record.csv:14: row 13, column `time_s`: two rows with the same time
+    error: record.csv:14: column `time_s`: two rows with the same time
        |
     14 | 11,0
        | ^^

@@ -1,8 +1,7 @@
 //! Texts of the suggestions.
 
 use super::{Suggestion, Suspect, percent};
-use crate::number_format::significant;
-use crate::report::findings::times_in_words;
+use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::ResidualPattern;
 use kmcfit_core::internals::solvers::Solver;
 use std::fmt;
