@@ -152,7 +152,14 @@ impl Context<'_> {
             () if source.is::<ParseFloatError>() => {
                 error("not a number", "a number").hint_if(number_in(&found))
             }
-            () if source.is::<ParseIntError>() => error("not a number", "an integer, 0 or more"),
+            () if source.is::<ParseIntError>() => {
+                let least = match &*name {
+                    "--nodes" => 3,
+                    "--threads" => 1,
+                    _ => 0,
+                };
+                error("not a number", &format!("an integer, {least} or more"))
+            }
             () => error("invalid value", &source.to_string()),
         })
     }

@@ -7,6 +7,7 @@ use crate::finding::Finding;
 use crate::number_format::{resolved, significant};
 use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::identifiability::ClassificationKind;
+use kmcfit_core::internals::solvers::Status;
 use std::fmt::Write;
 
 /// The summary: status, estimates, fit, identifiability, warnings, suggestions, then tables.
@@ -20,12 +21,11 @@ pub fn summary(document: &ResultDocument) -> String {
 fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
     let cost = &document.cost;
     writeln!(text, "{}", document.title)?;
-    writeln!(
-        text,
-        "{}: {}",
-        document.outcome.status.name(),
-        document.outcome.reason
-    )?;
+    let status = document.outcome.status;
+    match unidentified(document) {
+        Some(why) => writeln!(text, "{}, but {}", status.name(), why.text)?,
+        _ => writeln!(text, "{}: {}", status.name(), document.outcome.reason)?,
+    }
     write_findings(text, document)?;
     write!(text, "J {:.6e} -> {:.6e}", cost.initial, cost.r#final)?;
     if document.has_ratio() {
@@ -68,21 +68,46 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     Ok(())
 }
 
+/// Reason for which the optimum of a converged fit identifies no system.
+fn unidentified(document: &ResultDocument) -> Option<&Finding> {
+    let known = &document.identifiability;
+    let is_minimum = document.outcome.status == Status::Converged;
+    known
+        .warnings
+        .first()
+        .filter(|_| is_minimum && known.unidentified)
+}
+
 /// Estimate, fit, identifiability, warnings and suggestions under their headings.
 fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
     let known = &document.identifiability;
+    let status = document.outcome.status;
     let mut warnings = Finding::texts(&known.warnings);
     warnings.extend(Finding::texts(&document.warnings));
+    let estimate = match unidentified(document) {
+        Some(_) => {
+            // The second line of the summary has it.
+            warnings.remove(0);
+            "Values at the optimum"
+        }
+        None => "Estimate",
+    };
+    let (estimates, findings) = match status {
+        // Start values are no estimates.
+        Status::Infeasible => (Vec::new(), Vec::new()),
+        _ => (estimates(document), Finding::texts(&known.findings)),
+    };
+    let width = estimate.len().max(15);
     for (heading, sentences) in [
-        ("Estimate", estimates(document)),
+        (estimate, estimates),
         ("Fit", fit(document).into_iter().collect()),
-        ("Identifiability", Finding::texts(&known.findings)),
+        ("Identifiability", findings),
         ("Warnings", warnings),
         ("Suggestions", Finding::texts(&document.suggestions)),
     ] {
         for (i, sentence) in sentences.iter().enumerate() {
             let heading = if i == 0 { heading } else { "" };
-            writeln!(text, "  {heading:<15} {sentence}")?;
+            writeln!(text, "  {heading:<width$} {sentence}")?;
         }
     }
     writeln!(text)
@@ -177,6 +202,9 @@ pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> 
         }
     }
     match &document.step_check {
+        Some(half) if !half.change_per_sample.is_finite() => {
+            writeln!(text, "step-size check: the response is zero")
+        }
         Some(half) => writeln!(
             text,
             "step-size check: halving the step changes the response by at most {} % of its peak",
@@ -373,12 +401,17 @@ pub fn prediction_table(predictions: &[Prediction], is_rotation: bool) -> String
         .iter()
         .any(|p| p.cost.is_some() || p.energy.is_some());
     let m = if is_rotation { "rad" } else { "m" };
-    let row = |[y, v, one, other]: [&str; 4]| format!("{y:>12} {v:>12} {one:>14} {other:>14}\n");
-    let [y, v] = [format!("y(0) {m}"), format!("v(0) {m}/s")];
+    let [y, v] = [format!("y(0) ({m})"), format!("v(0) ({m}/s)")];
     let [one, other] = match has_truth {
-        true => [format!("cost {m}^2 s"), format!("energy {m}^2 s")],
-        false => [format!("largest {m}"), format!("at the end {m}")],
+        true => [
+            format!("int (y - y_true)^2 dt ({m}² s)"),
+            format!("int y_true^2 dt ({m}² s)"),
+        ],
+        false => [format!("peak |y| ({m})"), format!("y at end ({m})")],
     };
+    let [width, last] = [&one, &other].map(|name| name.chars().count().max(14));
+    let row =
+        |[y, v, one, other]: [&str; 4]| format!("{y:>12} {v:>12} {one:>width$} {other:>last$}\n");
     let mut text = row([&y, &v, &one, &other]);
     for p in predictions {
         let [y, v] = [p.displacement, p.velocity].map(|x| significant(x, 6));

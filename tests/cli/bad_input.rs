@@ -656,7 +656,7 @@ fn simulate_arguments() {
     assert_snapshot!(with(&["--nodes", "many"]), @"
     error: --nodes: not a number
       found: `many`
-      expected: an integer, 0 or more
+      expected: an integer, 3 or more
     ");
     bench.write("model.yaml", &MODEL.replace("    data: samples.csv\n", ""));
     assert_snapshot!(with(&[]), @"

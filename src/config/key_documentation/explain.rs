@@ -76,7 +76,13 @@ fn entry(found: &Found, wanted: &str) -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "  {name:<8} {value}");
     };
-    row("type", &kind(key.kind));
+    row(
+        "type",
+        &match (key.kind, key.range) {
+            (ValueType::Count, Some(range)) => format!("an integer, {range}"),
+            (kind_of_value, _) => kind(kind_of_value),
+        },
+    );
     if let Some(unit) = key.unit {
         row("unit", unit);
     }

@@ -26,6 +26,9 @@ pub(super) fn page(comparison: &Comparison) -> String {
     for (i, run) in comparison.measures.iter().enumerate() {
         body += &card(run, style(i));
     }
+    if let Some(warning) = comparison.warning() {
+        body += &format!("<p class=\"soft\">warning: {}</p>\n", prose(&warning));
+    }
     for left_out in &comparison.left_out {
         body += &format!(
             "<section class=\"run\">\n<h3>{}</h3>\n<p class=\"verdict\">no result: {}</p>\n</section>\n",

@@ -58,18 +58,7 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
             lines(&study.profiles, |p| p.text.clone()),
         ),
         ("Data-consistent extremes", extremes(study)),
-        (
-            "Equivalent systems",
-            (study.equivalent_systems.iter())
-                .filter(|e| e.response_error > 0.0)
-                .map(|e| {
-                    format!(
-                        "{}: the response differs from that of the fit by at most {:.1e} of the largest displacement",
-                        e.name, e.response_error
-                    )
-                })
-                .collect(),
-        ),
+        ("Equivalent systems", equivalent_systems(study)),
         (
             "Fits from random starting points",
             multistart
@@ -119,6 +108,26 @@ fn sensitivity(sensitivity: &SensitivityRecord) -> Vec<String> {
 fn bands(bands: &BandsRecord) -> Vec<String> {
     let classification = bands.classification.iter().map(|c| c.text.clone());
     classification.chain(bands.notes.iter().cloned()).collect()
+}
+
+fn equivalent_systems(study: &StudyDocument) -> Vec<String> {
+    let others = study.equivalent_systems.iter();
+    let mut lines: Vec<String> = others
+        .filter(|e| e.response_error > 0.0)
+        .map(|e| {
+            format!(
+                "{}: the response differs from that of the fit by at most {} % of the largest displacement",
+                e.name,
+                significant(100.0 * e.response_error, 2)
+            )
+        })
+        .collect();
+    if !lines.is_empty() {
+        let lead = "with c(t) and k(t) as free functions of time, other masses reproduce the same response; the bases, fixed values \
+                    and force of this model may exclude them";
+        lines.insert(0, lead.into());
+    }
+    lines
 }
 
 fn extremes(study: &StudyDocument) -> Vec<String> {

@@ -113,7 +113,7 @@ pub enum Reason {
     /// The simulation fails at all feasible starting points.
     #[serde(skip)]
     #[error(
-        "the simulation fails at all starting points within the constraints ({0}); the result is the start as given, which violates them"
+        "the simulation fails at all starting points within the constraints ({0}); nothing was estimated: the result holds the start values of the model, which violate the constraints"
     )]
     NoFeasibleResponse(SimulationError),
     /// A record has no equation error.
