@@ -45,7 +45,10 @@ impl Table {
                 Some(index) if index < self.width() => Ok(index),
                 _ => Err(InputError::file(self.path(), "no such column number")
                     .found(number)
-                    .expected(numbers(self.width()))),
+                    .expected(match self.width() {
+                        1 => "1: there is one column".to_owned(),
+                        width => format!("1 to {width}"),
+                    })),
             },
         }
     }

@@ -487,6 +487,15 @@ fn invalid_overrides_have_messages() {
 }
 
 #[test]
+fn help_has_help() {
+    let bench = Workbench::empty();
+    assert_eq!(
+        bench.run_to(0, &["help", "--help"]),
+        bench.run_to(0, &["help"])
+    );
+}
+
+#[test]
 fn the_demo_needs_nothing() {
     let bench = Workbench::empty();
     let stdout = bench.run_to(0, &["demo"]);

@@ -339,7 +339,7 @@ fn kinds() {
       expected: `function: mass`, `damping` or `stiffness`
     ");
     assert_snapshot!(message("[{function: mass, passive: true}]"), @"
-    m.yaml:11:26: constraints[0].function: this constraint applies to several functions
+    m.yaml:11:26: constraints[0].function: `passive` concerns mass, damping and stiffness: leave `function` out
       found: `function` beside `passive`
       expected: no `function`
     ");

@@ -33,12 +33,12 @@ fn columns() {
     assert_snapshot!(find("t,y\n0,1\n", ColumnName::Number(3)), @"
     t.csv: no such column number
       found: 3
-      expected: a number from 1 to 2
+      expected: 1 to 2
     ");
     assert_snapshot!(find("t\n0\n", ColumnName::Number(0)), @"
     t.csv: no such column number
       found: 0
-      expected: the number 1: there is one column
+      expected: 1: there is one column
     ");
     assert_snapshot!(find("0,1\n1,2\n", "t".into()), @"
     t.csv: there is no such column
