@@ -23,12 +23,12 @@ pub const LEAST: f64 = 0.05;
 pub enum Classification {
     /// Identified at (nearly) all times.
     Identified {
-        /// Largest half-width of the 95 % band, relative to the function's size.
+        /// Largest half-width of the 95 % band, relative to the function's largest value.
         relative: f64,
     },
     /// Determined under a condition alone, whose error the interval excludes.
     Conditional {
-        /// Largest half-width of the 95 % band under the condition, relative to the function's size.
+        /// Largest half-width of the 95 % band under the condition, relative to the function's largest value.
         relative: f64,
         /// Condition.
         on: Condition,
