@@ -7,7 +7,7 @@ use super::fit_assessment::ValidationRecord;
 use super::run::FittedModel;
 use crate::finding::Finding;
 use crate::number_format::resolved;
-use kmcfit_core::internals::assessment::{FunctionSummary, function_summaries};
+use kmcfit_core::internals::assessment::{FitWarning, FunctionSummary, function_summaries};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::{
     Classification, FunctionClassification, structural_rank,
@@ -64,9 +64,17 @@ impl FittedModel<'_> {
                 );
             }
         }
-        let warnings = plausibility.warnings.iter();
+        let negative = self.negative_damping();
+        // The warning with the interval replaces that on most times.
+        let is_replaced = |warning: &&FitWarning| {
+            let damping = CoefficientKind::Damping.name();
+            let is_damping =
+                matches!(warning, FitWarning::Negative { function } if function == damping);
+            is_damping && negative.is_some()
+        };
+        let warnings = plausibility.warnings.iter().filter(|w| !is_replaced(w));
         summary.warnings.extend(warnings.map(findings::warning));
-        summary.warnings.extend(self.negative_damping());
+        summary.warnings.extend(negative.clone());
         let poor = self.run_assessment.validation.iter();
         let poor = poor.filter_map(ValidationRecord::poor);
         summary.warnings.extend(poor.map(findings::not_predicted));

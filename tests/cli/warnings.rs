@@ -24,8 +24,7 @@ fit: {{method: gauss-newton}}
     )
 }
 
-/// From equal samples no model is scaffolded. Steps as long as a period match them with a response at rest, and no system is
-/// identified.
+/// From equal samples no model is scaffolded, and no fit is made.
 #[test]
 fn a_record_at_rest_is_refused() {
     let bench = Workbench::empty();
@@ -54,6 +53,30 @@ fn a_record_at_rest_is_refused() {
             "{grid}: {stderr}"
         );
     }
+}
+
+/// A growing oscillation has a negative damping, with its interval and in one warning.
+#[test]
+fn a_negative_damping_is_reported() {
+    let bench = Workbench::empty();
+    let row = |i: u32| {
+        let t = 0.05 * f64::from(i);
+        let noise = 0.01 * f64::from(i * 7919 % 101) / 101.0;
+        format!(
+            "{t},{}\n",
+            (0.02 * t).exp() * (2.0 * t).cos() + noise - 0.005
+        )
+    };
+    let rows: String = (0..600).map(row).collect();
+    bench.write("record.csv", &format!("t,y\n{rows}"));
+    let columns = "    columns: {time: t, displacement: y}\n    sigma: {displacement: estimate}\n";
+    bench.write("model.yaml", &starter("{}", columns));
+    let (_, summary, stderr) = bench.run(&["fit", "model.yaml", "--no-report"]);
+    assert!(
+        summary.contains("c is negative (95 % CI -"),
+        "{summary}{stderr}"
+    );
+    assert!(!summary.contains("the damping is negative"), "{summary}");
 }
 
 /// With few samples, two per period, the frequency is at best an alias of others.
