@@ -23,12 +23,10 @@ pub enum Location {
         /// Column, from 1.
         column: usize,
     },
-    /// A data row of a table; rows count from 1 without the header, `line` is the line in the file.
+    /// A data row of a table.
     Row {
         /// The file.
         file: PathBuf,
-        /// Data row, from 1.
-        row: usize,
         /// Line in the file, from 1.
         line: usize,
         /// Column name, for an error in one column.
@@ -44,15 +42,10 @@ impl fmt::Display for Location {
             Location::Line { file, line, column } => {
                 write!(f, "{}:{line}:{column}", file.display())
             }
-            Location::Row {
-                file,
-                row,
-                line,
-                column,
-            } => {
-                write!(f, "{}:{line}: row {row}", file.display())?;
+            Location::Row { file, line, column } => {
+                write!(f, "{}:{line}", file.display())?;
                 match column {
-                    Some(column) => write!(f, ", column `{column}`"),
+                    Some(column) => write!(f, ": column `{column}`"),
                     None => Ok(()),
                 }
             }

@@ -524,11 +524,16 @@ fn missing_measurements() -> Vec<MissingMeasurement> {
 fn reasons() -> Vec<Reason> {
     use kmcfit_core::internals::solvers::BoundedValue;
     let bounded = |value, limit| Some(BoundedValue { value, limit });
-    let met = || Box::new(Reason::SmallChange(1e-11));
+    let met = || {
+        Box::new(Reason::SmallChange(BoundedValue {
+            value: 1e-11,
+            limit: 1e-10,
+        }))
+    };
     let error = simulation_errors()[0];
     let mut all = samples![
         Reason::Ratios { .. } => Reason::Ratios { cost: bounded(2e-13, 1e-12), gradient: bounded(3e-9, 1e-8) },
-        Reason::SmallChange(_) => Reason::SmallChange(1e-11),
+        Reason::SmallChange(_) => Reason::SmallChange(BoundedValue { value: 1e-11, limit: 1e-10 }),
         Reason::SmallDecrease { .. } => Reason::SmallDecrease { decrease: 1e-13, change: 1e-9 },
         Reason::IterationLimit(_) => Reason::IterationLimit(50),
         Reason::AllIterations(_) => Reason::AllIterations(1000),
@@ -585,6 +590,7 @@ fn coarse_basis(halves: Option<[f64; 2]>) -> CoarseBasis {
     CoarseBasis {
         index: 2,
         function: "stiffness".into(),
+        unit: "N/m",
         p_value: 2.5e-4,
         change: 0.13,
         spans: vec![[3.0, 4.5]],
@@ -710,9 +716,9 @@ fn suggestions() -> Vec<Suggestion> {
         Suggestion::AnotherStart => Suggestion::AnotherStart,
         Suggestion::FinerSteps { .. } => Suggestion::FinerSteps { nodes: 8001.0 },
         Suggestion::LargerSigma { .. } => Suggestion::LargerSigma { times: 4.5, fit: 99.12 },
-        Suggestion::NoiseLimited { .. } => Suggestion::NoiseLimited { channel: channel(), fit: 71.0, is_white: true },
-        Suggestion::NoiseLimited { .. } => Suggestion::NoiseLimited { channel: channel(), fit: 71.0, is_white: false },
+        Suggestion::NoiseLimited { .. } => Suggestion::NoiseLimited { channel: channel(), fit: 71.0 },
         Suggestion::StateInputSigma { .. } => Suggestion::StateInputSigma { input: "force".into(), sigma: 0.701 },
+        Suggestion::OutliersLimited { .. } => Suggestion::OutliersLimited { channel: channel(), fit: 71.0 },
         Suggestion::FinerBasis { .. } => Suggestion::FinerBasis { function: "stiffness".into() },
         Suggestion::MoreParameters { .. } => Suggestion::MoreParameters { absent: vec!["cubic", "friction"] },
         Suggestion::Constant { .. } => Suggestion::Constant { function: "damping".into(), p_value: 0.62 },

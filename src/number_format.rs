@@ -1,12 +1,32 @@
 //! Numbers as people write them in a sentence.
 
-/// A number with `digits` significant digits, without trailing zeros; very small and very large numbers in powers of
-/// ten.
-pub(crate) fn significant(x: f64, digits: usize) -> String {
-    let rounded: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
-    match rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) {
-        true => format!("{rounded}"),
-        false => format!("{rounded:e}"),
+pub(crate) use kmcfit_core::internals::number_format::significant;
+
+/// A ratio with one decimal, or four significant digits if it is large.
+pub(crate) fn times_in_words(times: f64) -> String {
+    match times < 1e3 {
+        true => format!("{times:.1}"),
+        false => significant(times, 4),
+    }
+}
+
+/// Numbers in one notation and with equal decimals, as many as a half-width resolves: two digits of it.
+pub(crate) fn resolved<const N: usize>(numbers: [f64; N], half: f64) -> [String; N] {
+    let order = |x: f64| x.abs().log10().floor();
+    let largest = numbers.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    let decimals = 1.0 - order(half);
+    if (1e-3..1e7).contains(&largest) && (..=12.0).contains(&decimals) {
+        let decimals = decimals.max(0.0) as usize;
+        return numbers.map(|x| format!("{x:.decimals$}"));
+    }
+    let (exponent, decimals) = (order(largest), decimals + order(largest));
+    match decimals.is_finite() && (1e-300..1e300).contains(&largest) {
+        true => {
+            let decimals = decimals.clamp(1.0, 14.0) as usize;
+            let unit = 10f64.powi(exponent as i32);
+            numbers.map(|x| format!("{:.decimals$}e{exponent}", x / unit))
+        }
+        false => numbers.map(|x| significant(x, 4)),
     }
 }
 
@@ -15,12 +35,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_of_any_size() {
-        let written = [0.0, 1.0, -12_345.678, 2.5e-5, 1e300, 0.1 + 0.2, 9_999_999.0]
-            .map(|x| significant(x, 4));
+    fn intervals_have_one_notation() {
         assert_eq!(
-            written,
-            ["0", "1", "-12350", "2.5e-5", "1e300", "0.3", "1e7"]
+            resolved([4075.2, 4061.0, 4089.4], 14.2),
+            ["4075", "4061", "4089"]
+        );
+        assert_eq!(
+            resolved([0.1, -0.0004, 0.2004], 0.1004),
+            ["0.10", "-0.00", "0.20"]
+        );
+        assert_eq!(
+            resolved([1e-4, 9.8e-5, 1.02e-4], 2e-6),
+            ["1.000e-4", "0.980e-4", "1.020e-4"]
+        );
+        assert_eq!(
+            resolved([1.2e8, 1.1e8, 1.3e8], 1e7),
+            ["1.20e8", "1.10e8", "1.30e8"]
         );
     }
 }

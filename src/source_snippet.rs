@@ -233,7 +233,6 @@ mod tests {
     fn row(text: &str, line: usize, found: &str) -> String {
         let place = |file| Location::Row {
             file,
-            row: 1,
             line,
             column: None,
         };

@@ -73,7 +73,9 @@ pub fn read_bytes(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>, InputE
     let (file, length) = open(path, what)?;
     // A file that is too long is not read at all; sparse files can be longer than the disk.
     if length > limit {
-        return Err(too_long(path, limit).expected(what));
+        return Err(too_long(path, limit)
+            .found(kibibytes(length))
+            .expected(format!("{what} of at most {}", kibibytes(limit))));
     }
     memory::check_file(path, length.saturating_mul(BYTES_PER_BYTE))?;
     // One allocation: a vector that grows is copied several times.
@@ -146,7 +148,13 @@ fn read_into(
 }
 
 fn too_long(path: &Path, limit: u64) -> InputError {
-    InputError::file(path, format!("the file is longer than {limit} bytes"))
+    InputError::file(path, "the file is too large")
+        .expected(format!("at most {}", kibibytes(limit)))
+}
+
+/// A size in KiB.
+pub(crate) fn kibibytes(bytes: u64) -> String {
+    format!("{} KiB", bytes.div_ceil(1024))
 }
 
 /// Refuses a table with a line longer than `LONGEST_LINE`.

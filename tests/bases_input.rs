@@ -357,7 +357,7 @@ fn starts() {
       expected: 1 number, the value at all times
     ");
     assert_snapshot!(message("{basis: b-spline, knots: 4, start: [1, 2, 3, 4]}"), @"
-    m.yaml:5:44: functions.mass.start: a start of the basis `b-spline` cannot be a list
+    m.yaml:5:44: functions.mass.start: `start` of the basis `b-spline` must be one number
       found: a list
       expected: a finite number, or a column: {data: file.csv, column: name}
     ");
@@ -399,12 +399,12 @@ fn limits() {
     let with = |text: &str| message(&format!("{{basis: nodal, start: 1, {text}}}"));
     assert_snapshot!(with("min: 2, max: 1"), @"
     m.yaml:5:39: functions.mass.min: min is greater than max
-      found: min 2 and max 1 at 0 s
+      found: min 2 kg and max 1 kg at 0 s
       expected: min at most max at all times
     ");
     assert_snapshot!(with("min: 0.5, max: {data: m.csv, column: m_kg}"), @"
     m.yaml:5:39: functions.mass.min: min is greater than max
-      found: min 0.5 and max 0.48000000000000004 at 6.5 s
+      found: min 0.5 kg and max 0.48 kg at 6.5 s
       expected: min at most max at all times
     ");
     assert_snapshot!(with("min: none"), @"

@@ -167,5 +167,5 @@ fn equal_axes_share_their_labels() {
     let svg = render(&functions(&t, &[curve, curve]));
     assert_eq!(svg.matches("time t (s)").count(), 1);
     assert_eq!(svg.matches("mass m (kg)").count(), 2);
-    assert_eq!(svg.matches(">\nfound\n<").count(), 1);
+    assert_eq!(svg.matches(">\nestimate\n<").count(), 1);
 }

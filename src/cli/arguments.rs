@@ -153,7 +153,12 @@ impl Context<'_> {
                 error("not a number", "a number").hint_if(number_in(&found))
             }
             () if source.is::<ParseIntError>() => {
-                error("not a number", "a whole number, 0 or greater")
+                let least = match &*name {
+                    "--nodes" => 3,
+                    "--threads" => 1,
+                    _ => 0,
+                };
+                error("not a number", &format!("an integer, {least} or more"))
             }
             () => error("invalid value", &source.to_string()),
         })

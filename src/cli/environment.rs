@@ -25,9 +25,9 @@ pub fn provide_host() {
 pub fn check_arithmetic() -> Result<(), InputError> {
     check_limit().map_err(|found| {
         let names = arithmetics();
-        InputError::argument(LIMIT, "unknown arithmetic")
+        InputError::argument(format!("environment variable {LIMIT}"), "unknown value")
             .found(format!("`{found}`"))
-            .expected(names.join(", "))
+            .expected(format!("one of: {}", names.join(", ")))
             .hint_if(did_you_mean(&found, names))
     })
 }

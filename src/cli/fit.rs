@@ -38,7 +38,7 @@ pub struct Arguments {
     /// Print the result document instead of the summary.
     #[arg(long)]
     json: bool,
-    /// Write no figures and no page.
+    /// Write no figures and no report.
     #[arg(long)]
     no_report: bool,
     /// Print the computing times.

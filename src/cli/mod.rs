@@ -90,7 +90,12 @@ impl From<InputError> for CommandError {
 pub fn main() -> ExitCode {
     crate::memory::restart_with_plain_allocators();
     interrupt::ignore_file_size_signal();
-    let arguments = match Arguments::try_parse() {
+    let mut words: Vec<_> = std::env::args_os().collect();
+    // `kmcfit help --help` is `kmcfit help`; clap takes the option for a command.
+    if words.len() == 3 && words[1] == "help" && (words[2] == "--help" || words[2] == "-h") {
+        words.truncate(2);
+    }
+    let arguments = match Arguments::try_parse_from(words) {
         Ok(arguments) => arguments,
         Err(error) => {
             let command = std::env::args_os().nth(1);

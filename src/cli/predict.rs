@@ -42,8 +42,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
             OutputFolder::prepare(out, claim)
         })
         .transpose()?;
-    let responses = predict(&run.system, &run.coefficients, run.truth.as_ref(), &states)
-        .map_err(|breakdown| CommandError::Numerical(format!("no response: {breakdown}")))?;
+    let responses = predict(&run.system, &run.coefficients, run.truth.as_ref(), &states).map_err(
+        |breakdown| CommandError::Numerical(format!("--initial: no response: {breakdown}")),
+    )?;
     if let Some(folder) = folder {
         let unit = if run.document.is_rotation() {
             "rad"

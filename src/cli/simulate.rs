@@ -6,7 +6,7 @@ use crate::digest::{digest, digest_of_file};
 use crate::error::InputError;
 use crate::report::{CsvTable, json};
 use crate::results::write_together;
-use crate::text_io::{one_of, quote, read_text};
+use crate::text_io::{quote, read_text};
 use kmcfit_core::internals::record::Experiment;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -259,6 +259,9 @@ fn chosen<'a>(
         let names = experiments.iter().map(|e| e.name.as_str());
         InputError::argument("--experiment", "no such experiment in the model")
             .found(quote(arguments.experiment.as_deref().unwrap_or_default()))
-            .expected(one_of(names))
+            .expected(format!(
+                "one of the experiments of the model: {}",
+                names.map(quote).collect::<Vec<_>>().join(", ")
+            ))
     })
 }

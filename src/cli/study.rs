@@ -14,8 +14,10 @@ use crate::report::study::{
 };
 use crate::report::{Run, json};
 use crate::results::{
-    AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, STUDY_JOURNAL,
+    AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, RESULT,
+    STUDY_JOURNAL,
 };
+use crate::text_io::quote;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{CheckpointStore, Status};
@@ -55,7 +57,17 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         let run = Run::open(&arguments.model)?;
         let mut overrides = Override::parse_all(&run.document.model.overrides)?;
         overrides.extend(arguments.set.parse()?);
-        let file = ModelFile::read_with_overrides(&run.document.model.file, &overrides)?;
+        let model = Path::new(&run.document.model.file);
+        if !model.exists() {
+            let result = arguments.model.join(RESULT);
+            return Err(InputError::file(result, "the model file of this run was not found")
+                .key("model.file")
+                .found(format!("{}, relative to the current folder", quote(&run.document.model.file)))
+                .expected("the model file that was fitted")
+                .hint("run this command in the folder in which the fit was started, or give the model file")
+                .into());
+        }
+        let file = ModelFile::read_with_overrides(model, &overrides)?;
         return run_in(&file, &out, arguments.json, threads, false);
     }
     match Sequence::read(&arguments.model)? {

@@ -8,7 +8,7 @@ use super::expansion;
 use super::key_positions::Position;
 use super::key_positions::place;
 use crate::error::InputError;
-use crate::text_io::quote;
+use crate::text_io::{kibibytes, quote};
 use serde::de::DeserializeOwned;
 
 /// Longest model file that is read, in bytes; also its longest length with the aliases written out.
@@ -54,11 +54,10 @@ impl<'a> Checked<'a> {
 /// Refuses a text that is too long, nested too deeply, repeats too much, or gives an anchor twice.
 pub(super) fn check(file: &Path, text: &str) -> Result<(), InputError> {
     if text.len() as u64 > LONGEST_MODEL {
-        return Err(InputError::file(
-            file,
-            format!("the file is longer than {LONGEST_MODEL} bytes"),
-        )
-        .hint("put samples into CSV files"));
+        return Err(InputError::file(file, "the model file is too large")
+            .found(kibibytes(text.len() as u64))
+            .expected(format!("at most {}", kibibytes(LONGEST_MODEL)))
+            .hint("put samples into CSV files"));
     }
     check_brackets(file, text)?;
     check_anchors(file, text)?;

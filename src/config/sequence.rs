@@ -38,7 +38,11 @@ impl Sequence {
     /// When the file cannot be read, or is an invalid sequence.
     pub fn read(path: &Path) -> Result<Option<Self>, InputError> {
         check_path(path)?;
-        let text = read_text(path, "a model file or a sequence (YAML)", LONGEST_MODEL)?;
+        let text = read_text(
+            path,
+            "a model file or a sequence (YAML), or the folder of a finished run",
+            LONGEST_MODEL,
+        )?;
         let checked = Checked::new(path, &text)?;
         // The key in any style: `sequence:`, `"sequence":`, `{sequence: …}`.
         if locate(&text, &[Segment::Key("sequence".into())]).depth == 0 {

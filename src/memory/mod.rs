@@ -10,6 +10,7 @@ pub use restart::restart_with_plain_allocators;
 pub use sources::{Available, Limit};
 
 use crate::error::InputError;
+use crate::number_format::significant;
 use std::path::Path;
 
 /// Available memory on systems without a stated limit, bytes.
@@ -103,7 +104,10 @@ pub fn in_words(bytes: f64) -> String {
         middle if unit > 0 && middle < 99.95 => 1,
         _ => 0,
     };
-    format!("{value:.decimals$} {}", units[unit])
+    match value >= 1e6 {
+        true => format!("{} {}", significant(value, 3), units[unit]),
+        false => format!("{value:.decimals$} {}", units[unit]),
+    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,9 @@ use super::findings;
 use super::fit_assessment::ValidationRecord;
 use super::run::FittedModel;
 use crate::finding::Finding;
-use kmcfit_core::internals::assessment::{FunctionSummary, function_summaries};
+use crate::number_format::resolved;
+use kmcfit_core::internals::assessment::{FitWarning, FunctionSummary, function_summaries};
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::{
     Classification, FunctionClassification, structural_rank,
 };
@@ -32,6 +34,7 @@ impl FittedModel<'_> {
         summary.rank_bound = count.rank_bound;
         let plausibility = &assessment.plausibility;
         if let Some(reason) = &plausibility.unidentified {
+            summary.unidentified = true;
             summary.warnings.push(findings::unidentified(reason));
             return summary;
         }
@@ -61,12 +64,37 @@ impl FittedModel<'_> {
                 );
             }
         }
-        let warnings = plausibility.warnings.iter();
+        let negative = self.negative_damping();
+        // The warning with the interval replaces that on most times.
+        let is_replaced = |warning: &&FitWarning| {
+            let damping = CoefficientKind::Damping.name();
+            let is_damping =
+                matches!(warning, FitWarning::Negative { function } if function == damping);
+            is_damping && negative.is_some()
+        };
+        let warnings = plausibility.warnings.iter().filter(|w| !is_replaced(w));
         summary.warnings.extend(warnings.map(findings::warning));
+        summary.warnings.extend(negative.clone());
         let poor = self.run_assessment.validation.iter();
         let poor = poor.filter_map(ValidationRecord::poor);
         summary.warnings.extend(poor.map(findings::not_predicted));
         summary
+    }
+
+    /// Warning where the whole confidence interval of a constant damping is negative.
+    fn negative_damping(&self) -> Option<Finding> {
+        let summaries = self.function_summaries();
+        let damping = summaries.get(CoefficientKind::Damping.name())?;
+        let (value, half) = (damping.min, damping.half_width()?);
+        (damping.max == value && value + half < 0.0).then(|| {
+            let [low, high] = resolved([value - half, value + half], half);
+            let text = format!(
+                "c is negative (95 % CI {low} to {high} {}): the system gains energy",
+                damping.unit
+            );
+            let finding = Finding::new("negative_damping", text);
+            finding.with("value", value).with("half_width", half)
+        })
     }
 
     pub(super) fn function_summaries(&self) -> BTreeMap<String, FunctionSummary> {

@@ -10,11 +10,11 @@ pub fn assumptions(problem: &Problem) -> Vec<String> {
     for function in problem.functions.iter() {
         let name = function.name();
         match &function.basis {
-            None => known.push(format!("{name} known at all times")),
+            None => known.push(format!("{name} fixed")),
             Some(Basis::Nodal) => {}
             Some(basis) => known.push(match function.parameters() {
-                1 => format!("{name} one number"),
-                count => format!("{name} {count} numbers ({})", basis.name()),
+                1 => format!("{name} constant"),
+                count => format!("{name}: {}, {count} parameters", basis_in_words(basis)),
             }),
         }
     }
@@ -23,22 +23,24 @@ pub fn assumptions(problem: &Problem) -> Vec<String> {
     for penalty in &problem.penalties {
         let name = problem.functions.get(penalty.function).name();
         known.push(match penalty.order {
-            0 => format!("{name} near its reference"),
-            1 => format!("{name} of little slope"),
-            _ => format!("{name} of little curvature"),
+            0 => format!("{name}: deviation from its reference penalised"),
+            1 => format!("{name}: slope penalised"),
+            _ => format!("{name}: curvature penalised"),
         });
     }
     for variation in &problem.variations {
         let name = problem.functions.get(variation.function).name();
-        known.push(format!("{name} with few jumps"));
+        known.push(format!("{name}: total variation penalised"));
     }
-    known.extend(
-        problem
-            .soft
-            .iter()
-            .map(|g| format!("{} if possible", g.name)),
-    );
+    known.extend(problem.soft.iter().map(|g| format!("{} (soft)", g.name)));
     known
+}
+
+fn basis_in_words(basis: &Basis) -> &str {
+    match basis {
+        Basis::BSpline { .. } => "B-spline",
+        other => other.name(),
+    }
 }
 
 /// Number and kind of the records.
@@ -50,9 +52,13 @@ fn records(problem: &Problem) -> String {
         n => format!("{n} {kind} records"),
     };
     let which = match (free, forced) {
-        (0, forced) => count(forced, "driven"),
-        (free, 0) => count(free, "free"),
-        (free, forced) => format!("{} and {}", count(free, "free"), count(forced, "driven")),
+        (0, forced) => count(forced, "forced-vibration"),
+        (free, 0) => count(free, "free-vibration"),
+        (free, forced) => format!(
+            "{} and {}",
+            count(free, "free-vibration"),
+            count(forced, "forced-vibration")
+        ),
     };
     let sees = |e: &Experiment, kind: ChannelKind| e.channels.iter().any(|c| c.kind() == kind);
     let kinds = ChannelKind::ALL

@@ -196,7 +196,7 @@ impl<'a> FunctionCurve<'a> {
         panel
             .marks(self.band.map(band))
             .marks(self.start.map(start))
-            .mark(found("found", t, self.found))
+            .mark(found("estimate", t, self.found))
             .marks(self.truth.map(|y| truth(t, y)))
     }
 }
@@ -216,7 +216,7 @@ pub fn functions(t: &[f64], curves: &[FunctionCurve]) -> Figure {
     Figure::new(
         "functions",
         "Coefficient functions",
-        "The coefficient functions that were found, against time, one panel for each.",
+        "Estimated coefficients against time, one panel for each.",
     )
     .panels(curves.iter().map(|curve| curve.panel(t)))
 }
@@ -335,7 +335,7 @@ pub fn weight_path(path: &WeightPath) -> Figure {
         "weights",
         "Choice of the weight",
         "Misfit, roughness and effective degrees of freedom against the weight of the smoothness, \
-         with the weight that each rule picks.",
+         with the weight that each rule selects.",
     )
     .panels(parts.map(panel))
 }

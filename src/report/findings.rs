@@ -1,7 +1,7 @@
 //! Findings and warnings about a fit, from the typed results of the core.
 
 use crate::finding::Finding;
-use crate::number_format::significant;
+use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::{CoarseBasis, FitWarning, Unidentified};
 use kmcfit_core::internals::identifiability::{
     Classification, FunctionClassification, RankFinding, span_words,
@@ -63,11 +63,13 @@ pub fn not_predicted((record, percent): (&str, f64)) -> Finding {
 pub fn warning(warning: &FitWarning) -> Finding {
     let text = match warning {
         FitWarning::BeyondSigma { times } => format!(
-            "no confidence intervals: the residuals are {times:.1} times sigma, so the model does not explain the record \
-             or sigma is too small"
+            "no confidence intervals: the residuals are {} times sigma, so the model does not explain the record \
+             or sigma is too small",
+            times_in_words(*times)
         ),
         FitWarning::CoarseSteps { times } => format!(
-            "no confidence intervals: halving the step changes the response by {times:.1} times the rms residual"
+            "no confidence intervals: halving the step changes the response by {} times the rms residual",
+            times_in_words(*times)
         ),
         FitWarning::PoorFit => {
             "no confidence intervals: the residuals are large and autocorrelated".into()
@@ -139,9 +141,10 @@ fn coarse_basis(basis: &CoarseBasis) -> String {
     let p = p_in_words(*p_value);
     match (basis.halves, basis.knots) {
         (Some([first, second]), _) => format!(
-            "the {function} is not constant: {} in the first half of the record, {} in the second (F test, {p})",
+            "the {function} is not constant: {} {unit} in the first half of the record, {} {unit} in the second (F test, {p})",
             significant(first, 4),
-            significant(second, 4)
+            significant(second, 4),
+            unit = basis.unit
         ),
         (None, knots) => format!(
             "the basis of the {function} is too coarse (F test, {p}): {} changes it by up to {:.0} % on {}",

@@ -53,7 +53,7 @@ pub fn channel(view: &ChannelView) -> ChannelSummary {
     }
 }
 
-/// Estimated correlation of the noise of a channel.
+/// Correlation of the noise of a channel.
 fn noise(correlation: &Correlation) -> NoiseSummary {
     match correlation.law() {
         CorrelationLaw::Autoregressive(process) => NoiseSummary {

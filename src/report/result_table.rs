@@ -36,7 +36,7 @@ impl ResultTable {
     /// table can be read wherever the run itself fitted into memory.
     ///
     /// # Errors
-    /// If there is no such file; if a row has another number of fields than the header, or a field that is neither
+    /// If there is no such file; if a row has a wrong number of fields, or a field that is neither
     /// empty nor a number; if the number of rows differs, so that the table is truncated or belongs to another result;
     /// if its values do not fit into memory.
     pub fn read_rows(path: &Path, rows: usize, what: &str) -> Result<Self, InputError> {
@@ -110,7 +110,6 @@ impl ResultTable {
             Some(i) => {
                 let place = Location::Row {
                     file: self.path.clone(),
-                    row: i + 1,
                     line: i + 2,
                     column: Some(name.into()),
                 };
@@ -154,7 +153,6 @@ fn take(
     let damaged = |problem: &str, column: Option<&String>| {
         let place = Location::Row {
             file: path.to_path_buf(),
-            row: row + 1,
             line: row + 2,
             column: column.cloned(),
         };
@@ -162,7 +160,7 @@ fn take(
     };
     let fields = line.split(',').count();
     if fields != headers.len() {
-        return Err(damaged("the row has another number of fields", None)
+        return Err(damaged("wrong number of fields in this row", None)
             .found(fields)
             .expected(headers.len().to_string()));
     }

@@ -155,7 +155,7 @@ fn value(folder: &Path) -> Result<Value, InputError> {
     let format = value.get("format").and_then(Value::as_u64);
     if format != Some(FORMAT.into()) {
         return Err(
-            InputError::file(&path, "the result has another format version")
+            InputError::file(&path, "unsupported format version of the result")
                 .key("format")
                 .found(format.map_or("none".into(), |f| f.to_string()))
                 .expected(FORMAT.to_string()),

@@ -1,17 +1,14 @@
 //! Summary of a fit for the terminal.
 
-use super::document::{ChannelSummary, Prediction, ResultDocument};
+use super::document::{ChannelSummary, PenaltySummary, Prediction, ResultDocument};
+use super::estimates::estimates;
 use super::suggestions;
 use crate::finding::Finding;
-use crate::number_format::significant;
-use kmcfit_core::internals::assessment::FunctionSummary;
-use kmcfit_core::internals::functions::{CoefficientKind, WeightRule};
+use crate::number_format::{resolved, significant};
+use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::identifiability::ClassificationKind;
-use kmcfit_core::internals::solvers::StartStrategy;
+use kmcfit_core::internals::solvers::Status;
 use std::fmt::Write;
-
-/// Ratio of the largest to the smallest value above which the largest alone is stated.
-const MANY_TIMES: f64 = 1e4;
 
 /// The summary: status, estimates, fit, identifiability, warnings, suggestions, then tables.
 pub fn summary(document: &ResultDocument) -> String {
@@ -24,12 +21,11 @@ pub fn summary(document: &ResultDocument) -> String {
 fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
     let cost = &document.cost;
     writeln!(text, "{}", document.title)?;
-    writeln!(
-        text,
-        "{}: {}",
-        document.outcome.status.name(),
-        document.outcome.reason
-    )?;
+    let status = document.outcome.status;
+    match unidentified(document) {
+        Some(why) => writeln!(text, "{}, but {}", status.name(), why.text)?,
+        _ => writeln!(text, "{}: {}", status.name(), document.outcome.reason)?,
+    }
     write_findings(text, document)?;
     write!(text, "J {:.6e} -> {:.6e}", cost.initial, cost.r#final)?;
     if document.has_ratio() {
@@ -42,9 +38,10 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     };
     writeln!(
         text,
-        "; {}, {} forward and {others} {what} solves, {:.2} s",
+        "; {}, {} forward and {}, {:.2} s",
         iterations(document),
         counts.forward,
+        count(others as usize, &format!("{what} solve")),
         document.seconds
     )?;
     for (name, channel) in document.records() {
@@ -71,21 +68,46 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     Ok(())
 }
 
+/// Reason for which the optimum of a converged fit identifies no system.
+fn unidentified(document: &ResultDocument) -> Option<&Finding> {
+    let known = &document.identifiability;
+    let is_minimum = document.outcome.status == Status::Converged;
+    known
+        .warnings
+        .first()
+        .filter(|_| is_minimum && known.unidentified)
+}
+
 /// Estimate, fit, identifiability, warnings and suggestions under their headings.
 fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
     let known = &document.identifiability;
+    let status = document.outcome.status;
     let mut warnings = Finding::texts(&known.warnings);
     warnings.extend(Finding::texts(&document.warnings));
+    let estimate = match unidentified(document) {
+        Some(_) => {
+            // The second line of the summary has it.
+            warnings.remove(0);
+            "Values at the optimum"
+        }
+        None => "Estimate",
+    };
+    let (estimates, findings) = match status {
+        // Start values are no estimates.
+        Status::Infeasible => (Vec::new(), Vec::new()),
+        _ => (estimates(document), Finding::texts(&known.findings)),
+    };
+    let width = estimate.len().max(15);
     for (heading, sentences) in [
-        ("Estimate", estimates(document)),
+        (estimate, estimates),
         ("Fit", fit(document).into_iter().collect()),
-        ("Identifiability", Finding::texts(&known.findings)),
+        ("Identifiability", findings),
         ("Warnings", warnings),
         ("Suggestions", Finding::texts(&document.suggestions)),
     ] {
         for (i, sentence) in sentences.iter().enumerate() {
             let heading = if i == 0 { heading } else { "" };
-            writeln!(text, "  {heading:<15} {sentence}")?;
+            writeln!(text, "  {heading:<width$} {sentence}")?;
         }
     }
     writeln!(text)
@@ -115,71 +137,6 @@ fn fit(document: &ResultDocument) -> Option<String> {
 
 fn fit_percent(fit: f64) -> String {
     suggestions::percent(fit, 2)
-}
-
-/// Estimates of the coefficient functions: `k = 4075 N/m (95 % CI 4061 to 4089)`, or the range over the record.
-fn estimates(document: &ResultDocument) -> Vec<String> {
-    document.terms().map(estimate).collect()
-}
-
-fn estimate((name, f): (&str, &FunctionSummary)) -> String {
-    let symbol = symbol(name);
-    let unit = &f.unit;
-    if f.negligible {
-        return format!("{symbol} = 0 {unit}");
-    }
-    if f.verdict == Some(ClassificationKind::NotIdentified) {
-        return format!("{symbol}: not identifiable");
-    }
-    let fixed = match f.verdict {
-        Some(ClassificationKind::Fixed) => " (fixed)",
-        _ => "",
-    };
-    if let (Some(half), true) = (f.half_width(), f.min == f.max) {
-        let [value, low, high] = [f.min, f.min - half, f.min + half].map(|x| resolved(x, half));
-        return format!("{symbol} = {value} {unit} (95 % CI {low} to {high})");
-    }
-    let (range, span) = match f.identified_range {
-        Some(range) if f.verdict == Some(ClassificationKind::PartlyIdentified) => {
-            (range, " where it is identified")
-        }
-        _ => ([f.min, f.max], " over the record"),
-    };
-    let [low, high] = range.map(short);
-    match low == high {
-        true => format!("{symbol} = {low} {unit}{fixed}"),
-        // A coefficient at or near a lower limit of zero.
-        _ if range[0] >= 0.0 && range[1] > MANY_TIMES * range[0] => {
-            format!("{symbol} = at most {high} {unit}{span}{fixed}")
-        }
-        false => format!("{symbol} = {low} to {high} {unit}{span}{fixed}"),
-    }
-}
-
-/// Symbol of a coefficient function in the equation of motion; the name of any other.
-fn symbol(name: &str) -> &str {
-    let kind = CoefficientKind::ALL.into_iter().find(|k| k.name() == name);
-    kind.map_or(name, |kind| kind.symbol())
-}
-
-/// A value with the decimals that an interval of this half-width resolves: two digits of the half-width.
-fn resolved(x: f64, half: f64) -> String {
-    let order = |x: f64| x.abs().log10().floor();
-    let decimals = 1.0 - order(half);
-    if (1e-3..1e7).contains(&x.abs()) && (..=12.0).contains(&decimals) {
-        let decimals = decimals.max(0.0) as usize;
-        return format!("{x:.decimals$}");
-    }
-    let digits = order(x) + decimals + 1.0;
-    match digits.is_finite() {
-        true => significant(x, digits.clamp(2.0, 15.0) as usize),
-        false => short(x),
-    }
-}
-
-/// Four significant digits.
-fn short(x: f64) -> String {
-    significant(x, 4)
 }
 
 /// Fit of one channel.
@@ -231,15 +188,23 @@ pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> 
     if let Some(reduced) = statistics.reduced_chi_square {
         write!(
             text,
-            "chi-square per degree of freedom {reduced:.4} ({} samples, {} parameters)",
-            statistics.samples, statistics.parameters
+            "chi-square per degree of freedom {} ({} samples, {} parameters)",
+            significant(reduced, 4),
+            statistics.samples,
+            statistics.parameters
         )?;
         match (statistics.aic, statistics.bic) {
-            (Some(aic), Some(bic)) => writeln!(text, ", AIC {aic:.2}, BIC {bic:.2}")?,
+            (Some(aic), Some(bic)) => {
+                let [aic, bic] = [aic, bic].map(|x| significant(x, 5));
+                writeln!(text, ", AIC {aic}, BIC {bic}")?;
+            }
             _ => writeln!(text)?,
         }
     }
     match &document.step_check {
+        Some(half) if !half.change_per_sample.is_finite() => {
+            writeln!(text, "step-size check: the response is zero")
+        }
         Some(half) => writeln!(
             text,
             "step-size check: halving the step changes the response by at most {} % of its peak",
@@ -260,7 +225,7 @@ pub(super) fn write_nuisance_parameters(
         match parameter.half_width() {
             Some(half) => {
                 let (low, high) = (parameter.value - half, parameter.value + half);
-                let [value, low, high] = [parameter.value, low, high].map(|x| resolved(x, half));
+                let [value, low, high] = resolved([parameter.value, low, high], half);
                 writeln!(text, "{name} = {value} {unit} (95 % CI {low} to {high})")?;
             }
             None => writeln!(text, "{name} = {} {unit}", significant(parameter.value, 6))?,
@@ -269,30 +234,38 @@ pub(super) fn write_nuisance_parameters(
     Ok(())
 }
 
-/// Iterations of the last fit, and of the fits before it: along the path of weights, or from other starting points.
+/// Iterations in all, and in parentheses those of the reported fit and of the others: along the path of weights, or from other
+/// starting points.
 pub(super) fn iterations(document: &ResultDocument) -> String {
-    let last = count(document.counts.iterations as usize, "iteration");
-    if let Some(weights) = &document.weights {
-        let fits = count(weights.path.len(), "weight");
-        let before = weights.iterations();
-        return format!("{last}, {before} along the path of {fits} before");
+    let last = document.counts.iterations;
+    let attempts = document.attempts.iter().map(|attempt| attempt.iterations);
+    let (others, what) = match &document.weights {
+        Some(weights) => {
+            let fits = count(weights.path.len(), "weight");
+            (weights.iterations(), format!("along the path of {fits}"))
+        }
+        None if document.attempts.len() < 2 => (0, String::new()),
+        // Sigma is estimated after the attempts.
+        None if document.estimates_sigma() => (attempts.sum(), "before sigma was estimated".into()),
+        None => (
+            attempts.sum::<u64>().saturating_sub(last),
+            "in other attempts".into(),
+        ),
+    };
+    let all = count((last + others) as usize, "iteration");
+    match what.is_empty() {
+        true => all,
+        false => format!("{all} ({last} in the final fit, {others} {what})"),
     }
-    if document.attempts.len() < 2 {
-        return last;
-    }
-    let all = document
-        .attempts
-        .iter()
-        .map(|attempt| attempt.iterations)
-        .sum::<u64>();
-    let starts = document
-        .attempts
-        .iter()
-        .filter(|attempt| attempt.start != StartStrategy::Continued.name());
-    let starts = count(starts.count(), "starting point");
-    match document.estimates_sigma() {
-        true => format!("{last} after {all} from {starts}"),
-        false => format!("{last}, {all} in all from {starts}"),
+}
+
+/// Name of a rule for the weight of a penalty in a sentence.
+fn rule_in_words(rule: &str) -> &str {
+    match WeightRule::OF_PATHS.into_iter().find(|r| r.name() == rule) {
+        Some(WeightRule::Discrepancy) => "the discrepancy principle",
+        Some(WeightRule::LCurve) => "the L-curve",
+        Some(WeightRule::Gcv) => "generalised cross-validation",
+        _ => rule,
     }
 }
 
@@ -355,11 +328,16 @@ fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Re
 
 pub(super) fn write_constraints(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
     if let Some(weights) = &document.weights {
-        writeln!(
-            text,
-            "penalty weight {:.3e} by {}",
-            weights.weight, weights.rule
-        )?;
+        let (rule, weight) = (rule_in_words(&weights.rule), weights.weight);
+        write!(text, "penalty weight by {rule}: {weight:.3e}")?;
+        let of_rule = |p: &&PenaltySummary| p.rule.as_ref() == Some(&weights.rule);
+        let penalties = document.penalties.iter().filter(of_rule);
+        let mut functions: Vec<&str> = penalties.map(|p| p.function.as_str()).collect();
+        functions.dedup();
+        match functions.len() {
+            0 | 1 => writeln!(text)?,
+            _ => writeln!(text, " (the same factor for {})", functions.join(", "))?,
+        }
         if let Some(remark) = &weights.remark {
             writeln!(text, "{remark}")?;
         }
@@ -423,12 +401,17 @@ pub fn prediction_table(predictions: &[Prediction], is_rotation: bool) -> String
         .iter()
         .any(|p| p.cost.is_some() || p.energy.is_some());
     let m = if is_rotation { "rad" } else { "m" };
-    let row = |[y, v, one, other]: [&str; 4]| format!("{y:>12} {v:>12} {one:>14} {other:>14}\n");
-    let [y, v] = [format!("y(0) {m}"), format!("v(0) {m}/s")];
+    let [y, v] = [format!("y(0) ({m})"), format!("v(0) ({m}/s)")];
     let [one, other] = match has_truth {
-        true => [format!("cost {m}^2 s"), format!("energy {m}^2 s")],
-        false => [format!("largest {m}"), format!("at the end {m}")],
+        true => [
+            format!("int (y - y_true)^2 dt ({m}² s)"),
+            format!("int y_true^2 dt ({m}² s)"),
+        ],
+        false => [format!("peak |y| ({m})"), format!("y at end ({m})")],
     };
+    let [width, last] = [&one, &other].map(|name| name.chars().count().max(14));
+    let row =
+        |[y, v, one, other]: [&str; 4]| format!("{y:>12} {v:>12} {one:>width$} {other:>last$}\n");
     let mut text = row([&y, &v, &one, &other]);
     for p in predictions {
         let [y, v] = [p.displacement, p.velocity].map(|x| significant(x, 6));

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
-const WHAT: &str = "the journal of a study or comparison that was begun by kmcfit";
+const WHAT: &str = "the journal of a study or comparison that was started by kmcfit";
 
 /// Entry of the journal: the name of an analysis and its result.
 #[derive(Serialize, Deserialize)]
@@ -63,7 +63,7 @@ impl AnalysisJournal {
     /// Resumes the journal of this name in a folder, up to the first damaged line.
     ///
     /// # Errors
-    /// If there is no journal, or it was begun with other inputs or by another version.
+    /// If there is no journal, or it was started with other inputs or by another version.
     pub fn resume(folder: &Path, name: &str, heading: &Heading) -> Result<Self, InputError> {
         let path = folder.join(name);
         let text = JournalText::read(&path, WHAT)?;

@@ -96,7 +96,7 @@ impl Heading {
         match value.get("format").and_then(Value::as_u64) {
             Some(format) if format != u64::from(FORMAT) => Err(InputError::file(
                 journal,
-                "the journal has another format version",
+                "unsupported format version of the journal",
             )
             .found(format)
             .expected(FORMAT.to_string())),
@@ -104,14 +104,14 @@ impl Heading {
         }
     }
 
-    /// Refuses to resume work that was begun with other inputs, settings or another version.
+    /// Refuses to resume work that was started with other inputs, settings or another version.
     ///
     /// # Errors
     /// If version, values or files differ.
     pub(super) fn check_same(&self, before: &Self, journal: &Path) -> Result<(), InputError> {
         let command = &before.command;
         let differs = |what: &str, found: String, expected: String| {
-            InputError::file(journal, format!("this {command} was begun {what}"))
+            InputError::file(journal, format!("this {command} was started {what}"))
                 .found(found)
                 .expected(format!("{expected}, or a new {command}"))
         };
@@ -142,7 +142,7 @@ impl Heading {
         match changed.or_else(|| before.sources.iter().find(missing)) {
             Some(source) => Err(InputError::file(
                 &source.file,
-                format!("this file has changed since the {command} was begun"),
+                format!("this file has changed since the {command} was started"),
             )
             .expected(format!("the same model and data, or a new {command}"))),
             None => Ok(()),

@@ -131,7 +131,7 @@ impl Manifest {
                 .found(format!("other text at line {line}, column {column}"))
         })?;
         if manifest.format != FORMAT {
-            return Err(unknown("the manifest has another format version")
+            return Err(unknown("unsupported format version of the manifest")
                 .found(manifest.format)
                 .expected(FORMAT.to_string()));
         }

@@ -43,9 +43,12 @@ impl Table {
             ColumnName::Name(name) => self.find_name(name),
             ColumnName::Number(number) => match number.checked_sub(1) {
                 Some(index) if index < self.width() => Ok(index),
-                _ => Err(InputError::file(self.path(), "no column of this number")
+                _ => Err(InputError::file(self.path(), "no such column number")
                     .found(number)
-                    .expected(numbers(self.width()))),
+                    .expected(match self.width() {
+                        1 => "1: there is one column".to_owned(),
+                        width => format!("1 to {width}"),
+                    })),
             },
         }
     }

@@ -40,7 +40,7 @@ impl TableFormat {
         if let Some(sign) = self.decimal
             && !matches!(sign, '.' | ',')
         {
-            return Err(InputError::argument("decimal", "not a decimal sign")
+            return Err(InputError::argument("decimal", "invalid decimal separator")
                 .found(quote(&sign.to_string()))
                 .expected("`.` or `,`"));
         }

@@ -186,7 +186,6 @@ impl Table {
     pub fn place(&self, row: usize, column: Option<&str>) -> Location {
         Location::Row {
             file: self.path.clone(),
-            row: row + 1,
             line: self.lines.get(row).copied().unwrap_or_default(),
             column: column.map(str::to_owned),
         }

@@ -236,14 +236,14 @@ fn meaning() {
       expected: a number greater than 0, in kg
     ");
     assert_snapshot!(changed("start: 2.0", "start: 2.0, fixed: 2.0"), @"
-    error: model.yaml:10:36: functions.mass.start: a fixed function has no start
+    error: model.yaml:10:36: functions.mass.start: `fixed` and `start` exclude each other
        |
     10 |   mass:      {basis: nodal, start: 2.0, fixed: 2.0}
        |                                    ^^^
       expected: either `fixed` or `start`
     ");
     assert_snapshot!(changed("start: 2.0", "fixed: 2.0"), @"
-    error: model.yaml:10:22: functions.mass.basis: a fixed function has no basis
+    error: model.yaml:10:22: functions.mass.basis: `fixed` and `basis` exclude each other
        |
     10 |   mass:      {basis: nodal, fixed: 2.0}
        |                      ^^^^^
@@ -291,7 +291,7 @@ fn meaning() {
     16 |   stop: {iterations: 5, seconds: -1}
        |                                  ^^
       found: -1
-      expected: a number greater than 0
+      expected: a number greater than 0, in s
     ");
 }
 
@@ -384,7 +384,7 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
       |
     8 | grid: {nodes: 9223372036854775807, method: midpoint}
       |               ^^^^^^^^^^^^^^^^^^^
-      found: 9223372036854775807 nodes, which may need 34864346 PB: 3780 bytes each
+      found: 9223372036854775807 nodes, which may need 3.49e7 PB: 3780 bytes each
       expected: at most [nodes] nodes within [bytes]
     ");
     // A simulation needs less memory per node.
@@ -495,7 +495,7 @@ fn readings_files() {
 #[test]
 fn rows() {
     assert_snapshot!(with_row(17, "1.6,off"), @"
-    error: samples.csv:18: row 17, column `y_m`: not a number
+    error: samples.csv:18: column `y_m`: not a number
        |
     18 | 1.6,off
        |     ^^^
@@ -503,7 +503,7 @@ fn rows() {
       expected: a finite number, or an empty field for a missing sample
     ");
     assert_snapshot!(with_row(17, "1.6"), @"
-    error: samples.csv:18: row 17: the row does not fit the column names
+    error: samples.csv:18: the row does not fit the column names
        |
     18 | 1.6
        | ^^^
@@ -511,7 +511,7 @@ fn rows() {
       expected: 2 fields, one per column
     ");
     assert_snapshot!(with_row(17, "1.4,0.1"), @"
-    error: samples.csv:18: row 17, column `t_s`: the times do not increase
+    error: samples.csv:18: column `t_s`: the times do not increase
        |
     18 | 1.4,0.1
        | ^^^
@@ -519,7 +519,7 @@ fn rows() {
       expected: a time greater than 1.5
     ");
     assert_snapshot!(with_row(17, "1.5,0.1"), @"
-    error: samples.csv:18: row 17, column `t_s`: two rows with the same time
+    error: samples.csv:18: column `t_s`: two rows with the same time
        |
     18 | 1.5,0.1
        | ^^^
@@ -646,7 +646,7 @@ fn simulate_arguments() {
     assert_snapshot!(with(&["--experiment", "forced"]), @"
     error: --experiment: no such experiment in the model
       found: `forced`
-      expected: `free decay`
+      expected: one of the experiments of the model: `free decay`
     ");
     assert_snapshot!(with(&["--nodes", "2"]), @"
     error: --nodes: invalid number of nodes
@@ -656,7 +656,7 @@ fn simulate_arguments() {
     assert_snapshot!(with(&["--nodes", "many"]), @"
     error: --nodes: not a number
       found: `many`
-      expected: a whole number, 0 or greater
+      expected: an integer, 3 or more
     ");
     bench.write("model.yaml", &MODEL.replace("    data: samples.csv\n", ""));
     assert_snapshot!(with(&[]), @"
@@ -724,7 +724,7 @@ fn predict_arguments() {
     ");
     bench.write("other/result.json", "{}");
     assert_snapshot!(from("other", "1,0"), @"
-    error: other/result.json: format: the result has another format version
+    error: other/result.json: format: unsupported format version of the result
       found: none
       expected: 1
     ");

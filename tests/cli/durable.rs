@@ -475,7 +475,7 @@ fn a_resumption_that_is_refused() {
     std::fs::write(bench.path("run/fit.journal"), older).expect("room");
     let older_version = refused(&bench);
     assert!(
-        older_version.contains("this fit was begun by another version of kmcfit"),
+        older_version.contains("this fit was started by another version of kmcfit"),
         "{older_version}"
     );
     bench.write(
@@ -496,23 +496,23 @@ fn a_resumption_that_is_refused() {
         nothing,
     ];
     insta::assert_snapshot!(all.join("\n"), @"
-    error: models/paper.yaml: this file has changed since the fit was begun
+    error: models/paper.yaml: this file has changed since the fit was started
       expected: the same model and data, or a new fit
 
-    error: models/../data/paper.csv: this file has changed since the fit was begun
+    error: models/../data/paper.csv: this file has changed since the fit was started
       expected: the same model and data, or a new fit
 
     error: run/fit.journal: not a journal of kmcfit, or it was edited
       found: a first line with a wrong checksum
-      expected: the journal of a fit that was begun by `kmcfit fit`
+      expected: the journal of a fit that was started by `kmcfit fit`
 
-    error: run/fit.journal: the journal has another format version
+    error: run/fit.journal: unsupported format version of the journal
       found: 7
       expected: 2
 
     error: run/fit.journal: not a journal of kmcfit, or it was edited
       found: a first line that is not JSON
-      expected: the journal of a fit that was begun by `kmcfit fit`
+      expected: the journal of a fit that was started by `kmcfit fit`
 
     error: run: no unfinished run in this folder
       expected: the folder of an unfinished fit, study or comparison

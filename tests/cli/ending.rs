@@ -170,7 +170,7 @@ fn failed_and_empty_runs_are_read_back() {
         insta::allow_duplicates! {
             insta::assert_snapshot!(stderr, @"
             error: failed/result.json: this run failed and has no estimates
-              found: the start cannot be evaluated: the response overflows at t = 0.100000 s
+              found: the start cannot be evaluated: the response overflows at t = 0.1 s
               expected: the result of a run with estimates
             ");
         }

@@ -17,9 +17,9 @@ fn the_optimum_does_not_predict() {
         "3.4,1.1",
     ];
     assert_snapshot!(bench.run_to(0, &predict), @"
-    y(0) m     v(0) m/s     cost m^2 s   energy m^2 s
-      -3.3            1      3.97298e1      1.26929e2
-       3.4          1.1     6.15327e-2      1.41498e2
+    y(0) (m)   v(0) (m/s) int (y - y_true)^2 dt (m² s) int y_true^2 dt (m² s)
+        -3.3            1                    3.97298e1              1.26929e2
+         3.4          1.1                   6.15327e-2              1.41498e2
     ");
 
     let json = bench.run_to(0, &[&predict[..], &["--json"]].concat());
@@ -79,7 +79,7 @@ fn a_rotation_has_angular_units() {
     let words: Vec<&str> = header.split_whitespace().collect();
     assert_eq!(
         words.join(" "),
-        "y(0) rad v(0) rad/s largest rad at the end rad"
+        "y(0) (rad) v(0) (rad/s) peak |y| (rad) y at end (rad)"
     );
     let motions = bench.read("predicted/predictions.csv");
     assert_eq!(table(&motions).0, ["t_s", "y_rad_1"]);

@@ -103,10 +103,10 @@ fn damaged_runs() {
     let text = spoil("\n0,", "\nx,");
     let field = spoil("\n0,", "\n0,,");
     insta::assert_snapshot!([text, field].join("\n"), @"
-    run/functions.csv:2: row 1, column `t_s`: not a number
+    run/functions.csv:2: column `t_s`: not a number
       found: `x`
       expected: a number, or an empty field
-    run/functions.csv:2: row 1: the row has another number of fields
+    run/functions.csv:2: wrong number of fields in this row
       found: 9
       expected: 8
     ");

@@ -59,7 +59,7 @@ fn a_cost_that_overflows_is_an_outcome() {
     let (code, _, stderr) = bench.run(&["fit", "model.yaml"]);
     assert_eq!(code, 3, "{stderr}");
     assert!(
-        stderr.contains("the cost overflows") && stderr.contains("t = 1.0"),
+        stderr.contains("the cost overflows") && stderr.contains("t = 1 s"),
         "{stderr}"
     );
 }

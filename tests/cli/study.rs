@@ -217,7 +217,7 @@ fn a_sequence() {
 
 /// In a record at rest no parameter combination is identifiable; the study reports this and ends.
 #[test]
-fn a_record_at_rest() {
+fn a_record_at_rest_is_refused() {
     let bench = bench();
     let mut text = String::from("t_s,y_m\n");
     for i in 0..101 {
@@ -231,10 +231,36 @@ fn a_record_at_rest() {
         )
         .replace("    - {parameter: initial velocity of free decay}\n", "");
     bench.write("model.yaml", &model);
-    let (code, stdout, stderr) = bench.run(&["study", "model.yaml"]);
-    assert!(code == 0 || code == 3, "{code} {stderr}");
-    assert!(stdout.contains("the samples determine 0 of"), "{stdout}");
-    assert!(!stdout.contains("NaN"), "{stdout}");
+    let (code, _, stderr) = bench.run(&["study", "model.yaml"]);
+    assert_eq!(code, 2, "{stderr}");
+    assert!(
+        stderr.contains("columns.displacement: all samples are equal"),
+        "{stderr}"
+    );
+    assert!(stderr.contains("found: 101 samples, all 0 m\n"), "{stderr}");
+}
+
+/// The model file of a run is relative to the folder of the fit.
+#[test]
+fn a_run_of_another_folder() {
+    let bench = bench();
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
+    std::fs::rename(bench.path("model.yaml"), bench.path("moved.yaml")).expect("renamed");
+    let (code, _, stderr) = bench.run(&["study", "run"]);
+    assert_eq!(code, 2);
+    assert_snapshot!(stderr, @"
+    error: run/result.json: model.file: the model file of this run was not found
+      found: `model.yaml`, relative to the current folder
+      expected: the model file that was fitted
+      hint: run this command in the folder in which the fit was started, or give the model file
+    ");
+    let (code, _, stderr) = bench.run(&["study", "runn"]);
+    assert_eq!(code, 2);
+    assert_snapshot!(stderr, @"
+    error: runn: no such file
+      expected: a model file or a sequence (YAML), or the folder of a finished run
+      hint: did you mean `run`?
+    ");
 }
 
 /// In an edited journal the edited analyses are computed again, without a panic.

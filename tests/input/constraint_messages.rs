@@ -339,7 +339,7 @@ fn kinds() {
       expected: `function: mass`, `damping` or `stiffness`
     ");
     assert_snapshot!(message("[{function: mass, passive: true}]"), @"
-    m.yaml:11:26: constraints[0].function: this constraint applies to several functions
+    m.yaml:11:26: constraints[0].function: `passive` concerns mass, damping and stiffness: leave `function` out
       found: `function` beside `passive`
       expected: no `function`
     ");
@@ -387,12 +387,12 @@ fn shapes_and_ranges() {
     ");
     assert_snapshot!(message("[{function: mass, min: 2, max: 1}]"), @"
     m.yaml:11:37: constraints[0].min: min is greater than max
-      found: min 2 and max 1 at 0 s
+      found: min 2 kg and max 1 kg at 0 s
       expected: min at most max at all times
     ");
     assert_snapshot!(message("[{function: mass, min: 0.2, max: {data: c.csv, column: c}}]"), @"
     m.yaml:11:37: constraints[0].min: min is greater than max
-      found: min 0.2 and max 0.1 at 0 s
+      found: min 0.2 kg and max 0.1 kg at 0 s
       expected: min at most max at all times
     ");
     assert_snapshot!(message("[{function: mass, min: {data: c.csv, column: d}}]"), @"

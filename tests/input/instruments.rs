@@ -217,7 +217,7 @@ fn a_mistake_in_the_first_row_does_not_make_it_a_name() {
         assert_eq!(table.headers(), ["t", "y"]);
         let message = table.column("y").unwrap_err().to_string();
         assert!(
-            message.starts_with("t.csv:2: row 1, column `y`: not a number"),
+            message.starts_with("t.csv:2: column `y`: not a number"),
             "{message}"
         );
     }

@@ -31,14 +31,14 @@ fn columns() {
       expected: one of: a [g], a [V]
     ");
     assert_snapshot!(find("t,y\n0,1\n", ColumnName::Number(3)), @"
-    t.csv: no column of this number
+    t.csv: no such column number
       found: 3
-      expected: a number from 1 to 2
+      expected: 1 to 2
     ");
     assert_snapshot!(find("t\n0\n", ColumnName::Number(0)), @"
-    t.csv: no column of this number
+    t.csv: no such column number
       found: 0
-      expected: the number 1: there is one column
+      expected: 1: there is one column
     ");
     assert_snapshot!(find("0,1\n1,2\n", "t".into()), @"
     t.csv: there is no such column
@@ -51,29 +51,29 @@ fn columns() {
 #[test]
 fn fields() {
     assert_snapshot!(sample_table("t;y\n0;1,5\n1;off\n", 1), @"
-    t.csv:3: row 2, column `y`: not a number
+    t.csv:3: column `y`: not a number
       found: `off`
       expected: a finite number, or an empty field for a missing sample
     ");
     assert_snapshot!(sample_table("t;y\n0;1,5\n1;1.5\n", 1), @"
-    t.csv:2: row 1, column `y`: not a number
+    t.csv:2: column `y`: not a number
       found: `1,5`
       expected: a finite number, or an empty field for a missing sample
       hint: write numbers with a decimal point, not a comma
     ");
     assert_snapshot!(sample_table("t,y\n0,1.5\n1,-inf\n", 1), @"
-    t.csv:3: row 2, column `y`: not a finite number
+    t.csv:3: column `y`: not a finite number
       found: `-inf`
       expected: a finite number, or an empty field for a missing sample
       hint: leave the field empty for a missing sample or an overload
     ");
     assert_snapshot!(sample_table("0,1.5\n1,off\n", 1), @"
-    t.csv:2: row 2, column `2`: not a number
+    t.csv:2: column `2`: not a number
       found: `off`
       expected: a finite number, or an empty field for a missing sample
     ");
     assert_snapshot!(parsed("0,1.5\n1,\n").values(1).unwrap_err(), @"
-    t.csv:2: row 2, column `2`: a number is missing
+    t.csv:2: column `2`: a number is missing
       found: nothing
       expected: a finite number
     ");
@@ -83,17 +83,17 @@ fn fields() {
 fn rows() {
     let any = TableFormat::default();
     assert_snapshot!(with("0;1\n1;2\n2\n", &any), @"
-    t.csv:3: row 3: the row does not fit the other rows
+    t.csv:3: the row does not fit the other rows
       found: 1 field
       expected: 2 fields, one per column
     ");
     assert_snapshot!(with("Rig;7\n\nt;y\ns;m\n0,5;1\n1,5;2;3\n", &any), @"
-    t.csv:6: row 2: the row does not fit the column names
+    t.csv:6: the row does not fit the column names
       found: 3 fields
       expected: 2 fields, one per column
     ");
     assert_snapshot!(with("t\n0,5\n1,5\n", &any), @"
-    t.csv:2: row 1: the row does not fit the column names
+    t.csv:2: the row does not fit the column names
       found: 2 fields
       expected: 1 field, one per column
       hint: write numbers with a decimal point, not a comma
@@ -121,7 +121,7 @@ fn formats() {
       expected: a comma, a semicolon, a tab, a space or another punctuation mark, except `.`, `+`, `-`, `#` and quotes
     ");
     assert_snapshot!(told(TableFormat { decimal: Some('\''), ..any }), @"
-    decimal: not a decimal sign
+    decimal: invalid decimal separator
       found: `'`
       expected: `.` or `,`
     ");

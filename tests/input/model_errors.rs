@@ -63,8 +63,9 @@ fn files() {
       hint: it looks like UTF-16: save it as UTF-8
     ");
     assert_snapshot!(file("model.yaml", &vec![b' '; 1 << 21], "model.yaml"), @"
-    DIR/model.yaml: the file is longer than 262144 bytes
-      expected: a model file (YAML)
+    DIR/model.yaml: the file is too large
+      found: 2048 KiB
+      expected: a model file (YAML) of at most 256 KiB
     ");
 }
 
@@ -119,6 +120,7 @@ fn unknown_keys() {
     m.yaml:22:3: fit: unknown key
       found: `12`
       expected: one of: method, initial, gradient, qp, refinement, memory, stop
+      hint: write 1.0 with a decimal point; in { … } a comma separates entries
     ");
 }
 
@@ -576,7 +578,9 @@ fn limits_of_the_yaml_crate_are_reported() {
       expected: every `[` and `{` closed
     ");
     assert_snapshot!(message(&"- ".repeat(1 << 18)), @"
-    m.yaml: the file is longer than 262144 bytes
+    m.yaml: the model file is too large
+      found: 512 KiB
+      expected: at most 256 KiB
       hint: put samples into CSV files
     ");
     for piece in ["- ", "? ", "a: b\n", "!t ", "'", "- &a *a\n", "{}"] {

@@ -115,38 +115,38 @@ fn fields() {
         text.push_str(&format!("{row},{}\n", if row == 17 { "off" } else { "1" }));
     }
     assert_snapshot!(column(&text, "y"), @"
-    t.csv:19: row 17, column `y`: not a number
+    t.csv:19: column `y`: not a number
       found: `off`
       expected: a finite number
     ");
     assert_snapshot!(column("t,y\n0,\n", "y"), @"
-    t.csv:2: row 1, column `y`: a number is missing
+    t.csv:2: column `y`: a number is missing
       found: nothing
       expected: a finite number
     ");
     assert_snapshot!(column("t,y\n0,NaN\n", "y"), @"
-    t.csv:2: row 1, column `y`: not a finite number
+    t.csv:2: column `y`: not a finite number
       found: `NaN`
       expected: a finite number
     ");
     assert_snapshot!(column("t,y\n0,1e999\n", "y"), @"
-    t.csv:2: row 1, column `y`: not a finite number
+    t.csv:2: column `y`: not a finite number
       found: `1e999`
       expected: a finite number
     ");
     assert_snapshot!(column("t,y\n0,\"3,5\"\n", "y"), @"
-    t.csv:2: row 1, column `y`: not a number
+    t.csv:2: column `y`: not a number
       found: `3,5`
       expected: a finite number
       hint: write numbers with a decimal point, not a comma
     ");
     assert_snapshot!(column("t,y\n0,3.5 m\n", "y"), @"
-    t.csv:2: row 1, column `y`: not a number
+    t.csv:2: column `y`: not a number
       found: `3.5 m`
       expected: a finite number
     ");
     assert_snapshot!(column("t,y\n0,\"3.5\n1,2\n", "y"), @r"
-    t.csv:2: row 1, column `y`: not a number
+    t.csv:2: column `y`: not a number
       found: `3.5\n1,2`
       expected: a finite number
       hint: a quote that is opened in this row is not closed in it
@@ -156,23 +156,23 @@ fn fields() {
 #[test]
 fn ragged_rows() {
     assert_snapshot!(message("t,y\n0,1\n1\n"), @"
-    t.csv:3: row 2: the row does not fit the column names
+    t.csv:3: the row does not fit the column names
       found: 1 field
       expected: 2 fields, one per column
     ");
     assert_snapshot!(message("t,y\n0,1\n\n1,2,3\n"), @"
-    t.csv:4: row 2: the row does not fit the column names
+    t.csv:4: the row does not fit the column names
       found: 3 fields
       expected: 2 fields, one per column
     ");
     assert_snapshot!(message("t,y\n0,5,1,5\n"), @"
-    t.csv:2: row 1: the row does not fit the column names
+    t.csv:2: the row does not fit the column names
       found: 4 fields
       expected: 2 fields, one per column
       hint: write numbers with a decimal point, not a comma
     ");
     assert_snapshot!(message("t,y\n\"0,1\n1,2\n"), @"
-    t.csv:2: row 1: the row does not fit the column names
+    t.csv:2: the row does not fit the column names
       found: 1 field
       expected: 2 fields, one per column
       hint: a quote that is opened in this row is not closed in it
@@ -194,17 +194,17 @@ fn spacing() {
         ))
     };
     assert_snapshot!(increasing("t\n0\n1\n1\n2\n"), @"
-    t.csv:4: row 3, column `t`: two rows with the same time
+    t.csv:4: column `t`: two rows with the same time
       found: 1 after 1 in line 3
       expected: a time greater than 1
     ");
     assert_snapshot!(increasing("t\n0\n1\n# again\n0.5\n2\n"), @"
-    t.csv:5: row 3, column `t`: the times do not increase
+    t.csv:5: column `t`: the times do not increase
       found: 0.5 after 1 in line 3
       expected: a time greater than 1
     ");
     assert_snapshot!(increasing("t\n0\nx\n"), @"
-    t.csv:3: row 2, column `t`: not a number
+    t.csv:3: column `t`: not a number
       found: `x`
       expected: a finite number
     ");
@@ -214,23 +214,23 @@ fn spacing() {
       expected: `u`
     ");
     assert_snapshot!(equal("t\n0\n0.1\n0.2\n0.4\n0.5\n0.6\n"), @"
-    t.csv:5: row 4, column `t`: the times are not equally spaced
+    t.csv:5: column `t`: the times are not equally spaced
       found: 0.4 after 0.2, a spacing of 0.2
       expected: a spacing of 0.1, as between most rows
     ");
     assert_snapshot!(equal("t\n0\n0.1\n0.20001\n0.3\n0.4\n"), @"
-    t.csv:4: row 3, column `t`: the times are not equally spaced
+    t.csv:4: column `t`: the times are not equally spaced
       found: 0.20001 after 0.1, a spacing of 0.10001
       expected: a spacing of 0.1, as between most rows
       hint: the times may have been rounded: print more digits of them
     ");
     assert_snapshot!(equal("t\n0\n0\n"), @"
-    t.csv:3: row 2, column `t`: two rows with the same time
+    t.csv:3: column `t`: two rows with the same time
       found: 0 after 0 in line 2
       expected: a time greater than 0
     ");
     assert_snapshot!(equal("t\n0\n"), @"
-    t.csv:2: row 1, column `t`: a single row of data
+    t.csv:2: column `t`: a single row of data
       found: 1 row
       expected: at least 2 rows
     ");

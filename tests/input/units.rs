@@ -39,8 +39,8 @@ fn a_name_that_ends_like_another_unit_is_a_warning_for_times_and_samples() {
     let (warnings, time) = built(&rows("t_ms,y_mm"), ["t_ms", "y_mm"], "").expect("a model");
     assert_eq!(time, 100.0);
     assert_snapshot!(warnings, @"
-    experiments[0].columns.displacement: column `y_mm` is read in m, although its name ends like mm; if mm is its unit, add `units: {displacement: mm}`
-    experiments[0].columns.time: column `t_ms` is read in s, although its name ends like ms; if ms is its unit, add `units: {time: ms}`
+    experiments[0].columns.displacement: column `y_mm`: m is assumed, although its name ends in mm; add `units: {displacement: mm}` if it is in mm
+    experiments[0].columns.time: column `t_ms`: s is assumed, although its name ends in ms; add `units: {time: ms}` if it is in ms
     ");
     // The remedy that the warnings suggest.
     let units = "units: {time: ms, displacement: mm}";
@@ -50,8 +50,8 @@ fn a_name_that_ends_like_another_unit_is_a_warning_for_times_and_samples() {
     let (warnings, time) = built(&rows("t_ms,y_mm"), ["t_ms", "y_mm"], units).expect("a model");
     assert_eq!(time, 100.0);
     assert_snapshot!(warnings, @"
-    experiments[0].units.displacement: column `y_mm` is read in m, as the model states; the file states mm
-    experiments[0].units.time: column `t_ms` is read in s, as the model states; the file states ms
+    experiments[0].units.displacement: column `y_mm`: unit taken from the model (m); the file says mm
+    experiments[0].units.time: column `t_ms`: unit taken from the model (s); the file says ms
     ");
 }
 
@@ -61,11 +61,11 @@ fn a_name_that_ends_like_another_unit_than_the_file_states() {
     let (warnings, time) = built(&rows(head), ["1", "y_mm"], "").expect("a model");
     assert_eq!(time, 0.1);
     assert_snapshot!(warnings, @"
-    experiments[0].columns.displacement: column `y_mm` is read in m, as the file's row of units states; its name ends like mm
-    experiments[0].columns.time: column `t_s [ms]` is read in ms, as the file's row of units states; its name ends like s
+    experiments[0].columns.displacement: column `y_mm`: unit taken from the file's row of units (m); its name ends in mm
+    experiments[0].columns.time: column `t_s [ms]`: unit taken from the file's row of units (ms); its name ends in s
     ");
     let unknown = built(&rows("t [h],y"), ["t", "y"], "").expect("a model").0;
-    assert_snapshot!(unknown, @"experiments[0].columns.time: unknown unit `h` of time in column `t [h]`; the values are read in s without conversion");
+    assert_snapshot!(unknown, @"experiments[0].columns.time: unknown unit `h` of time in column `t [h]`; s is assumed");
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn a_name_and_a_row_of_units_that_differ_are_refused() {
     let units = "units: {time: ms}";
     let (warnings, time) = built(&rows(head), ["t", "y"], units).expect("a model");
     assert_eq!(time, 0.1);
-    assert_snapshot!(warnings, @"experiments[0].units.time: column `t [ms]` is read in ms, as the model states; the file states s");
+    assert_snapshot!(warnings, @"experiments[0].units.time: column `t [ms]`: unit taken from the model (ms); the file says s");
 }
 
 #[test]
@@ -95,5 +95,5 @@ fn a_column_of_standard_deviations_in_another_unit() {
     let text = format!("t_s,y_m,s_mm\n{}", (0..101).map(row).collect::<String>());
     let units = "sigma: {displacement: s_mm}";
     let (warnings, _) = built(&text, ["t_s", "y_m"], units).expect("a model");
-    assert_snapshot!(warnings, @"experiments[0].sigma.displacement: column `s_mm` is read in m, the unit of its samples; the file states mm");
+    assert_snapshot!(warnings, @"experiments[0].sigma.displacement: column `s_mm`: unit taken from the samples (m); the file says mm");
 }

@@ -144,7 +144,7 @@ fn a_report_is_complete() {
             .flat_map(|p| p["marks"].as_array().expect("marks"))
             .filter_map(|m| m["label"].as_str())
             .collect();
-        for label in ["95 % band", "found", "truth"] {
+        for label in ["95 % band", "estimate", "truth"] {
             assert!(labels.contains(&label), "{label} in {labels:?}");
         }
     }

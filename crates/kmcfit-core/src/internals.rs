@@ -62,6 +62,9 @@ pub mod qp {
 pub mod noise {
     pub use crate::noise::{Correlation, CorrelationLaw};
 }
+pub mod number_format {
+    pub use crate::number_format::significant;
+}
 pub mod record {
     pub use crate::record::{
         BaseMotion, Channel, ChannelKind, Experiment, Input, InputError, InputErrorKind, Loss,

@@ -65,6 +65,7 @@ mod functions;
 mod host;
 mod identifiability;
 mod noise;
+mod number_format;
 mod objective;
 mod problem;
 mod qp;

@@ -175,7 +175,10 @@ fn stopping(file: &ModelFile, stop: &StopSpec) -> Result<Stopping, InputError> {
         Some(value) if value.0 <= 0.0 => Err(file
             .error_at(&format!("fit.stop.{key}"), "this limit must be positive")
             .found(value.0)
-            .expected("a number greater than 0")),
+            .expected(match key {
+                "seconds" => "a number greater than 0, in s",
+                _ => "a number greater than 0",
+            })),
         value => Ok(value.as_ref().map(|v| v.0)),
     };
     let seconds = positive("seconds", &stop.seconds)?;

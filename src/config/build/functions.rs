@@ -69,12 +69,18 @@ pub(super) fn specification(
     let mut spec = match (&given.fixed, &given.start, given.basis) {
         (Some(_), Some(_), _) => {
             return Err(file
-                .error_at(&format!("{key}.start"), "a fixed function has no start")
+                .error_at(
+                    &format!("{key}.start"),
+                    "`fixed` and `start` exclude each other",
+                )
                 .expected("either `fixed` or `start`"));
         }
         (Some(_), None, Some(_)) => {
             return Err(file
-                .error_at(&format!("{key}.basis"), "a fixed function has no basis")
+                .error_at(
+                    &format!("{key}.basis"),
+                    "`fixed` and `basis` exclude each other",
+                )
                 .expected("either `fixed`, or `basis` with `start`"));
         }
         (Some(fixed), None, None) => {
@@ -202,7 +208,7 @@ fn start(
     match given {
         StartSpec::Number(value) => Ok(builder::Start::Constant(value.0)),
         StartSpec::List(_) if kind == Basis::BSpline => Err(file
-            .error_at(key, "a start of the basis `b-spline` cannot be a list")
+            .error_at(key, "`start` of the basis `b-spline` must be one number")
             .found("a list")
             .expected("a finite number, or a column: {data: file.csv, column: name}")),
         StartSpec::List(values) => Ok(builder::Start::Parameters(numbers(values))),

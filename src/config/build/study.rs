@@ -166,7 +166,7 @@ fn check(file: &ModelFile, spec: &StudySpec) -> Result<(), InputError> {
         return Err(file
             .error_at("study.misfit_limit", "the largest J must be positive")
             .found(level.0)
-            .expected("a number greater than 0, in the unit of J"));
+            .expected("a number greater than 0 (dimensionless with `sigma`, otherwise m² s)"));
     }
     for (key, is_given, needed, is_there) in [
         (

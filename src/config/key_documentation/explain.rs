@@ -4,6 +4,7 @@ use super::{Found, MODEL, ValueType, all};
 use crate::error::InputError;
 use crate::spelling::did_you_mean;
 use crate::text_io::quote;
+use std::collections::HashSet;
 use std::fmt::Write;
 
 /// Most further paths of a key that are listed.
@@ -68,12 +69,20 @@ fn entry(found: &Found, wanted: &str) -> String {
     let mut paths: Vec<&str> = found.paths.iter().map(String::as_str).collect();
     // The requested path first, then the shortest.
     paths.sort_by_key(|path| (*path != wanted, path.matches('.').count()));
+    let mut known = HashSet::new();
+    paths.retain(|path| known.insert(*path));
     let mut text = format!("{}\n  {}\n", paths[0], key.text);
     let mut row = |name: &str, value: &str| {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "  {name:<8} {value}");
     };
-    row("type", &kind(key.kind));
+    row(
+        "type",
+        &match (key.kind, key.range) {
+            (ValueType::Count, Some(range)) => format!("an integer, {range}"),
+            (kind_of_value, _) => kind(kind_of_value),
+        },
+    );
     if let Some(unit) = key.unit {
         row("unit", unit);
     }

@@ -282,8 +282,16 @@ impl ColumnAssignment {
                 Role::BaseDisplacement => "displacement of the base".to_owned(),
                 _ => role,
             };
+            let gaps = match (c.role.is_channel(), table.samples(c.index)) {
+                (false, Ok(samples)) => samples.iter().filter(|x| x.is_nan()).count(),
+                _ => 0,
+            };
+            let gaps = match gaps {
+                0 => String::new(),
+                count => format!("; {count} values missing: an input needs a value in every row"),
+            };
             format!(
-                "column `{}`: {role}, {}{guess}",
+                "column `{}`: {role}, {}{guess}{gaps}",
                 table.label(c.index),
                 c.unit.symbol()
             )

@@ -5,6 +5,7 @@ use super::measures::Measures;
 use super::run::ComparedRun;
 use super::table::short;
 use crate::report::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
+use crate::report::summary::count;
 use kmcfit_core::internals::assessment::is_same_truth;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::system::NodalCoefficients;
@@ -234,8 +235,9 @@ fn residuals(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
 fn convergence(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
     let ends = list(measures, |m| {
         Some(format!(
-            "{:.1e} after {} iterations",
-            m.cost_ratio, m.iterations
+            "{:.1e} after {}",
+            m.cost_ratio,
+            count(m.iterations as usize, "iteration")
         ))
     });
     let lines = runs.iter().enumerate();

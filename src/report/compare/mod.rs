@@ -88,6 +88,16 @@ impl Comparison {
         conclusions::conclusions(&self.measures)
     }
 
+    /// Warning where runs have different records.
+    fn warning(&self) -> Option<String> {
+        let first = self.runs.first()?;
+        let other = self.runs.iter().find(|run| !run.has_records_of(first))?;
+        Some(format!(
+            "the runs use different records ({}, {}): misfit, fit and iterations are not comparable",
+            first.name, other.name
+        ))
+    }
+
     /// The measures of each run.
     pub fn measures(&self) -> &[Measures] {
         &self.measures

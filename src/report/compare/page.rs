@@ -22,9 +22,12 @@ pub(super) fn page(comparison: &Comparison) -> String {
         body += "<h2>Conclusions</h2>\n";
         body += &shell::list(&conclusions(&comparison.measures));
     }
-    body += "<h2>What each run means</h2>\n";
+    body += "<h2>Summary of each run</h2>\n";
     for (i, run) in comparison.measures.iter().enumerate() {
         body += &card(run, style(i));
+    }
+    if let Some(warning) = comparison.warning() {
+        body += &format!("<p class=\"soft\">warning: {}</p>\n", prose(&warning));
     }
     for left_out in &comparison.left_out {
         body += &format!(

@@ -58,6 +58,20 @@ impl ComparedRun {
         })
     }
 
+    /// True if another run has the same records: channels, numbers of samples, measured displacements.
+    pub(super) fn has_records_of(&self, other: &Self) -> bool {
+        let channels = |run: &Self| -> Vec<(String, usize)> {
+            let experiments = run.finished.document.experiments.iter();
+            let channels = experiments.flat_map(|e| &e.channels);
+            channels.map(|c| (c.kind.clone(), c.samples)).collect()
+        };
+        let displacements = |run: &Self| -> Vec<f64> {
+            let responses = run.responses.iter();
+            responses.flat_map(|r| r.observed.clone()).collect()
+        };
+        channels(self) == channels(other) && displacements(self) == displacements(other)
+    }
+
     /// Times of the nodes, s.
     pub fn times(&self) -> Vec<f64> {
         self.finished.system.grid.times()

@@ -26,6 +26,9 @@ fn write_runs(text: &mut String, comparison: &Comparison) -> std::fmt::Result {
         writeln!(text, "{}: {}", plain(&run.name), plain(&run.title))?;
         writeln!(text, "  {}", run.verdict)?;
     }
+    if let Some(warning) = comparison.warning() {
+        writeln!(text, "warning: {}", plain(&warning))?;
+    }
     for left_out in &comparison.left_out {
         let (name, reason) = (plain(&left_out.name), plain(&left_out.reason));
         writeln!(text, "{name}: no result\n  {reason}")?;

@@ -100,10 +100,17 @@ pub(super) fn verdict(response: &ResponseFit, errors: Option<&TruthErrors>) -> S
         return format!("{response}; true system not known");
     };
     if errors.within(RECOVERY_TOLERANCE) {
-        let mut text = format!(
-            "true system recovered: relative error of k/m and c/m at most {}",
-            size(errors.largest_ratio_error())
-        );
+        let mut text = match errors.relative_to_critical {
+            true => format!(
+                "true system recovered: k/m within {} of its largest value, c/m within {} of critical damping",
+                size(errors.k_over_m_relative),
+                size(errors.c_over_m_relative)
+            ),
+            false => format!(
+                "true system recovered: relative error of k/m and c/m at most {}",
+                size(errors.largest_ratio_error())
+            ),
+        };
         if errors.mass_relative >= RECOVERY_TOLERANCE {
             let off = percent(errors.mass_relative);
             text += &format!("; m, c and k are scaled by a common factor (error of m {off})");
@@ -161,6 +168,7 @@ fn distances(errors: &TruthErrors) -> String {
 /// A small number with two digits; with one if it is at the level of rounding errors.
 fn size(x: f64) -> String {
     match x < ROUNDING {
+        _ if x == 0.0 => "0".into(),
         true => format!("{x:.0e}"),
         false => format!("{x:.1e}"),
     }

@@ -287,6 +287,9 @@ pub struct IdentifiabilitySummary {
     /// Parameters and functions that records, constraints and penalties determine.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<Finding>,
+    /// True if the optimum identifies no system; the first warning has the reason.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub unidentified: bool,
     /// Parameters and functions that are not identifiable, and limits of the confidence intervals.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<Finding>,

@@ -32,8 +32,8 @@ const SCRIPTS: [&str; 6] = [
 ];
 
 /// Instructions for charts, referenced by every chart.
-const KEYS: &str = "Hover over a chart to show values; drag to zoom. Click, then use the wheel to zoom in time, with Shift \
-     in the value. Keys: arrows, Home and End move the cursor, with Shift in larger steps; + and - zoom; Escape or a \
+const KEYS: &str = "Hover over a chart to show values; drag to zoom. Click, then use the wheel to zoom in time; hold \
+     Shift to zoom the vertical axis. Keys: arrows, Home and End move the cursor; hold Shift for larger steps; + and - zoom; Escape or a \
      double click resets the view. The legend entries show and hide curves.";
 
 /// A page from its title and its body, which must be escaped.

@@ -13,7 +13,7 @@ pub(super) fn reproducibility(run: &FittedModel, document: &ResultDocument) -> S
         ("program", format!("kmcfit {}", document.version)),
         (
             "arithmetic",
-            format!("{} (all give the same bits)", arithmetic()),
+            format!("{} (results are identical on all processors)", arithmetic()),
         ),
     ];
     rows.extend(

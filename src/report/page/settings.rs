@@ -24,7 +24,7 @@ pub(super) fn settings(run: &FittedModel, document: &ResultDocument) -> String {
         ("method", model.method.clone()),
         ("gradient", model.gradient.clone()),
         (
-            "forces",
+            "terms",
             std::iter::once("mass")
                 .chain(model.terms.iter().map(String::as_str))
                 .collect::<Vec<_>>()

@@ -5,7 +5,7 @@ use super::{
     SensitivityRecord, StudyDocument,
 };
 use crate::finding::Finding;
-use crate::number_format::significant;
+use crate::number_format::{resolved, significant};
 
 /// Most extremes that are listed because their search did not converge.
 const MOST_LISTED: usize = 6;
@@ -58,18 +58,7 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
             lines(&study.profiles, |p| p.text.clone()),
         ),
         ("Data-consistent extremes", extremes(study)),
-        (
-            "Equivalent systems",
-            (study.equivalent_systems.iter())
-                .filter(|e| e.response_error > 0.0)
-                .map(|e| {
-                    format!(
-                        "{}: the response differs from that of the fit by at most {:.1e} of the largest displacement",
-                        e.name, e.response_error
-                    )
-                })
-                .collect(),
-        ),
+        ("Equivalent systems", equivalent_systems(study)),
         (
             "Fits from random starting points",
             multistart
@@ -121,6 +110,26 @@ fn bands(bands: &BandsRecord) -> Vec<String> {
     classification.chain(bands.notes.iter().cloned()).collect()
 }
 
+fn equivalent_systems(study: &StudyDocument) -> Vec<String> {
+    let others = study.equivalent_systems.iter();
+    let mut lines: Vec<String> = others
+        .filter(|e| e.response_error > 0.0)
+        .map(|e| {
+            format!(
+                "{}: the response differs from that of the fit by at most {} % of the largest displacement",
+                e.name,
+                significant(100.0 * e.response_error, 2)
+            )
+        })
+        .collect();
+    if !lines.is_empty() {
+        let lead = "with c(t) and k(t) as free functions of time, other masses reproduce the same response; the bases, fixed values \
+                    and force of this model may exclude them";
+        lines.insert(0, lead.into());
+    }
+    lines
+}
+
 fn extremes(study: &StudyDocument) -> Vec<String> {
     let mut lines = lines(&study.extremes, widest);
     let systems = study.extremes.iter().flat_map(|e| &e.systems);
@@ -130,7 +139,8 @@ fn extremes(study: &StudyDocument) -> Vec<String> {
             .take(MOST_LISTED)
             .map(|s| format!("{}: {}", s.name, search(s.status))),
     );
-    if !study.extremes.is_empty() && !study.roughness_limited {
+    let mut systems = study.extremes.iter().flat_map(|e| &e.systems);
+    if !study.roughness_limited && systems.any(|s| s.status == ExtremeSearch::RangeLimit) {
         lines.push(
             "no penalty limits the roughness of these systems: their extremes are those of the constraints, or of the search range"
                 .into(),
@@ -162,26 +172,29 @@ fn widest(e: &ExtremesRecord) -> String {
             e.unit
         );
     }
+    let [low, high] = ends([e.low[widest], e.high[widest]]);
+    let is_constant = |values: &[f64]| values.iter().all(|x| *x == values[0]);
+    let at = match is_constant(&e.low) && is_constant(&e.high) {
+        true => String::new(),
+        false => format!(" at {} s, where the range is widest", e.times[widest]),
+    };
     format!(
-        "{}: {} to {} {} at {} s, where the range is widest (misfit limit {:.4e})",
-        e.name,
-        significant(e.low[widest], 6),
-        significant(e.high[widest], 6),
-        e.unit,
-        e.times[widest],
-        e.misfit_limit
+        "{}: {low} to {high} {}{at} (misfit limit {:.4e})",
+        e.name, e.unit, e.misfit_limit
     )
+}
+
+/// The ends of an interval with three digits of its half-width.
+fn ends([low, high]: [f64; 2]) -> [String; 2] {
+    resolved([low, high], 0.05 * (high - low))
 }
 
 fn interval(b: &BootstrapRecord) -> String {
     match b.interval {
-        Some([low, high]) => format!(
-            "{}: {} to {} {}",
-            b.name,
-            significant(low, 6),
-            significant(high, 6),
-            b.unit
-        ),
+        Some(interval) => {
+            let [low, high] = ends(interval);
+            format!("{}: {low} to {high} {}", b.name, b.unit)
+        }
         None => format!("{}: too few refits converged", b.name),
     }
 }

@@ -64,8 +64,13 @@ pub enum Suggestion {
         channel: String,
         /// Its fit, per cent.
         fit: f64,
-        /// True if the residuals pass the test of whiteness.
-        is_white: bool,
+    },
+    /// No change of the model: outliers lower the fit of a channel with a robust loss.
+    OutliersLimited {
+        /// Kind of the channel.
+        channel: String,
+        /// Its fit, per cent.
+        fit: f64,
     },
     /// A change of the input, the start or the functions for a record that is not fitted.
     Mismatch {
@@ -293,17 +298,13 @@ fn about_residuals(document: &ResultDocument) -> Option<Suggestion> {
     };
     let fit = channel.fit_percent;
     let kind = channel.kind.clone();
-    if let (Some(_), Some(p), false) = (
-        channel.sigma,
-        channel.whiteness_p_value,
-        is_coloured(channel),
-    ) {
-        let is_white = p >= SIGNIFICANCE;
-        return Some(Suggestion::NoiseLimited {
-            channel: kind,
-            fit,
-            is_white,
-        });
+    let has_outliers = |sigma: f64| channel.rms_residual > BEYOND_SIGMA * sigma;
+    if channel.robust && channel.sigma.is_some_and(has_outliers) {
+        return Some(Suggestion::OutliersLimited { channel: kind, fit });
+    }
+    let is_white = channel.whiteness_p_value.is_some_and(|p| p >= SIGNIFICANCE);
+    if channel.sigma.is_some() && is_white && !is_coloured(channel) {
+        return Some(Suggestion::NoiseLimited { channel: kind, fit });
     }
     let start = StartStrategy::StartValues.name();
     let tried = document.attempts.iter().any(|r| r.start != start);

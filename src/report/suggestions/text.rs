@@ -1,7 +1,7 @@
 //! Texts of the suggestions.
 
 use super::{Suggestion, Suspect, percent};
-use crate::number_format::significant;
+use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::ResidualPattern;
 use kmcfit_core::internals::solvers::Solver;
 use std::fmt;
@@ -33,14 +33,20 @@ impl fmt::Display for Suggestion {
             } => write_pattern(f, channel, *has_sigma, pattern),
             Suggestion::LargerSigma { times, fit } => write!(
                 f,
-                "sigma is too small: the residuals are {times:.1} times sigma although the fit is {}; use `sigma: estimate`",
+                "sigma is too small: the residuals are {} times sigma although the fit is {}; use `sigma: estimate`",
+                times_in_words(*times),
                 percent(*fit, 2)
             ),
-            Suggestion::NoiseLimited {
-                channel,
-                fit,
-                is_white,
-            } => write_noise_limited(f, channel, *fit, *is_white),
+            Suggestion::NoiseLimited { channel, fit } => write!(
+                f,
+                "{channel}: fit {}, but the residuals are white: measurement noise limits the fit, not the model",
+                percent(*fit, 0)
+            ),
+            Suggestion::OutliersLimited { channel, fit } => write!(
+                f,
+                "{channel}: outliers cause the low fit of {}; the robust loss limits their influence on the estimates",
+                percent(*fit, 0)
+            ),
             Suggestion::Mismatch {
                 channel,
                 fit,
@@ -83,24 +89,6 @@ impl fmt::Display for Suggestion {
             ),
         }
     }
-}
-
-/// A fit that is limited by the noise of a channel.
-fn write_noise_limited(
-    f: &mut fmt::Formatter<'_>,
-    channel: &str,
-    fit: f64,
-    is_white: bool,
-) -> fmt::Result {
-    let noise = match is_white {
-        true => "white",
-        false => "nearly white",
-    };
-    let fit = percent(fit, 0);
-    write!(
-        f,
-        "{channel}: fit {fit}, but the residuals are {noise}: measurement noise limits the fit, not the model"
-    )
 }
 
 /// The channel and its poor fit.

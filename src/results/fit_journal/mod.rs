@@ -139,7 +139,7 @@ impl FitJournal {
     /// Resumes the journal in a folder, up to the first damaged line.
     ///
     /// # Errors
-    /// If there is no journal, or it was begun with another model, other data or by another version.
+    /// If there is no journal, or it was started with another model, other data or by another version.
     pub fn resume(folder: &Path, heading: &Heading) -> Result<Self, InputError> {
         let path = folder.join(FIT_JOURNAL);
         let reader = JournalReader::open(folder)?;

@@ -7,7 +7,7 @@ use kmcfit_core::internals::solvers::{CheckpointUnit, IterationRecord, SolverSta
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-const WHAT: &str = "the journal of a fit that was begun by `kmcfit fit`";
+const WHAT: &str = "the journal of a fit that was started by `kmcfit fit`";
 
 /// A journal that was read.
 pub(super) struct JournalReader {

@@ -10,6 +10,9 @@ use crate::solvers::{Fit, Status, number_or_nan};
 use crate::system::NodalCoefficients;
 use serde::{Deserialize, Serialize};
 
+/// Largest distance from an active bound, relative to its scale.
+const NEAR: f64 = 1e-6;
+
 /// One function at the best point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FunctionSummary {
@@ -29,6 +32,12 @@ pub struct FunctionSummary {
     /// True if the function is zero to machine precision, relative to its natural scale.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub negligible: bool,
+    /// True if the model fixes the function.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub fixed: bool,
+    /// True for a constant at one of its bounds.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub at_bound: bool,
     /// Classification: `identified`, `only-ratio`, `partly-identified`, `not-identified` or `fixed`; for models with few parameters
     /// and meaningful standard errors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -62,6 +71,18 @@ impl FunctionSummary {
         let degrees = self.degrees_of_freedom.unwrap_or(f64::INFINITY);
         Some(self.standard_error? * student_half_width(degrees))
     }
+}
+
+/// True if a bound of this parameter alone is active.
+fn is_at_bound(problem: &Problem, theta: &[f64], parameter: usize) -> bool {
+    problem.constraints.groups.iter().any(|group| {
+        (0..group.rows.len()).any(|i| {
+            let [low, high] = group.bounds(i);
+            group.single(i).is_some_and(|(p, _)| p == parameter)
+                && low < high
+                && group.relative_violation(i, theta) >= -NEAR
+        })
+    })
 }
 
 /// Summaries of the functions of a fit, in their order; `truth` is the true system, where known.
@@ -99,6 +120,8 @@ pub fn function_summaries(
             min: values.iter().copied().fold(f64::INFINITY, f64::min),
             max: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
             negligible: largest > 0.0 && is_negligible(largest, sizes[i]),
+            fixed: function.basis.is_none(),
+            at_bound: function.parameters() == 1 && is_at_bound(problem, theta, range.start),
             verdict: judged.map(|j| j.verdict.kind()),
             identified_range: judged.and_then(|j| j.identified_range),
             powers: match &function.basis {

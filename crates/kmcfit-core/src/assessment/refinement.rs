@@ -40,6 +40,8 @@ pub struct CoarseBasis {
     pub index: usize,
     /// Name of the function.
     pub function: String,
+    /// Unit of the function.
+    pub unit: &'static str,
     /// Probability of so large an improvement by noise alone.
     pub p_value: f64,
     /// Largest change of the function by the finer basis, relative to its size.
@@ -254,6 +256,7 @@ impl FinerBases {
         CoarseBasis {
             index,
             function: function.name(),
+            unit: function.quantity.unit(),
             p_value,
             change: largest / size,
             spans: spans(&times, |i| values[i].abs() >= PLACE * largest),

@@ -5,6 +5,7 @@ use super::basis::{BasisSpec, Knots};
 use crate::constraints::TimeHistory;
 use crate::functions::basis::from_physical_powers;
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind, WeightRule};
+use crate::number_format::significant;
 use crate::system::Grid;
 
 /// Highest order of a penalised derivative.
@@ -223,7 +224,7 @@ impl CoefficientSpec {
         key: &str,
         grid: &Grid,
     ) -> Result<CoefficientFunction, BuildError> {
-        self.check(key, grid)?;
+        self.check(kind, key, grid)?;
         let nodes = grid.nodes();
         let (key, function) = match &self.form {
             CoefficientForm::Fixed(values) => {
@@ -246,7 +247,7 @@ impl CoefficientSpec {
     }
 
     /// Error for invalid bounds or penalties, and for either on a fixed function.
-    fn check(&self, key: &str, grid: &Grid) -> Result<(), BuildError> {
+    fn check(&self, kind: CoefficientKind, key: &str, grid: &Grid) -> Result<(), BuildError> {
         let given = [
             ("min", self.min.is_some()),
             ("max", self.max.is_some()),
@@ -268,7 +269,7 @@ impl CoefficientSpec {
         };
         bound("min", &self.min)?;
         bound("max", &self.max)?;
-        uncrossed(key, self.min.as_ref(), self.max.as_ref(), grid)?;
+        uncrossed(key, kind.unit(), self.min.as_ref(), self.max.as_ref(), grid)?;
         for (i, penalty) in self.penalties.iter().enumerate() {
             penalty.check(&format!("{key}.penalty[{i}]"), grid)?;
         }
@@ -314,6 +315,7 @@ impl PenaltySpec {
 /// Error if a lower bound exceeds the upper one; the keys are `min` and `max` below `key`.
 pub(super) fn uncrossed(
     key: &str,
+    unit: &str,
     min: Option<&TimeHistory>,
     max: Option<&TimeHistory>,
     grid: &Grid,
@@ -324,9 +326,9 @@ pub(super) fn uncrossed(
     match (0..grid.nodes()).find(|&i| min.at(i) > max.at(i)) {
         Some(i) => {
             let problem = "min is greater than max";
-            let (min, max, time) = (min.at(i), max.at(i), grid.time(i));
+            let [min, max, time] = [min.at(i), max.at(i), grid.time(i)].map(|x| significant(x, 6));
             Err(BuildError::new(format!("{key}.min"), problem)
-                .found(format!("min {min} and max {max} at {time} s"))
+                .found(format!("min {min} {unit} and max {max} {unit} at {time} s"))
                 .expected("min at most max at all times"))
         }
         None => Ok(()),

@@ -62,7 +62,7 @@ impl Builder {
         let grid = problem.system.grid;
         constraint.check()?;
         if let Constraint::Bounds { of, min, max } = &constraint.statement {
-            uncrossed(key, min.as_ref(), max.as_ref(), &grid)?;
+            uncrossed(key, of.unit(), min.as_ref(), max.as_ref(), &grid)?;
             let lowest = min.as_ref().map(TimeHistory::least);
             if *of == CoefficientKind::Mass && lowest.is_some_and(|least| least <= 0.0) {
                 notices.push(BuildNotice::MassMayVanish { key: key.clone() });
@@ -184,8 +184,8 @@ impl ConstraintSpec {
         }
         let problem = "this bound excludes a positive mass: the mass must be positive at all times";
         Err(BuildError::new(&self.key, problem)
-            .found(held)
-            .expected("a number greater than 0"))
+            .found(format!("{held} kg"))
+            .expected("a number greater than 0, in kg"))
     }
 }
 

@@ -3,6 +3,7 @@
 use super::{BuildError, CoefficientSpec};
 use crate::functions::{CoefficientKind, Prior};
 use crate::noise::{HIGHEST_ORDER, uninterrupted_runs};
+use crate::number_format::significant;
 use crate::record::{
     BaseMotion, ChannelKind, Input, InputErrorKind, Loss, NoiseModel, Waveform, Weighting,
 };
@@ -421,6 +422,11 @@ impl Record {
     }
 }
 
+/// A time span with six significant digits.
+fn seconds(start: f64, end: f64) -> String {
+    format!("{} s to {} s", significant(start, 6), significant(end, 6))
+}
+
 /// Error if a force or a motion of the base does not cover the record.
 fn check_cover(input: &Input, key: &str, [start, end]: [f64; 2]) -> Result<(), BuildError> {
     let force = match &input.force {
@@ -437,9 +443,10 @@ fn check_cover(input: &Input, key: &str, [start, end]: [f64; 2]) -> Result<(), B
             let problem = format!("the {} is shorter than the record", name.replace('_', " "));
             let times = signal.times();
             Err(BuildError::new(format!("{key}.columns.{name}"), problem)
-                .found(format!("{} s to {} s", times[0], times[times.len() - 1]))
+                .found(seconds(times[0], times[times.len() - 1]))
                 .expected(format!(
-                    "at least {start} s to {end} s: its values outside are unknown"
+                    "at least {}: its values outside are unknown",
+                    seconds(start, end)
                 )))
         }
         None => Ok(()),

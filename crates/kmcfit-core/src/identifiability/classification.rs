@@ -23,12 +23,12 @@ pub const LEAST: f64 = 0.05;
 pub enum Classification {
     /// Identified at (nearly) all times.
     Identified {
-        /// Largest half-width of the 95 % band, relative to the function's size.
+        /// Largest half-width of the 95 % band, relative to the function's largest value.
         relative: f64,
     },
     /// Determined under a condition alone, whose error the interval excludes.
     Conditional {
-        /// Largest half-width of the 95 % band under the condition, relative to the function's size.
+        /// Largest half-width of the 95 % band under the condition, relative to the function's largest value.
         relative: f64,
         /// Condition.
         on: Condition,
@@ -132,7 +132,7 @@ impl FunctionClassification {
 impl Condition {
     fn sentence(self, name: &str, relative: f64) -> String {
         let half = format!(
-            "95 % CI half-width at most {} of its size",
+            "95 % CI half-width at most {} of its largest value",
             percent(relative)
         );
         match self {
@@ -194,9 +194,7 @@ pub fn is_negligible(value: f64, size: f64) -> bool {
 /// Sentence on the accuracy of an identified function. The half-width is given relative to the function's largest value, or
 /// as a number where the band contains zero or the function is small relative to `size`.
 fn identified(name: &str, band: &Band, size: f64) -> String {
-    let seen = || (0..band.values.len()).filter(|i| is_known(band, size, *i));
-    let half = seen().fold(0.0f64, |most, i| most.max(band.half_width(i)));
-    let own = seen().fold(0.0f64, |most, i| most.max(band.values[i].abs()));
+    let [half, own] = half_width_and_value(band, size);
     let unit = &band.unit;
     if is_negligible(half.max(own), size) {
         return format!("{name} is zero to machine precision");
@@ -218,6 +216,15 @@ fn identified(name: &str, band: &Band, size: f64) -> String {
         () => percent(share),
     };
     format!("{name} is identified: 95 % CI half-width at most {share} of its largest value")
+}
+
+/// Largest half-width and largest absolute value where the function is known.
+fn half_width_and_value(band: &Band, size: f64) -> [f64; 2] {
+    let known = || (0..band.values.len()).filter(|i| is_known(band, size, *i));
+    [
+        known().fold(0.0, |most, i| most.max(band.half_width(i))),
+        known().fold(0.0, |most, i| most.max(band.values[i].abs())),
+    ]
 }
 
 /// A share in per cent with two decimals; a small one in powers of ten.
@@ -302,10 +309,9 @@ fn judge(times: &[f64], band: &Band, size: f64) -> Classification {
     let count = (0..times.len()).filter(|i| known(*i)).count();
     let share = count as f64 / times.len() as f64;
     if share >= MOST {
-        let relative = |i: usize| band.half_width(i) / size;
-        let known = (0..times.len()).filter(|i| known(*i));
+        let [half, largest] = half_width_and_value(band, size);
         return Classification::Identified {
-            relative: known.map(relative).fold(0.0, f64::max),
+            relative: half / largest,
         };
     }
     match share < LEAST {

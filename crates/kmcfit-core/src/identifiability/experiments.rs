@@ -94,10 +94,26 @@ impl Ranked {
                     Some(false) => ", excluding the common scale",
                     None => "",
                 };
-                format!(
-                    "`{}` determines {} more parameter combinations{scale}; standard errors of the others change by a factor {:.3}",
-                    self.name, gain.new_directions, gain.volume
-                )
+                let more = match gain.new_directions {
+                    0 => "no additional parameter combination".to_owned(),
+                    1 => format!("1 additional parameter combination{scale}"),
+                    many => format!("{many} additional parameter combinations{scale}"),
+                };
+                let factor = format!("{:.3}", gain.volume);
+                match (gain.new_directions, factor == "1.000") {
+                    (0, true) => format!(
+                        "`{}`: {more}; standard errors unchanged (factor {factor})",
+                        self.name
+                    ),
+                    (0, false) => format!(
+                        "`{}`: {more}; standard errors change by a factor {factor}",
+                        self.name
+                    ),
+                    _ => format!(
+                        "`{}`: {more}; standard errors of the others change by a factor {factor}",
+                        self.name
+                    ),
+                }
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Errors of simulations.
 
 use super::Trajectory;
+use crate::number_format::significant;
 use crate::simd::sum::are_positive;
 use crate::system::{Grid, NodalCoefficients};
 use thiserror::Error;
@@ -32,12 +33,15 @@ pub struct SimulationError {
 
 impl SimulationError {
     fn sentence(&self) -> String {
-        let (time, value) = (self.time, self.value);
+        let (time, value) = (significant(self.time, 4), self.value);
         match self.cause {
-            Cause::Mass => format!("the mass is {value} kg at t = {time:.6} s, not positive"),
-            Cause::Overflow => format!("the response overflows at t = {time:.6} s"),
+            Cause::Mass => format!(
+                "the mass is {} kg at t = {time} s, not positive",
+                significant(value, 6)
+            ),
+            Cause::Overflow => format!("the response overflows at t = {time} s"),
             Cause::CostOverflow => {
-                format!("the cost overflows: the residual at t = {time:.6} s is {value:.3e}")
+                format!("the cost overflows: the residual at t = {time} s is {value:.3e}")
             }
         }
     }

@@ -26,12 +26,14 @@ pub enum Reason {
         /// `G^2 / G0^2`, if there is a limit.
         gradient: Option<BoundedValue>,
     },
-    /// The last iteration changed every function by at most this share of its size.
-    #[error("the last iteration changed no function by more than {0:.1e} of its size")]
-    SmallChange(f64),
+    /// Largest change of a coefficient in the last iteration, relative to its size, and its tolerance.
+    #[error(
+        "relative change of every coefficient in the last iteration at most {:.1e} (tolerance {:.0e})", .0.value, .0.limit
+    )]
+    SmallChange(BoundedValue),
     /// The last iteration lowered J by a small share.
     #[error(
-        "the last iteration lowered J by a fraction of {decrease:.1e} and changed no function by more than {change:.1e} of its size"
+        "relative decrease of J in the last iteration {decrease:.1e}, relative change of every coefficient at most {change:.1e}"
     )]
     SmallDecrease {
         /// Share of J.
@@ -40,10 +42,10 @@ pub enum Reason {
         change: f64,
     },
     /// The iteration limit was reached before a stopping test was met.
-    #[error("no stopping test was met in {0} iterations")]
+    #[error("no stopping test was met in {}", iterations(*.0))]
     IterationLimit(u64),
     /// All requested iterations were run without a stopping test.
-    #[error("all {0} iterations requested were run")]
+    #[error("{}", all_iterations(*.0))]
     AllIterations(u64),
     /// The wall-clock limit was reached.
     #[error("reached the limit of {} s", .0.as_secs_f64())]
@@ -73,7 +75,7 @@ pub enum Reason {
     #[error("the predicted decrease of the cost is below its tolerance")]
     NoPredictedDecrease,
     /// The step of the linearised problem changes every function by at most this share of its size.
-    #[error("the predicted step changes no function by more than {0:.1e} of its size")]
+    #[error("relative change of every coefficient in the predicted step at most {0:.1e}")]
     NoPredictedChange(f64),
     /// No Gauss-Newton step lowers the cost.
     #[error("no Gauss-Newton step lowers the cost")]
@@ -88,7 +90,7 @@ pub enum Reason {
     #[error("the projected gradient is zero to machine precision")]
     ZeroProjectedGradient,
     /// The cost rises towards the projected gradient.
-    #[error("the cost does not fall towards the projected gradient")]
+    #[error("the cost does not decrease along the projected gradient direction")]
     NoDescentToProjection,
     /// No step towards the projected gradient lowers the cost.
     #[error("no step towards the projected gradient lowers the cost")]
@@ -111,7 +113,7 @@ pub enum Reason {
     /// The simulation fails at all feasible starting points.
     #[serde(skip)]
     #[error(
-        "the simulation fails at all starting points within the constraints ({0}); the result is the start as given, which violates them"
+        "the simulation fails at all starting points within the constraints ({0}); nothing was estimated: the result holds the start values of the model, which violate the constraints"
     )]
     NoFeasibleResponse(SimulationError),
     /// A record has no equation error.
@@ -178,6 +180,20 @@ pub enum MissingMeasurement {
     /// A nonzero response.
     #[error("all samples are zero")]
     Motion,
+}
+
+fn iterations(count: u64) -> String {
+    match count {
+        1 => "1 iteration".into(),
+        _ => format!("{count} iterations"),
+    }
+}
+
+fn all_iterations(count: u64) -> String {
+    match count {
+        1 => "the iteration requested was run".into(),
+        _ => format!("all {count} iterations requested were run"),
+    }
 }
 
 fn ratios(cost: Option<&BoundedValue>, gradient: Option<&BoundedValue>) -> String {

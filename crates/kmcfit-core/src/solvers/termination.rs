@@ -154,8 +154,10 @@ impl Stopping {
         let change = row.relative_change;
         let decrease = (previous_cost - row.cost) / previous_cost.max(f64::MIN_POSITIVE);
         let within = |limit: Option<f64>, value: f64| limit.is_some_and(|limit| value <= limit);
-        if within(self.step, change) || within(self.tolerance, change) {
-            return Some(Reason::SmallChange(change));
+        let limits = [self.step, self.tolerance];
+        if let Some(limit) = limits.into_iter().flatten().find(|limit| change <= *limit) {
+            let value = change;
+            return Some(Reason::SmallChange(BoundedValue { value, limit }));
         }
         let is_flat =
             within(self.tolerance, decrease) && within(self.tolerance.map(f64::sqrt), change);

@@ -311,8 +311,8 @@ fn remark(
 ) -> Option<String> {
     match (rule, index) {
         (WeightRule::Discrepancy, Some(0)) => Some(
-                "even the largest weight on the path leaves residuals of the size of the noise, and is chosen: the data \
-                 require no roughness"
+                "the largest weight tried fits within the noise and was used: the data are compatible with the smoothest \
+                 functions"
                 .into(),
         ),
         (WeightRule::Discrepancy, None) => {

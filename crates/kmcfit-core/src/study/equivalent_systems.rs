@@ -91,14 +91,14 @@ pub fn equivalent_systems(
     std::iter::once(fit).chain(found).collect()
 }
 
-/// Default masses: growing, falling and oscillating about that of the fit.
+/// Default masses: increasing, decreasing and oscillating about that of the fit.
 fn factors(mass: &[f64]) -> Vec<Choice> {
     let last = (mass.len() - 1) as f64;
     type Factor = fn(f64) -> f64;
     let choices: [(&str, Factor); 3] = [
-        ("mass growing by half", |x| 1.0 + 0.5 * x),
-        ("mass falling by a third", |x| 1.0 - x / 3.0),
-        ("mass oscillating by a fifth", |x| {
+        ("mass increasing by 50 %", |x| 1.0 + 0.5 * x),
+        ("mass decreasing by 33 %", |x| 1.0 - x / 3.0),
+        ("mass oscillating by ±20 %", |x| {
             1.0 + 0.2 * (12.0 * x).sin()
         }),
     ];

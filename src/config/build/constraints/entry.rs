@@ -141,8 +141,14 @@ impl ConstraintReader<'_> {
                     .expected("`function: mass`, `damping` or `stiffness`"));
             }
             (false, Some(_)) => {
+                let problem = match kind {
+                    ConstraintKey::Passive => {
+                        "`passive` concerns mass, damping and stiffness: leave `function` out"
+                    }
+                    _ => "this constraint applies to several functions: leave `function` out",
+                };
                 return Err(self
-                    .error("function", "this constraint applies to several functions")
+                    .error("function", problem)
                     .found(format!("`function` beside {}", kind.name()))
                     .expected("no `function`"));
             }

@@ -8,6 +8,7 @@ use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, Sou
 use crate::config::values::{ColumnId, Text};
 use crate::error::InputError;
 use crate::finding::Finding;
+use crate::number_format::significant;
 use crate::tables::{ColumnName, SAMPLE_RATES, Table, TableFormat, increasing_at};
 use crate::units::{Quantity, Unit};
 
@@ -159,11 +160,15 @@ fn inside(
                 &format!("{experiment}.window"),
                 "no sample lies in the window",
             )
-            .found(format!("{from} s to {to} s"))
+            .found(match (from.is_finite(), to.is_finite()) {
+                (true, true) => format!("{from} s to {to} s"),
+                (true, false) => format!("from {from} s to the end of the record"),
+                (false, _) => format!("from the start of the record to {to} s"),
+            })
             .expected(format!(
                 "a part of {} s to {} s",
-                times[0],
-                times[times.len() - 1]
+                significant(times[0], 6),
+                significant(times[times.len() - 1], 6)
             ))),
     }
 }

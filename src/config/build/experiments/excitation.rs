@@ -269,13 +269,17 @@ fn shape_keys(
             .found(format!("`interpolation` beside `{shape}`"))
             .expected("one of the two"));
     }
-    for (name, value) in [("frequency", spec.frequency), ("duration", spec.duration)] {
+    let positive = [
+        ("frequency", spec.frequency, "Hz"),
+        ("duration", spec.duration, "s"),
+    ];
+    for (name, value, unit) in positive {
         if let Some(value) = value.filter(|v| v.0 <= 0.0) {
             let at = format!("{key}.{name}");
             return Err(file
                 .error_at(&at, format!("the {name} must be positive"))
-                .found(value.0)
-                .expected("a number greater than 0"));
+                .found(format!("{} {unit}", value.0))
+                .expected(format!("a number greater than 0, in {unit}")));
         }
     }
     Ok(())

@@ -10,7 +10,7 @@ use thiserror::Error;
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub(crate) enum DataWarning {
     /// The model and the file state different units of a column.
-    #[error("column `{column}` is read in {used}, as the model states; the file states {stated}")]
+    #[error("column `{column}`: unit taken from the model ({used}); the file says {stated}")]
     UnitDiffersFromFile {
         column: String,
         used: String,
@@ -18,7 +18,7 @@ pub(crate) enum DataWarning {
     },
     /// The row of units and the name of a column state different units.
     #[error(
-        "column `{column}` is read in {used}, as the file's row of units states; its name ends like {stated}"
+        "column `{column}`: unit taken from the file's row of units ({used}); its name ends in {stated}"
     )]
     UnitDiffersFromName {
         column: String,
@@ -26,19 +26,17 @@ pub(crate) enum DataWarning {
         stated: String,
     },
     /// The file states a unit that the program cannot convert.
-    #[error(
-        "unknown unit `{stated}` of {quantity} in column `{column}`; the values are read in {used} without conversion"
-    )]
+    #[error("unknown unit `{stated}` of {quantity} in column `{column}`; {used} is assumed")]
     UnknownUnit {
         column: String,
         stated: String,
         quantity: &'static str,
         used: String,
     },
-    /// The name of a column ends like a unit that is not used.
+    /// The name of a column ends in a unit that is not used.
     #[error(
-        "column `{column}` is read in {used}, although its name ends like {stated}; if {stated} is its unit, add `units: \
-         {{{name}: {stated}}}`"
+        "column `{column}`: {used} is assumed, although its name ends in {stated}; add `units: {{{name}: {stated}}}` if it is \
+         in {stated}"
     )]
     UnitOfNameUnused {
         column: String,
@@ -47,9 +45,7 @@ pub(crate) enum DataWarning {
         stated: String,
     },
     /// A column of standard deviations states another unit than its samples.
-    #[error(
-        "column `{column}` is read in {used}, the unit of its samples; the file states {stated}"
-    )]
+    #[error("column `{column}`: unit taken from the samples ({used}); the file says {stated}")]
     SigmaUnitDiffers {
         column: String,
         used: String,

@@ -14,6 +14,7 @@ use crate::config::spec::{
 use crate::config::values::{ColumnId, Sigma, Text};
 use crate::error::InputError;
 use crate::finding::Finding;
+use crate::number_format::significant;
 use crate::units::{Quantity, Unit};
 use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel, Weighting};
 use kmcfit_core::internals::signal::SecondOrder;
@@ -220,7 +221,12 @@ fn read_one(
         decimate(file, &key, factor.0, &mut source, &mut ignored)?;
     }
     let span = [source.times[0], source.times[source.times.len() - 1]];
-    let present = present(file, &format!("{key}.columns.{}", kind.name()), &source)?;
+    let present = present(
+        file,
+        &format!("{key}.columns.{}", kind.name()),
+        kind,
+        &source,
+    )?;
     let missing = source.values.len() - present.len();
     if missing > 0 {
         ignored.push((missing, "missing".to_owned()));
@@ -253,10 +259,11 @@ fn read_one(
     })
 }
 
-/// The rows without a missing sample. Refuses too few of them.
+/// The rows without a missing sample. Refuses too few of them, and samples that are all equal.
 fn present(
     file: &ModelFile,
     column: &str,
+    kind: ChannelKind,
     source: &column_samples::ColumnSamples,
 ) -> Result<Vec<usize>, InputError> {
     let rows = 0..source.values.len();
@@ -271,7 +278,20 @@ fn present(
         }
         1 => "1 sample".to_owned(),
         count if count < Grid::FEWEST_NODES => format!("{count} samples"),
-        _ => return Ok(present),
+        count => {
+            let first = source.values[present[0]];
+            if present.iter().any(|&r| source.values[r] != first) {
+                return Ok(present);
+            }
+            let unit = kind.unit_of(source.unit.is_angular());
+            return Err(file
+                .error_at(column, "all samples are equal")
+                .found(format!(
+                    "{count} samples, all {} {unit}",
+                    significant(first, 6)
+                ))
+                .expected("a record of a moving system"));
+        }
     };
     Err(file
         .error_at(column, "too few samples")

@@ -6,6 +6,7 @@ use crate::config::alternatives::ScalarOr;
 use crate::config::spec::{CorrelationName, LossName};
 use crate::config::values::Sigma;
 use crate::error::InputError;
+use crate::number_format::significant;
 use kmcfit_core::internals::record::{Loss, NoiseModel, Weighting};
 
 /// Threshold of Huber's loss: 95 % efficiency for Gaussian noise.
@@ -36,7 +37,11 @@ pub(super) fn weighting(
                     .error_at(key, "a standard deviation must be positive")
                     .found(match sigmas[row].is_nan() {
                         true => format!("an empty field in `{name}` for sample {}", row + 1),
-                        false => format!("{} in `{name}` beside sample {}", sigmas[row], row + 1),
+                        false => format!(
+                            "{} in `{name}` for sample {}",
+                            significant(sigmas[row], 6),
+                            row + 1
+                        ),
                     })
                     .expected("a number greater than 0 for every sample")),
                 None => Ok(Some(Weighting::Sigmas(sigmas))),
@@ -74,7 +79,10 @@ pub(super) fn loss(file: &ModelFile, key: &str, of_kind: &Spec) -> Result<Loss, 
                         format!("the `{part}` must be positive"),
                     )
                     .found(number.0)
-                    .expected("a number greater than 0"));
+                    .expected(match part {
+                        "threshold" => "a number greater than 0, in standard deviations",
+                        _ => "a number greater than 0",
+                    }));
             }
             _ => {}
         }
