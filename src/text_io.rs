@@ -74,8 +74,8 @@ pub fn read_bytes(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>, InputE
     // A file that is too long is not read at all; sparse files can be longer than the disk.
     if length > limit {
         return Err(too_long(path, limit)
-            .found(kibibytes(length))
-            .expected(format!("{what} of at most {}", kibibytes(limit))));
+            .found(binary_size(length))
+            .expected(format!("{what} of at most {}", binary_size(limit))));
     }
     memory::check_file(path, length.saturating_mul(BYTES_PER_BYTE))?;
     // One allocation: a vector that grows is copied several times.
@@ -149,12 +149,15 @@ fn read_into(
 
 fn too_long(path: &Path, limit: u64) -> InputError {
     InputError::file(path, "the file is too large")
-        .expected(format!("at most {}", kibibytes(limit)))
+        .expected(format!("at most {}", binary_size(limit)))
 }
 
-/// A size in KiB.
-pub(crate) fn kibibytes(bytes: u64) -> String {
-    format!("{} KiB", bytes.div_ceil(1024))
+/// A size in the largest binary unit that it exceeds, rounded up.
+pub(crate) fn binary_size(bytes: u64) -> String {
+    let units = [(1u64 << 30, "GiB"), (1 << 20, "MiB"), (1 << 10, "KiB")];
+    let found = units.into_iter().find(|(unit, _)| bytes >= *unit);
+    let (unit, name) = found.unwrap_or((1 << 10, "KiB"));
+    format!("{} {name}", bytes.div_ceil(unit))
 }
 
 /// Refuses a table with a line longer than `LONGEST_LINE`.

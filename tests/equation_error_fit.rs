@@ -620,9 +620,9 @@ fn model_files() {
       expected: samples from which displacement, velocity and acceleration follow
     ");
     assert_snapshot!(read(&text, |_| 0.0, 401).map(|_| ()).unwrap_err(), @"
-    m.yaml:3:5: experiments[0]: the method `equation-error` cannot derive the response from these samples
-      found: all samples are zero
-      expected: samples from which displacement, velocity and acceleration follow
+    m.yaml:3:5: experiments[0].columns.displacement: all samples are equal
+      found: 401 samples, all 0 m
+      expected: a record of a moving system
     ");
 }
 

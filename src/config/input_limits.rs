@@ -8,7 +8,7 @@ use super::expansion;
 use super::key_positions::Position;
 use super::key_positions::place;
 use crate::error::InputError;
-use crate::text_io::{kibibytes, quote};
+use crate::text_io::{binary_size, quote};
 use serde::de::DeserializeOwned;
 
 /// Longest model file that is read, in bytes; also its longest length with the aliases written out.
@@ -55,8 +55,8 @@ impl<'a> Checked<'a> {
 pub(super) fn check(file: &Path, text: &str) -> Result<(), InputError> {
     if text.len() as u64 > LONGEST_MODEL {
         return Err(InputError::file(file, "the model file is too large")
-            .found(kibibytes(text.len() as u64))
-            .expected(format!("at most {}", kibibytes(LONGEST_MODEL)))
+            .found(binary_size(text.len() as u64))
+            .expected(format!("at most {}", binary_size(LONGEST_MODEL)))
             .hint("put samples into CSV files"));
     }
     check_brackets(file, text)?;

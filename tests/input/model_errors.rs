@@ -64,7 +64,7 @@ fn files() {
     ");
     assert_snapshot!(file("model.yaml", &vec![b' '; 1 << 21], "model.yaml"), @"
     DIR/model.yaml: the file is too large
-      found: 2048 KiB
+      found: 2 MiB
       expected: a model file (YAML) of at most 256 KiB
     ");
 }
