@@ -46,11 +46,16 @@ fn force() -> Vec<f64> {
     each.collect()
 }
 
-/// Displacements by the fourth-order method of Runge and Kutta under a force that is linear between its samples.
-fn response([m, c, k]: [f64; 3], force: &[f64]) -> Vec<f64> {
+/// Displacements under a force.
+fn response(system: [f64; 3], force: &[f64]) -> Vec<f64> {
+    states(system, force).into_iter().map(|[y, _]| y).collect()
+}
+
+/// Displacements and velocities by the fourth-order method of Runge and Kutta under a force that is linear between its samples.
+fn states([m, c, k]: [f64; 3], force: &[f64]) -> Vec<[f64; 2]> {
     let slope = |y: f64, v: f64, f: f64| [v, (f - c * v - k * y) / m];
     let (mut y, mut v) = (0.0, 0.0);
-    let mut samples = vec![y];
+    let mut samples = vec![[y, v]];
     let h = SPACING / SUBSTEPS as f64;
     for pair in force.windows(2) {
         for s in 0..SUBSTEPS {
@@ -63,7 +68,7 @@ fn response([m, c, k]: [f64; 3], force: &[f64]) -> Vec<f64> {
             y += h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * d[0] + e[0]);
             v += h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * d[1] + e[1]);
         }
-        samples.push(y);
+        samples.push([y, v]);
     }
     samples
 }
@@ -292,6 +297,79 @@ fn the_sigma_of_the_channel_is_estimated_beside_that_of_the_force() {
     }
     let (counts, _) = summary(&errors(case, 20));
     assert!(counts.iter().all(|c| *c >= 15), "{counts:?}");
+}
+
+/// Noise of the sensor of the base, 5 %, for sensors of the displacement relative to the base and of the absolute acceleration: the
+/// errors are estimated, and the intervals of c and k at a known mass hold. The residuals stay those of the measured input.
+#[test]
+fn intervals_hold_with_errors_of_the_base() {
+    let system = truth(0.03);
+    let [m, c, k] = system;
+    let base: Vec<f64> = force().iter().map(|f| -f / m).collect();
+    let clean = states(system, &force());
+    let times: Vec<f64> = (0..SAMPLES).map(|i| SPACING * i as f64).collect();
+    for kind in [ChannelKind::Displacement, ChannelKind::Acceleration] {
+        let exact: Vec<f64> = (clean.iter())
+            .map(|[y, v]| match kind {
+                ChannelKind::Displacement => *y,
+                _ => -(c * v + k * y) / m,
+            })
+            .collect();
+        let (sigma, size) = (0.01 * rms(&exact), 0.05 * rms(&base));
+        let mut counts = [0, 0];
+        for seed in 0..20 {
+            let with = |values: &[f64], sigma: f64, stream: u64| -> Vec<f64> {
+                let pairs = values.iter().zip(white(seed, stream));
+                pairs.map(|(y, e)| y + sigma * e).collect()
+            };
+            let record = |error: bool| {
+                let mut channel = ChannelSpec::new(kind, &times, &with(&exact, sigma, 4));
+                channel.weighting = Some(Weighting::Sigma(sigma));
+                let record = Record::new("moved")
+                    .from_state(0.0, 0.0)
+                    .base_acceleration(&times, &with(&base, size, 3))
+                    .channel(channel);
+                match error {
+                    true => record.input_error(
+                        InputQuantity::BaseAcceleration,
+                        InputErrorKind::Sensor,
+                        size,
+                    ),
+                    false => record,
+                }
+            };
+            let built = |error: bool| {
+                let parts = [
+                    CoefficientSpec::fixed(m),
+                    CoefficientSpec::constant(1.02 * c),
+                    CoefficientSpec::constant(1.02 * k),
+                ];
+                let builder = Builder::new(parts).record(record(error));
+                builder
+                    .nodes(2 * (SAMPLES - 1) + 1)
+                    .method(Method::Rk4)
+                    .build()
+                    .unwrap()
+            };
+            let problem = built(true);
+            let settings = FitSettings::default();
+            let found = fit_with_noise(&problem, &problem.start(), &settings, &mut |_| {});
+            let (problem, fit) = found.unwrap();
+            let covariance = problem.covariance(&fit.best.evaluation).unwrap();
+            for (j, truth) in [c, k].into_iter().enumerate() {
+                let error = (fit.best.parameters[j] - truth).abs();
+                counts[j] += usize::from(error <= 1.96 * covariance[(j, j)].sqrt());
+            }
+            // The system is linear: the response to the estimated errors is subtracted exactly, up to the last change of the parameters.
+            let plain = built(false).evaluate(&fit.best.parameters).unwrap();
+            let pairs = fit.best.evaluation.predictions[0][0]
+                .iter()
+                .zip(&plain.predictions[0][0]);
+            let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(apart < 0.02 * sigma, "{kind:?} {seed}: {apart} {sigma}");
+        }
+        assert!(counts.iter().all(|n| *n >= 15), "{kind:?}: {counts:?}");
+    }
 }
 
 /// Counts of 200 seeds, as a table.

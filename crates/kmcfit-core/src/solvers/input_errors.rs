@@ -20,11 +20,11 @@ use crate::noise::{Correlation, CorrelationLaw, InputErrors, InputRow, InputStep
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::{
-    Channel, ChannelKind, Input, InputError, InputErrorKind, NoiseEstimate, Weighting,
+    Channel, ChannelKind, Experiment, Input, InputError, InputErrorKind, NoiseEstimate, Weighting,
 };
 use crate::simulate::SimulationError;
 use crate::simulate::reference::input_derivatives;
-use crate::system::InputQuantity;
+use crate::system::{Grid, InputQuantity};
 use std::sync::Arc;
 
 /// Largest number of rounds of fit and estimation.
@@ -69,52 +69,28 @@ pub(super) fn with_input_errors(
 /// with the measured input, whose estimated sigmas are renewed.
 fn with_errors_at(measured: &mut Problem, evaluation: &Evaluation) -> Problem {
     let share = (measured.parameters() as f64 / measured.sample_count() as f64).min(0.5);
-    let effects: Vec<Option<InputErrors>> = (0..measured.experiments.len())
-        .map(|e| effect(measured, evaluation, e))
-        .collect();
-    for (e, effect) in effects.iter().enumerate() {
-        if let Some(effect) = effect {
-            let predicted = &evaluation.predictions[e][0];
-            let channel = &mut measured.parts_mut().experiments[e].channels[0];
-            *channel = with_sigma(channel, effect, predicted, share);
-        }
-    }
     let mut next = measured.clone();
-    for (e, effect) in effects.into_iter().enumerate() {
-        let Some(effect) = effect else { continue };
-        let gain = gain(measured, evaluation, e);
-        let grid = next.system.grid;
-        let experiment = &mut next.parts_mut().experiments[e];
-        let Some(error) = experiment.input_error.clone() else {
+    let grid = next.system.grid;
+    for e in 0..measured.experiments.len() {
+        let Some(effect) = effect(measured, evaluation, e) else {
             continue;
         };
-        let channel = &mut experiment.channels[0];
+        let predicted = &evaluation.predictions[e][0];
+        let channel = &mut measured.parts_mut().experiments[e].channels[0];
+        *channel = with_sigma(channel, &effect, predicted, share);
         let sigma = sigma_of(channel);
-        let effect = relative(&effect, sigma);
-        if error.kind == InputErrorKind::Sensor {
-            let residuals = channel.residuals(&evaluation.predictions[e][0]);
+        let effect = effect.scaled(1.0 / sigma);
+        let experiment = &mut next.parts_mut().experiments[e];
+        experiment.channels[0] = channel.clone();
+        let is_sensor = |error: &InputError| error.kind == InputErrorKind::Sensor;
+        if let Some(error) = experiment.input_error.clone().filter(is_sensor) {
+            let residuals = channel.residuals(predicted);
             let normalised: Vec<f64> = residuals.map(|r| -r / sigma).collect();
             let inputs = effect.smoothed(&normalised, error.times.len());
-            let is_absolute = error.quantity == InputQuantity::BaseAcceleration
-                && channel.kind() == ChannelKind::Acceleration
-                && !channel.base().is_empty();
-            let here: Vec<f64> = (channel.times().iter())
-                .map(|t| error.at(&inputs, *t))
-                .collect();
-            let changes = effect.response(&inputs).into_iter().zip(&here);
-            let changes: Vec<f64> = changes
-                .map(|(z, own)| z * sigma / gain - if is_absolute { *own } else { 0.0 })
-                .collect();
-            *channel = channel
-                .clone()
-                .with_input_change(error.quantity, &here, &changes);
-            let nodes: Vec<f64> = (0..experiment.nodes)
-                .map(|i| error.at(&inputs, grid.time(i)))
-                .collect();
-            let excitation = experiment.excitation.take().unwrap_or_default();
-            experiment.excitation = Some(excitation.plus(error.quantity, &nodes));
-            // The excitation is no longer that of the samples.
-            experiment.input = Input::default();
+            let [gain, ..] = channel.sensor().values(&evaluation.scalars);
+            let response = effect.response(&inputs).into_iter();
+            let response: Vec<f64> = response.map(|z| z * sigma / gain).collect();
+            add_to_input(experiment, &grid, &error, &inputs, response);
         }
         let channel = &mut experiment.channels[0];
         let law = CorrelationLaw::InputErrors(Arc::new(effect));
@@ -127,21 +103,37 @@ fn with_errors_at(measured: &mut Problem, evaluation: &Evaluation) -> Problem {
     next
 }
 
+/// Adds changes of the samples of an input to the experiment, and subtracts their effect `response` from the response at the samples of
+/// the channel.
+fn add_to_input(
+    experiment: &mut Experiment,
+    grid: &Grid,
+    error: &InputError,
+    inputs: &[f64],
+    mut response: Vec<f64>,
+) {
+    let channel = &experiment.channels[0];
+    let here = channel.times().iter().map(|t| error.at(inputs, *t));
+    let here: Vec<f64> = here.collect();
+    let is_absolute = channel.kind() == ChannelKind::Acceleration && !channel.base().is_empty();
+    if error.quantity == InputQuantity::BaseAcceleration && is_absolute {
+        // The sensor of absolute motion moves with the base.
+        let pairs = response.iter_mut().zip(&here);
+        pairs.for_each(|(change, base)| *change -= base);
+    }
+    let changed = channel.clone();
+    experiment.channels[0] = changed.with_input_change(error.quantity, &here, &response);
+    let nodes = (0..experiment.nodes).map(|i| error.at(inputs, grid.time(i)));
+    let nodes: Vec<f64> = nodes.collect();
+    let excitation = experiment.excitation.take().unwrap_or_default();
+    experiment.excitation = Some(excitation.plus(error.quantity, &nodes));
+    // The excitation is no longer that of the samples.
+    experiment.input = Input::default();
+}
+
 /// Sigma of a channel with one sigma for all samples.
 fn sigma_of(channel: &Channel) -> f64 {
     channel.weighting().sigma(0).unwrap_or(1.0)
-}
-
-/// The effect of errors of the input in units of sigma, from that in units of the samples.
-fn relative(effect: &InputErrors, sigma: f64) -> InputErrors {
-    effect.scaled(1.0 / sigma)
-}
-
-fn gain(problem: &Problem, evaluation: &Evaluation, e: usize) -> f64 {
-    let [gain, ..] = problem.experiments[e].channels[0]
-        .sensor()
-        .values(&evaluation.scalars);
-    gain
 }
 
 /// Effect of the errors of the input of experiment `e` on the samples of its channel, in the unit of the samples; `None` without errors
@@ -210,7 +202,7 @@ fn with_sigma(channel: &Channel, effect: &InputErrors, predicted: &[f64], share:
     let target = (1.0 - share) * residuals.len() as f64;
     let excess = |sigma: f64| {
         let normalised: Vec<f64> = residuals.iter().map(|r| r / sigma).collect();
-        let whitened = relative(effect, sigma).whiten(&normalised);
+        let whitened = effect.scaled(1.0 / sigma).whiten(&normalised);
         whitened.iter().map(|e| e * e).sum::<f64>() - target
     };
     let (mut low, mut high) = ((sigma / WIDEST).ln(), (sigma * WIDEST).ln());
