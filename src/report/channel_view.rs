@@ -5,6 +5,7 @@ use super::csv::CsvTable;
 use super::figures;
 use crate::config::ChannelNote;
 use kmcfit_core::internals::assessment::diagnostics;
+use kmcfit_core::internals::diagnostics::Whiteness;
 use kmcfit_core::internals::record::Channel;
 
 /// A channel, its prediction, and its notes for reports.
@@ -63,7 +64,10 @@ impl ChannelView<'_> {
         let diagnostics = diagnostics(self.channel, self.predicted);
         [
             figures::channel(label, times, &self.observed(), &self.model()),
-            figures::residuals(label, times, &self.residuals(), &diagnostics),
+            Figure {
+                description: whiteness(self.channel, &diagnostics.whiteness),
+                ..figures::residuals(label, times, &self.residuals(), &diagnostics)
+            },
         ]
     }
 
@@ -74,5 +78,13 @@ impl ChannelView<'_> {
             .column("measured", self.observed())
             .column("predicted", self.model())
             .column("residual", self.residuals())
+    }
+}
+
+/// Result of the test of whiteness, which is that of the innovations of correlated noise.
+pub(super) fn whiteness(channel: &Channel, test: &Whiteness) -> String {
+    match channel.correlation() {
+        None => test.to_string(),
+        Some(_) => test.to_string().replace("residuals", "innovations"),
     }
 }

@@ -1,6 +1,6 @@
 //! Fit quality in the result document: channels, nuisance parameters, validation records.
 
-use super::channel_view::ChannelView;
+use super::channel_view::{ChannelView, whiteness};
 use super::document::{
     ChannelSummary, IgnoredSummary, NoiseSummary, NuisanceParameter, ValidationSummary,
 };
@@ -42,10 +42,7 @@ pub fn channel(view: &ChannelView) -> ChannelSummary {
         robust: channel.loss() != Loss::Squares,
         pattern: pattern(channel, predicted),
         cost: channel.cost(predicted),
-        whiteness: match channel.correlation() {
-            None => diagnostics.whiteness.to_string(),
-            Some(_) => (diagnostics.whiteness.to_string()).replace("residuals", "innovations"),
-        },
+        whiteness: whiteness(channel, &diagnostics.whiteness),
         whiteness_p_value: (diagnostics.whiteness.p_value.is_finite())
             .then_some(diagnostics.whiteness.p_value),
         autocorrelation_band: diagnostics.band,
