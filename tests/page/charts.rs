@@ -119,7 +119,7 @@ fn keys_zoom_and_read() {
     browser.key("ArrowRight");
     let said = browser.text("document.getElementById('chart-cursor').textContent");
     assert!(said.starts_with("time t 10.2 s; "), "{said}");
-    for part in ["found 1.", "truth 1 kg", "95 % band "] {
+    for part in ["estimate 1.", "truth 1 kg", "95 % band "] {
         assert!(said.contains(part), "{part} in {said}");
     }
     browser.key("+");
