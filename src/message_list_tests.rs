@@ -15,6 +15,7 @@ use kmcfit_core::internals::solvers::{
     ConditionFailure, MissingMeasurement, Reason, Status, UnsupportedRecord,
 };
 use kmcfit_core::internals::study::multistart::MultistartFinding;
+use kmcfit_core::internals::system::InputQuantity;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::fs;
@@ -608,10 +609,10 @@ fn fit_warnings() -> Vec<FitWarning> {
         FitWarning::Correlated => FitWarning::Correlated,
         FitWarning::CoarseBasis(_) => FitWarning::CoarseBasis(coarse_basis(None)),
         FitWarning::DisturbedInput { .. } => FitWarning::DisturbedInput {
-            experiment: "shaker".into(), input: "force".into(), sigma: 0.701, share: 0.052,
+            experiment: "shaker".into(), input: InputQuantity::Force, sigma: 0.701, share: 0.052,
         },
         FitWarning::ContradictedInputSigma { .. } => FitWarning::ContradictedInputSigma {
-            experiment: "shaker".into(), input: "base_acceleration".into(), given: 0.1, likely: 0.048,
+            experiment: "shaker".into(), input: InputQuantity::BaseAcceleration, given: 0.1, likely: 0.048,
         },
         FitWarning::Aliased { .. } => FitWarning::Aliased { per_period: 2.2, frequency: 45.25 },
         FitWarning::Negative { .. } => FitWarning::Negative { function: "stiffness".into() },

@@ -17,7 +17,9 @@ pub(crate) fn resolved<const N: usize>(numbers: [f64; N], half: f64) -> [String;
     let decimals = 1.0 - order(half);
     if (1e-3..1e7).contains(&largest) && (..=12.0).contains(&decimals) {
         let decimals = decimals.max(0.0) as usize;
-        return numbers.map(|x| format!("{x:.decimals$}"));
+        // Zero has no sign.
+        let unit = 0.5 * 0.1f64.powi(decimals as i32);
+        return numbers.map(|x| format!("{:.decimals$}", if x.abs() < unit { 0.0 } else { x }));
     }
     let (exponent, decimals) = (order(largest), decimals + order(largest));
     match decimals.is_finite() && (1e-300..1e300).contains(&largest) {
@@ -42,7 +44,7 @@ mod tests {
         );
         assert_eq!(
             resolved([0.1, -0.0004, 0.2004], 0.1004),
-            ["0.10", "-0.00", "0.20"]
+            ["0.10", "0.00", "0.20"]
         );
         assert_eq!(
             resolved([1e-4, 9.8e-5, 1.02e-4], 2e-6),

@@ -109,7 +109,7 @@ impl YamlError<'_> {
             "dt" if self.key == "grid" => {
                 error.hint("the step follows from the others: dt = duration/(nodes - 1)")
             }
-            key if key.bytes().all(|b| b.is_ascii_digit()) => {
+            key if !key.is_empty() && key.bytes().all(|b| b.is_ascii_digit()) => {
                 error.hint("write 1.0 with a decimal point; in { … } a comma separates entries")
             }
             key => match did_you_mean(key, known.iter().copied()) {

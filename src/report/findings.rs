@@ -98,7 +98,7 @@ pub fn warning(warning: &FitWarning) -> Finding {
             share,
             ..
         } => {
-            let input = input.replace('_', " ");
+            let input = input.name().replace('_', " ");
             format!(
                 "a disturbance enters through the equation of motion of {experiment}: noise of the {input} sensor ({} of the {input} \
                  would explain the residuals), an unmeasured drive, or a missing term; the confidence intervals exclude it",
@@ -112,10 +112,10 @@ pub fn warning(warning: &FitWarning) -> Finding {
             likely,
         } => format!(
             "the stated sigma of the {} of {experiment}, {} {unit}, is contradicted by the residuals: {} {unit} is most likely",
-            input.replace('_', " "),
+            input.name().replace('_', " "),
             significant(*given, 3),
             significant(*likely, 3),
-            unit = if input == "force" { "N" } else { "m/s²" }
+            unit = input.unit()
         ),
         FitWarning::Negative { function } => {
             format!("the {function} is negative at most times: the system is not passive")

@@ -88,7 +88,7 @@ fn contradicted(
     let is_far = !(1.0 / CONTRADICTED..=CONTRADICTED).contains(&ratio);
     (is_significant && is_far).then(|| FitWarning::ContradictedInputSigma {
         experiment: experiment.name.clone(),
-        input: error.quantity.name().to_owned(),
+        input: error.quantity,
         given: error.sigma,
         likely: ratio * error.sigma,
     })
@@ -143,7 +143,7 @@ fn disturbed(
     let scale = mean_square(&effect.with_sigma(share * size).whiten(&normalised)).sqrt();
     (as_noise - as_disturbance > EVIDENCE).then(|| FitWarning::DisturbedInput {
         experiment: experiment.name.clone(),
-        input: quantity.name().to_owned(),
+        input: quantity,
         sigma: share * scale * size,
         share: share * scale,
     })

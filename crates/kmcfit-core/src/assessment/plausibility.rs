@@ -11,7 +11,7 @@ use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::{Channel, Loss};
 use crate::simulate::SimulationError;
-use crate::system::{Excitation, Term};
+use crate::system::{Excitation, InputQuantity, Term};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::TAU;
@@ -95,8 +95,8 @@ pub enum FitWarning {
     DisturbedInput {
         /// Name of the experiment.
         experiment: String,
-        /// The input, as its column in the model file.
-        input: String,
+        /// The input.
+        input: InputQuantity,
         /// Sigma of errors of the input that leave such residuals, in its SI unit.
         sigma: f64,
         /// The same relative to the input, root mean square.
@@ -106,8 +106,8 @@ pub enum FitWarning {
     ContradictedInputSigma {
         /// Name of the experiment.
         experiment: String,
-        /// The input, as its column in the model file.
-        input: String,
+        /// The input.
+        input: InputQuantity,
         /// Stated sigma, in the SI unit of the input.
         given: f64,
         /// Sigma of the largest likelihood, in the SI unit of the input.

@@ -15,19 +15,19 @@ impl Record {
         input: &Input,
         record: &str,
     ) -> Result<Option<InputError>, BuildError> {
-        let Some(spec) = self.input_error else {
+        let Some(stated) = &self.input_error else {
             return Ok(None);
         };
-        let name = spec.quantity.name();
+        let name = stated.quantity.name();
         let key = format!("{record}.sigma.{name}");
-        if !(spec.sigma.is_finite() && spec.sigma > 0.0) {
+        if !(stated.sigma.is_finite() && stated.sigma > 0.0) {
             return Err(
                 BuildError::new(key, "a standard deviation must be positive")
-                    .found(spec.sigma)
+                    .found(stated.sigma)
                     .expected("a number greater than 0, in SI units"),
             );
         }
-        let Some(signal) = samples(input, spec.quantity) else {
+        let Some(signal) = samples(input, stated.quantity) else {
             let quantity = name.replace('_', " ");
             return Err(
                 BuildError::new(key, format!("the {quantity} is not measured"))
@@ -51,10 +51,8 @@ impl Record {
             }
         }
         Ok(Some(InputError {
-            quantity: spec.quantity,
-            kind: spec.kind,
-            sigma: spec.sigma,
             times: signal.times().to_vec(),
+            ..stated.clone()
         }))
     }
 }

@@ -5,7 +5,8 @@ use crate::functions::{CoefficientKind, Prior};
 use crate::noise::{HIGHEST_ORDER, uninterrupted_runs};
 use crate::number_format::significant;
 use crate::record::{
-    BaseMotion, ChannelKind, Input, InputErrorKind, Loss, NoiseModel, Waveform, Weighting,
+    BaseMotion, ChannelKind, Input, InputError, InputErrorKind, Loss, NoiseModel, Waveform,
+    Weighting,
 };
 use crate::signal::{Interpolation, SecondOrder, Signal, median_spacing};
 use crate::system::InputQuantity;
@@ -174,15 +175,6 @@ impl ChannelSpec {
     }
 }
 
-/// Specification of independent errors of the samples of an input.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct InputErrorSpec {
-    pub quantity: InputQuantity,
-    pub kind: InputErrorKind,
-    /// Standard deviation, in the SI unit of the input.
-    pub sigma: f64,
-}
-
 /// One record of the response, in SI units; corresponds to an entry of `experiments` in a model file.
 ///
 /// Force and base acceleration are linear between their samples unless [`Record::interpolation`] is set. Under base excitation,
@@ -194,7 +186,7 @@ pub struct Record {
     pub(super) channels: Vec<ChannelSpec>,
     pub(super) coefficients: Vec<(CoefficientKind, CoefficientSpec)>,
     pub(super) validation: bool,
-    pub(super) input_error: Option<InputErrorSpec>,
+    pub(super) input_error: Option<InputError>,
     input: Input,
     force: Option<[Vec<f64>; 2]>,
     base: Option<[Vec<f64>; 2]>,
@@ -261,10 +253,12 @@ impl Record {
         kind: InputErrorKind,
         sigma: f64,
     ) -> Self {
-        self.input_error = Some(InputErrorSpec {
+        self.input_error = Some(InputError {
             quantity,
             kind,
             sigma,
+            // Those of the input, when it is known.
+            times: Vec::new(),
         });
         self
     }

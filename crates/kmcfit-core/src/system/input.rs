@@ -2,6 +2,7 @@
 
 use super::TimePoint;
 use super::integrator::StagePosition;
+use serde::Serialize;
 
 /// A function of time at the left end, the middle and the right end of every step. The value at a right end is the limit from the
 /// left, so a jump at a node belongs to the following step.
@@ -138,7 +139,8 @@ impl Excitation {
 }
 
 /// A quantity that excites a system.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum InputQuantity {
     /// Force, N.
     Force,
@@ -152,6 +154,14 @@ impl InputQuantity {
         match self {
             Self::Force => "force",
             Self::BaseAcceleration => "base_acceleration",
+        }
+    }
+
+    /// SI unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Force => "N",
+            Self::BaseAcceleration => "m/s^2",
         }
     }
 }
