@@ -4,12 +4,15 @@
 use crate::config::DataWarning;
 use crate::report::findings;
 use crate::report::suggestions::{Suggestion, Suspect};
-use kmcfit_core::internals::assessment::{CoarseBasis, FitWarning, ResidualPattern, Unidentified};
+use kmcfit_core::internals::assessment::{
+    CoarseBasis, FitWarning, FunctionInGap, GapAssessment, GapStatus, ResidualPattern, Unidentified,
+};
 use kmcfit_core::internals::builder::BuildNotice;
 use kmcfit_core::internals::diagnostics::{UntestedReason, Whiteness, WhitenessResult};
 use kmcfit_core::internals::identifiability::{Classification, Condition, FunctionClassification};
 use kmcfit_core::internals::problem::ProblemError;
 use kmcfit_core::internals::qp::ConicStatus;
+use kmcfit_core::internals::record::ScoreCovariance;
 use kmcfit_core::internals::simulate::{Cause, SimulationError};
 use kmcfit_core::internals::solvers::{
     ConditionFailure, MissingMeasurement, Reason, Status, UnsupportedRecord,
@@ -600,14 +603,37 @@ fn coarse_basis(halves: Option<[f64; 2]>) -> CoarseBasis {
     }
 }
 
+fn gap(other_counts: usize) -> GapAssessment {
+    let statuses = samples![
+        GapStatus::Identified => GapStatus::Identified,
+        GapStatus::CarriedByBasis => GapStatus::CarriedByBasis,
+        GapStatus::CarriedByPenalty => GapStatus::CarriedByPenalty,
+        GapStatus::NotIdentified => GapStatus::NotIdentified,
+    ];
+    let functions = statuses.into_iter().enumerate();
+    let functions = functions.map(|(index, status)| FunctionInGap {
+        index,
+        function: ["mass", "damping", "stiffness", "cubic stiffness"][index].into(),
+        status,
+    });
+    GapAssessment {
+        span: [12.0, 18.5],
+        cycles: 5.996,
+        ci95: Some([5.98, 6.012]),
+        other_counts,
+        functions: functions.collect(),
+    }
+}
+
 fn fit_warnings() -> Vec<FitWarning> {
     let mut all = samples![
         FitWarning::BeyondSigma { .. } => FitWarning::BeyondSigma { times: 7.5 },
         FitWarning::CoarseSteps { .. } => FitWarning::CoarseSteps { times: 3.25 },
         FitWarning::PoorFit => FitWarning::PoorFit,
-        FitWarning::Coloured => FitWarning::Coloured,
+        FitWarning::Coloured { .. } => FitWarning::Coloured { covariance: ScoreCovariance::Model },
         FitWarning::Correlated => FitWarning::Correlated,
         FitWarning::CoarseBasis(_) => FitWarning::CoarseBasis(coarse_basis(None)),
+        FitWarning::Gap(_) => FitWarning::Gap(gap(0)),
         FitWarning::DisturbedInput { .. } => FitWarning::DisturbedInput {
             experiment: "shaker".into(), input: InputQuantity::Force, sigma: 0.701, share: 0.052,
         },
@@ -620,6 +646,9 @@ fn fit_warnings() -> Vec<FitWarning> {
     ];
     let halves = coarse_basis(Some([1520.0, 1498.5]));
     all.push(FitWarning::CoarseBasis(halves));
+    all.push(FitWarning::Gap(gap(1)));
+    let covariance = ScoreCovariance::Kernel;
+    all.push(FitWarning::Coloured { covariance });
     all
 }
 

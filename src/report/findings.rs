@@ -2,10 +2,13 @@
 
 use crate::finding::Finding;
 use crate::number_format::{significant, times_in_words};
-use kmcfit_core::internals::assessment::{CoarseBasis, FitWarning, Unidentified};
+use kmcfit_core::internals::assessment::{
+    CoarseBasis, FitWarning, GapAssessment, GapStatus, Unidentified,
+};
 use kmcfit_core::internals::identifiability::{
     Classification, FunctionClassification, RankFinding, span_words,
 };
+use kmcfit_core::internals::record::ScoreCovariance;
 use kmcfit_core::internals::study::multistart;
 
 /// A finding on the structural rank.
@@ -74,11 +77,21 @@ pub fn warning(warning: &FitWarning) -> Finding {
         FitWarning::PoorFit => {
             "no confidence intervals: the residuals are large and autocorrelated".into()
         }
-        FitWarning::Coloured => {
+        FitWarning::Coloured {
+            covariance: ScoreCovariance::Model,
+        } => {
             "the residuals are autocorrelated: the true confidence intervals are wider than those given, because the noise \
              model neglects this correlation"
                 .into()
         }
+        FitWarning::Coloured {
+            covariance: ScoreCovariance::Kernel,
+        } => {
+            "the residuals are autocorrelated beyond the noise model: the confidence intervals come from a heteroscedasticity- \
+             and autocorrelation-consistent covariance; a term missing from the model leaves such residuals too"
+                .into()
+        }
+        FitWarning::Gap(gap) => gap_in_words(gap),
         FitWarning::Correlated => {
             "the residuals are autocorrelated: the confidence intervals assume correlated noise; a term missing from the model \
              leaves such residuals too"
@@ -134,6 +147,39 @@ fn p_in_words(p: f64) -> String {
     }
 }
 
+fn gap_in_words(gap: &GapAssessment) -> String {
+    let [from, to] = gap.span.map(|time| significant(time, 4));
+    let cycles = match (gap.ci95, gap.other_counts) {
+        (Some([low, high]), 0) => format!(
+            "{} cycles (95 % CI {} to {})",
+            significant(gap.cycles, 4),
+            significant(low, 4),
+            significant(high, 4)
+        ),
+        (Some([low, high]), _) => format!(
+            "{} to {} cycles, several numbers of cycles fit",
+            significant(low, 4),
+            significant(high, 4)
+        ),
+        (None, _) => format!("{} cycles", significant(gap.cycles, 4)),
+    };
+    let functions: Vec<String> = (gap.functions.iter())
+        .map(|f| {
+            let status = match f.status {
+                GapStatus::Identified => "is identified in it",
+                GapStatus::CarriedByBasis => "is determined by its basis in it",
+                GapStatus::CarriedByPenalty => "is determined by its penalty in it",
+                GapStatus::NotIdentified => "is not identified in it",
+            };
+            format!("; the {} {status}", f.function)
+        })
+        .collect();
+    format!(
+        "the records have a gap from {from} to {to} s, with {cycles}{}",
+        functions.concat()
+    )
+}
+
 fn coarse_basis(basis: &CoarseBasis) -> String {
     let CoarseBasis {
         function, p_value, ..
@@ -141,13 +187,13 @@ fn coarse_basis(basis: &CoarseBasis) -> String {
     let p = p_in_words(*p_value);
     match (basis.halves, basis.knots) {
         (Some([first, second]), _) => format!(
-            "the {function} is not constant: {} {unit} in the first half of the record, {} {unit} in the second (F test, {p})",
+            "the {function} is not constant: {} {unit} in the first half of the record, {} {unit} in the second ({p})",
             significant(first, 4),
             significant(second, 4),
             unit = basis.unit
         ),
         (None, knots) => format!(
-            "the basis of the {function} is too coarse (F test, {p}): {} changes it by up to {:.0} % on {}",
+            "the basis of the {function} is too coarse ({p}): {} changes it by up to {:.0} % on {}",
             knots.map_or("a finer one".to_owned(), |knots| format!(
                 "one of {knots} knots"
             )),

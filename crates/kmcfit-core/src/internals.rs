@@ -4,9 +4,10 @@
 pub mod assessment {
     pub use crate::assessment::{
         BEYOND_SIGMA, BasisTest, CoarseBasis, EXACT, FitAssessment, FitStatistics, FitWarning,
-        FunctionSummary, POOR, Plausibility, RECOVERY_TOLERANCE, ResidualPattern, Roughness,
-        StepCheck, TruthErrors, Unidentified, constant_probability, diagnostics,
-        function_summaries, is_same_truth, outliers, pattern, standard_error,
+        FunctionInGap, FunctionSummary, GapAssessment, GapStatus, POOR, Plausibility,
+        RECOVERY_TOLERANCE, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
+        constant_probability, diagnostics, function_summaries, is_same_truth, outliers, pattern,
+        standard_error,
     };
 }
 pub mod builder {
@@ -68,7 +69,7 @@ pub mod number_format {
 pub mod record {
     pub use crate::record::{
         BaseMotion, Channel, ChannelKind, Experiment, Input, InputError, InputErrorKind, Loss,
-        NoiseEstimate, NoiseModel, Sensor, Waveform, Weighting, integral_over,
+        NoiseEstimate, NoiseModel, ScoreCovariance, Sensor, Waveform, Weighting, integral_over,
     };
 }
 pub mod signal {
@@ -91,12 +92,12 @@ pub mod solvers {
     pub use crate::problem::FEW_PARAMETERS;
     pub use crate::solvers::{
         ActiveGroup, Attempt, BoundedValue, CheckpointStore, CheckpointUnit, ConditionFailure,
-        ExactF64s, Fit, FitSettings, Initial, IterationEvent, IterationRecord, Measurements,
-        MissingMeasurement, Observer, Optimality, PathPoint, QpSolver, Reason, Solver, SolverState,
-        StartProjection, StartStrategy, Status, Stopping, UnsupportedRecord, WeightPath,
-        active_constraints, choose_weight, choose_weight_watched, equation_error, estimate_states,
-        fit, fit_from, fit_with_noise, fit_with_noise_watched, no_response, number_or_nan,
-        predict_validation, timed,
+        CycleCount, ExactF64s, Fit, FitSettings, Gap, Initial, IterationEvent, IterationRecord,
+        Measurements, MissingMeasurement, Observer, Optimality, PathPoint, QpSolver, Reason,
+        Solver, SolverState, StartProjection, StartStrategy, Status, Stopping, UnsupportedRecord,
+        WeightPath, active_constraints, choose_weight, choose_weight_watched, cycles,
+        equation_error, estimate_states, fit, fit_from, fit_with_noise, fit_with_noise_watched,
+        no_response, number_or_nan, predict_validation, timed,
     };
 }
 pub mod study {

@@ -266,6 +266,17 @@ impl Problem {
         &theta[self.functions.scalar_range()]
     }
 
+    /// Positions of the samples of each channel among all samples.
+    pub(crate) fn channel_samples(&self) -> Vec<Range<usize>> {
+        let mut first = 0;
+        let each = self.channels().map(|channel| {
+            let samples = first..first + channel.len();
+            first = samples.end;
+            samples
+        });
+        each.collect()
+    }
+
     /// All channels of all experiments.
     pub fn channels(&self) -> impl Iterator<Item = &Channel> {
         self.experiments.iter().flat_map(|e| &e.channels)

@@ -7,10 +7,11 @@ use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Rec
 use kmcfit_core::internals::diagnostics::student_half_width;
 use kmcfit_core::internals::noise::Correlation;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{ChannelKind, NoiseEstimate, NoiseModel, Weighting};
+use kmcfit_core::internals::record::{
+    ChannelKind, Loss, NoiseEstimate, NoiseModel, ScoreCovariance, Weighting,
+};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
 use kmcfit_core::internals::system::Method;
-use nalgebra::DMatrix;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -37,6 +38,8 @@ enum Law {
     Autoregressive(Vec<f64>),
     /// Moving average `e_i + b e_(i-1)`.
     MovingAverage(f64),
+    /// Independent, with Student's t distribution of these degrees of freedom.
+    Student(u32),
 }
 
 /// Autoregressive process with the poles `radius exp(+- i w)` at a multiple `frequency` of the oscillator's frequency of 1 Hz.
@@ -55,6 +58,16 @@ fn noise(seed: u64, law: &Law) -> Vec<f64> {
             shocks
                 .windows(2)
                 .map(|e| (e[1] + b * e[0]) / size)
+                .collect()
+        }
+        Law::Student(degrees) => {
+            let numerators = white(seed, 1, SAMPLES).into_iter();
+            let denominators = white(seed, 4, SAMPLES * *degrees as usize);
+            let squares = denominators.chunks(*degrees as usize);
+            let means = squares.map(|z| z.iter().map(|z| z * z).sum::<f64>() / f64::from(*degrees));
+            numerators
+                .zip(means)
+                .map(|(z, mean)| z / mean.sqrt())
                 .collect()
         }
     }
@@ -78,9 +91,9 @@ fn coloured(seed: u64, a: &[f64], count: usize) -> Vec<f64> {
     kept.iter().map(|x| x / size).collect()
 }
 
-/// Broadband force at the samples, and displacements by the fourth-order method of Runge and Kutta with 40 steps per sample
+/// Broadband force at the samples, and a channel by the fourth-order method of Runge and Kutta with 40 steps per sample
 /// (800 per cycle, an error of 1e-9) under the force linear between its samples.
-fn data() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+fn data(kind: ChannelKind) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let times: Vec<f64> = (0..SAMPLES).map(|i| SPACING * i as f64).collect();
     let raw = white(99, 2, SAMPLES);
     let mut force = Vec::new();
@@ -92,7 +105,12 @@ fn data() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let [m, c, k] = TRUTH;
     let slope = |y: f64, v: f64, f: f64| [v, (f - c * v - k * y) / m];
     let (mut y, mut v) = (0.0, 0.0);
-    let mut samples = vec![y];
+    let sample = |y: f64, v: f64, f: f64| match kind {
+        ChannelKind::Displacement => y,
+        ChannelKind::Velocity => v,
+        ChannelKind::Acceleration => slope(y, v, f)[1],
+    };
+    let mut samples = vec![sample(y, v, force[0])];
     let h = SPACING / SUBSTEPS as f64;
     for i in 0..SAMPLES - 1 {
         for s in 0..SUBSTEPS {
@@ -107,7 +125,7 @@ fn data() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
             y += h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * d[0] + e[0]);
             v += h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * d[1] + e[1]);
         }
-        samples.push(y);
+        samples.push(sample(y, v, force[i + 1]));
     }
     (times, force, samples)
 }
@@ -119,12 +137,32 @@ struct Score {
     order: usize,
 }
 
-/// The forced oscillator with samples of a displacement.
-fn problem(times: &[f64], samples: &[f64], weighting: Weighting, model: NoiseModel) -> Problem {
-    let (forced, force, _) = data();
-    let mut channel = ChannelSpec::new(ChannelKind::Displacement, times, samples);
+/// How the samples are measured and fitted.
+#[derive(Clone, Copy)]
+struct Setting {
+    kind: ChannelKind,
+    model: NoiseModel,
+    loss: Loss,
+}
+
+impl Setting {
+    /// Displacement, by least squares.
+    fn displacement(model: NoiseModel) -> Self {
+        Self {
+            kind: ChannelKind::Displacement,
+            model,
+            loss: Loss::Squares,
+        }
+    }
+}
+
+/// The forced oscillator with samples of one channel.
+fn problem(times: &[f64], samples: &[f64], weighting: Weighting, setting: Setting) -> Problem {
+    let (forced, force, _) = data(setting.kind);
+    let mut channel = ChannelSpec::new(setting.kind, times, samples);
     channel.weighting = Some(weighting);
-    channel.noise = model;
+    channel.noise = setting.model;
+    channel.loss = setting.loss;
     let record = Record::new("forced")
         .from_state(0.0, 0.0)
         .force(&forced, &force)
@@ -151,10 +189,11 @@ fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|y| y * y).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Standardised errors and half-widths of a fit.
+/// Standardised errors and half-widths of a fit, by the covariance of its bands.
 fn score((problem, fit): &(Problem, Fit)) -> Score {
     let evaluation = &fit.best.evaluation;
-    let covariance = problem.covariance(evaluation).unwrap();
+    let covariance = problem.covariance_of_estimates(&fit.best.parameters, evaluation);
+    let covariance = covariance.unwrap();
     let degrees = problem.degrees_of_freedom(evaluation);
     let error = |j: usize| (fit.best.parameters[j] - TRUTH[j]) / covariance[(j, j)].sqrt();
     Score {
@@ -164,18 +203,44 @@ fn score((problem, fit): &(Problem, Fit)) -> Score {
     }
 }
 
+/// Standardised errors of [`fits`].
+fn scores(law: &Law, setting: Setting, seeds: u64, kept: impl Fn(usize) -> bool) -> Vec<Score> {
+    let each = fits(law, setting, seeds, kept);
+    each.map(|found| score(&found)).collect()
+}
+
 /// Fits to the data with noise of this law, one for each seed, of the samples `kept`.
-fn scores(law: &Law, model: NoiseModel, seeds: u64, kept: impl Fn(usize) -> bool) -> Vec<Score> {
-    let (times, _, clean) = data();
+fn fits(
+    law: &Law,
+    setting: Setting,
+    seeds: u64,
+    kept: impl Fn(usize) -> bool,
+) -> impl Iterator<Item = (Problem, Fit)> {
+    let (times, _, clean) = data(setting.kind);
     let size = root_mean_square(&clean);
-    let each = (0..seeds).map(|seed| {
+    (0..seeds).map(move |seed| {
         let noise = noise(seed, law);
         let rows = (0..SAMPLES).filter(|i| kept(*i));
         let (times, samples): (Vec<f64>, Vec<f64>) = rows
             .map(|i| (times[i], clean[i] + 0.03 * size * noise[i]))
             .unzip();
         let weighting = Weighting::Estimated { sigma: 0.05 * size };
-        score(&fitted(&problem(&times, &samples, weighting, model)))
+        fitted(&problem(&times, &samples, weighting, setting))
+    })
+}
+
+/// [`scores`] with the covariance of the noise model, whether residuals are white or not.
+fn scores_by_model(law: &Law, setting: Setting, seeds: u64) -> Vec<Score> {
+    let each = fits(law, setting, seeds, all).map(|(problem, fit)| {
+        let by_model = problem.with(|parts| {
+            let channel = &mut parts.experiments[0].channels[0];
+            let noise = NoiseEstimate {
+                scores: ScoreCovariance::Model,
+                ..channel.noise().clone()
+            };
+            *channel = channel.clone().with_noise(noise);
+        });
+        score(&(by_model.unwrap(), fit))
     });
     each.collect()
 }
@@ -210,7 +275,12 @@ fn laws() -> Vec<(&'static str, Law)> {
 fn intervals_hold_under_white_and_correlated_noise() {
     let mut sum = 0;
     for (name, law) in laws() {
-        let counts = inside(&scores(&law, NoiseModel::Auto, 40, all));
+        let counts = inside(&scores(
+            &law,
+            Setting::displacement(NoiseModel::Auto),
+            40,
+            all,
+        ));
         assert!(counts.iter().all(|c| *c >= 33), "{name}: {counts:?}");
         sum += counts.iter().sum::<usize>();
     }
@@ -218,14 +288,75 @@ fn intervals_hold_under_white_and_correlated_noise() {
     assert!((0.91..=0.98).contains(&share), "{share}");
 }
 
+/// An acceleration under white and AR(1) noise, and outliers of Student's t distribution with 3 degrees of freedom under the loss of
+/// that distribution; the bounds are those of the displacement.
+#[test]
+fn intervals_hold_for_accelerations_and_robust_losses() {
+    let mut sum = 0;
+    let cases = robust_and_acceleration();
+    for (name, law, setting) in &cases {
+        let counts = inside(&scores(law, *setting, 40, all));
+        println!("{name}: {counts:?}");
+        assert!(counts.iter().all(|c| *c >= 33), "{name}: {counts:?}");
+        sum += counts.iter().sum::<usize>();
+    }
+    let share = sum as f64 / (40 * 3 * cases.len()) as f64;
+    assert!((0.91..=0.98).contains(&share), "{share}");
+}
+
+fn robust_and_acceleration() -> Vec<(&'static str, Law, Setting)> {
+    let acceleration = Setting {
+        kind: ChannelKind::Acceleration,
+        ..Setting::displacement(NoiseModel::Auto)
+    };
+    let robust = Setting {
+        loss: Loss::StudentT { degrees: 3.0 },
+        ..Setting::displacement(NoiseModel::Auto)
+    };
+    let huber = Setting {
+        loss: Loss::Huber { threshold: 1.345 },
+        ..robust
+    };
+    let white = || Law::Autoregressive(Vec::new());
+    vec![
+        ("acceleration, white", white(), acceleration),
+        (
+            "acceleration, AR(1), 0.8",
+            Law::Autoregressive(vec![0.8]),
+            acceleration,
+        ),
+        ("Student's t noise and loss", Law::Student(3), robust),
+        ("Student's t noise, Huber loss", Law::Student(3), huber),
+        ("white noise, Huber loss", white(), huber),
+    ]
+}
+
+/// With the noise stated as white the residuals of AR(1) noise fail the test of whiteness, and the kernel covariance covers at 91 %
+/// where that of the model covers at 65 to 74 % (1000 seeds, `docs/long/noise.md`); with 89 % fewer than 30 of 40 hold with a probability
+/// of 0.3 %.
+#[test]
+fn residuals_that_are_not_white_have_intervals_by_a_kernel() {
+    let law = Law::Autoregressive(vec![0.8]);
+    let counts = inside(&scores(
+        &law,
+        Setting::displacement(NoiseModel::White),
+        40,
+        all,
+    ));
+    println!("{counts:?}");
+    assert!(counts.iter().all(|c| *c >= 30), "{counts:?}");
+}
+
 /// Least squares with white noise covers the truth in two thirds of the cases where the noise is AR(1) with 0.8: the test detects a
 /// correlation that is ignored. White noise has order 0.
 #[test]
 fn intervals_that_ignore_the_correlation_are_too_short() {
     let law = Law::Autoregressive(vec![0.8]);
-    let counts = inside(&scores(&law, NoiseModel::White, 40, all));
+    let white = Setting::displacement(NoiseModel::White);
+    let counts = inside(&scores_by_model(&law, white, 40));
     assert!(counts.iter().sum::<usize>() < 100, "{counts:?}");
-    let white = scores(&Law::Autoregressive(Vec::new()), NoiseModel::Auto, 40, all);
+    let automatic = Setting::displacement(NoiseModel::Auto);
+    let white = scores(&Law::Autoregressive(Vec::new()), automatic, 40, all);
     // An order above 0 is chosen with a probability of about 2 %.
     assert!(white.iter().filter(|s| s.order == 0).count() >= 36);
 }
@@ -235,10 +366,11 @@ fn intervals_that_ignore_the_correlation_are_too_short() {
 #[test]
 fn intervals_hold_with_gaps_and_at_irregular_times() {
     let law = Law::Autoregressive(vec![0.8]);
-    let gap = scores(&law, NoiseModel::Auto, 40, |i| !(400..500).contains(&i));
+    let setting = Setting::displacement(NoiseModel::Auto);
+    let gap = scores(&law, setting, 40, |i| !(400..500).contains(&i));
     assert!(inside(&gap).iter().all(|c| *c >= 33), "{:?}", inside(&gap));
     let drawn: Vec<bool> = white(5, 3, SAMPLES).iter().map(|x| *x > -0.25).collect();
-    let irregular = scores(&law, NoiseModel::Auto, 40, |i| drawn[i]);
+    let irregular = scores(&law, setting, 40, |i| drawn[i]);
     let counts = inside(&irregular);
     assert!(counts.iter().all(|c| *c >= 33), "{counts:?}");
     assert!(irregular.iter().all(|s| s.order == 1));
@@ -249,15 +381,15 @@ fn intervals_hold_with_gaps_and_at_irregular_times() {
 fn a_stated_order_is_kept() {
     let law = Law::Autoregressive(Vec::new());
     let model = NoiseModel::Autoregressive { order: 3 };
-    let scores = scores(&law, model, 3, all);
+    let scores = scores(&law, Setting::displacement(model), 3, all);
     assert!(scores.iter().all(|s| s.order == 3));
 }
 
 /// Residuals that need not be noise leave it uncorrelated: those of exact samples (rounded to 6 digits), of a stated sigma a tenth of
-/// the residuals, and of fewer than eight samples per parameter.
+/// the residuals, and of fewer than sixteen samples per parameter.
 #[test]
 fn residuals_that_need_not_be_noise_are_not_correlated() {
-    let (times, _, clean) = data();
+    let (times, _, clean) = data(ChannelKind::Displacement);
     let size = root_mean_square(&clean);
     let law = Law::Autoregressive(vec![0.9]);
     let spoilt = |share: f64| -> Vec<f64> {
@@ -279,7 +411,7 @@ fn residuals_that_need_not_be_noise_are_not_correlated() {
             &times[..count],
             samples,
             weighting.clone(),
-            NoiseModel::Auto,
+            Setting::displacement(NoiseModel::Auto),
         );
         let (found, _) = fitted(&problem);
         assert_eq!(
@@ -294,24 +426,16 @@ fn residuals_that_need_not_be_noise_are_not_correlated() {
 /// freedom for every linear combination.
 #[test]
 fn white_noise_with_an_estimated_sigma_has_n_minus_p_degrees_of_freedom() {
-    let (times, _, clean) = data();
+    let (times, _, clean) = data(ChannelKind::Displacement);
     let weighting = Weighting::Estimated { sigma: 0.01 };
-    let problem = problem(&times, &clean, weighting, NoiseModel::White);
+    let white = Setting::displacement(NoiseModel::White);
+    let law = Law::Autoregressive(Vec::new());
+    let pairs = clean.iter().zip(noise(0, &law));
+    let samples: Vec<f64> = pairs.map(|(y, e)| y + 0.01 * e).collect();
+    let (problem, fit) = fitted(&problem(&times, &samples, weighting, white));
     let left = (SAMPLES - 3) as f64;
-    let problem = problem
-        .with(|parts| {
-            let channel = &mut parts.experiments[0].channels[0];
-            let covariance = DMatrix::from_element(1, 1, 0.5 / left);
-            *channel = channel.clone().with_noise(NoiseEstimate {
-                correlation: None,
-                covariance,
-            });
-        })
-        .unwrap();
-    let evaluation = problem.evaluate(&problem.start()).unwrap();
-    for degrees in problem.degrees_of_freedom(&evaluation) {
-        // Central differences with a step of 1e-3 in the logarithm of sigma.
-        assert!((degrees / left - 1.0).abs() < 1e-5, "{degrees}");
+    for degrees in problem.degrees_of_freedom(&fit.best.evaluation) {
+        assert!((degrees / left - 1.0).abs() < 1e-10, "{degrees}");
     }
 }
 
@@ -323,7 +447,11 @@ fn print_coverage() {
     println!("|---|---|---|---|---|---|");
     for (name, law) in laws() {
         for model in [NoiseModel::White, NoiseModel::Auto] {
-            let scores = scores(&law, model, SEEDS, all);
+            let setting = Setting::displacement(model);
+            let scores = match model {
+                NoiseModel::White => scores_by_model(&law, setting, SEEDS),
+                _ => scores(&law, setting, SEEDS, all),
+            };
             let percent = |c: usize| format!("{:.1} %", 100.0 * c as f64 / SEEDS as f64);
             let counts = inside(&scores).map(percent).join(" | ");
             // A t distributed error is brought to the normal distribution by the ratio of the half-widths.

@@ -332,6 +332,35 @@ fn only_rules_with_coverage_identify_a_smoothed_function() {
     }
 }
 
+/// Rules on a path of weights estimate sigma and the correlation of the noise at the chosen weight: AR(1) noise with a coefficient of 0.8,
+/// whose standard deviation has a relative standard error of 4.5 % at 1000 samples, is found within four of these. The bands of
+/// cross-validation hold the stiffness at 95 % of the times on average; over 40 records, of which each has a share with a standard
+/// deviation of 22 %, mostly the common error of mass and stiffness, the mean is above 88 %.
+#[test]
+fn path_rules_estimate_the_noise() {
+    const SEEDS: u64 = 40;
+    let data = data(ONE_CYCLE);
+    let rms = (data.2.iter().map(|y| y * y).sum::<f64>() / SAMPLES as f64).sqrt();
+    let (settings, rule) = (FitSettings::default(), WeightRule::Gcv);
+    let mut mean = 0.0;
+    for seed in 0..SEEDS {
+        let stiffness = CoefficientSpec::b_spline(21, LEVEL).penalty(penalty(rule));
+        let problem = problem(&data, &noise(seed, 0.8), stiffness, estimated);
+        let start = problem.start();
+        let (path, problem, fit) =
+            choose_weight(&problem, &start, &settings, rule, &[0], &mut |_| {}).unwrap();
+        let channel = &problem.experiments[0].channels[0];
+        let Weighting::Estimated { sigma } = channel.weighting() else {
+            panic!("sigma is estimated");
+        };
+        assert!((sigma / (0.03 * rms) - 1.0).abs() < 0.18, "{seed}: {sigma}");
+        assert!(channel.correlation().is_some(), "{seed}");
+        assert!(path.picks[2].is_some(), "{seed}");
+        mean += coverage(&problem, &fit, ONE_CYCLE).0 / SEEDS as f64;
+    }
+    assert!((0.88..=0.995).contains(&mean), "{mean}");
+}
+
 /// The finding on the stiffness with these knots of a piecewise-linear basis.
 fn coarse_bases(data: &Data, seed: u64, coefficient: f64, stiffness: CoefficientSpec) -> BasisTest {
     let problem = problem(data, &noise(seed, coefficient), stiffness, estimated);

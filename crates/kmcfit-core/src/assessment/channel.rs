@@ -1,6 +1,6 @@
-//! Assessment of one channel: outliers, residual diagnostics, and systematic patterns of the residuals.
+//! Systematic patterns in the residuals of one channel.
 
-use crate::diagnostics::{ResidualDiagnostics, ResidualRecord, offset_and_drift, outlier_indices};
+use crate::diagnostics::{offset_and_drift, outlier_indices};
 use crate::record::{Channel, Loss};
 use crate::signal::{Spectrum, even_spacing};
 use serde::{Deserialize, Serialize};
@@ -82,31 +82,4 @@ fn tone(channel: &Channel, residuals: &[f64]) -> Option<ResidualPattern> {
         .any(|n| (frequency - n * beside).abs() <= MULTIPLE * frequency);
     (is_narrow && is_other && !is_multiple && beside > 0.0 && frequency > 0.0)
         .then_some(ResidualPattern::Tone { frequency, beside })
-}
-
-/// Diagnostics of a channel's residuals; [`outliers`] count as missing. Autocorrelation and whiteness are those of the
-/// innovations where the noise is correlated.
-pub fn diagnostics(channel: &Channel, predicted: &[f64]) -> ResidualDiagnostics {
-    let mut residuals = channel.innovations(predicted);
-    let mut observed = channel.observed().to_vec();
-    let missed: Vec<f64> = channel.residuals(predicted).collect();
-    for i in outliers(channel, &missed) {
-        residuals[i] = f64::NAN;
-        observed[i] = f64::NAN;
-    }
-    ResidualDiagnostics::new(&ResidualRecord {
-        times: channel.times(),
-        residuals: &residuals,
-        observed: &observed,
-        model: predicted,
-    })
-}
-
-/// Indices of outliers ([`outlier_indices`]) under a robust loss, which are excluded from the statistics of the fit. Empty under least
-/// squares.
-pub fn outliers(channel: &Channel, residuals: &[f64]) -> Vec<usize> {
-    match channel.loss() {
-        Loss::Squares => Vec::new(),
-        _ => outlier_indices(residuals),
-    }
 }

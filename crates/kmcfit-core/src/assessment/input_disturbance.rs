@@ -12,10 +12,9 @@
 //! from the equation leave such residuals alike.
 
 use super::FitWarning;
-use super::channel::diagnostics;
 use crate::diagnostics::{SIGNIFICANCE, standard_deviation};
 use crate::noise::{Correlation, InputErrors};
-use crate::objective::Evaluation;
+use crate::objective::{Evaluation, diagnostics};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{
     BaseMotion, Channel, Experiment, InputError, InputErrorKind, Loss, NoiseModel, Waveform,

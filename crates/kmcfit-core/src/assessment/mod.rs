@@ -3,6 +3,7 @@
 mod channel;
 mod constants;
 mod function;
+mod gaps;
 mod input_disturbance;
 mod plausibility;
 mod recovery;
@@ -10,18 +11,22 @@ mod refinement;
 mod statistics;
 mod step_check;
 
-pub use channel::{ResidualPattern, diagnostics, outliers, pattern};
+pub use crate::objective::{diagnostics, outliers};
+pub use channel::{ResidualPattern, pattern};
 pub use constants::{constant_probability, standard_error};
 pub use function::{FunctionSummary, function_summaries};
+pub use gaps::{FunctionInGap, GapAssessment, GapStatus};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
 pub use recovery::{RECOVERY_TOLERANCE, Roughness, TruthErrors, is_same_truth};
 pub use refinement::{BasisTest, CoarseBasis};
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
 
+use gaps::gap_assessments;
+
 use crate::identifiability::{
     BandSettings, Bands, FunctionClassification, classify_functions, condition_on_bases,
-    condition_on_inputs,
+    condition_on_inputs, except_gap,
 };
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::{Fit, Status};
@@ -77,20 +82,36 @@ impl FitAssessment {
             bands: None,
             classifications: Vec::new(),
         };
+        let mut gaps = Vec::new();
         if reports_errors && assessment.plausibility.errors_hold {
             let settings = BandSettings {
                 draws: 0,
                 ..BandSettings::default()
             };
             let bands = Bands::at(problem, &best.parameters, &best.evaluation, &settings);
-            let test = match tests_bases && !assessment.plausibility.is_coloured {
-                true => BasisTest::of(problem, &best.parameters, &best.evaluation),
-                false => BasisTest::default(),
+            let (theta, evaluation) = (&best.parameters, &best.evaluation);
+            let test = match (tests_bases, assessment.plausibility.is_coloured) {
+                (true, false) => BasisTest::of(problem, theta, evaluation),
+                (true, true) => BasisTest::of_halves(problem, theta, evaluation),
+                (false, _) => BasisTest::default(),
             };
             assessment.classifications = classify_functions(problem, &best.evaluation, &bands);
             condition_on_bases(problem, &mut assessment.classifications, &test.doubtful);
             if assessment.plausibility.is_disturbed {
                 condition_on_inputs(&mut assessment.classifications);
+            }
+            gaps = gap_assessments(problem, fit, Some(&bands));
+            for gap in &gaps {
+                let functions = gap.functions.iter();
+                let open = functions.filter(|f| f.status != GapStatus::Identified);
+                let open: Vec<usize> = open.map(|f| f.index).collect();
+                except_gap(
+                    problem,
+                    &mut assessment.classifications,
+                    &open,
+                    gap.span,
+                    &bands,
+                );
             }
             let warnings = test.coarse.into_iter().map(FitWarning::CoarseBasis);
             assessment.plausibility.warnings.extend(warnings);
@@ -103,7 +124,11 @@ impl FitAssessment {
                     problem.effective_parameters(&best.parameters, &best.evaluation);
             }
             assessment.bands = Some(bands);
+        } else if few {
+            gaps = gap_assessments(problem, fit, None);
         }
+        let gaps = gaps.into_iter().map(FitWarning::Gap);
+        assessment.plausibility.warnings.extend(gaps);
         assessment
     }
 }

@@ -1,15 +1,15 @@
 //! Plausibility of a fit: conditions under which its optimum identifies no system, and warnings about its intervals.
 
-use super::channel::diagnostics;
+use super::gaps::GapAssessment;
 use super::input_disturbance::input_warnings;
 use super::refinement::CoarseBasis;
 use super::statistics::{FitStatistics, statistics};
 use super::step_check::{StepCheckOutcome, step_check};
 use crate::diagnostics::rms;
 use crate::functions::CoefficientKind;
-use crate::objective::Evaluation;
+use crate::objective::{Evaluation, diagnostics};
 use crate::problem::Problem;
-use crate::record::{Channel, Loss};
+use crate::record::{Channel, Loss, ScoreCovariance};
 use crate::simulate::SimulationError;
 use crate::system::{Excitation, InputQuantity, Term};
 use serde::Serialize;
@@ -78,8 +78,11 @@ pub enum FitWarning {
     },
     /// The residuals are large and not white: standard errors are unknown.
     PoorFit,
-    /// The residuals are not white: standard errors are too small.
-    Coloured,
+    /// The residuals are not white, beyond the noise model.
+    Coloured {
+        /// Covariance of the intervals: that of the model gives standard errors that are too small.
+        covariance: ScoreCovariance,
+    },
     /// The noise of a channel is estimated as correlated, and the intervals account for it.
     Correlated,
     /// Systems of other frequencies match equally spaced samples as well: standard errors are unknown.
@@ -91,6 +94,8 @@ pub enum FitWarning {
     },
     /// A finer basis fits significantly better: the intervals exclude the error of the basis.
     CoarseBasis(CoarseBasis),
+    /// The records have a gap of more than half a period.
+    Gap(GapAssessment),
     /// The residuals are those of errors of a measured input, or of a term missing from the equation of motion.
     DisturbedInput {
         /// Name of the experiment.
@@ -170,7 +175,9 @@ impl Plausibility {
             |c: &Channel| c.correlation().is_some_and(|c| c.input_errors().is_none());
         let is_correlated = !is_disturbed && problem.channels().any(is_estimated);
         let optimistic = match (errors_hold, coloured, is_correlated) {
-            (true, true, _) => Some(FitWarning::Coloured),
+            (true, true, _) => Some(FitWarning::Coloured {
+                covariance: score_covariance(problem),
+            }),
             (true, false, true) => Some(FitWarning::Correlated),
             _ => None,
         };
@@ -200,6 +207,13 @@ impl Plausibility {
         self.unidentified = Some(Unidentified::Failed);
         self.errors_hold = false;
     }
+}
+
+/// Covariance of the scores: a kernel where some channel has one.
+fn score_covariance(problem: &Problem) -> ScoreCovariance {
+    let mut all = problem.channels().map(|c| c.noise().scores);
+    all.find(|scores| *scores == ScoreCovariance::Kernel)
+        .unwrap_or_default()
 }
 
 /// True if the residuals of a channel are certainly coloured; and if such a channel is also fitted poorly.

@@ -12,14 +12,16 @@
 
 use crate::diagnostics::{rms, standard_deviation};
 use crate::functions::{Basis, CoefficientFunction, Parameterization};
-use crate::identifiability::{Factorisation, has_active_rows};
+use crate::identifiability::{BandSettings, Bands, Factorisation, has_active_rows};
+use crate::noise::KernelCovariance;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::solvers::weighted_jacobian;
 use crate::spans::spans;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+use std::ops::Range;
 
 /// Probability of a false alarm over all functions of a fit.
 const LEVEL: f64 = 0.01;
@@ -71,6 +73,18 @@ impl BasisTest {
         Self::where_it_applies(problem, theta, evaluation).unwrap_or_default()
     }
 
+    /// Tests the constants by halves of the record, with a covariance that is consistent under heteroscedasticity and autocorrelation: for
+    /// residuals that are not white. Empty where [`BasisTest::of`] is.
+    pub fn of_halves(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Self {
+        let test = || {
+            applies(problem, theta, evaluation).then_some(())?;
+            let finer = FinerBases::new(problem, theta)?;
+            let evaluation = finer.problem.evaluate(&finer.theta).ok()?;
+            Some(finer.halves(problem, &evaluation))
+        };
+        test().unwrap_or_default()
+    }
+
     fn where_it_applies(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Option<Self> {
         applies(problem, theta, evaluation).then_some(())?;
         let finer = FinerBases::new(problem, theta)?;
@@ -92,7 +106,7 @@ fn applies(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> bool {
 }
 
 /// The problem in finer bases, without penalties and constraints.
-struct FinerBases {
+pub(super) struct FinerBases {
     problem: Problem,
     theta: Vec<f64>,
     /// For each function with a finer basis the parameters in it of each parameter in the given one.
@@ -100,7 +114,8 @@ struct FinerBases {
 }
 
 impl FinerBases {
-    fn new(problem: &Problem, theta: &[f64]) -> Option<Self> {
+    /// `None` where no basis can be finer.
+    pub(super) fn new(problem: &Problem, theta: &[f64]) -> Option<Self> {
         let grid = &problem.system.grid;
         let functions = &problem.functions;
         let mut list: Vec<CoefficientFunction> = functions.iter().cloned().collect();
@@ -155,12 +170,16 @@ impl FinerBases {
         })
     }
 
+    /// Bands with all finer bases; `None` with too many parameters or without a response.
+    pub(super) fn bands(&self, settings: &BandSettings) -> Option<Bands> {
+        let evaluation = self.problem.evaluate(&self.theta).ok()?;
+        let is_few = self.problem.parameters() <= MOST_PARAMETERS;
+        is_few.then(|| Bands::at(&self.problem, &self.theta, &evaluation, settings))
+    }
+
     fn test(&self, given: &Problem, evaluation: &Evaluation) -> BasisTest {
         let jacobian = weighted_jacobian(&self.problem, evaluation);
-        let residuals: Vec<f64> = (self.problem.predicted(evaluation))
-            .flat_map(|(channel, predicted)| channel.majorant(predicted).weighted)
-            .collect();
-        let residuals = DVector::from_vec(residuals);
+        let residuals = self.residuals(evaluation);
         let mut open: Vec<usize> = (0..self.maps.len())
             .filter(|i| self.maps[*i].is_some())
             .collect();
@@ -191,6 +210,44 @@ impl FinerBases {
             open.retain(|i| *i != index);
             finer.push(index);
             coarse = minimum;
+        }
+    }
+
+    /// Weighted and whitened residuals.
+    fn residuals(&self, evaluation: &Evaluation) -> DVector<f64> {
+        let each = (self.problem.predicted(evaluation))
+            .flat_map(|(channel, predicted)| channel.majorant(predicted).weighted);
+        DVector::from_vec(each.collect())
+    }
+
+    /// Wald test of each constant alone: the difference of its values in the halves, beside its standard error by the kernel's covariance.
+    fn halves(&self, given: &Problem, evaluation: &Evaluation) -> BasisTest {
+        let jacobian = weighted_jacobian(&self.problem, evaluation);
+        let residuals = self.residuals(evaluation);
+        let records = self.problem.channel_samples();
+        let constants = (0..self.maps.len())
+            .filter(|i| self.maps[*i].is_some() && given.functions.is_constant(*i));
+        let constants: Vec<usize> = constants.collect();
+        let sizes = given.median_scales(evaluation);
+        let coarse = Minimum::of(&self.columns(&jacobian, &[]), &residuals);
+        let mut found: Vec<CoarseBasis> = Vec::new();
+        for &index in &constants {
+            let columns = self.columns(&jacobian, &[index]);
+            let minimum = Minimum::of(&columns, &residuals);
+            let place = self.place(index, &[index]);
+            let p_value = minimum.difference(&columns, &residuals, place, &records);
+            if let Some(p_value) = p_value.filter(|p| *p < LEVEL / constants.len() as f64) {
+                let change = self.change(index, &[], &coarse, &minimum);
+                found.push(self.finding(given, index, &change, p_value, sizes[index]));
+            }
+        }
+        found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+        let doubtful = found.iter().map(|basis| basis.index).collect();
+        // A constant that varies appears as a variation of the others.
+        found.truncate(1);
+        BasisTest {
+            coarse: found,
+            doubtful,
         }
     }
 
@@ -326,6 +383,8 @@ struct Minimum {
     squares: f64,
     rank: usize,
     change: DVector<f64>,
+    /// Root `F` of `(J^T J)^-1 = F F^T`.
+    root: DMatrix<f64>,
 }
 
 impl Minimum {
@@ -337,16 +396,40 @@ impl Minimum {
         for (mut column, size) in scaled.column_iter_mut().zip(&sizes) {
             column /= *size;
         }
-        let root = Factorisation::of(&scaled).inverse_root();
-        let mut change = -(&root * root.tr_mul(&scaled.tr_mul(residuals)));
-        for (x, size) in change.iter_mut().zip(&sizes) {
-            *x /= size;
+        let mut root = Factorisation::of(&scaled).inverse_root();
+        for (mut row, size) in root.row_iter_mut().zip(&sizes) {
+            row /= *size;
         }
+        let change = -(&root * root.tr_mul(&jacobian.tr_mul(residuals)));
         Self {
             squares: (residuals + jacobian * &change).norm_squared(),
             rank: root.ncols(),
             change,
+            root,
         }
+    }
+
+    /// Probability of at least this difference of the parameters at `place` and `place + 1` by noise, from the covariance
+    /// `F F^T S F F^T` with the kernel's covariance `S` of the scores.
+    fn difference(
+        &self,
+        jacobian: &DMatrix<f64>,
+        residuals: &DVector<f64>,
+        place: usize,
+        records: &[Range<usize>],
+    ) -> Option<f64> {
+        let left = residuals + jacobian * &self.change;
+        let mut scores = jacobian * &self.root;
+        for (mut row, r) in scores.row_iter_mut().zip(left.iter()) {
+            row *= *r;
+        }
+        let covariance = KernelCovariance::of(&scores, records, self.rank as f64)?.sum;
+        let contrast = (self.root.row(place) - self.root.row(place + 1)).transpose();
+        let variance = contrast.dot(&(covariance * &contrast));
+        let difference = self.change[place] - self.change[place + 1];
+        let statistic = difference * difference / variance;
+        let law = ChiSquared::new(1.0).ok()?;
+        statistic.is_finite().then(|| law.sf(statistic))
     }
 
     /// Probability of at least this improvement over `coarse` by noise alone.

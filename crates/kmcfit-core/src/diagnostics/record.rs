@@ -18,6 +18,8 @@ pub struct ResidualRecord<'a> {
     pub observed: &'a [f64],
     /// Predictions, in the same unit.
     pub model: &'a [f64],
+    /// Number of fitted parameters of the noise, of which the residuals are the innovations.
+    pub fitted: usize,
 }
 
 /// Diagnostics of the residuals of one channel.
@@ -52,6 +54,7 @@ impl ResidualDiagnostics {
             residuals,
             observed,
             model,
+            fitted,
         } = *record;
         let length = [times, residuals, observed, model]
             .map(<[f64]>::len)
@@ -68,7 +71,7 @@ impl ResidualDiagnostics {
             fit_percent: fit_percent(observed, model),
             step,
             band: correlation.band(),
-            whiteness: whiteness(&correlation, step, 0),
+            whiteness: whiteness(&correlation, step, fitted),
             autocorrelation: correlation.values,
         }
     }
@@ -129,6 +132,7 @@ mod tests {
             residuals: noise,
             observed: &observed,
             model: &model,
+            fitted: 0,
         })
     }
 
@@ -217,6 +221,7 @@ mod tests {
             residuals: &[nan; 30],
             observed: &[1.0; 20],
             model: &[],
+            fitted: 0,
         };
         assert_eq!(ResidualDiagnostics::new(&uneven).count, 0);
     }

@@ -3,6 +3,7 @@
 use super::active::ActiveRow;
 use super::covariance::{Information, is_bayesian};
 use crate::problem::Problem;
+use crate::record::ScoreCovariance;
 
 /// The notes, in the order in which they are shown.
 pub(super) fn notes(
@@ -26,6 +27,16 @@ pub(super) fn notes(
     if is_bayesian(problem) {
         notes.push(
             "the bands of smoothed functions cover on average over the record, less where a function bends most".to_owned(),
+        );
+    }
+    if problem
+        .channels()
+        .any(|c| c.noise().scores == ScoreCovariance::Kernel)
+    {
+        notes.push(
+            "the residuals are not white under the noise model: the bands come from a covariance that is consistent under \
+             heteroscedasticity and autocorrelation"
+                .to_owned(),
         );
     }
     if !problem.variations.is_empty() {

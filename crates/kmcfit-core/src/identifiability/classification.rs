@@ -160,27 +160,69 @@ pub(crate) fn condition_on_bases(
     classifications: &mut [FunctionClassification],
     coarse: &[usize],
 ) {
-    let assembly = problem.functions.coefficient_set(0);
-    let of = |term: Term| {
-        let place = problem.system.terms.iter().position(|t| *t == term);
-        place.map(|place| assembly[place + 1])
-    };
+    for classification in of_functions(problem, classifications, coarse) {
+        classification.depends_on(Condition::Basis);
+    }
+}
+
+/// Excludes the span of a gap (s) from the times at which these functions, and the ratios with them, are identified.
+pub(crate) fn except_gap(
+    problem: &Problem,
+    classifications: &mut [FunctionClassification],
+    open: &[usize],
+    gap: [f64; 2],
+    bands: &Bands,
+) {
+    let grid = &problem.system.grid;
+    let whole = [grid.start(), grid.start() + grid.duration()];
+    for classification in of_functions(problem, classifications, open) {
+        let before = match &classification.verdict {
+            Classification::Identified { .. } | Classification::Conditional { .. } => vec![whole],
+            Classification::PartlyIdentified(spans) => spans.clone(),
+            _ => continue,
+        };
+        let parts = |[from, to]: [f64; 2]| [[from, to.min(gap[0])], [from.max(gap[1]), to]];
+        let spans = before.into_iter().flat_map(parts);
+        let spans: Vec<[f64; 2]> = spans.filter(|[from, to]| from < to).collect();
+        let mut all = bands.functions.iter().chain(&bands.ratios);
+        let band = all.find(|band| band.name == classification.name);
+        classification.identified_range = band.and_then(|band| {
+            let is_inside = |t: f64| spans.iter().any(|[from, to]| (*from..=*to).contains(&t));
+            let nodes = (0..band.values.len()).filter(|i| is_inside(bands.times[*i]));
+            let values = nodes.map(|i| [band.values[i]; 2]);
+            values.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+        });
+        classification.sentence = partly_identified(&classification.name, &spans);
+        classification.verdict = Classification::PartlyIdentified(spans);
+    }
+}
+
+/// Classifications of these functions, and of the ratios with them.
+fn of_functions<'a>(
+    problem: &Problem,
+    classifications: &'a mut [FunctionClassification],
+    chosen: &'a [usize],
+) -> impl Iterator<Item = &'a mut FunctionClassification> {
+    let assembly = problem.functions.coefficient_set(0).to_vec();
+    let terms = problem.system.terms.clone();
     let functions = problem.functions.ranges().len();
-    for (index, classification) in classifications.iter_mut().enumerate() {
-        let numerator = match classification.name.as_str() {
+    let is_chosen = move |index: usize, name: &str| {
+        let of = |term: Term| {
+            let place = terms.iter().position(|t| *t == term);
+            place.map(|place| assembly[place + 1])
+        };
+        let numerator = match name {
             _ if index < functions => Some(index),
             "k/m" => of(Term::Stiffness),
             _ => of(Term::Damping),
         };
         let mass = (index >= functions).then_some(assembly[0]);
-        if numerator
-            .into_iter()
-            .chain(mass)
-            .any(|f| coarse.contains(&f))
-        {
-            classification.depends_on(Condition::Basis);
-        }
-    }
+        let mut all = numerator.into_iter().chain(mass);
+        all.any(|f| chosen.contains(&f))
+    };
+    let each = classifications.iter_mut().enumerate();
+    each.filter(move |(index, c)| is_chosen(*index, &c.name))
+        .map(|(_, c)| c)
 }
 
 /// Values below this share of a function's size are rounding errors.
@@ -320,6 +362,10 @@ fn judge(times: &[f64], band: &Band, size: f64) -> Classification {
     }
 }
 
+fn partly_identified(name: &str, spans: &[[f64; 2]]) -> String {
+    format!("{name} is identified only on {}", span_words(spans))
+}
+
 fn classification(
     name: &str,
     verdict: Classification,
@@ -332,9 +378,7 @@ fn classification(
         Classification::OnlyRatio(ratio) => {
             format!("{name} itself is not identifiable; the ratio {ratio} is identified")
         }
-        Classification::PartlyIdentified(spans) => {
-            format!("{name} is identified only on {}", span_words(spans))
-        }
+        Classification::PartlyIdentified(spans) => partly_identified(name, spans),
         Classification::NotIdentified => format!("{name} is not identifiable from these records"),
         Classification::Fixed => format!("{name} is fixed by the model"),
     };

@@ -7,9 +7,12 @@ use super::factorisation::Factorisation;
 use super::sensitivity::Sensitivity;
 use super::step_error::step_error;
 use crate::functions::{Penalty, WeightRule};
+use crate::noise::KernelCovariance;
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
+use crate::record::ScoreCovariance;
 use nalgebra::{DMatrix, DVector, DVectorView};
+use std::ops::Range;
 
 /// Information on the parameters, in scaled directions.
 pub(super) struct Information {
@@ -25,6 +28,8 @@ pub(super) struct Information {
     rounding: f64,
     /// Discretisation error of the weighted predictions, where it is included.
     step_error: Option<DVector<f64>>,
+    /// Samples of channels whose scores have the covariance of a kernel.
+    kernels: Vec<Range<usize>>,
 }
 
 /// Covariance root, `Cov = F F^T` on determined directions and zero on the others.
@@ -73,6 +78,7 @@ impl Information {
             sensitivity,
             rounding: f64::EPSILON * largest * problem.system.grid.nodes() as f64,
             step_error: None,
+            kernels: kernels(problem),
         }
     }
 
@@ -106,7 +112,8 @@ impl Information {
 
     /// Covariance with the rows `held` fixed: `H^+ M H^+` in the null space of these rows, with `H = J^T W J + R` and
     /// `M = J^T W J` (`W` multiplied by the estimated variance for samples without sigma); `H^+`, the Bayesian covariance, for
-    /// penalties whose rule gives coverage.
+    /// penalties whose rule gives coverage. For channels whose innovations are not white the part of their scores in `M` is that of
+    /// a kernel ([`KernelCovariance`]).
     pub fn factor(&self, held: &[&ActiveRow]) -> CovarianceRoot {
         let directions = &self.sensitivity.directions;
         let n = directions.len();
@@ -147,12 +154,17 @@ impl Information {
             }
         }
         let rank = inverse_root.ncols();
-        if self.is_bayesian && variance.is_none() {
+        let is_bayesian = self.is_bayesian && variance.is_none();
+        if is_bayesian && self.kernels.is_empty() {
             return CovarianceRoot {
                 root: with_column(inverse_root, shift),
                 undetermined,
                 variance,
             };
+        }
+        self.replace_scores(&mut answers);
+        if is_bayesian {
+            answers = stacked(&answers, &(&self.pulled * &inverse_root));
         }
         let root = match answers.nrows() >= rank && rank > 0 {
             true => &inverse_root * answers.qr().r().transpose(),
@@ -162,6 +174,30 @@ impl Information {
             root: with_column(root, shift),
             undetermined,
             variance,
+        }
+    }
+
+    /// Replaces the rows of channels whose innovations are not white by a root of the kernel's covariance of their scores.
+    fn replace_scores(&self, answers: &mut DMatrix<f64>) {
+        let rank = answers.ncols();
+        for samples in &self.kernels {
+            let residuals = &self.sensitivity.residuals[samples.clone()];
+            let mut scores = answers.rows(samples.start, samples.len()).into_owned();
+            for (mut row, residual) in scores.row_iter_mut().zip(residuals) {
+                row *= *residual;
+            }
+            let record = 0..samples.len();
+            let found = KernelCovariance::of(&scores, std::slice::from_ref(&record), rank as f64);
+            let Some(found) = found else {
+                continue;
+            };
+            let eigen = found.sum.symmetric_eigen();
+            let mut rows = answers.rows_mut(samples.start, samples.len());
+            rows.fill(0.0);
+            for k in 0..rank {
+                let root = eigen.eigenvalues[k].max(0.0).sqrt();
+                rows.set_row(k, &(eigen.eigenvectors.column(k).transpose() * root));
+            }
         }
     }
 
@@ -200,6 +236,15 @@ impl Information {
             () => squares / left,
         })
     }
+}
+
+/// Samples of the channels whose scores have the covariance of a kernel, in the order of all samples.
+fn kernels(problem: &Problem) -> Vec<Range<usize>> {
+    let channels = problem.channels().zip(problem.channel_samples());
+    let misspecified = channels.filter(|(channel, samples)| {
+        channel.noise().scores == ScoreCovariance::Kernel && samples.len() > problem.parameters()
+    });
+    misspecified.map(|(_, samples)| samples).collect()
 }
 
 fn with_column(root: DMatrix<f64>, column: Option<DVector<f64>>) -> DMatrix<f64> {

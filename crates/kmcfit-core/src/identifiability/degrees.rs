@@ -15,7 +15,7 @@ use super::sensitivity::Sensitivity;
 use crate::noise::STEP;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::record::Channel;
+use crate::record::{Channel, Weighting};
 use nalgebra::DMatrix;
 
 /// Covariances of the parameters with the noise moved along its coordinates.
@@ -42,6 +42,7 @@ impl NoiseVariants {
         let n = problem.parameters();
         let directions = Directions::new(problem, evaluation, n, n);
         let jacobian = directions.of_jacobian(problem.predictions_jacobian(evaluation));
+        let is_alone = problem.channels().count() == 1;
         let mut channels = Vec::new();
         for (e, experiment) in problem.experiments.iter().enumerate() {
             for (c, channel) in experiment.channels.iter().enumerate() {
@@ -56,7 +57,13 @@ impl NoiseVariants {
                 };
                 let mut sides = Vec::new();
                 for index in 0..channel.noise().covariance.nrows() {
-                    sides.push([side(index, STEP)?, side(index, -STEP)?]);
+                    sides.push(match (is_alone, channel.weighting(), index) {
+                        // All samples have this sigma: its square is a factor of the covariance.
+                        (true, Weighting::Estimated { .. }, 0) => {
+                            [STEP, -STEP].map(|step| &here * (1.0 + 2.0 * step))
+                        }
+                        _ => [side(index, STEP)?, side(index, -STEP)?],
+                    });
                 }
                 channels.push(ChannelVariants {
                     sides,

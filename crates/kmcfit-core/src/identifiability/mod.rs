@@ -50,7 +50,7 @@ pub use bands::{BandSettings, Bands};
 pub use classification::{
     Classification, ClassificationKind, Condition, FunctionClassification, classify_functions,
 };
-pub(crate) use classification::{condition_on_bases, condition_on_inputs};
+pub(crate) use classification::{IDENTIFIED, condition_on_bases, condition_on_inputs, except_gap};
 pub(crate) use covariance::stacked;
 pub use experiments::{
     CandidateChannel, CandidateExperiment, Gain, Ranked, rank_experiments, residual_spread,

@@ -160,6 +160,8 @@ pub struct RestrictedLikelihood {
     penalties: Vec<PenaltyMoments>,
     /// For each penalty of an estimated weight its logarithm, where it is as good as infinite; such penalties stand in `known`.
     infinite: Vec<Option<f64>>,
+    /// The terms `- rank(L_j) log w_j` of such penalties.
+    constant: f64,
 }
 
 /// Estimated noise and weights.
@@ -171,6 +173,8 @@ pub struct RestrictedFit {
     pub covariances: Vec<DMatrix<f64>>,
     /// Logarithms of the weights of the penalties.
     pub log_weights: Vec<f64>,
+    /// `f` at the minimum.
+    pub value: f64,
 }
 
 impl RestrictedLikelihood {
@@ -181,6 +185,7 @@ impl RestrictedLikelihood {
             known,
             penalties: Vec::new(),
             infinite: Vec::new(),
+            constant: 0.0,
         }
     }
 
@@ -197,6 +202,7 @@ impl RestrictedLikelihood {
                 true => None,
                 false => {
                     self.known += &penalty.gram * penalty.log_weight.exp();
+                    self.constant -= penalty.rank as f64 * penalty.log_weight;
                     Some(penalty.log_weight)
                 }
             });
@@ -231,7 +237,7 @@ impl RestrictedLikelihood {
     /// `f` at the coordinates of all channels and the logarithms of the weights; NaN where the Gram matrix is not positive definite.
     pub fn value(&self, at: &[f64]) -> f64 {
         let mut gram = self.known.clone();
-        let mut constant = 0.0;
+        let mut constant = self.constant;
         for (channel, noise) in self.channels.iter().zip(self.split(at)) {
             let (own, determinant) = channel.whitened(&noise.correlation_parameters);
             let log_sigma = noise.log_sigma.unwrap_or(0.0);
@@ -263,7 +269,7 @@ impl RestrictedLikelihood {
             return None;
         }
         if at.is_empty() {
-            return Some(self.result(&at, &DMatrix::zeros(0, 0)));
+            return Some(self.result(&at, &DMatrix::zeros(0, 0), value));
         }
         for _ in 0..STEPS {
             let (gradient, hessian) = self.derivatives(&at, value);
@@ -287,11 +293,11 @@ impl RestrictedLikelihood {
         }
         let (_, hessian) = self.derivatives(&at, value);
         let covariance = positive(&hessian).try_inverse()? * 2.0;
-        Some(self.result(&at, &covariance))
+        Some(self.result(&at, &covariance, value))
     }
 
-    /// The estimate at the coordinates, with their covariance.
-    fn result(&self, at: &[f64], covariance: &DMatrix<f64>) -> RestrictedFit {
+    /// The estimate at the coordinates, with their covariance and `f`.
+    fn result(&self, at: &[f64], covariance: &DMatrix<f64>, value: f64) -> RestrictedFit {
         let mut first = 0;
         let blocks = self.channels.iter().map(|channel| {
             let count = channel.start.len();
@@ -303,6 +309,7 @@ impl RestrictedLikelihood {
         let mut estimated = at[self.noise_coordinates()..].iter();
         let log_weights = self.infinite.iter();
         RestrictedFit {
+            value,
             covariances,
             channels: self.split(at),
             log_weights: log_weights

@@ -18,7 +18,7 @@ pub use input_error::{InputError, InputErrorKind};
 pub use kind::ChannelKind;
 pub use loss::Loss;
 pub use misfit::integral_over;
-pub use noise::{Majorant, NoiseEstimate, NoiseModel};
+pub use noise::{Majorant, NoiseEstimate, NoiseModel, ScoreCovariance};
 pub use sensor::Sensor;
 pub use weighting::Weighting;
 

@@ -21,6 +21,18 @@ pub enum NoiseModel {
     },
 }
 
+/// Covariance of the scores of a channel, the derivatives of its misfit by the parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ScoreCovariance {
+    /// That of the noise model: independent innovations of equal variance.
+    #[default]
+    Model,
+    /// Consistent under heteroscedasticity and autocorrelation, by a kernel
+    /// ([`KernelCovariance`](crate::noise::KernelCovariance)): for innovations that are not white.
+    Kernel,
+}
+
 /// Estimated noise of a channel.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct NoiseEstimate {
@@ -30,6 +42,8 @@ pub struct NoiseEstimate {
     /// the correlation ([`Correlation::coordinates`]). Without rows where the
     /// noise counts as known.
     pub covariance: DMatrix<f64>,
+    /// Covariance of the scores.
+    pub scores: ScoreCovariance,
 }
 
 /// Quadratic majorant `sum_i (root_i (e_i + de_i))^2` of a channel's misfit at a point: `e` are the residuals, whitened

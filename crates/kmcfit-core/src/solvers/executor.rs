@@ -372,6 +372,7 @@ impl SearchDriver<'_, '_> {
             timings: self.before.timings + self.timings,
             elapsed,
             attempts: Vec::new(),
+            gaps: Vec::new(),
             optimality: None,
         })
     }

@@ -6,9 +6,11 @@
 mod active_set;
 mod checkpoint;
 mod correlation_estimation;
+mod cycle_counts;
 mod evaluator;
 mod executor;
 mod fit;
+mod gaps;
 mod history;
 mod infeasible_subset;
 mod input_errors;
@@ -32,6 +34,7 @@ mod termination;
 mod timings;
 mod traces;
 mod validation;
+mod weight_choice;
 mod weight_path;
 
 pub use active_set::{ActiveGroup, active_constraints};
@@ -40,6 +43,8 @@ pub use checkpoint::{
 };
 pub use executor::fit_from;
 pub use fit::{Attempt, Fit};
+pub use gaps::{CycleCount, Gap, cycles};
+pub(crate) use gaps::{gaps, varying_function};
 pub use history::{IterationRecord, number_or_nan};
 pub(crate) use input_errors::input_error_effect;
 pub use iterate::Iterate;
@@ -57,7 +62,8 @@ pub use state_estimation::estimate_states;
 pub use termination::{Outcome, Status, Stopping};
 pub use timings::{Timings, timed};
 pub use validation::predict_validation;
-pub use weight_path::{PathPoint, WeightPath, choose_weight, choose_weight_watched};
+pub use weight_choice::{choose_weight, choose_weight_watched};
+pub use weight_path::{PathPoint, WeightPath};
 
 use crate::problem::Problem;
 use crate::simulate::SimulationError;

@@ -2,8 +2,10 @@
 
 use super::checkpoint::Observer;
 use super::correlation_estimation::{
-    correlated, is_white, is_worse, may_correlate, movement, orders,
+    correlated, is_likelihood, is_white, is_worse, mark_misspecified, may_correlate, movement,
+    orders,
 };
+use super::cycle_counts::with_cycle_counts;
 use super::executor::search;
 use super::fit::{Fit, measured};
 use super::history::IterationRecord;
@@ -15,9 +17,10 @@ use super::settings::FitSettings;
 use super::start_strategy::search_from_starts;
 use super::timings::Timings;
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::record::{Channel, Loss, Weighting};
+use crate::record::{Channel, Loss, NoiseEstimate, Weighting};
 use crate::simd::sum::rms;
 use crate::simulate::SimulationError;
+use nalgebra::DMatrix;
 
 /// Largest number of rounds of fit and estimation.
 const ROUNDS: usize = 20;
@@ -79,10 +82,28 @@ pub fn fit_with_noise_watched(
         true => with_weights(&mut problem, found, settings, watch)?,
         false => with_sigmas(&mut problem, found, settings, watch)?,
     };
+    if is_likelihood(settings) {
+        found = with_cycle_counts(&mut problem, found, &mut |problem, start| {
+            let chooses = estimates_weights(problem);
+            if chooses {
+                start_weights(problem, start);
+            }
+            let fit = search(problem, start, settings, None, watch).ok()?;
+            let fit = match chooses {
+                true => with_weights(problem, fit, settings, watch),
+                false => with_sigmas(problem, fit, settings, watch),
+            };
+            fit.ok()
+        });
+    }
     if has_input_errors(&problem) {
         found = with_input_errors(&mut problem, found, settings, watch)?;
     } else if may_correlate(&problem, settings) {
         found = with_correlations(&mut problem, found, settings, watch)?;
+    }
+    add_sigma_variances(&mut problem);
+    if is_likelihood(settings) {
+        mark_misspecified(&mut problem, &found);
     }
     let is_as_stated = !estimates_sigma(&problem) && is_white(&problem) && !chooses;
     // All costs refer to the final noise.
@@ -93,7 +114,7 @@ pub fn fit_with_noise_watched(
     Ok((problem, found))
 }
 
-fn estimates_sigma(problem: &Problem) -> bool {
+pub(super) fn estimates_sigma(problem: &Problem) -> bool {
     let mut channels = problem.channels();
     channels.any(|c| matches!(c.weighting(), Weighting::Estimated { .. }))
 }
@@ -109,7 +130,7 @@ fn with_sigmas(
         return Ok(found);
     }
     for _ in 0..ROUNDS {
-        let change = update(problem, &found, |_| true);
+        let change = update(problem, &found, parameter_share(problem), |_| true);
         let ended = is_ended(&found);
         let next = search(problem, &found.best.parameters, settings, None, watch)?;
         found = with_round(found, next, ended);
@@ -127,7 +148,7 @@ fn with_weights(
     settings: &FitSettings,
     watch: &mut Observer,
 ) -> Result<Fit, SimulationError> {
-    update(problem, &found, |_| true);
+    update(problem, &found, parameter_share(problem), |_| true);
     for _ in 0..WEIGHT_ROUNDS {
         if is_ended(&found) {
             break;
@@ -145,7 +166,8 @@ fn with_weights(
         };
         let change = weight_change(problem, &next);
         *problem = next;
-        let sigmas = update(problem, &found, |c| c.loss() != Loss::Squares);
+        let share = parameter_share(problem);
+        let sigmas = update(problem, &found, share, |c| c.loss() != Loss::Squares);
         let fit = search(problem, &found.best.parameters, settings, None, watch)?;
         found = with_round(found, fit, false);
         if change.max(sigmas) < WEIGHTS_AT_REST {
@@ -249,10 +271,13 @@ fn refitted(
     Ok((found, moved))
 }
 
-/// Sets the sigmas of the residuals of the channels `which`; returns the largest relative change.
-fn update(problem: &mut Problem, found: &Fit, which: impl Fn(&Channel) -> bool) -> f64 {
-    let samples = problem.sample_count() as f64;
-    let share = (problem.parameters() as f64 / samples).min(0.5);
+/// Sets the sigmas of the residuals of the channels `which`, with `share` parameters per sample; returns the largest relative change.
+pub(super) fn update(
+    problem: &mut Problem,
+    found: &Fit,
+    share: f64,
+    which: impl Fn(&Channel) -> bool,
+) -> f64 {
     let mut largest = 0.0f64;
     let experiments = problem.parts_mut().experiments.iter_mut();
     for (experiment, predictions) in experiments.zip(&found.best.evaluation.predictions) {
@@ -275,6 +300,30 @@ fn update(problem: &mut Problem, found: &Fit, which: impl Fn(&Channel) -> bool) 
         }
     }
     largest
+}
+
+/// Sets the variance `1/(2 (n - p))` of the logarithm of each estimated sigma that has none, with `p` the channel's share of the
+/// parameters: intervals then have Student's t distribution. A robust sigma, from the median, keeps the normal distribution.
+pub(super) fn add_sigma_variances(problem: &mut Problem) {
+    let share = parameter_share(problem);
+    let channels = (problem.parts_mut().experiments.iter_mut()).flat_map(|e| &mut e.channels);
+    for channel in channels {
+        let is_estimated = matches!(channel.weighting(), Weighting::Estimated { .. });
+        let has_none = channel.noise().covariance.is_empty() && channel.correlation().is_none();
+        if is_estimated && has_none && channel.loss() == Loss::Squares {
+            let left = channel.len() as f64 * (1.0 - share);
+            let noise = NoiseEstimate {
+                covariance: DMatrix::from_element(1, 1, 0.5 / left),
+                ..NoiseEstimate::default()
+            };
+            *channel = channel.clone().with_noise(noise);
+        }
+    }
+}
+
+/// Parameters per sample, at most a half.
+fn parameter_share(problem: &Problem) -> f64 {
+    (problem.parameters() as f64 / problem.sample_count() as f64).min(0.5)
 }
 
 fn spread(channel: &Channel, predicted: &[f64]) -> f64 {

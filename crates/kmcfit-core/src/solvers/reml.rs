@@ -8,7 +8,7 @@ use crate::noise::{ChannelMoments, NoiseCoordinates, PenaltyMoments, RestrictedL
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::qp::Subproblem;
-use crate::record::{Channel, Loss, NoiseEstimate, Weighting};
+use crate::record::{Channel, Loss, NoiseEstimate, ScoreCovariance, Weighting};
 use nalgebra::DMatrix;
 
 /// Ratio `tau/T` of the smoothing time of the initial penalty weight to the duration of the grid, dimensionless.
@@ -88,7 +88,7 @@ pub(super) fn refined(
     if problem.parameters() > FEW_PARAMETERS {
         return None;
     }
-    let found = likelihood(problem, theta, evaluation).fit()?;
+    let found = likelihood(problem, theta, evaluation).0.fit()?;
     let mut next = problem.clone();
     let parts = next.parts_mut();
     let channels = parts.experiments.iter_mut().flat_map(|e| &mut e.channels);
@@ -104,9 +104,38 @@ pub(super) fn refined(
     Some(next)
 }
 
+/// Minus twice the logarithm of the largest restricted likelihood of noise and weights, linearised at `theta`, without a constant of
+/// the problem: smaller is better. `None` with more than [`FEW_PARAMETERS`] parameters, where a combination of parameters is
+/// undetermined, or if the likelihood has no maximum.
+pub(super) fn restricted_deviance(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+) -> Option<f64> {
+    if problem.parameters() > FEW_PARAMETERS {
+        return None;
+    }
+    let (likelihood, map) = likelihood(problem, theta, evaluation);
+    let n = problem.parameters();
+    (map.ncols() == n + 1).then_some(())?;
+    let value = likelihood.fit()?.value;
+    // The likelihood is that of scaled parameters and of residuals over the present sigma.
+    let scale = map.view((0, 0), (n, n)).determinant().abs().ln();
+    let sigmas = problem.channels().map(|channel| match channel.weighting() {
+        Weighting::Estimated { sigma } => 2.0 * channel.len() as f64 * sigma.ln(),
+        _ => 0.0,
+    });
+    Some(value - 2.0 * scale + sigmas.sum::<f64>())
+}
+
 /// Builds the restricted likelihood of noise and weights in the q parameter combinations determined by data, priors and
-/// penalties, scaled so that their Gram matrix (at the current weights) is the identity.
-fn likelihood(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> RestrictedLikelihood {
+/// penalties, scaled so that their Gram matrix (at the current weights) is the identity; with the matrix that scales them
+/// ([`determined`]).
+fn likelihood(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+) -> (RestrictedLikelihood, DMatrix<f64>) {
     let known = known_rows(problem, theta);
     let penalties: Vec<(&Penalty, DMatrix<f64>)> = (problem.penalties.iter())
         .filter(|p| is_estimated(p))
@@ -138,7 +167,9 @@ fn likelihood(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Rest
             log_weight: penalty.weight.ln(),
         }
     });
-    RestrictedLikelihood::new(moments, known.tr_mul(&known)).with_penalties(penalties.collect())
+    let penalties = penalties.collect();
+    let likelihood = RestrictedLikelihood::new(moments, known.tr_mul(&known));
+    (likelihood.with_penalties(penalties), map)
 }
 
 /// Returns samples x (n+1) rows `sqrt(w_i) [dprediction_i/dtheta, r_i]` with `r` = prediction minus sample; rows of channels with
@@ -246,5 +277,6 @@ fn with_coordinates(
     next.with_noise(NoiseEstimate {
         correlation,
         covariance,
+        scores: ScoreCovariance::Model,
     })
 }

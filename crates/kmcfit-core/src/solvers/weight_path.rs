@@ -3,7 +3,6 @@
 use super::checkpoint::Observer;
 use super::executor::search;
 use super::fit::{Attempt, Fit, measured};
-use super::history::IterationRecord;
 use super::linearization::linearisation_tangents;
 use super::settings::FitSettings;
 use super::solve_counts::SolveCounts;
@@ -75,39 +74,12 @@ impl Problem {
     }
 }
 
-/// Fits `problem` along a path of factors on the penalties `which`, each fit started from its neighbour, and again at the
-/// factor chosen by `rule`. Returns the path, the problem at that factor, and its fit.
-///
-/// # Errors
-/// A [`SimulationError`] if the simulation at the start of the first fit, at the middle weight, fails.
-pub fn choose_weight(
+/// [`choose_weight`] at the noise of the problem.
+pub(super) fn choose_weight_at_noise(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
-    rule: WeightRule,
-    which: &[usize],
-    observe: &mut dyn FnMut(&IterationRecord),
-) -> Result<(WeightPath, Problem, Fit), SimulationError> {
-    choose_weight_watched(
-        problem,
-        start,
-        settings,
-        rule,
-        which,
-        &mut Observer::new(observe),
-    )
-}
-
-/// [`choose_weight`] with an observer, which may hold checkpoints.
-///
-/// # Errors
-/// As [`choose_weight`].
-pub fn choose_weight_watched(
-    problem: &Problem,
-    start: &[f64],
-    settings: &FitSettings,
-    rule: WeightRule,
-    which: &[usize],
+    (rule, which): (WeightRule, &[usize]),
     watch: &mut Observer,
 ) -> Result<(WeightPath, Problem, Fit), SimulationError> {
     let mut walk = WeightPathSearch {
@@ -338,7 +310,7 @@ fn remark(
 mod tests {
     use super::*;
     use crate::builder::{Builder, CoefficientSpec, Record};
-    use crate::solvers::{fit, fit_from};
+    use crate::solvers::{IterationRecord, fit, fit_from};
     use crate::system::Grid;
 
     /// Points of a path with these natural logarithms of misfit and roughness.

@@ -53,6 +53,12 @@ impl Grid {
         self.start + i as f64 * self.step()
     }
 
+    /// Index of the node nearest to a time (s).
+    pub fn nearest(&self, time: f64) -> usize {
+        let place = ((time - self.start) / self.step()).round().max(0.0);
+        (place as usize).min(self.nodes - 1)
+    }
+
     /// Times of all nodes in s.
     pub fn times(&self) -> Vec<f64> {
         (0..self.nodes).map(|i| self.time(i)).collect()

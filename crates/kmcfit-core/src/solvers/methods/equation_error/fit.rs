@@ -96,6 +96,7 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationR
         timings,
         elapsed: clock.elapsed(),
         attempts: Vec::new(),
+        gaps: Vec::new(),
         optimality,
     }
 }
@@ -154,6 +155,7 @@ fn failed(problem: &Problem, start: &[f64], reason: UnsupportedRecord) -> Fit {
         timings: Timings::default(),
         elapsed: std::time::Duration::ZERO,
         attempts: Vec::new(),
+        gaps: Vec::new(),
         optimality: None,
     }
 }
