@@ -209,7 +209,7 @@ fn a_sigma_that_is_too_small_is_reported() {
     assert!(summary.contains("stiffness is identified"), "{summary}");
 }
 
-/// A slightly wrong model leaves autocorrelated residuals, and a warning says that the intervals are too small.
+/// A slightly wrong model leaves autocorrelated residuals, and a warning states the covariance of the intervals.
 #[test]
 fn autocorrelated_residuals_are_reported() {
     let bench = Workbench::empty();
@@ -225,7 +225,8 @@ fn autocorrelated_residuals_are_reported() {
     let model = starter("{nodes: 801}", "    sigma: {displacement: estimate}\n");
     bench.write("model.yaml", &model.replace("39", "3.8"));
     let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report"]);
-    let said = "the residuals are autocorrelated: the true confidence intervals are wider";
+    let said = "the residuals are autocorrelated beyond the noise model: the confidence intervals come from a \
+                heteroscedasticity- and autocorrelation-consistent covariance";
     assert!(
         summary.contains(&format!("Warnings        {said}")),
         "{summary}"
