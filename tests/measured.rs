@@ -3,7 +3,9 @@
 mod common;
 
 use kmcfit::config::{BuildMode, ModelFile, build};
-use kmcfit_core::internals::solvers::{Status, fit};
+use kmcfit_core::internals::assessment::{FitAssessment, FitWarning};
+use kmcfit_core::internals::identifiability::{Classification, Condition};
+use kmcfit_core::internals::solvers::{Status, fit, fit_with_noise};
 
 /// Roll decay of the ship model KVLCC2 (Alexandersson and Kjellberg 2021, doi
 /// 10.17632/2stvkyngj9.1, CC BY 4.0): the best constant inertia and damping.
@@ -137,4 +139,63 @@ fn the_roll_decay_with_damping_over_time() {
             at(55.0)
         );
     }
+}
+
+/// The two halves of the decay give inertias of 135.87 and 135.44 kg m^2, six standard errors apart: that of the whole record is
+/// conditional on its constancy, with the values of the halves.
+#[test]
+fn the_inertia_of_the_ship_differs_between_the_halves_of_the_record() {
+    let Some(folder) = common::shared("data") else {
+        return;
+    };
+    let text = format!(
+        "
+format: 1
+experiments:
+  - data: {}
+    columns: {{time: t_s, displacement: phi_rad}}
+    initial: estimate
+    sigma: {{displacement: estimate}}
+functions:
+  mass: {{basis: constant, start: 100.0}}
+  stiffness: {{fixed: 821.96}}
+  cubic_stiffness: {{basis: constant, start: 0.0}}
+  damping: {{basis: constant, start: 1.0}}
+  quadratic_damping: {{basis: constant, start: 0.0}}
+  static_force: {{basis: constant, start: 0.0}}
+",
+        folder
+            .join("kvlcc2_21337_decay_25Hz.csv")
+            .canonicalize()
+            .unwrap()
+            .display()
+    );
+    let file = ModelFile::parse("roll.yaml", text).unwrap();
+    let model = build(&file, BuildMode::Fit).unwrap();
+    let start = model.problem.functions.start();
+    let (problem, found) =
+        fit_with_noise(&model.problem, &start, &model.settings, &mut |_| {}).unwrap();
+    let assessment = FitAssessment::of(&problem, &found, true);
+    let mass = &assessment.classifications[0];
+    assert!(
+        matches!(
+            mass.verdict,
+            Classification::Conditional {
+                on: Condition::Basis,
+                ..
+            }
+        ),
+        "{mass:?}"
+    );
+    let halves = assessment
+        .plausibility
+        .warnings
+        .iter()
+        .find_map(|warning| match warning {
+            FitWarning::CoarseBasis(basis) if basis.function == "mass" => basis.halves,
+            _ => None,
+        });
+    let [first, second] = halves.expect("values of the halves");
+    assert!((135.7..136.05).contains(&first), "{first}");
+    assert!((135.35..135.65).contains(&second), "{second}");
 }

@@ -220,34 +220,35 @@ impl FinerBases {
         DVector::from_vec(each.collect())
     }
 
-    /// Wald test of each constant alone: the difference of its values in the halves, beside its standard error by the kernel's covariance.
+    /// Wald test of each constant, with all of them in halves: the difference of its values beside its standard error by the kernel's
+    /// covariance.
     fn halves(&self, given: &Problem, evaluation: &Evaluation) -> BasisTest {
         let jacobian = weighted_jacobian(&self.problem, evaluation);
         let residuals = self.residuals(evaluation);
         let records = self.problem.channel_samples();
-        let constants = (0..self.maps.len())
-            .filter(|i| self.maps[*i].is_some() && given.functions.is_constant(*i));
-        let constants: Vec<usize> = constants.collect();
+        let constants: Vec<usize> = (0..self.maps.len())
+            .filter(|i| self.maps[*i].is_some() && given.functions.is_constant(*i))
+            .collect();
         let sizes = given.median_scales(evaluation);
         let coarse = Minimum::of(&self.columns(&jacobian, &[]), &residuals);
+        let columns = self.columns(&jacobian, &constants);
+        let minimum = Minimum::of(&columns, &residuals);
         let mut found: Vec<CoarseBasis> = Vec::new();
         for &index in &constants {
-            let columns = self.columns(&jacobian, &[index]);
-            let minimum = Minimum::of(&columns, &residuals);
-            let place = self.place(index, &[index]);
+            let place = self.place(index, &constants);
             let p_value = minimum.difference(&columns, &residuals, place, &records);
-            if let Some(p_value) = p_value.filter(|p| *p < LEVEL / constants.len() as f64) {
-                let change = self.change(index, &[], &coarse, &minimum);
+            let is_significant = |p: &f64| *p < LEVEL / constants.len() as f64;
+            if let Some(p_value) = p_value.filter(is_significant) {
+                let to = minimum.change.rows(place, 2).into_owned();
+                let from = coarse.change[self.place(index, &[])];
+                let change = [to.clone(), to.add_scalar(-from)];
                 found.push(self.finding(given, index, &change, p_value, sizes[index]));
             }
         }
         found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
-        let doubtful = found.iter().map(|basis| basis.index).collect();
-        // A constant that varies appears as a variation of the others.
-        found.truncate(1);
         BasisTest {
+            doubtful: found.iter().map(|basis| basis.index).collect(),
             coarse: found,
-            doubtful,
         }
     }
 
