@@ -5,7 +5,8 @@ use crate::config::DataWarning;
 use crate::report::findings;
 use crate::report::suggestions::{Suggestion, Suspect};
 use kmcfit_core::internals::assessment::{
-    CoarseBasis, FitWarning, FunctionInGap, GapAssessment, GapStatus, ResidualPattern, Unidentified,
+    CoarseBasis, FitWarning, FunctionInGap, GapAssessment, GapStatus, NoIntervals, ResidualPattern,
+    Unidentified,
 };
 use kmcfit_core::internals::builder::BuildNotice;
 use kmcfit_core::internals::diagnostics::{UntestedReason, Whiteness, WhitenessResult};
@@ -88,6 +89,20 @@ fn messages() {
         "Identifiability of a function",
         all.iter().map(|c| c.verdict.name().to_owned()),
     );
+    let all = conditions().into_iter();
+    let all = all.map(|condition| condition.sentence("stiffness", 0.04));
+    section(&mut list, "Functions identified conditionally", all);
+    let all = no_intervals();
+    let all = all.iter().map(Some).chain([None]);
+    let all = all.map(|reason| findings::equation_error(reason).text);
+    section(&mut list, "Fits of the equation error", all);
+    let level = (2.0, Some([1.95, 2.05]));
+    let all = [
+        findings::jumps("stiffness", "N/m", &[], &[level]).text,
+        findings::jumps("stiffness", "N/m", &[12.02], &[level, (1.6, None)]).text,
+        findings::jumps("stiffness", "N/m", &[4.0, 12.02], &[level; 3]).text,
+    ];
+    section(&mut list, "Jumps of a function", all);
     let all = starts();
     let all = all
         .iter()
@@ -702,6 +717,25 @@ fn classifications() -> Vec<FunctionClassification> {
         identified_range: None,
     };
     all.into_iter().map(of).collect()
+}
+
+fn conditions() -> Vec<Condition> {
+    samples![
+        Condition::Smoothness => Condition::Smoothness,
+        Condition::Basis => Condition::Basis,
+        Condition::Input => Condition::Input,
+        Condition::NegligibleNoise => Condition::NegligibleNoise,
+        Condition::Jumps => Condition::Jumps,
+    ]
+}
+
+fn no_intervals() -> Vec<NoIntervals> {
+    samples![
+        NoIntervals::ManyParameters => NoIntervals::ManyParameters,
+        NoIntervals::ManySamples => NoIntervals::ManySamples,
+        NoIntervals::ScaleOverTime => NoIntervals::ScaleOverTime,
+        NoIntervals::NoMinimum => NoIntervals::NoMinimum,
+    ]
 }
 
 fn starts() -> Vec<(MultistartFinding, usize)> {

@@ -499,9 +499,9 @@ fn penalties() {
       expected: a number, 0 or more
     ");
     assert_snapshot!(with("penalty: {kind: tv, weight: gcv}"), @"
-    m.yaml:5:62: functions.mass.penalty.weight: total variation has no rule for its weight
+    m.yaml:5:62: functions.mass.penalty.weight: the weight of total variation has the rule `bic` only
       found: `gcv`
-      expected: a finite number
+      expected: `bic`, or a finite number
     ");
     assert_snapshot!(with("variation: 1"), @"
     m.yaml:5:34: functions.mass: unknown key

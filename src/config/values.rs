@@ -289,6 +289,9 @@ choice! {
         RestrictedLikelihood = "reml",
         /// Weight at which the function resolves changes within one dominant period of the response.
         Period = "period",
+        /// For `tv`: Bayesian information criterion with the number of levels as degrees of freedom; then a fit without the
+        /// penalty on the jumps found.
+        Bic = "bic",
     }
 }
 

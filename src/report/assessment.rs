@@ -8,26 +8,29 @@ use super::run::FittedModel;
 use crate::finding::Finding;
 use crate::number_format::resolved;
 use kmcfit_core::internals::assessment::{FitWarning, FunctionSummary, function_summaries};
+use kmcfit_core::internals::diagnostics::student_half_width;
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::{
     Classification, FunctionClassification, structural_rank,
 };
+use kmcfit_core::internals::problem::Jumps;
 use std::collections::BTreeMap;
 
 impl FittedModel<'_> {
     /// Findings and warnings on identifiability: the structural rank, the classification of the functions and the
-    /// plausibility of the fit. A fit of the equation error simulates no response and has none of them.
+    /// plausibility of the fit. A fit of the equation error simulates no response and has the classification alone.
     pub(super) fn identifiability(&self) -> IdentifiabilitySummary {
         let problem = &self.model.problem;
         let mut summary = IdentifiabilitySummary {
             parameters: problem.parameters(),
             assumptions: assumptions(problem),
+            covariance: (self.run_assessment.bands())
+                .map(|bands| bands.covariance_kind)
+                .unwrap_or_default(),
             ..IdentifiabilitySummary::default()
         };
         let Some(assessment) = &self.run_assessment.assessment else {
-            let text = "a fit of the equation error gives no confidence intervals, and noise biases its estimates; refine \
-                        it with `method: gauss-newton` and `initial: data`";
-            summary.warnings.push(Finding::new("equation_error", text));
+            self.add_equation_error(&mut summary);
             return summary;
         };
         let count = structural_rank(problem);
@@ -56,6 +59,9 @@ impl FittedModel<'_> {
         for finding in &count.findings {
             add(finding.is_warning(), findings::rank(finding));
         }
+        for jumps in &problem.jumps {
+            add(false, self.jumps(jumps));
+        }
         for classification in classifications {
             if classification.verdict != Classification::Fixed {
                 add(
@@ -81,6 +87,46 @@ impl FittedModel<'_> {
         summary
     }
 
+    /// The jumps found in a function, with the levels between them.
+    fn jumps(&self, jumps: &Jumps) -> Finding {
+        let problem = &self.model.problem;
+        let function = problem.functions.get(jumps.function);
+        let range = problem.functions.ranges()[jumps.function].clone();
+        let theta = &self.fit.best.parameters[range.clone()];
+        let errors = self.run_assessment.errors();
+        let interval = |(value, j): (&f64, usize)| {
+            let errors = errors?;
+            let covariance = errors.covariance?;
+            let error = covariance[(j, j)].sqrt();
+            let half = student_half_width(errors.degrees_of_freedom[j]) * error;
+            Some([value - half, value + half])
+        };
+        let levels = theta.iter().zip(range);
+        let levels: Vec<_> = levels
+            .map(|(value, j)| (*value, interval((value, j))))
+            .collect();
+        findings::jumps(&function.name(), self.unit(function), &jumps.times, &levels)
+    }
+
+    /// Adds the classification of a fit of the equation error, and the bias of its estimates.
+    fn add_equation_error(&self, summary: &mut IdentifiabilitySummary) {
+        let Some(equation) = &self.run_assessment.equation else {
+            return;
+        };
+        summary
+            .warnings
+            .push(findings::equation_error(equation.as_ref().err()));
+        let Ok(intervals) = equation else {
+            return;
+        };
+        summary.findings.push(findings::kernel_covariance());
+        let judged = intervals.classifications.iter();
+        let judged = judged.filter(|c| c.verdict != Classification::Fixed);
+        summary
+            .warnings
+            .extend(judged.map(findings::classification));
+    }
+
     /// Warning where the whole confidence interval of a constant damping is negative.
     fn negative_damping(&self) -> Option<Finding> {
         let summaries = self.function_summaries();
@@ -99,8 +145,8 @@ impl FittedModel<'_> {
 
     pub(super) fn function_summaries(&self) -> BTreeMap<String, FunctionSummary> {
         let (problem, truth) = (&self.model.problem, self.model.truth.as_ref());
-        let assessment = self.run_assessment.assessment.as_ref();
-        let summaries = function_summaries(problem, self.fit, assessment, truth);
+        let errors = self.run_assessment.errors();
+        let summaries = function_summaries(problem, self.fit, errors, truth);
         let named = problem.functions.iter().zip(summaries);
         named
             .map(|(function, summary)| {

@@ -32,6 +32,10 @@ pub fn assumptions(problem: &Problem) -> Vec<String> {
         let name = problem.functions.get(variation.function).name();
         known.push(format!("{name}: total variation penalised"));
     }
+    for jumps in &problem.jumps {
+        let name = problem.functions.get(jumps.function).name();
+        known.push(format!("{name}: constant between jumps"));
+    }
     known.extend(problem.soft.iter().map(|g| format!("{} (soft)", g.name)));
     known
 }

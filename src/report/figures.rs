@@ -327,9 +327,16 @@ pub fn weight_path(path: &WeightPath) -> Figure {
                 style,
             ))
         });
+        // Only total variation has a criterion on its path, and its rule alone.
+        let is_bic = path.points.iter().any(|p| p.bic.is_some());
+        let bic = is_bic.then(|| {
+            let style = Style::nth(1).dash(Dash::Dashed);
+            Mark::vertical(WeightRule::Bic.name(), path.chosen_weight(), style)
+        });
         Panel::new(Axis::log("weight", ""), Axis::log(label, ""))
             .mark(Mark::line(label, &weights, &values, style))
             .marks(picks)
+            .marks(bic)
     };
     Figure::new(
         "weights",

@@ -1,9 +1,9 @@
 //! Findings and warnings about a fit, from the typed results of the core.
 
 use crate::finding::Finding;
-use crate::number_format::{significant, times_in_words};
+use crate::number_format::{resolved, significant, times_in_words};
 use kmcfit_core::internals::assessment::{
-    CoarseBasis, FitWarning, GapAssessment, GapStatus, Unidentified,
+    CoarseBasis, FitWarning, GapAssessment, GapStatus, NoIntervals, Unidentified,
 };
 use kmcfit_core::internals::identifiability::{
     Classification, FunctionClassification, RankFinding, span_words,
@@ -50,6 +50,65 @@ pub fn unidentified(reason: &Unidentified) -> Finding {
         Unidentified::Noise => "the model would fit white noise equally well".into(),
     };
     Finding::of(reason, format!("no system identified: {why}"))
+}
+
+/// The bias of a fit of the equation error, and the reason why it has no confidence intervals, if it has none.
+pub fn equation_error(reason: Option<&NoIntervals>) -> Finding {
+    let intervals = match reason {
+        None => ", and the intervals exclude this bias".to_owned(),
+        Some(reason) => format!("; no confidence intervals: {}", no_intervals(*reason)),
+    };
+    let text = format!(
+        "noise of the measured response biases the estimates of the equation error{intervals}; refine the fit with \
+         `method: gauss-newton` and `initial: data`"
+    );
+    Finding::new("equation_error", text)
+}
+
+/// The reason why a fit of the equation error has no confidence intervals, in words.
+fn no_intervals(reason: NoIntervals) -> &'static str {
+    match reason {
+        NoIntervals::ManyParameters => "more than 64 parameters",
+        NoIntervals::ManySamples => "too many samples for a covariance of so many parameters",
+        NoIntervals::ScaleOverTime => {
+            "m, c and k are determined only up to a common factor at every time"
+        }
+        NoIntervals::NoMinimum => "no admissible minimum",
+    }
+}
+
+/// The covariance of a fit of the equation error.
+pub fn kernel_covariance() -> Finding {
+    Finding::new(
+        "kernel_covariance",
+        "intervals from a heteroscedasticity- and autocorrelation-consistent covariance",
+    )
+}
+
+/// The jumps found in a function: its name, unit, and each level with its 95 % interval, where it has one.
+pub fn jumps(name: &str, unit: &str, times: &[f64], levels: &[(f64, Option<[f64; 2]>)]) -> Finding {
+    let level = |(value, interval): &(f64, Option<[f64; 2]>)| match interval {
+        Some([low, high]) => {
+            let half = 0.5 * (high - low);
+            let [value, low, high] = resolved([*value, *low, *high], half);
+            format!("{value} {unit} (95 % CI {low} to {high})")
+        }
+        None => format!("{} {unit}", significant(*value, 4)),
+    };
+    let mut text = match times.len() {
+        0 => format!("no jump of {name} found: "),
+        1 => format!("1 jump of {name} found: "),
+        count => format!("{count} jumps of {name} found: "),
+    };
+    for (i, each) in levels.iter().enumerate() {
+        if i > 0 {
+            text += &format!("; from {} s ", significant(times[i - 1], 5));
+        }
+        text += &level(each);
+    }
+    let values: Vec<f64> = levels.iter().map(|(value, _)| *value).collect();
+    let finding = Finding::new("jumps", text).with("function", name);
+    finding.with("times", times).with("levels", values)
 }
 
 /// A validation record that the fit does not predict: name, and fit in per cent.

@@ -2,7 +2,10 @@
 
 use super::channel_view::ChannelView;
 use crate::config::{HoldOut, Model};
-use kmcfit_core::internals::assessment::{FitAssessment, POOR, StepCheck, diagnostics};
+use kmcfit_core::internals::assessment::{
+    EquationErrorIntervals, EstimateErrors, FitAssessment, NoIntervals, POOR, StepCheck,
+    diagnostics,
+};
 use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
@@ -15,6 +18,8 @@ use nalgebra::DMatrix;
 pub struct RunAssessment {
     /// `None` for the equation error, which simulates no response.
     pub(super) assessment: Option<FitAssessment>,
+    /// Intervals of a fit of the equation error, or the reason why there are none; `None` for other fits, and without parameters.
+    pub(super) equation: Option<Result<EquationErrorIntervals, NoIntervals>>,
     /// Validation records.
     pub(super) validation: Vec<ValidationRecord>,
 }
@@ -27,6 +32,8 @@ impl RunAssessment {
         Self {
             assessment: is_simulated
                 .then(|| FitAssessment::of(&model.problem, fit, model.tests_bases)),
+            equation: (!is_simulated && model.problem.parameters() > 0)
+                .then(|| EquationErrorIntervals::of(&model.problem, fit)),
             validation: validation
                 .map(|out| ValidationRecord::of(model, fit, out))
                 .collect(),
@@ -40,7 +47,18 @@ impl RunAssessment {
 
     /// Bands of functions and ratios, if standard errors are meaningful.
     pub(super) fn bands(&self) -> Option<&Bands> {
-        self.assessment.as_ref()?.bands.as_ref()
+        match (&self.assessment, &self.equation) {
+            (Some(assessment), _) => assessment.bands.as_ref(),
+            (None, equation) => Some(&equation.as_ref()?.as_ref().ok()?.bands),
+        }
+    }
+
+    /// Errors of the estimates.
+    pub(super) fn errors(&self) -> Option<EstimateErrors<'_>> {
+        match (&self.assessment, &self.equation) {
+            (Some(assessment), _) => Some(assessment.errors()),
+            (None, equation) => Some(equation.as_ref()?.as_ref().ok()?.errors()),
+        }
     }
 
     /// The step-size check, if there is a response on the finer grid.

@@ -30,6 +30,7 @@ mod fit_figures;
 mod fit_quality;
 mod page;
 mod result_table;
+mod rule_names;
 mod run;
 mod run_reader;
 pub mod study;

@@ -215,6 +215,7 @@ impl FittedModel<'_> {
             .iter()
             .zip(path.picks)
             .filter_map(|(rule, pick)| Some((rule.name().to_string(), path.points[pick?].weight)));
+        let bic = (rule == WeightRule::Bic).then(|| (rule.name().to_owned(), path.chosen_weight()));
         let point = |p: &PathPoint| PathPointSummary {
             weight: p.weight,
             iterations: p.iterations,
@@ -224,11 +225,12 @@ impl FittedModel<'_> {
                 .degrees_of_freedom
                 .is_finite()
                 .then_some(p.degrees_of_freedom),
+            bic: p.bic,
         };
         Some(WeightSummary {
             rule: rule.name().into(),
             weight: path.chosen_weight(),
-            picks: picks.collect(),
+            picks: picks.chain(bic).collect(),
             seed: path.seed,
             remark: path.remark.clone(),
             path: path.points.iter().map(point).collect(),

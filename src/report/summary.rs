@@ -2,6 +2,7 @@
 
 use super::document::{ChannelSummary, PenaltySummary, Prediction, ResultDocument};
 use super::estimates::estimates;
+use super::rule_names::rule_in_words;
 use super::suggestions;
 use crate::finding::Finding;
 use crate::number_format::{resolved, significant};
@@ -256,16 +257,6 @@ pub(super) fn iterations(document: &ResultDocument) -> String {
     match what.is_empty() {
         true => all,
         false => format!("{all} ({last} in the final fit, {others} {what})"),
-    }
-}
-
-/// Name of a rule for the weight of a penalty in a sentence.
-fn rule_in_words(rule: &str) -> &str {
-    match WeightRule::OF_PATHS.into_iter().find(|r| r.name() == rule) {
-        Some(WeightRule::Discrepancy) => "the discrepancy principle",
-        Some(WeightRule::LCurve) => "the L-curve",
-        Some(WeightRule::Gcv) => "generalised cross-validation",
-        _ => rule,
     }
 }
 

@@ -324,3 +324,87 @@ fit: {{stop: {{iterations: 100, tolerance: 1e-12}}}}
         );
     }
 }
+
+/// A jump of the stiffness at noise of 3 %: its time and levels are a finding, and the stiffness is conditional on it.
+#[test]
+fn jumps_of_a_stiffness() {
+    let bench = Workbench::empty();
+    bench.write("k.csv", "t_s,k\n0,4\n11.99,4\n12.01,3.2\n24,3.2\n");
+    let device = "format: 1
+experiments:
+  - initial: {displacement: 1.0, velocity: 0.0}
+grid: {nodes: 801, method: rk4, duration: 24.0}
+functions:
+  mass: {fixed: 1.0}
+  damping: {fixed: 0.06}
+  stiffness: {fixed: {data: k.csv, column: k}}
+";
+    bench.write("device.yaml", device);
+    bench.run_to(
+        0,
+        &[
+            "simulate",
+            "device.yaml",
+            "--out",
+            "samples.csv",
+            "--noise",
+            "0.015",
+            "--seed",
+            "7",
+        ],
+    );
+    let model = "format: 1
+experiments:
+  - data: samples.csv
+    initial: {displacement: 1.0, velocity: 0.0}
+    sigma: {displacement: estimate}
+functions:
+  mass: {fixed: 1.0}
+  damping: {basis: constant, start: 0.1}
+  stiffness: {basis: piecewise-constant, knots: 41, start: 5.0, penalty: {kind: tv, weight: bic}}
+";
+    let result = fitted(&bench, model);
+    assert_eq!(result["weights"]["rule"], "bic");
+    let findings = result["identifiability"]["findings"]
+        .as_array()
+        .expect("a list");
+    let jumps = findings
+        .iter()
+        .find(|f| f["kind"] == "jumps")
+        .expect("the jumps");
+    let times = jumps["times"].as_array().expect("a list");
+    assert_eq!(times.len(), 1);
+    assert!((number(&times[0]) - 12.0).abs() < 0.7, "{times:?}");
+    assert_eq!(result["functions"]["stiffness"]["verdict"], "conditional");
+    println!("{jumps:#}");
+}
+
+/// A fit of the equation error states the kind of its covariance once, and every coefficient is conditional on negligible noise.
+#[test]
+fn intervals_of_the_equation_error() {
+    let bench = Workbench::with_shipped_models();
+    let method = "fit.method=equation-error";
+    let model = [
+        "fit",
+        "models/duffing.yaml",
+        "--set",
+        method,
+        "--out",
+        "run",
+    ];
+    let summary = bench.run_to(0, &model);
+    let kind = "heteroscedasticity- and autocorrelation-consistent covariance";
+    assert_eq!(summary.matches(kind).count(), 1, "{summary}");
+    let text = bench.read("run/result.json");
+    let result: Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!(result["identifiability"]["covariance"], "kernel");
+    for function in ["mass", "damping", "stiffness", "cubic_stiffness"] {
+        let found = &result["functions"][function];
+        assert_eq!(found["verdict"], "conditional");
+        assert!(number(&found["standard_error"]) > 0.0);
+    }
+    let warnings = result["identifiability"]["warnings"].as_array();
+    let conditional = warnings.expect("a list").iter();
+    let conditional = conditional.filter(|w| w["condition"] == "negligible-noise");
+    assert_eq!(conditional.count(), 6);
+}

@@ -244,6 +244,81 @@ fn penalties_and_rules() {
     ");
 }
 
+/// The rule of total variation: one function with levels, one rule, a likelihood.
+#[test]
+fn jumps_by_bic() {
+    let with = |damping: &str| {
+        let changed = text("").replace("start: 1}", &format!("start: 1, {damping}}}"));
+        let changed = changed.replace("constraints: \n", "");
+        changed.replace(
+            "    initial:",
+            "    sigma: {displacement: 0.1}\n    initial:",
+        )
+    };
+    let bic = "penalty: {kind: tv, weight: bic}";
+    let found = read(&with(bic)).unwrap_or_else(|error| panic!("{error}"));
+    let search = found.weight_rule.expect("a rule");
+    assert_eq!((search.rule.name(), search.penalties), ("bic", vec![0]));
+    assert_eq!(found.problem.variations[0].weight, 1.0);
+
+    let without = with(bic).replace("    sigma: {displacement: 0.1}\n", "");
+    assert_snapshot!(said(&without), @"
+    m.yaml:9:65: functions.damping.penalty.weight: the rule `bic` needs a likelihood of the samples
+      found: no `sigma` in experiments[0]
+      expected: `sigma` in every experiment, a number or `estimate`; or a number for the weight
+    ");
+    assert_snapshot!(said(&with("penalty: {kind: tv, weight: bci}")), @"
+    m.yaml:10:65: functions.damping.penalty.weight: unknown choice
+      found: `bci`
+      expected: a finite number, or one of: discrepancy, l-curve, gcv, reml, period, bic
+      hint: did you mean `bic`?
+    ");
+    assert_snapshot!(said(&with("penalty: {kind: tikhonov, order: 1, weight: bic}")), @"
+    m.yaml:10:81: functions.damping.penalty.weight: the rule `bic` applies to total variation only
+      found: `kind: tikhonov`
+      expected: `kind: tv`, or `reml`, `discrepancy`, `l-curve`, `gcv` or a number
+    ");
+    assert_snapshot!(said(&with("penalty: [{kind: tv, weight: bic}, {kind: tikhonov, order: 1, weight: 2}]")), @"
+    m.yaml:10:66: functions.damping.penalty[0].weight: a function with the rule `bic` has no other penalty
+      found: several penalties of the function
+      expected: `{kind: tv, weight: bic}` alone
+    ");
+    let spline = with(bic).replace("{basis: nodal", "{basis: piecewise-linear, knots: 5");
+    assert_snapshot!(said(&spline), @"
+    m.yaml:10:86: functions.damping.penalty.weight: the rule `bic` needs a basis of levels
+      found: `piecewise-linear`
+      expected: `basis: piecewise-constant` or `basis: nodal`, or a number for the weight
+    ");
+    let mass = |penalty: &str| {
+        let mass = format!("start: 2, penalty: {penalty}}}");
+        said(
+            &with(bic)
+                .replace("start: 2}", &mass)
+                .replace("basis: piecewise-linear", "basis: piecewise-constant"),
+        )
+    };
+    assert_snapshot!(mass("{kind: tv, weight: bic}"), @"
+    m.yaml:10:65: functions.damping.penalty.weight: the rule `bic` is the only rule of a model, for one function
+      found: `bic` beside `bic`
+      expected: one rule, and numbers for the other weights
+    ");
+    assert_snapshot!(mass("{kind: tikhonov, order: 1, weight: reml}"), @"
+    m.yaml:10:65: functions.damping.penalty.weight: the rule `bic` is the only rule of a model, for one function
+      found: `bic` beside `reml`
+      expected: one rule, and numbers for the other weights
+    ");
+    assert_snapshot!(said(&format!("{}fit: {{method: equation-error}}\n", with(bic))), @"
+    m.yaml:10:65: functions.damping.penalty.weight: the method `equation-error` has no search for the weight
+      found: `bic`
+      expected: a number, or `method: gauss-newton`
+    ");
+    assert_snapshot!(said(&format!("{}fit: {{method: lbfgs}}\n", with(bic))), @"
+    m.yaml:12:15: fit.method: this method does not support total variation
+      found: `lbfgs`
+      expected: `gauss-newton`, which does
+    ");
+}
+
 #[test]
 fn contradictions_name_their_lines() {
     assert_snapshot!(message("

@@ -3,11 +3,11 @@
 
 pub mod assessment {
     pub use crate::assessment::{
-        BEYOND_SIGMA, BasisTest, CoarseBasis, EXACT, FitAssessment, FitStatistics, FitWarning,
-        FunctionInGap, FunctionSummary, GapAssessment, GapStatus, POOR, Plausibility,
-        RECOVERY_TOLERANCE, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
-        constant_probability, diagnostics, function_summaries, is_same_truth, outliers, pattern,
-        standard_error,
+        BEYOND_SIGMA, BasisTest, CoarseBasis, EXACT, EquationErrorIntervals, EstimateErrors,
+        FitAssessment, FitStatistics, FitWarning, FunctionInGap, FunctionSummary, GapAssessment,
+        GapStatus, NoIntervals, POOR, Plausibility, RECOVERY_TOLERANCE, ResidualPattern, Roughness,
+        StepCheck, TruthErrors, Unidentified, constant_probability, diagnostics,
+        function_summaries, is_same_truth, outliers, pattern, standard_error,
     };
 }
 pub mod builder {
@@ -42,10 +42,10 @@ pub mod host {
 pub mod identifiability {
     pub use crate::identifiability::{
         Band, BandSettings, BandSide, Bands, CandidateChannel, CandidateExperiment, Classification,
-        ClassificationKind, Condition, FunctionClassification, Gain, RankFinding, RankFindingKind,
-        Ranked, ResolvedDirection, ScaleFreedom, ScalingAmbiguity, Sensitivity, SingularSpectrum,
-        anchors, classify_functions, is_negligible, is_unhindered, rank_experiments,
-        residual_spread, structural_rank,
+        ClassificationKind, Condition, CovarianceKind, EquationRows, FunctionClassification, Gain,
+        RankFinding, RankFindingKind, Ranked, ResolvedDirection, ScaleFreedom, ScalingAmbiguity,
+        Sensitivity, SingularSpectrum, anchors, classify_functions, is_negligible, is_unhindered,
+        rank_experiments, residual_spread, structural_rank,
     };
     pub use crate::spans::span_words;
 }
@@ -55,13 +55,16 @@ pub mod objective {
     };
 }
 pub mod problem {
-    pub use crate::problem::{Problem, ProblemError, ProblemParts};
+    pub use crate::problem::{Jumps, Problem, ProblemError, ProblemParts};
 }
 pub mod qp {
     pub use crate::qp::{ConicStatus, Kkt, ResponseVariables, StageLayout, Subproblem, project};
 }
 pub mod noise {
-    pub use crate::noise::{Correlation, CorrelationLaw};
+    pub use crate::noise::{
+        Correlation, CorrelationLaw, KernelCovariance, automatic_bandwidth, kernel_sum,
+        quadratic_spectral,
+    };
 }
 pub mod number_format {
     pub use crate::number_format::significant;
@@ -96,8 +99,8 @@ pub mod solvers {
         Measurements, MissingMeasurement, Observer, Optimality, PathPoint, QpSolver, Reason,
         Solver, SolverState, StartProjection, StartStrategy, Status, Stopping, UnsupportedRecord,
         WeightPath, active_constraints, choose_weight, choose_weight_watched, cycles,
-        equation_error, estimate_states, fit, fit_from, fit_with_noise, fit_with_noise_watched,
-        no_response, number_or_nan, predict_validation, timed,
+        equation_error, equation_rows, estimate_states, fit, fit_from, fit_with_noise,
+        fit_with_noise_watched, no_response, number_or_nan, predict_validation, timed,
     };
 }
 pub mod study {

@@ -28,6 +28,17 @@ pub struct ProblemParts {
     pub constraints: Constraints,
     /// Soft constraints.
     pub soft: Vec<RowGroup>,
+    /// Jumps found in functions, on which all estimates are conditional.
+    pub jumps: Vec<Jumps>,
+}
+
+/// Jumps found in a function by the rule `bic` of its total variation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Jumps {
+    /// Index of the function, mass 0.
+    pub function: usize,
+    /// Times of the jumps, s; none for a constant.
+    pub times: Vec<f64>,
 }
 
 /// A consistent problem; its parts are read-only.
@@ -179,6 +190,7 @@ impl Problem {
             variations: Vec::new(),
             constraints: Constraints::default(),
             soft: Vec::new(),
+            jumps: Vec::new(),
         };
         parts.check().map(|()| Self(parts))
     }

@@ -235,18 +235,7 @@ fn penalty(
     let reference = reference.map(|r| history(file, grid, &format!("{key}.reference"), r));
     Ok(PenaltySpec::Tikhonov {
         order,
-        weight: match given.weight {
-            Weight::Number(weight) => PenaltyWeight::Given(weight.0),
-            Weight::Rule(WeightRule::Period) => PenaltyWeight::Period,
-            Weight::Rule(WeightRule::Discrepancy) => {
-                PenaltyWeight::Rule(functions::WeightRule::Discrepancy)
-            }
-            Weight::Rule(WeightRule::LCurve) => PenaltyWeight::Rule(functions::WeightRule::LCurve),
-            Weight::Rule(WeightRule::Gcv) => PenaltyWeight::Rule(functions::WeightRule::Gcv),
-            Weight::Rule(WeightRule::RestrictedLikelihood) => {
-                PenaltyWeight::Rule(functions::WeightRule::RestrictedLikelihood)
-            }
-        },
+        weight: penalty_weight(given.weight),
         reference: reference.transpose()?,
     })
 }
@@ -270,16 +259,23 @@ fn total_variation(
             .found(format!("`{other}` beside `kind: tv`"))
             .expected(format!("no `{other}`, or `kind: tikhonov`")));
     }
-    match given.weight {
-        Weight::Number(Number(weight)) => Ok(PenaltySpec::TotalVariation { weight }),
-        Weight::Rule(rule) => Err(file
-            .error_at(
-                &format!("{key}.weight"),
-                "total variation has no rule for its weight",
-            )
-            .found(format!("`{rule}`"))
-            .expected("a finite number")),
-    }
+    let weight = penalty_weight(given.weight);
+    Ok(PenaltySpec::TotalVariation { weight })
+}
+
+fn penalty_weight(given: Weight) -> PenaltyWeight {
+    let rule = match given {
+        Weight::Number(Number(weight)) => return PenaltyWeight::Given(weight),
+        Weight::Rule(WeightRule::Period) => return PenaltyWeight::Period,
+        Weight::Rule(WeightRule::Discrepancy) => functions::WeightRule::Discrepancy,
+        Weight::Rule(WeightRule::LCurve) => functions::WeightRule::LCurve,
+        Weight::Rule(WeightRule::Gcv) => functions::WeightRule::Gcv,
+        Weight::Rule(WeightRule::RestrictedLikelihood) => {
+            functions::WeightRule::RestrictedLikelihood
+        }
+        Weight::Rule(WeightRule::Bic) => functions::WeightRule::Bic,
+    };
+    PenaltyWeight::Rule(rule)
 }
 
 /// A constant, or a column named by `key`, interpolated at the nodes.

@@ -145,12 +145,12 @@ keys! {
             example "2",
             range "0, 1 or 2",
             needs "`kind: tikhonov`";
-        /// Weight of the penalty in J, or for `tikhonov` the rule that chooses it.
+        /// Weight of the penalty in J, or the rule that chooses it.
         weight: Weight,
             example "0.1",
             unit "of J per unit of the measure",
             range "0 or more",
-            needs "a rule: `kind: tikhonov` and method gauss-newton; discrepancy and reml also `sigma` (for reml a number or `estimate`); period: order 1 or 2 and method equation-error";
+            needs "a rule: method gauss-newton, and `kind: tikhonov` except for bic; discrepancy, reml and bic also `sigma` (for reml and bic a number or `estimate`); bic: `kind: tv` and basis nodal or piecewise-constant; period: order 1 or 2 and method equation-error";
         /// For `tikhonov` of order 0: the reference values.
         reference: Option<NumberOrColumn>,
             example "1.0",

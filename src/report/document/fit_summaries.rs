@@ -30,8 +30,8 @@ pub struct WeightSummary {
     pub rule: String,
     /// Weight used for the fit.
     pub weight: f64,
-    /// Weight chosen on the path by each rule, keyed by rule name (`discrepancy`, `l-curve`, `gcv`); rules that choose none are
-    /// omitted.
+    /// Weight chosen on the path by each rule, keyed by rule name (`discrepancy`, `l-curve`, `gcv`; `bic` on a path of total
+    /// variation); rules that choose none are omitted.
     pub picks: BTreeMap<String, f64>,
     /// Seed of the random probe vectors used to estimate the effective degrees of freedom.
     pub seed: u64,
@@ -60,11 +60,14 @@ pub struct PathPointSummary {
     /// Misfit: part of J from the samples.
     pub misfit: f64,
     /// Unweighted penalty `|L theta - target|^2` with `L` the roughness rows (for target 0 the integral of the squared
-    /// derivative), summed over the penalties on the path.
+    /// derivative), summed over the penalties on the path; on a path of total variation that variation.
     pub roughness: f64,
     /// Effective number of parameters that the data determine; absent if not finite.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<f64>,
+    /// Bayesian information criterion, on a path of total variation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bic: Option<f64>,
 }
 
 /// A penalty on the roughness of a function.

@@ -13,6 +13,7 @@ use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
 use kmcfit_core::internals::assessment::{FitStatistics, FunctionSummary, StepCheck};
 use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::internals::identifiability::CovarianceKind;
 use kmcfit_core::internals::solvers::{Optimality, Status, number_or_nan};
 pub use kmcfit_core::internals::study::PredictionSummary as Prediction;
 use kmcfit_core::internals::system::Grid;
@@ -295,6 +296,10 @@ pub struct IdentifiabilitySummary {
     pub warnings: Vec<Finding>,
     /// Assumptions of the model beside the records: fixed functions, bases, constraints, penalties.
     pub assumptions: Vec<String>,
+    /// Kind of the covariance of the intervals: `penalised`, `bayesian` or `kernel`; absent for the inverse of the information of
+    /// the samples, and without intervals.
+    #[serde(default, skip_serializing_if = "CovarianceKind::is_information")]
+    pub covariance: CovarianceKind,
 }
 
 /// The constraints at the best point.

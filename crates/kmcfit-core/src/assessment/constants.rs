@@ -22,7 +22,7 @@ pub fn standard_error(
 /// a chi-square distribution with one degree of freedom less than there are parameters; divided by that number, an F
 /// distribution where the noise is estimated from the residuals. A penalised function with `effective` parameters counts as having
 /// that many, rounded: `C` is inverted on as many of its directions of largest variance less one (Wood 2013). `None` for a function whose basis contains no constant, or
-/// nothing else, and under a robust loss, which has another covariance.
+/// nothing else, for one whose jumps were found in the same samples, and under a robust loss, which has another covariance.
 pub fn constant_probability(
     problem: &Problem,
     f: usize,
@@ -42,7 +42,8 @@ pub fn constant_probability(
         | Basis::BSpline { .. } => DVector::from_element(n, 1.0),
     };
     let is_robust = problem.channels().any(|c| c.loss() != Loss::Squares);
-    if is_robust || function.offset.iter().any(|x| *x != 0.0) {
+    let is_found = problem.jumps.iter().any(|jumps| jumps.function == f);
+    if is_robust || is_found || function.offset.iter().any(|x| *x != 0.0) {
         return None;
     }
     let block = covariance.view((range.start, range.start), (n, n));

@@ -1,14 +1,32 @@
 //! Summary of each coefficient function of a fit.
 
-use super::{FitAssessment, constant_probability, standard_error};
+use super::{constant_probability, standard_error};
 use crate::diagnostics::student_half_width;
 use crate::functions::basis::physical_powers;
 use crate::functions::{Basis, CoefficientFunction};
-use crate::identifiability::{ClassificationKind, is_negligible, is_unhindered};
+use crate::identifiability::{
+    ClassificationKind, FunctionClassification, is_negligible, is_unhindered,
+};
 use crate::problem::Problem;
 use crate::solvers::{Fit, Status, number_or_nan};
 use crate::system::NodalCoefficients;
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
+
+/// Errors of the estimates of a fit.
+#[derive(Debug, Clone, Copy)]
+pub struct EstimateErrors<'a> {
+    /// Covariance of the parameters, where standard errors are meaningful.
+    pub covariance: Option<&'a DMatrix<f64>>,
+    /// Degrees of freedom of the estimate of each parameter.
+    pub degrees_of_freedom: &'a [f64],
+    /// Classification of functions and ratios, functions first.
+    pub classifications: &'a [FunctionClassification],
+    /// Effective number of parameters of the function of each penalty, where there are penalties.
+    pub effective_parameters: Option<&'a [f64]>,
+    /// True if residuals that may be noise permit the test of a constant.
+    pub tests_constants: bool,
+}
 
 /// Largest distance from an active bound, relative to its scale.
 const NEAR: f64 = 1e-6;
@@ -89,28 +107,28 @@ fn is_at_bound(problem: &Problem, theta: &[f64], parameter: usize) -> bool {
 pub fn function_summaries(
     problem: &Problem,
     fit: &Fit,
-    assessment: Option<&FitAssessment>,
+    errors: Option<EstimateErrors>,
     truth: Option<&NodalCoefficients>,
 ) -> Vec<FunctionSummary> {
     let theta = &fit.best.parameters;
     let sizes = problem.natural_scales(&fit.best.evaluation);
-    let is_white = assessment.is_some_and(|a| !a.plausibility.is_coloured);
+    let is_white = errors.is_some_and(|e| e.tests_constants);
     let is_minimum = fit.outcome.status == Status::Converged;
-    let covariance = assessment.and_then(|a| a.covariance.as_ref());
+    let covariance = errors.and_then(|e| e.covariance);
     let free = covariance.filter(|_| is_white && is_minimum && is_unhindered(problem, theta));
     let values = problem.functions.values(theta);
     let functions = problem.functions.iter().zip(&values).enumerate();
     let summary = |(i, (function, values)): (usize, (&CoefficientFunction, &Vec<f64>))| {
         let range = problem.functions.ranges()[i].clone();
         // Classifications of the functions come first, in their order.
-        let judged = assessment.and_then(|a| a.classifications.get(i));
+        let judged = errors.and_then(|e| e.classifications.get(i));
         let largest = values.iter().fold(0.0f64, |most, x| most.max(x.abs()));
         let truth = truth.and_then(|truth| truth.functions().nth(i));
-        let errors = truth.map(|truth| -> Vec<f64> {
+        let differences = truth.map(|truth| -> Vec<f64> {
             let pairs = values.iter().zip(truth);
             pairs.map(|(a, b)| (a - b).abs()).collect()
         });
-        let errors = errors.as_ref();
+        let differences = differences.as_ref();
         let rms = |e: &Vec<f64>| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt();
         // Zero but for rounding where an equality holds the constant.
         let error = standard_error(function, range.start, covariance)
@@ -131,24 +149,24 @@ pub fn function_summaries(
                 _ => None,
             },
             standard_error: error,
-            degrees_of_freedom: assessment
+            degrees_of_freedom: errors
                 .filter(|_| error.is_some())
-                .map(|a| a.degrees_of_freedom[range.start])
+                .map(|e| e.degrees_of_freedom[range.start])
                 .filter(|degrees| degrees.is_finite()),
             constant_p_value: free.and_then(|covariance| {
-                let effective = effective(problem, i, assessment);
+                let effective = effective(problem, i, errors);
                 constant_probability(problem, i, theta, covariance, effective)
             }),
-            truth_max_error: errors.map(|e| e.iter().copied().fold(0.0, f64::max)),
-            truth_rms_error: errors.map(rms),
+            truth_max_error: differences.map(|e| e.iter().copied().fold(0.0, f64::max)),
+            truth_rms_error: differences.map(rms),
         }
     };
     functions.map(summary).collect()
 }
 
 /// Effective number of parameters of a penalised function.
-fn effective(problem: &Problem, f: usize, assessment: Option<&FitAssessment>) -> Option<f64> {
-    let effective = assessment?.effective_parameters.as_ref()?;
+fn effective(problem: &Problem, f: usize, errors: Option<EstimateErrors>) -> Option<f64> {
+    let effective = errors?.effective_parameters?;
     let mut penalties = problem.penalties.iter().zip(effective);
     penalties
         .find(|(p, _)| p.function == f)

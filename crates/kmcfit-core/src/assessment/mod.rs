@@ -2,6 +2,7 @@
 
 mod channel;
 mod constants;
+mod equation_error;
 mod function;
 mod gaps;
 mod input_disturbance;
@@ -14,7 +15,8 @@ mod step_check;
 pub use crate::objective::{diagnostics, outliers};
 pub use channel::{ResidualPattern, pattern};
 pub use constants::{constant_probability, standard_error};
-pub use function::{FunctionSummary, function_summaries};
+pub use equation_error::{EquationErrorIntervals, NoIntervals};
+pub use function::{EstimateErrors, FunctionSummary, function_summaries};
 pub use gaps::{FunctionInGap, GapAssessment, GapStatus};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
 pub use recovery::{RECOVERY_TOLERANCE, Roughness, TruthErrors, is_same_truth};
@@ -130,5 +132,16 @@ impl FitAssessment {
         let gaps = gaps.into_iter().map(FitWarning::Gap);
         assessment.plausibility.warnings.extend(gaps);
         assessment
+    }
+
+    /// Errors of the estimates, for the summaries of the functions.
+    pub fn errors(&self) -> EstimateErrors<'_> {
+        EstimateErrors {
+            covariance: self.covariance.as_ref(),
+            degrees_of_freedom: &self.degrees_of_freedom,
+            classifications: &self.classifications,
+            effective_parameters: self.effective_parameters.as_deref(),
+            tests_constants: !self.plausibility.is_coloured,
+        }
     }
 }

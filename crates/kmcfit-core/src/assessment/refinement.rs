@@ -122,7 +122,8 @@ impl FinerBases {
         let mut maps = Vec::with_capacity(list.len());
         for (index, function) in list.iter_mut().enumerate() {
             let is_penalised = problem.penalties.iter().any(|p| p.function == index)
-                || problem.variations.iter().any(|v| v.function == index);
+                || problem.variations.iter().any(|v| v.function == index)
+                || problem.jumps.iter().any(|j| j.function == index);
             let finer = function.basis.as_ref().filter(|_| !is_penalised);
             let map = finer
                 .and_then(|basis| finer_basis(problem, basis))

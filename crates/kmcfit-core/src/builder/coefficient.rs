@@ -47,8 +47,8 @@ pub enum PenaltySpec {
     },
     /// `weight * total variation of p`: equal for jumps and slow changes of the same height.
     TotalVariation {
-        /// Weight.
-        weight: f64,
+        /// Weight: a number, or the rule [`WeightRule::Bic`].
+        weight: PenaltyWeight,
     },
 }
 
@@ -174,6 +174,7 @@ impl CoefficientSpec {
     /// Penalty `weight * total variation`, equal for jumps and slow changes of the same height.
     #[must_use]
     pub fn total_variation(self, weight: f64) -> Self {
+        let weight = PenaltyWeight::Given(weight);
         self.penalty(PenaltySpec::TotalVariation { weight })
     }
 
@@ -280,9 +281,7 @@ impl CoefficientSpec {
 impl PenaltySpec {
     fn check(&self, key: &str, grid: &Grid) -> Result<(), BuildError> {
         let (order, weight, reference) = match self {
-            Self::TotalVariation { weight } => {
-                return check_weight(&format!("{key}.weight"), *weight);
-            }
+            Self::TotalVariation { weight } => (1, *weight, &None),
             Self::Tikhonov {
                 order,
                 weight,

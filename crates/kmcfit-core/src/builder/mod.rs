@@ -42,6 +42,7 @@ mod lowering;
 mod notice;
 mod penalties;
 mod record;
+mod variations;
 
 pub use basis::{BasisSpec, Knots};
 pub use coefficient::{CoefficientSpec, PenaltySpec, PenaltyWeight, Start};

@@ -1,9 +1,9 @@
-//! Penalties of a builder: Tikhonov and total-variation penalties of its functions.
+//! Penalties of a builder: Tikhonov penalties of its functions.
 
 use super::coefficient::{PenaltySpec, PenaltyWeight, values_at_nodes};
 use super::{BuildError, BuildNotice, Builder};
 use crate::constraints::TimeHistory;
-use crate::functions::{Basis, Penalty, TotalVariation, WeightRule};
+use crate::functions::{Basis, Penalty, WeightRule};
 use crate::problem::Problem;
 use crate::record::Weighting;
 use crate::solvers::Measurements;
@@ -39,7 +39,8 @@ impl Builder {
                         reference,
                     } => (*order, *weight, reference.as_ref()),
                     PenaltySpec::TotalVariation { weight } => {
-                        penalize_variation(problem, (j, &basis), &key, *weight)?;
+                        let function = (j, &basis);
+                        search = self.add_variation(problem, function, &key, *weight, search)?;
                         continue;
                     }
                 };
@@ -117,6 +118,12 @@ impl Builder {
         search: Option<&WeightSearch>,
     ) -> Result<(), BuildError> {
         let key = format!("{key}.weight");
+        if rule == WeightRule::Bic {
+            let problem = "the rule `bic` applies to total variation only";
+            return Err(BuildError::new(key, problem)
+                .found("`kind: tikhonov`")
+                .expected("`kind: tv`, or `reml`, `discrepancy`, `l-curve`, `gcv` or a number"));
+        }
         if self.is_equation_error() {
             let problem = "the method `equation-error` has no search for the weight";
             return Err(BuildError::new(key, problem)
@@ -143,7 +150,7 @@ impl Builder {
                 "the rule `reml` needs a likelihood of the samples",
                 "`sigma` in every experiment, a number or `estimate`; or `l-curve` or `gcv`, which do without",
             ),
-            WeightRule::LCurve | WeightRule::Gcv => return Ok(()),
+            WeightRule::LCurve | WeightRule::Gcv | WeightRule::Bic => return Ok(()),
         };
         match found {
             Some(i) => Err(BuildError::new(key, problem)
@@ -157,25 +164,6 @@ impl Builder {
 /// True if the standard deviation of the noise is not given.
 fn is_unknown(weighting: &Weighting) -> bool {
     !matches!(weighting, Weighting::Sigma(_) | Weighting::Sigmas(_))
-}
-
-/// Adds a total-variation penalty to the problem.
-fn penalize_variation(
-    problem: &mut Problem,
-    (function, basis): (usize, &Basis),
-    key: &str,
-    weight: f64,
-) -> Result<(), BuildError> {
-    if weight == 0.0 {
-        return Ok(());
-    }
-    let rows = basis.changes(&problem.system.grid);
-    let added = problem.penalize_variation(TotalVariation {
-        function,
-        weight,
-        rows,
-    });
-    added.map_err(|why| BuildError::new(key, why.to_string()))
 }
 
 /// Residuals of a penalty at its reference.

@@ -2,6 +2,9 @@
 
 use super::Rows;
 
+/// Size of a row whose entries have cancelled.
+const NO_ENTRY: f64 = 1e-12;
+
 /// Second-order cone `|(rows_1, ..., rows_k) z - right_{1..k}| <= rows_0 z - right_0`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cone {
@@ -73,6 +76,24 @@ impl RowGroup {
         [self.rows.right()[i], self.upper[i]]
     }
 
+    /// The group in other parameters, in which entry `(j, a)` is `column(j, a)`; rows without entries there are omitted.
+    #[must_use]
+    pub fn in_parameters(&self, column: &dyn Fn(usize, f64) -> (usize, f64)) -> Self {
+        let rows = rows_in_parameters(&self.rows, column);
+        let mut group = Self {
+            rows: Rows::new(),
+            upper: Vec::new(),
+            times: Vec::new(),
+            ..self.clone()
+        };
+        for i in 0..rows.len() {
+            if rows.scale(i) > NO_ENTRY {
+                group.push(rows.row(i), self.bounds(i), self.times[i]);
+            }
+        }
+        group
+    }
+
     /// Parameter and coefficient of row `i`, if it has a single entry.
     pub fn single(&self, i: usize) -> Option<(usize, f64)> {
         let mut entries = self.rows.row(i).filter(|(_, a)| *a != 0.0);
@@ -87,6 +108,20 @@ impl Constraints {
     /// True without constraints.
     pub fn is_empty(&self) -> bool {
         self.groups.is_empty() && self.cones.is_empty()
+    }
+
+    /// The constraints in other parameters, in which entry `(j, a)` is `column(j, a)`.
+    #[must_use]
+    pub fn in_parameters(&self, column: &dyn Fn(usize, f64) -> (usize, f64)) -> Self {
+        let mut cones = self.cones.clone();
+        for cone in cones.iter_mut().flat_map(|group| &mut group.cones) {
+            cone.rows = rows_in_parameters(&cone.rows, column);
+        }
+        let groups = self.groups.iter();
+        Self {
+            groups: groups.map(|group| group.in_parameters(column)).collect(),
+            cones,
+        }
     }
 
     /// Adds the constraints of `other`.
@@ -135,4 +170,13 @@ impl Constraints {
             }
         }
     }
+}
+
+/// Rows in other parameters.
+fn rows_in_parameters(rows: &Rows, column: &dyn Fn(usize, f64) -> (usize, f64)) -> Rows {
+    let mut out = Rows::new();
+    for (i, right) in rows.right().iter().enumerate() {
+        out.push(rows.row(i).map(|(j, a)| column(j, a)), *right);
+    }
+    out
 }

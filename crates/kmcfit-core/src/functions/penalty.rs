@@ -13,10 +13,12 @@ pub enum WeightRule {
     Gcv,
     /// Largest restricted likelihood of noise and weights, each penalty with its own weight (Wood 2011).
     RestrictedLikelihood,
+    /// Least Bayesian information criterion of a total-variation penalty, then a fit without it on the jumps found.
+    Bic,
 }
 
 impl WeightRule {
-    /// Rules that choose a point of a path of weights.
+    /// Rules that choose a point of a path of weights of Tikhonov penalties.
     pub const OF_PATHS: [Self; 3] = [Self::Discrepancy, Self::LCurve, Self::Gcv];
 
     /// Name in a model file.
@@ -26,6 +28,7 @@ impl WeightRule {
             Self::LCurve => "l-curve",
             Self::Gcv => "gcv",
             Self::RestrictedLikelihood => "reml",
+            Self::Bic => "bic",
         }
     }
 

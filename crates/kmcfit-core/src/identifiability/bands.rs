@@ -27,8 +27,11 @@ use super::active::{ActiveRow, active_rows};
 use super::band::{Band, BandSide};
 use super::band_notes::notes;
 use super::covariance::{CovarianceRoot, Information};
+use super::covariance_kind::CovarianceKind;
 use super::degrees::{NoiseVariants, degrees_of_parameters};
 use super::directions::Directions;
+use super::equation_rows::EquationRows;
+use super::linearised_curve::{LinearisedCurve, combine};
 use super::ratios::{Ratio, damping_ratio, frequency, over_mass};
 use super::sensitivity::Sensitivity;
 use crate::objective::Evaluation;
@@ -90,6 +93,8 @@ pub struct Bands {
     pub sigma: Option<f64>,
     /// Number of undetermined directions.
     pub undetermined: usize,
+    /// Kind of the covariance.
+    pub covariance_kind: CovarianceKind,
     /// Covariance of the parameters, with penalties, priors and equality constraints; `None` with many parameters and where a
     /// combination is undetermined.
     pub covariance: Option<DMatrix<f64>>,
@@ -97,16 +102,6 @@ pub struct Bands {
     pub degrees_of_freedom: Vec<f64>,
     /// Notes on all bands.
     pub notes: Vec<String>,
-}
-
-/// A curve over time, linearised in the parameters.
-struct LinearisedCurve {
-    /// Products with the columns of the covariance root, with all active rows fixed, and with only the equalities fixed.
-    roots: [DMatrix<f64>; 2],
-    /// Norm of the slope in undetermined directions, in both cases.
-    hidden: [DMatrix<f64>; 2],
-    /// Norm of the full slope.
-    sizes: Vec<f64>,
 }
 
 impl Bands {
@@ -124,7 +119,30 @@ impl Bands {
         let sensitivity = Sensitivity::along(problem, evaluation, directions);
         let information =
             Information::new(problem, theta, sensitivity).with_step_error(problem, evaluation);
-        let active = active_rows(problem, theta);
+        Self::from_information(problem, theta, evaluation, &information, settings)
+    }
+
+    /// Computes the bands of the equation error at its minimum `theta`, from the scores of its samples.
+    pub fn of_equation(
+        problem: &Problem,
+        theta: &[f64],
+        evaluation: &Evaluation,
+        equation: &EquationRows,
+        settings: &BandSettings,
+    ) -> Self {
+        let information = Information::of_equation(problem, theta, evaluation, equation);
+        Self::from_information(problem, theta, evaluation, &information, settings)
+    }
+
+    fn from_information(
+        problem: &Problem,
+        theta: &[f64],
+        evaluation: &Evaluation,
+        information: &Information,
+        settings: &BandSettings,
+    ) -> Self {
+        let mut active = active_rows(problem, theta);
+        active.extend(information.held().iter().cloned());
         let equal: Vec<&ActiveRow> = active.iter().filter(|r| r.equality).collect();
         let bounded = active.iter().any(|r| !r.equality);
         let all: Vec<&ActiveRow> = active.iter().collect();
@@ -135,7 +153,10 @@ impl Bands {
         };
         let stride = problem.functions.nodes().div_ceil(MOST_NODES);
         let nodes: Vec<usize> = (0..problem.functions.nodes()).step_by(stride).collect();
-        let variants = NoiseVariants::of(problem, evaluation);
+        let variants = match information.is_equation() {
+            true => None,
+            false => NoiseVariants::of(problem, evaluation),
+        };
         let maker = Maker {
             problem,
             variants: variants.as_ref(),
@@ -160,7 +181,7 @@ impl Bands {
         });
         let functions = functions.collect();
         let undetermined = loose.undetermined.ncols();
-        let mut notes = notes(problem, &information, &active);
+        let mut notes = notes(problem, information, &active);
         if undetermined > 0 {
             notes.push(format!(
                 "parameter combinations that are not identifiable: {undetermined}; the bands of the functions they change are infinite"
@@ -175,6 +196,7 @@ impl Bands {
                 _ => None,
             },
             undetermined,
+            covariance_kind: information.kind(),
             degrees_of_freedom: degrees_of_parameters(problem, maker.variants),
             notes,
             times: maker.times,
@@ -401,35 +423,5 @@ impl Maker<'_> {
             bands.extend(damping.map(|c| band("damping ratio", "", &[c, k, m], damping_ratio)));
         }
         bands
-    }
-}
-
-/// Linear combination `sum_f slope_f(t) p_f(t)`, with slopes at each node.
-fn combine(
-    linearised: &[LinearisedCurve],
-    functions: &[usize],
-    slopes: &[Vec<f64>],
-) -> LinearisedCurve {
-    let sum = |of: &dyn Fn(&LinearisedCurve) -> &DMatrix<f64>| {
-        let parts = functions.iter().enumerate().map(|(p, f)| {
-            let mut part = of(&linearised[*f]).clone();
-            for (mut row, slopes) in part.row_iter_mut().zip(slopes) {
-                row *= slopes[p];
-            }
-            part
-        });
-        parts
-            .reduce(|sum, part| sum + part)
-            .expect("at least one function")
-    };
-    let size = |(i, slopes): (usize, &Vec<f64>)| {
-        let each = functions.iter().zip(slopes);
-        let each = each.map(|(f, by)| (linearised[*f].sizes[i] * by).abs());
-        each.fold(0.0, f64::max)
-    };
-    LinearisedCurve {
-        roots: [sum(&|l| &l.roots[0]), sum(&|l| &l.roots[1])],
-        hidden: [sum(&|l| &l.hidden[0]), sum(&|l| &l.hidden[1])],
-        sizes: slopes.iter().enumerate().map(size).collect(),
     }
 }

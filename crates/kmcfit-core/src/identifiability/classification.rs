@@ -79,6 +79,10 @@ pub enum Condition {
     Basis,
     /// The measured input and the terms of the equation of motion: the residuals are those of errors of the input or of a missing term.
     Input,
+    /// Negligible noise of the measured response, which biases the minimum of the equation error.
+    NegligibleNoise,
+    /// The number and the times of the jumps found.
+    Jumps,
 }
 
 /// Kind of a [`Classification`].
@@ -130,7 +134,8 @@ impl FunctionClassification {
 }
 
 impl Condition {
-    fn sentence(self, name: &str, relative: f64) -> String {
+    /// Sentence on a function identified under the condition, with its largest half-width relative to its largest value.
+    pub fn sentence(self, name: &str, relative: f64) -> String {
         let half = format!(
             "95 % CI half-width at most {} of its largest value",
             percent(relative)
@@ -145,6 +150,12 @@ impl Condition {
             Self::Input => format!(
                 "{name} is identified conditionally on an exact input: {half}; the residuals show a disturbance of the equation of motion"
             ),
+            Self::Jumps => format!(
+                "{name} is identified conditionally on the number and times of the jumps: {half}; the interval excludes their uncertainty"
+            ),
+            Self::NegligibleNoise => format!(
+                "{name} is identified conditionally on negligible noise of the measured response: {half}"
+            ),
         }
     }
 }
@@ -152,6 +163,11 @@ impl Condition {
 /// Makes all identified functions conditional on the measured input.
 pub(crate) fn condition_on_inputs(classifications: &mut [FunctionClassification]) {
     (classifications.iter_mut()).for_each(|each| each.depends_on(Condition::Input));
+}
+
+/// Makes all identified functions conditional on negligible noise of the measured response.
+pub(crate) fn condition_on_negligible_noise(classifications: &mut [FunctionClassification]) {
+    (classifications.iter_mut()).for_each(|each| each.depends_on(Condition::NegligibleNoise));
 }
 
 /// Makes classifications conditional on the basis for these functions, and for the ratios with them.
@@ -332,12 +348,18 @@ pub fn classify_functions(
     functions.into_iter().chain(ratios).collect()
 }
 
-/// Verdict on a function or ratio: conditional instead of identified where the weight of a penalty was chosen by a rule whose
-/// intervals exclude the smoothing bias, which is a bias of all estimates.
+/// Verdict on a function or ratio: conditional instead of identified where jumps were found, and where the weight of a penalty was
+/// chosen by a rule whose intervals exclude the smoothing bias, which is a bias of all estimates.
 fn conditional(problem: &Problem, verdict: Classification) -> Classification {
     let mut rules = problem.penalties.iter().filter_map(|p| p.rule);
     let is_biased = rules.any(|rule| !rule.gives_coverage());
     match verdict {
+        Classification::Identified { relative } if !problem.jumps.is_empty() => {
+            Classification::Conditional {
+                relative,
+                on: Condition::Jumps,
+            }
+        }
         Classification::Identified { relative } if is_biased => Classification::Conditional {
             relative,
             on: Condition::Smoothness,

@@ -2,7 +2,10 @@
 //! undetermined. Standard errors ([`Problem::covariance`]) and bands ([`super::Bands`]) are computed from it.
 
 use super::active::{ActiveRow, active_rows};
+use super::columns::with_column;
+use super::covariance_kind::CovarianceKind;
 use super::directions::Directions;
+use super::equation_rows::{EquationRows, Scores};
 use super::factorisation::Factorisation;
 use super::sensitivity::Sensitivity;
 use super::step_error::step_error;
@@ -30,6 +33,8 @@ pub(super) struct Information {
     step_error: Option<DVector<f64>>,
     /// Samples of channels whose scores have the covariance of a kernel.
     kernels: Vec<Range<usize>>,
+    /// Scores of the samples, for the kernel covariance of an equation error.
+    scores: Option<Scores>,
 }
 
 /// Covariance root, `Cov = F F^T` on determined directions and zero on the others.
@@ -53,6 +58,20 @@ impl Information {
                 priors.push(directions.row([(j, 1.0 / prior.sigma)].into_iter()));
             }
         }
+        let n = directions.len();
+        let priors = DMatrix::from_fn(priors.len(), n, |i, k| priors[i][k]);
+        let measured = stacked(&sensitivity.jacobian, &priors);
+        Self::of_measured(problem, theta, sensitivity, measured)
+    }
+
+    /// Information of the rows `measured`, penalties and violated soft constraints.
+    pub fn of_measured(
+        problem: &Problem,
+        theta: &[f64],
+        sensitivity: Sensitivity,
+        measured: DMatrix<f64>,
+    ) -> Self {
+        let directions = &sensitivity.directions;
         let mut pulls = Vec::new();
         for group in &problem.soft {
             let root = group.row_weight().sqrt();
@@ -63,9 +82,7 @@ impl Information {
             }
         }
         let n = directions.len();
-        let stack = |rows: &[Vec<f64>]| DMatrix::from_fn(rows.len(), n, |i, k| rows[i][k]);
-        let measured = stacked(&sensitivity.jacobian, &stack(&priors));
-        let mut pulled = stack(&pulls);
+        let mut pulled = DMatrix::from_fn(pulls.len(), n, |i, k| pulls[i][k]);
         for penalty in &problem.penalties {
             pulled = stacked(&pulled, &roughness(problem, penalty, directions));
         }
@@ -79,7 +96,50 @@ impl Information {
             rounding: f64::EPSILON * largest * problem.system.grid.nodes() as f64,
             step_error: None,
             kernels: kernels(problem),
+            scores: None,
         }
+    }
+
+    /// Information of the equation error at its minimum `theta`, with the covariance from the scores of the samples.
+    pub fn of_equation(
+        problem: &Problem,
+        theta: &[f64],
+        evaluation: &Evaluation,
+        equation: &EquationRows,
+    ) -> Self {
+        let n = problem.parameters();
+        let directions = Directions::new(problem, evaluation, n, n);
+        let jacobian = directions.of_jacobian(equation.rows.clone());
+        let residuals = equation.residuals.clone();
+        let sensitivity = Sensitivity::of_rows(problem, jacobian, residuals, directions);
+        let functions = problem.functions.scalar_range().start;
+        let scores = Scores::of(equation, &sensitivity, theta, functions);
+        let measured = sensitivity.jacobian.clone();
+        Self {
+            scores: Some(scores),
+            kernels: Vec::new(),
+            ..Self::of_measured(problem, theta, sensitivity, measured)
+        }
+    }
+
+    /// True for the equation error.
+    pub fn is_equation(&self) -> bool {
+        self.scores.is_some()
+    }
+
+    /// Kind of the covariance.
+    pub fn kind(&self) -> CovarianceKind {
+        match () {
+            () if self.is_equation() || !self.kernels.is_empty() => CovarianceKind::Kernel,
+            () if self.is_pulled() => CovarianceKind::Penalised,
+            () if self.is_bayesian => CovarianceKind::Bayesian,
+            () => CovarianceKind::Information,
+        }
+    }
+
+    /// Rows held with equality besides the constraints.
+    pub fn held(&self) -> &[ActiveRow] {
+        self.scores.as_ref().map_or(&[], |scores| &scores.held)
     }
 
     /// Includes the discretisation error of the time steps.
@@ -113,7 +173,7 @@ impl Information {
     /// Covariance with the rows `held` fixed: `H^+ M H^+` in the null space of these rows, with `H = J^T W J + R` and
     /// `M = J^T W J` (`W` multiplied by the estimated variance for samples without sigma); `H^+`, the Bayesian covariance, for
     /// penalties whose rule gives coverage. For channels whose innovations are not white the part of their scores in `M` is that of
-    /// a kernel ([`KernelCovariance`]).
+    /// a kernel ([`KernelCovariance`]), as for an equation error all of them.
     pub fn factor(&self, held: &[&ActiveRow]) -> CovarianceRoot {
         let directions = &self.sensitivity.directions;
         let n = directions.len();
@@ -140,6 +200,9 @@ impl Information {
         };
         let shift = self.shift(&inverse_root);
         let mut answers = &self.measured * &inverse_root;
+        if let Some(scores) = &self.scores {
+            return kernel_root(scores, &inverse_root, answers.norm_squared(), undetermined);
+        }
         let variance = self.variance(&answers);
         if let Some(variance) = variance {
             let samples = self
@@ -247,15 +310,22 @@ fn kernels(problem: &Problem) -> Vec<Range<usize>> {
     misspecified.map(|(_, samples)| samples).collect()
 }
 
-fn with_column(root: DMatrix<f64>, column: Option<DVector<f64>>) -> DMatrix<f64> {
-    match column {
-        None => root,
-        Some(column) => {
-            let last = root.ncols();
-            let mut wider = root.insert_column(last, 0.0);
-            wider.set_column(last, &column);
-            wider
-        }
+/// Covariance root from the scores of an equation error; all directions are undetermined if these have no covariance.
+fn kernel_root(
+    scores: &Scores,
+    inverse_root: &DMatrix<f64>,
+    effective: f64,
+    undetermined: DMatrix<f64>,
+) -> CovarianceRoot {
+    let all = inverse_root.nrows();
+    let (root, undetermined) = match scores.root(inverse_root, effective) {
+        Some(root) => (root, scores.undetermined(undetermined)),
+        None => (DMatrix::zeros(all, 0), DMatrix::identity(all, all)),
+    };
+    CovarianceRoot {
+        root,
+        undetermined,
+        variance: None,
     }
 }
 

@@ -14,12 +14,16 @@ mod band_curves;
 mod band_notes;
 mod bands;
 mod classification;
+mod columns;
 mod components;
 mod covariance;
+mod covariance_kind;
 mod degrees;
 mod directions;
+mod equation_rows;
 mod experiments;
 mod factorisation;
+mod linearised_curve;
 mod ratios;
 mod scaling_ambiguity;
 mod sensitivity;
@@ -50,8 +54,12 @@ pub use bands::{BandSettings, Bands};
 pub use classification::{
     Classification, ClassificationKind, Condition, FunctionClassification, classify_functions,
 };
-pub(crate) use classification::{IDENTIFIED, condition_on_bases, condition_on_inputs, except_gap};
+pub(crate) use classification::{
+    IDENTIFIED, condition_on_bases, condition_on_inputs, condition_on_negligible_noise, except_gap,
+};
 pub(crate) use covariance::stacked;
+pub use covariance_kind::CovarianceKind;
+pub use equation_rows::EquationRows;
 pub use experiments::{
     CandidateChannel, CandidateExperiment, Gain, Ranked, rank_experiments, residual_spread,
 };

@@ -95,6 +95,24 @@ impl Sensitivity {
         }
     }
 
+    /// Rows with the weight one: residuals of another equation than the misfit, along the directions.
+    pub(super) fn of_rows(
+        problem: &Problem,
+        jacobian: DMatrix<f64>,
+        residuals: Vec<f64>,
+        directions: Directions,
+    ) -> Self {
+        let count = residuals.len();
+        Self {
+            jacobian,
+            residuals,
+            roots: vec![1.0; count],
+            has_sigma: vec![true; count],
+            directions,
+            names: problem.functions.iter().map(|f| f.name()).collect(),
+        }
+    }
+
     /// Singular value decomposition.
     pub fn spectrum(&self) -> SingularSpectrum {
         let mut factorisation = Factorisation::of(&self.jacobian);

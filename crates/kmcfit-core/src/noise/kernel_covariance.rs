@@ -25,7 +25,7 @@ use std::ops::Range;
 
 /// Largest absolute autocorrelation in the bandwidth (Andrews & Monahan 1992), which bounds it for scores near a random walk.
 const LARGEST_CORRELATION: f64 = 0.97;
-/// Arguments below which the kernel is `1 - z^2/10`, its expansion to rounding.
+/// Arguments below which the kernel is `1 - z^2/10`, its expansion to machine precision.
 const SMALL: f64 = 1e-4;
 
 /// Covariance of a sum of scores.
@@ -61,7 +61,9 @@ pub fn automatic_bandwidth(scores: &DMatrix<f64>, records: &[Range<usize>]) -> f
     let samples: usize = records.iter().map(ExactSizeIterator::len).sum();
     let (mut above, mut below) = (0.0, 0.0);
     for score in scores.column_iter() {
-        let rho = correlation(score.as_slice(), records);
+        let Some(rho) = correlation(score.as_slice(), records) else {
+            continue;
+        };
         let rho = rho.clamp(-LARGEST_CORRELATION, LARGEST_CORRELATION);
         let size = ((1.0 + rho) / (1.0 - rho)).powi(2);
         above += size * 4.0 * rho * rho / (1.0 - rho).powi(4);
@@ -73,18 +75,15 @@ pub fn automatic_bandwidth(scores: &DMatrix<f64>, records: &[Range<usize>]) -> f
     1.3221 * (above / below * samples as f64).powf(0.2)
 }
 
-/// Autocorrelation at lag one; zero for scores that vanish.
-fn correlation(score: &[f64], records: &[Range<usize>]) -> f64 {
+/// Autocorrelation at lag one; `None` for scores that vanish.
+fn correlation(score: &[f64], records: &[Range<usize>]) -> Option<f64> {
     let (mut products, mut squares) = (0.0, 0.0);
     for record in records {
         let of_record = &score[record.clone()];
         products += of_record.windows(2).map(|w| w[0] * w[1]).sum::<f64>();
         squares += of_record.iter().map(|s| s * s).sum::<f64>();
     }
-    match squares > 0.0 {
-        true => products / squares,
-        false => 0.0,
-    }
+    (squares > 0.0).then(|| products / squares)
 }
 
 /// Quadratic-spectral kernel `kappa(x)`, 1 at zero.

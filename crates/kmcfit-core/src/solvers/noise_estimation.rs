@@ -120,7 +120,7 @@ pub(super) fn estimates_sigma(problem: &Problem) -> bool {
 }
 
 /// Fit and estimation of the sigmas in alternation, until these converge.
-fn with_sigmas(
+pub(super) fn with_sigmas(
     problem: &mut Problem,
     mut found: Fit,
     settings: &FitSettings,

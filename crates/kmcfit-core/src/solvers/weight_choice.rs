@@ -7,11 +7,13 @@ use super::correlation_estimation::{
 use super::executor::search;
 use super::fit::Fit;
 use super::history::IterationRecord;
+use super::jumps::choose_jumps;
 use super::noise_estimation::{add_sigma_variances, estimates_sigma, update};
+use super::path::WeightPath;
 use super::reml::refined;
 use super::rounds::{counted, is_ended, with_round};
 use super::settings::FitSettings;
-use super::weight_path::{WeightPath, choose_weight_at_noise};
+use super::weight_path::choose_weight_at_noise;
 use crate::functions::WeightRule;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
@@ -26,7 +28,8 @@ const FREE_ROUNDS: usize = 2;
 /// Fits `problem` along a path of factors on the penalties `which`, each fit started from its neighbour, and again at the
 /// factor chosen by `rule`. Sigmas ([`Weighting::Estimated`](crate::record::Weighting::Estimated)) and correlations are estimated from
 /// the residuals at the chosen factor, with `n - q` degrees of freedom for `q` effective parameters, and the path is repeated with them until
-/// they are at rest; correlations then by restricted likelihood at that factor. Returns the path, the problem at the chosen factor with its noise, and its fit.
+/// they are at rest; correlations then by restricted likelihood at that factor. Returns the path, the problem at the chosen factor with its noise, and its fit. For the rule `bic`, `which` is the index
+/// of one total-variation penalty, and the last fit is that without the penalty on the jumps found.
 ///
 /// # Errors
 /// A [`SimulationError`] if the simulation at the start of the first fit, at the middle weight, fails.
@@ -54,6 +57,9 @@ pub fn choose_weight_watched(
     which: &[usize],
     watch: &mut Observer,
 ) -> Result<(WeightPath, Problem, Fit), SimulationError> {
+    if let (WeightRule::Bic, [which]) = (rule, which) {
+        return choose_jumps(problem, start, settings, *which, watch);
+    }
     let mut base = problem.clone();
     let choice = (rule, which);
     let (mut path, mut weighted, mut found) =

@@ -1,6 +1,6 @@
 //! The null model of the constancy test: the problem with one function replaced by a constant, `theta = M theta'`.
 
-use crate::constraints::{Constraints, RowGroup, Rows};
+use crate::constraints::Rows;
 use crate::functions::{CoefficientFunction, Parameterization, Penalty};
 use crate::problem::Problem;
 
@@ -50,36 +50,11 @@ impl ConstantModel {
 
     /// Rewrites constraints and penalties in the parameters of the constant model.
     fn rewrite(&mut self, whole: &Problem) {
-        let groups = |list: &[RowGroup]| -> Vec<RowGroup> {
-            let each = list.iter().map(|group| RowGroup {
-                rows: self.rows(&group.rows),
-                ..group.clone()
-            });
-            each.collect()
-        };
-        let mut constraints = Constraints {
-            groups: groups(&whole.constraints.groups),
-            cones: whole.constraints.cones.clone(),
-        };
-        for cone in constraints.cones.iter_mut().flat_map(|g| &mut g.cones) {
-            cone.rows = self.rows(&cone.rows);
-        }
+        let column = |j: usize, a: f64| self.column(j, a);
         // Rows on the shape of the function have no entries for a constant.
-        for group in &mut constraints.groups {
-            let mut kept = RowGroup {
-                rows: Rows::new(),
-                upper: Vec::new(),
-                times: Vec::new(),
-                ..group.clone()
-            };
-            for i in 0..group.rows.len() {
-                if group.rows.scale(i) > 1e-12 {
-                    kept.push(group.rows.row(i), group.bounds(i), group.times[i]);
-                }
-            }
-            *group = kept;
-        }
-        let soft = groups(&whole.soft);
+        let constraints = whole.constraints.in_parameters(&column);
+        let soft = whole.soft.iter();
+        let soft = soft.map(|group| group.in_parameters(&column)).collect();
         let penalties = whole
             .penalties
             .iter()
@@ -93,15 +68,6 @@ impl ConstantModel {
         parts.soft = soft;
         parts.penalties = penalties;
         parts.variations = variations;
-    }
-
-    /// Rows `A M` with `theta = M theta'`.
-    fn rows(&self, rows: &Rows) -> Rows {
-        let mut out = Rows::new();
-        for (i, right) in rows.right().iter().enumerate() {
-            out.push(rows.row(i).map(|(j, a)| self.column(j, a)), *right);
-        }
-        out
     }
 
     pub fn column(&self, j: usize, a: f64) -> (usize, f64) {

@@ -7,9 +7,11 @@
 
 mod fit;
 mod measured;
+mod rows;
 
 pub(in crate::solvers) use fit::fit;
 pub use measured::Measurements;
+pub use rows::{NoEquationRows, equation_rows};
 
 use crate::constraints::{Constraints, RowGroup, TOLERANCE};
 use crate::problem::Problem;
@@ -245,23 +247,36 @@ fn add_rows(
 /// otherwise zero coefficients satisfy the equation.
 fn with_scale_held(problem: &Problem, start: &[f64]) -> Constraints {
     let mut constraints = problem.constraints.clone();
-    if !(equation_fixes_scale(problem) || equalities_fix_scale(&constraints, start)) {
+    if let Some(row) = scale_row(problem, &constraints, start) {
         let grid = &problem.system.grid;
-        let mut ones = problem.functions.empty_nodal();
-        ones.mass
-            .copy_from_slice(&trapezoid_weights(grid.nodes(), grid.step()));
-        let row = problem.functions.transpose(&ones);
-        let mean: f64 = row.iter().zip(start).map(|(a, s)| a * s).sum();
-        let entries = row.into_iter().enumerate().filter(|(_, a)| *a != 0.0);
+        let mean: f64 = row.iter().map(|(j, a)| a * start[*j]).sum();
         let mut group = RowGroup::new("mean of the mass as at the start");
         group.push(
-            entries,
+            row,
             [mean, mean],
             [grid.start(), grid.start() + grid.duration()],
         );
         constraints.groups.push(group);
     }
     constraints
+}
+
+/// Row of the integral of the mass over the record, where equation and constraints leave the common scale of all functions
+/// undetermined.
+fn scale_row(
+    problem: &Problem,
+    constraints: &Constraints,
+    start: &[f64],
+) -> Option<Vec<(usize, f64)>> {
+    if equation_fixes_scale(problem) || equalities_fix_scale(constraints, start) {
+        return None;
+    }
+    let grid = &problem.system.grid;
+    let mut ones = problem.functions.empty_nodal();
+    ones.mass
+        .copy_from_slice(&trapezoid_weights(grid.nodes(), grid.step()));
+    let row = problem.functions.transpose(&ones).into_iter().enumerate();
+    Some(row.filter(|(_, a)| *a != 0.0).collect())
 }
 
 /// True if the equation of motion determines the scale of `theta`. Its error is linear in `theta`, and homogeneous unless a

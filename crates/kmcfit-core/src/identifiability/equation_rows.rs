@@ -1,0 +1,100 @@
+//! Covariance of the estimates of the equation error from the scores of its samples.
+//!
+//! With the rows `x_i` of the equation of motion in the parameters and its residuals `e_i`, in units of the root of the cost, the
+//! scores are `s_i = x_i e_i` and
+//!
+//! ```text
+//! Cov = H^-1 S H^-1,    H = sum_i x_i x_i^T + sum_j weight_j L_j^T L_j
+//! ```
+//!
+//! with the kernel covariance `S` of the scores ([`KernelCovariance`]): no assumption is made on the variance and the correlation of the
+//! residuals. It **excludes** the bias by errors of the rows, which contain the measured response.
+
+use super::active::ActiveRow;
+use super::columns::with_column;
+use super::sensitivity::Sensitivity;
+use crate::noise::KernelCovariance;
+use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+
+/// The equation of motion at the samples, linear in the parameters, at the minimum of the equation error.
+#[derive(Debug, Clone)]
+pub struct EquationRows {
+    /// Samples x parameters.
+    pub rows: DMatrix<f64>,
+    /// Residual of each sample.
+    pub residuals: Vec<f64>,
+    /// Samples of each record, in time order.
+    pub records: Vec<Range<usize>>,
+    /// Linear forms of the parameters held besides the constraints, as columns and coefficients: nuisance parameters, and the mean of the
+    /// mass where the common scale of the functions is undetermined.
+    pub held: Vec<Vec<(usize, f64)>>,
+    /// True if the common scale of the functions is undetermined.
+    pub is_scale_free: bool,
+}
+
+/// Scores of the samples of an equation error along scaled directions.
+pub(super) struct Scores {
+    /// Scores, samples x directions.
+    scores: DMatrix<f64>,
+    records: Vec<Range<usize>>,
+    pub held: Vec<ActiveRow>,
+    /// Unit vector along the common scale, where that is undetermined.
+    scale: Option<DVector<f64>>,
+}
+
+impl Scores {
+    pub fn of(
+        equation: &EquationRows,
+        sensitivity: &Sensitivity,
+        theta: &[f64],
+        functions: usize,
+    ) -> Self {
+        let mut scores = sensitivity.jacobian.clone();
+        for mut column in scores.column_iter_mut() {
+            (column.iter_mut().zip(&equation.residuals)).for_each(|(x, e)| *x *= e);
+        }
+        // The score of a held parameter does not count in the bandwidth.
+        for entries in &equation.held {
+            if let [(j, _)] = entries.as_slice() {
+                scores.column_mut(*j).fill(0.0);
+            }
+        }
+        let held = |entries: &Vec<(usize, f64)>| ActiveRow {
+            entries: entries.clone(),
+            equality: true,
+            name: String::new(),
+        };
+        let scaled: Vec<f64> = (theta.iter().enumerate())
+            .map(|(j, t)| if j < functions { *t } else { 0.0 })
+            .collect();
+        let along = DVector::from_vec(sensitivity.directions.nearest(&scaled));
+        Self {
+            scores,
+            records: equation.records.clone(),
+            held: equation.held.iter().map(held).collect(),
+            scale: (equation.is_scale_free && along.norm() > 0.0).then(|| along.normalize()),
+        }
+    }
+
+    /// Root of `H^-1 S H^-1` for the root of `H^-1` and the `effective` number of parameters; `None` if the scores have no
+    /// covariance.
+    pub fn root(&self, inverse_root: &DMatrix<f64>, effective: f64) -> Option<DMatrix<f64>> {
+        let covariance = KernelCovariance::of(&self.scores, &self.records, effective)?;
+        let middle = inverse_root.tr_mul(&covariance.sum) * inverse_root;
+        let eigen = (0.5 * (&middle + middle.transpose())).symmetric_eigen();
+        let mut vectors = eigen.eigenvectors;
+        for (mut vector, value) in vectors.column_iter_mut().zip(&eigen.eigenvalues) {
+            vector *= value.max(0.0).sqrt();
+        }
+        Some(inverse_root * vectors)
+    }
+
+    /// The undetermined directions, with the common scale where that is undetermined.
+    pub fn undetermined(&self, others: DMatrix<f64>) -> DMatrix<f64> {
+        match &self.scale {
+            None => others,
+            Some(scale) => with_column(others, Some(scale.clone())),
+        }
+    }
+}
