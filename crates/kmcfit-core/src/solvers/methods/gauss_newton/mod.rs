@@ -18,7 +18,9 @@ use crate::solvers::linearization::{Linearization, linearisation_tangents, linea
 use crate::solvers::optimality::Optimality;
 use crate::solvers::reason::Reason;
 use crate::solvers::settings::QpSolver;
-use proposal::{Proposal, ProposalOutcome, SMALLEST_CHANGE, at_minimum, change, propose};
+use proposal::{
+    Proposal, ProposalOutcome, SMALLEST_CHANGE, at_minimum, change, is_below_rounding, propose,
+};
 
 /// Initial weight of the proximal term, relative to J.
 const FIRST_DAMPING: f64 = 1e-2;
@@ -108,6 +110,10 @@ impl StepRule for GaussNewton {
             if linear.trouble.is_none()
                 && let Some(reason) = at_minimum(problem, point, &proposal)
             {
+                let decrease = decrease.unwrap_or(f64::INFINITY);
+                if work.has_step_limit && is_below_rounding(problem, point, &proposal, decrease) {
+                    return linear.step_to(work, point, proposal, evaluation, 0.0);
+                }
                 return Step::Minimum(reason);
             }
             if !proposal.is_solved {
