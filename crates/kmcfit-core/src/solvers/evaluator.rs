@@ -22,8 +22,8 @@ pub(crate) struct CountedEvaluator<'a, 'p> {
     pub program_iterations: u32,
     /// Solver of the programs.
     pub qp: QpSolver,
-    /// True if the fit has a limit of the last step: then steps continue below the rounding error of the cost.
-    pub has_step_limit: bool,
+    /// Limit of the change in the last step, if the fit has one: then steps continue below the rounding error of the cost.
+    pub step_limit: Option<f64>,
     /// Time by kind of work.
     pub timings: Timings,
 }
@@ -51,7 +51,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
             },
             program_iterations: settings.stopping.program_iterations,
             qp: settings.qp,
-            has_step_limit: settings.stopping.step.is_some(),
+            step_limit: settings.stopping.step,
             timings: Timings::default(),
         }
     }

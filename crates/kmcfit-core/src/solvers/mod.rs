@@ -46,7 +46,7 @@ pub use executor::fit_from;
 pub use fit::{Attempt, Fit};
 pub use gaps::{CycleCount, Gap, cycles};
 pub(crate) use gaps::{gaps, varying_function};
-pub use grid_refinement::{GridNotice, OnNodes, RefinedFit, RunFit, fit_on_refined_grids};
+pub use grid_refinement::{GridNotice, fit_on_refined_grids};
 pub use history::{IterationRecord, number_or_nan};
 pub(crate) use input_errors::input_error_effect;
 pub use iterate::Iterate;

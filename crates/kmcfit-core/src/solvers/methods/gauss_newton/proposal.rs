@@ -66,8 +66,8 @@ pub(super) fn at_minimum(
     (is_known && change <= SMALLEST_CHANGE).then_some(Reason::NoPredictedChange(change))
 }
 
-/// True for a significant change of the parameters whose effect on the cost, `decrease`, is within the rounding error: near a
-/// minimum the cost has half the digits of the parameters.
+/// True if the decrease of the cost, predicted and computed, is within the rounding error: near a minimum the cost has half the
+/// digits of the parameters.
 pub(super) fn is_below_rounding(
     problem: &Problem,
     point: &Iterate,
@@ -75,9 +75,7 @@ pub(super) fn is_below_rounding(
     decrease: f64,
 ) -> bool {
     let rounding = response_rounding(problem, point.evaluation.cost);
-    proposal.is_solved
-        && decrease.abs().max(proposal.predicted.abs()) <= rounding
-        && change(problem, point, proposal) > SMALLEST_CHANGE
+    proposal.is_solved && decrease.abs().max(proposal.predicted.abs()) <= rounding
 }
 
 /// Largest change of a function in a proposal, relative to its size.
