@@ -4,7 +4,7 @@ mod auto;
 mod finer;
 mod per_node;
 
-pub(super) use finer::FinerNodes;
+pub(super) use finer::{FinerNodes, stable_nodes};
 
 use super::BuildMode;
 use super::experiments::{RawChannel, RawRecord};

@@ -1,9 +1,8 @@
 //! Finer grids of a model whose number of nodes is automatic.
 
-use super::grid::FinerNodes;
+use super::grid::{FinerNodes, stable_nodes};
 use super::{BuildMode, Model, build_on};
 use crate::config::ModelFile;
-use crate::finding::Finding;
 use kmcfit_core::internals::solvers::Solver;
 use std::sync::Arc;
 
@@ -69,12 +68,7 @@ impl Model {
             return self;
         };
         let nodes = finer.problem.system.grid.nodes();
-        let text = format!(
-            "grid: {nodes} nodes instead of {before}, for stable steps at the start values of the functions"
-        );
-        finer
-            .automatic
-            .push(Finding::new("nodes_for_stability", text).with("nodes", nodes));
+        finer.automatic.push(stable_nodes(nodes, before));
         finer
     }
 }

@@ -10,13 +10,9 @@
 //! with the order `p` of the stepper. The shift is one more column of the root of the covariance, `Cov + delta delta^T`, so that every
 //! interval derived from it contains the shift.
 
-use super::active::{ActiveRow, active_rows};
-use super::covariance::Information;
-use super::directions::Directions;
-use super::sensitivity::Sensitivity;
 use crate::diagnostics::rms;
 use crate::objective::Evaluation;
-use crate::problem::{FEW_PARAMETERS, Problem};
+use crate::problem::Problem;
 use nalgebra::DVector;
 
 /// Residuals below this share of the discretisation error are those of samples that were simulated with the same steps.
@@ -42,7 +38,11 @@ pub(super) fn step_error(
 
 /// Discretisation error of `changes`, the predictions on half the step less those on the whole step, weighted and whitened; `None`
 /// where it is not finite.
-fn weighted(problem: &Problem, changes: Vec<Vec<f64>>, roots: &[f64]) -> Option<DVector<f64>> {
+pub(super) fn weighted(
+    problem: &Problem,
+    changes: Vec<Vec<f64>>,
+    roots: &[f64],
+) -> Option<DVector<f64>> {
     let order = 2f64.powi(problem.system.method.order() as i32);
     let factor = order / (order - 1.0);
     let mut error = Vec::with_capacity(roots.len());
@@ -53,28 +53,4 @@ fn weighted(problem: &Problem, changes: Vec<Vec<f64>>, roots: &[f64]) -> Option<
     let error = error.iter().zip(roots).map(|(e, root)| factor * root * e);
     let error = DVector::from_iterator(roots.len(), error);
     error.iter().all(|e| e.is_finite()).then_some(error)
-}
-
-impl Problem {
-    /// Largest shift of an estimate by the discretisation error of `changes`, the predictions of each channel on half the step less
-    /// those on the whole step, in standard errors. `None` without parameters, with more than [`FEW_PARAMETERS`], and where
-    /// the error is not finite.
-    pub fn shift_by_steps(
-        &self,
-        theta: &[f64],
-        evaluation: &Evaluation,
-        changes: Vec<Vec<f64>>,
-    ) -> Option<f64> {
-        let n = self.parameters();
-        if n == 0 || n > FEW_PARAMETERS {
-            return None;
-        }
-        let directions = Directions::new(self, evaluation, n, n);
-        let sensitivity = Sensitivity::along(self, evaluation, directions);
-        let error = weighted(self, changes, &sensitivity.roots)?;
-        let active = active_rows(self, theta);
-        let held: Vec<&ActiveRow> = active.iter().collect();
-        let information = Information::new(self, theta, sensitivity).with_error(Some(error));
-        information.largest_shift(&held)
-    }
 }

@@ -1,6 +1,7 @@
 //! Numbers of nodes of automatic grids that are finer than the first one.
 
 use crate::config::build::experiments::RawRecord;
+use crate::finding::Finding;
 
 /// Most nodes per sample of a refined grid; the first one has fewer ([`super::auto`]).
 const MOST_PER_SAMPLE: usize = 1024;
@@ -39,6 +40,14 @@ impl FinerNodes {
             }
         }
     }
+}
+
+/// Note on a grid that was chosen for stable steps.
+pub fn stable_nodes(nodes: usize, before: usize) -> Finding {
+    let text = format!(
+        "grid: {nodes} nodes instead of {before}, for stable steps at the start values of the functions"
+    );
+    Finding::new("nodes_for_stability", text).with("nodes", nodes)
 }
 
 #[cfg(test)]
