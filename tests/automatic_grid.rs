@@ -7,7 +7,9 @@
 
 use kmcfit::config::{BuildMode, Model, ModelFile, Override, build};
 use kmcfit::fitting::fit_model;
-use kmcfit_core::internals::solvers::{Fit, Observer, Status, fit_with_noise};
+use kmcfit_core::internals::solvers::{
+    Fit, GridNotice, Observer, Status, fit_on_refined_grids, fit_with_noise, fit_with_noise_watched,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -301,6 +303,39 @@ fn check(seeds: std::ops::Range<u64>) {
         }
     }
     assert!(missed.is_empty(), "{missed:?}");
+}
+
+/// A grid that may not be refined leaves a warning with its error; one that may, a note.
+#[test]
+fn the_limit_of_an_automatic_grid_is_a_notice() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/certified/micro.yaml");
+    let auto = Override::parse_all(&["grid.nodes=auto".to_owned()]).unwrap();
+    let file = ModelFile::read_with_overrides(path, &auto).unwrap();
+    let model = build(&file, BuildMode::Fit).unwrap();
+    let first = model.problem.system.grid.nodes();
+    let start = model.problem.start();
+    for most in [first, 4 * first] {
+        let found = fit_on_refined_grids(
+            &model.problem,
+            &start,
+            most,
+            &mut |least| Some(model.on_nodes(least)?.problem),
+            &mut |problem, start, watch| {
+                fit_with_noise_watched(problem, start, &model.settings, watch)
+                    .map(|(problem, fit)| ((), problem, fit))
+            },
+            &mut Observer::new(&mut |_| {}),
+        );
+        match found.unwrap().notices.as_slice() {
+            [GridNotice::GridLimited { nodes, error }] => {
+                assert!(most == first && *nodes == first && *error > LARGEST_ERROR);
+            }
+            [GridNotice::GridRefined { from, nodes, error }] => {
+                assert!(most > first && *from == first && *nodes > first && *error < LARGEST_ERROR);
+            }
+            other => panic!("{other:?}"),
+        }
+    }
 }
 
 #[test]
