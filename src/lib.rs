@@ -9,9 +9,10 @@
 //!
 //! 1. [`config`] reads a model file, and through [`tables`] its tables, and builds a problem of [`kmcfit_core`]
 //!    from it; errors in the input are an [`mod@error`]; [`units`] has units and their factors to SI.
-//! 2. [`report`] writes tables, figures, pages and the result document, loads them back ([`Run::open`]), and compares
+//! 2. [`fitting`] fits the problem.
+//! 3. [`report`] writes tables, figures, pages and the result document, loads them back ([`Run::open`]), and compares
 //!    runs; [`results`] makes output folders, journals and files crash-safe.
-//! 3. [`cli`] is one file per command.
+//! 4. [`cli`] is one file per command.
 // All output passes `cli::output`, all changes of files `results`, all thread starts `threads` of the core.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_macros))]
 #![allow(
@@ -25,6 +26,7 @@ pub mod error;
 mod escape;
 mod faults;
 pub mod finding;
+pub mod fitting;
 pub mod guide;
 mod memory;
 #[cfg(test)]

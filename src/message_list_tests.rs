@@ -16,7 +16,7 @@ use kmcfit_core::internals::qp::ConicStatus;
 use kmcfit_core::internals::record::ScoreCovariance;
 use kmcfit_core::internals::simulate::{Cause, SimulationError};
 use kmcfit_core::internals::solvers::{
-    ConditionFailure, MissingMeasurement, Reason, Status, UnsupportedRecord,
+    ConditionFailure, GridNotice, MissingMeasurement, Reason, Status, UnsupportedRecord,
 };
 use kmcfit_core::internals::study::multistart::MultistartFinding;
 use kmcfit_core::internals::system::InputQuantity;
@@ -61,6 +61,12 @@ fn messages() {
     section(
         &mut list,
         "Notices on a model",
+        all.iter().map(|n| shown(n)),
+    );
+    let all = grid_notices();
+    section(
+        &mut list,
+        "Notices on an automatic grid",
         all.iter().map(|n| shown(n)),
     );
     let all = statuses().into_iter().map(|s| s.name().to_owned());
@@ -466,6 +472,13 @@ fn data_warnings() -> Vec<DataWarning> {
         DataWarning::Saturation { .. } => DataWarning::Saturation {
             channel: "acceleration", samples: 12, level: 49.03, unit: text("m/s^2"),
         },
+    ]
+}
+
+fn grid_notices() -> Vec<GridNotice> {
+    samples![
+        GridNotice::GridRefined { .. } => GridNotice::GridRefined { from: 1001, nodes: 3001, error: 0.0512 },
+        GridNotice::GridLimited { .. } => GridNotice::GridLimited { nodes: 257_024, error: 0.42 },
     ]
 }
 

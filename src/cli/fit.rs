@@ -4,8 +4,9 @@ use super::progress::Progress;
 use super::{
     CommandError, Overrides, announce, exit_code, inputs, interrupt, print, say, stem, unwritable,
 };
-use crate::config::{BuildMode, Model, ModelFile, Override, WeightSearch, build};
+use crate::config::{BuildMode, Model, ModelFile, Override, build};
 use crate::error::InputError;
+use crate::fitting::fit_model;
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
     FittedModel, OverheadTimings, RunAssessment, TimingsSummary, charts, fit_claim, json, predict,
@@ -16,7 +17,7 @@ use console::Term;
 use kmcfit_core::internals::simulate::SimulationError;
 use kmcfit_core::internals::solvers::{
     CheckpointStore, Fit, IterationEvent, IterationRecord, Observer, Status, WeightPath,
-    choose_weight_watched, fit_with_noise_watched, no_response,
+    no_response,
 };
 use kmcfit_core::internals::system::State;
 use std::path::{Path, PathBuf};
@@ -235,13 +236,12 @@ pub(super) fn fit_into(
     Ok((document, status))
 }
 
-/// Runs the fit. If a rule chooses the penalty weight, also returns the model with that weight and the path of weights.
+/// Runs the fit. Also returns the model as fitted, with the path of weights if a rule chose one; no model without a response.
 pub(super) fn search(
     model: &Model,
     progress: &Progress,
     store: Option<&mut dyn CheckpointStore>,
 ) -> Result<(Option<Model>, Option<WeightPath>, Fit), String> {
-    let start = model.problem.functions.start();
     let (mut ignore, mut show) = (
         |_: &IterationRecord| {},
         |moment: &IterationEvent| progress.show(moment),
@@ -253,24 +253,11 @@ pub(super) fn search(
     if let Some(store) = store {
         watch = watch.with_checkpoints(store);
     }
-    let (problem, settings) = (&model.problem, &model.settings);
-    let result = match &model.weight_rule {
-        None => fit_with_noise_watched(problem, &start, settings, &mut watch)
-            .map(|(problem, fit)| (None, problem, fit)),
-        Some(WeightSearch { rule, penalties }) => {
-            choose_weight_watched(problem, &start, settings, *rule, penalties, &mut watch)
-                .map(|(path, problem, fit)| (Some(path), problem, fit))
-        }
-    };
+    let result = fit_model(model, &mut watch);
     progress.clear();
-    let result = result.map(|(path, problem, fit)| {
-        let as_fitted = Model {
-            problem,
-            ..model.clone()
-        };
-        (Some(as_fitted), path, fit)
-    });
+    let result = result.map(|found| (Some(found.model), found.weights, found.fit));
     let result = result.or_else(|breakdown| {
+        let (problem, settings) = (&model.problem, &model.settings);
         let fit = no_response(problem, &model.given_start, settings, breakdown)?;
         Ok((None, None, fit))
     });

@@ -133,24 +133,26 @@ fn run_in(
         .inputs(inputs(file));
     let folder = OutputFolder::prepare(out, claim)?;
     let journal = open_analyses(&folder, STUDY_JOURNAL, &heading, is_resumed)?;
+    let document = StudyDocument {
+        format: 1,
+        title: model.title.clone(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        status: "interrupted".into(),
+        confidence: model.study.confidence,
+        seed: model.study.seed,
+        structural_rank: structural_rank(&model.problem),
+        ..StudyDocument::default()
+    };
+    let threads = model.threads_within_memory(threads);
     let mut work = StudyRun {
-        model: &model,
+        model: Arc::new(model),
         folder: folder.path(),
         heading: Heading::of_model("study", file, false, None),
         is_resumed,
         journal,
         flag,
-        threads: model.threads_within_memory(threads),
-        document: StudyDocument {
-            format: 1,
-            title: model.title.clone(),
-            version: env!("CARGO_PKG_VERSION").into(),
-            status: "interrupted".into(),
-            confidence: model.study.confidence,
-            seed: model.study.seed,
-            structural_rank: structural_rank(&model.problem),
-            ..StudyDocument::default()
-        },
+        threads,
+        document,
     };
     let done = match work.run() {
         Ok(()) => true,
@@ -201,6 +203,16 @@ fn can_be_studied(file: &ModelFile, model: &Model) -> Result<(), InputError> {
     }
 }
 
+/// The model on the grid of a fit; `None` if it cannot be built.
+fn on_grid_of(model: &Arc<Model>, fit: &StudiedFit) -> Option<Arc<Model>> {
+    if fit.nodes == model.problem.system.grid.nodes() {
+        return Some(Arc::clone(model));
+    }
+    let finer = model.on_nodes(fit.nodes)?;
+    finer.check_study_memory().ok()?;
+    (finer.problem.system.grid.nodes() == fit.nodes).then(|| Arc::new(finer))
+}
+
 /// The journal of the fit within a study. A resumed study without one starts its fit over.
 fn fit_journal(folder: &Path, heading: &Heading, is_resumed: bool) -> Option<FitJournal> {
     let before = is_resumed.then(|| FitJournal::resume(folder, heading));
@@ -225,7 +237,8 @@ impl From<io::Error> for StudyError {
 
 /// A running study.
 struct StudyRun<'a> {
-    model: &'a Model,
+    /// The model; after the fit on the grid of the fit.
+    model: Arc<Model>,
     folder: &'a Path,
     /// Heading of the journal of the fit.
     heading: Heading,
@@ -252,7 +265,7 @@ impl StudyRun<'_> {
 
     /// Analyses of the linearised fit, profiles, candidate experiments and equivalent systems.
     fn at_the_optimum(&mut self, at: Optimum) -> Result<(), StudyError> {
-        let model = self.model;
+        let model = Arc::clone(&self.model);
         let plan = &model.study;
         self.document.sensitivity = Some(self.analysis("sensitivity", || study::sensitivity(at))?);
         let bands = || study::bands(at, plan, model.truth.as_ref());
@@ -277,10 +290,10 @@ impl StudyRun<'_> {
 
     /// Further fits: from random starting points, with constant functions, of resampled records.
     fn further_fits(&mut self, at: Optimum) -> Result<(), StudyError> {
-        let (model, threads) = (self.model, self.threads);
+        let (model, threads) = (Arc::clone(&self.model), self.threads);
         let plan = &model.study;
         if plan.starts > 0 {
-            let starts = || study::starts(model, at, threads);
+            let starts = || study::starts(&model, at, threads);
             self.document.multistart = Some(self.analysis("starts", starts)?);
         }
         if plan.constancy_test {
@@ -298,8 +311,8 @@ impl StudyRun<'_> {
 
     /// Extremes of the functions, and the predictions of the systems that have them.
     fn extremes(&mut self, at: Optimum) -> Result<(), StudyError> {
-        let (model, threads) = (self.model, self.threads);
-        let compute = || study::extremes(model, at, threads);
+        let (model, threads) = (Arc::clone(&self.model), self.threads);
+        let compute = || study::extremes(&model, at, threads);
         let (extremes, predictions) = self.analysis("extremes", compute)?;
         if extremes.is_empty() {
             let reason = "the optimum violates the misfit limit or the constraints";
@@ -343,7 +356,7 @@ impl StudyRun<'_> {
 
     /// The fit, from the journal or computed.
     fn fit(&mut self) -> Result<(Problem, Vec<f64>, Evaluation), StudyError> {
-        let model = self.model;
+        let model = Arc::clone(&self.model);
         let progress = Progress::new(&model.settings.stopping);
         let (folder, heading, is_resumed) = (self.folder, &self.heading, self.is_resumed);
         let flag = Arc::clone(&self.flag);
@@ -351,15 +364,16 @@ impl StudyRun<'_> {
         let compute = || {
             let mut journal = fit_journal(folder, heading, is_resumed);
             let journal = journal.as_mut().map(|j| j as &mut dyn CheckpointStore);
-            let (weighted, _, found) = search(model, &progress, journal)?;
+            let (weighted, _, found) = search(&model, &progress, journal)?;
             let problem = weighted.as_ref().map_or(&model.problem, |m| &m.problem);
             let fit = StudiedFit::of(problem, &found);
             interrupted = Some(fit.clone());
             Ok::<_, String>(fit)
         };
         let whole = || !flag.load(Ordering::Relaxed);
-        let is_right = |kept: &Result<StudiedFit, String>| {
-            kept.as_ref().map_or(true, |fit| fit.is_of(&model.problem))
+        let is_right = |kept: &Result<StudiedFit, String>| match kept {
+            Ok(fit) => on_grid_of(&model, fit).is_some_and(|model| fit.is_of(&model.problem)),
+            Err(_) => true,
         };
         self.journal.forget_unless("fit", is_right);
         let fitted = self.journal.analysis("fit", compute, whole)?;
@@ -371,7 +385,13 @@ impl StudyRun<'_> {
         let fit = fitted.map_err(StudyError::Numerical)?;
         FitJournal::clear(folder)?;
         let interrupted = fit.status == Status::Interrupted;
+        let model = on_grid_of(&model, &fit);
+        let model = model.ok_or_else(|| {
+            StudyError::Numerical("the grid of the fit does not fit into memory".into())
+        })?;
         let problem = fit.problem(&model.problem);
+        self.threads = model.threads_within_memory(self.threads);
+        self.model = model;
         let theta = fit.parameters.clone();
         self.document.fit = Some(fit);
         let evaluation = problem

@@ -27,8 +27,8 @@ mod yaml_errors;
 #[cfg(test)]
 pub(crate) use build::DataWarning;
 pub use build::{
-    BuildMode, Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation, StudyPlan,
-    StudyTarget, WeightSearch, build,
+    AutomaticGrid, BuildMode, Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation,
+    StudyPlan, StudyTarget, WeightSearch, build,
 };
 pub use model_file::ModelFile;
 pub use overrides::Override;

@@ -62,7 +62,8 @@ keys! {
 keys! {
     /// Time grid and stepper.
     pub struct GridSpec = "grid", expecting "a map such as {nodes: 2000, method: midpoint}" {
-        /// Number of nodes, with the step duration/(nodes - 1); `auto` chooses it from the spectrum of the records.
+        /// Number of nodes, with the step duration/(nodes - 1); `auto` chooses it from the spectrum of the records, and a fit
+        /// refines it until the discretisation error is below a tenth of the standard errors.
         nodes: Option<Nodes>,
             example "2000",
             default "one per sample",

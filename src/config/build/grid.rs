@@ -1,7 +1,10 @@
 //! The time grid: given by the model file, one node per sample, or an automatic number of nodes.
 
 mod auto;
+mod finer;
 mod per_node;
+
+pub(super) use finer::{FinerNodes, stable_nodes};
 
 use super::BuildMode;
 use super::experiments::{RawChannel, RawRecord};
@@ -15,12 +18,21 @@ use kmcfit_core::internals::system::{Grid, Method};
 /// Most nodes of an automatic choice: the same on every machine.
 const MOST_CHOSEN: usize = 10_000_000;
 
+/// The grid, and the numbers of nodes for finer ones where it is automatic.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct GridChoice {
+    pub grid: Grid,
+    pub finer: Option<FinerNodes>,
+}
+
+/// Chooses the grid; an automatic one has at least `least` nodes.
 pub(super) fn build(
     file: &ModelFile,
     mode: BuildMode,
     records: &[Option<RawRecord>],
+    least: usize,
     notes: &mut Vec<Finding>,
-) -> Result<Grid, InputError> {
+) -> Result<GridChoice, InputError> {
     let asked = file.spec.grid.as_ref().and_then(|g| g.nodes.as_ref());
     let asked = match (mode.nodes(), asked) {
         (Some(nodes), _) => Some(Nodes::Count(Count(nodes))),
@@ -28,18 +40,28 @@ pub(super) fn build(
     };
     let (start, duration) = span(file, records)?;
     let measured = records.iter().flatten().any(|r| !r.channels.is_empty());
-    let nodes = match asked {
-        Some(Nodes::Count(count)) => count.0,
+    let stated = match asked {
+        Some(Nodes::Count(count)) => Some(count.0),
         _ if !measured => {
             return Err(file
                 .error_at("grid", "the number of nodes is missing")
                 .expected("`nodes`, because there is no record"));
         }
-        Some(Nodes::Auto) => auto::nodes(method(file), records, duration, MOST_CHOSEN, notes),
-        None => match node_per_sample(records) {
-            Some(nodes) => nodes,
-            None => auto::nodes(method(file), records, duration, MOST_CHOSEN, notes),
-        },
+        Some(Nodes::Auto) => None,
+        None => node_per_sample(records),
+    };
+    let (nodes, finer) = match stated {
+        Some(nodes) => (nodes, None),
+        None => {
+            let finer = FinerNodes::of(records, duration, MOST_CHOSEN);
+            let first = auto::nodes(method(file), records, duration, MOST_CHOSEN, notes);
+            let nodes = if least > first {
+                finer.at_least(least)
+            } else {
+                first
+            };
+            (nodes, Some(finer))
+        }
     };
     if nodes < Grid::FEWEST_NODES {
         return Err(about_nodes(file, mode, "invalid number of nodes")
@@ -47,11 +69,12 @@ pub(super) fn build(
             .expected(format!("{} or more", Grid::FEWEST_NODES)));
     }
     fits_into_memory(file, mode, nodes)?;
-    Grid::new(start, duration, nodes).ok_or_else(|| {
+    let grid = Grid::new(start, duration, nodes).ok_or_else(|| {
         file.error_at("grid", "invalid time axis")
             .found(format!("{nodes} nodes over {duration:?} s"))
             .expected("a positive duration whose steps are not zero")
-    })
+    })?;
+    Ok(GridChoice { grid, finer })
 }
 
 fn about_nodes(file: &ModelFile, mode: BuildMode, problem: &str) -> InputError {

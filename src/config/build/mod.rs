@@ -6,12 +6,14 @@ mod fit;
 mod functions;
 mod grid;
 mod on_grid;
+mod refinement;
 mod study;
 
 #[cfg(test)]
 pub(crate) use experiments::DataWarning;
 pub use experiments::{ChannelNote, HoldOut};
 pub use kmcfit_core::internals::builder::WeightSearch;
+pub use refinement::AutomaticGrid;
 pub use study::{Candidate, Equivalent, StudyPlan, StudyTarget};
 
 use super::key_positions::{key_path, locate};
@@ -59,6 +61,8 @@ pub struct Model {
     pub warnings: Vec<Finding>,
     /// Automatic choices, such as the number of nodes.
     pub automatic: Vec<Finding>,
+    /// The automatic grid of a fit, which may be refined; `None` for a stated number of nodes.
+    pub grid: Option<AutomaticGrid>,
     /// Source files.
     pub source: ModelSource,
     /// Time taken to build it.
@@ -197,6 +201,12 @@ fn contradicted(file: &ModelFile, contradiction: &Contradiction, problem: &str) 
 /// # Errors
 /// At the first invalid key, with its line.
 pub fn build(file: &ModelFile, mode: BuildMode) -> Result<Model, InputError> {
+    let model = build_on(file, mode, 0)?;
+    Ok(model.on_stable_grid())
+}
+
+/// [`build()`] with at least `least` nodes of an automatic grid.
+fn build_on(file: &ModelFile, mode: BuildMode, least: usize) -> Result<Model, InputError> {
     let clock = Instant::now();
     let mut reading = Duration::ZERO;
     let spec = &file.spec;
@@ -205,7 +215,8 @@ pub fn build(file: &ModelFile, mode: BuildMode) -> Result<Model, InputError> {
     let records = timed(&mut reading, || {
         experiments::read(file, mode, &mut warnings)
     })?;
-    let grid = grid::build(file, mode, &records, &mut automatic)?;
+    let choice = grid::build(file, mode, &records, least, &mut automatic)?;
+    let grid = choice.grid;
     let solver = fit::solver(file)?;
     let (builder, notes) = builder(file, mode, &grid, solver, records)?;
     let about = |error| input_error(file, error);
@@ -258,6 +269,7 @@ pub fn build(file: &ModelFile, mode: BuildMode) -> Result<Model, InputError> {
         predictions: spec.predict.iter().flatten().map(state).collect(),
         warnings,
         automatic,
+        grid: AutomaticGrid::of(file, mode, solver, choice.finer),
         source,
         preparation: Preparation {
             reading,

@@ -73,6 +73,8 @@ pub struct StudiedFit {
     pub cost: f64,
     /// Part of J from the samples.
     pub misfit: f64,
+    /// Number of nodes.
+    pub nodes: usize,
     /// Parameters of the functions, then the nuisance parameters.
     pub parameters: Vec<f64>,
     /// Weights of the penalties.

@@ -17,6 +17,7 @@ impl StudiedFit {
             reason: fit.outcome.reason.to_string(),
             cost: fit.best.evaluation.cost,
             misfit: fit.best.evaluation.misfit,
+            nodes: problem.system.grid.nodes(),
             parameters: fit.best.parameters.clone(),
             weights: problem.penalties.iter().map(|p| p.weight).collect(),
             sigmas: problem.channels().map(sigma).collect(),

@@ -143,9 +143,28 @@ impl Information {
     }
 
     /// Includes the discretisation error of the time steps.
-    pub fn with_step_error(mut self, problem: &Problem, evaluation: &Evaluation) -> Self {
-        self.step_error = step_error(problem, evaluation, &self.sensitivity.roots);
-        self
+    pub fn with_step_error(self, problem: &Problem, evaluation: &Evaluation) -> Self {
+        let error = step_error(problem, evaluation, &self.sensitivity.roots);
+        self.with_error(error)
+    }
+
+    /// Includes this discretisation error of the weighted predictions.
+    pub fn with_error(self, step_error: Option<DVector<f64>>) -> Self {
+        Self { step_error, ..self }
+    }
+
+    /// Largest shift of a parameter by the discretisation error, in standard errors without it, with the rows `held` fixed. `None`
+    /// where no error is included.
+    pub fn largest_shift(&self, held: &[&ActiveRow]) -> Option<f64> {
+        self.step_error.as_ref()?;
+        let columns = self.columns(&self.factor(held));
+        let (shift, root) = columns.split_last()?;
+        let in_errors = shift.iter().enumerate().map(|(i, shift)| {
+            let variance: f64 = root.iter().map(|column| column[i] * column[i]).sum();
+            shift.abs() / variance.sqrt()
+        });
+        // Zero over zero for a parameter that is held or undetermined.
+        Some(in_errors.filter(|x| !x.is_nan()).fold(0.0, f64::max))
     }
 
     /// The shift of the estimates by the discretisation error, as a column of the covariance root.
@@ -270,12 +289,16 @@ impl Information {
         if covariance.undetermined.ncols() > 0 || !is_known || covariance.root.ncols() == 0 {
             return None;
         }
+        let root = DMatrix::from_columns(&self.columns(covariance));
+        Some(&root * root.transpose())
+    }
+
+    /// Columns of the covariance root as changes of the parameters.
+    fn columns(&self, covariance: &CovarianceRoot) -> Vec<DVector<f64>> {
         let directions = &self.sensitivity.directions;
         let column =
             |z: DVectorView<f64>| DVector::from_vec(directions.to_parameters(z.as_slice()));
-        let columns: Vec<_> = covariance.root.column_iter().map(column).collect();
-        let root = DMatrix::from_columns(&columns);
-        Some(&root * root.transpose())
+        covariance.root.column_iter().map(column).collect()
     }
 
     /// Estimated variance `sum r^2 / (n - effective parameters)` of samples without sigma; infinite if the difference is not

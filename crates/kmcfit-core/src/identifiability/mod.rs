@@ -28,6 +28,7 @@ mod ratios;
 mod scaling_ambiguity;
 mod sensitivity;
 mod step_error;
+mod step_shift;
 mod structural_rank;
 pub use classification::is_negligible;
 

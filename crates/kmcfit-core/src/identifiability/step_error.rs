@@ -26,21 +26,31 @@ pub(super) fn step_error(
     roots: &[f64],
 ) -> Option<DVector<f64>> {
     let halved = problem.on_half_step(evaluation).ok()??;
+    let changes: Vec<Vec<f64>> = halved.changes.into_iter().flatten().collect();
+    let pairs = problem.predicted(evaluation).zip(&changes);
+    let is_of_these_steps = pairs.fold(true, |all, ((channel, predicted), changes)| {
+        let residuals: Vec<f64> = channel.residuals(predicted).collect();
+        all & (rms(&residuals) < SAME_STEPS * rms(changes))
+    });
+    let error = weighted(problem, changes, roots)?;
+    (!is_of_these_steps).then_some(error)
+}
+
+/// Discretisation error of `changes`, the predictions on half the step less those on the whole step, weighted and whitened; `None`
+/// where it is not finite.
+pub(super) fn weighted(
+    problem: &Problem,
+    changes: Vec<Vec<f64>>,
+    roots: &[f64],
+) -> Option<DVector<f64>> {
     let order = 2f64.powi(problem.system.method.order() as i32);
     let factor = order / (order - 1.0);
     let mut error = Vec::with_capacity(roots.len());
-    let mut is_of_these_steps = true;
-    let pairs = problem
-        .predicted(evaluation)
-        .zip(halved.changes.into_iter().flatten());
-    for ((channel, predicted), mut changes) in pairs {
-        let residuals: Vec<f64> = channel.residuals(predicted).collect();
-        is_of_these_steps &= rms(&residuals) < SAME_STEPS * rms(&changes);
+    for (channel, mut changes) in problem.channels().zip(changes) {
         channel.whiten_rows(&mut changes);
         error.extend(changes);
     }
     let error = error.iter().zip(roots).map(|(e, root)| factor * root * e);
     let error = DVector::from_iterator(roots.len(), error);
-    let is_known = error.iter().all(|e| e.is_finite());
-    (is_known && !is_of_these_steps).then_some(error)
+    error.iter().all(|e| e.is_finite()).then_some(error)
 }

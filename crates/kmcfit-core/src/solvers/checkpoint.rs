@@ -70,7 +70,7 @@ pub enum MethodState {
     },
     /// Gauss–Newton.
     GaussNewton {
-        /// Weight of the proximal term, and the cost at the first point, if any.
+        /// Weight of the proximal term, the cost at the first point and the change of the last step below its rounding error, if any.
         numbers: ExactF64s,
         /// Parameters at which the Jacobian in use was computed, if they differ from the current point.
         #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -22,6 +22,8 @@ pub(crate) struct CountedEvaluator<'a, 'p> {
     pub program_iterations: u32,
     /// Solver of the programs.
     pub qp: QpSolver,
+    /// Limit of the change in the last step, if the fit has one: then steps continue below the rounding error of the cost.
+    pub step_limit: Option<f64>,
     /// Time by kind of work.
     pub timings: Timings,
 }
@@ -49,6 +51,7 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
             },
             program_iterations: settings.stopping.program_iterations,
             qp: settings.qp,
+            step_limit: settings.stopping.step,
             timings: Timings::default(),
         }
     }

@@ -1,7 +1,7 @@
 //! Fits: methods, each a search direction and a step rule, their common loop, starting points, and analyses based on fits.
 //!
 //! Order of imports: settings, termination, history and checkpoint; linearisation; iterate and counted evaluations;
-//! methods; executor (the loop); starts; start strategy; noise estimation, weight path and validation.
+//! methods; executor (the loop); starts; start strategy; noise estimation, weight path and validation; grid refinement.
 
 mod active_set;
 mod checkpoint;
@@ -11,6 +11,7 @@ mod evaluator;
 mod executor;
 mod fit;
 mod gaps;
+mod grid_refinement;
 mod history;
 mod infeasible_subset;
 mod input_errors;
@@ -48,6 +49,7 @@ pub use executor::fit_from;
 pub use fit::{Attempt, Fit};
 pub use gaps::{CycleCount, Gap, cycles};
 pub(crate) use gaps::{gaps, varying_function};
+pub use grid_refinement::{GridNotice, fit_on_refined_grids};
 pub use history::{IterationRecord, number_or_nan};
 pub(crate) use input_errors::input_error_effect;
 pub use iterate::Iterate;

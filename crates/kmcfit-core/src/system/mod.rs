@@ -10,6 +10,7 @@ mod grid;
 mod input;
 mod integrator;
 pub mod quadrature;
+mod stability;
 
 pub(crate) use integrator::{MIDPOINT, RK4, StagePosition, Tableau};
 

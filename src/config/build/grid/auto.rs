@@ -2,7 +2,9 @@
 //!
 //! A response of angular frequency `w`, integrated over the time `T` with the step `h`, has a phase error of about
 //! `w T (w h)^p / C` at the end, with `p = 2`, `C = 6` for the midpoint rule and `p = 4`, `C = 120` for the classical
-//! Runge-Kutta method. The step is chosen for the frequency below which 90 % of the energy of the records lies, then
+//! Runge-Kutta method. A fit determines the phase of `n` samples at the end of a record to about `3 q / sqrt(n)`, with the noise `q`
+//! relative to the root-mean-square response. The first grid has an error of that size, within limits; refinement after the fit
+//! makes it as small as needed. The step is chosen for the frequency below which 90 % of the energy of the records lies, then
 //! shortened so that samples of force and base fall on nodes. For records without a spectrum (too few or equal samples)
 //! the step is the sampling interval.
 
@@ -13,8 +15,11 @@ use kmcfit_core::internals::signal::Spectrum;
 use kmcfit_core::internals::system::Method;
 use std::f64::consts::TAU;
 
-/// Target phase error at the end of the record, rad: the largest error of the response relative to its amplitude.
-const ACCURACY: f64 = 1e-4;
+/// Smallest and largest target of the phase error at the end of the record, rad: the largest error of the response relative to its
+/// amplitude.
+const ACCURACY: [f64; 2] = [1e-4, 1e-2];
+/// Standard error of the phase at the end of a record, in `q / sqrt(n)`: that of a frequency, `sqrt(12)`, rounded down.
+const PHASE_ERROR: f64 = 3.0;
 /// Share of the energy below the frequency for which the accuracy holds, and below the frequency that must be resolved
 /// with [`STEPS_PER_PERIOD`].
 const ENERGY: f64 = 0.9;
@@ -41,10 +46,13 @@ pub fn nodes(
     let mut samples = 2;
     for channel in records.iter().flatten().flat_map(|r| &r.channels) {
         samples = samples.max(channel.times.len());
-        let spectrum = Spectrum::of(lively(&channel.values), channel.median_spacing);
-        let spectrum = spectrum.map(|s| s.without_noise());
+        let lively = lively(&channel.values);
+        let whole = Spectrum::of(lively, channel.median_spacing);
+        let spectrum = whole.as_ref().map(Spectrum::without_noise);
         let frequency = spectrum.as_ref().map(|s| s.energy_quantile(ENERGY));
-        let (Some(spectrum), Some(frequency)) = (spectrum, frequency.filter(|f| *f > 0.0)) else {
+        let (Some(whole), Some(spectrum), Some(frequency)) =
+            (whole, spectrum, frequency.filter(|f| *f > 0.0))
+        else {
             if channel.median_spacing > 0.0 {
                 longest = longest.min(channel.median_spacing);
             }
@@ -53,8 +61,9 @@ pub fn nodes(
         fastest = fastest.max(frequency);
         let omega = TAU * frequency;
         let (order, constant) = error_constant(method);
+        let accuracy = accuracy(&whole, &spectrum, lively.len());
         longest = longest
-            .min((ACCURACY * constant / (omega * duration)).powf(1.0 / order) / omega)
+            .min((accuracy * constant / (omega * duration)).powf(1.0 / order) / omega)
             .min(1.0 / (STEPS_PER_PERIOD * spectrum.energy_quantile(ALL_ENERGY)));
     }
     let shortest = duration / (most.min(MOST_PER_SAMPLE * samples) - 1) as f64;
@@ -92,6 +101,18 @@ pub fn nodes(
         .with("frequency", fastest);
     notes.push(note.with("phase_error", phase_error));
     nodes
+}
+
+/// Target phase error for a spectrum of `samples` samples, with and without noise; the geometric mean of the limits where noise
+/// and response do not differ.
+fn accuracy(whole: &Spectrum, quiet: &Spectrum, samples: usize) -> f64 {
+    let [least, most] = ACCURACY;
+    if quiet == whole {
+        return (least * most).sqrt();
+    }
+    let energy = |spectrum: &Spectrum| spectrum.density().iter().sum::<f64>();
+    let noise = (1.0 - energy(quiet) / energy(whole)).max(0.0).sqrt();
+    (PHASE_ERROR * noise / (samples.max(1) as f64).sqrt()).clamp(least, most)
 }
 
 /// First part of a decaying response: halved as long as the later half has next to no energy, where noise dominates the

@@ -18,7 +18,9 @@ use crate::solvers::linearization::{Linearization, linearisation_tangents, linea
 use crate::solvers::optimality::Optimality;
 use crate::solvers::reason::Reason;
 use crate::solvers::settings::QpSolver;
-use proposal::{Proposal, ProposalOutcome, SMALLEST_CHANGE, at_minimum, change, propose};
+use proposal::{
+    Proposal, ProposalOutcome, SMALLEST_CHANGE, at_minimum, change, is_below_rounding, propose,
+};
 
 /// Initial weight of the proximal term, relative to J.
 const FIRST_DAMPING: f64 = 1e-2;
@@ -45,6 +47,8 @@ const AS_PREDICTED: f64 = 0.1;
 pub struct GaussNewton {
     damping: f64,
     first_cost: Option<f64>,
+    /// Change of the last step below the rounding error of the cost.
+    last_change: Option<f64>,
     /// Storage for the next trial.
     spare: Option<Evaluation>,
 }
@@ -54,6 +58,7 @@ impl Default for GaussNewton {
         Self {
             damping: FIRST_DAMPING,
             first_cost: None,
+            last_change: None,
             spare: None,
         }
     }
@@ -108,6 +113,12 @@ impl StepRule for GaussNewton {
             if linear.trouble.is_none()
                 && let Some(reason) = at_minimum(problem, point, &proposal)
             {
+                let decrease = decrease.unwrap_or(f64::INFINITY);
+                if is_below_rounding(problem, point, &proposal, decrease)
+                    && self.contracts(work.step_limit, change(problem, point, &proposal))
+                {
+                    return linear.step_to(work, point, proposal, evaluation, 0.0);
+                }
                 return Step::Minimum(reason);
             }
             if !proposal.is_solved {
@@ -129,6 +140,8 @@ impl StepRule for GaussNewton {
 
     fn state(&self, point: &Iterate) -> MethodState {
         let numbers = std::iter::once(self.damping).chain(self.first_cost);
+        // Known only with a first cost.
+        let numbers = numbers.chain(self.last_change);
         let made_at = point.linearization().computed_at();
         MethodState::GaussNewton {
             numbers: ExactF64s(numbers.collect()),
@@ -140,9 +153,10 @@ impl StepRule for GaussNewton {
         let MethodState::GaussNewton { numbers, made_at } = memory else {
             return false;
         };
-        let (damping, first_cost) = match *numbers.0.as_slice() {
-            [damping] => (damping, None),
-            [damping, first_cost] => (damping, Some(first_cost)),
+        let (damping, first_cost, last_change) = match *numbers.0.as_slice() {
+            [damping] => (damping, None, None),
+            [damping, first_cost] => (damping, Some(first_cost), None),
+            [damping, first_cost, last_change] => (damping, Some(first_cost), Some(last_change)),
             _ => return false,
         };
         if let Some(ExactF64s(at)) = made_at {
@@ -151,12 +165,24 @@ impl StepRule for GaussNewton {
                 return false;
             }
         }
-        (self.damping, self.first_cost) = (damping, first_cost);
+        self.damping = damping;
+        (self.first_cost, self.last_change) = (first_cost, last_change);
         true
     }
 }
 
 impl GaussNewton {
+    /// True for a `change` above the limit of the last step, and at most half of that of the step before: steps below the rounding
+    /// error of the cost go on as long as they contract.
+    fn contracts(&mut self, limit: Option<f64>, change: f64) -> bool {
+        let is_long = limit.is_some_and(|limit| change > limit);
+        let contracts = is_long && self.last_change.is_none_or(|last| change <= 0.5 * last);
+        if contracts {
+            self.last_change = Some(change);
+        }
+        contracts
+    }
+
     fn learn(&mut self, gain: f64) {
         if gain > GOOD {
             self.damping = (self.damping / 10.0).max(LEAST_DAMPING);
@@ -268,5 +294,17 @@ mod tests {
         let mut method = GaussNewton::default();
         (0..20).for_each(|_| method.learn(1.0));
         assert_eq!(method.damping, LEAST_DAMPING);
+    }
+
+    /// Only with a limit of the last step, above it, and at most half as long as the step before.
+    #[test]
+    fn steps_below_the_rounding_error_contract() {
+        let mut method = GaussNewton::default();
+        assert!(!method.contracts(None, 1e-8));
+        let limit = Some(1e-12);
+        let steps = [(1e-8, true), (6e-9, false), (1e-10, true), (1e-13, false)];
+        for (change, expected) in steps {
+            assert_eq!(method.contracts(limit, change), expected, "{change}");
+        }
     }
 }

@@ -66,6 +66,18 @@ pub(super) fn at_minimum(
     (is_known && change <= SMALLEST_CHANGE).then_some(Reason::NoPredictedChange(change))
 }
 
+/// True if the decrease of the cost, predicted and computed, is within the rounding error: near a minimum the cost has half the
+/// digits of the parameters.
+pub(super) fn is_below_rounding(
+    problem: &Problem,
+    point: &Iterate,
+    proposal: &Proposal,
+    decrease: f64,
+) -> bool {
+    let rounding = response_rounding(problem, point.evaluation.cost);
+    proposal.is_solved && decrease.abs().max(proposal.predicted.abs()) <= rounding
+}
+
 /// Largest change of a function in a proposal, relative to its size.
 pub(super) fn change(problem: &Problem, point: &Iterate, proposal: &Proposal) -> f64 {
     point.relative_change(problem, &proposal.parameters)

@@ -1,0 +1,79 @@
+//! Stability of explicit steps: the largest rate of the linear terms, and the number of nodes that it requires.
+
+use super::{Method, NodalCoefficients, System, Term};
+
+impl Method {
+    /// Largest product of step and rate, `h |lambda|`, of a stable step, with a margin of a tenth. Decay is stable up to
+    /// 2.785 (`rk4`) and 2 (`midpoint`), undamped oscillation with `rk4` up to 2.828. The midpoint rule amplifies undamped
+    /// oscillations at every step, by `(h omega)^4 / 8`, which is part of its error.
+    fn stability_limit(self) -> f64 {
+        match self {
+            Method::Midpoint => 1.8,
+            Method::Rk4 => 2.5,
+        }
+    }
+}
+
+impl System {
+    /// Smallest number of nodes with stable steps for mass, damping and stiffness of `nodal`.
+    pub fn stable_nodes(&self, nodal: &NodalCoefficients) -> usize {
+        let steps = self.grid.duration() * self.largest_rate(nodal) / self.method.stability_limit();
+        // The cast saturates.
+        (steps.ceil() as usize).saturating_add(1)
+    }
+
+    /// Largest magnitude of a root of `m lambda^2 + c lambda + k` at the nodes, 1/s; nodes where it is not finite are omitted.
+    fn largest_rate(&self, nodal: &NodalCoefficients) -> f64 {
+        let of = |wanted: Term| {
+            let index = self.terms.iter().position(|term| *term == wanted);
+            index.and_then(|index| nodal.coefficients.get(index))
+        };
+        let (damping, stiffness) = (of(Term::Damping), of(Term::Stiffness));
+        let value = |f: Option<&Vec<f64>>, i: usize| f.map_or(0.0, |f| f[i]);
+        let rates = (nodal.mass.iter().enumerate())
+            .map(|(i, m)| rate(*m, value(damping, i), value(stiffness, i)));
+        rates.filter(|rate| rate.is_finite()).fold(0.0, f64::max)
+    }
+}
+
+/// Largest magnitude of a root of `m lambda^2 + c lambda + k`.
+fn rate(m: f64, c: f64, k: f64) -> f64 {
+    let (half, square) = (0.5 * c / m, k / m);
+    let discriminant = half * half - square;
+    match discriminant < 0.0 {
+        true => square.sqrt(),
+        false => half.abs() + discriminant.sqrt(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::system::Grid;
+
+    fn system(method: Method) -> System {
+        System {
+            grid: Grid::new(0.0, 2.0, 101).unwrap(),
+            method,
+            terms: vec![Term::Damping, Term::Stiffness],
+        }
+    }
+
+    fn constant(m: f64, c: f64, k: f64) -> NodalCoefficients {
+        NodalCoefficients {
+            mass: vec![m; 101],
+            coefficients: vec![vec![c; 101], vec![k; 101]],
+        }
+    }
+
+    /// Decay rates of 2 and 498 per second, and oscillation at 10 rad/s.
+    #[test]
+    fn the_number_of_nodes_follows_from_the_largest_rate() {
+        let rk4 = system(Method::Rk4);
+        assert_eq!(rk4.stable_nodes(&constant(1.0, 500.0, 996.0)), 400);
+        assert_eq!(rk4.stable_nodes(&constant(2.0, 0.0, 200.0)), 9);
+        let midpoint = system(Method::Midpoint);
+        assert_eq!(midpoint.stable_nodes(&constant(2.0, 0.0, 200.0)), 13);
+        assert_eq!(rk4.stable_nodes(&constant(0.0, 1.0, 1.0)), 1);
+    }
+}

@@ -1,0 +1,73 @@
+//! Numbers of nodes of automatic grids that are finer than the first one.
+
+use crate::config::build::experiments::RawRecord;
+use crate::finding::Finding;
+
+/// Most nodes per sample of a refined grid; the first one has fewer ([`super::auto`]).
+const MOST_PER_SAMPLE: usize = 1024;
+
+/// Numbers of nodes of finer grids.
+#[derive(Debug, Clone, Copy)]
+pub struct FinerNodes {
+    /// Most nodes.
+    pub most: usize,
+    /// Sampling intervals of force or base in the record, whose samples fall on nodes; `None` without them.
+    intervals: Option<f64>,
+}
+
+impl FinerNodes {
+    /// Numbers of at most `most` nodes for records of `duration` s.
+    pub fn of(records: &[Option<RawRecord>], duration: f64, most: usize) -> Self {
+        let records = || records.iter().flatten();
+        let channels = records().flat_map(|r| &r.channels);
+        let samples = channels.map(|c| c.times.len()).max().unwrap_or(2);
+        let spacing = records().filter_map(RawRecord::drive_spacing);
+        Self {
+            most: most.min(samples.saturating_mul(MOST_PER_SAMPLE)),
+            intervals: spacing.reduce(f64::min).map(|spacing| duration / spacing),
+        }
+    }
+
+    /// Smallest number of nodes from `least` on with the samples of the force on nodes.
+    pub fn at_least(&self, least: usize) -> usize {
+        let steps = least.saturating_sub(1) as f64;
+        match self.intervals {
+            None => least,
+            Some(intervals) => {
+                // Rounding of the interval adds no step to each.
+                let each = (steps / intervals * (1.0 - 1e-9)).ceil().max(1.0);
+                (intervals * each).round() as usize + 1
+            }
+        }
+    }
+}
+
+/// Note on a grid that was chosen for stable steps.
+pub fn stable_nodes(nodes: usize, before: usize) -> Finding {
+    let text = format!(
+        "grid: {nodes} nodes instead of {before}, for stable steps at the start values of the functions"
+    );
+    Finding::new("nodes_for_stability", text).with("nodes", nodes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::FinerNodes;
+
+    #[test]
+    fn samples_of_a_force_stay_on_nodes() {
+        let free = FinerNodes {
+            most: 1000,
+            intervals: None,
+        };
+        assert_eq!(free.at_least(42), 42);
+        let forced = FinerNodes {
+            most: 1000,
+            intervals: Some(10.0),
+        };
+        assert_eq!(
+            [11, 12, 21, 42].map(|n| forced.at_least(n)),
+            [11, 21, 21, 51]
+        );
+    }
+}

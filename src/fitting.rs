@@ -1,0 +1,80 @@
+//! Fits of models: with their noise, the weights chosen by a rule, and finer grids where the number of nodes is automatic.
+
+use crate::config::{AutomaticGrid, Model, WeightSearch};
+use crate::finding::Finding;
+use kmcfit_core::internals::problem::Problem;
+use kmcfit_core::internals::simulate::SimulationError;
+use kmcfit_core::internals::solvers::{
+    Fit, GridNotice, Observer, WeightPath, choose_weight_watched, fit_on_refined_grids,
+    fit_with_noise_watched,
+};
+
+/// A fit, and the model as fitted.
+pub struct ModelFit {
+    /// The model with the grid, sigmas and penalty weights of the fit.
+    pub model: Model,
+    /// Fits with other weights, if a rule chose them.
+    pub weights: Option<WeightPath>,
+    /// The fit.
+    pub fit: Fit,
+}
+
+/// Fits a model from its start.
+///
+/// # Errors
+/// A [`SimulationError`] if no starting point can be simulated.
+pub fn fit_model(model: &Model, watch: &mut Observer) -> Result<ModelFit, SimulationError> {
+    let start = model.problem.functions.start();
+    let mut run =
+        |problem: &Problem, start: &[f64], watch: &mut Observer| run(model, problem, start, watch);
+    let Some(most) = model.grid.as_ref().map(AutomaticGrid::most) else {
+        let (weights, problem, fit) = run(&model.problem, &start, watch)?;
+        let model = Model {
+            problem,
+            ..model.clone()
+        };
+        return Ok(ModelFit {
+            model,
+            weights,
+            fit,
+        });
+    };
+    let mut on_nodes = |least| Some(model.on_nodes(least)?.problem);
+    let found = fit_on_refined_grids(&model.problem, &start, most, &mut on_nodes, &mut run, watch)?;
+    let nodes = found.problem.system.grid.nodes();
+    let is_same = nodes == model.problem.system.grid.nodes();
+    let refined = (!is_same).then(|| model.on_nodes(nodes)).flatten();
+    let mut model = Model {
+        problem: found.problem,
+        ..refined.unwrap_or_else(|| model.clone())
+    };
+    for notice in found.notices {
+        match notice {
+            GridNotice::GridRefined { .. } => model.automatic.push(Finding::stated(&notice)),
+            GridNotice::GridLimited { .. } => model.warnings.push(Finding::stated(&notice)),
+        }
+    }
+    Ok(ModelFit {
+        model,
+        weights: found.further,
+        fit: found.fit,
+    })
+}
+
+/// Fits a problem of the model.
+fn run(
+    model: &Model,
+    problem: &Problem,
+    start: &[f64],
+    watch: &mut Observer,
+) -> Result<(Option<WeightPath>, Problem, Fit), SimulationError> {
+    let settings = &model.settings;
+    match &model.weight_rule {
+        None => fit_with_noise_watched(problem, start, settings, watch)
+            .map(|(problem, fit)| (None, problem, fit)),
+        Some(WeightSearch { rule, penalties }) => {
+            choose_weight_watched(problem, start, settings, *rule, penalties, watch)
+                .map(|(path, problem, fit)| (Some(path), problem, fit))
+        }
+    }
+}
