@@ -442,25 +442,35 @@ fn white_noise_with_an_estimated_sigma_has_n_minus_p_degrees_of_freedom() {
 #[test]
 #[ignore = "counts of 1000 seeds take minutes"]
 fn print_coverage() {
-    const SEEDS: u64 = 1000;
     println!("| noise | model | m | c | k | spread of the standardised errors |");
     println!("|---|---|---|---|---|---|");
     for (name, law) in laws() {
-        for model in [NoiseModel::White, NoiseModel::Auto] {
-            let setting = Setting::displacement(model);
-            let scores = match model {
-                NoiseModel::White => scores_by_model(&law, setting, SEEDS),
-                _ => scores(&law, setting, SEEDS, all),
-            };
-            let percent = |c: usize| format!("{:.1} %", 100.0 * c as f64 / SEEDS as f64);
-            let counts = inside(&scores).map(percent).join(" | ");
-            // A t distributed error is brought to the normal distribution by the ratio of the half-widths.
-            let spread: [String; 3] = std::array::from_fn(|j| {
-                let square = |s: &Score| (s.errors[j] * 1.959_964 / s.half_widths[j]).powi(2);
-                let sum: f64 = scores.iter().map(square).sum();
-                format!("{:.3}", (sum / SEEDS as f64).sqrt())
-            });
-            println!("| {name} | {model:?} | {counts} | {} |", spread.join(", "));
-        }
+        let white = Setting::displacement(NoiseModel::White);
+        print_row(
+            name,
+            "white, its covariance",
+            &scores_by_model(&law, white, LONG),
+        );
+        print_row(name, "white, kernel", &scores(&law, white, LONG, all));
+        let automatic = Setting::displacement(NoiseModel::Auto);
+        print_row(name, "auto", &scores(&law, automatic, LONG, all));
     }
+    for (name, law, setting) in robust_and_acceleration() {
+        print_row(name, "auto", &scores(&law, setting, LONG, all));
+    }
+}
+
+/// Seeds of the long counts.
+const LONG: u64 = 1000;
+
+fn print_row(name: &str, model: &str, scores: &[Score]) {
+    let percent = |c: usize| format!("{:.1} %", 100.0 * c as f64 / LONG as f64);
+    let counts = inside(scores).map(percent).join(" | ");
+    // A t distributed error is brought to the normal distribution by the ratio of the half-widths.
+    let spread: [String; 3] = std::array::from_fn(|j| {
+        let square = |s: &Score| (s.errors[j] * 1.959_964 / s.half_widths[j]).powi(2);
+        let sum: f64 = scores.iter().map(square).sum();
+        format!("{:.3}", (sum / LONG as f64).sqrt())
+    });
+    println!("| {name} | {model} | {counts} | {} |", spread.join(", "));
 }
