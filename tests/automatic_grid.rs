@@ -314,7 +314,7 @@ fn the_limit_of_an_automatic_grid_is_a_notice() {
     let model = build(&file, BuildMode::Fit).unwrap();
     let first = model.problem.system.grid.nodes();
     let start = model.problem.start();
-    for most in [first, 4 * first] {
+    for most in [first, 16 * first] {
         let found = fit_on_refined_grids(
             &model.problem,
             &start,
