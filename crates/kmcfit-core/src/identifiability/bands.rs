@@ -16,6 +16,8 @@
 //!
 //! the covariance of a random function whose prior is the penalty. It includes the smoothing bias on average over the record
 //! (Wahba 1983; Nychka 1988): there a 95 % band holds the function at 95 % of the times, fewer where it bends most.
+//! The standard error of a piecewise-linear function without a penalty includes the error of linear interpolation between its knots, as far
+//! as its second differences show it.
 //! Priors of scalars count as measurements. Total-variation penalties and
 //! the curvature of the predictions are neglected.
 //!
@@ -26,6 +28,7 @@
 use super::active::{ActiveRow, active_rows};
 use super::band::{Band, BandSide};
 use super::band_notes::notes;
+use super::basis_error::basis_error;
 use super::covariance::{CovarianceRoot, Information};
 use super::covariance_kind::CovarianceKind;
 use super::degrees::{NoiseVariants, degrees_of_parameters};
@@ -159,6 +162,7 @@ impl Bands {
         };
         let maker = Maker {
             problem,
+            theta,
             variants: variants.as_ref(),
             times: nodes.iter().map(|i| problem.system.grid.time(*i)).collect(),
             nodes,
@@ -211,6 +215,7 @@ impl Bands {
 
 struct Maker<'a> {
     problem: &'a Problem,
+    theta: &'a [f64],
     variants: Option<&'a NoiseVariants>,
     nodes: Vec<usize>,
     times: Vec<f64>,
@@ -269,7 +274,16 @@ impl Maker<'_> {
             roots: self.factors.map(|factor| image(&factor.root)),
             hidden: self.factors.map(|factor| image(&factor.undetermined)),
             sizes: self.nodes.iter().map(size).collect(),
+            basis_error: match self.is_penalised(f) {
+                true => vec![0.0; self.nodes.len()],
+                false => basis_error(functions.get(f), &self.theta[range], &self.times),
+            },
         }
+    }
+
+    /// True if a penalty smooths function `f`.
+    fn is_penalised(&self, f: usize) -> bool {
+        self.problem.penalties.iter().any(|p| p.function == f)
     }
 
     fn band(
@@ -285,7 +299,10 @@ impl Maker<'_> {
             let hidden = linear.hidden[which].row(i).norm();
             match hidden > UNSEEN_SHARE * linear.sizes[i] {
                 true => f64::INFINITY,
-                false => linear.roots[which].row(i).norm(),
+                false => linear.roots[which]
+                    .row(i)
+                    .norm()
+                    .hypot(linear.basis_error[i]),
             }
         };
         let (mut errors, mut sides) = (Vec::with_capacity(count), Vec::with_capacity(count));

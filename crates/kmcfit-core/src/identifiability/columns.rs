@@ -1,4 +1,4 @@
-//! Matrices with a further column.
+//! Matrices with further rows or a further column.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,4 +13,12 @@ pub(super) fn with_column(root: DMatrix<f64>, column: Option<DVector<f64>>) -> D
             wider
         }
     }
+}
+
+/// Matrix `a` above `b`.
+pub(crate) fn stacked(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(a.nrows() + b.nrows(), a.ncols());
+    out.rows_mut(0, a.nrows()).copy_from(a);
+    out.rows_mut(a.nrows(), b.nrows()).copy_from(b);
+    out
 }

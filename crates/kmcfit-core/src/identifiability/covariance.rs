@@ -2,18 +2,18 @@
 //! undetermined. Standard errors ([`Problem::covariance`]) and bands ([`super::Bands`]) are computed from it.
 
 use super::active::{ActiveRow, active_rows};
-use super::columns::with_column;
+use super::columns::{stacked, with_column};
 use super::covariance_kind::CovarianceKind;
 use super::directions::Directions;
 use super::equation_rows::{EquationRows, Scores};
 use super::factorisation::Factorisation;
+use super::misspecified::kernels;
 use super::sensitivity::Sensitivity;
 use super::step_error::step_error;
 use crate::functions::{Penalty, WeightRule};
 use crate::noise::KernelCovariance;
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::record::ScoreCovariance;
 use nalgebra::{DMatrix, DVector, DVectorView};
 use std::ops::Range;
 
@@ -324,15 +324,6 @@ impl Information {
     }
 }
 
-/// Samples of the channels whose scores have the covariance of a kernel, in the order of all samples.
-fn kernels(problem: &Problem) -> Vec<Range<usize>> {
-    let channels = problem.channels().zip(problem.channel_samples());
-    let misspecified = channels.filter(|(channel, samples)| {
-        channel.noise().scores == ScoreCovariance::Kernel && samples.len() > problem.parameters()
-    });
-    misspecified.map(|(_, samples)| samples).collect()
-}
-
 /// Covariance root from the scores of an equation error; all directions are undetermined if these have no covariance.
 fn kernel_root(
     scores: &Scores,
@@ -453,12 +444,4 @@ fn roughness(problem: &Problem, penalty: &Penalty, directions: &Directions) -> D
     }
     out *= penalty.weight.sqrt();
     if rows > n { out.qr().r() } else { out }
-}
-
-/// Matrix `a` above `b`.
-pub(crate) fn stacked(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(a.nrows() + b.nrows(), a.ncols());
-    out.rows_mut(0, a.nrows()).copy_from(a);
-    out.rows_mut(a.nrows(), b.nrows()).copy_from(b);
-    out
 }

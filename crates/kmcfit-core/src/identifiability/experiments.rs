@@ -11,7 +11,8 @@
 //!
 //! are ratios of standard errors, after to before; 1 is no gain (Pukelsheim, *Optimal Design of Experiments*).
 
-use super::covariance::{Information, stacked};
+use super::columns::stacked;
+use super::covariance::Information;
 use super::factorisation::Factorisation;
 use super::scaling_ambiguity::ScalingAmbiguity;
 use super::sensitivity::Sensitivity;

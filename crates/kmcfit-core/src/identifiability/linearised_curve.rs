@@ -10,6 +10,8 @@ pub(super) struct LinearisedCurve {
     pub hidden: [DMatrix<f64>; 2],
     /// Norm of the full slope.
     pub sizes: Vec<f64>,
+    /// Error of the basis, which the standard errors include.
+    pub basis_error: Vec<f64>,
 }
 
 /// Linear combination `sum_f slope_f(t) p_f(t)`, with slopes at each node.
@@ -35,9 +37,14 @@ pub(super) fn combine(
         let each = each.map(|(f, by)| (linearised[*f].sizes[i] * by).abs());
         each.fold(0.0, f64::max)
     };
+    let error = |(i, slopes): (usize, &Vec<f64>)| {
+        let each = functions.iter().zip(slopes);
+        each.map(|(f, by)| linearised[*f].basis_error[i] * by).sum()
+    };
     LinearisedCurve {
         roots: [sum(&|l| &l.roots[0]), sum(&|l| &l.roots[1])],
         hidden: [sum(&|l| &l.hidden[0]), sum(&|l| &l.hidden[1])],
         sizes: slopes.iter().enumerate().map(size).collect(),
+        basis_error: slopes.iter().enumerate().map(error).collect(),
     }
 }

@@ -13,6 +13,7 @@ mod band;
 mod band_curves;
 mod band_notes;
 mod bands;
+mod basis_error;
 mod classification;
 mod columns;
 mod components;
@@ -24,6 +25,7 @@ mod equation_rows;
 mod experiments;
 mod factorisation;
 mod linearised_curve;
+mod misspecified;
 mod ratios;
 mod scaling_ambiguity;
 mod sensitivity;
@@ -58,7 +60,7 @@ pub use classification::{
 pub(crate) use classification::{
     IDENTIFIED, condition_on_bases, condition_on_inputs, condition_on_negligible_noise, except_gap,
 };
-pub(crate) use covariance::stacked;
+pub(crate) use columns::stacked;
 pub use covariance_kind::CovarianceKind;
 pub use equation_rows::EquationRows;
 pub use experiments::{
