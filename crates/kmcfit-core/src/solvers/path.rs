@@ -26,7 +26,7 @@ pub struct PathPoint {
 pub struct WeightPath {
     /// Fits, by falling weight.
     pub points: Vec<PathPoint>,
-    /// Index chosen by each rule of [`WeightRule::OF_PATHS`]; `None` where a rule chooses none.
+    /// Index chosen by each rule of [`WeightRule::OF_PATHS`](crate::functions::WeightRule::OF_PATHS); `None` where a rule chooses none.
     pub picks: [Option<usize>; 3],
     /// Index of the point whose weight is used.
     pub chosen: usize,

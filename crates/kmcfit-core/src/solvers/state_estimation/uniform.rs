@@ -10,58 +10,36 @@ use crate::system::State;
 const ROUNDS: u32 = 14;
 /// Decimal exponents of the smoothing weight between no smoothing and a parabola.
 const EXPONENTS: [f64; 2] = [-12.0, 16.0];
-/// Smallest number of samples.
-const FEWEST: usize = 8;
 /// Noise level, relative to the size of the samples, below which they are not smoothed.
 const NOISELESS: f64 = 1e-6;
 
-/// Number of neighbouring samples that are averaged where even the largest weight does not smooth enough; odd.
-const AVERAGED: usize = 15;
-
-/// States at all samples, or means of samples, but two at each end.
+/// States at all samples but two at each end.
 pub fn kinematics(channel: &Channel, stride: usize, step: f64) -> Option<Kinematics> {
-    let Smoothed { y, count } = smoothed(channel)?;
-    let h = step * (stride * count) as f64;
-    // Distance of the first mean from the first sample.
-    let lead = 0.5 * (count - 1) as f64 / count as f64 * h;
+    let y = smoothed(channel)?;
+    let h = step * stride as f64;
     let each = |f: &dyn Fn(&[f64]) -> f64| y.windows(5).map(f).collect::<Vec<f64>>();
     let first = [-25.0, 48.0, -36.0, 16.0, -3.0];
     let slope = first.iter().zip(&y).map(|(w, y)| w * y).sum::<f64>() / (12.0 * h);
-    let curvature = (y[0] - 2.0 * y[1] + y[2]) / (h * h);
     Some(Kinematics {
-        nodes: (2..y.len() - 2)
-            .map(|i| (i * count + (count - 1) / 2) * stride)
-            .collect(),
+        nodes: (2..y.len() - 2).map(|i| i * stride).collect(),
         v: each(&|w| (w[0] - 8.0 * w[1] + 8.0 * w[3] - w[4]) / (12.0 * h)),
         a: each(&|w| (-w[0] + 16.0 * w[1] - 30.0 * w[2] + 16.0 * w[3] - w[4]) / (12.0 * h * h)),
         y: each(&|w| w[2]),
-        initial: Some(match count {
-            1 => State {
-                displacement: y[0],
-                velocity: slope,
-            },
-            _ => State {
-                displacement: y[0] - slope * lead + 0.5 * curvature * lead * lead,
-                velocity: slope - curvature * lead,
-            },
+        initial: Some(State {
+            displacement: y[0],
+            velocity: slope,
         }),
         size: y.iter().fold(0.0f64, |m, y| m.max(y.abs())),
-        weight: count as f64 * channel.weighting().weight(1, channel.len()),
+        weight: channel.weighting().weight(1, channel.len()),
     })
 }
 
-/// Smoothed samples.
-struct Smoothed {
-    /// One value for each mean.
-    y: Vec<f64>,
-    /// Number of samples per mean.
-    count: usize,
-}
-
-/// Smoothest curve (in third differences) whose distance from the samples equals their noise. Samples so close together that even a
-/// weight of `10^16` smooths too little are replaced by means of neighbours.
-fn smoothed(channel: &Channel) -> Option<Smoothed> {
+/// Smoothest curve (in third differences) whose distance from the samples equals their noise.
+fn smoothed(channel: &Channel) -> Option<Vec<f64>> {
     let observed = channel.observed();
+    if observed.len() < 8 {
+        return None;
+    }
     let noise = match channel.weighting() {
         Weighting::Sigma(sigma) => *sigma,
         Weighting::Sigmas(sigmas) => rms(sigmas),
@@ -70,29 +48,7 @@ fn smoothed(channel: &Channel) -> Option<Smoothed> {
         }
     };
     if noise <= NOISELESS * rms(observed) {
-        let y = (observed.len() >= FEWEST).then(|| observed.to_vec())?;
-        return Some(Smoothed { y, count: 1 });
-    }
-    let mut means = observed.to_vec();
-    let mut count = 1;
-    loop {
-        let noise = noise / (count as f64).sqrt();
-        let (y, is_limited) = smoothed_to(&means, noise)?;
-        if !is_limited || means.len() < FEWEST * AVERAGED {
-            return Some(Smoothed { y, count });
-        }
-        let blocks = means.chunks_exact(AVERAGED);
-        means = blocks
-            .map(|block| block.iter().sum::<f64>() / AVERAGED as f64)
-            .collect();
-        count *= AVERAGED;
-    }
-}
-
-/// Smoothest curve whose distance from `observed`, root mean square, is `noise`; also true if the largest weight smooths less.
-fn smoothed_to(observed: &[f64], noise: f64) -> Option<(Vec<f64>, bool)> {
-    if observed.len() < FEWEST {
-        return None;
+        return Some(observed.to_vec());
     }
     let [mut low, mut high] = EXPONENTS;
     let mut best = observed.to_vec();
@@ -108,7 +64,7 @@ fn smoothed_to(observed: &[f64], noise: f64) -> Option<(Vec<f64>, bool)> {
             high = middle;
         }
     }
-    Some((best, high == EXPONENTS[1]))
+    Some(best)
 }
 
 /// Minimises `|y - observed|^2 + weight |third differences of y|^2`.
