@@ -296,7 +296,6 @@ fn intervals_hold_for_accelerations_and_robust_losses() {
     let cases = robust_and_acceleration();
     for (name, law, setting) in &cases {
         let counts = inside(&scores(law, *setting, 40, all));
-        println!("{name}: {counts:?}");
         assert!(counts.iter().all(|c| *c >= 33), "{name}: {counts:?}");
         sum += counts.iter().sum::<usize>();
     }
@@ -331,9 +330,9 @@ fn robust_and_acceleration() -> Vec<(&'static str, Law, Setting)> {
     ]
 }
 
-/// With the noise stated as white the residuals of AR(1) noise fail the test of whiteness, and the kernel covariance covers at 91 %
-/// where that of the model covers at 65 to 74 % (1000 seeds, `docs/long/noise.md`); with 89 % fewer than 30 of 40 hold with a probability
-/// of 0.3 %.
+/// With the noise stated as white the residuals of AR(1) noise fail the test of whiteness, and the intervals come from the kernel's
+/// covariance: at least 33 of 40 hold, as under noise that is modelled. With the covariance of the model fewer than 100 of the 120 of the same
+/// records do (`intervals_that_ignore_the_correlation_are_too_short`).
 #[test]
 fn residuals_that_are_not_white_have_intervals_by_a_kernel() {
     let law = Law::Autoregressive(vec![0.8]);
@@ -343,8 +342,7 @@ fn residuals_that_are_not_white_have_intervals_by_a_kernel() {
         40,
         all,
     ));
-    println!("{counts:?}");
-    assert!(counts.iter().all(|c| *c >= 30), "{counts:?}");
+    assert!(counts.iter().all(|c| *c >= 33), "{counts:?}");
 }
 
 /// Least squares with white noise covers the truth in two thirds of the cases where the noise is AR(1) with 0.8: the test detects a

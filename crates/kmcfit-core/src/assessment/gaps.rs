@@ -5,6 +5,7 @@
 //! the scatter of the estimate `V_F`, caused by the noise, is a small share of the variance `V_B` that includes the prior.
 
 use super::refinement::FinerBases;
+use crate::diagnostics::NORMAL_975;
 use crate::functions::WeightRule;
 use crate::identifiability::{BandSettings, Bands, IDENTIFIED};
 use crate::problem::Problem;
@@ -20,8 +21,6 @@ const BY_PENALTY: f64 = 1.0 / 3.0;
 const BY_BASIS: f64 = 5.0;
 /// Relative step of the differences of the number of cycles.
 const STEP: f64 = 1e-6;
-/// Standard errors of the 95 % interval of the number of cycles.
-const HALF_WIDTH: f64 = 1.959_964;
 
 /// What determines a function within a gap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -103,7 +102,7 @@ pub(super) fn gap_assessments(
                     let all = accepted.iter().map(|count| count.cycles).chain([own]);
                     let [low, high] =
                         all.fold([own; 2], |[low, high], n| [low.min(n), high.max(n)]);
-                    [low - HALF_WIDTH * error, high + HALF_WIDTH * error]
+                    [low - NORMAL_975 * error, high + NORMAL_975 * error]
                 }),
             other_counts: accepted.len(),
             functions: functions.collect(),

@@ -64,9 +64,8 @@ pub(super) fn with_cycle_counts(problem: &mut Problem, mut found: Fit, refit: &m
     }
     let is_other = |gap: &Gap| {
         let count = cycles(problem, &own, gap.span);
-        gap.counts
-            .iter()
-            .any(|best| (best.cycles - count).abs() > SAME && best.deviance == 0.0)
+        let best = gap.counts.first();
+        best.is_some_and(|best| (best.cycles - count).abs() > SAME)
     };
     if !found.gaps.iter().any(is_other) {
         return found;
