@@ -13,6 +13,8 @@ use std::fmt;
 use std::ops::Deref;
 use std::path::Path;
 
+/// The word for a bound that is lifted.
+const NO_BOUND: &str = "none";
 /// The word for an estimated value.
 const ESTIMATE: &str = "estimate";
 
@@ -345,6 +347,37 @@ impl Value for NumberOrColumn {
     }
     fn map<'de, A: MapAccess<'de>>(map: A, report: &Report) -> Result<Self, A::Error> {
         ColumnSpec::map(map, report).map(Self::Column)
+    }
+}
+
+/// A bound of a function: a number or a column, or the word `none`.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Bound {
+    /// No bound, not even a default one.
+    None,
+    /// Bound over time.
+    At(NumberOrColumn),
+}
+
+impl Value for Bound {
+    const KIND: ValueType = ValueType::AnyOf(&[
+        ValueType::Number,
+        ValueType::Word(NO_BOUND),
+        ColumnSpec::KIND,
+    ]);
+    fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
+        let expected = "a finite number, `none`, or a column: {data: file.csv, column: name}";
+        match scalar {
+            Scalar::Text(NO_BOUND) => Ok(Self::None),
+            Scalar::Text(word) if number_in(word).is_none() => Err(scalar
+                .refused("neither a number nor `none`", expected)
+                .suggest(did_you_mean(word, [NO_BOUND]))),
+            other => number_or(other, expected).map(|n| Self::At(NumberOrColumn::Number(n))),
+        }
+    }
+    fn map<'de, A: MapAccess<'de>>(map: A, report: &Report) -> Result<Self, A::Error> {
+        let column = ColumnSpec::map(map, report)?;
+        Ok(Self::At(NumberOrColumn::Column(column)))
     }
 }
 

@@ -1,6 +1,9 @@
 //! Gaps of a record: an oscillator of 1 Hz with a stiffness that varies, sampled at 20 Hz with 2 % noise, without samples in 30 % of
 //! the record; data by an independent integrator. Seeds are 0, 1, 2, ...
 
+mod common;
+
+use common::forced::{response, white};
 use kmcfit_core::internals::assessment::{FitAssessment, FitWarning, GapAssessment, GapStatus};
 use kmcfit_core::internals::builder::{
     BasisSpec, Builder, ChannelSpec, CoefficientSpec, Knots, Record, Start,
@@ -10,15 +13,11 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, cycles, fit, fit_with_noise};
 use kmcfit_core::internals::system::Method;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
 const LEVEL: f64 = TAU * TAU;
 const DAMPING: f64 = 0.02 * TAU;
 const SPACING: f64 = 0.05;
-const SUBSTEPS: usize = 40;
 const NOISE: f64 = 0.02;
 const SEEDS: u64 = 40;
 
@@ -54,33 +53,18 @@ impl Case {
         each.sum()
     }
 
-    /// Free decay from 1 m by the fourth-order method of Runge and Kutta with 40 steps per sample, without the samples in the gap.
+    /// Free decay from 1 m without the samples in the gap.
     fn samples(&self, seed: u64) -> (Vec<f64>, Vec<f64>) {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let slope = |y: f64, v: f64, t: f64| [v, -DAMPING * v - self.stiffness(t) * y];
-        let (mut y, mut v) = (1.0, 0.0);
-        let h = SPACING / SUBSTEPS as f64;
+        let count = (self.duration / SPACING).round() as usize + 1;
+        let states = response(SPACING, [1.0, 0.0], &vec![0.0; count], |t, y, v, _| {
+            -DAMPING * v - self.stiffness(t) * y
+        });
         let [from, to] = self.gap();
-        let count = (self.duration / SPACING).round() as usize;
-        let (mut times, mut values) = (Vec::new(), Vec::new());
-        for i in 0..=count {
-            let time = SPACING * i as f64;
-            let noise: f64 = StandardNormal.sample(&mut random);
-            if !(from..to).contains(&time) {
-                times.push(time);
-                values.push(y + NOISE * noise);
-            }
-            for s in 0..SUBSTEPS {
-                let t = time + h * s as f64;
-                let a = slope(y, v, t);
-                let b = slope(y + 0.5 * h * a[0], v + 0.5 * h * a[1], t + 0.5 * h);
-                let d = slope(y + 0.5 * h * b[0], v + 0.5 * h * b[1], t + 0.5 * h);
-                let e = slope(y + h * d[0], v + h * d[1], t + h);
-                y += h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * d[0] + e[0]);
-                v += h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * d[1] + e[1]);
-            }
-        }
-        (times, values)
+        let each = states.iter().zip(white(seed, 0, count)).enumerate();
+        let samples = each.map(|(i, ([y, ..], noise))| (SPACING * i as f64, y + NOISE * noise));
+        samples
+            .filter(|(time, _)| !(from..to).contains(time))
+            .unzip()
     }
 
     fn nodes(&self) -> usize {

@@ -3,21 +3,19 @@
 //!
 //! `.ci/long input` counts 200 seeds.
 
+mod common;
+
+use common::forced::{self, broadband, rms};
 use kmcfit_core::internals::assessment::{FitWarning, Plausibility};
 use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, InputErrorKind, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Status, fit_with_noise};
 use kmcfit_core::internals::system::{InputQuantity, Method};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
 const SPACING: f64 = 0.05;
 const SAMPLES: usize = 1000;
-/// Steps of the data's integrator per sample: 400 per cycle, an error of 1e-8.
-const SUBSTEPS: usize = 20;
 
 /// Mass (kg), damping (N s/m) and stiffness (N/m) of a damping ratio.
 fn truth(ratio: f64) -> [f64; 3] {
@@ -25,25 +23,12 @@ fn truth(ratio: f64) -> [f64; 3] {
 }
 
 fn white(seed: u64, stream: u64) -> Vec<f64> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(stream);
-    (0..SAMPLES)
-        .map(|_| StandardNormal.sample(&mut random))
-        .collect()
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|y| y * y).sum::<f64>() / values.len() as f64).sqrt()
+    forced::white(seed, stream, SAMPLES)
 }
 
 /// Broadband force at the samples, N.
 fn force() -> Vec<f64> {
-    let mut smooth = 0.0;
-    let each = white(99, 2).into_iter().map(|e| {
-        smooth = 0.7 * smooth + e;
-        10.0 * smooth
-    });
-    each.collect()
+    broadband(white(99, 2))
 }
 
 /// Displacements under a force.
@@ -51,26 +36,12 @@ fn response(system: [f64; 3], force: &[f64]) -> Vec<f64> {
     states(system, force).into_iter().map(|[y, _]| y).collect()
 }
 
-/// Displacements and velocities by the fourth-order method of Runge and Kutta under a force that is linear between its samples.
+/// Displacements and velocities under a force.
 fn states([m, c, k]: [f64; 3], force: &[f64]) -> Vec<[f64; 2]> {
-    let slope = |y: f64, v: f64, f: f64| [v, (f - c * v - k * y) / m];
-    let (mut y, mut v) = (0.0, 0.0);
-    let mut samples = vec![[y, v]];
-    let h = SPACING / SUBSTEPS as f64;
-    for pair in force.windows(2) {
-        for s in 0..SUBSTEPS {
-            let at =
-                |part: f64| pair[0] + (s as f64 + part) / SUBSTEPS as f64 * (pair[1] - pair[0]);
-            let a = slope(y, v, at(0.0));
-            let b = slope(y + 0.5 * h * a[0], v + 0.5 * h * a[1], at(0.5));
-            let d = slope(y + 0.5 * h * b[0], v + 0.5 * h * b[1], at(0.5));
-            let e = slope(y + h * d[0], v + h * d[1], at(1.0));
-            y += h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * d[0] + e[0]);
-            v += h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * d[1] + e[1]);
-        }
-        samples.push([y, v]);
-    }
-    samples
+    let states = forced::response(SPACING, [0.0, 0.0], force, |_, y, v, f| {
+        (f - c * v - k * y) / m
+    });
+    states.into_iter().map(|[y, v, _]| [y, v]).collect()
 }
 
 /// A case: share of the noise in the force, damping ratio, what the noise is, and as what the fit treats it.

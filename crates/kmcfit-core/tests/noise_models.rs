@@ -3,6 +3,9 @@
 //!
 //! `.ci/long noise` counts 1000 seeds.
 
+mod common;
+
+use common::forced::{broadband, response, white};
 use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
 use kmcfit_core::internals::diagnostics::student_half_width;
 use kmcfit_core::internals::noise::Correlation;
@@ -12,25 +15,11 @@ use kmcfit_core::internals::record::{
 };
 use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
 use kmcfit_core::internals::system::Method;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
 const TRUTH: [f64; 3] = [2.0, 0.06 * TAU * 2.0, TAU * TAU * 2.0];
 const SPACING: f64 = 0.05;
 const SAMPLES: usize = 1000;
-/// Steps of the data's integrator per sample.
-const SUBSTEPS: usize = 40;
-
-/// White numbers of a seed and a stream.
-fn white(seed: u64, stream: u64, count: usize) -> Vec<f64> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(stream);
-    (0..count)
-        .map(|_| StandardNormal.sample(&mut random))
-        .collect()
-}
 
 /// Law of the noise.
 enum Law {
@@ -91,42 +80,20 @@ fn coloured(seed: u64, a: &[f64], count: usize) -> Vec<f64> {
     kept.iter().map(|x| x / size).collect()
 }
 
-/// Broadband force at the samples, and a channel by the fourth-order method of Runge and Kutta with 40 steps per sample
-/// (800 per cycle, an error of 1e-9) under the force linear between its samples.
+/// Times, broadband force and samples of a channel.
 fn data(kind: ChannelKind) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let times: Vec<f64> = (0..SAMPLES).map(|i| SPACING * i as f64).collect();
-    let raw = white(99, 2, SAMPLES);
-    let mut force = Vec::new();
-    let mut smooth = 0.0;
-    for e in raw {
-        smooth = 0.7 * smooth + e;
-        force.push(10.0 * smooth);
-    }
+    let force = broadband(white(99, 2, SAMPLES));
     let [m, c, k] = TRUTH;
-    let slope = |y: f64, v: f64, f: f64| [v, (f - c * v - k * y) / m];
-    let (mut y, mut v) = (0.0, 0.0);
-    let sample = |y: f64, v: f64, f: f64| match kind {
+    let states = response(SPACING, [0.0, 0.0], &force, |_, y, v, f| {
+        (f - c * v - k * y) / m
+    });
+    let sample = |[y, v, a]: [f64; 3]| match kind {
         ChannelKind::Displacement => y,
         ChannelKind::Velocity => v,
-        ChannelKind::Acceleration => slope(y, v, f)[1],
+        ChannelKind::Acceleration => a,
     };
-    let mut samples = vec![sample(y, v, force[0])];
-    let h = SPACING / SUBSTEPS as f64;
-    for i in 0..SAMPLES - 1 {
-        for s in 0..SUBSTEPS {
-            let at = |part: f64| {
-                let share = (s as f64 + part) / SUBSTEPS as f64;
-                force[i] + share * (force[i + 1] - force[i])
-            };
-            let a = slope(y, v, at(0.0));
-            let b = slope(y + 0.5 * h * a[0], v + 0.5 * h * a[1], at(0.5));
-            let d = slope(y + 0.5 * h * b[0], v + 0.5 * h * b[1], at(0.5));
-            let e = slope(y + h * d[0], v + h * d[1], at(1.0));
-            y += h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * d[0] + e[0]);
-            v += h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * d[1] + e[1]);
-        }
-        samples.push(sample(y, v, force[i + 1]));
-    }
+    let samples = states.into_iter().map(sample).collect();
     (times, force, samples)
 }
 

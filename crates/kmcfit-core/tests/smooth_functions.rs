@@ -3,6 +3,9 @@
 //!
 //! `.ci/long smooth` counts 200 seeds.
 
+mod common;
+
+use common::forced::{broadband, response, white};
 use kmcfit_core::internals::assessment::BasisTest;
 use kmcfit_core::internals::builder::{
     BasisSpec, Builder, ChannelSpec, CoefficientSpec, Knots, PenaltySpec, PenaltyWeight, Record,
@@ -16,9 +19,6 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::solvers::{Fit, FitSettings, choose_weight, fit_with_noise};
 use kmcfit_core::internals::system::Method;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
 const MASS: f64 = 2.0;
@@ -26,17 +26,6 @@ const DAMPING: f64 = 0.06 * TAU * MASS;
 const LEVEL: f64 = TAU * TAU * MASS;
 const SPACING: f64 = 0.05;
 const SAMPLES: usize = 1000;
-/// Steps of the data's integrator per sample.
-const SUBSTEPS: usize = 40;
-
-/// White numbers of a seed and a stream.
-fn white(seed: u64, stream: u64, count: usize) -> Vec<f64> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(stream);
-    (0..count)
-        .map(|_| StandardNormal.sample(&mut random))
-        .collect()
-}
 
 /// Stiffness over its level, as a function of the share of the record.
 type Course = fn(f64) -> f64;
@@ -47,44 +36,15 @@ const S_CURVE: Course = |x| 1.0 - 0.15 * (1.0 + (10.0 * (x - 0.5)).tanh());
 const ONE_CYCLE: Course = |x| 1.0 + 0.15 * (TAU * x).sin();
 const THREE_CYCLES: Course = |x| 1.0 + 0.15 * (3.0 * TAU * x).sin();
 
-/// Times, broadband force, and displacements by the fourth-order method of Runge and Kutta with 40 steps per sample under the force
-/// linear between its samples.
+/// Times, broadband force and displacements.
 fn data(course: Course) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let times: Vec<f64> = (0..SAMPLES).map(|i| SPACING * i as f64).collect();
-    let mut smooth = 0.0;
-    let force: Vec<f64> = white(99, 2, SAMPLES)
-        .into_iter()
-        .map(|e| {
-            smooth = 0.7 * smooth + e;
-            10.0 * smooth
-        })
-        .collect();
+    let force = broadband(white(99, 2, SAMPLES));
     let end = SPACING * (SAMPLES - 1) as f64;
-    let slope = |y: f64, v: f64, f: f64, t: f64| {
-        [v, (f - DAMPING * v - LEVEL * course(t / end) * y) / MASS]
-    };
-    let (mut y, mut v) = (0.0, 0.0);
-    let mut samples = vec![y];
-    let h = SPACING / SUBSTEPS as f64;
-    for i in 0..SAMPLES - 1 {
-        for s in 0..SUBSTEPS {
-            let at = |part: f64| {
-                let share = (s as f64 + part) / SUBSTEPS as f64;
-                (
-                    force[i] + share * (force[i + 1] - force[i]),
-                    times[i] + share * SPACING,
-                )
-            };
-            let [start, middle, last] = [at(0.0), at(0.5), at(1.0)];
-            let a = slope(y, v, start.0, start.1);
-            let b = slope(y + 0.5 * h * a[0], v + 0.5 * h * a[1], middle.0, middle.1);
-            let d = slope(y + 0.5 * h * b[0], v + 0.5 * h * b[1], middle.0, middle.1);
-            let e = slope(y + h * d[0], v + h * d[1], last.0, last.1);
-            y += h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * d[0] + e[0]);
-            v += h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * d[1] + e[1]);
-        }
-        samples.push(y);
-    }
+    let states = response(SPACING, [0.0, 0.0], &force, |t, y, v, f| {
+        (f - DAMPING * v - LEVEL * course(t / end) * y) / MASS
+    });
+    let samples = states.into_iter().map(|[y, ..]| y).collect();
     (times, force, samples)
 }
 

@@ -5,7 +5,9 @@ use crate::config::ModelFile;
 use crate::config::spec::{
     self as config, Basis, ColumnSpec, FunctionSpec, PenaltyKind, WeightRule,
 };
-use crate::config::values::{Count, KnotSpec, Number, NumberOrColumn, StartSpec, Text, Weight};
+use crate::config::values::{
+    Bound, Count, KnotSpec, Number, NumberOrColumn, StartSpec, Text, Weight,
+};
 use crate::error::InputError;
 use kmcfit_core::internals::builder::{
     self, BasisSpec, CoefficientSpec, PenaltySpec, PenaltyWeight,
@@ -13,6 +15,10 @@ use kmcfit_core::internals::builder::{
 use kmcfit_core::internals::constraints::TimeHistory;
 use kmcfit_core::internals::functions::{self, CoefficientKind};
 use kmcfit_core::internals::system::{Grid, NodalCoefficients};
+
+/// Default lower limit of a mass, as a share of its smallest start value: a fit can otherwise end with a mass of nearly zero, whose
+/// response follows the force at all frequencies.
+const LEAST_MASS: f64 = 1e-3;
 
 /// The function of a kind in a map with one key for each function.
 macro_rules! by_kind {
@@ -54,17 +60,19 @@ pub(super) fn all(file: &ModelFile) -> Vec<Given<'_>> {
     shared(file).into_iter().chain(own).collect()
 }
 
-/// The specification of the function at `key`.
+/// The specification of the function at `key`; if the fit is limited, an estimated mass without `min` has a lower bound of
+/// [`LEAST_MASS`] times its smallest start value.
 pub(super) fn specification(
     file: &ModelFile,
     grid: &Grid,
     key: &str,
-    given: &FunctionSpec,
+    (kind, given): Given<'_>,
+    is_limited: bool,
 ) -> Result<CoefficientSpec, InputError> {
     check_basis_keys(file, key, given)?;
-    let bound = |name: &str, given: &Option<NumberOrColumn>| {
-        let read = |given| history(file, grid, &format!("{key}.{name}"), given);
-        given.as_ref().map(read).transpose()
+    let bound = |name: &str, given: &Option<Bound>| match given {
+        None | Some(Bound::None) => Ok(None),
+        Some(Bound::At(given)) => history(file, grid, &format!("{key}.{name}"), given).map(Some),
     };
     let mut spec = match (&given.fixed, &given.start, given.basis) {
         (Some(_), Some(_), _) => {
@@ -103,6 +111,9 @@ pub(super) fn specification(
         }
     };
     spec = spec.bounds(bound("min", &given.min)?, bound("max", &given.max)?);
+    if given.min.is_none() && is_limited && kind == CoefficientKind::Mass {
+        spec = spec.min_of_start(LEAST_MASS);
+    }
     for (place, given) in given.penalty.iter().flat_map(|list| list.iter()) {
         spec = spec.penalty(penalty(
             file,

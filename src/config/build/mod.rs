@@ -130,10 +130,13 @@ fn builder(
     solver: Solver,
     records: Vec<Option<experiments::RawRecord>>,
 ) -> Result<(Builder, Vec<Vec<ChannelNote>>), InputError> {
+    let is_limited =
+        mode == BuildMode::Fit && matches!(solver, Solver::GaussNewton | Solver::ProjectedGradient);
     let shared = functions::shared(file).into_iter();
-    let shared = shared.map(|(kind, given)| {
-        let key = format!("functions.{}", kind.name());
-        Ok((kind, functions::specification(file, grid, &key, given)?))
+    let shared = shared.map(|given| {
+        let key = format!("functions.{}", given.0.name());
+        let spec = functions::specification(file, grid, &key, given, is_limited)?;
+        Ok((given.0, spec))
     });
     let shared = shared.collect::<Result<_, _>>()?;
     let mut builder = Builder::of(shared).grid(*grid).solver(solver);
@@ -143,7 +146,8 @@ fn builder(
     }
     let mut notes = Vec::new();
     for (i, record) in records.into_iter().enumerate() {
-        let (record, of_record) = experiments::specification(file, mode, grid, i, record)?;
+        let (record, of_record) =
+            experiments::specification(file, mode, grid, i, record, is_limited)?;
         builder = builder.record(record);
         notes.push(of_record);
     }

@@ -3,7 +3,7 @@
 use crate::config::alternatives::OneOrList;
 use crate::config::choice::choice;
 use crate::config::map::keys;
-use crate::config::values::{Count, KnotSpec, Number, NumberOrColumn, StartSpec, Weight};
+use crate::config::values::{Bound, Count, KnotSpec, Number, NumberOrColumn, StartSpec, Weight};
 
 keys! {
     /// Coefficient functions of the system; mass, damping and stiffness are required.
@@ -85,18 +85,18 @@ keys! {
             unit "that of the function",
             range "greater than 0 for a mass",
             needs "no `start`";
-        /// Lower bound.
-        min: Option<NumberOrColumn>,
+        /// Lower bound. A mass has the default because a fit can otherwise end with a mass of nearly zero; `none` lifts it.
+        min: Option<Bound>,
             example "0.05",
             unit "that of the function",
-            default "none",
+            default "for a mass with gauss-newton or projected-gradient 0.001 times its smallest start value, otherwise `none`",
             range "at most `max`",
             needs "`basis`; method gauss-newton, projected-gradient or equation-error";
         /// Upper bound.
-        max: Option<NumberOrColumn>,
+        max: Option<Bound>,
             example "10.0",
             unit "that of the function",
-            default "none",
+            default "`none`",
             range "at least `min`",
             needs "`basis`; method gauss-newton, projected-gradient or equation-error";
         /// Penalty on the roughness, added to J; or a list of penalties.

@@ -66,6 +66,8 @@ pub struct CoefficientSpec {
     form: CoefficientForm,
     pub(super) min: Option<TimeHistory>,
     pub(super) max: Option<TimeHistory>,
+    /// Lower bound as a share of the smallest start value.
+    min_of_start: Option<f64>,
     pub(super) penalties: Vec<PenaltySpec>,
     pub(super) width: Option<f64>,
 }
@@ -76,6 +78,7 @@ impl CoefficientSpec {
             form,
             min: None,
             max: None,
+            min_of_start: None,
             penalties: Vec::new(),
             width: None,
         }
@@ -151,6 +154,24 @@ impl CoefficientSpec {
     #[must_use]
     pub fn max(self, max: f64) -> Self {
         self.bounds(None, Some(TimeHistory::Constant(max)))
+    }
+
+    /// Lower bound of `share` times the smallest start value, where no other lower bound is given and the upper one is above it.
+    #[must_use]
+    pub fn min_of_start(mut self, share: f64) -> Self {
+        self.min_of_start = Some(share);
+        self
+    }
+
+    /// Lower bound, given or by the nodal values of the start.
+    pub(super) fn lower_bound(&self, start: &[f64]) -> Option<TimeHistory> {
+        let by_start = || {
+            let least = start.iter().copied().fold(f64::INFINITY, f64::min);
+            let bound = self.min_of_start? * least;
+            let is_below = self.max.as_ref().is_none_or(|max| bound < max.least());
+            (self.is_estimated() && is_below).then_some(TimeHistory::Constant(bound))
+        };
+        self.min.clone().or_else(by_start)
     }
 
     /// Bounds that may vary in time; `None` keeps the present one.

@@ -27,10 +27,14 @@ pub(super) struct RowKey {
     key: String,
 }
 
-/// Constraints from the bounds of a function.
-pub(super) fn of_bounds(entry: &FunctionEntry, coefficient_set: usize) -> Vec<ConstraintSpec> {
+/// Constraints from the bounds of a function with the nodal values `start`.
+pub(super) fn of_bounds(
+    entry: &FunctionEntry,
+    start: &[f64],
+    coefficient_set: usize,
+) -> Vec<ConstraintSpec> {
     let (of, key) = (entry.kind, entry.key.as_str());
-    let (min, max) = (entry.spec.min.clone(), entry.spec.max.clone());
+    let (min, max) = (entry.spec.lower_bound(start), entry.spec.max.clone());
     let constraint = |name: &str, min, max| ConstraintSpec {
         key: format!("{key}.{name}"),
         statement: Constraint::Bounds { of, min, max },

@@ -61,9 +61,10 @@ impl Builder {
         let measured = self.measurements(&problem, &mut notices)?;
         let weight_search = self.add_penalties(&mut problem, measured.as_ref(), &mut notices)?;
         let mut rows = Vec::new();
-        for entry in self.entries() {
+        let starts = problem.functions.values(&problem.start());
+        for (entry, start) in self.entries().iter().zip(&starts) {
             let coefficient_set = entry.owner.map_or(0, |i| coefficient_sets.of_record[i]);
-            for constraint in of_bounds(&entry, coefficient_set) {
+            for constraint in of_bounds(entry, start, coefficient_set) {
                 self.add(&constraint, &mut problem, &mut rows, &mut notices)?;
             }
         }

@@ -122,19 +122,21 @@ fn are_noise(channel: &Channel, residuals: &[f64], normalised: &[f64]) -> bool {
     (NOISE[0]..NOISE[1]).contains(&share) && (is_estimated || rms(normalised) <= BEYOND_SIGMA)
 }
 
-/// Marks the channels whose innovations are not white: the covariance of their scores is that of a kernel. Residuals at
-/// rounding and step-size errors have no distribution.
+/// True if the residuals of a channel, whitened for its correlation, are not white. Residuals at rounding and step-size errors have
+/// no distribution.
+pub(super) fn is_misspecified(channel: &Channel, predicted: &[f64]) -> bool {
+    let residuals: Vec<f64> = channel.residuals(predicted).collect();
+    let is_noise = rms(&residuals) >= NOISE[0] * standard_deviation(channel.observed());
+    channel.weighting().is_sigma()
+        && is_noise
+        && diagnostics(channel, predicted).whiteness.p_value < SIGNIFICANCE
+}
+
+/// Marks the channels whose innovations are not white: the covariance of their scores is that of a kernel.
 pub(super) fn mark_misspecified(problem: &mut Problem, found: &Fit) {
     if !(1..=FEW_PARAMETERS).contains(&problem.parameters()) || !is_long(problem) {
         return;
     }
-    let is_misspecified = |channel: &Channel, predicted: &[f64]| {
-        let residuals: Vec<f64> = channel.residuals(predicted).collect();
-        let is_noise = rms(&residuals) >= NOISE[0] * standard_deviation(channel.observed());
-        channel.weighting().is_sigma()
-            && is_noise
-            && diagnostics(channel, predicted).whiteness.p_value < SIGNIFICANCE
-    };
     let marks: Vec<bool> = (problem.predicted(&found.best.evaluation))
         .map(|(channel, predicted)| is_misspecified(channel, predicted))
         .collect();

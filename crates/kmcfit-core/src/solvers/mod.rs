@@ -10,6 +10,7 @@ mod cycle_counts;
 mod evaluator;
 mod executor;
 mod fit;
+mod further_starts;
 mod gaps;
 mod grid_refinement;
 mod history;

@@ -8,6 +8,7 @@ use super::correlation_estimation::{
 use super::cycle_counts::with_cycle_counts;
 use super::executor::search;
 use super::fit::{Fit, measured};
+use super::further_starts::with_further_starts;
 use super::history::IterationRecord;
 use super::input_errors::{has_input_errors, with_input_errors};
 use super::reml::{estimates_weights, refined, start_weights};
@@ -82,6 +83,14 @@ pub fn fit_with_noise_watched(
         true => with_weights(&mut problem, found, settings, watch)?,
         false => with_sigmas(&mut problem, found, settings, watch)?,
     };
+    let before = found.best.evaluation.cost;
+    found = with_further_starts(&problem, start, found, settings, watch)?;
+    if found.best.evaluation.cost < before {
+        found = match chooses {
+            true => with_weights(&mut problem, found, settings, watch)?,
+            false => with_sigmas(&mut problem, found, settings, watch)?,
+        };
+    }
     if is_likelihood(settings) {
         found = with_cycle_counts(&mut problem, found, &mut |problem, start| {
             let chooses = estimates_weights(problem);

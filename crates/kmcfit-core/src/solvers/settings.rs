@@ -72,6 +72,14 @@ pub enum StartStrategy {
     GrowingHorizon,
     /// Collocation: states and parameters fitted together, from a response near the measurements.
     Collocation,
+    /// Constants by a scan of the natural frequency, then three knots, then the functions; the last in the parameters or in their
+    /// logarithms.
+    FrequencyScan {
+        /// True for steps in the logarithms of mass, damping and stiffness.
+        logarithms: bool,
+    },
+    /// The best fit with outliers of mass and stiffness moved to the median of their function.
+    WithoutOutliers,
     /// End of the attempt with the lowest cost.
     Continued,
 }
@@ -85,6 +93,9 @@ impl StartStrategy {
             Self::EquationError => "equation error",
             Self::GrowingHorizon => "growing part of the record",
             Self::Collocation => "collocation",
+            Self::FrequencyScan { logarithms: false } => "frequency scan",
+            Self::FrequencyScan { logarithms: true } => "frequency scan in logarithms",
+            Self::WithoutOutliers => "best of these, without outliers",
             Self::Continued => "best of these, continued",
         }
     }

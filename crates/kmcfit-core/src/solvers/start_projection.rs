@@ -30,6 +30,19 @@ pub enum StartProjection {
 }
 
 impl Problem {
+    /// The starting point `parameters`, projected onto the constraints if its program violates them, which rows of very different
+    /// scales cause; `otherwise` if the projection fails.
+    pub(super) fn feasible_or(&self, parameters: Vec<f64>, otherwise: &[f64]) -> Vec<f64> {
+        if self.constraints.hold(&parameters, TOLERANCE) {
+            return parameters;
+        }
+        match self.feasible_start(&parameters) {
+            StartProjection::Kept(inside) => inside,
+            StartProjection::Moved { parameters, .. } => parameters,
+            _ => otherwise.to_vec(),
+        }
+    }
+
     /// Projects `start` onto the constraint set, in the L2 metric relative to the functions' sizes.
     pub fn feasible_start(&self, start: &[f64]) -> StartProjection {
         let worst = match self.constraints.largest_violation(start) {

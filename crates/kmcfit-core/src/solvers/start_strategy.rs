@@ -11,14 +11,12 @@ use super::fit::{Attempt, Fit, measured};
 use super::history::{IterationRecord, Reference};
 use super::settings::{FitSettings, Initial, Solver, StartStrategy};
 use super::solve_counts::SolveCounts;
-use super::start_projection::StartProjection;
 use super::starts::{
     Referred, collocation_start, equation_error_start, growing_horizon_start, reference,
     truncated_start, truncated_steps,
 };
 use super::termination::Status;
 use super::timings::{Timings, timed};
-use crate::constraints::TOLERANCE;
 use crate::host::Instant;
 use crate::objective::GradientKind;
 use crate::problem::Problem;
@@ -222,10 +220,13 @@ impl<'a, 'w> Attempts<'a, 'w> {
                 Some((_, prepared)) => return prepared,
                 None => start.to_vec(),
             },
-            StartStrategy::StartValues | StartStrategy::Continued => start.to_vec(),
+            StartStrategy::StartValues
+            | StartStrategy::FrequencyScan { .. }
+            | StartStrategy::WithoutOutliers
+            | StartStrategy::Continued => start.to_vec(),
             StartStrategy::EquationError => {
                 let found = equation_error_start(&mut self.timings);
-                self.inside(found)
+                problem.feasible_or(found, start)
             }
             StartStrategy::GrowingHorizon => {
                 let from = equation_error_start(&mut self.timings);
@@ -233,7 +234,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
                     growing_horizon_start(problem, from, &self.probing, self.watch);
                 self.counts += counts;
                 self.timings += timings;
-                self.inside(found)
+                problem.feasible_or(found, start)
             }
             StartStrategy::Collocation => {
                 let flag = self.settings.interrupt.as_ref();
@@ -245,26 +246,13 @@ impl<'a, 'w> Attempts<'a, 'w> {
                     });
                     found.unwrap_or_else(|| equation_error_start(timings))
                 });
-                self.inside(found)
+                problem.feasible_or(found, start)
             }
         };
         Prepared {
             parameters,
             evaluation: None,
             spare: None,
-        }
-    }
-
-    /// Starting point from the data, projected onto the constraints if its program violates them, which rows of very different
-    /// scales cause; the start values if the projection fails.
-    fn inside(&self, parameters: Vec<f64>) -> Vec<f64> {
-        if self.problem.constraints.hold(&parameters, TOLERANCE) {
-            return parameters;
-        }
-        match self.problem.feasible_start(&parameters) {
-            StartProjection::Kept(inside) => inside,
-            StartProjection::Moved { parameters, .. } => parameters,
-            _ => self.start.to_vec(),
         }
     }
 

@@ -146,13 +146,14 @@ fn read_one(
     Ok(record)
 }
 
-/// The specification of experiment `i` with its data, and the notes on its channels.
+/// The specification of experiment `i` with its data, and the notes on its channels; with default limits if the fit `is_limited`.
 pub(super) fn specification(
     file: &ModelFile,
     mode: BuildMode,
     grid: &Grid,
     i: usize,
     record: Option<RawRecord>,
+    is_limited: bool,
 ) -> Result<(builder::Record, Vec<ChannelNote>), InputError> {
     let spec = &file.spec.experiments[i];
     let estimate = ScalarOr::Scalar(NumberOrEstimate::Estimate);
@@ -164,10 +165,10 @@ pub(super) fn specification(
     if is_held_out(spec) {
         found = found.validation();
     }
-    for (kind, given) in functions::own(file, i) {
-        let key = format!("experiments[{i}].functions.{}", kind.name());
-        let own = functions::specification(file, grid, &key, given)?;
-        found = found.coefficient(kind, own);
+    for given in functions::own(file, i) {
+        let key = format!("experiments[{i}].functions.{}", given.0.name());
+        let own = functions::specification(file, grid, &key, given, is_limited)?;
+        found = found.coefficient(given.0, own);
     }
     if let Some((quantity, error)) = input_sigma(file, i)? {
         let kind = match error.kind {

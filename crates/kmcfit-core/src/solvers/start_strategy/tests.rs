@@ -70,10 +70,7 @@ fn a_start_from_the_data_is_moved_to_the_nearest_feasible_point() {
         CoefficientSpec::constant(2.0).max(3.0),
     ];
     let problem = Builder::new(parts).record(record).build().unwrap();
-    let (settings, start) = (FitSettings::default(), problem.start());
-    let mut observe = |_: &IterationRecord| {};
-    let mut watch = Observer::new(&mut observe);
-    let attempts = Attempts::new(&problem, &start, &settings, &mut watch);
+    let start = problem.start();
     let cases = [
         ([0.2, 2.5], [0.2, 2.5]),
         ([-0.4, 2.5], [0.0, 2.5]),
@@ -81,6 +78,6 @@ fn a_start_from_the_data_is_moved_to_the_nearest_feasible_point() {
         ([-0.4, 7.0], [0.0, 3.0]),
     ];
     for (found, nearest) in cases {
-        assert_eq!(attempts.inside(found.to_vec()), nearest);
+        assert_eq!(problem.feasible_or(found.to_vec(), &start), nearest);
     }
 }

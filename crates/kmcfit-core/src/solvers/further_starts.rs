@@ -1,0 +1,187 @@
+//! A second search where the first one ends above the noise.
+//!
+//! The residuals of a fit at the minimum are noise: their squares, over the squares of stated sigmas, have a mean of one, and
+//! with estimated sigmas they are white unless the noise is correlated. Where they are not, the fit may be in a local minimum,
+//! and the searches of a scan of the natural frequency ([`scan_starts`]) are made.
+
+use super::checkpoint::Observer;
+use super::correlation_estimation::is_misspecified;
+use super::executor::search;
+use super::fit::{Attempt, Fit};
+use super::rounds::{is_ended, with_round};
+use super::settings::{FitSettings, Solver, StartStrategy};
+use super::starts::scan_starts;
+use super::timings::timed;
+use crate::functions::CoefficientKind;
+use crate::host::Instant;
+use crate::problem::{FEW_PARAMETERS, Problem};
+use crate::record::Weighting;
+use crate::simulate::SimulationError;
+use std::sync::atomic::Ordering;
+
+/// Largest mean square of the residuals, in units of the stated sigma, of a fit at the noise.
+const LARGEST_MEAN_SQUARE: f64 = 1.1;
+/// Ratio of a value to the median of its function beyond which it is an outlier, and the ratio to which outliers are moved. A search
+/// that has the right frequency can still end with values at the ends of the record of another sign or size.
+const OUTLYING: f64 = 1.8;
+const MOVED: f64 = 1.2;
+/// Most searches from a fit without outliers.
+const MOST_MOVES: usize = 3;
+/// Relative decrease of the cost by which another minimum is lower.
+const LOWER: f64 = 1e-6;
+
+/// The fit `found`, or one of lower cost from further starts.
+///
+/// # Errors
+/// A [`SimulationError`] if a search cannot be continued.
+pub(super) fn with_further_starts(
+    problem: &Problem,
+    start: &[f64],
+    found: Fit,
+    settings: &FitSettings,
+    watch: &mut Observer,
+) -> Result<Fit, SimulationError> {
+    if settings.solver != Solver::GaussNewton || problem.parameters() == 0 {
+        return Ok(found);
+    }
+    let mut further = FurtherStarts {
+        problem,
+        settings,
+        watch,
+        found,
+    };
+    further.scan(start)?;
+    further.move_outliers()?;
+    Ok(further.found)
+}
+
+/// Searches from further starts, and the best fit of all.
+struct FurtherStarts<'a, 'w> {
+    problem: &'a Problem,
+    settings: &'a FitSettings,
+    watch: &'a mut Observer<'w>,
+    found: Fit,
+}
+
+impl FurtherStarts<'_, '_> {
+    /// Searches from a scan of the natural frequency where the residuals are not noise.
+    fn scan(&mut self, start: &[f64]) -> Result<(), SimulationError> {
+        let (problem, settings) = (self.problem, self.settings);
+        if is_ended(&self.found) || is_noise(problem, &self.found) {
+            return Ok(());
+        }
+        let flag = settings.interrupt.as_ref();
+        let is_interrupted = || flag.is_some_and(|flag| flag.load(Ordering::Relaxed));
+        let count = problem.parameters();
+        let clock = Instant::now();
+        let timings = &mut self.found.timings;
+        let starts = self.watch.numbers(2 * count, &is_interrupted, || {
+            let found = timed(&mut timings.start, || scan_starts(problem, start, settings));
+            found.map_or_else(|| vec![f64::NAN; 2 * count], |starts| starts.concat())
+        });
+        self.found.elapsed += clock.elapsed();
+        for (from, logarithms) in starts.chunks_exact(count).zip([false, true]) {
+            let is_known = from.iter().all(|number| number.is_finite());
+            if !is_known || is_ended(&self.found) || is_noise(problem, &self.found) {
+                break;
+            }
+            self.search(StartStrategy::FrequencyScan { logarithms }, from)?;
+        }
+        Ok(())
+    }
+
+    /// Searches from the fit with the outliers of mass and stiffness moved, if there are any, as long as the cost falls.
+    fn move_outliers(&mut self) -> Result<(), SimulationError> {
+        let is_few = self.problem.parameters() <= FEW_PARAMETERS;
+        if !is_few || !has_likelihood(self.problem) {
+            return Ok(());
+        }
+        for _ in 0..MOST_MOVES {
+            let before = self.found.best.evaluation.cost;
+            let from = without_outliers(self.problem, &self.found.best.parameters);
+            let Some(from) = from.filter(|_| !is_ended(&self.found)) else {
+                break;
+            };
+            self.search(StartStrategy::WithoutOutliers, &from)?;
+            if self.found.best.evaluation.cost >= before {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn search(&mut self, strategy: StartStrategy, from: &[f64]) -> Result<(), SimulationError> {
+        let Self {
+            problem, settings, ..
+        } = *self;
+        self.watch.begin_attempt(strategy);
+        let from = problem.feasible_or(from.to_vec(), &self.found.best.parameters);
+        let next = match search(problem, &from, settings, None, self.watch) {
+            Ok(next) => next,
+            Err(breakdown) => {
+                self.found
+                    .attempts
+                    .push(Attempt::failed(strategy, breakdown));
+                return Ok(());
+            }
+        };
+        self.found.attempts.push(Attempt::of(strategy, &next));
+        let found = self.found.clone();
+        let least = (1.0 - LOWER) * found.best.evaluation.cost;
+        self.found = match next.best.evaluation.cost < least {
+            true => with_round(found, next, false),
+            false => found.with_work_of(next.counts, next.timings, next.elapsed),
+        };
+        Ok(())
+    }
+}
+
+/// Parameters `theta` with values of mass and stiffness beyond [`OUTLYING`] times their median moved to that distance; `None` if there
+/// are none.
+fn without_outliers(problem: &Problem, theta: &[f64]) -> Option<Vec<f64>> {
+    let functions = &problem.functions;
+    let mut moved = theta.to_vec();
+    let mut has_any = false;
+    for (f, values) in functions.values(theta).into_iter().enumerate() {
+        let function = functions.get(f);
+        let is_wanted = matches!(
+            function.quantity,
+            CoefficientKind::Mass | CoefficientKind::Stiffness
+        );
+        let mut sorted = values.clone();
+        sorted.sort_by(f64::total_cmp);
+        let median = sorted[sorted.len() / 2];
+        let range = median / OUTLYING..=median * OUTLYING;
+        if !is_wanted || median <= 0.0 || values.iter().all(|value| range.contains(value)) {
+            continue;
+        }
+        let inside = values
+            .iter()
+            .zip(&function.offset)
+            .map(|(value, offset)| value.clamp(median / MOVED, median * MOVED) - offset);
+        let inside: Vec<f64> = inside.collect();
+        let basis = function.basis.as_ref();
+        if let Some(own) = basis.and_then(|b| b.project(&problem.system.grid, &inside)) {
+            moved[functions.ranges()[f].clone()].copy_from_slice(&own);
+            has_any = true;
+        }
+    }
+    has_any.then_some(moved)
+}
+
+fn has_likelihood(problem: &Problem) -> bool {
+    problem.channels().all(|c| c.weighting().is_sigma())
+}
+
+/// True if the residuals of a fit are noise, or no likelihood says what noise is.
+fn is_noise(problem: &Problem, found: &Fit) -> bool {
+    let mut channels = problem.predicted(&found.best.evaluation);
+    channels.all(|(channel, predicted)| match channel.weighting() {
+        Weighting::Sigma(_) | Weighting::Sigmas(_) => {
+            let mean = channel.cost(predicted) / channel.len() as f64;
+            mean <= LARGEST_MEAN_SQUARE && !is_misspecified(channel, predicted)
+        }
+        Weighting::Estimated { .. } => !is_misspecified(channel, predicted),
+        Weighting::Integral { .. } | Weighting::Trapezoid(_) => true,
+    })
+}

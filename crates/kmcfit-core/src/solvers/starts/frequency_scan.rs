@@ -1,0 +1,296 @@
+//! Starting points by a scan of the natural frequency.
+//!
+//! A response of a wrong period fits worse than no response, so that a search from a distant start ends in a local minimum. With
+//! constant coefficients the frequency `sqrt(k/m)` is one number: steps from [`FREQUENCIES`] values of it, the best one
+//! continued, give the level of each function; three knots give their course, and the functions of the problem their details.
+//!
+//! The steps are taken in the logarithms of mass, damping and stiffness, which stay positive without a bound. From three knots
+//! on they are taken in the parameters themselves as well: either may end in a higher minimum.
+
+use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Design, Parameterization};
+use crate::problem::{FEW_PARAMETERS, Problem};
+use crate::solvers::executor::search_unobserved;
+use crate::solvers::linearization::{Linearization, linearise};
+use crate::solvers::settings::FitSettings;
+use crate::solvers::timings::Timings;
+use crate::system::Term;
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::TAU;
+
+/// Natural frequencies of the scan.
+const FREQUENCIES: usize = 25;
+/// Periods of the lowest frequency in the shortest record, and samples per period of the highest one.
+const LIMITS: [f64; 2] = [2.0, 2.5];
+/// Steps from each frequency.
+const SCAN_STEPS: u64 = 6;
+/// Steps from the best frequency, and in the logarithms of further functions.
+const STEPS: u64 = 40;
+/// Knots of the functions between constants and those of the problem.
+const COARSE_KNOTS: usize = 3;
+/// Least damping ratio of a start: a response without damping never forgets its phase.
+const LEAST_DAMPING_RATIO: f64 = 0.02;
+/// Largest change of a logarithm in a step.
+const LARGEST_CHANGE: f64 = 1.0;
+/// Damping of the first step, relative to the diagonal of the normal matrix, its factor, and its largest value.
+const DAMPING: [f64; 3] = [1e-3, 10.0, 1e8];
+/// Relative decrease of the cost below which steps end.
+const CONVERGED: f64 = 1e-7;
+
+/// Starting points for `problem` by a scan with the other values of `start`, by steps in the parameters and in logarithms; `None`
+/// where no frequency can be set.
+pub(in crate::solvers) fn scan_starts(
+    problem: &Problem,
+    start: &[f64],
+    settings: &FitSettings,
+) -> Option<[Vec<f64>; 2]> {
+    let constants = with_knots(problem, 1)?;
+    let best = scanned(problem, &constants, start)?;
+    let mut in_logarithms = best.clone();
+    let mut in_parameters = best;
+    let mut stage = constants;
+    if let Some(coarse) = with_knots(problem, COARSE_KNOTS) {
+        in_logarithms = transferred(&stage, &in_logarithms, &coarse);
+        in_parameters = transferred(&stage, &in_parameters, &coarse);
+        in_logarithms = Descent::new(&coarse, STEPS).run(in_logarithms).0;
+        if let Ok(fit) = search_unobserved(&coarse, &in_parameters, settings) {
+            in_parameters = fit.best.parameters;
+        }
+        stage = coarse;
+    }
+    in_parameters = transferred(&stage, &in_parameters, problem);
+    in_logarithms = transferred(&stage, &in_logarithms, problem);
+    if problem.parameters() <= FEW_PARAMETERS {
+        in_logarithms = Descent::new(problem, STEPS).run(in_logarithms).0;
+    }
+    Some([in_parameters, in_logarithms])
+}
+
+/// The problem with each function that has more parameters on so many knots, constant with one, and without penalties and
+/// constraints; `None` where its functions do not change.
+fn with_knots(problem: &Problem, knots: usize) -> Option<Problem> {
+    let grid = &problem.system.grid;
+    let functions = &problem.functions;
+    let is_finer = |f: &CoefficientFunction| f.parameters() > knots;
+    if knots > 1 && !functions.iter().any(is_finer) {
+        return None;
+    }
+    let nodal = functions.values(&functions.start());
+    let list = functions.iter().zip(nodal).map(|(function, values)| {
+        if !is_finer(function) {
+            return function.clone();
+        }
+        let (basis, design) = match knots {
+            1 => (Basis::Constant, Design::ones(grid.nodes())),
+            _ => {
+                let share = |i: usize| i as f64 / (knots - 1) as f64;
+                let time = |i: usize| grid.start() + share(i) * grid.duration();
+                let basis = Basis::PiecewiseLinear {
+                    knots: (0..knots).map(time).collect(),
+                };
+                let design = basis.design(grid);
+                (basis, design)
+            }
+        };
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        CoefficientFunction {
+            start: vec![mean; knots],
+            positive_parameters: basis.positive_parameters(),
+            basis: Some(basis),
+            design,
+            ..function.clone()
+        }
+    });
+    let sets = functions.coefficient_sets().to_vec();
+    let list = list.collect();
+    let coarse = Parameterization::with_coefficient_sets(list, sets, grid.nodes(), grid.step())?;
+    let coarse = coarse.with_scalars(functions.scalars().to_vec());
+    let changed = problem.clone().with(|parts| {
+        parts.functions = coarse;
+        parts.penalties.clear();
+        parts.variations.clear();
+        parts.constraints = Default::default();
+        parts.soft.clear();
+        parts.jumps.clear();
+    });
+    changed.ok()
+}
+
+/// Parameters of `to` with the values of the functions and scalars of `from` at `theta`.
+fn transferred(from: &Problem, theta: &[f64], to: &Problem) -> Vec<f64> {
+    let mut result = to.start();
+    let values = from.functions.values(theta);
+    for (f, (function, nodal)) in to.functions.iter().zip(values).enumerate() {
+        let own = from.functions.get(f);
+        let range = to.functions.ranges()[f].clone();
+        if own.basis == function.basis {
+            result[range].copy_from_slice(&theta[from.functions.ranges()[f].clone()]);
+            continue;
+        }
+        let free: Vec<f64> = nodal
+            .iter()
+            .zip(&function.offset)
+            .map(|(v, o)| v - o)
+            .collect();
+        let basis = function.basis.as_ref();
+        if let Some(found) = basis.and_then(|b| b.project(&to.system.grid, &free)) {
+            result[range].copy_from_slice(&found);
+        }
+    }
+    let scalars = to.functions.scalar_range();
+    result[scalars].copy_from_slice(from.scalars(theta));
+    result
+}
+
+/// Constants of the lowest cost after steps from each frequency, continued; `None` where neither mass nor stiffness is free or no
+/// response can be simulated.
+fn scanned(problem: &Problem, constants: &Problem, start: &[f64]) -> Option<Vec<f64>> {
+    let functions = &constants.functions;
+    let set = functions.coefficient_set(0);
+    let terms = &problem.system.terms;
+    let at = |kind: Term| {
+        terms
+            .iter()
+            .position(|t| *t == kind)
+            .map(|place| set[place + 1])
+    };
+    let (mass, stiffness) = (set[0], at(Term::Stiffness)?);
+    let first = |f: usize| functions.ranges()[f].clone().next();
+    (first(mass).is_some() || first(stiffness).is_some()).then_some(())?;
+    let base = transferred(problem, start, constants);
+    let level = |f: usize| -> f64 {
+        let values = &functions.values(&base)[f];
+        values.iter().sum::<f64>() / values.len() as f64
+    };
+    let (m, k) = (level(mass), level(stiffness));
+    let k = if k > 0.0 { k } else { m };
+    let mut best: Option<(Vec<f64>, f64)> = None;
+    for omega in frequencies(problem)? {
+        let mut theta = base.clone();
+        let ratio = omega * omega * m / k;
+        let (to_mass, to_stiffness) = match (first(mass), first(stiffness)) {
+            (Some(i), Some(j)) => {
+                theta[i] = m / ratio.sqrt();
+                theta[j] = k * ratio.sqrt();
+                (m / ratio.sqrt(), k * ratio.sqrt())
+            }
+            (Some(i), None) => {
+                theta[i] = m / ratio;
+                (m / ratio, k)
+            }
+            (None, Some(j)) => {
+                theta[j] = k * ratio;
+                (m, k * ratio)
+            }
+            (None, None) => return None,
+        };
+        if let Some(i) = at(Term::Damping).and_then(first) {
+            let least = 2.0 * LEAST_DAMPING_RATIO * (to_mass * to_stiffness).sqrt();
+            theta[i] = theta[i].max(least);
+        }
+        let (theta, cost) = Descent::new(constants, SCAN_STEPS).run(theta);
+        if cost.is_finite() && best.as_ref().is_none_or(|(_, least)| cost < *least) {
+            best = Some((theta, cost));
+        }
+    }
+    let (theta, _) = best?;
+    Some(Descent::new(constants, STEPS).run(theta).0)
+}
+
+/// Natural frequencies of the scan, rad/s: equally spaced logarithms between [`LIMITS`].
+fn frequencies(problem: &Problem) -> Option<Vec<f64>> {
+    let channels = || problem.channels().filter(|c| c.len() > 1);
+    let length = |times: &[f64]| times[times.len() - 1] - times[0];
+    let shortest = channels()
+        .map(|c| length(c.times()))
+        .fold(f64::INFINITY, f64::min);
+    let spacing = channels().map(|c| length(c.times()) / (c.len() - 1) as f64);
+    let spacing = spacing.fold(f64::INFINITY, f64::min);
+    let [low, high] = [LIMITS[0] / shortest, 1.0 / (LIMITS[1] * spacing)].map(|f| TAU * f);
+    (low > 0.0 && high > low && high.is_finite()).then_some(())?;
+    let share = |i: usize| i as f64 / (FREQUENCIES - 1) as f64;
+    let all = (0..FREQUENCIES).map(|i| low * (high / low).powf(share(i)));
+    Some(all.collect())
+}
+
+/// Levenberg–Marquardt steps in the logarithms of positive mass, damping and stiffness.
+struct Descent<'a> {
+    problem: &'a Problem,
+    steps: u64,
+    /// True for parameters whose logarithm is the coordinate.
+    is_logarithmic: Vec<bool>,
+}
+
+impl<'a> Descent<'a> {
+    fn new(problem: &'a Problem, steps: u64) -> Self {
+        let functions = &problem.functions;
+        let mut is_logarithmic = vec![false; problem.parameters()];
+        for (function, range) in functions.iter().zip(functions.ranges()) {
+            use CoefficientKind::{Damping, Mass, Stiffness};
+            let has_sign = matches!(function.quantity, Mass | Damping | Stiffness);
+            is_logarithmic[range.clone()].fill(has_sign && function.positive_parameters);
+        }
+        Self {
+            problem,
+            steps,
+            is_logarithmic,
+        }
+    }
+
+    /// Parameters after the steps, and their cost; infinite where the start cannot be simulated.
+    fn run(&self, mut theta: Vec<f64>) -> (Vec<f64>, f64) {
+        let Ok(mut here) = self.problem.evaluate(&theta) else {
+            return (theta, f64::INFINITY);
+        };
+        let [mut damping, factor, largest] = DAMPING;
+        for _ in 0..self.steps {
+            let fresh = Linearization::Fresh;
+            let (sub, _) = linearise(self.problem, &theta, &here, &fresh, &mut Timings::default());
+            let scales: Vec<f64> = (theta.iter().zip(&self.is_logarithmic))
+                .map(|(t, log)| if *log && *t > 0.0 { *t } else { 1.0 })
+                .collect();
+            let rows = &sub.residuals;
+            let mut jacobian = DMatrix::zeros(rows.len(), theta.len());
+            for i in 0..rows.len() {
+                for (j, a) in rows.row(i).filter(|(j, _)| *j < theta.len()) {
+                    jacobian[(i, j)] = a * scales[j];
+                }
+            }
+            let right = DVector::from_column_slice(rows.right());
+            let normal = jacobian.tr_mul(&jacobian);
+            let descent = jacobian.tr_mul(&right);
+            let before = here.cost;
+            let mut is_lower = false;
+            while damping <= largest && !is_lower {
+                let mut damped = normal.clone();
+                for j in 0..theta.len() {
+                    damped[(j, j)] += damping * normal[(j, j)].max(f64::MIN_POSITIVE);
+                }
+                let step = damped.cholesky().map(|factor| factor.solve(&descent));
+                let moved = step.map(|step| self.moved(&theta, &scales, step.as_slice()));
+                let there =
+                    moved.and_then(|moved| Some((self.problem.evaluate(&moved).ok()?, moved)));
+                match there {
+                    Some((evaluation, moved)) if evaluation.cost < before => {
+                        (here, theta, is_lower) = (evaluation, moved, true);
+                        damping /= factor;
+                    }
+                    _ => damping *= factor,
+                }
+            }
+            if !is_lower || before - here.cost <= CONVERGED * before {
+                break;
+            }
+        }
+        (theta, here.cost)
+    }
+
+    /// Parameters after a step of the coordinates.
+    fn moved(&self, theta: &[f64], scales: &[f64], step: &[f64]) -> Vec<f64> {
+        let each = theta.iter().zip(scales).zip(step).zip(&self.is_logarithmic);
+        each.map(|(((t, scale), step), log)| match *log && *t > 0.0 {
+            true => t * step.clamp(-LARGEST_CHANGE, LARGEST_CHANGE).exp(),
+            false => t + scale * step,
+        })
+        .collect()
+    }
+}
