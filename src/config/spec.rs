@@ -66,7 +66,7 @@ keys! {
         /// refines it until the discretisation error is below a tenth of the standard errors.
         nodes: Option<Nodes>,
             example "2000",
-            default "one per sample",
+            default "auto; one per sample with a stated `method` or for equation-error",
             range "3 to 1e8";
         /// Time integration method.
         method: Option<StepMethod>, example "midpoint", default "rk4";

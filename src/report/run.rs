@@ -158,6 +158,7 @@ impl FittedModel<'_> {
             file: self.model.file.display().to_string(),
             overrides: self.model.source.overrides.clone(),
             nodes: grid.nodes(),
+            steps_per_row: self.steps_per_row(),
             start: grid.start(),
             duration: grid.duration(),
             step: grid.step(),

@@ -53,9 +53,9 @@ pub struct Run {
     pub truth: Option<NodalCoefficients>,
     /// `history.csv`: one row per iteration.
     pub history: Vec<IterationRecord>,
-    /// `functions.csv`: one row per node; NaN for an empty field.
+    /// `functions.csv`: one row per node, on long grids per several steps; NaN for an empty field.
     pub functions: ResultTable,
-    /// `trajectory.csv`: one row per node; NaN beyond the end of a record or without a sample.
+    /// `trajectory.csv`: rows as in `functions.csv`; NaN beyond the end of a record or without a sample.
     pub trajectory: ResultTable,
 }
 
@@ -77,14 +77,20 @@ impl Run {
         let (system, quantities) = system(folder, &document)?;
         let nodes = system.grid.nodes();
         memory::check_file(&folder.join("result.json"), nodes as u64 * PER_NODE)?;
-        let functions = ResultTable::read_rows(&folder.join("functions.csv"), nodes, "node")?;
-        let trajectory = ResultTable::read_rows(&folder.join("trajectory.csv"), nodes, "node")?;
+        let steps = document.model.steps_per_row.clamp(1, nodes);
+        let rows = (nodes - 1).div_ceil(steps) + 1;
+        let what = match steps {
+            1 => "node".to_owned(),
+            _ => format!("{steps} steps"),
+        };
+        let functions = ResultTable::read_rows(&folder.join("functions.csv"), rows, &what)?;
+        let trajectory = ResultTable::read_rows(&folder.join("trajectory.csv"), rows, &what)?;
         let has_truth = functions.headers().iter().any(|h| h.starts_with("true_"));
         Ok(Self {
             folder: folder.to_path_buf(),
-            coefficients: coefficients(&functions, "", &quantities)?,
+            coefficients: coefficients(&functions, "", &quantities, nodes, steps)?,
             truth: has_truth
-                .then(|| coefficients(&functions, "true_", &quantities))
+                .then(|| coefficients(&functions, "true_", &quantities, nodes, steps))
                 .transpose()?,
             history: history(folder, document.counts.iterations)?,
             document,
@@ -99,7 +105,11 @@ impl Run {
     /// of shaker`), in its unit; `None` if there is none.
     pub fn band(&self, name: &str) -> Option<[Vec<f64>; 2]> {
         let name = name.replace([' ', '/', ','], "_");
-        let end = |side: &str| self.functions.column(&format!("{name}_{side}_95"));
+        let (nodes, steps) = (self.system.grid.nodes(), self.document.model.steps_per_row);
+        let end = |side: &str| {
+            let rows = self.functions.column(&format!("{name}_{side}_95"))?;
+            Some(at_nodes(rows, nodes, steps))
+        };
         Some([end("low")?, end("high")?])
     }
 }
@@ -207,6 +217,8 @@ fn coefficients(
     table: &ResultTable,
     prefix: &str,
     quantities: &[CoefficientKind],
+    nodes: usize,
+    steps: usize,
 ) -> Result<NodalCoefficients, InputError> {
     let is_rotation = table
         .column(&format!(
@@ -219,13 +231,33 @@ fn coefficients(
             true => quantity.angular_column(),
             false => quantity.column(),
         };
-        table.finite(&format!("{prefix}{name}"))
+        let rows = table.finite(&format!("{prefix}{name}"))?;
+        Ok(at_nodes(rows, nodes, steps))
     };
-    Ok(NodalCoefficients {
+    Ok::<_, InputError>(NodalCoefficients {
         mass: column(CoefficientKind::Mass)?,
         coefficients: quantities
             .iter()
             .map(|q| column(*q))
             .collect::<Result<_, _>>()?,
     })
+}
+
+/// Values at all nodes from `rows` at every so many steps and at the end, linear in between.
+fn at_nodes(rows: Vec<f64>, nodes: usize, steps: usize) -> Vec<f64> {
+    if steps <= 1 {
+        return rows;
+    }
+    let value = |node: usize| {
+        let row = node / steps;
+        let next = ((row + 1) * steps).min(nodes - 1);
+        match next - row * steps {
+            0 => rows[row],
+            length => {
+                let share = (node - row * steps) as f64 / length as f64;
+                rows[row] + share * (rows[row + 1] - rows[row])
+            }
+        }
+    };
+    (0..nodes).map(value).collect()
 }

@@ -3,9 +3,31 @@
 use super::FittedModel;
 use super::csv::CsvTable;
 use kmcfit_core::internals::functions::{CoefficientKind, Ratios};
+use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 use kmcfit_core::internals::solvers::IterationRecord;
 
+/// Most rows of the tables over time where a curve through them has the values in between: what spreadsheets open at once.
+const MOST_ROWS: usize = 50_000;
+
 impl FittedModel<'_> {
+    /// Steps between the rows of the tables over time: 1, unless the functions have few parameters on more than [`MOST_ROWS`] nodes.
+    pub(super) fn steps_per_row(&self) -> usize {
+        let problem = &self.model.problem;
+        let few = problem.functions.parameters() <= FEW_PARAMETERS;
+        match (problem.system.grid.nodes() - 1).div_ceil(MOST_ROWS) {
+            steps if few => steps,
+            _ => 1,
+        }
+    }
+
+    /// The values of every node with a row in the tables over time: one in so many steps, and the last one.
+    fn rows(&self, values: &[f64]) -> Vec<f64> {
+        let steps = self.steps_per_row();
+        let last = values.len() - 1;
+        let nodes = (0..last).step_by(steps).chain([last]);
+        nodes.map(|node| values[node]).collect()
+    }
+
     pub(super) fn history(&self) -> CsvTable {
         let column = |f: fn(&IterationRecord) -> f64| self.fit.history.iter().map(f).collect();
         CsvTable::new()
@@ -30,8 +52,8 @@ impl FittedModel<'_> {
 
     pub(super) fn functions_table(&self) -> CsvTable {
         let coefficients = &self.fit.best.evaluation.nodal;
-        let times = self.model.problem.system.grid.times();
-        let mut table = CsvTable::new().column("t_s", times);
+        let times = self.rows(&self.model.problem.system.grid.times());
+        let mut table = CsvTable::new().column("t_s", times.clone());
         for (function, values) in self.named_functions() {
             let column = self.column(function.quantity);
             let name = match &function.owner {
@@ -39,16 +61,15 @@ impl FittedModel<'_> {
                 // A comma would end the header.
                 Some(owner) => format!("{column} of {}", owner.replace([',', '"', '\n'], " ")),
             };
-            table = table.column(name, values);
+            table = table.column(name, self.rows(&values));
         }
         let ratios = Ratios::of(coefficients);
         table = table
-            .column("k_over_m_per_s2", ratios.k_over_m)
-            .column("c_over_m_per_s", ratios.c_over_m)
-            .column("natural_frequency_Hz", ratios.frequency)
-            .column("damping_ratio", ratios.damping_ratio);
+            .column("k_over_m_per_s2", self.rows(&ratios.k_over_m))
+            .column("c_over_m_per_s", self.rows(&ratios.c_over_m))
+            .column("natural_frequency_Hz", self.rows(&ratios.frequency))
+            .column("damping_ratio", self.rows(&ratios.damping_ratio));
         if let Some(bands) = self.bands() {
-            let times = self.model.problem.system.grid.times();
             for list in [&bands.functions, &bands.ratios] {
                 for (band, [low, high]) in list.iter().zip(bands.curves(list, &times)) {
                     let name = band.name.replace([' ', '/', ','], "_");
@@ -62,7 +83,7 @@ impl FittedModel<'_> {
             let functions = self.model.problem.functions.iter();
             for (function, values) in functions.zip(truth.functions()) {
                 let name = format!("true_{}", self.column(function.quantity));
-                table = table.column(name, values.to_vec());
+                table = table.column(name, self.rows(values));
             }
         }
         table
@@ -70,7 +91,7 @@ impl FittedModel<'_> {
 
     pub(super) fn trajectories(&self) -> CsvTable {
         let problem = &self.model.problem;
-        let mut table = CsvTable::new().column("t_s", problem.system.grid.times());
+        let mut table = CsvTable::new().column("t_s", self.rows(&problem.system.grid.times()));
         let several = problem.experiments.len() > 1;
         let [y, v, observed_y] = match self.is_rotation() {
             true => ["y_rad", "v_rad_per_s", "observed_y_rad"],
@@ -89,7 +110,7 @@ impl FittedModel<'_> {
             let full = |values: &[f64]| {
                 let mut values = values.to_vec();
                 values.resize(problem.system.grid.nodes(), f64::NAN);
-                values
+                self.rows(&values)
             };
             table = table
                 .column(name(y), full(&response.displacement))
@@ -101,7 +122,7 @@ impl FittedModel<'_> {
                 for (i, value) in channel.observed().iter().enumerate() {
                     observed[i * stride] = *value;
                 }
-                table = table.column(name(observed_y), observed);
+                table = table.column(name(observed_y), self.rows(&observed));
             }
         }
         table

@@ -8,8 +8,8 @@ use kmcfit::config::spec::{
     Basis, FitMethod, Gradient, InitialSpec, PenaltyKind, PenaltySpec, StepMethod, WeightRule,
 };
 use kmcfit::config::values::{
-    ColumnId, Count, KnotSpec, Nodes, Number, NumberOrColumn, NumberOrEstimate, Sigma, StartSpec,
-    Weight,
+    Bound, ColumnId, Count, KnotSpec, Nodes, Number, NumberOrColumn, NumberOrEstimate, Sigma,
+    StartSpec, Weight,
 };
 
 pub const FULL: &str = "\
@@ -128,8 +128,9 @@ fn shapes_limits_and_penalties_are_read() {
     assert_eq!(mass.knots, Some(KnotSpec::Count(Count(11))));
     let list = vec![Number(1.0), Number(2.5)];
     assert_eq!(mass.start, Some(StartSpec::List(list)));
-    assert_eq!(mass.min, Some(NumberOrColumn::Number(Number(0.1))));
-    let Some(NumberOrColumn::Column(max)) = mass.max else {
+    let bound = Bound::At(NumberOrColumn::Number(Number(0.1)));
+    assert_eq!(mass.min, Some(bound));
+    let Some(Bound::At(NumberOrColumn::Column(max))) = mass.max else {
         panic!("a column")
     };
     assert_eq!((&*max.data, &*max.column), ("m.csv", "m"));

@@ -9,6 +9,7 @@ pub(super) use finer::{FinerNodes, stable_nodes};
 use super::BuildMode;
 use super::experiments::{RawChannel, RawRecord};
 use crate::config::ModelFile;
+use crate::config::spec::FitMethod;
 use crate::config::values::{Count, Nodes};
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
@@ -48,6 +49,7 @@ pub(super) fn build(
                 .expected("`nodes`, because there is no record"));
         }
         Some(Nodes::Auto) => None,
+        None if is_automatic(file) => None,
         None => node_per_sample(records),
     };
     let (nodes, finer) = match stated {
@@ -105,6 +107,13 @@ fn fits_into_memory(file: &ModelFile, mode: BuildMode, nodes: usize) -> Result<(
             "at most {} nodes within {available}",
             available.bytes.saturating_sub(memory::BASE) / each,
         )))
+}
+
+/// True if a model without a number of nodes has an automatic one: it states no stepper either, and its response is simulated.
+fn is_automatic(file: &ModelFile) -> bool {
+    let has_stepper = file.spec.grid.as_ref().is_some_and(|g| g.method.is_some());
+    let method = file.spec.fit.as_ref().and_then(|fit| fit.method);
+    !has_stepper && method != Some(FitMethod::EquationError)
 }
 
 /// Number of nodes for one node per sample, if all channels of all records have the same equally spaced times.

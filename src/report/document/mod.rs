@@ -107,6 +107,9 @@ pub struct ModelSummary {
     pub overrides: Vec<String>,
     /// Number of nodes.
     pub nodes: usize,
+    /// Steps between the rows of `functions.csv` and `trajectory.csv`: 1, more on long grids.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub steps_per_row: usize,
     /// First time, s.
     pub start: f64,
     /// Length of the record, s.
@@ -131,6 +134,18 @@ pub struct ModelSummary {
     pub cost_kind: CostKind,
     /// Formula of J with all factors, as a sentence.
     pub cost_definition: String,
+}
+
+fn one() -> usize {
+    1
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "the signature that serde calls"
+)]
+fn is_one(steps: &usize) -> bool {
+    *steps == 1
 }
 
 impl ModelSummary {

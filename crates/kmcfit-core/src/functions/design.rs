@@ -10,6 +10,11 @@ pub enum Design {
     Empty,
     /// One parameter per node.
     Identity,
+    /// One parameter, the value at all nodes.
+    Constant {
+        /// Number of nodes.
+        nodes: usize,
+    },
     /// General sparse matrix, by rows.
     Sparse(Rows),
 }
@@ -17,24 +22,32 @@ pub enum Design {
 impl Design {
     /// Columns and values of row `i`.
     pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let unit = matches!(self, Design::Identity).then_some((i, 1.0));
+        let unit = match self {
+            Design::Identity => Some((i, 1.0)),
+            Design::Constant { .. } => Some((0, 1.0)),
+            Design::Empty | Design::Sparse(_) => None,
+        };
         let entries = match self {
             Design::Sparse(rows) => Some(rows.row(i)),
-            Design::Empty | Design::Identity => None,
+            Design::Empty | Design::Identity | Design::Constant { .. } => None,
         };
         unit.into_iter().chain(entries.into_iter().flatten())
     }
 
     /// True for a single column with equal entries at all nodes.
     pub fn is_constant(&self) -> bool {
-        matches!(self, Design::Sparse(rows) if rows.is_constant())
+        match self {
+            Design::Constant { .. } => true,
+            Design::Sparse(rows) => rows.is_constant(),
+            Design::Empty | Design::Identity => false,
+        }
     }
 
     /// Largest absolute value of `B theta` over the nodes.
     pub fn largest(&self, theta: &[f64]) -> f64 {
         match self {
             Design::Empty => 0.0,
-            Design::Identity => largest(theta),
+            Design::Identity | Design::Constant { .. } => largest(theta),
             Design::Sparse(rows) => rows.largest(theta),
         }
     }
@@ -51,6 +64,7 @@ impl Design {
         match self {
             Design::Empty => {}
             Design::Identity => values.iter_mut().zip(theta).for_each(|(v, t)| *v += t),
+            Design::Constant { .. } => values.iter_mut().for_each(|v| *v += theta[0]),
             Design::Sparse(rows) => rows.multiply_add(theta, values),
         }
     }
@@ -60,14 +74,8 @@ impl Design {
         match self {
             Design::Empty => {}
             Design::Identity => out.iter_mut().zip(nodal).for_each(|(o, n)| *o += n),
+            Design::Constant { .. } => out[0] = nodal.iter().fold(out[0], |sum, n| sum + n),
             Design::Sparse(rows) => rows.transpose_multiply_add(nodal, out),
         }
-    }
-
-    /// One parameter, equal to the value at all nodes.
-    pub fn ones(nodes: usize) -> Self {
-        let mut rows = Rows::of_width(1);
-        (0..nodes).for_each(|_| rows.push([(0, 1.0)], 0.0));
-        Design::Sparse(rows)
     }
 }

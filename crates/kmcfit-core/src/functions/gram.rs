@@ -32,6 +32,10 @@ impl Gram {
         match design {
             Design::Empty => Some(Gram::Diagonal(Vec::new())),
             Design::Identity => Some(Gram::Diagonal(weights.to_vec())),
+            Design::Constant { .. } => {
+                let sum = weights.iter().sum();
+                Self::factored(&CsrMatrix::from(&DMatrix::from_element(1, 1, sum)))
+            }
             Design::Sparse(rows) => {
                 let (starts, columns, values) = rows.compressed();
                 let parts = (starts.to_vec(), columns.to_vec(), values.to_vec());
@@ -43,15 +47,19 @@ impl Gram {
                     let mut row = weighted.row_mut(i);
                     row.values_mut().iter_mut().for_each(|b| *b *= weight);
                 }
-                let gram = matrix.transpose() * weighted;
-                let factor = CscCholesky::factor(&CscMatrix::from(&gram)).ok()?;
-                independent(&gram, factor.l()).then_some(())?;
-                Some(Gram::Factored {
-                    matrix: rows_of(&gram),
-                    factor: Box::new(factor),
-                })
+                Self::factored(&(matrix.transpose() * weighted))
             }
         }
+    }
+
+    /// With its Cholesky factor; `None` for (nearly) dependent columns.
+    fn factored(gram: &CsrMatrix<f64>) -> Option<Self> {
+        let factor = CscCholesky::factor(&CscMatrix::from(gram)).ok()?;
+        independent(gram, factor.l()).then_some(())?;
+        Some(Gram::Factored {
+            matrix: rows_of(gram),
+            factor: Box::new(factor),
+        })
     }
 
     /// Diagonal of `G`.

@@ -82,7 +82,7 @@ impl CoefficientFunction {
 
     /// A constant function on `nodes` nodes with start `start`.
     pub fn constant(quantity: CoefficientKind, start: f64, nodes: usize) -> Self {
-        let design = Design::ones(nodes);
+        let design = Design::Constant { nodes };
         Self::with_design(quantity, Basis::Constant, design, nodes, vec![start])
     }
 
@@ -130,7 +130,7 @@ impl CoefficientFunction {
             // A nodal function without a fixed part is copied, which preserves all bits.
             Design::Identity => values.copy_from_slice(theta),
             Design::Empty => values.copy_from_slice(&self.offset),
-            Design::Sparse(_) => {
+            Design::Sparse(_) | Design::Constant { .. } => {
                 values.copy_from_slice(&self.offset);
                 self.design.multiply_add(theta, values);
             }

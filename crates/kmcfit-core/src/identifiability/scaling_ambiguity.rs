@@ -302,6 +302,7 @@ fn dense(design: &Design, nodes: usize) -> DMatrix<f64> {
     match design {
         Design::Empty => DMatrix::zeros(nodes, 0),
         Design::Identity => DMatrix::identity(nodes, nodes),
+        Design::Constant { .. } => DMatrix::from_element(nodes, 1, 1.0),
         Design::Sparse(rows) => rows.dense(),
     }
 }
@@ -323,7 +324,7 @@ fn change(
         match &functions.get(f).design {
             Design::Empty => {}
             Design::Identity => part.copy_from_slice(&product),
-            design @ Design::Sparse(_) => {
+            design @ (Design::Sparse(_) | Design::Constant { .. }) => {
                 let gram = functions.gram(f);
                 let mut step = vec![0.0; part.len()];
                 // A second pass removes the error of the normal equations.

@@ -74,7 +74,8 @@ impl Sensitivity {
         let mut has_sigma = Vec::new();
         for (channel, predicted) in problem.predicted(evaluation) {
             let majorant = channel.majorant(predicted);
-            roots.extend(majorant.roots);
+            let factor = channel.information_root(predicted);
+            roots.extend(majorant.roots.iter().map(|root| factor * root));
             residuals.extend(majorant.weighted);
             has_sigma.extend(std::iter::repeat_n(
                 channel.weighting().is_sigma(),

@@ -43,6 +43,34 @@ impl Loss {
             Self::StudentT { degrees } => (degrees + 1.0) / (degrees + u * u),
         }
     }
+
+    /// Derivative of the score `psi(u) = rho'(u) / 2 = weight(u) u`.
+    fn score_slope(self, u: f64) -> f64 {
+        match self {
+            Self::Squares => 1.0,
+            Self::Huber { threshold } => f64::from(u.abs() <= threshold),
+            Self::StudentT { degrees } => {
+                (degrees + 1.0) * (degrees - u * u) / (degrees + u * u).powi(2)
+            }
+        }
+    }
+
+    /// Ratio of the information of samples with the normalised residuals `u` to that of the majorant, whose weights are
+    /// `weight(u)`: an M-estimator has the variance `E psi^2 / (E psi')^2` of the mean in place of `1 / E weight` (Huber 1964). With
+    /// scores of a known covariance the ratio is that of the curvatures, squared. 1 for least squares.
+    pub(super) fn information_ratio(self, u: &[f64], has_score_covariance: bool) -> f64 {
+        let mean = |of: &dyn Fn(f64) -> f64| u.iter().map(|u| of(*u)).sum::<f64>() / u.len() as f64;
+        let weight = mean(&|u| self.weight(u));
+        let slope = mean(&|u| self.score_slope(u)).max(0.0);
+        let ratio = match has_score_covariance {
+            true => (slope / weight).powi(2),
+            false => slope * slope / (mean(&|u| (self.weight(u) * u).powi(2)) * weight),
+        };
+        if self == Self::Squares || !ratio.is_finite() {
+            return 1.0;
+        }
+        ratio
+    }
 }
 
 #[cfg(test)]

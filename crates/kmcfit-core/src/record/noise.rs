@@ -154,6 +154,25 @@ impl Channel {
         }
     }
 
+    /// Factor of the standard errors' inverse by the loss, beside the roots of [`Channel::majorant`]; 1 for least squares.
+    pub fn information_root(&self, predicted: &[f64]) -> f64 {
+        if self.loss() == Loss::Squares || !self.weighting().is_sigma() {
+            return 1.0;
+        }
+        let normalised = match self.correlation() {
+            Some(_) => self.normalised_innovations(predicted),
+            None => {
+                let each = self.residuals(predicted).enumerate();
+                each.map(|(i, r)| r / self.sigma_of(i)).collect()
+            }
+        };
+        let has_score_covariance = self.noise().scores == ScoreCovariance::Kernel;
+        let ratio = self
+            .loss()
+            .information_ratio(&normalised, has_score_covariance);
+        ratio.sqrt()
+    }
+
     /// `W (r/sigma)`, of unit variance.
     pub(super) fn normalised_innovations(&self, predicted: &[f64]) -> Vec<f64> {
         let mut residuals: Vec<f64> = self.residuals(predicted).collect();

@@ -115,6 +115,9 @@ impl Basis {
     pub fn design(&self, grid: &Grid) -> Design {
         match self {
             Basis::Nodal => Design::Identity,
+            Basis::Constant => Design::Constant {
+                nodes: grid.nodes(),
+            },
             _ => Design::Sparse(self.rows(grid, &grid.times(), 0)),
         }
     }

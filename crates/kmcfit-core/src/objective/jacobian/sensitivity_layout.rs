@@ -133,6 +133,9 @@ impl FunctionLayout<'_> {
                     set(node, first + node, 1.0);
                 }
             }
+            Design::Constant { nodes } => {
+                (0..TILE_NODES.min(nodes - first)).for_each(|node| set(node, 0, 1.0));
+            }
             Design::Sparse(rows) => {
                 let last = (first + TILE_NODES).min(rows.len());
                 for (node, i) in (first..last).enumerate() {

@@ -7,7 +7,7 @@
 //! The steps are taken in the logarithms of mass, damping and stiffness, which stay positive without a bound. From three knots
 //! on they are taken in the parameters themselves as well: either may end in a higher minimum.
 
-use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Design, Parameterization};
+use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::executor::search_unobserved;
 use crate::solvers::linearization::{Linearization, linearise};
@@ -79,24 +79,20 @@ fn with_knots(problem: &Problem, knots: usize) -> Option<Problem> {
         if !is_finer(function) {
             return function.clone();
         }
-        let (basis, design) = match knots {
-            1 => (Basis::Constant, Design::ones(grid.nodes())),
-            _ => {
-                let share = |i: usize| i as f64 / (knots - 1) as f64;
-                let time = |i: usize| grid.start() + share(i) * grid.duration();
-                let basis = Basis::PiecewiseLinear {
-                    knots: (0..knots).map(time).collect(),
-                };
-                let design = basis.design(grid);
-                (basis, design)
-            }
+        let share = |i: usize| i as f64 / (knots - 1) as f64;
+        let time = |i: usize| grid.start() + share(i) * grid.duration();
+        let basis = match knots {
+            1 => Basis::Constant,
+            _ => Basis::PiecewiseLinear {
+                knots: (0..knots).map(time).collect(),
+            },
         };
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         CoefficientFunction {
             start: vec![mean; knots],
             positive_parameters: basis.positive_parameters(),
+            design: basis.design(grid),
             basis: Some(basis),
-            design,
             ..function.clone()
         }
     });
