@@ -10,13 +10,15 @@ use kmcfit_core::internals::assessment::{
 };
 use kmcfit_core::internals::builder::BuildNotice;
 use kmcfit_core::internals::diagnostics::{UntestedReason, Whiteness, WhitenessResult};
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::{Classification, Condition, FunctionClassification};
 use kmcfit_core::internals::problem::ProblemError;
 use kmcfit_core::internals::qp::ConicStatus;
 use kmcfit_core::internals::record::ScoreCovariance;
 use kmcfit_core::internals::simulate::{Cause, SimulationError};
 use kmcfit_core::internals::solvers::{
-    ConditionFailure, GridNotice, MissingMeasurement, Reason, Status, UnsupportedRecord,
+    ConditionFailure, GridNotice, MissingMeasurement, MissingTerm, Reason, Status,
+    UnsupportedRecord,
 };
 use kmcfit_core::internals::study::multistart::MultistartFinding;
 use kmcfit_core::internals::system::InputQuantity;
@@ -462,6 +464,7 @@ fn data_warnings() -> Vec<DataWarning> {
         DataWarning::OppositeSign { .. } => DataWarning::OppositeSign {
             high: "acceleration", low: "displacement",
         },
+        DataWarning::TwoModes { .. } => DataWarning::TwoModes { channel: "acceleration", frequencies: [4.2, 7.31] },
         DataWarning::AtRest { .. } => DataWarning::AtRest { channel: "displacement", start: 1.25 },
         DataWarning::Outliers { .. } => DataWarning::Outliers {
             channel: "displacement", samples: 1, first_value: -9999.0, first_time: 4.5, unit: text("mm"), has_sigma: true,
@@ -669,6 +672,9 @@ fn fit_warnings() -> Vec<FitWarning> {
             experiment: "shaker".into(), input: InputQuantity::BaseAcceleration, given: 0.1, likely: 0.048,
         },
         FitWarning::Aliased { .. } => FitWarning::Aliased { per_period: 2.2, frequency: 45.25 },
+        FitWarning::MissingTerm(_) => FitWarning::MissingTerm(MissingTerm {
+            term: CoefficientKind::QuadraticDamping, value: 0.352, t: 21.5, share: 0.031,
+        }),
         FitWarning::Negative { .. } => FitWarning::Negative { function: "stiffness".into() },
         FitWarning::NegligibleForce { .. } => FitWarning::NegligibleForce { experiment: "shaker".into() },
     ];
@@ -796,6 +802,7 @@ fn suggestions() -> Vec<Suggestion> {
         Suggestion::NoiseLimited { .. } => Suggestion::NoiseLimited { channel: channel(), fit: 71.0 },
         Suggestion::StateInputSigma { .. } => Suggestion::StateInputSigma { input: "force".into(), sigma: 0.701 },
         Suggestion::OutliersLimited { .. } => Suggestion::OutliersLimited { channel: channel(), fit: 71.0 },
+        Suggestion::AddTerm { .. } => Suggestion::AddTerm { term: CoefficientKind::CoulombFriction, start: 4.125 },
         Suggestion::FinerBasis { .. } => Suggestion::FinerBasis { function: "stiffness".into() },
         Suggestion::MoreParameters { .. } => Suggestion::MoreParameters { absent: vec!["cubic", "friction"] },
         Suggestion::Constant { .. } => Suggestion::Constant { function: "damping".into(), p_value: 0.62 },

@@ -102,7 +102,7 @@ experiments:
     initial: estimate
 grid: {nodes: 4801}
 functions:
-  mass:      {basis: constant, start: 3.0}
+  mass:      {basis: constant, start: 3.0, min: none}
   damping:   {basis: constant, start: 0.5, penalty: {kind: tv, weight: 0.1}}
   stiffness: {basis: piecewise-constant, knots: 3, start: 2000.0, penalty: {kind: tv, weight: 1e-6}}
   cubic_stiffness: {fixed: 0.0}

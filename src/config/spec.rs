@@ -66,7 +66,7 @@ keys! {
         /// refines it until the discretisation error is below a tenth of the standard errors.
         nodes: Option<Nodes>,
             example "2000",
-            default "auto; one per sample with a stated `method` or for equation-error",
+            default "auto with `sigma` and no `method`, for gauss-newton and projected-gradient; otherwise one per sample",
             range "3 to 1e8";
         /// Time integration method.
         method: Option<StepMethod>, example "midpoint", default "rk4";

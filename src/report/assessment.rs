@@ -116,6 +116,9 @@ impl FittedModel<'_> {
         summary
             .warnings
             .push(findings::equation_error(equation.as_ref().err()));
+        let missing = self.run_assessment.missing_terms.iter();
+        let missing = missing.map(|term| findings::warning(&FitWarning::MissingTerm(*term)));
+        summary.warnings.extend(missing);
         let Ok(intervals) = equation else {
             return;
         };

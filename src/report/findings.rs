@@ -5,6 +5,7 @@ use crate::number_format::{resolved, significant, times_in_words};
 use kmcfit_core::internals::assessment::{
     CoarseBasis, FitWarning, GapAssessment, GapStatus, NoIntervals, Unidentified,
 };
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::{
     Classification, FunctionClassification, RankFinding, span_words,
 };
@@ -188,6 +189,22 @@ pub fn warning(warning: &FitWarning) -> Finding {
             significant(*given, 3),
             significant(*likely, 3),
             unit = input.unit()
+        ),
+        FitWarning::MissingTerm(missing) => format!(
+            "the residuals of the equation of motion show {} that the model does not have: {} = {} {} (t = {}), {} of the largest \
+             term; the other estimates are biased by it",
+            match missing.term {
+                CoefficientKind::Offset => "a static force",
+                CoefficientKind::CoulombFriction => "Coulomb friction",
+                CoefficientKind::QuadraticDamping => "quadratic damping",
+                CoefficientKind::CubicStiffness => "a cubic stiffness",
+                other => other.name(),
+            },
+            missing.term.name(),
+            significant(missing.value, 3),
+            missing.term.unit(),
+            significant(missing.t, 2),
+            super::suggestions::percent(100.0 * missing.share, 1),
         ),
         FitWarning::Negative { function } => {
             format!("the {function} is negative at most times: the system is not passive")

@@ -10,7 +10,9 @@ use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::simulate::SimulationError;
-use kmcfit_core::internals::solvers::{Fit, Solver, predict_validation};
+use kmcfit_core::internals::solvers::{
+    Fit, MissingTerm, Solver, missing_terms, predict_validation,
+};
 use nalgebra::DMatrix;
 
 /// Assessment of a fit, computed once for all its documents.
@@ -20,6 +22,8 @@ pub struct RunAssessment {
     pub(super) assessment: Option<FitAssessment>,
     /// Intervals of a fit of the equation error, or the reason why there are none; `None` for other fits, and without parameters.
     pub(super) equation: Option<Result<EquationErrorIntervals, NoIntervals>>,
+    /// Terms missing from the equation of motion, by its error; none for other fits.
+    pub(super) missing_terms: Vec<MissingTerm>,
     /// Validation records.
     pub(super) validation: Vec<ValidationRecord>,
 }
@@ -34,6 +38,10 @@ impl RunAssessment {
                 .then(|| FitAssessment::of(&model.problem, fit, model.tests_bases)),
             equation: (!is_simulated && model.problem.parameters() > 0)
                 .then(|| EquationErrorIntervals::of(&model.problem, fit)),
+            missing_terms: match is_simulated {
+                true => Vec::new(),
+                false => missing_terms(&model.problem, &fit.best.parameters),
+            },
             validation: validation
                 .map(|out| ValidationRecord::of(model, fit, out))
                 .collect(),

@@ -116,6 +116,7 @@ fn infeasible(constraint: &str) -> (String, Value) {
     let bench = Workbench::with_small_model();
     let model = MODEL
         .replace("method: lbfgs", "method: gauss-newton")
+        .replace("start: 2.0", "start: 2.0, min: none")
         .replace("fit:", &format!("constraints: [{constraint}]\nfit:"));
     bench.write("model.yaml", &model);
     let stdout = bench.run_to(3, &["fit", "model.yaml", "--out", "run"]);

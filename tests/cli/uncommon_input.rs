@@ -215,7 +215,7 @@ fn roles_of_experiments() {
         )
     };
     let own = "functions: {damping: {basis: constant, start: 1.0}}\n    validation: true";
-    let friction = "functions: {coulomb_friction: {basis: constant, start: 0.2, width: 0.1}}";
+    let friction = "functions: {coulomb_friction: {basis: constant, start: 0.2, width: 0.2}}";
     let shared =
         format!("{STIFFNESS}\n  coulomb_friction: {{basis: constant, start: 0.1, width: 0.1}}");
     let sensor = "    sensors: {displacement: {gain: estimate}}\n    initial:";

@@ -86,6 +86,7 @@ fn every_kind_of_constraint_is_accepted() {
     assert_eq!(
         names(list),
         [
+            "mass >= 0.002",
             "mass non-increasing",
             "mass convex",
             "damping >= 0.5",

@@ -222,6 +222,12 @@ fn numbers() {
       found: an infinite number
       expected: a finite number, `estimate`, or a map such as {start: 1.0, prior: {mean: 1.0, sigma: 0.1}}
     ");
+    assert_snapshot!(changed("start: 2.0}", "start: 2.0, min: non}"), @"
+    m.yaml:14:41: functions.mass.min: neither a number nor `none`
+      found: text `non`
+      expected: a finite number, `none`, or a column: {data: file.csv, column: name}
+      hint: did you mean `none`?
+    ");
     assert_snapshot!(changed("velocity: 1}", "velocity: yes}"), @"
     m.yaml:8:44: experiments[0].initial.velocity: neither a number nor `estimate`
       found: text `yes`

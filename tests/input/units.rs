@@ -11,7 +11,7 @@ fn built(table: &str, names: [&str; 2], units: &str) -> Result<(String, f64), St
     let [time, reading] = names;
     let text = format!(
         "format: 1\nexperiments:\n  - data: d.csv\n    columns: {{time: {time}, displacement: \
-         {reading}}}\n    {units}\n    initial: {{displacement: 1, velocity: 0}}\nfunctions: {{mass: \
+         {reading}}}\n    {units}\n    initial: {{displacement: 1, velocity: 0}}\ngrid: {{nodes: 101}}\nfunctions: {{mass: \
          {{basis: constant, start: 2}}, damping: {{fixed: 0}}, stiffness: {{fixed: 1}}}}\n"
     );
     let said = |error: kmcfit::error::InputError| {

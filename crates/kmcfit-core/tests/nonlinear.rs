@@ -2,7 +2,9 @@
 
 mod common;
 
+use common::forced::{broadband, response, white};
 use common::synthetic::{Truth, cramer_rao, rms, run, with_noise};
+use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
 use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, Parameterization};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Weighting};
@@ -185,4 +187,58 @@ fn a_mass_that_sticks_in_every_cycle_to_one_per_cent() {
         assert!(fastest > 20.0 * WIDTH, "{fastest}");
     }
     case.check();
+}
+
+/// Two records of one oscillator whose guides have another friction in each: both frictions within four standard errors, 1 % of
+/// 0.4 N at most by the noise of 1 %.
+#[test]
+fn each_record_has_its_own_friction() {
+    const WIDTH: f64 = 0.01;
+    const SPACING: f64 = 0.02;
+    let frictions = [0.4, 0.8];
+    let [m, c, k] = [2.0, 0.5, 80.0];
+    let mut builder = {
+        let parts = [m, c, k].map(|value| CoefficientSpec::constant(1.1 * value));
+        Builder::new(parts).coulomb_friction(CoefficientSpec::constant(0.5), WIDTH)
+    };
+    for (i, friction) in frictions.into_iter().enumerate() {
+        let seed = i as u64;
+        let force = broadband(white(seed, 1, 1500));
+        let states = response(SPACING, [0.0, 0.0], &force, |_, y, v, f| {
+            (f - c * v - k * y - friction * v / v.hypot(WIDTH)) / m
+        });
+        let exact: Vec<f64> = states.iter().map(|[y, ..]| *y).collect();
+        let sigma = NOISE * rms(&exact);
+        let noise = white(seed, 2, exact.len());
+        let samples: Vec<f64> = exact
+            .iter()
+            .zip(noise)
+            .map(|(y, e)| y + sigma * e)
+            .collect();
+        let times: Vec<f64> = (0..exact.len()).map(|i| SPACING * i as f64).collect();
+        let mut channel = ChannelSpec::new(ChannelKind::Displacement, &times, &samples);
+        channel.weighting = Some(Weighting::Sigma(sigma));
+        let mut record = Record::new(&format!("record {i}"))
+            .from_state(0.0, 0.0)
+            .force(&times, &force)
+            .channel(channel);
+        if i == 1 {
+            let own = CoefficientSpec::constant(0.5);
+            record = record.coefficient(CoefficientKind::CoulombFriction, own);
+        }
+        builder = builder.record(record);
+    }
+    // Ten steps per sample resolve the change of the sign.
+    let problem = builder.nodes(14_991).build().unwrap();
+    let fit = run(&problem);
+    let covariance = cramer_rao(&problem, &fit.best.parameters);
+    for (place, friction) in [(3, 0.4), (4, 0.8)] {
+        let error = covariance[(place, place)].sqrt();
+        let found = fit.best.parameters[place];
+        assert!(
+            (found - friction).abs() < 4.0 * error,
+            "{found} {friction} +- {error}"
+        );
+        assert!(error < 0.004, "{error}");
+    }
 }

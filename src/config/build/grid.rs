@@ -41,6 +41,11 @@ pub(super) fn build(
     };
     let (start, duration) = span(file, records)?;
     let measured = records.iter().flatten().any(|r| !r.channels.is_empty());
+    // Without a statement, samples that are equally spaced stay on nodes.
+    let sampling = match asked {
+        None => node_per_sample(records),
+        Some(_) => None,
+    };
     let stated = match asked {
         Some(Nodes::Count(count)) => Some(count.0),
         _ if !measured => {
@@ -50,19 +55,26 @@ pub(super) fn build(
         }
         Some(Nodes::Auto) => None,
         None if is_automatic(file) => None,
-        None => node_per_sample(records),
+        None => sampling,
     };
     let (nodes, finer) = match stated {
         Some(nodes) => (nodes, None),
         None => {
-            let finer = FinerNodes::of(records, duration, MOST_CHOSEN);
-            let first = auto::nodes(method(file), records, duration, MOST_CHOSEN, notes);
-            let nodes = if least > first {
-                finer.at_least(least)
-            } else {
-                first
-            };
-            (nodes, Some(finer))
+            let finer = FinerNodes::of(records, duration, MOST_CHOSEN, sampling, asked.is_some());
+            let mut choice = Vec::new();
+            let first = auto::nodes(
+                method(file),
+                records,
+                duration,
+                MOST_CHOSEN,
+                &finer,
+                &mut choice,
+            );
+            // One node per sample needs no explanation.
+            if sampling != Some(first) {
+                notes.append(&mut choice);
+            }
+            (finer.at_least(least.max(first)), Some(finer))
         }
     };
     if nodes < Grid::FEWEST_NODES {
@@ -109,11 +121,17 @@ fn fits_into_memory(file: &ModelFile, mode: BuildMode, nodes: usize) -> Result<(
         )))
 }
 
-/// True if a model without a number of nodes has an automatic one: it states no stepper either, and its response is simulated.
+/// True if a model without a number of nodes has an automatic one: it states no stepper either, and its method refines the grid by
+/// the standard errors, for which every experiment has a sigma.
 fn is_automatic(file: &ModelFile) -> bool {
     let has_stepper = file.spec.grid.as_ref().is_some_and(|g| g.method.is_some());
     let method = file.spec.fit.as_ref().and_then(|fit| fit.method);
-    !has_stepper && method != Some(FitMethod::EquationError)
+    let refines = matches!(
+        method,
+        None | Some(FitMethod::GaussNewton | FitMethod::ProjectedGradient)
+    );
+    let has_sigma = file.spec.experiments.iter().all(|e| e.sigma.is_some());
+    !has_stepper && refines && has_sigma
 }
 
 /// Number of nodes for one node per sample, if all channels of all records have the same equally spaced times.

@@ -6,9 +6,10 @@ use super::document::{ChannelSummary, ExperimentSummary, ResultDocument};
 use crate::finding::Finding;
 use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR, ResidualPattern};
 use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::solvers::{Solver, StartStrategy, Status};
 use kmcfit_core::internals::system::Method;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Residuals with a lower probability under white noise have a pattern.
 const PATTERN: f64 = 1e-3;
@@ -93,6 +94,13 @@ pub enum Suggestion {
         /// Likely sigma, in its SI unit.
         sigma: f64,
     },
+    /// A term that the residuals of the equation of motion show.
+    AddTerm {
+        /// Key of its function.
+        term: CoefficientKind,
+        /// Start value, in its SI unit.
+        start: f64,
+    },
     /// A finer basis for a function whose basis is too coarse.
     FinerBasis {
         /// Name of the function.
@@ -149,6 +157,7 @@ fn typed(document: &ResultDocument) -> Vec<Suggestion> {
     let mut steps = Vec::new();
     steps.extend(about_ending(document));
     steps.extend(about_steps(document));
+    steps.extend(about_terms(document));
     steps.extend(about_inputs(document));
     steps.extend(about_bases(document).or_else(|| about_residuals(document)));
     if wanders(document) {
@@ -180,6 +189,17 @@ fn about_bases(document: &ResultDocument) -> Option<Suggestion> {
     let function = coarse.quantities.get("function")?.as_str()?;
     Some(Suggestion::FinerBasis {
         function: function.to_owned(),
+    })
+}
+
+/// The most significant missing term of an equation of motion.
+fn about_terms(document: &ResultDocument) -> Option<Suggestion> {
+    let warnings = &document.identifiability.warnings;
+    let missing = warnings.iter().find(|w| w.kind == "missing_term")?;
+    let term = missing.quantities.get("term")?;
+    Some(Suggestion::AddTerm {
+        term: CoefficientKind::deserialize(term).ok()?,
+        start: missing.quantities.get("value")?.as_f64()?,
     })
 }
 

@@ -3,6 +3,7 @@
 use super::{Suggestion, Suspect, percent};
 use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::ResidualPattern;
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::solvers::Solver;
 use std::fmt;
 
@@ -66,6 +67,18 @@ impl fmt::Display for Suggestion {
                 significant(*sigma, 2),
                 quantity = input.replace('_', " ")
             ),
+            Suggestion::AddTerm { term, start } => {
+                let width = match term {
+                    CoefficientKind::CoulombFriction => ", width: a hundredth of the peak velocity",
+                    _ => "",
+                };
+                write!(
+                    f,
+                    "add the missing term: `{}: {{basis: constant, start: {}{width}}}` under `functions`",
+                    term.name(),
+                    significant(*start, 3)
+                )
+            }
             Suggestion::FinerBasis { function } => write!(
                 f,
                 "let the {function} vary more freely (`basis: b-spline`, `knots: auto`); an error of the input and a missing force term, too, appear as a coefficient that varies"

@@ -11,6 +11,7 @@ use crate::objective::{Evaluation, diagnostics};
 use crate::problem::Problem;
 use crate::record::{Channel, Loss, ScoreCovariance};
 use crate::simulate::SimulationError;
+use crate::solvers::MissingTerm;
 use crate::system::{Excitation, InputQuantity, Term};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -118,6 +119,8 @@ pub enum FitWarning {
         /// Sigma of the largest likelihood, in the SI unit of the input.
         likely: f64,
     },
+    /// The residuals of the equation of motion show a term that the model does not have.
+    MissingTerm(MissingTerm),
     /// A function is negative at most times, which violates passivity.
     Negative {
         /// Name of the function.

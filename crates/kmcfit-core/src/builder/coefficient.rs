@@ -8,9 +8,6 @@ use crate::functions::{Basis, CoefficientFunction, CoefficientKind, WeightRule};
 use crate::number_format::significant;
 use crate::system::Grid;
 
-/// Highest order of a penalised derivative.
-const HIGHEST_ORDER: usize = 2;
-
 /// Start of a coefficient function, in its unit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Start {
@@ -299,39 +296,6 @@ impl CoefficientSpec {
     }
 }
 
-impl PenaltySpec {
-    fn check(&self, key: &str, grid: &Grid) -> Result<(), BuildError> {
-        let (order, weight, reference) = match self {
-            Self::TotalVariation { weight } => (1, *weight, &None),
-            Self::Tikhonov {
-                order,
-                weight,
-                reference,
-            } => (*order, *weight, reference),
-        };
-        if order > HIGHEST_ORDER {
-            let problem = "this derivative cannot be penalised";
-            return Err(BuildError::new(format!("{key}.order"), problem)
-                .found(order)
-                .expected("0 (the value), 1 (the slope) or 2 (the curvature)"));
-        }
-        if let PenaltyWeight::Given(weight) = weight {
-            check_weight(&format!("{key}.weight"), weight)?;
-        }
-        let at = format!("{key}.reference");
-        match reference {
-            Some(_) if order > 0 => Err(BuildError::new(
-                &at,
-                "only a penalty of order 0 has a reference",
-            )
-            .found(format!("a reference with order {order}"))
-            .expected("no `reference`, or `order: 0`")),
-            Some(reference) => values_at_nodes(reference, &at, grid.nodes()).map(drop),
-            None => Ok(()),
-        }
-    }
-}
-
 /// Error if a lower bound exceeds the upper one; the keys are `min` and `max` below `key`.
 pub(super) fn uncrossed(
     key: &str,
@@ -352,15 +316,6 @@ pub(super) fn uncrossed(
                 .expected("min at most max at all times"))
         }
         None => Ok(()),
-    }
-}
-
-fn check_weight(key: &str, weight: f64) -> Result<(), BuildError> {
-    match weight.is_finite() && weight >= 0.0 {
-        true => Ok(()),
-        false => Err(BuildError::new(key, "a weight cannot be negative")
-            .found(weight)
-            .expected("a number, 0 or more")),
     }
 }
 

@@ -122,11 +122,13 @@ impl Builder {
                     )),
             );
         };
-        match entry.kind {
-            CoefficientKind::CoulombFriction => {
-                let problem = "Coulomb friction is shared by all experiments";
-                Err(BuildError::new(&entry.key, problem)
-                    .expected("`functions.coulomb_friction`, for all experiments"))
+        let shared = self.coefficients[place].1.width;
+        match entry.spec.width {
+            Some(width) if shared != Some(width) => {
+                let problem = "the width of Coulomb friction is shared by all experiments";
+                Err(BuildError::new(format!("{}.width", entry.key), problem)
+                    .found(width)
+                    .expected("no `width`, or that of `functions.coulomb_friction`"))
             }
             _ => Ok(place),
         }

@@ -22,9 +22,12 @@ impl RowGroup {
         let terms: f64 = self.rows.row(i).map(|(j, a)| (a * theta[j]).abs()).sum();
         let finite = |b: f64| if b.is_finite() { b.abs() } else { 0.0 };
         let [lower, upper] = self.bounds(i);
-        // A row whose terms are zero has the scale of its coefficients.
-        let size = terms.max(finite(lower)).max(finite(upper));
-        size.max(self.rows.scale(i))
+        let bound = finite(lower).max(finite(upper));
+        // A row whose terms are zero has the scale of its coefficients; a bound of one parameter is a scale in any unit.
+        match bound > 0.0 && self.single(i).is_some() {
+            true => terms.max(bound),
+            false => terms.max(bound).max(self.rows.scale(i)),
+        }
     }
 
     /// Distance of row `i` outside its bounds, relative to its scale; not positive inside.

@@ -3,7 +3,8 @@
 use crate::system::Term;
 
 /// Kind of a coefficient function of the equation of motion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum CoefficientKind {
     /// Mass `m(t)`.
     Mass,
@@ -18,6 +19,7 @@ pub enum CoefficientKind {
     /// Coulomb friction, the factor of a smoothed sign of `v`.
     CoulombFriction,
     /// Static force.
+    #[serde(rename = "static_force")]
     Offset,
 }
 

@@ -11,6 +11,7 @@ use super::fit::{Attempt, Fit};
 use super::rounds::{is_ended, with_round};
 use super::settings::{FitSettings, Solver, StartStrategy};
 use super::starts::scan_starts;
+use super::termination::Status;
 use super::timings::timed;
 use crate::functions::CoefficientKind;
 use crate::host::Instant;
@@ -25,6 +26,8 @@ const LARGEST_MEAN_SQUARE: f64 = 1.1;
 /// that has the right frequency can still end with values at the ends of the record of another sign or size.
 const OUTLYING: f64 = 1.8;
 const MOVED: f64 = 1.2;
+/// Most nodes of all records for a scan, which simulates them some three hundred times.
+const MOST_NODES: usize = 500_000;
 /// Most searches from a fit without outliers.
 const MOST_MOVES: usize = 3;
 /// Relative decrease of the cost by which another minimum is lower.
@@ -41,7 +44,8 @@ pub(super) fn with_further_starts(
     settings: &FitSettings,
     watch: &mut Observer,
 ) -> Result<Fit, SimulationError> {
-    if settings.solver != Solver::GaussNewton || problem.parameters() == 0 {
+    let is_minimum = matches!(found.outcome.status, Status::Converged | Status::Stalled);
+    if settings.solver != Solver::GaussNewton || problem.parameters() == 0 || !is_minimum {
         return Ok(found);
     }
     let mut further = FurtherStarts {
@@ -67,7 +71,8 @@ impl FurtherStarts<'_, '_> {
     /// Searches from a scan of the natural frequency where the residuals are not noise.
     fn scan(&mut self, start: &[f64]) -> Result<(), SimulationError> {
         let (problem, settings) = (self.problem, self.settings);
-        if is_ended(&self.found) || is_noise(problem, &self.found) {
+        let nodes = problem.system.grid.nodes() * problem.experiments.len();
+        if nodes > MOST_NODES || is_noise(problem, &self.found) {
             return Ok(());
         }
         let flag = settings.interrupt.as_ref();

@@ -23,6 +23,10 @@ const AIM: f64 = 0.06;
 /// Largest change of the response by halving the step, relative to the largest sample, that needs no finer grid: the resolution
 /// of single precision, with which loggers store samples.
 const RESOLUTION: f64 = 1e-7;
+/// Misfit, relative to that of the zero response, of a fit that belongs to no system, on any grid.
+const POOR: f64 = 0.25;
+/// Factor by which the next grid may be better than [`RESOLUTION`].
+const BEYOND: f64 = 16.0;
 /// Change of the response by halving the step, relative to the largest sample, from which the estimates are no start.
 const OTHER_SYSTEM: f64 = 0.01;
 /// Smallest and largest factor of the number of steps from one grid to the next. Beyond the largest one the order of the stepper
@@ -94,7 +98,8 @@ pub struct RefinedFit<T> {
 }
 
 /// Fits `problem` from `start` by `run`, and on finer grids of at most `most` nodes while the discretisation error exceeds a tenth
-/// of a standard error. Fits that converged to no minimum, or have too many parameters for standard errors, keep their grid.
+/// of a standard error. Fits that converged to no minimum, explain less than three quarters of the
+/// misfit of the zero response, or have too many parameters for standard errors keep their grid.
 ///
 /// # Errors
 /// A [`SimulationError`] if the first fit fails.
@@ -191,7 +196,8 @@ impl GridError {
             Status::Stalled => true,
             _ => false,
         };
-        if !is_minimum {
+        let misfit = fit.best.evaluation.misfit;
+        if !is_minimum || misfit > POOR * problem.zero_response_misfit() {
             return None;
         }
         let theta = &fit.best.parameters;
@@ -243,7 +249,7 @@ impl GridError {
             Some(shift) if shift <= LARGEST_ERROR || self.change <= RESOLUTION => None,
             Some(shift) => {
                 let order = self.order(shift, here, before, f64::from(system.method.order()));
-                let ratio = (shift / AIM).min(2.0 * self.change / RESOLUTION);
+                let ratio = (shift / AIM).min(BEYOND * self.change / RESOLUTION);
                 Some(finer(ratio.powf(1.0 / order)))
             }
         };

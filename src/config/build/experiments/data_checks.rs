@@ -9,7 +9,7 @@ use crate::config::values::NumberOrEstimate;
 use crate::finding::Finding;
 use kmcfit_core::internals::diagnostics::{detrended, outlier_indices, standard_deviation};
 use kmcfit_core::internals::record::ChannelKind;
-use kmcfit_core::internals::signal::{Interpolation, Signal, Spectrum, clipped, onset};
+use kmcfit_core::internals::signal::{Interpolation, Signal, Spectrum, clipped, onset, two_modes};
 use kmcfit_core::internals::system::round_time;
 use std::f64::consts::TAU;
 
@@ -44,6 +44,7 @@ pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord)
     if !is_equation_error(file) {
         warnings.extend(rest_before_motion(spec, record));
     }
+    warnings.extend(modes(spec, record));
     let name = file.experiment_name(i);
     let place = format!("experiments[{i}] ({name})");
     warnings.iter().map(|warning| warning.at(&place)).collect()
@@ -161,9 +162,27 @@ fn correlation_with_estimate(low: &RawChannel, high: &RawChannel) -> Option<f64>
     correlation.is_finite().then_some(correlation)
 }
 
+/// A free record in which two modes vibrate.
+fn modes(spec: &ExperimentSpec, record: &RawRecord) -> Option<DataWarning> {
+    if has_input(spec, record) {
+        return None;
+    }
+    let each = record.channels.iter().filter(|c| c.spacing.is_some());
+    let mut found = each.filter_map(|c| Some((c, two_modes(&c.values, c.median_spacing)?)));
+    let (channel, frequencies) = found.next()?;
+    Some(DataWarning::TwoModes {
+        channel: channel.kind.name(),
+        frequencies,
+    })
+}
+
+fn has_input(spec: &ExperimentSpec, record: &RawRecord) -> bool {
+    !record.excitation.is_empty() || spec.force.is_some() || spec.base.is_some()
+}
+
 /// A free record that begins at rest, before the release or the impact.
 fn rest_before_motion(spec: &ExperimentSpec, record: &RawRecord) -> Option<DataWarning> {
-    if !record.excitation.is_empty() || spec.force.is_some() || spec.base.is_some() {
+    if has_input(spec, record) {
         return None;
     }
     let mut channels = record.channels.iter();

@@ -78,6 +78,18 @@ pub(crate) enum DataWarning {
          {start}}}`"
     )]
     AtRest { channel: &'static str, start: f64 },
+    /// Two modes in a free response.
+    #[error(
+        "two modes vibrate in the {channel}, at {} and {} Hz; the model has one; keep one by `band`, or measure at a node of the \
+         other",
+        significant(frequencies[0], 3),
+        significant(frequencies[1], 3)
+    )]
+    TwoModes {
+        channel: &'static str,
+        /// The stronger one first, Hz.
+        frequencies: [f64; 2],
+    },
     /// Outliers under a quadratic loss.
     #[error(
         "{samples} outlier{} in the {channel}, the first {} {unit} at {first_time} s; delete {} (empty fields) or use a \

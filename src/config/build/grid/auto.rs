@@ -8,6 +8,7 @@
 //! shortened so that samples of force and base fall on nodes. For records without a spectrum (too few or equal samples)
 //! the step is the sampling interval.
 
+use super::FinerNodes;
 use crate::config::build::experiments::RawRecord;
 use crate::finding::Finding;
 use crate::number_format::significant;
@@ -42,6 +43,7 @@ pub fn nodes(
     records: &[Option<RawRecord>],
     duration: f64,
     most: usize,
+    finer: &FinerNodes,
     notes: &mut Vec<Finding>,
 ) -> usize {
     let mut longest = f64::INFINITY;
@@ -71,16 +73,9 @@ pub fn nodes(
             .min(1.0 / (STEPS_PER_PERIOD * spectrum.energy_quantile(ALL_ENERGY)));
     }
     let shortest = duration / (most.min(MOST_PER_SAMPLE * samples) - 1) as f64;
-    let mut step = longest.clamp(shortest, duration / 8.0);
-    let drives = records
-        .iter()
-        .flatten()
-        .filter_map(RawRecord::drive_spacing);
-    if let Some(spacing) = drives.reduce(f64::min) {
-        // Samples on nodes: no step crosses a kink of the force.
-        step = spacing / (spacing / step).ceil();
-    }
-    let nodes = (duration / step).round() as usize + 1;
+    let step = longest.clamp(shortest, duration / 8.0);
+    // No step crosses a kink of the force.
+    let nodes = finer.at_least((duration / step).round() as usize + 1);
     let step = duration / (nodes - 1) as f64;
     let (order, constant) = error_constant(method);
     if fastest == 0.0 {

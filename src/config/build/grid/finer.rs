@@ -3,28 +3,37 @@
 use crate::config::build::experiments::RawRecord;
 use crate::finding::Finding;
 
-/// Most nodes per sample of a refined grid; the first one has fewer ([`super::auto`]).
-const MOST_PER_SAMPLE: usize = 1024;
+/// Most nodes per sample of a refined grid with a stated `auto`, and of one without a statement; the first one has fewer
+/// ([`super::auto`]).
+const MOST_PER_SAMPLE: [usize; 2] = [1024, 64];
 
 /// Numbers of nodes of finer grids.
 #[derive(Debug, Clone, Copy)]
 pub struct FinerNodes {
     /// Most nodes.
     pub most: usize,
-    /// Sampling intervals of force or base in the record, whose samples fall on nodes; `None` without them.
+    /// Sampling intervals in the record of samples that fall on nodes, those of force or base or those of all channels; `None`
+    /// without them.
     intervals: Option<f64>,
 }
 
 impl FinerNodes {
-    /// Numbers of at most `most` nodes for records of `duration` s.
-    pub fn of(records: &[Option<RawRecord>], duration: f64, most: usize) -> Self {
+    /// Numbers of at most `most` nodes for records of `duration` s; samples that are equally spaced on `sampling` nodes stay on nodes.
+    pub fn of(
+        records: &[Option<RawRecord>],
+        duration: f64,
+        most: usize,
+        sampling: Option<usize>,
+        is_stated: bool,
+    ) -> Self {
         let records = || records.iter().flatten();
         let channels = records().flat_map(|r| &r.channels);
         let samples = channels.map(|c| c.times.len()).max().unwrap_or(2);
         let spacing = records().filter_map(RawRecord::drive_spacing);
         Self {
-            most: most.min(samples.saturating_mul(MOST_PER_SAMPLE)),
-            intervals: spacing.reduce(f64::min).map(|spacing| duration / spacing),
+            most: most.min(samples.saturating_mul(MOST_PER_SAMPLE[usize::from(!is_stated)])),
+            intervals: (spacing.reduce(f64::min).map(|spacing| duration / spacing))
+                .or_else(|| sampling.map(|nodes| (nodes - 1) as f64)),
         }
     }
 

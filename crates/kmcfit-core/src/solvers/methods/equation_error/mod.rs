@@ -7,10 +7,12 @@
 
 mod fit;
 mod measured;
+mod missing_terms;
 mod rows;
 
 pub(in crate::solvers) use fit::fit;
 pub use measured::Measurements;
+pub use missing_terms::{MissingTerm, missing_terms};
 pub use rows::{NoEquationRows, equation_rows};
 
 use crate::constraints::{Constraints, RowGroup, TOLERANCE};
