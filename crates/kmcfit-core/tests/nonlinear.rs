@@ -218,7 +218,7 @@ fn each_record_has_its_own_friction() {
         let times: Vec<f64> = (0..exact.len()).map(|i| SPACING * i as f64).collect();
         let mut channel = ChannelSpec::new(ChannelKind::Displacement, &times, &samples);
         channel.weighting = Some(Weighting::Sigma(sigma));
-        let mut record = Record::new(&format!("record {i}"))
+        let mut record = Record::new(format!("record {i}"))
             .from_state(0.0, 0.0)
             .force(&times, &force)
             .channel(channel);

@@ -150,7 +150,7 @@ fn counts_of_200_further_seeds() {
             "| {channel:?} | {:.0} % | 200 | {count} | {largest:.3} |",
             100.0 * noise
         );
-        // 9 of 1200 at 2, 5 and 10 % when these searches were written.
+        // 10 of 800 in the last long run (docs/long/search.md).
         assert!(count <= 10, "{channel:?}, {noise}: {missed:?}");
     }
 }

@@ -2,13 +2,13 @@
 
 use super::Spectrum;
 
-/// Fewest values for a judgement.
+/// Fewest values of a record.
 const FEWEST: usize = 256;
 /// Fewest frequency spacings below the lower peak and between the two: drift, and the width of a window.
 const APART: usize = 8;
 /// Smallest energy of the weaker mode, relative to that of the stronger one.
 const WEAKEST: f64 = 0.02;
-/// Largest mean density of four neighbours in the valley between two modes, relative to the lower peak. A frequency that varies leaves
+/// Largest mean density of four neighbours at the lowest place between two modes, relative to the lower peak. A frequency that varies leaves
 /// ripples that are less deep.
 const DEEPEST: f64 = 0.05;
 /// Smallest ratio of a peak to the noise floor.
@@ -41,15 +41,15 @@ pub fn two_modes(values: &[f64], spacing: f64) -> Option<[f64; 2]> {
     let second = highest(&mut (APART..density.len()).filter(is_apart))?;
     let [low, high] = [first.min(second), first.max(second)];
     let least = density[first].min(density[second]);
-    let valley = density[low..=high].windows(4);
-    let valley = valley
+    let between = density[low..=high].windows(4);
+    let between = between
         .map(|w| w.iter().sum::<f64>() / 4.0)
         .fold(f64::INFINITY, f64::min);
     let ratio = high as f64 / low as f64;
     let is_harmonic = HARMONICS.iter().any(|q| (ratio - q).abs() < HARMONIC * q);
     let is_mode = density[second] > ABOVE_FLOOR * floor
         && energy(second) > WEAKEST * energy(first)
-        && valley < DEEPEST * least
+        && between < DEEPEST * least
         && !is_harmonic;
     is_mode.then(|| [first, second].map(|k| k as f64 * spectrum.resolution()))
 }

@@ -11,7 +11,6 @@ use super::fit::{Attempt, Fit};
 use super::rounds::{is_ended, with_round};
 use super::settings::{FitSettings, Solver, StartStrategy};
 use super::starts::scan_starts;
-use super::termination::Status;
 use super::timings::timed;
 use crate::functions::CoefficientKind;
 use crate::host::Instant;
@@ -44,8 +43,8 @@ pub(super) fn with_further_starts(
     settings: &FitSettings,
     watch: &mut Observer,
 ) -> Result<Fit, SimulationError> {
-    let is_minimum = matches!(found.outcome.status, Status::Converged | Status::Stalled);
-    if settings.solver != Solver::GaussNewton || problem.parameters() == 0 || !is_minimum {
+    let searches = settings.solver == Solver::GaussNewton && settings.stopping.has_test();
+    if !searches || problem.parameters() == 0 {
         return Ok(found);
     }
     let mut further = FurtherStarts {

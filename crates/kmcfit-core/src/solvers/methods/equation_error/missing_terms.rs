@@ -116,7 +116,7 @@ fn candidates(problem: &Problem, measured: &[&Measured]) -> Vec<Candidate> {
     let kinds = CoefficientKind::ALL.into_iter();
     kinds
         // The filter of an acceleration removes a static force.
-        .filter(|kind| !is_there(*kind) && !(in_bands && *kind == CoefficientKind::Offset))
+        .filter(|kind| !(is_there(*kind) || in_bands && *kind == CoefficientKind::Offset))
         .filter_map(|kind| {
             Some(Candidate {
                 kind,
@@ -169,11 +169,12 @@ impl WeakForm {
         weak.residuals =
             weak.averaged(|record, i| equation.residuals[start(record) + i] / roots[record]);
         let masses = problem.functions.ranges()[problem.functions.coefficient_set(0)[0]].clone();
-        for j in 0..problem.functions.scalar_range().start {
+        let functions = problem.functions.scalar_range().start;
+        for (j, value) in theta[..functions].iter().enumerate() {
             let of_parameter =
                 weak.averaged(|record, i| equation.rows[(start(record) + i, j)] / roots[record]);
             let size = (of_parameter.norm_squared() / of_parameter.len().max(1) as f64).sqrt();
-            weak.largest = weak.largest.max(theta[j].abs() * size);
+            weak.largest = weak.largest.max(value.abs() * size);
             // Without a scale the equation holds at zero: that of the mass is kept.
             if size > 0.0 && !(equation.is_scale_free && masses.contains(&j)) {
                 weak.terms.push(of_parameter);
