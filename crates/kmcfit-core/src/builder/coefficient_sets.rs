@@ -122,6 +122,9 @@ impl Builder {
                     )),
             );
         };
+        if entry.kind != CoefficientKind::CoulombFriction {
+            return entry.width().map(|_| place);
+        }
         let shared = self.coefficients[place].1.width;
         match entry.spec.width {
             Some(width) if shared != Some(width) => {

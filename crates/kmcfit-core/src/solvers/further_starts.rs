@@ -1,8 +1,9 @@
-//! A second search where the first one ends above the noise.
+//! Further searches after a fit: where it ends above the noise, and from it without its outliers.
 //!
 //! The residuals of a fit at the minimum are noise: their squares, over the squares of stated sigmas, have a mean of one, and
 //! with estimated sigmas they are white unless the noise is correlated. Where they are not, the fit may be in a local minimum,
-//! and the searches of a scan of the natural frequency ([`scan_starts`]) are made.
+//! and the searches of a scan of the natural frequency ([`scan_starts`]) are made. Values of mass and stiffness far from the median
+//! of their function, which the record hardly determines, are moved towards it, and the search is repeated.
 
 use super::checkpoint::Observer;
 use super::correlation_estimation::is_misspecified;
@@ -114,6 +115,7 @@ impl FurtherStarts<'_, '_> {
         Ok(())
     }
 
+    /// Searches from one start. An interrupt or the time limit ends all further searches, whichever fit is the better one.
     fn search(&mut self, strategy: StartStrategy, from: &[f64]) -> Result<(), SimulationError> {
         let Self {
             problem, settings, ..
@@ -131,17 +133,22 @@ impl FurtherStarts<'_, '_> {
         };
         self.found.attempts.push(Attempt::of(strategy, &next));
         let found = self.found.clone();
+        let outcome = next.outcome.clone();
+        let was_ended = is_ended(&next);
         let least = (1.0 - LOWER) * found.best.evaluation.cost;
         self.found = match next.best.evaluation.cost < least {
             true => with_round(found, next, false),
             false => found.with_work_of(next.counts, next.timings, next.elapsed),
         };
+        if was_ended {
+            self.found.outcome = outcome;
+        }
         Ok(())
     }
 }
 
-/// Parameters `theta` with values of mass and stiffness beyond [`OUTLYING`] times their median moved to that distance; `None` if there
-/// are none.
+/// Parameters `theta` where a mass or stiffness has values beyond [`OUTLYING`] times its median, with its values moved to [`MOVED`] times the
+/// median at most; `None` if there are none.
 fn without_outliers(problem: &Problem, theta: &[f64]) -> Option<Vec<f64>> {
     let functions = &problem.functions;
     let mut moved = theta.to_vec();
