@@ -3,10 +3,11 @@
 
 use crate::config::DataWarning;
 use crate::report::findings;
+use crate::report::reason_in_words;
 use crate::report::suggestions::{Suggestion, Suspect};
 use kmcfit_core::internals::assessment::{
     CoarseBasis, FitWarning, FunctionInGap, GapAssessment, GapStatus, NoIntervals, ResidualPattern,
-    Unidentified,
+    Unidentified, VerdictReason,
 };
 use kmcfit_core::internals::builder::BuildNotice;
 use kmcfit_core::internals::diagnostics::{UntestedReason, Whiteness, WhitenessResult};
@@ -82,6 +83,9 @@ fn messages() {
     let all = fit_warnings();
     let all = all.iter().map(|w| findings::warning(w).text);
     section(&mut list, "Warnings about a fit", all);
+    let all = verdict_reasons();
+    let all = all.iter().map(|r| reason_in_words(r).text);
+    section(&mut list, "Reasons of a verdict", all);
     let all = unidentified();
     let all = all.iter().map(|u| findings::unidentified(u).text);
     section(&mut list, "No system identified", all);
@@ -686,6 +690,51 @@ fn fit_warnings() -> Vec<FitWarning> {
     all
 }
 
+fn verdict_reasons() -> Vec<VerdictReason> {
+    let experiment = || "shaker".to_owned();
+    let missing = MissingTerm {
+        term: CoefficientKind::CubicStiffness,
+        value: 0.352,
+        t: 21.5,
+        share: 0.031,
+    };
+    samples![
+        VerdictReason::Failed { .. } => VerdictReason::Failed { status: Status::Infeasible },
+        VerdictReason::NoSystem { .. } => VerdictReason::NoSystem { reason: Unidentified::Noise },
+        VerdictReason::PoorFit { .. } => VerdictReason::PoorFit { fit_percent: 57.4 },
+        VerdictReason::BeyondSigma { .. } => VerdictReason::BeyondSigma { times: 7.5 },
+        VerdictReason::CoarseSteps { .. } => VerdictReason::CoarseSteps { times: 3.25 },
+        VerdictReason::NotConverged { .. } => VerdictReason::NotConverged { status: Status::TimeLimit },
+        VerdictReason::MissingTerm(_) => VerdictReason::MissingTerm(missing),
+        VerdictReason::SecondMode { .. } => VerdictReason::SecondMode { frequencies: [3.98, 17.21] },
+        VerdictReason::Saturation { .. } => VerdictReason::Saturation { channel: "acceleration".into() },
+        VerdictReason::DisturbedInput { .. } => VerdictReason::DisturbedInput {
+            experiment: experiment(), input: InputQuantity::Force,
+        },
+        VerdictReason::ContradictedInputSigma { .. } => VerdictReason::ContradictedInputSigma {
+            experiment: experiment(), input: InputQuantity::Force,
+        },
+        VerdictReason::NegligibleForce { .. } => VerdictReason::NegligibleForce { experiment: experiment() },
+        VerdictReason::CoarseBasis { .. } => VerdictReason::CoarseBasis { function: "stiffness".into() },
+        VerdictReason::ColouredResiduals => VerdictReason::ColouredResiduals,
+        VerdictReason::Gap { .. } => VerdictReason::Gap { span: [12.0, 18.5] },
+        VerdictReason::Aliased { .. } => VerdictReason::Aliased { per_period: 2.2 },
+        VerdictReason::Negative { .. } => VerdictReason::Negative { function: "stiffness".into() },
+        VerdictReason::NotPredicted { .. } => VerdictReason::NotPredicted {
+            experiment: experiment(), fit_percent: 71.3,
+        },
+        VerdictReason::NotIdentified { .. } => VerdictReason::NotIdentified {
+            functions: vec!["mass".into(), "damping".into(), "stiffness".into()],
+        },
+        VerdictReason::RankDeficient { .. } => VerdictReason::RankDeficient {
+            rank_bound: 1999, parameters: 6000,
+        },
+        VerdictReason::OnlyRatios { .. } => VerdictReason::OnlyRatios { fixed: vec!["mass".into()] },
+        VerdictReason::OnlyRatios { .. } => VerdictReason::OnlyRatios { fixed: Vec::new() },
+        VerdictReason::EquationError => VerdictReason::EquationError,
+    ]
+}
+
 fn unidentified() -> Vec<Unidentified> {
     let error = simulation_errors()[1];
     samples![
@@ -812,7 +861,6 @@ fn suggestions() -> Vec<Suggestion> {
         Suggestion::StudyUnidentifiable { .. } => Suggestion::StudyUnidentifiable {
             parameters: 33, rank_bound: 32, can_be_simpler: false,
         },
-        Suggestion::Study => Suggestion::Study,
         Suggestion::Pattern { .. } => Suggestion::Pattern {
             channel: channel(), has_sigma: false, pattern: ResidualPattern::Offset,
         },

@@ -14,6 +14,7 @@ use crate::report::{
 };
 use crate::results::{FitJournal, Heading, OutputFolder, RESULT};
 use console::Term;
+use kmcfit_core::internals::assessment::VerdictLevel;
 use kmcfit_core::internals::simulate::SimulationError;
 use kmcfit_core::internals::solvers::{
     CheckpointStore, Fit, IterationEvent, IterationRecord, Observer, Status, WeightPath,
@@ -45,6 +46,12 @@ pub struct Arguments {
     /// Print the computing times.
     #[arg(long)]
     timings: bool,
+    /// Print all findings, the fit of each channel and the work of the solver.
+    #[arg(long, conflicts_with = "json")]
+    verbose: bool,
+    /// Exit with 4 for the verdict Check, with 5 for Inadequate.
+    #[arg(long)]
+    strict: bool,
     /// Plot record, fit and functions in the terminal.
     #[arg(long, conflicts_with = "json")]
     plot: bool,
@@ -53,6 +60,9 @@ pub struct Arguments {
     checkpoint: Option<f64>,
 }
 
+/// Exit codes of the verdicts with `--strict`.
+const CHECK: u8 = 4;
+const INADEQUATE: u8 = 5;
 /// Width of a chart without a terminal, columns.
 const PIPED: usize = 80;
 
@@ -61,6 +71,9 @@ pub(super) struct Printed {
     pub json: bool,
     pub timings: bool,
     pub plot: bool,
+    pub verbose: bool,
+    /// True where the verdict determines the exit code.
+    pub strict: bool,
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
@@ -76,6 +89,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         json: arguments.json,
         timings: arguments.timings,
         plot: arguments.plot,
+        verbose: arguments.verbose,
+        strict: arguments.strict,
     };
     let heading = Heading::of_model("fit", &file, !arguments.no_report, arguments.checkpoint);
     let out = arguments.out.clone().unwrap_or_else(own);
@@ -115,7 +130,18 @@ fn fit(
     if status == Status::Interrupted {
         interrupt::say_resumable(folder.path(), "fit");
     }
-    Ok(exit_code(status))
+    Ok(code(&document, printed))
+}
+
+/// Exit code of a fit: that of its end, or with `--strict` of its verdict where the fit ended well.
+pub(super) fn code(document: &ResultDocument, printed: &Printed) -> u8 {
+    let by_end = exit_code(document.outcome.status);
+    let level = document.verdict.as_ref().map(|verdict| verdict.level);
+    match (by_end, level) {
+        (0, Some(VerdictLevel::Inadequate)) if printed.strict => INADEQUATE,
+        (0, Some(VerdictLevel::Check)) if printed.strict => CHECK,
+        _ => by_end,
+    }
 }
 
 /// Notes that unfinished work of the same command on the same inputs is discarded.
@@ -156,7 +182,7 @@ pub(super) fn print_results(document: &ResultDocument, folder: &Path, printed: &
     if printed.json {
         return print(&json(document));
     }
-    print(&summary(document));
+    print(&summary(document, printed.verbose));
     if printed.plot {
         let width = Term::stdout()
             .size_checked()

@@ -1,7 +1,7 @@
 //! `kmcfit resume`: continues an interrupted fit, study or comparison from its journal.
 
 use super::fit::{self, Printed};
-use super::{CommandError, INTERRUPTED, compare, exit_code, say, study};
+use super::{CommandError, INTERRUPTED, compare, say, study};
 use crate::error::InputError;
 use crate::report::Run;
 use crate::results::{self, COMPARE_JOURNAL, FitJournal, STUDY_JOURNAL};
@@ -17,6 +17,12 @@ pub struct Arguments {
     /// Print the result document instead of the summary.
     #[arg(long)]
     json: bool,
+    /// Print all findings, the fit of each channel and the work of the solver.
+    #[arg(long, conflicts_with = "json")]
+    verbose: bool,
+    /// Exit with 4 for the verdict Check of a fit, with 5 for Inadequate.
+    #[arg(long)]
+    strict: bool,
     /// Plot record, fit and functions in the terminal.
     #[arg(long, conflicts_with = "json")]
     plot: bool,
@@ -43,6 +49,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         json: arguments.json,
         timings: false,
         plot: arguments.plot,
+        verbose: arguments.verbose,
+        strict: arguments.strict,
     };
     if let Some(heading) = FitJournal::heading(folder)? {
         return fit::resume(folder, &heading, &printed);
@@ -63,6 +71,6 @@ fn finished(arguments: &Arguments, printed: &Printed) -> Result<u8, CommandError
     fit::print_results(&run.document, folder, printed);
     Ok(match run.document.outcome.status {
         Status::Interrupted => INTERRUPTED,
-        status => exit_code(status),
+        _ => fit::code(&run.document, printed),
     })
 }

@@ -350,6 +350,44 @@ impl Value for NumberOrColumn {
     }
 }
 
+keys! {
+    /// Known values: a number with its standard deviation, or a column of a file with times in `t_s`.
+    pub struct KnownValueMap = "known_value", expecting "{value: 4.5, sigma: 0.02}, or {data: file.csv, column: name}" {
+        /// Known value.
+        value: Option<Number>, example "4.5", unit "that of the function", needs "`sigma`";
+        /// Standard deviation of the known value, which enters all confidence intervals.
+        sigma: Option<Number>,
+            example "0.02",
+            unit "that of the function",
+            range "greater than 0",
+            needs "`value`; `sigma` in every experiment, and a method other than equation-error";
+        /// The file, relative to the model file.
+        data: Option<Text>, example "coefficients.csv", needs "`column`";
+        /// Name of the column.
+        column: Option<Text>, example "mass_kg", needs "`data`";
+    }
+}
+
+/// Known values of a function: a number, a number with its standard deviation, or a column of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum KnownValue {
+    /// The same number at all times.
+    Number(Number),
+    /// Number with its standard deviation, or values over time.
+    Map(KnownValueMap),
+}
+
+impl Value for KnownValue {
+    const KIND: ValueType = ValueType::AnyOf(&[ValueType::Number, KnownValueMap::KIND]);
+    fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
+        let expected = "a finite number, {value: 4.5, sigma: 0.02}, or a column: {data: file.csv, column: name}";
+        number_or(scalar, expected).map(Self::Number)
+    }
+    fn map<'de, A: MapAccess<'de>>(map: A, report: &Report) -> Result<Self, A::Error> {
+        KnownValueMap::map(map, report).map(Self::Map)
+    }
+}
+
 /// A bound of a function: a number or a column, or the word `none`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Bound {

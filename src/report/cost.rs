@@ -1,7 +1,7 @@
 //! Definition of the cost J of a problem: kind of the misfit, and the formula as text.
 
 use kmcfit_core::internals::constraints::RowGroup;
-use kmcfit_core::internals::functions::{CoefficientKind, Penalty};
+use kmcfit_core::internals::functions::{CoefficientKind, Penalty, Prior};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Loss;
 use kmcfit_core::internals::solvers::Solver;
@@ -64,12 +64,11 @@ pub fn cost_definition(problem: &Problem, solver: Solver) -> String {
     let quantities: Vec<CoefficientKind> = problem.functions.iter().map(|f| f.quantity).collect();
     let misfit = CostKind::of(problem, solver).misfit().to_string() + &robust(problem);
     let scalars = problem.functions.scalars().iter();
-    let priors = scalars.filter_map(|s| {
-        let prior = s.prior?;
-        Some(format!(
-            "(({} - {:?})/{:?})^2",
-            s.name, prior.mean, prior.sigma
-        ))
+    let scalars = scalars.map(|s| (s.name.clone(), s.prior));
+    let known = problem.functions.iter().map(|f| (f.name(), f.prior));
+    let priors = known.chain(scalars).filter_map(|(name, prior)| {
+        let Prior { mean, sigma } = prior?;
+        Some(format!("(({name} - {mean:?})/{sigma:?})^2"))
     });
     let smooth = (problem.penalties.iter()).map(|p| penalty(p, quantities[p.function].symbol()));
     let jumps = problem.variations.iter().map(|variation| {

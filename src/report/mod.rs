@@ -14,6 +14,7 @@
 //! assert!(render(&figure).contains("time t (s)"));
 //! ```
 
+mod answer;
 mod assessment;
 mod assumptions;
 mod channel_view;
@@ -22,13 +23,13 @@ pub mod compare;
 mod cost;
 mod csv;
 pub mod document;
-mod estimates;
 pub mod figures;
 pub(crate) mod findings;
 mod fit_assessment;
 mod fit_figures;
 mod fit_quality;
 mod page;
+mod parameters;
 mod result_table;
 mod rule_names;
 mod run;
@@ -40,7 +41,9 @@ mod tables;
 mod terminal;
 mod text;
 mod timings;
+mod verdict;
 
+pub use answer::{AnswerRow, answer};
 pub use chart::{Axis, Colour, Dash, Figure, Mark, Panel, Scale, Style, render};
 pub use compare::Comparison;
 pub use cost::{CostKind, cost_definition};
@@ -53,4 +56,7 @@ pub use run::{FittedModel, fit_claim, json};
 pub use run_reader::Run;
 pub use summary::{prediction_table, summary};
 pub use terminal::charts;
+pub use verdict::Verdict;
+#[cfg(test)]
+pub(crate) use verdict::reason_in_words;
 pub use timings::{OverheadTimings, PartSummary, TimingsSummary};

@@ -53,6 +53,7 @@ impl FittedModel<'_> {
     ) -> io::Result<Duration> {
         let mut writing = Duration::ZERO;
         let mut write = |name: &str, text: &str| timed(&mut writing, || stage.write(name, text));
+        write("parameters.json", &json(&self.parameters(document)))?;
         write("history.csv", &self.history().to_csv())?;
         write("functions.csv", &self.functions_table().to_csv())?;
         write("trajectory.csv", &self.trajectories().to_csv())?;
@@ -80,6 +81,8 @@ impl FittedModel<'_> {
             format: FORMAT,
             title: model.title.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
+            verdict: Some(self.verdict()),
+            estimates: self.estimates(),
             model: self.model_summary(),
             outcome: OutcomeSummary {
                 status: fit.outcome.status,
@@ -135,9 +138,9 @@ impl FittedModel<'_> {
             automatic: model.automatic.clone(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),
-            suggestions: Vec::new(),
+            advice: Vec::new(),
         };
-        document.suggestions = suggestions(&document);
+        document.advice = suggestions(&document);
         document
     }
 
@@ -362,6 +365,7 @@ pub fn fit_claim(model: &Model) -> Claim {
     Claim::new("fit")
         .files([
             RESULT,
+            "parameters.json",
             "history.csv",
             "functions.csv",
             "trajectory.csv",

@@ -1,33 +1,78 @@
 //! Summary of a fit for the terminal.
 
 use super::document::{ChannelSummary, PenaltySummary, Prediction, ResultDocument};
-use super::estimates::estimates;
+use super::answer::answer_table;
 use super::rule_names::rule_in_words;
 use super::suggestions;
 use crate::finding::Finding;
 use crate::number_format::{resolved, significant};
 use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::identifiability::ClassificationKind;
-use kmcfit_core::internals::solvers::Status;
 use std::fmt::Write;
 
-/// The summary: status, estimates, fit, identifiability, warnings, suggestions, then tables.
-pub fn summary(document: &ResultDocument) -> String {
+/// The summary of a fit: verdict, estimates, fit of the samples, advice; `verbose` adds the solver, each channel, all findings and the
+/// constraints.
+pub fn summary(document: &ResultDocument, verbose: bool) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
-    let _ = write_summary(&mut text, document);
+    let _ = write_answer(&mut text, document);
+    if verbose {
+        let _ = write_details(&mut text, document);
+    }
+    if !document.predictions.is_empty() {
+        let table = prediction_table(&document.predictions, document.is_rotation());
+        text += &format!("\n{table}");
+    }
     text
 }
 
-fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
-    let cost = &document.cost;
-    writeln!(text, "{}", document.title)?;
-    let status = document.outcome.status;
-    match unidentified(document) {
-        Some(why) => writeln!(text, "{}, but {}", status.name(), why.text)?,
-        _ => writeln!(text, "{}: {}", status.name(), document.outcome.reason)?,
+/// The answer: title, verdict, estimates, fit, warnings about the data, advice.
+fn write_answer(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+    let samples = document.experiments.iter().map(|e| e.samples).sum::<usize>();
+    writeln!(
+        text,
+        "{}: {}, {} s",
+        document.title,
+        count(samples, "sample"),
+        significant(document.model.duration, 4)
+    )?;
+    if let Some(verdict) = &document.verdict {
+        writeln!(text, "{}", verdict.lines())?;
     }
-    write_findings(text, document)?;
+    if !document.estimates.is_empty() {
+        write!(text, "\n{}", answer_table(document))?;
+    }
+    writeln!(text)?;
+    let lists = [
+        ("Fit", fit(document)),
+        ("Truth", truth(document).into_iter().collect()),
+        ("Data", Finding::texts(&document.warnings)),
+        ("Next", Finding::texts(&document.advice)),
+    ];
+    for (heading, sentences) in lists {
+        for (i, sentence) in sentences.iter().enumerate() {
+            let heading = if i == 0 { heading } else { "" };
+            writeln!(text, "{heading:<6} {sentence}")?;
+        }
+    }
+    Ok(())
+}
+
+/// Largest errors against the true system, where it is known.
+fn truth(document: &ResultDocument) -> Option<String> {
+    let errors = document.all_functions().filter_map(|(name, f)| {
+        let error = significant(f.truth_max_error?, 2);
+        Some(format!("{name} {error} {}", f.unit))
+    });
+    let errors: Vec<String> = errors.collect();
+    (!errors.is_empty()).then(|| format!("largest errors: {}", errors.join(", ")))
+}
+
+/// Everything besides the answer: end of the search, cost and work, findings, channels, statistics, functions, constraints, attempts.
+fn write_details(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+    let cost = &document.cost;
+    let outcome = &document.outcome;
+    writeln!(text, "\n{}: {}", outcome.status.name(), outcome.reason)?;
     write!(text, "J {:.6e} -> {:.6e}", cost.initial, cost.r#final)?;
     if document.has_ratio() {
         write!(text, ", J/J0 {:.4e}", cost.ratio)?;
@@ -45,6 +90,16 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
         count(others as usize, &format!("{what} solve")),
         document.seconds
     )?;
+    let known = &document.identifiability;
+    for (heading, findings) in [
+        ("Identifiability", &known.findings),
+        ("Warnings", &known.warnings),
+    ] {
+        for (i, finding) in findings.iter().enumerate() {
+            let heading = if i == 0 { heading } else { "" };
+            writeln!(text, "{heading:<15} {finding}")?;
+        }
+    }
     for (name, channel) in document.records() {
         write_channel(text, &name, channel)?;
     }
@@ -58,82 +113,34 @@ fn write_summary(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     write_functions(text, document)?;
     write_nuisance_parameters(text, document)?;
     write_constraints(text, document)?;
-    write_attempts(text, document)?;
-    if !document.predictions.is_empty() {
-        write!(
-            text,
-            "\n{}",
-            prediction_table(&document.predictions, document.is_rotation())
-        )?;
-    }
-    Ok(())
+    write_attempts(text, document)
 }
 
-/// Reason for which the optimum of a converged fit identifies no system.
-fn unidentified(document: &ResultDocument) -> Option<&Finding> {
-    let known = &document.identifiability;
-    let is_minimum = document.outcome.status == Status::Converged;
-    known
-        .warnings
-        .first()
-        .filter(|_| is_minimum && known.unidentified)
-}
-
-/// Estimate, fit, identifiability, warnings and suggestions under their headings.
-fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
-    let known = &document.identifiability;
-    let status = document.outcome.status;
-    let mut warnings = Finding::texts(&known.warnings);
-    warnings.extend(Finding::texts(&document.warnings));
-    let estimate = match unidentified(document) {
-        Some(_) => {
-            // The second line of the summary has it.
-            warnings.remove(0);
-            "Values at the optimum"
-        }
-        None => "Estimate",
+/// Fit of the channels: of each one up to three, else of the worst.
+fn fit(document: &ResultDocument) -> Vec<String> {
+    let Some(worst) = document.worst_fit() else {
+        return Vec::new();
     };
-    let (estimates, findings) = match status {
-        // Start values are no estimates.
-        Status::Infeasible => (Vec::new(), Vec::new()),
-        _ => (estimates(document), Finding::texts(&known.findings)),
-    };
-    let width = estimate.len().max(15);
-    for (heading, sentences) in [
-        (estimate, estimates),
-        ("Fit", fit(document).into_iter().collect()),
-        ("Identifiability", findings),
-        ("Warnings", warnings),
-        ("Suggestions", Finding::texts(&document.suggestions)),
-    ] {
-        for (i, sentence) in sentences.iter().enumerate() {
-            let heading = if i == 0 { heading } else { "" };
-            writeln!(text, "  {heading:<width$} {sentence}")?;
-        }
-    }
-    writeln!(text)
-}
-
-/// Fit of the worst channel, of the validation records, rejected outliers and cost ratio in one line; `None` where no
-/// channel has a fit in per cent.
-fn fit(document: &ResultDocument) -> Option<String> {
-    let worst = document.worst_fit()?;
-    let mut text = match document.channels().count() {
-        1 => fit_percent(worst),
+    let channels: Vec<&ChannelSummary> = document.channels().collect();
+    let mut text = match channels.as_slice() {
+        [only] => format!(
+            "{} of {}; residual {} {} rms",
+            fit_percent(worst),
+            only.kind,
+            significant(only.rms_residual, 3),
+            only.unit
+        ),
         _ => format!("{} for the worst channel", fit_percent(worst)),
     };
-    let outliers = document.channels().map(|c| c.outliers).sum::<usize>();
+    let outliers = channels.iter().map(|c| c.outliers).sum::<usize>();
     if outliers > 0 {
-        text += &format!(", {} rejected", count(outliers, "outlier"));
+        text += &format!("; {} rejected", count(outliers, "outlier"));
     }
     let validation = document.validation.iter().flat_map(|e| &e.channels);
     if let Some(worst) = validation.map(|c| c.fit_percent).reduce(f64::min) {
         text += &format!("; validation records: {}", fit_percent(worst));
     }
-    if document.has_ratio() {
-        text += &format!("; J/J0 {:.1e}", document.cost.ratio);
-    }
-    Some(text)
+    vec![text]
 }
 
 fn fit_percent(fit: f64) -> String {

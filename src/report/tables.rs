@@ -56,8 +56,12 @@ impl FittedModel<'_> {
         let mut table = CsvTable::new().column("t_s", times.clone());
         for (function, values) in self.named_functions() {
             let column = self.column(function.quantity);
+            let column = match function.is_known_part {
+                true => format!("known_part_of_{column}"),
+                false => column.to_owned(),
+            };
             let name = match &function.owner {
-                None => column.to_owned(),
+                None => column,
                 // A comma would end the header.
                 Some(owner) => format!("{column} of {}", owner.replace([',', '"', '\n'], " ")),
             };

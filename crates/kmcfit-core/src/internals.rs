@@ -3,11 +3,12 @@
 
 pub mod assessment {
     pub use crate::assessment::{
-        BEYOND_SIGMA, BasisTest, CoarseBasis, EXACT, EquationErrorIntervals, EstimateErrors,
-        FitAssessment, FitStatistics, FitWarning, FunctionInGap, FunctionSummary, GapAssessment,
+        BEYOND_SIGMA, BasisTest, CoarseBasis, EXACT, EquationErrorIntervals, Estimate,
+        EstimateErrors, EstimateStatus, FitAssessment, FitStatistics, FitWarning, FunctionInGap, FunctionSummary, GapAssessment,
         GapStatus, NoIntervals, POOR, Plausibility, RECOVERY_TOLERANCE, ResidualPattern, Roughness,
-        StepCheck, TruthErrors, Unidentified, constant_probability, diagnostics,
-        function_summaries, is_same_truth, outliers, pattern, standard_error,
+        StepCheck, TruthErrors, Unidentified, VerdictLevel, VerdictReason,
+        constant_probability, diagnostics, estimates, function_summaries, is_same_truth, outliers,
+        pattern, standard_error, verdict_level, verdict_reasons,
     };
 }
 pub mod builder {

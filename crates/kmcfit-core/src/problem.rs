@@ -104,7 +104,7 @@ impl ProblemParts {
             return Err(ProblemError::Nodes { functions, grid });
         }
         let terms = self.system.terms.len();
-        for found in self.functions.coefficient_sets().iter().map(Vec::len) {
+        for found in self.functions.coefficient_sets().iter().map(|set| set.len()) {
             if found != 1 + terms {
                 return Err(ProblemError::Functions { found, terms });
             }
@@ -245,19 +245,17 @@ impl Problem {
         self.functions.parameters()
     }
 
-    /// Nodal values of the shared coefficient function of kind `kind` at the parameters `theta`, in its SI unit; `None` if the system has
-    /// no such function.
+    /// Nodal values of the coefficient `kind` of the shared coefficient set at the parameters `theta`, in its SI unit, with known
+    /// parts; `None` if the system has no such coefficient.
     ///
     /// # Panics
     /// If `theta` has another number of parameters.
     pub fn coefficient(&self, kind: CoefficientKind, theta: &[f64]) -> Option<Vec<f64>> {
         let functions = &self.functions;
         let mut shared = functions.coefficient_set(0).iter();
-        let index = *shared.find(|&&f| functions.get(f).quantity == kind)?;
-        let mut values = vec![0.0; functions.nodes()];
-        let range = functions.ranges()[index].clone();
-        functions.get(index).values_into(&theta[range], &mut values);
-        Some(values)
+        let place = shared.position(|f| functions.get(*f).quantity == kind)?;
+        let nodal = functions.nodal(theta);
+        nodal.functions().nth(place).map(<[f64]>::to_vec)
     }
 
     /// Start parameters.

@@ -6,7 +6,8 @@ use crate::config::spec::{
     self as config, Basis, ColumnSpec, FunctionSpec, PenaltyKind, WeightRule,
 };
 use crate::config::values::{
-    Bound, Count, KnotSpec, Number, NumberOrColumn, StartSpec, Text, Weight,
+    Bound, Count, KnotSpec, KnownValue, KnownValueMap, Number, NumberOrColumn, StartSpec, Text,
+    Weight,
 };
 use crate::error::InputError;
 use kmcfit_core::internals::builder::{
@@ -69,6 +70,7 @@ pub(super) fn specification(
     (kind, given): Given<'_>,
     is_limited: bool,
 ) -> Result<CoefficientSpec, InputError> {
+    let is_own = !key.starts_with("functions.");
     check_basis_keys(file, key, given)?;
     let bound = |name: &str, given: &Option<Bound>| match given {
         None | Some(Bound::None) => Ok(None),
@@ -91,9 +93,8 @@ pub(super) fn specification(
                 )
                 .expected("either `fixed`, or `basis` with `start`"));
         }
-        (Some(fixed), None, None) => {
-            CoefficientSpec::known(history(file, grid, &format!("{key}.fixed"), fixed)?)
-        }
+        (Some(fixed), None, None) => known(file, grid, &format!("{key}.fixed"), fixed)?,
+        (None, None, None) if is_own && is_known_part_alone(given) => CoefficientSpec::shared(),
         (None, None, _) => {
             return Err(file
                 .error_at(key, "this function has neither a start nor a fixed value")
@@ -122,10 +123,72 @@ pub(super) fn specification(
             given,
         )?);
     }
+    if let Some(part) = &given.known_part {
+        spec = spec.known_part(known(file, grid, &format!("{key}.known_part"), part)?);
+    }
     Ok(match given.width {
         Some(width) => spec.width(width.0),
         None => spec,
     })
+}
+
+/// True for a function of an experiment that has a known part and no other key.
+fn is_known_part_alone(given: &FunctionSpec) -> bool {
+    let has_other = given.min.is_some()
+        || given.max.is_some()
+        || given.penalty.is_some()
+        || given.width.is_some();
+    given.known_part.is_some() && !has_other
+}
+
+/// Known values at `key`.
+fn known(
+    file: &ModelFile,
+    grid: &Grid,
+    key: &str,
+    given: &KnownValue,
+) -> Result<CoefficientSpec, InputError> {
+    let map = match given {
+        KnownValue::Number(value) => return Ok(CoefficientSpec::fixed(value.0)),
+        KnownValue::Map(map) => map,
+    };
+    let KnownValueMap {
+        value,
+        sigma,
+        data,
+        column,
+    } = map;
+    match (value, sigma, data, column) {
+        (Some(value), Some(sigma), None, None) => Ok(CoefficientSpec::uncertain(value.0, sigma.0)),
+        (None, None, Some(data), Some(name)) => {
+            let column = NumberOrColumn::Column(ColumnSpec {
+                data: data.clone(),
+                column: name.clone(),
+            });
+            history(file, grid, key, &column).map(CoefficientSpec::known)
+        }
+        _ => {
+            let keys = [
+                ("value", value.is_some()),
+                ("sigma", sigma.is_some()),
+                ("data", data.is_some()),
+                ("column", column.is_some()),
+            ];
+            let given = keys.iter().filter(|(_, is_given)| *is_given);
+            let given: Vec<String> = given.map(|(name, _)| format!("`{name}`")).collect();
+            let found = match given.is_empty() {
+                true => "an empty map".to_owned(),
+                false => given.join(" and "),
+            };
+            Err(file
+                .error_at(
+                    key,
+                    "neither a value with its standard deviation nor a column of a file",
+                )
+                .found(found)
+                .expected("{value: 4.5, sigma: 0.02}, or {data: file.csv, column: name}"))
+        }
+    }
 }
 
 /// The additional key of a basis.

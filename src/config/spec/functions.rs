@@ -3,7 +3,7 @@
 use crate::config::alternatives::OneOrList;
 use crate::config::choice::choice;
 use crate::config::map::keys;
-use crate::config::values::{Bound, Count, KnotSpec, Number, NumberOrColumn, StartSpec, Weight};
+use crate::config::values::{Bound, Count, KnotSpec, KnownValue, Number, NumberOrColumn, StartSpec, Weight};
 
 keys! {
     /// Coefficient functions of the system; mass, damping and stiffness are required.
@@ -79,12 +79,22 @@ keys! {
             unit "that of the function",
             range "greater than 0 for a mass",
             needs "`basis`";
-        /// Fixed values, in place of `basis`.
-        fixed: Option<NumberOrColumn>,
+        /// Fixed values, in place of `basis`; with a standard deviation, `{value: 4.5, sigma: 0.02}`, one that enters all confidence
+        /// intervals.
+        fixed: Option<KnownValue>,
             example "1.0",
             unit "that of the function",
             range "greater than 0 for a mass",
             needs "no `start`";
+        /// Known values added to the estimated function, as `fixed`: a weighed block on a carriage of unknown mass. Start, bounds,
+        /// penalties and constraints concern the estimated part. In `functions` of an experiment without other keys it is
+        /// added to the shared function.
+        known_part: Option<KnownValue>,
+            example "1.4665",
+            unit "that of the function",
+            default "none",
+            range "greater than 0 for a mass",
+            needs "no `fixed`";
         /// Lower bound. A mass has the default because a fit can otherwise end with a mass of nearly zero; `none` lifts it.
         min: Option<Bound>,
             example "0.05",

@@ -1,16 +1,19 @@
 //! The result document of a run, `result.json`. Its keys are stable.
 
 mod channel;
+mod estimates;
 mod fit_summaries;
 
 pub use channel::{
     ChannelSummary, IgnoredSummary, NoiseSummary, NuisanceParameter, ValidationSummary,
 };
+pub use estimates::Estimates;
 pub use fit_summaries::{AttemptSummary, PathPointSummary, PenaltySummary, WeightSummary};
 
 use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
+use crate::report::verdict::Verdict;
 use kmcfit_core::internals::assessment::{FitStatistics, FunctionSummary, StepCheck};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::CovarianceKind;
@@ -32,6 +35,12 @@ pub struct ResultDocument {
     pub title: String,
     /// Version of kmcfit.
     pub version: String,
+    /// Verdict on the fit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
+    /// Estimates of the natural frequency, the damping ratio, the functions and ratios; none for a fit that failed.
+    #[serde(default, skip_serializing_if = "Estimates::is_empty")]
+    pub estimates: Estimates,
     /// Model, grid and method.
     pub model: ModelSummary,
     /// Status and reason of the end.
@@ -92,8 +101,8 @@ pub struct ResultDocument {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<Finding>,
     /// Recommendations, the most urgent first.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub suggestions: Vec<Finding>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty", alias = "suggestions")]
+    pub advice: Vec<Finding>,
 }
 
 /// Model, grid and method of a run.

@@ -26,7 +26,7 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
         (
             "functions",
             "Coefficient functions",
-            figures_without(START, &[run.functions_figure()]),
+            overview::functions(document) + &figures_without(START, &[run.functions_figure()]),
         ),
         (
             "ratios",
@@ -102,7 +102,7 @@ fn convergence(run: &FittedModel, document: &ResultDocument) -> String {
         let response = run.response(i, channel.times(), channel.observed());
         drawn.push(run.titled(response, i, 0));
     }
-    let work = paragraph(&overview::work(document));
+    let work = overview::state(document) + &paragraph(&overview::work(document));
     work + &list(&lines(|text| write_attempts(text, document))) + &figures(&drawn)
 }
 

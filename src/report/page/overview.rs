@@ -1,13 +1,15 @@
-//! First part of the page of a fit: status, main figures, estimates, identifiability, warnings, suggestions; and the
+//! First part of the page of a fit: verdict, answer, main figures, identifiability, warnings, suggestions; and the
 //! tables of records and work.
 
 use super::table::{list, number, table};
 use crate::finding::Finding;
+use crate::report::answer::{AnswerRow, answer};
 use crate::report::document::{ChannelSummary, ResultDocument};
 use crate::report::suggestions;
 use crate::report::summary::{count, iterations};
 use crate::report::text::{escape, prose};
-use kmcfit_core::internals::assessment::FunctionSummary;
+use crate::report::verdict::level_in_words;
+use kmcfit_core::internals::assessment::{FunctionSummary, VerdictLevel};
 use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::solvers::Status;
 
@@ -19,17 +21,54 @@ pub(super) fn overview(document: &ResultDocument) -> String {
     let lists = [
         ("Identifiability", Finding::texts(&known.findings)),
         ("Warnings", warnings),
-        ("Suggestions", Finding::texts(&document.suggestions)),
+        ("Suggestions", Finding::texts(&document.advice)),
         ("Automatic choices", Finding::texts(&document.automatic)),
     ];
     let lists = lists.iter().filter(|(_, sentences)| !sentences.is_empty());
     let lists =
         lists.map(|(heading, sentences)| format!("<h3>{heading}</h3>\n{}", list(sentences)));
-    state(document) + &facts(document) + &estimates(document) + &lists.collect::<String>()
+    verdict(document) + &answers(document) + &facts(document) + &lists.collect::<String>()
 }
 
-/// Status as a coloured word, and the reason.
-fn state(document: &ResultDocument) -> String {
+/// Verdict as a coloured word, and its reasons.
+fn verdict(document: &ResultDocument) -> String {
+    let Some(verdict) = &document.verdict else {
+        return state(document);
+    };
+    let colour = match verdict.level {
+        VerdictLevel::Adequate => "good",
+        VerdictLevel::Check => "warn",
+        VerdictLevel::Inadequate => "bad",
+    };
+    let reasons = match verdict.reasons.as_slice() {
+        [] => vec![verdict.passed.clone()],
+        reasons => Finding::texts(reasons),
+    };
+    format!(
+        "<p><span class=\"state {colour}\">{}</span> {}</p>\n",
+        level_in_words(verdict.level),
+        prose(&reasons.join("; "))
+    )
+}
+
+/// Table of the answer.
+fn answers(document: &ResultDocument) -> String {
+    let row = |row: AnswerRow| {
+        vec![
+            row.quantity,
+            row.estimate,
+            row.interval,
+            row.unit,
+            row.status,
+        ]
+    };
+    let rows: Vec<Vec<String>> = answer(document).into_iter().map(row).collect();
+    let headings = ["quantity", "estimate", "95 % CI", "unit", "status"];
+    table(&headings, &rows)
+}
+
+/// Status of the solver as a coloured word, and the reason.
+pub(super) fn state(document: &ResultDocument) -> String {
     let outcome = &document.outcome;
     let colour = match outcome.status {
         Status::Converged | Status::Completed => "good",
@@ -81,7 +120,7 @@ fn facts(document: &ResultDocument) -> String {
 }
 
 /// Table of the functions in the order of the equation of motion, then those of single experiments.
-fn estimates(document: &ResultDocument) -> String {
+pub(super) fn functions(document: &ResultDocument) -> String {
     let functions: Vec<(&str, &FunctionSummary)> = document.all_functions().collect();
     let has_truth = functions.iter().any(|(_, f)| f.truth_max_error.is_some());
     let has_error = functions.iter().any(|(_, f)| f.standard_error.is_some());

@@ -127,8 +127,6 @@ pub enum Suggestion {
         /// True if fewer parameters or a penalty are an option.
         can_be_simpler: bool,
     },
-    /// A study.
-    Study,
 }
 
 /// Likeliest cause of a poor fit of a record.
@@ -169,14 +167,11 @@ fn typed(document: &ResultDocument) -> Vec<Suggestion> {
         // Constraints may determine what the records do not.
         let is_open = known.rank_bound < known.parameters && !known.warnings.is_empty();
         let is_smooth = document.cost.regularisation > 0.0;
-        steps.push(match is_open {
-            true => Suggestion::StudyUnidentifiable {
-                parameters: known.parameters,
-                rank_bound: known.rank_bound,
-                can_be_simpler: !is_smooth && !changes_nothing(document),
-            },
-            false => Suggestion::Study,
-        });
+        steps.extend(is_open.then(|| Suggestion::StudyUnidentifiable {
+            parameters: known.parameters,
+            rank_bound: known.rank_bound,
+            can_be_simpler: !is_smooth && !changes_nothing(document),
+        }));
     }
     steps.truncate(MOST);
     steps

@@ -97,9 +97,6 @@ impl fmt::Display for Suggestion {
                 }
                 f.write_str("`kmcfit study` lists the identifiable parameter combinations")
             }
-            Suggestion::Study => f.write_str(
-                "`kmcfit study` computes profiles, extremes and, with `study.candidates`, the most informative next experiment",
-            ),
         }
     }
 }

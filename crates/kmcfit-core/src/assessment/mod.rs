@@ -3,18 +3,22 @@
 mod channel;
 mod constants;
 mod equation_error;
+mod estimates;
 mod function;
 mod gaps;
 mod input_disturbance;
 mod plausibility;
 mod recovery;
 mod refinement;
+mod score_tests;
 mod statistics;
 mod step_check;
+mod verdict;
 
 pub use crate::objective::{diagnostics, outliers};
 pub use channel::{ResidualPattern, pattern};
 pub use constants::{constant_probability, standard_error};
+pub use estimates::{Estimate, EstimateStatus, estimates};
 pub use equation_error::{EquationErrorIntervals, NoIntervals};
 pub use function::{EstimateErrors, FunctionSummary, function_summaries};
 pub use gaps::{FunctionInGap, GapAssessment, GapStatus};
@@ -22,9 +26,11 @@ pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unid
 pub use recovery::{RECOVERY_TOLERANCE, Roughness, TruthErrors, is_same_truth};
 pub use refinement::{BasisTest, CoarseBasis};
 pub use statistics::{FitStatistics, statistics};
+pub use verdict::{VerdictLevel, VerdictReason, verdict_level, verdict_reasons};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
 
 use gaps::gap_assessments;
+use score_tests::missing_term;
 
 use crate::identifiability::{
     BandSettings, Bands, FunctionClassification, classify_functions, condition_on_bases,
@@ -101,6 +107,11 @@ impl FitAssessment {
             condition_on_bases(problem, &mut assessment.classifications, &test.doubtful);
             if assessment.plausibility.is_disturbed {
                 condition_on_inputs(&mut assessment.classifications);
+            }
+            if tests_bases && !assessment.plausibility.is_disturbed {
+                let missing = missing_term(problem, theta, evaluation);
+                let missing = missing.map(FitWarning::MissingTerm);
+                assessment.plausibility.warnings.extend(missing);
             }
             gaps = gap_assessments(problem, fit, Some(&bands));
             for gap in &gaps {

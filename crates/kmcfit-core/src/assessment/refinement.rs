@@ -96,7 +96,7 @@ impl BasisTest {
     }
 }
 
-fn applies(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> bool {
+pub(super) fn applies(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> bool {
     let is_noise = problem.predicted(evaluation).all(|(channel, predicted)| {
         let residuals: Vec<f64> = channel.residuals(predicted).collect();
         rms(&residuals) > EXACT * standard_deviation(channel.observed())
@@ -124,7 +124,9 @@ impl FinerBases {
             let is_penalised = problem.penalties.iter().any(|p| p.function == index)
                 || problem.variations.iter().any(|v| v.function == index)
                 || problem.jumps.iter().any(|j| j.function == index);
-            let finer = function.basis.as_ref().filter(|_| !is_penalised);
+            // A known value does not vary.
+            let is_open = !is_penalised && function.prior.is_none();
+            let finer = function.basis.as_ref().filter(|_| is_open);
             let map = finer
                 .and_then(|basis| finer_basis(problem, basis))
                 .and_then(|finer| {

@@ -4,9 +4,12 @@ use super::BuildError;
 use super::basis::{BasisSpec, Knots};
 use crate::constraints::TimeHistory;
 use crate::functions::basis::from_physical_powers;
-use crate::functions::{Basis, CoefficientFunction, CoefficientKind, WeightRule};
+use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Prior, WeightRule};
 use crate::number_format::significant;
 use crate::system::Grid;
+
+/// Last key of a known part.
+pub(super) const KNOWN_PART: &str = "known_part";
 
 /// Start of a coefficient function, in its unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,11 +52,13 @@ pub enum PenaltySpec {
     },
 }
 
-/// Fixed values, or a basis with a start.
+/// Fixed values, a known constant with a standard deviation, a basis with a start, or for a record the shared function.
 #[derive(Debug, Clone, PartialEq)]
 enum CoefficientForm {
     Fixed(TimeHistory),
+    Uncertain(Prior),
     Estimated(BasisSpec, Start),
+    Shared,
 }
 
 /// A coefficient function: mass (kg), damping (N s/m), stiffness (N/m) or the factor of a further term; fixed, or estimated in
@@ -67,6 +72,8 @@ pub struct CoefficientSpec {
     min_of_start: Option<f64>,
     pub(super) penalties: Vec<PenaltySpec>,
     pub(super) width: Option<f64>,
+    /// Known part that is added.
+    pub(super) known_part: Option<Box<CoefficientSpec>>,
 }
 
 impl CoefficientSpec {
@@ -78,6 +85,7 @@ impl CoefficientSpec {
             min_of_start: None,
             penalties: Vec::new(),
             width: None,
+            known_part: None,
         }
     }
 
@@ -89,6 +97,25 @@ impl CoefficientSpec {
     /// Fixed and constant.
     pub fn fixed(value: f64) -> Self {
         Self::known(TimeHistory::Constant(value))
+    }
+
+    /// Constant, known as `value` with the standard deviation `sigma`: a parameter whose prior adds `((x - value)/sigma)^2` to J, so
+    /// that every interval includes it. It requires a sigma in every record.
+    pub fn uncertain(value: f64, sigma: f64) -> Self {
+        Self::new(CoefficientForm::Uncertain(Prior { mean: value, sigma }))
+    }
+
+    /// For a record ([`Record::coefficient`](super::Record::coefficient)): the shared function, with the known part of this record.
+    pub fn shared() -> Self {
+        Self::new(CoefficientForm::Shared)
+    }
+
+    /// Adds a known part, [`CoefficientSpec::known`] or [`CoefficientSpec::uncertain`], to the function. Start, bounds and penalties
+    /// concern the function without it.
+    #[must_use]
+    pub fn known_part(mut self, part: CoefficientSpec) -> Self {
+        self.known_part = Some(Box::new(part));
+        self
     }
 
     /// Fixed, one value per node.
@@ -213,8 +240,8 @@ impl CoefficientSpec {
     /// Basis of an estimated function.
     pub(super) fn basis(&self) -> Option<&BasisSpec> {
         match &self.form {
-            CoefficientForm::Fixed(_) => None,
             CoefficientForm::Estimated(basis, _) => Some(basis),
+            _ => None,
         }
     }
 
@@ -236,6 +263,19 @@ impl CoefficientSpec {
         matches!(self.form, CoefficientForm::Estimated(..))
     }
 
+    /// True for the shared function, with a known part of a record.
+    pub(super) fn is_shared(&self) -> bool {
+        self.form == CoefficientForm::Shared
+    }
+
+    /// Known constant with a standard deviation, if it is one.
+    pub(super) fn prior(&self) -> Option<Prior> {
+        match self.form {
+            CoefficientForm::Uncertain(prior) => Some(prior),
+            _ => None,
+        }
+    }
+
     /// Constructs the function on a grid; errors name keys below `key`.
     pub(super) fn on(
         &self,
@@ -247,9 +287,20 @@ impl CoefficientSpec {
         let nodes = grid.nodes();
         let (key, function) = match &self.form {
             CoefficientForm::Fixed(values) => {
-                let key = format!("{key}.fixed");
+                let key = fixed_key(key);
                 let values = values_at_nodes(values, &key, nodes)?;
                 (key, CoefficientFunction::fixed(kind, values))
+            }
+            CoefficientForm::Uncertain(prior) => {
+                let key = fixed_key(key);
+                check_prior(&key, prior)?;
+                (key, CoefficientFunction::uncertain(kind, *prior, nodes))
+            }
+            CoefficientForm::Shared => {
+                return Err(
+                    BuildError::new(key, "this function has neither a start nor a fixed value")
+                        .expected("`start` for a function to be fitted, `fixed` for a known one"),
+                );
             }
             CoefficientForm::Estimated(basis, start) => {
                 let basis = basis.on(key, grid)?;
@@ -293,6 +344,34 @@ impl CoefficientSpec {
             penalty.check(&format!("{key}.penalty[{i}]"), grid)?;
         }
         Ok(())
+    }
+}
+
+/// Key of the fixed values of a function: `known_part` has them itself.
+fn fixed_key(key: &str) -> String {
+    match key.ends_with(KNOWN_PART) {
+        true => key.to_owned(),
+        false => format!("{key}.fixed"),
+    }
+}
+
+/// Error for a known value that is not finite, or a standard deviation that is not positive.
+fn check_prior(key: &str, prior: &Prior) -> Result<(), BuildError> {
+    if !(prior.sigma.is_finite() && prior.sigma > 0.0) {
+        return Err(BuildError::new(
+            format!("{key}.sigma"),
+            "a standard deviation must be positive",
+        )
+        .found(prior.sigma)
+        .expected("a number greater than 0, in the unit of the function"));
+    }
+    match prior.mean.is_finite() {
+        true => Ok(()),
+        false => Err(
+            BuildError::new(format!("{key}.value"), "not a finite number")
+                .found(prior.mean)
+                .expected("a finite number"),
+        ),
     }
 }
 

@@ -1,7 +1,9 @@
 //! Coefficient sets of a builder: the functions shared by all records, and those of single records.
 
+use super::coefficient::KNOWN_PART;
 use super::{BuildError, Builder, CoefficientSpec};
-use crate::functions::CoefficientKind;
+use crate::functions::{CoefficientKind, CoefficientSet};
+use crate::solvers::Solver;
 
 /// A coefficient function of a builder, with its key.
 pub(super) struct FunctionEntry<'a> {
@@ -11,6 +13,8 @@ pub(super) struct FunctionEntry<'a> {
     pub spec: &'a CoefficientSpec,
     /// Index of the record with its own function; `None` for a shared one.
     pub owner: Option<usize>,
+    /// True for a known part.
+    pub is_known_part: bool,
 }
 
 impl FunctionEntry<'_> {
@@ -44,19 +48,37 @@ impl FunctionEntry<'_> {
 
 /// Coefficient sets, and the set of each record.
 pub(super) struct CoefficientSets {
-    /// Indices into the list of [`Builder::entries`], mass first; the first set is the shared one.
-    pub sets: Vec<Vec<usize>>,
+    /// Functions of [`Builder::entries`]; the first set is the shared one.
+    pub sets: Vec<CoefficientSet>,
     pub of_record: Vec<usize>,
 }
 
 impl Builder {
-    /// All functions in the order of the problem: the shared ones, mass first, then those of single records.
+    /// All functions in the order of the problem: the shared ones, mass first, those of single records, then known parts.
     pub(super) fn entries(&self) -> Vec<FunctionEntry<'_>> {
+        let given = self.given();
+        let known = (given.iter()).filter_map(|entry| {
+            Some(FunctionEntry {
+                key: format!("{}.{KNOWN_PART}", entry.key),
+                spec: entry.spec.known_part.as_deref()?,
+                is_known_part: true,
+                ..*entry
+            })
+        });
+        let known: Vec<FunctionEntry> = known.collect();
+        let has_own = |entry: &FunctionEntry| entry.owner.is_none() || !entry.spec.is_shared();
+        let functions = given.into_iter().filter(has_own);
+        functions.chain(known).collect()
+    }
+
+    /// The specified functions, of all records and of single ones.
+    fn given(&self) -> Vec<FunctionEntry<'_>> {
         let shared = (self.coefficients.iter()).map(|(kind, spec)| FunctionEntry {
             key: format!("functions.{}", kind.name()),
             kind: *kind,
             spec,
             owner: None,
+            is_known_part: false,
         });
         let own = self.records.iter().enumerate().flat_map(|(i, record)| {
             record
@@ -67,6 +89,7 @@ impl Builder {
                     kind: *kind,
                     spec,
                     owner: Some(i),
+                    is_known_part: false,
                 })
         });
         shared.chain(own).collect()
@@ -74,14 +97,23 @@ impl Builder {
 
     /// Coefficient sets of the records.
     pub(super) fn coefficient_sets(&self) -> Result<CoefficientSets, BuildError> {
-        let entries = self.entries();
+        let (given, entries) = (self.given(), self.entries());
+        self.check_known(&entries)?;
         let shared: Vec<usize> = (0..self.coefficients.len()).collect();
+        let known_of = |owner: Option<usize>| {
+            let known = entries.iter().enumerate();
+            known.filter(move |(_, entry)| entry.is_known_part && entry.owner == owner)
+        };
+        let mut of_shared = Vec::new();
+        for (f, entry) in known_of(None) {
+            of_shared.push((self.shared_place(entry)?, f));
+        }
         let mut found = CoefficientSets {
-            sets: vec![shared.clone()],
+            sets: vec![CoefficientSet::from(shared.clone()).with_known_parts(of_shared.clone())],
             of_record: Vec::new(),
         };
         for (i, record) in self.records.iter().enumerate() {
-            let mut set = shared.clone();
+            let (mut set, mut known) = (shared.clone(), of_shared.clone());
             if record.validation && !record.coefficients.is_empty() {
                 let problem = "a validation record cannot have functions of its own";
                 return Err(
@@ -92,21 +124,55 @@ impl Builder {
                         ),
                 );
             }
-            for (f, entry) in entries
-                .iter()
-                .enumerate()
-                .filter(|(_, s)| s.owner == Some(i))
-            {
-                set[self.shared_place(entry)?] = f;
+            // The function of a record replaces the shared one with its known part.
+            for entry in given.iter().filter(|entry| entry.owner == Some(i)) {
+                let place = self.shared_place(entry)?;
+                known.retain(|(other, _)| *other != place);
             }
-            let known = found.sets.iter().position(|s| *s == set);
-            found.of_record.push(known.unwrap_or(found.sets.len()));
-            if known.is_none() {
+            for (f, entry) in (entries.iter().enumerate()).filter(|(_, e)| e.owner == Some(i)) {
+                let place = self.shared_place(entry)?;
+                match entry.is_known_part {
+                    true => known.push((place, f)),
+                    false => set[place] = f,
+                }
+            }
+            let set = CoefficientSet::from(set).with_known_parts(known);
+            let before = found.sets.iter().position(|s| *s == set);
+            found.of_record.push(before.unwrap_or(found.sets.len()));
+            if before.is_none() {
                 found.sets.push(set);
             }
         }
         check_shared(&entries, &found)?;
         Ok(found)
+    }
+
+    /// Error for a known part that is not known, beside a fixed value, or without the likelihood that its standard deviation needs.
+    fn check_known(&self, entries: &[FunctionEntry]) -> Result<(), BuildError> {
+        for entry in self.given() {
+            if entry.spec.known_part.is_some() && entry.spec.basis().is_none() && !entry.spec.is_shared() {
+                let problem = "a fixed function has no known part";
+                return Err(BuildError::new(format!("{}.{KNOWN_PART}", entry.key), problem)
+                    .found("`fixed` and `known_part`")
+                    .expected("their sum as `fixed`"));
+            }
+        }
+        let Some(entry) = entries.iter().find(|entry| entry.spec.prior().is_some()) else {
+            return Ok(());
+        };
+        let found = match self.solver {
+            Solver::EquationError => Some("method equation-error".to_owned()),
+            _ => (self.without_likelihood()).map(|i| format!("no `sigma` in experiments[{i}]")),
+        };
+        match found {
+            Some(found) if !self.is_simulation => {
+                let problem = "a known value with a standard deviation needs a likelihood of the samples";
+                Err(BuildError::new(&entry.key, problem).found(found).expected(
+                    "`sigma` in every experiment and another method, or a number without a standard deviation",
+                ))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Index of the shared function that a record replaces.
@@ -141,7 +207,7 @@ impl Builder {
 /// Error if records share no estimated function, or a function applies to no record.
 fn check_shared(entries: &[FunctionEntry], found: &CoefficientSets) -> Result<(), BuildError> {
     let users = |f: usize| {
-        let uses = |set: &&usize| found.sets[**set].contains(&f);
+        let uses = |set: &&usize| found.sets[**set].parts().any(|(_, part)| part == f);
         found.of_record.iter().filter(uses).count()
     };
     let own = (entries.iter()).any(|s| s.owner.is_some() && s.spec.is_estimated());
@@ -157,7 +223,10 @@ fn check_shared(entries: &[FunctionEntry], found: &CoefficientSets) -> Result<()
         Some((_, entry)) => Err(
             BuildError::new(&entry.key, "no experiment uses this function")
                 .found("a separate function in every experiment")
-                .expected("an experiment without a separate function, or `fixed` here"),
+                .expected(match entry.is_known_part {
+                    true => "no `known_part` here, or an experiment without one of its own",
+                    false => "an experiment without a separate function, or `fixed` here",
+                }),
         ),
         None => Ok(()),
     }

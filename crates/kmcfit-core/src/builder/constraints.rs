@@ -65,6 +65,20 @@ impl Builder {
         let key = &constraint.key;
         let grid = problem.system.grid;
         constraint.check()?;
+        let set = problem.functions.coefficient_set(constraint.coefficient_set);
+        let list = &problem.functions;
+        let has_known_part = |kind: &CoefficientKind| {
+            let known = set.known_parts().iter();
+            let mut kinds = known.map(|(_, f)| list.get(*f).quantity);
+            kinds.any(|k| k == *kind)
+        };
+        let joint = constraint.statement.functions();
+        if joint.len() > 1 && joint.iter().any(has_known_part) {
+            let problem = "a constraint on several functions cannot include one with a known part";
+            return Err(BuildError::new(key, problem)
+                .found("`known_part` in one of them")
+                .expected("`min` and `max` of the functions, which concern the estimated part"));
+        }
         if let Constraint::Bounds { of, min, max } = &constraint.statement {
             uncrossed(key, of.unit(), min.as_ref(), max.as_ref(), &grid)?;
             let lowest = min.as_ref().map(TimeHistory::least);

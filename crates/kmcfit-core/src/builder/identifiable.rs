@@ -77,7 +77,7 @@ fn scale_is_open(problem: &Problem) -> bool {
         })
     });
     let mut functions = problem.functions.iter();
-    !held && functions.all(|f| f.offset.iter().all(|p| *p == 0.0))
+    !held && functions.all(|f| f.prior.is_none() && f.offset.iter().all(|p| *p == 0.0))
 }
 
 /// Error for a static force together with unknown sensor offsets: a response shifted by `d`, a sensor offset lower by `d` and

@@ -1,6 +1,6 @@
 //! Lowering of a builder to a problem: grid, functions, records, penalties, constraints and start.
 
-use super::coefficient_sets::CoefficientSets;
+use super::coefficient_sets::{CoefficientSets, FunctionEntry};
 use super::constraints::of_bounds;
 use super::experiment::ExperimentBuilder;
 use super::{BuildError, BuildNotice, Builder, Built, Record, identifiable, input_error};
@@ -165,7 +165,8 @@ impl Builder {
     /// Force terms of the system.
     fn terms(&self) -> Result<Vec<Term>, BuildError> {
         let mut terms = Vec::new();
-        for entry in self.entries().iter().filter(|entry| entry.owner.is_none()) {
+        let is_term = |entry: &&FunctionEntry| entry.owner.is_none() && !entry.is_known_part;
+        for entry in self.entries().iter().filter(is_term) {
             terms.extend(entry.kind.term(entry.width()?));
         }
         Ok(terms)
@@ -182,6 +183,7 @@ impl Builder {
         for entry in self.entries() {
             let mut function = entry.spec.on(entry.kind, &entry.key, grid)?;
             function.owner = entry.owner.map(|i| self.records[i].name.clone());
+            function.is_known_part = entry.is_known_part;
             list.push(function);
         }
         if list.iter().all(|f| f.parameters() == 0) {

@@ -6,6 +6,7 @@
 
 pub mod basis;
 mod coefficient_kind;
+mod coefficient_set;
 mod design;
 mod gram;
 mod parameterization;
@@ -16,6 +17,7 @@ mod total_variation;
 
 pub use basis::Basis;
 pub use coefficient_kind::CoefficientKind;
+pub use coefficient_set::CoefficientSet;
 pub use design::Design;
 pub use gram::Gram;
 pub use parameterization::Parameterization;
@@ -33,6 +35,10 @@ pub struct CoefficientFunction {
     pub quantity: CoefficientKind,
     /// Name of the experiment with its own function; `None` for a function of the shared coefficient set.
     pub owner: Option<String>,
+    /// True for a known part, which a coefficient set adds to another function of the same kind.
+    pub is_known_part: bool,
+    /// Prior of the parameter of a constant function: a known value with its standard deviation.
+    pub prior: Option<Prior>,
     /// Basis; `None` for a fixed function.
     pub basis: Option<Basis>,
     /// Design matrix.
@@ -52,6 +58,8 @@ impl CoefficientFunction {
         Self {
             quantity,
             owner: None,
+            is_known_part: false,
+            prior: None,
             basis: None,
             design: Design::Empty,
             offset: values,
@@ -96,6 +104,8 @@ impl CoefficientFunction {
         Self {
             quantity,
             owner: None,
+            is_known_part: false,
+            prior: None,
             design,
             offset: vec![0.0; nodes],
             start,
@@ -104,11 +114,23 @@ impl CoefficientFunction {
         }
     }
 
+    /// A constant on `nodes` nodes, known as `prior`.
+    pub fn uncertain(quantity: CoefficientKind, prior: Prior, nodes: usize) -> Self {
+        Self {
+            prior: Some(prior),
+            ..Self::constant(quantity, prior.mean, nodes)
+        }
+    }
+
     /// Name in reports: kind and, if any, its experiment.
     pub fn name(&self) -> String {
+        let part = match self.is_known_part {
+            true => "known part of ",
+            false => "",
+        };
         match &self.owner {
-            None => self.quantity.name().to_owned(),
-            Some(owner) => format!("{} of {owner}", self.quantity.name()),
+            None => format!("{part}{}", self.quantity.name()),
+            Some(owner) => format!("{part}{} of {owner}", self.quantity.name()),
         }
     }
 

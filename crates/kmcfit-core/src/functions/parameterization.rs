@@ -1,6 +1,6 @@
 //! Parameterization of a problem: all functions and scalars, with their parameters in one vector.
 
-use super::{CoefficientFunction, Design, Gram, ScalarParameter};
+use super::{CoefficientFunction, CoefficientSet, Design, Gram, Prior, ScalarParameter};
 use crate::simd::sum::largest_difference;
 use crate::system::NodalCoefficients;
 use crate::system::quadrature::{trapezoid, trapezoid_weights};
@@ -9,14 +9,14 @@ use std::ops::Range;
 /// Coefficient functions and scalar parameters. Their parameters form one vector `theta`, functions first.
 ///
 /// The first functions of the list are the shared coefficient set: mass, then one per force term. Further functions belong to
-/// single experiments, where they replace a shared one: each coefficient set is a list of indices
-/// ([`Parameterization::coefficient_set`]).
+/// single experiments, where they replace a shared one, or are known parts: each coefficient set is a list of indices
+/// ([`CoefficientSet`]).
 #[derive(Debug, Clone)]
 pub struct Parameterization {
     list: Vec<CoefficientFunction>,
     ranges: Vec<Range<usize>>,
     grams: Vec<Gram>,
-    coefficient_sets: Vec<Vec<usize>>,
+    coefficient_sets: Vec<CoefficientSet>,
     scalars: Vec<ScalarParameter>,
     nodes: usize,
     step: f64,
@@ -32,26 +32,30 @@ impl Parameterization {
     /// Parameterization with `list` (mass first) on `nodes` nodes of step `step` (s) as the shared coefficient set; `None` if a basis
     /// is linearly dependent on the grid or the list is empty.
     pub fn new(list: Vec<CoefficientFunction>, nodes: usize, step: f64) -> Option<Self> {
-        let main = (0..list.len()).collect();
+        let main: Vec<usize> = (0..list.len()).collect();
         Self::with_coefficient_sets(list, vec![main], nodes, step)
     }
 
-    /// [`Parameterization::new`] with several coefficient sets: each is a list of indices into `list`, mass first.
+    /// [`Parameterization::new`] with several coefficient sets, the shared one first.
     ///
     /// # Panics
     /// If there is no coefficient set, or a set has an index outside the list or twice.
     pub fn with_coefficient_sets(
         list: Vec<CoefficientFunction>,
-        coefficient_sets: Vec<Vec<usize>>,
+        coefficient_sets: Vec<impl Into<CoefficientSet>>,
         nodes: usize,
         step: f64,
     ) -> Option<Self> {
+        let coefficient_sets: Vec<CoefficientSet> =
+            coefficient_sets.into_iter().map(Into::into).collect();
+        let indices = |set: &CoefficientSet| set.parts().map(|(_, f)| f).collect::<Vec<_>>();
+        let sets: Vec<Vec<usize>> = coefficient_sets.iter().map(indices).collect();
         assert!(
-            !coefficient_sets.is_empty(),
+            !sets.is_empty(),
             "at least the shared coefficient set"
         );
         assert!(
-            coefficient_sets.iter().flatten().all(|f| *f < list.len()),
+            sets.iter().flatten().all(|f| *f < list.len()),
             "coefficient sets with functions of the list"
         );
         let is_once = |nodal: &Vec<usize>| {
@@ -59,7 +63,7 @@ impl Parameterization {
             nodal.iter().enumerate().all(|(i, f)| first(f) == Some(i))
         };
         assert!(
-            coefficient_sets.iter().all(is_once),
+            sets.iter().all(is_once),
             "each function once in a coefficient set"
         );
         let weights = trapezoid_weights(nodes, step);
@@ -115,14 +119,27 @@ impl Parameterization {
         first..first + self.scalars.len()
     }
 
-    /// Coefficient sets as indices of functions, mass first; the first is the shared one.
-    pub fn coefficient_sets(&self) -> &[Vec<usize>] {
+    /// Coefficient sets; the first is the shared one.
+    pub fn coefficient_sets(&self) -> &[CoefficientSet] {
         &self.coefficient_sets
     }
 
-    /// Functions of coefficient set `set`, mass first.
-    pub fn coefficient_set(&self, set: usize) -> &[usize] {
+    /// Coefficient set `set`.
+    pub fn coefficient_set(&self, set: usize) -> &CoefficientSet {
         &self.coefficient_sets[set]
+    }
+
+    /// Priors, with the indices of their parameters: of known values with a standard deviation, then of scalars.
+    pub fn priors(&self) -> impl Iterator<Item = (usize, Prior)> + '_ {
+        let functions = self.list.iter().zip(&self.ranges);
+        let of_functions = functions.filter_map(|(f, range)| Some((range.start, f.prior?)));
+        let scalars = self.scalar_range().zip(&self.scalars);
+        of_functions.chain(scalars.filter_map(|(index, scalar)| Some((index, scalar.prior?))))
+    }
+
+    /// Sum of `((x - mean) / sigma)^2` of all priors at the parameters `theta`.
+    pub(crate) fn prior_cost(&self, theta: &[f64]) -> f64 {
+        self.priors().map(|(i, prior)| prior.price(theta[i])).sum()
     }
 
     /// Function `index` of the list.
@@ -249,6 +266,14 @@ impl Parameterization {
                 _ => self.list[f].values_into(theta, values),
             }
         }
+        for &(place, f) in self.coefficient_sets[which].known_parts() {
+            let values = nodal.functions_mut().nth(place);
+            let values = values.expect("a coefficient for each known part");
+            let part = &self.list[f];
+            (values.iter_mut().zip(&part.offset)).for_each(|(value, known)| *value += known);
+            part.design
+                .multiply_add(&theta[self.ranges[f].clone()], values);
+        }
     }
 
     /// Nodal values of all functions of the list at the parameters `theta`.
@@ -264,10 +289,9 @@ impl Parameterization {
     /// Linear part `B theta` of coefficient set `which`, without fixed parts: its change along a direction.
     pub fn direction(&self, theta: &[f64], which: usize) -> NodalCoefficients {
         let mut nodal = self.empty_nodal();
-        for (&f, values) in self.coefficient_sets[which]
-            .iter()
-            .zip(nodal.functions_mut())
-        {
+        for (place, f) in self.coefficient_sets[which].parts() {
+            let values = nodal.functions_mut().nth(place);
+            let values = values.expect("a coefficient for each part");
             let range = self.ranges[f].clone();
             self.list[f].design.multiply_add(&theta[range], values);
         }
@@ -277,7 +301,9 @@ impl Parameterization {
     /// Adds `B^T` times the nodal values of coefficient set `which` to `out`, which converts Euclidean gradients from nodal values
     /// to parameters.
     pub fn add_transpose(&self, nodal: &NodalCoefficients, which: usize, out: &mut [f64]) {
-        for (&f, values) in self.coefficient_sets[which].iter().zip(nodal.functions()) {
+        let values: Vec<&[f64]> = nodal.functions().collect();
+        for (place, f) in self.coefficient_sets[which].parts() {
+            let values = values[place];
             let out = &mut out[self.ranges[f].clone()];
             self.list[f].design.transpose_multiply_add(values, out);
         }

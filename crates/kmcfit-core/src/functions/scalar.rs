@@ -1,12 +1,20 @@
 //! Scalar parameters: initial states, gains and offsets of sensors, estimated together with the functions.
 
-/// Gaussian prior of a scalar.
+/// Gaussian prior of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// Mean.
     pub mean: f64,
     /// Standard deviation; the prior adds `((x - mean) / sigma)^2` to J.
     pub sigma: f64,
+}
+
+impl Prior {
+    /// Contribution to J at the value `x`.
+    pub fn price(self, x: f64) -> f64 {
+        let u = (x - self.mean) / self.sigma;
+        u * u
+    }
 }
 
 /// A scalar parameter.
@@ -22,16 +30,6 @@ pub struct ScalarParameter {
     pub size: f64,
     /// Prior, if any.
     pub prior: Option<Prior>,
-}
-
-impl ScalarParameter {
-    /// Contribution of the prior to J at the value `x`.
-    pub fn price(&self, x: f64) -> f64 {
-        self.prior.map_or(0.0, |p| {
-            let u = (x - p.mean) / p.sigma;
-            u * u
-        })
-    }
 }
 
 /// A scalar that is known, or estimated as one of the [`ScalarParameter`]s.

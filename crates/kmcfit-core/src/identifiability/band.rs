@@ -15,6 +15,32 @@ pub enum BandSide {
     Neither,
 }
 
+/// Mean of a function or ratio over the record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeanOverRecord {
+    /// Mean `1/T integral p dt` by the trapezoid rule over the times of the bands, in the unit of the band; NaN where a value is not
+    /// defined.
+    pub value: f64,
+    /// Derivatives in the parameters: with the covariance `C` of the parameters ([`Bands::covariance`](super::Bands::covariance)) and the
+    /// gradient `g` the standard error is the root of `g^T C g + basis_error^2`.
+    pub gradient: Vec<f64>,
+    /// Standard error; zero if nothing is estimated, infinite where the mean is not identifiable.
+    pub standard_error: f64,
+    /// Part of the standard error from the error of the basis.
+    pub basis_error: f64,
+    /// Degrees of freedom of its t distribution; infinite where the noise counts as known.
+    pub degrees: f64,
+}
+
+impl MeanOverRecord {
+    /// 95 % confidence interval; `None` where nothing is estimated, or the mean is not identifiable.
+    pub fn interval(&self) -> Option<[f64; 2]> {
+        let half = student_half_width(self.degrees) * self.standard_error;
+        let is_interval = half > 0.0 && half.is_finite() && self.value.is_finite();
+        is_interval.then_some([self.value - half, self.value + half])
+    }
+}
+
 /// Confidence band of one function or ratio over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Band {
@@ -31,6 +57,8 @@ pub struct Band {
     pub degrees: Vec<f64>,
     /// Sides of each value on which the band extends.
     pub sides: Vec<BandSide>,
+    /// Mean over the record.
+    pub mean: MeanOverRecord,
     /// Half-width, in standard errors, of the simultaneous 95 % band, which contains the curve at all times;
     /// `None` if not simulated.
     pub simultaneous: Option<f64>,

@@ -26,7 +26,7 @@
 //! function, its band is infinite.
 
 use super::active::{ActiveRow, active_rows};
-use super::band::{Band, BandSide};
+use super::band::{Band, BandSide, MeanOverRecord};
 use super::band_notes::notes;
 use super::basis_error::basis_error;
 use super::covariance::{CovarianceRoot, Information};
@@ -41,7 +41,8 @@ use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::spans::{span_words, spans};
 use crate::system::Term;
-use nalgebra::DMatrix;
+use crate::system::quadrature::trapezoid_weights;
+use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -165,6 +166,7 @@ impl Bands {
             theta,
             variants: variants.as_ref(),
             times: nodes.iter().map(|i| problem.system.grid.time(*i)).collect(),
+            shares: trapezoid_weights(nodes.len(), 1.0 / (nodes.len() - 1).max(1) as f64),
             nodes,
             factors: [&tight, &loose],
             directions: &information.sensitivity().directions,
@@ -219,6 +221,8 @@ struct Maker<'a> {
     variants: Option<&'a NoiseVariants>,
     nodes: Vec<usize>,
     times: Vec<f64>,
+    /// Weight of each node in a mean over the record.
+    shares: Vec<f64>,
     factors: [&'a CovarianceRoot; 2],
     directions: &'a Directions,
     active: &'a [ActiveRow],
@@ -242,12 +246,47 @@ impl Maker<'_> {
         row.map(|(j, b)| (first + j, factor * b)).collect()
     }
 
-    /// Degrees of freedom of the values with these entries at each node of the band.
-    fn degrees(&self, entries: &dyn Fn(usize) -> Vec<(usize, f64)>) -> Vec<f64> {
-        let each = 0..self.nodes.len();
-        match self.variants {
-            None => each.map(|_| f64::INFINITY).collect(),
-            Some(variants) => each.map(|i| variants.degrees(&entries(i))).collect(),
+    /// Degrees of freedom of the values with these entries at each node of the band, and the gradient of their mean.
+    fn degrees(&self, entries: &dyn Fn(usize) -> Vec<(usize, f64)>) -> (Vec<f64>, Vec<f64>) {
+        let mut gradient = vec![0.0; self.problem.parameters()];
+        let degrees = (0..self.nodes.len()).map(|i| {
+            let entries = entries(i);
+            let weight = self.shares[i];
+            entries
+                .iter()
+                .for_each(|(j, a)| gradient[*j] += weight * a);
+            self.variants
+                .map_or(f64::INFINITY, |variants| variants.degrees(&entries))
+        });
+        (degrees.collect(), gradient)
+    }
+
+    /// Mean over the record of a curve with these values, with the equalities fixed.
+    fn mean(
+        &self,
+        values: &[f64],
+        linear: &LinearisedCurve,
+        gradient: Vec<f64>,
+    ) -> MeanOverRecord {
+        let shares = DVector::from_column_slice(&self.shares);
+        let sum = |values: &[f64]| values.iter().zip(&self.shares).map(|(x, w)| x * w).sum();
+        let size: f64 = sum(&linear.sizes);
+        let hidden = linear.hidden[1].tr_mul(&shares).norm();
+        let error = linear.roots[1].tr_mul(&shares).norm();
+        let basis_error: f64 = sum(&linear.basis_error);
+        let is_known = hidden <= UNSEEN_SHARE * size && error.is_finite();
+        let entries: Vec<(usize, f64)> = gradient.iter().copied().enumerate().collect();
+        MeanOverRecord {
+            value: sum(values),
+            standard_error: match is_known {
+                true => error.hypot(basis_error),
+                false => f64::INFINITY,
+            },
+            basis_error,
+            degrees: self
+                .variants
+                .map_or(f64::INFINITY, |variants| variants.degrees(&entries)),
+            gradient,
         }
     }
 
@@ -292,7 +331,7 @@ impl Maker<'_> {
         unit: &str,
         values: Vec<f64>,
         linear: &LinearisedCurve,
-        (degrees, function): (Vec<f64>, Option<usize>),
+        ((degrees, gradient), function): ((Vec<f64>, Vec<f64>), Option<usize>),
     ) -> Band {
         let count = self.nodes.len();
         let error = |which: usize, i: usize| {
@@ -337,6 +376,7 @@ impl Maker<'_> {
         });
         Band {
             simultaneous: self.simultaneous(linear, &errors, &sides),
+            mean: self.mean(&values, linear, gradient),
             name,
             unit: unit.to_owned(),
             values,
@@ -409,20 +449,30 @@ impl Maker<'_> {
 
     /// Ratios of the shared coefficient set, by the delta method.
     fn ratios(&self, values: &[Vec<f64>], linearised: &[LinearisedCurve]) -> Vec<Band> {
-        let assembly = self.problem.functions.coefficient_set(0);
+        let set = self.problem.functions.coefficient_set(0);
         let terms = &self.problem.system.terms;
+        // The functions of a coefficient: its own and its known parts.
+        let at_place = |place: usize| -> Vec<usize> {
+            let parts = set.parts().filter(|(other, _)| *other == place);
+            parts.map(|(_, f)| f).collect()
+        };
         let of = |term: Term| {
             let place = terms.iter().position(|t| *t == term)?;
-            Some(assembly[place + 1])
+            Some(at_place(place + 1))
         };
-        let (m, damping, stiffness) = (assembly[0], of(Term::Damping), of(Term::Stiffness));
-        let band = |name: &str, unit: &str, functions: &[usize], ratio: Ratio| {
+        let (m, damping, stiffness) = (at_place(0), of(Term::Damping), of(Term::Stiffness));
+        let band = |name: &str, unit: &str, coefficients: &[&Vec<usize>], ratio: Ratio| {
+            let functions: Vec<usize> = coefficients.iter().flat_map(|c| c.iter().copied()).collect();
             let at = |node: &usize| {
-                let at_node: Vec<f64> = functions.iter().map(|f| values[*f][*node]).collect();
-                ratio(&at_node)
+                let sum = |c: &&Vec<usize>| c.iter().map(|f| values[*f][*node]).sum();
+                let at_node: Vec<f64> = coefficients.iter().map(sum).collect();
+                let (ratio, slopes) = ratio(&at_node);
+                let each = coefficients.iter().zip(slopes);
+                let each = each.flat_map(|(c, slope)| c.iter().map(move |_| slope));
+                (ratio, each.collect::<Vec<f64>>())
             };
             let (ratios, slopes): (Vec<_>, Vec<_>) = self.nodes.iter().map(at).unzip();
-            let linear = combine(linearised, functions, &slopes);
+            let linear = combine(linearised, &functions, &slopes);
             let entries = |i: usize| -> Vec<(usize, f64)> {
                 let pairs = functions.iter().zip(&slopes[i]);
                 pairs
@@ -433,11 +483,12 @@ impl Maker<'_> {
             self.band(name.into(), unit, ratios, &linear, (degrees, None))
         };
         let mut bands = Vec::new();
-        bands.extend(stiffness.map(|k| band("k/m", "1/s^2", &[k, m], over_mass)));
-        bands.extend(damping.map(|c| band("c/m", "1/s", &[c, m], over_mass)));
-        if let Some(k) = stiffness {
-            bands.push(band("natural frequency", "Hz", &[k, m], frequency));
-            bands.extend(damping.map(|c| band("damping ratio", "", &[c, k, m], damping_ratio)));
+        bands.extend((stiffness.iter()).map(|k| band("k/m", "1/s^2", &[k, &m], over_mass)));
+        bands.extend((damping.iter()).map(|c| band("c/m", "1/s", &[c, &m], over_mass)));
+        if let Some(k) = &stiffness {
+            bands.push(band("natural frequency", "Hz", &[k, &m], frequency));
+            let ratio = |c| band("damping ratio", "", &[c, k, &m], damping_ratio);
+            bands.extend(damping.iter().map(ratio));
         }
         bands
     }

@@ -25,11 +25,12 @@ pub(super) fn components(problem: &Problem) -> Vec<Component> {
         {
             continue;
         }
-        let shares = |c: &Component| c.functions.iter().any(|f| assembly.contains(f));
+        let functions: Vec<usize> = assembly.parts().map(|(_, f)| f).collect();
+        let shares = |c: &Component| c.functions.iter().any(|f| functions.contains(f));
         let (joined, others): (Vec<_>, Vec<_>) = found.into_iter().partition(shares);
         found = others;
         let mut union = Component {
-            functions: assembly.clone(),
+            functions,
             coefficient_sets: vec![which],
         };
         for part in joined {
@@ -57,14 +58,15 @@ impl Component {
 
     /// Symbols of the functions, `(m, c, k)`.
     pub fn symbols(&self, problem: &Problem) -> String {
-        let symbol = |f: &usize| {
-            let function = problem.functions.get(*f);
+        let functions = self.functions.iter().map(|f| problem.functions.get(*f));
+        let symbol = |function: &CoefficientFunction| {
             match &function.owner {
                 None => function.quantity.symbol().to_owned(),
                 Some(owner) => format!("{} of {owner}", function.quantity.symbol()),
             }
         };
-        let symbols: Vec<String> = self.functions.iter().map(symbol).collect();
+        let functions = functions.filter(|function| !function.is_known_part);
+        let symbols: Vec<String> = functions.map(symbol).collect();
         format!("({})", symbols.join(", "))
     }
 
@@ -88,19 +90,21 @@ impl Component {
     pub fn known(&self, problem: &Problem) -> Vec<bool> {
         let mut known = vec![false; problem.functions.nodes()];
         for function in self.given(problem) {
+            let is_known = |p: &f64| *p != 0.0 || function.prior.is_some();
             let values = known.iter_mut().zip(&function.offset);
-            values.for_each(|(k, p)| *k |= *p != 0.0);
+            values.for_each(|(k, p)| *k |= is_known(p));
         }
         known
     }
 
-    /// Fixed functions that are nonzero somewhere.
+    /// Fixed functions that are nonzero somewhere, and known values with a standard deviation.
     pub fn given<'a>(
         &'a self,
         problem: &'a Problem,
     ) -> impl Iterator<Item = &'a CoefficientFunction> + 'a {
         let functions = self.functions.iter().map(|f| problem.functions.get(*f));
-        functions.filter(|f| f.parameters() == 0 && f.offset.iter().any(|p| *p != 0.0))
+        let is_nonzero = |f: &CoefficientFunction| f.offset.iter().any(|p| *p != 0.0);
+        functions.filter(move |f| f.prior.is_some() || f.parameters() == 0 && is_nonzero(f))
     }
 }
 

@@ -10,7 +10,7 @@ use super::factorisation::Factorisation;
 use super::misspecified::kernels;
 use super::sensitivity::Sensitivity;
 use super::step_error::step_error;
-use crate::functions::{Penalty, WeightRule};
+use crate::functions::{Penalty, Prior, WeightRule};
 use crate::noise::KernelCovariance;
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
@@ -51,13 +51,9 @@ pub(super) struct CovarianceRoot {
 impl Information {
     pub fn new(problem: &Problem, theta: &[f64], sensitivity: Sensitivity) -> Self {
         let directions = &sensitivity.directions;
-        let functions = &problem.functions;
-        let mut priors = Vec::new();
-        for (j, scalar) in functions.scalar_range().zip(functions.scalars()) {
-            if let Some(prior) = scalar.prior {
-                priors.push(directions.row([(j, 1.0 / prior.sigma)].into_iter()));
-            }
-        }
+        let priors = problem.functions.priors();
+        let row = |(j, prior): (usize, Prior)| directions.row([(j, 1.0 / prior.sigma)].into_iter());
+        let priors: Vec<Vec<f64>> = priors.map(row).collect();
         let n = directions.len();
         let priors = DMatrix::from_fn(priors.len(), n, |i, k| priors[i][k]);
         let measured = stacked(&sensitivity.jacobian, &priors);

@@ -27,6 +27,7 @@ mod factorisation;
 mod linearised_curve;
 mod misspecified;
 mod ratios;
+mod scale_source;
 mod scaling_ambiguity;
 mod sensitivity;
 mod step_error;
@@ -67,6 +68,7 @@ pub use experiments::{
     CandidateChannel, CandidateExperiment, Gain, Ranked, rank_experiments, residual_spread,
 };
 pub(crate) use factorisation::Factorisation;
+pub use scale_source::{ScaleSource, scale_source};
 pub use scaling_ambiguity::ScalingAmbiguity;
 pub use sensitivity::{ResolvedDirection, Sensitivity, SingularSpectrum};
 pub use structural_rank::{RankFinding, RankFindingKind, ScaleFreedom, structural_rank};

@@ -77,7 +77,7 @@ impl Problem {
             && channel.len() == nodes
             && channel.stride() == Some(1)
             && self.functions.scalars().is_empty()
-            && matches!(self.functions.coefficient_sets(), [only] if only == &[0, 1, 2])
+            && matches!(self.functions.coefficient_sets(), [only] if *only == vec![0, 1, 2].into())
             && designs.all(|d| matches!(d, Design::Identity))
             && experiment
                 .excitation

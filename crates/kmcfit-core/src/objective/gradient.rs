@@ -89,8 +89,8 @@ impl Problem {
 
     /// True if the cost has terms besides the misfit.
     pub fn is_regularised(&self) -> bool {
-        let priors = self.functions.scalars().iter().any(|s| s.prior.is_some());
-        priors || !(self.penalties.is_empty() && self.variations.is_empty() && self.soft.is_empty())
+        self.functions.priors().next().is_some()
+            || !(self.penalties.is_empty() && self.variations.is_empty() && self.soft.is_empty())
     }
 
     /// Euclidean gradient of [`Problem::regularisation`] in the parameters.
@@ -107,10 +107,8 @@ impl Problem {
         for group in &self.soft {
             group.add_price_gradient(theta, &mut gradient);
         }
-        for (index, scalar) in self.functions.scalar_range().zip(self.functions.scalars()) {
-            if let Some(prior) = scalar.prior {
-                gradient[index] += 2.0 * (theta[index] - prior.mean) / prior.sigma.powi(2);
-            }
+        for (index, prior) in self.functions.priors() {
+            gradient[index] += 2.0 * (theta[index] - prior.mean) / prior.sigma.powi(2);
         }
         gradient
     }
@@ -176,7 +174,7 @@ impl Problem {
         let assembly = functions.coefficient_set(experiment.coefficient_set);
         let view = self.view(evaluation, e);
         if view.engine() != Engine::Prefactored
-            || !assembly.iter().all(|f| functions.is_constant_or_known(*f))
+            || !assembly.parts().all(|(_, f)| functions.is_constant_or_known(f))
         {
             return false;
         }
@@ -198,10 +196,10 @@ impl Problem {
         let Some((sums, initial)) = found else {
             return false;
         };
-        for (f, (sum, direct)) in assembly.iter().zip(sums.iter().zip(&direct)) {
-            let first = functions.ranges()[*f].start;
-            for (j, entry) in functions.get(*f).design.row(0) {
-                gradient[first + j] += entry * (direct + sum);
+        for (place, f) in assembly.parts() {
+            let first = functions.ranges()[f].start;
+            for (j, entry) in functions.get(f).design.row(0) {
+                gradient[first + j] += entry * (direct[place] + sums[place]);
             }
         }
         add_initial(experiment.initial_parameters, initial, &mut own);

@@ -248,7 +248,7 @@ impl Problem {
     }
 
     /// Regularisation at `theta`: penalties `weight |L theta - target|^2`, total variation `weight sum |D theta|`, soft
-    /// constraints `weight mean excess^2` and priors of scalars.
+    /// constraints `weight mean excess^2` and priors.
     pub fn regularisation(&self, theta: &[f64]) -> f64 {
         let ranges = self.functions.ranges();
         let smooth = self.penalties.iter().map(|penalty| {
@@ -258,9 +258,8 @@ impl Problem {
             variation.weight * variation.total(&theta[ranges[variation.function].clone()])
         });
         let broken = self.soft.iter().map(|group| group.price(theta));
-        let scalars = self.functions.scalars().iter().zip(self.scalars(theta));
-        let priors = scalars.map(|(scalar, x)| scalar.price(*x));
+        let priors = self.functions.prior_cost(theta);
         // An empty sum is -0.0.
-        0.0 + smooth.sum::<f64>() + jumps.sum::<f64>() + broken.sum::<f64>() + priors.sum::<f64>()
+        0.0 + smooth.sum::<f64>() + jumps.sum::<f64>() + broken.sum::<f64>() + priors
     }
 }

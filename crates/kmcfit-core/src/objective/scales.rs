@@ -56,6 +56,9 @@ impl Problem {
             for (&f, (own, natural)) in assembly.iter().zip(own.zip(natural)) {
                 sizes[f] = sizes[f].max(own).max(natural);
             }
+            for &(place, f) in assembly.known_parts() {
+                sizes[f] = sizes[f].max(sizes[assembly[place]]);
+            }
         }
         sizes
     }

@@ -189,8 +189,7 @@ fn is_noise(problem: &Problem, found: &Fit) -> bool {
     let mut channels = problem.predicted(&found.best.evaluation);
     channels.all(|(channel, predicted)| match channel.weighting() {
         Weighting::Sigma(_) | Weighting::Sigmas(_) => {
-            let mean = channel.cost(predicted) / channel.len() as f64;
-            mean <= LARGEST_MEAN_SQUARE && !is_misspecified(channel, predicted)
+            channel.cost(predicted) <= LARGEST_MEAN_SQUARE * channel.len() as f64
         }
         Weighting::Estimated { .. } => !is_misspecified(channel, predicted),
         Weighting::Integral { .. } | Weighting::Trapezoid(_) => true,

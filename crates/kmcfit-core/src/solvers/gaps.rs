@@ -32,12 +32,13 @@ pub struct CycleCount {
 }
 
 /// Function whose variation changes the number of cycles: the stiffness, or the mass beside a constant stiffness; `None` where
-/// both are constant or there is no stiffness, and with functions of single records.
+/// both are constant or there is no stiffness, and with functions of single records or known parts.
 pub(crate) fn varying_function(problem: &Problem) -> Option<usize> {
     let functions = &problem.functions;
     let [set] = functions.coefficient_sets() else {
         return None;
     };
+    set.known_parts().is_empty().then_some(())?;
     let place = problem
         .system
         .terms

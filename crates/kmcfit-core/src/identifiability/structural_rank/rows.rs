@@ -136,8 +136,8 @@ impl Inputs {
             base.is_none_or(|b| b.is_zero())
         };
         let nodal = records.iter().all(|r| {
-            let assembly = problem.functions.coefficient_set(r.coefficient_set).iter();
-            let mut functions = assembly.map(|f| problem.functions.get(*f));
+            let assembly = problem.functions.coefficient_set(r.coefficient_set).parts();
+            let mut functions = assembly.map(|(_, f)| problem.functions.get(f));
             functions.all(|f| f.parameters() == 0 || f.basis == Some(Basis::Nodal))
         });
         let sampled = records.iter().all(|r| {

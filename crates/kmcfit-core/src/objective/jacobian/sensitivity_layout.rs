@@ -46,34 +46,35 @@ impl<'a> SensitivityLayout<'a> {
         let initial_states =
             estimated.filter_map(|(state, index)| Some((state, column_of[scalars + index?])));
         let assembly = functions.coefficient_set(experiment.coefficient_set);
-        let slot_of = |function: usize, j: usize| Slot {
-            group: column_of[j] / LANES,
-            function,
-        };
-        let mut slots: Vec<Slot> = (assembly.iter().enumerate())
-            .flat_map(|(function, f)| functions.ranges()[*f].clone().map(move |j| (function, j)))
-            .map(|(function, j)| slot_of(function, j))
+        // A known part, which is constant, and the function that it is added to have slots of their own in a group.
+        let slot_of = |(place, f): (usize, usize), j: usize| (column_of[j] / LANES, place, f);
+        let mut slots: Vec<(usize, usize, usize)> = (assembly.parts())
+            .flat_map(|part| (functions.ranges()[part.1].clone()).map(move |j| (part, j)))
+            .map(|(part, j)| slot_of(part, j))
             .collect();
-        slots.sort_unstable_by_key(|s| (s.group, s.function));
+        slots.sort_unstable();
         slots.dedup();
-        let find = |slot: Slot| {
-            slots.partition_point(|s| (s.group, s.function) < (slot.group, slot.function))
-        };
-        let layout = |(function, &f): (usize, &usize)| {
-            let design = &functions.get(f).design;
-            let lane = |j: usize| (find(slot_of(function, j)), column_of[j] % LANES);
-            let own = (0..slots.len()).filter(|s| slots[*s].function == function);
+        let layout = |(place, f): (usize, usize)| {
+            let lane = |j: usize| {
+                let slot = slots.partition_point(|slot| *slot < slot_of((place, f), j));
+                (slot, column_of[j] % LANES)
+            };
+            let own = (0..slots.len()).filter(|slot| slots[*slot].2 == f);
             FunctionLayout {
-                design,
+                design: &functions.get(f).design,
                 slots: own.collect(),
                 lanes: functions.ranges()[f].clone().map(lane).collect(),
                 is_constant: functions.is_constant(f),
             }
         };
+        let functions = assembly.parts().map(layout).collect();
+        let slots = slots.into_iter();
         Self {
-            functions: assembly.iter().enumerate().map(layout).collect(),
+            functions,
             initial_states: initial_states.collect(),
-            slots,
+            slots: slots
+                .map(|(group, function, _)| Slot { group, function })
+                .collect(),
             groups: order.len().div_ceil(LANES),
             columns: order.len(),
         }

@@ -218,7 +218,7 @@ impl Kernel for Advance<'_> {
                 if !tangents.begun[g] {
                     continue;
                 }
-                // A group has at most one slot for each function.
+                // A group has at most one slot for each function that varies.
                 let mut moving = [0; FUNCTIONS];
                 let mut count = 0;
                 let held = &mut tangents.held[g];

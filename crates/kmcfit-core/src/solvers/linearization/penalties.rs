@@ -3,15 +3,12 @@
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 
-/// Adds priors of scalars, `(x + delta - mean) / sigma`, as residual rows.
+/// Adds priors, `(x + delta - mean) / sigma`, as residual rows.
 pub(crate) fn add_priors(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
-    let functions = &problem.functions;
-    for (index, scalar) in functions.scalar_range().zip(functions.scalars()) {
-        if let Some(prior) = scalar.prior {
-            let row = [(index, 1.0 / prior.sigma)];
-            sub.residuals
-                .push(row, (prior.mean - parameters[index]) / prior.sigma);
-        }
+    for (index, prior) in problem.functions.priors() {
+        let row = [(index, 1.0 / prior.sigma)];
+        let residual = (prior.mean - parameters[index]) / prior.sigma;
+        sub.residuals.push(row, residual);
     }
 }
 

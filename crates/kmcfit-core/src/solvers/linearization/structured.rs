@@ -134,11 +134,8 @@ impl UnknownColumns<'_> {
         entries: &mut Vec<(usize, f64)>,
     ) {
         let functions = &self.problem.functions;
-        for (place, &f) in functions
-            .coefficient_set(self.experiment.coefficient_set)
-            .iter()
-            .enumerate()
-        {
+        let set = functions.coefficient_set(self.experiment.coefficient_set);
+        for (place, f) in set.parts() {
             let (function, range) = (functions.get(f), &functions.ranges()[f]);
             for side in 0..2 {
                 let slope = slope(place, side);

@@ -93,6 +93,8 @@ fn shorter(function: &CoefficientFunction, nodes: usize) -> Option<CoefficientFu
     };
     Some(CoefficientFunction {
         owner: function.owner.clone(),
+        is_known_part: function.is_known_part,
+        prior: function.prior,
         positive_parameters: function.positive_parameters,
         ..short
     })

@@ -72,7 +72,8 @@ pub fn envelopes(
     times: &[f64],
     threads: usize,
 ) -> Vec<Envelope> {
-    let main = problem.functions.coefficient_set(0);
+    let set = problem.functions.coefficient_set(0);
+    let main: &[usize] = set;
     let mut jobs = Vec::new();
     for &f in main {
         let function = problem.functions.get(f);
@@ -89,6 +90,8 @@ pub fn envelopes(
         ("k/m", CoefficientKind::Stiffness, "1/s^2"),
         ("c/m", CoefficientKind::Damping, "1/s"),
     ];
+    // A ratio of sums with known parts is not a ratio of two functions.
+    let ratios = ratios.into_iter().filter(|_| set.known_parts().is_empty());
     for (name, over, unit) in ratios {
         if let (Some(&over), Some(&mass)) = (of(over), of(CoefficientKind::Mass)) {
             jobs.push((name.to_owned(), unit, ratios_at(problem, over, mass, times)));

@@ -28,11 +28,7 @@ const POOR: f64 = 0.2;
 
 /// Misfit of the samples plus the priors.
 fn measure(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> f64 {
-    let scalars = problem.functions.scalars().iter();
-    let priors = scalars
-        .zip(problem.scalars(theta))
-        .map(|(s, x)| s.price(*x));
-    evaluation.misfit + priors.sum::<f64>()
+    evaluation.misfit + problem.functions.prior_cost(theta)
 }
 
 /// The search for extremes of one problem under one misfit limit.

@@ -54,6 +54,9 @@ fn along_scaling(
     s: f64,
     straight: Vec<f64>,
 ) -> Option<Vec<f64>> {
+    // A known part fixes the scale.
+    let has_known_part = (problem.functions.iter()).any(|f| f.is_known_part);
+    (!has_known_part).then_some(())?;
     let mut theta = straight;
     let (one, two) = (problem.functions.nodal(a), problem.functions.nodal(b));
     if one.mass.iter().chain(&two.mass).any(|m| *m <= 0.0) {

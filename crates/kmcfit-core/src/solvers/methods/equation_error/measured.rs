@@ -372,8 +372,8 @@ impl Measurements {
             let assembly = problem
                 .functions
                 .coefficient_set(experiment.coefficient_set);
-            let f = assembly.iter().position(|f| *f == index)?;
-            Some((f, measured.as_ref()?))
+            let (place, _) = assembly.parts().find(|(_, f)| *f == index)?;
+            Some((place, measured.as_ref()?))
         })
     }
 }
@@ -381,7 +381,7 @@ impl Measurements {
 /// Mass of the first coefficient set with function `index`.
 fn mass_of(functions: &Parameterization, index: usize) -> Option<usize> {
     let mut nodal_sets = functions.coefficient_sets().iter();
-    let nodal = nodal_sets.find(|assembly| assembly.contains(&index))?;
+    let nodal = nodal_sets.find(|set| set.parts().any(|(_, f)| f == index))?;
     nodal.first().copied()
 }
 

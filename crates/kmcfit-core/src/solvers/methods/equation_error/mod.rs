@@ -231,7 +231,7 @@ fn add_rows(
         measured.places.iter().zip(errors).enumerate()
     {
         let mut entries = Vec::new();
-        for (which, &f) in assembly.iter().enumerate() {
+        for (which, f) in assembly.parts() {
             let first = functions.ranges()[f].start;
             let response = measured.response(problem, which, i);
             for (side, share) in [1.0 - fraction, fraction].into_iter().enumerate() {
@@ -285,7 +285,7 @@ fn scale_row(
 /// nonzero force or a nonzero fixed function contributes a right-hand side.
 fn equation_fixes_scale(problem: &Problem) -> bool {
     let nonzero = |values: &[f64]| values.iter().any(|v| *v != 0.0);
-    let fixed = problem.functions.iter().any(|f| nonzero(&f.offset));
+    let fixed = (problem.functions.iter()).any(|f| nonzero(&f.offset) || f.prior.is_some());
     let mut measured = problem
         .experiments
         .iter()

@@ -1,0 +1,200 @@
+//! Force terms that the residuals of a simulated response show and the model does not have: score tests, one for each candidate.
+//!
+//! The equation of motion is extended by a constant coefficient `p` of each term that the model lacks, at `p = 0`, where the response is
+//! that of the fit. With the derivatives `J` of the weighted and whitened residuals `r` in the parameters of the model and `d` in `p`, and the
+//! parts `z` of `d` and `e` of `r` that are orthogonal to `J`,
+//!
+//! ```text
+//! p = -z^T e / z^T z,    t = p sqrt(z^T z) / s,    s^2 = (e^T e - p^2 z^T z) / (n - q - 1)
+//! ```
+//!
+//! is the estimate after one step of Gauss and Newton from the fit, without a refit (Rao 1948). Where the innovations of a channel are not
+//! white the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
+
+use super::refinement::applies;
+use crate::functions::{CoefficientFunction, CoefficientKind, CoefficientSet, Parameterization};
+use crate::identifiability::Factorisation;
+use crate::noise::KernelCovariance;
+use crate::objective::Evaluation;
+use crate::problem::{FEW_PARAMETERS, Problem};
+use crate::record::ScoreCovariance;
+use crate::simd::sum::rms;
+use crate::simulate::Trajectory;
+use crate::solvers::{MissingTerm, weighted_jacobian};
+use crate::system::Term;
+use nalgebra::{DMatrix, DVector};
+
+/// Width of the sign of the velocity in the candidate for Coulomb friction, relative to the root mean square of the velocity.
+const WIDTH: f64 = 0.01;
+/// Smallest `|t|` of a missing term: of 4000 standard normal numbers one has a larger value by chance.
+const SIGNIFICANT: f64 = 4.5;
+/// Fewest samples per parameter.
+const SAMPLES_PER_PARAMETER: usize = 4;
+/// Part of a candidate's derivatives outside the span of the model's below which it is no candidate.
+const APART: f64 = 1e-6;
+
+/// The most significant missing term at the optimum `theta`; `None` where the residuals show none, and where the test does not apply: without a
+/// likelihood, at an active constraint, for residuals at machine precision, and with few samples or many parameters.
+pub(super) fn missing_term(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+) -> Option<MissingTerm> {
+    let is_few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
+    let is_long = problem.sample_count() >= SAMPLES_PER_PARAMETER * problem.parameters();
+    (is_few && is_long && applies(problem, theta, evaluation)).then_some(())?;
+    let kinds = candidates(problem, evaluation);
+    (!kinds.is_empty()).then_some(())?;
+    let (extended, at) = extended(problem, theta, &kinds)?;
+    let evaluation = extended.evaluate(&at).ok()?;
+    let jacobian = weighted_jacobian(&extended, &evaluation);
+    let residuals = (extended.predicted(&evaluation))
+        .flat_map(|(channel, predicted)| channel.majorant(predicted).weighted);
+    let residuals = DVector::from_vec(residuals.collect());
+    let first = problem.functions.scalar_range().start;
+    let is_new = |j: &usize| (first..first + kinds.len()).contains(j);
+    let own: Vec<usize> = (0..jacobian.ncols()).filter(|j| !is_new(j)).collect();
+    let model = Span::of(&jacobian.select_columns(&own));
+    let tests = kinds.iter().enumerate().filter_map(|(i, (kind, term))| {
+        let column = jacobian.column(first + i).into_owned();
+        let (value, t) = model.test(&extended, &column, &residuals)?;
+        let share = (value * force(&evaluation, *term)).abs()
+            / largest_force(problem, &evaluation);
+        Some(MissingTerm {
+            term: *kind,
+            value,
+            t,
+            share,
+        })
+    });
+    let best = tests.max_by(|a, b| a.t.abs().total_cmp(&b.t.abs()))?;
+    (best.t.abs() >= SIGNIFICANT).then_some(best)
+}
+
+/// Kinds and terms that the model does not have.
+fn candidates(problem: &Problem, evaluation: &Evaluation) -> Vec<(CoefficientKind, Term)> {
+    let speeds: Vec<f64> = (evaluation.trajectories.iter())
+        .flat_map(|response| response.velocity.iter().copied())
+        .collect();
+    let width = WIDTH * rms(&speeds);
+    let set = problem.functions.coefficient_set(0);
+    let has = |kind: CoefficientKind| set.iter().any(|f| problem.functions.get(*f).quantity == kind);
+    let kinds = CoefficientKind::ALL.into_iter().filter(|kind| !has(*kind));
+    let kinds = kinds.filter_map(|kind| Some((kind, kind.term(width)?)));
+    kinds.filter(|_| width > 0.0 && width.is_finite()).collect()
+}
+
+/// The problem with constants for the terms of `kinds`, without penalties and constraints, and its parameters.
+fn extended(
+    problem: &Problem,
+    theta: &[f64],
+    kinds: &[(CoefficientKind, Term)],
+) -> Option<(Problem, Vec<f64>)> {
+    let functions = &problem.functions;
+    let (nodes, step) = (functions.nodes(), problem.system.grid.step());
+    let mut list: Vec<CoefficientFunction> = functions.iter().cloned().collect();
+    let first = list.len();
+    let new = kinds.iter().map(|(kind, _)| CoefficientFunction::constant(*kind, 0.0, nodes));
+    list.extend(new);
+    let set = |set: &CoefficientSet| {
+        let all = set.iter().copied().chain(first..list.len());
+        CoefficientSet::from(all.collect::<Vec<usize>>()).with_known_parts(set.known_parts().to_vec())
+    };
+    let sets: Vec<CoefficientSet> = functions.coefficient_sets().iter().map(set).collect();
+    let longer = Parameterization::with_coefficient_sets(list, sets, nodes, step)?
+        .with_scalars(functions.scalars().to_vec());
+    let extended = problem.clone().with(|parts| {
+        parts.functions = longer;
+        parts.system.terms.extend(kinds.iter().map(|(_, term)| *term));
+        parts.penalties.clear();
+        parts.variations.clear();
+        parts.constraints = Default::default();
+        parts.soft.clear();
+        parts.jumps.clear();
+    });
+    let scalars = functions.scalar_range().start;
+    let zeros = vec![0.0; kinds.len()];
+    Some((
+        extended.ok()?,
+        [&theta[..scalars], &zeros, &theta[scalars..]].concat(),
+    ))
+}
+
+/// Orthonormal basis of the derivatives of the model.
+struct Span {
+    basis: DMatrix<f64>,
+}
+
+impl Span {
+    fn of(jacobian: &DMatrix<f64>) -> Self {
+        let mut scaled = jacobian.clone();
+        for mut column in scaled.column_iter_mut() {
+            let size = column.norm().max(f64::MIN_POSITIVE);
+            column /= size;
+        }
+        let root = Factorisation::of(&scaled).inverse_root();
+        Self {
+            basis: scaled * root,
+        }
+    }
+
+    fn orthogonal(&self, vector: &DVector<f64>) -> DVector<f64> {
+        vector - &self.basis * self.basis.tr_mul(vector)
+    }
+
+    /// Estimate of the coefficient with the derivatives `column`, and its ratio to the standard error.
+    fn test(
+        &self,
+        problem: &Problem,
+        column: &DVector<f64>,
+        residuals: &DVector<f64>,
+    ) -> Option<(f64, f64)> {
+        let (z, e) = (self.orthogonal(column), self.orthogonal(residuals));
+        let square = z.norm_squared();
+        (square > APART * APART * column.norm_squared()).then_some(())?;
+        let value = -z.dot(&e) / square;
+        let rest = &e + value * &z;
+        let estimated = (self.basis.ncols() + 1) as f64;
+        let is_kernel = |c: &crate::record::Channel| c.noise().scores == ScoreCovariance::Kernel;
+        let variance = match problem.channels().any(is_kernel) {
+            true => {
+                let scores = DMatrix::from_columns(&[z.component_mul(&rest)]);
+                let found = KernelCovariance::of(&scores, &problem.channel_samples(), estimated)?;
+                found.sum[(0, 0)] / (square * square)
+            }
+            false => rest.norm_squared() / (rest.len() as f64 - estimated) / square,
+        };
+        let error = variance.max(0.0).sqrt();
+        (error > 0.0).then(|| (value, value / error))
+    }
+}
+
+/// Root mean square of `phi` of a term over all records.
+fn force(evaluation: &Evaluation, term: Term) -> f64 {
+    let of = |response: &Trajectory| -> Vec<f64> {
+        let states = response.displacement.iter().zip(&response.velocity);
+        states.map(|(y, v)| term.phi(*y, *v)).collect()
+    };
+    let all: Vec<f64> = evaluation.trajectories.iter().flat_map(of).collect();
+    rms(&all)
+}
+
+/// Root mean square of the largest force term of the model.
+fn largest_force(problem: &Problem, evaluation: &Evaluation) -> f64 {
+    let mut largest = f64::MIN_POSITIVE;
+    for (place, term) in problem.system.terms.iter().enumerate() {
+        let mut all = Vec::new();
+        for (experiment, response) in problem.experiments.iter().zip(&evaluation.trajectories) {
+            let Some(values) = (evaluation.nodal_of(experiment.coefficient_set))
+                .coefficients
+                .get(place)
+            else {
+                continue;
+            };
+            let states = response.displacement.iter().zip(&response.velocity);
+            all.extend((states.zip(values)).map(|((y, v), p)| p * term.phi(*y, *v)));
+        }
+        largest = largest.max(rms(&all));
+    }
+    largest
+}

@@ -1,0 +1,299 @@
+//! Verdict on a fit: may its estimates be used?
+//!
+//! The verdict is the worst level of its reasons. Each reason is one test of the fit: its end, the fit of the samples, the residuals after the
+//! noise model, the time steps, the bases, missing force terms, gaps, the inputs, and what the samples identify. A negative damping is no
+//! reason: some systems gain energy.
+
+use super::gaps::{GapAssessment, GapStatus};
+use super::plausibility::{FitWarning, Unidentified};
+use super::FitAssessment;
+use crate::functions::CoefficientKind;
+use crate::identifiability::{
+    Classification, FunctionClassification, ScaleSource, scale_source, structural_rank,
+};
+use crate::problem::Problem;
+use crate::solvers::{Fit, MissingTerm, Status};
+use crate::system::InputQuantity;
+use serde::{Deserialize, Serialize};
+
+/// Level of a verdict.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VerdictLevel {
+    /// All tests passed: the estimates and their intervals can be used.
+    Adequate,
+    /// A reason limits the estimates or needs an engineer's judgement.
+    Check,
+    /// The estimates are not those of the system.
+    Inadequate,
+}
+
+/// A reason of a verdict.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum VerdictReason {
+    /// The fit failed or no parameters satisfy the constraints.
+    Failed {
+        /// Status at the end.
+        status: Status,
+    },
+    /// The optimum identifies no system.
+    NoSystem {
+        /// The reason.
+        #[serde(skip)]
+        reason: Unidentified,
+    },
+    /// The model does not explain the samples.
+    PoorFit {
+        /// Fit of the worst channel, per cent.
+        fit_percent: f64,
+    },
+    /// The residuals are a multiple of the stated sigma.
+    BeyondSigma {
+        /// Root of the reduced chi-square.
+        times: f64,
+    },
+    /// The error of the time steps exceeds the residuals.
+    CoarseSteps {
+        /// Change by halving the step, relative to the root-mean-square residual.
+        times: f64,
+    },
+    /// The fit ended before it converged.
+    NotConverged {
+        /// Status at the end.
+        status: Status,
+    },
+    /// The residuals show a term that the model does not have.
+    MissingTerm(MissingTerm),
+    /// Two modes vibrate in a record.
+    SecondMode {
+        /// Their frequencies, Hz, the stronger first.
+        frequencies: [f64; 2],
+    },
+    /// Many samples equal the largest one.
+    Saturation {
+        /// Name of the channel.
+        channel: String,
+    },
+    /// The residuals are those of errors of a measured input, or of a missing term.
+    DisturbedInput {
+        /// Name of the experiment.
+        experiment: String,
+        /// The input.
+        input: InputQuantity,
+    },
+    /// The residuals contradict the stated sigma of an input.
+    ContradictedInputSigma {
+        /// Name of the experiment.
+        experiment: String,
+        /// The input.
+        input: InputQuantity,
+    },
+    /// The force is negligible beside the inertia force.
+    NegligibleForce {
+        /// Name of the experiment.
+        experiment: String,
+    },
+    /// A finer basis fits significantly better.
+    CoarseBasis {
+        /// Name of the function.
+        function: String,
+    },
+    /// Residuals that are not white after the noise model.
+    ColouredResiduals,
+    /// A gap in the records in which a function is not identified.
+    Gap {
+        /// The gap, s.
+        span: [f64; 2],
+    },
+    /// Other frequencies match the samples as well.
+    Aliased {
+        /// Samples per period.
+        per_period: f64,
+    },
+    /// A mass or a stiffness is negative at most times.
+    Negative {
+        /// Name of the function.
+        function: String,
+    },
+    /// A validation record is not predicted.
+    NotPredicted {
+        /// Name of the record.
+        experiment: String,
+        /// Fit of its worst channel, per cent.
+        fit_percent: f64,
+    },
+    /// Functions that the samples do not identify, or only at some times.
+    NotIdentified {
+        /// Names of the functions.
+        functions: Vec<String>,
+    },
+    /// Fewer parameter combinations are identifiable than parameters are estimated.
+    RankDeficient {
+        /// Largest number of identifiable combinations.
+        rank_bound: usize,
+        /// Number of parameters.
+        parameters: usize,
+    },
+    /// Without a measured force the samples determine ratios to the mass only.
+    OnlyRatios {
+        /// Names of the functions that the model fixes; none where constraints or penalties determine the scale.
+        fixed: Vec<String>,
+    },
+    /// The equation error neglects the noise of the response, which biases its estimates.
+    EquationError,
+}
+
+impl VerdictReason {
+    /// Level of the reason.
+    pub fn level(&self) -> VerdictLevel {
+        match self {
+            Self::Failed { .. }
+            | Self::NoSystem { .. }
+            | Self::PoorFit { .. }
+            | Self::BeyondSigma { .. }
+            | Self::CoarseSteps { .. } => VerdictLevel::Inadequate,
+            _ => VerdictLevel::Check,
+        }
+    }
+}
+
+/// Level of a verdict with these reasons.
+pub fn verdict_level(reasons: &[VerdictReason]) -> VerdictLevel {
+    let levels = reasons.iter().map(VerdictReason::level);
+    levels.max().unwrap_or(VerdictLevel::Adequate)
+}
+
+/// Reasons from a fit and its assessment, those of the highest level first; `None` for the assessment of an equation error. Those from the
+/// data and from validation records are added by the application.
+pub fn verdict_reasons(
+    problem: &Problem,
+    fit: &Fit,
+    assessment: Option<&FitAssessment>,
+) -> Vec<VerdictReason> {
+    let mut reasons = Vec::new();
+    reasons.extend(ending(fit.outcome.status));
+    if let Some(assessment) = assessment {
+        let plausibility = &assessment.plausibility;
+        match &plausibility.unidentified {
+            Some(Unidentified::Failed) => {}
+            Some(reason) => reasons.push(VerdictReason::NoSystem {
+                reason: reason.clone(),
+            }),
+            None => {
+                let warnings = plausibility.warnings.iter();
+                reasons.extend(warnings.filter_map(|w| of_warning(problem, fit, w)));
+                reasons.extend(of_classifications(&assessment.classifications));
+                let is_classified = !assessment.classifications.is_empty();
+                reasons.extend(of_rank(problem, is_classified));
+            }
+        }
+    } else {
+        reasons.push(VerdictReason::EquationError);
+    }
+    if !reasons.iter().any(is_rank) {
+        reasons.extend(of_scale(problem));
+    }
+    reasons.sort_by_key(|reason| std::cmp::Reverse(reason.level()));
+    reasons
+}
+
+fn ending(status: Status) -> Option<VerdictReason> {
+    match status {
+        Status::Converged | Status::Completed => None,
+        Status::Failed | Status::Infeasible => Some(VerdictReason::Failed { status }),
+        _ => Some(VerdictReason::NotConverged { status }),
+    }
+}
+
+fn of_warning(problem: &Problem, fit: &Fit, warning: &FitWarning) -> Option<VerdictReason> {
+    Some(match warning {
+        FitWarning::BeyondSigma { times } => VerdictReason::BeyondSigma { times: *times },
+        FitWarning::CoarseSteps { times } => VerdictReason::CoarseSteps { times: *times },
+        FitWarning::PoorFit => VerdictReason::PoorFit {
+            fit_percent: worst_fit(problem, fit),
+        },
+        FitWarning::Coloured { .. } => VerdictReason::ColouredResiduals,
+        FitWarning::Correlated => return None,
+        FitWarning::Aliased { per_period, .. } => VerdictReason::Aliased {
+            per_period: *per_period,
+        },
+        FitWarning::CoarseBasis(coarse) => VerdictReason::CoarseBasis {
+            function: coarse.function.clone(),
+        },
+        FitWarning::Gap(gap) => VerdictReason::Gap {
+            span: open_gap(gap)?,
+        },
+        FitWarning::DisturbedInput {
+            experiment, input, ..
+        } => VerdictReason::DisturbedInput {
+            experiment: experiment.clone(),
+            input: *input,
+        },
+        FitWarning::ContradictedInputSigma {
+            experiment, input, ..
+        } => VerdictReason::ContradictedInputSigma {
+            experiment: experiment.clone(),
+            input: *input,
+        },
+        FitWarning::MissingTerm(term) => VerdictReason::MissingTerm(*term),
+        FitWarning::Negative { function } if function == CoefficientKind::Damping.name() => {
+            return None;
+        }
+        FitWarning::Negative { function } => VerdictReason::Negative {
+            function: function.clone(),
+        },
+        FitWarning::NegligibleForce { experiment } => VerdictReason::NegligibleForce {
+            experiment: experiment.clone(),
+        },
+    })
+}
+
+/// Span of a gap in which a function is not identified by the samples.
+fn open_gap(gap: &GapAssessment) -> Option<[f64; 2]> {
+    let is_open = gap.functions.iter().any(|f| f.status != GapStatus::Identified);
+    is_open.then_some(gap.span)
+}
+
+/// Fit of the worst channel, per cent.
+fn worst_fit(problem: &Problem, fit: &Fit) -> f64 {
+    let channels = problem.predicted(&fit.best.evaluation);
+    let fits = channels.map(|(channel, predicted)| {
+        crate::objective::diagnostics(channel, predicted).fit_percent
+    });
+    fits.fold(100.0, f64::min)
+}
+
+fn of_classifications(classifications: &[FunctionClassification]) -> Option<VerdictReason> {
+    let is_open = |c: &&FunctionClassification| {
+        matches!(
+            c.verdict,
+            Classification::NotIdentified | Classification::PartlyIdentified(_)
+        )
+    };
+    let open = classifications.iter().filter(is_open);
+    let functions: Vec<String> = open.map(|c| c.name.clone()).collect();
+    (!functions.is_empty()).then_some(VerdictReason::NotIdentified { functions })
+}
+
+fn is_rank(reason: &VerdictReason) -> bool {
+    matches!(reason, VerdictReason::RankDeficient { .. })
+}
+
+/// Rank deficiency by the structural rank, for models without classifications.
+fn of_rank(problem: &Problem, is_classified: bool) -> Option<VerdictReason> {
+    let rank = structural_rank(problem);
+    let is_deficient = rank.rank_bound < rank.parameters && !is_classified;
+    is_deficient.then_some(VerdictReason::RankDeficient {
+        rank_bound: rank.rank_bound,
+        parameters: rank.parameters,
+    })
+}
+
+fn of_scale(problem: &Problem) -> Option<VerdictReason> {
+    match scale_source(problem) {
+        ScaleSource::Force | ScaleSource::KnownValue => None,
+        ScaleSource::Fixed(fixed) => Some(VerdictReason::OnlyRatios { fixed }),
+        ScaleSource::Model => Some(VerdictReason::OnlyRatios { fixed: Vec::new() }),
+    }
+}

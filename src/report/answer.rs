@@ -1,0 +1,188 @@
+//! The answer of a fit as a table: estimates with their confidence intervals, units and status.
+
+use super::document::ResultDocument;
+use crate::number_format::{resolved, significant};
+use kmcfit_core::internals::assessment::{Estimate, EstimateStatus};
+use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::internals::identifiability::ClassificationKind;
+
+/// A row of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AnswerRow {
+    /// Name in `estimates` of the result document.
+    pub key: String,
+    /// Quantity in words, with its symbol.
+    pub quantity: String,
+    /// Mean over the record.
+    pub estimate: String,
+    /// 95 % confidence interval of the mean; empty without one.
+    pub interval: String,
+    /// Unit; empty if dimensionless.
+    pub unit: String,
+    /// How it was obtained, and its range over the record.
+    pub status: String,
+}
+
+/// The rows of the answer: natural frequency and damping ratio, then the coefficients; with ratios only the ratios to the mass before what the
+/// model assumes.
+pub fn answer(document: &ResultDocument) -> Vec<AnswerRow> {
+    let is_scaled = (document.estimates.0.iter())
+        .any(|(_, estimate)| estimate.status == EstimateStatus::OnlyAsRatio);
+    let is_shown = |name: &str| is_scaled || !matches!(name, "k_over_m" | "c_over_m");
+    let rows = document.estimates.0.iter();
+    let rows = rows.filter(|(name, _)| is_shown(name));
+    rows.map(|(name, estimate)| row(document, name, estimate)).collect()
+}
+
+fn row(document: &ResultDocument, name: &str, estimate: &Estimate) -> AnswerRow {
+    let function = document.functions.get(name);
+    let is_open = function.is_some_and(|f| f.verdict == Some(ClassificationKind::NotIdentified));
+    let [mut value, mut interval] = numbers(estimate);
+    let mut status = vec![status(document, estimate)];
+    if let Some(range) = estimate.range.and_then(range_in_words) {
+        status.push(format!("mean; {range} over the record"));
+    }
+    if is_negligible(document, name) {
+        value = "0".to_owned();
+        interval.clear();
+        status.truncate(1);
+    } else if function.is_some_and(|f| f.at_bound) {
+        status.push("at its bound".to_owned());
+    }
+    if is_open {
+        status = vec!["not identifiable".to_owned()];
+        value.clear();
+        interval.clear();
+    }
+    let details = status.split_off(1).join("; ");
+    AnswerRow {
+        key: name.to_owned(),
+        quantity: quantity(name),
+        estimate: value,
+        interval,
+        unit: estimate.unit.clone(),
+        status: match details.is_empty() {
+            true => status.concat(),
+            false => format!("{} ({details})", status.concat()),
+        },
+    }
+}
+
+/// Estimate and interval with the digits that the interval resolves; four digits without one.
+fn numbers(estimate: &Estimate) -> [String; 2] {
+    match estimate.ci95 {
+        _ if !estimate.value.is_finite() => [String::new(), String::new()],
+        Some([low, high]) => {
+            let numbers = resolved([estimate.value, low, high], 0.5 * (high - low));
+            let [value, low, high] = numbers;
+            match low == high {
+                // Exact to the last digit.
+                true => [value, String::new()],
+                false => [value, format!("{low} to {high}")],
+            }
+        }
+        None => [significant(estimate.value, 4), String::new()],
+    }
+}
+
+/// A range with at least three digits, as many as distinguish its ends; `None` for ends that are equal to six digits.
+fn range_in_words([low, high]: [f64; 2]) -> Option<String> {
+    let ends = |digits| [low, high].map(|x| significant(x, digits));
+    let [low, high] = (3..=6).map(ends).find(|[low, high]| low != high)?;
+    Some(format!("{low} to {high}"))
+}
+
+/// True for a function that is zero to machine precision, and for its ratios.
+fn is_negligible(document: &ResultDocument, name: &str) -> bool {
+    let function = match name {
+        "damping_ratio" | "c_over_m" => "damping",
+        "natural_frequency" | "k_over_m" => "stiffness",
+        name => name,
+    };
+    (document.functions.get(function)).is_some_and(|function| function.negligible)
+}
+
+fn status(document: &ResultDocument, estimate: &Estimate) -> String {
+    match estimate.status {
+        EstimateStatus::Estimated if !estimate.value.is_finite() => "not defined".to_owned(),
+        EstimateStatus::Estimated => "estimated".to_owned(),
+        EstimateStatus::Fixed => match others_scale(document) {
+            true => "fixed; the others scale with it".to_owned(),
+            false => "fixed".to_owned(),
+        },
+        EstimateStatus::OnlyAsRatio => match fixed_name(document) {
+            Some(name) => format!("scales with the fixed {name}"),
+            None => "only as ratio".to_owned(),
+        },
+    }
+}
+
+fn others_scale(document: &ResultDocument) -> bool {
+    fixed_name(document).is_some()
+}
+
+/// Name of the fixed function that determines the scale of all others.
+fn fixed_name(document: &ResultDocument) -> Option<&str> {
+    let estimates = || document.estimates.0.iter();
+    let scaled = estimates().any(|(_, e)| e.status == EstimateStatus::OnlyAsRatio);
+    let is_fixed = |(name, e): &&(String, Estimate)| {
+        e.status == EstimateStatus::Fixed && e.value != 0.0 && document.functions.contains_key(name)
+    };
+    let mut fixed = estimates().filter(is_fixed);
+    let first = fixed.next().filter(|_| scaled);
+    match fixed.next() {
+        None => first.map(|(name, _)| name.as_str()),
+        Some(_) => None,
+    }
+}
+
+/// A quantity in words: `stiffness k`, `damping c of first`.
+pub fn quantity(name: &str) -> String {
+    let ratio = match name {
+        "natural_frequency" => "natural frequency",
+        "damping_ratio" => "damping ratio",
+        "k_over_m" => "stiffness / mass",
+        "c_over_m" => "damping / mass",
+        _ => "",
+    };
+    if !ratio.is_empty() {
+        return ratio.to_owned();
+    }
+    let (first, owner) = match name.split_once(" of ") {
+        Some((first, owner)) if first != "known part" => (first, format!(" of {owner}")),
+        _ => (name, String::new()),
+    };
+    let kind = CoefficientKind::ALL.into_iter().find(|k| k.name() == first);
+    match kind {
+        Some(kind) => format!("{} {}{owner}", first.replace('_', " "), kind.symbol()),
+        None => name.replace('_', " "),
+    }
+}
+
+/// The table as text.
+pub fn answer_table(document: &ResultDocument) -> String {
+    let rows = answer(document);
+    let widths = |of: &dyn Fn(&AnswerRow) -> &str, heading: &str| {
+        let cells = rows.iter().map(|row| of(row).chars().count());
+        cells.chain([heading.chars().count()]).max().unwrap_or(0)
+    };
+    let quantity = widths(&|r| &r.quantity, "");
+    let estimate = widths(&|r| &r.estimate, "estimate");
+    let interval = widths(&|r| &r.interval, "95 % CI");
+    let unit = widths(&|r| &r.unit, "unit");
+    let line = |[q, e, i, u, s]: [&str; 5]| {
+        let text = format!("{q:<quantity$}  {e:>estimate$}  {i:<interval$}  {u:<unit$}  {s}");
+        text.trim_end().to_owned() + "\n"
+    };
+    let mut text = line(["", "estimate", "95 % CI", "unit", "status"]);
+    for row in &rows {
+        text += &line([
+            &row.quantity,
+            &row.estimate,
+            &row.interval,
+            &row.unit,
+            &row.status,
+        ]);
+    }
+    text
+}

@@ -1,0 +1,247 @@
+//! Verdict on a fit in words: its level and its reasons, each a clause of one line.
+
+use super::document::Estimates;
+use super::fit_assessment::ValidationRecord;
+use super::run::FittedModel;
+use super::suggestions::percent;
+use crate::finding::Finding;
+use crate::number_format::{significant, times_in_words};
+use kmcfit_core::internals::assessment::{
+    VerdictLevel, VerdictReason, estimates, verdict_level, verdict_reasons,
+};
+use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::internals::solvers::Status;
+use serde::{Deserialize, Serialize};
+
+/// Verdict on a fit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Level: the worst of the reasons.
+    pub level: VerdictLevel,
+    /// Reasons, the most important first; for `adequate` none.
+    pub reasons: Vec<Finding>,
+    /// Tests that the fit passed, as one clause.
+    pub passed: String,
+}
+
+impl FittedModel<'_> {
+    /// Verdict on the fit: reasons from its assessment, the data and the validation records.
+    pub(super) fn verdict(&self) -> Verdict {
+        let problem = &self.model.problem;
+        let assessment = self.run_assessment.assessment.as_ref();
+        let mut reasons = verdict_reasons(problem, self.fit, assessment);
+        let missing = self.run_assessment.missing_terms.iter();
+        reasons.extend(missing.map(|term| VerdictReason::MissingTerm(*term)));
+        reasons.extend(self.model.warnings.iter().filter_map(of_data));
+        let poor = self.run_assessment.validation.iter();
+        let poor = poor.filter_map(ValidationRecord::poor);
+        reasons.extend(poor.map(|(name, fit_percent)| VerdictReason::NotPredicted {
+            experiment: name.to_owned(),
+            fit_percent,
+        }));
+        reasons.sort_by_key(|reason| std::cmp::Reverse(reason.level()));
+        Verdict {
+            level: verdict_level(&reasons),
+            reasons: reasons.iter().map(reason_in_words).collect(),
+            passed: self.passed(),
+        }
+    }
+
+    /// The tests that a fit without reasons passed.
+    fn passed(&self) -> String {
+        let problem = &self.model.problem;
+        let orders = problem.channels().filter_map(|c| c.correlation());
+        let order = orders.map(|correlation| correlation.order()).max();
+        let noise = match order {
+            Some(order) if order > 0 => format!(" (AR({order}) noise model)"),
+            _ => String::new(),
+        };
+        let residuals = match problem.channels().all(|c| c.weighting().is_sigma()) {
+            true => format!("residuals are white{noise}; "),
+            false => String::new(),
+        };
+        let bases = match self.model.tests_bases {
+            true => "step-size, refinement and missing-term checks passed",
+            false => "step-size check passed",
+        };
+        residuals + bases
+    }
+
+    /// Estimates of the fit; none where it failed.
+    pub(super) fn estimates(&self) -> Estimates {
+        let status = self.fit.outcome.status;
+        if matches!(status, Status::Failed | Status::Infeasible) {
+            return Estimates::default();
+        }
+        let problem = &self.model.problem;
+        let mut found = estimates(problem, self.fit, self.bands());
+        for ((_, estimate), function) in (found.iter_mut())
+            .filter(|(name, _)| !is_ratio(name))
+            .zip(problem.functions.iter())
+        {
+            self.unit(function).clone_into(&mut estimate.unit);
+        }
+        Estimates(found)
+    }
+}
+
+/// True for the ratios among the estimates.
+fn is_ratio(name: &str) -> bool {
+    matches!(
+        name,
+        "natural_frequency" | "damping_ratio" | "k_over_m" | "c_over_m"
+    )
+}
+
+/// Reason from a warning about the data.
+fn of_data(warning: &Finding) -> Option<VerdictReason> {
+    let text = |name: &str| Some(warning.quantities.get(name)?.as_str()?.to_owned());
+    match warning.kind.as_str() {
+        "two_modes" => {
+            let frequencies = warning.quantities.get("frequencies")?.as_array()?;
+            let frequencies: Vec<f64> = frequencies.iter().filter_map(|f| f.as_f64()).collect();
+            Some(VerdictReason::SecondMode {
+                frequencies: frequencies.try_into().ok()?,
+            })
+        }
+        "saturation" => Some(VerdictReason::Saturation {
+            channel: text("channel")?,
+        }),
+        _ => None,
+    }
+}
+
+impl Verdict {
+    /// The verdict and its reasons, one on each line: `Check       no force is measured: ...`.
+    pub fn lines(&self) -> String {
+        let reasons = Finding::texts(&self.reasons);
+        let lines = match reasons.is_empty() {
+            true => vec![self.passed.clone()],
+            false => reasons,
+        };
+        let level = level_in_words(self.level);
+        let line = |(i, line): (usize, &String)| {
+            let level = if i == 0 { level } else { "" };
+            format!("{level:<11}{line}")
+        };
+        let lines: Vec<String> = lines.iter().enumerate().map(line).collect();
+        lines.join("\n")
+    }
+}
+
+/// A level as a word.
+pub fn level_in_words(level: VerdictLevel) -> &'static str {
+    match level {
+        VerdictLevel::Adequate => "Adequate",
+        VerdictLevel::Check => "Check",
+        VerdictLevel::Inadequate => "Inadequate",
+    }
+}
+
+/// A missing term with its article.
+pub fn term_in_words(term: CoefficientKind) -> &'static str {
+    match term {
+        CoefficientKind::Offset => "a static force",
+        CoefficientKind::CoulombFriction => "Coulomb friction",
+        CoefficientKind::QuadraticDamping => "quadratic damping",
+        CoefficientKind::CubicStiffness => "a cubic stiffness",
+        other => other.name(),
+    }
+}
+
+/// A reason as a clause.
+pub fn reason_in_words(reason: &VerdictReason) -> Finding {
+    let text = match reason {
+        VerdictReason::Failed { status } => format!("the fit ended {}", status.name()),
+        VerdictReason::NoSystem { reason } => super::findings::unidentified(reason).text,
+        VerdictReason::PoorFit { fit_percent } => format!(
+            "fit {}: the residuals are large and autocorrelated",
+            percent(*fit_percent, 0)
+        ),
+        VerdictReason::BeyondSigma { times } => {
+            format!("the residuals are {} times sigma", times_in_words(*times))
+        }
+        VerdictReason::CoarseSteps { times } => format!(
+            "the error of the time steps is {} times the residuals",
+            times_in_words(*times)
+        ),
+        VerdictReason::NotConverged { status } => {
+            format!("the fit ended before it converged ({})", status.name())
+        }
+        VerdictReason::MissingTerm(missing) => format!(
+            "the residuals show {} that the model does not have",
+            term_in_words(missing.term)
+        ),
+        VerdictReason::SecondMode {
+            frequencies: [first, second],
+        } => format!(
+            "the record has a second mode at {} Hz beside that at {} Hz",
+            significant(*second, 3),
+            significant(*first, 3)
+        ),
+        VerdictReason::Saturation { channel } => {
+            format!("the {channel} saturates: many samples equal the largest one")
+        }
+        VerdictReason::DisturbedInput { experiment, .. } => format!(
+            "a disturbance enters through the equation of motion of {experiment}: force sensor, unmeasured drive or missing term"
+        ),
+        VerdictReason::ContradictedInputSigma { experiment, input } => format!(
+            "the residuals contradict the stated sigma of the {} of {experiment}",
+            input.name().replace('_', " ")
+        ),
+        VerdictReason::NegligibleForce { experiment } => {
+            format!("the force of {experiment} is negligible beside the inertia force")
+        }
+        VerdictReason::CoarseBasis { function } => {
+            format!("the {function} varies more than its basis allows")
+        }
+        VerdictReason::ColouredResiduals => {
+            "the residuals are autocorrelated beyond the noise model".to_owned()
+        }
+        VerdictReason::Gap { span } => {
+            let [from, to] = span.map(|time| significant(time, 4));
+            format!("the records have a gap from {from} to {to} s")
+        }
+        VerdictReason::Aliased { per_period } => format!(
+            "aliasing: with {per_period:.1} samples per period other frequencies fit equally well"
+        ),
+        VerdictReason::Negative { function } => {
+            format!("the {function} is negative at most times")
+        }
+        VerdictReason::NotPredicted {
+            experiment,
+            fit_percent,
+        } => format!(
+            "validation record {experiment} is not predicted (fit {})",
+            percent(*fit_percent, 0)
+        ),
+        VerdictReason::NotIdentified { functions } => format!(
+            "the samples do not identify {} at all times",
+            and_list(functions)
+        ),
+        VerdictReason::RankDeficient {
+            rank_bound,
+            parameters,
+        } => format!("at most {rank_bound} of {parameters} parameter combinations are identifiable"),
+        VerdictReason::OnlyRatios { fixed } => match fixed.is_empty() {
+            true => "no force is measured: the samples determine ratios to the mass only".to_owned(),
+            false => format!(
+                "no force is measured: the samples determine ratios only, with the {} fixed by the model",
+                and_list(fixed)
+            ),
+        },
+        VerdictReason::EquationError => {
+            "the equation error neglects the noise of the response, which biases the estimates".to_owned()
+        }
+    };
+    Finding::of(reason, text)
+}
+
+/// `a, b and c`.
+fn and_list(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
