@@ -6,6 +6,9 @@ use kmcfit_core::internals::assessment::{Estimate, EstimateStatus};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::ClassificationKind;
 
+/// Half-width of an interval, relative to the estimate, below which it is not printed: samples without noise.
+const EXACT: f64 = 1e-7;
+
 /// A row of the table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnswerRow {
@@ -15,7 +18,7 @@ pub struct AnswerRow {
     pub quantity: String,
     /// Mean over the record.
     pub estimate: String,
-    /// 95 % confidence interval of the mean; empty without one.
+    /// 95 % confidence interval of the mean; empty without one, and where its half-width is below 1e-7 of the estimate.
     pub interval: String,
     /// Unit; empty if dimensionless.
     pub unit: String,
@@ -72,15 +75,12 @@ fn row(document: &ResultDocument, name: &str, estimate: &Estimate) -> AnswerRow 
 fn numbers(estimate: &Estimate) -> [String; 2] {
     match estimate.ci95 {
         _ if !estimate.value.is_finite() => [String::new(), String::new()],
-        Some([low, high]) => {
+        Some([low, high]) if 0.5 * (high - low) > EXACT * estimate.value.abs() => {
             let numbers = resolved([estimate.value, low, high], 0.5 * (high - low));
             let [value, low, high] = numbers;
-            match low == high {
-                // Exact to the last digit.
-                true => [value, String::new()],
-                false => [value, format!("{low} to {high}")],
-            }
+            [value, format!("{low} to {high}")]
         }
+        Some(_) => [significant(estimate.value, 7), String::new()],
         None => [significant(estimate.value, 4), String::new()],
     }
 }

@@ -408,3 +408,55 @@ fn intervals_of_the_equation_error() {
     let conditional = conditional.filter(|w| w["condition"] == "negligible-noise");
     assert_eq!(conditional.count(), 6);
 }
+
+/// Every interval of `result.json` is computed again from `parameters.json` alone: covariance, gradient, quantile.
+#[test]
+fn intervals_follow_from_the_parameters() {
+    let bench = Workbench::with_shipped_models();
+    for (model, least) in [("duffing", 6), ("accelerometer", 6), ("hammer-and-shaker", 5)] {
+        let path = format!("models/{model}.yaml");
+        bench.run_to(0, &["fit", &path, "--out", "out", "--no-report"]);
+        let read = |name: &str| -> Value {
+            serde_json::from_str(&bench.read(name)).expect("a document")
+        };
+        let (result, parameters) = (read("out/result.json"), read("out/parameters.json"));
+        let number = |value: &Value| value.as_f64().expect("a number");
+        let list = |value: &Value| -> Vec<f64> {
+            value.as_array().expect("a list").iter().map(number).collect()
+        };
+        let covariance = parameters["covariance"].as_array().expect("a matrix");
+        let covariance: Vec<Vec<f64>> = covariance.iter().map(list).collect();
+        let names = parameters["names"].as_array().expect("names");
+        assert_eq!(names.len(), covariance.len());
+        assert_eq!(list(&parameters["values"]).len(), covariance.len());
+        let half = |name: &str| {
+            let error = &parameters["estimates"][name];
+            let gradient = list(&error["gradient"]);
+            let rows = gradient.iter().zip(&covariance);
+            let square: f64 = rows
+                .map(|(a, row)| a * row.iter().zip(&gradient).map(|(c, b)| c * b).sum::<f64>())
+                .sum();
+            number(&error["quantile"]) * (square + number(&error["basis_error"]).powi(2)).sqrt()
+        };
+        let estimates = result["estimates"].as_object().expect("a map");
+        let mut compared = 0;
+        for (name, estimate) in estimates {
+            let Some(interval) = estimate["ci95"].as_array() else {
+                continue;
+            };
+            let [low, high] = [0, 1].map(|i| number(&interval[i]));
+            let (found, stated) = (half(name), 0.5 * (high - low));
+            // The difference of the ends has a rounding error of their size.
+            let rounding = 1e-15 * low.abs().max(high.abs());
+            assert!((found - stated).abs() < 1e-9 * stated + rounding, "{model}: {name} {found} {stated}");
+            compared += 1;
+        }
+        for parameter in result["nuisance_parameters"].as_array().into_iter().flatten() {
+            let name = parameter["name"].as_str().expect("a name");
+            let error = number(&parameter["standard_error"]);
+            let stated = error * number(&parameters["estimates"][name]["quantile"]);
+            assert!((half(name) / stated - 1.0).abs() < 1e-6, "{model}: {name}");
+        }
+        assert!(compared >= least, "{model}: {compared}");
+    }
+}

@@ -143,7 +143,7 @@ fn suggestions_improve_the_fit() {
             "{summary}"
         );
         let run = Run::open(bench.path("runs/model")).expect("a run");
-        let first = run.document.suggestions.first().expect("a suggestion");
+        let first = run.document.advice.first().expect("a suggestion");
         assert_eq!(first.kind, "pattern");
         assert_eq!(first.quantities["channel"], "displacement");
         let pattern = first.quantities["pattern"].clone();

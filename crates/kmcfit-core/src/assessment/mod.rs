@@ -90,6 +90,14 @@ impl FitAssessment {
             bands: None,
             classifications: Vec::new(),
         };
+        let plausibility = &assessment.plausibility;
+        if tests_bases && plausibility.unidentified.is_none() {
+            let is_noise = plausibility.errors_hold && !plausibility.is_coloured;
+            let is_modelled = is_noise && !plausibility.is_disturbed;
+            let missing = missing_term(problem, &best.parameters, &best.evaluation, is_modelled);
+            let missing = missing.map(FitWarning::MissingTerm);
+            assessment.plausibility.warnings.extend(missing);
+        }
         let mut gaps = Vec::new();
         if reports_errors && assessment.plausibility.errors_hold {
             let settings = BandSettings {
@@ -107,11 +115,6 @@ impl FitAssessment {
             condition_on_bases(problem, &mut assessment.classifications, &test.doubtful);
             if assessment.plausibility.is_disturbed {
                 condition_on_inputs(&mut assessment.classifications);
-            }
-            if tests_bases && !assessment.plausibility.is_disturbed {
-                let missing = missing_term(problem, theta, evaluation);
-                let missing = missing.map(FitWarning::MissingTerm);
-                assessment.plausibility.warnings.extend(missing);
             }
             gaps = gap_assessments(problem, fit, Some(&bands));
             for gap in &gaps {

@@ -8,14 +8,14 @@
 //! p = -z^T e / z^T z,    t = p sqrt(z^T z) / s,    s^2 = (e^T e - p^2 z^T z) / (n - q - 1)
 //! ```
 //!
-//! is the estimate after one step of Gauss and Newton from the fit, without a refit (Rao 1948). Where the innovations of a channel are not
-//! white the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
+//! is the estimate after one step of Gauss and Newton from the fit, without a refit (Rao 1948). Where the noise model does not describe the
+//! residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
 
 use super::refinement::applies;
 use crate::functions::{CoefficientFunction, CoefficientKind, CoefficientSet, Parameterization};
 use crate::identifiability::Factorisation;
 use crate::noise::KernelCovariance;
-use crate::objective::Evaluation;
+use crate::objective::{Evaluation, diagnostics};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::ScoreCovariance;
 use crate::simd::sum::rms;
@@ -28,21 +28,28 @@ use nalgebra::{DMatrix, DVector};
 const WIDTH: f64 = 0.01;
 /// Smallest `|t|` of a missing term: of 4000 standard normal numbers one has a larger value by chance.
 const SIGNIFICANT: f64 = 4.5;
+/// Fit of a channel, per cent, below which a fit is not near the system, and a linearisation in further terms says nothing.
+const UNRELATED: f64 = 50.0;
 /// Fewest samples per parameter.
 const SAMPLES_PER_PARAMETER: usize = 4;
 /// Part of a candidate's derivatives outside the span of the model's below which it is no candidate.
 const APART: f64 = 1e-6;
 
 /// The most significant missing term at the optimum `theta`; `None` where the residuals show none, and where the test does not apply: without a
-/// likelihood, at an active constraint, for residuals at machine precision, and with few samples or many parameters.
+/// likelihood, at an active constraint, for residuals at machine precision or as large as the response, and with few samples or many
+/// parameters. `is_modelled` is true for residuals that the noise model describes.
 pub(super) fn missing_term(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
+    is_modelled: bool,
 ) -> Option<MissingTerm> {
     let is_few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
     let is_long = problem.sample_count() >= SAMPLES_PER_PARAMETER * problem.parameters();
     (is_few && is_long && applies(problem, theta, evaluation)).then_some(())?;
+    let mut fits = (problem.predicted(evaluation))
+        .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent);
+    fits.all(|fit| fit > UNRELATED).then_some(())?;
     let kinds = candidates(problem, evaluation);
     (!kinds.is_empty()).then_some(())?;
     let (extended, at) = extended(problem, theta, &kinds)?;
@@ -57,7 +64,7 @@ pub(super) fn missing_term(
     let model = Span::of(&jacobian.select_columns(&own));
     let tests = kinds.iter().enumerate().filter_map(|(i, (kind, term))| {
         let column = jacobian.column(first + i).into_owned();
-        let (value, t) = model.test(&extended, &column, &residuals)?;
+        let (value, t) = model.test(&extended, &column, &residuals, is_modelled)?;
         let share = (value * force(&evaluation, *term)).abs()
             / largest_force(problem, &evaluation);
         Some(MissingTerm {
@@ -148,6 +155,7 @@ impl Span {
         problem: &Problem,
         column: &DVector<f64>,
         residuals: &DVector<f64>,
+        is_modelled: bool,
     ) -> Option<(f64, f64)> {
         let (z, e) = (self.orthogonal(column), self.orthogonal(residuals));
         let square = z.norm_squared();
@@ -156,7 +164,7 @@ impl Span {
         let rest = &e + value * &z;
         let estimated = (self.basis.ncols() + 1) as f64;
         let is_kernel = |c: &crate::record::Channel| c.noise().scores == ScoreCovariance::Kernel;
-        let variance = match problem.channels().any(is_kernel) {
+        let variance = match !is_modelled || problem.channels().any(is_kernel) {
             true => {
                 let scores = DMatrix::from_columns(&[z.component_mul(&rest)]);
                 let found = KernelCovariance::of(&scores, &problem.channel_samples(), estimated)?;

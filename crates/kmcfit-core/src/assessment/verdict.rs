@@ -181,7 +181,11 @@ pub fn verdict_reasons(
                 reason: reason.clone(),
             }),
             None => {
-                let warnings = plausibility.warnings.iter();
+                // A missing term explains other reasons.
+                let is_term = |w: &&FitWarning| matches!(w, FitWarning::MissingTerm(_));
+                let (terms, others): (Vec<_>, Vec<_>) =
+                    plausibility.warnings.iter().partition(is_term);
+                let warnings = terms.into_iter().chain(others);
                 reasons.extend(warnings.filter_map(|w| of_warning(problem, fit, w)));
                 reasons.extend(of_classifications(&assessment.classifications));
                 let is_classified = !assessment.classifications.is_empty();
