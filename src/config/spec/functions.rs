@@ -16,11 +16,21 @@ keys! {
         stiffness: FunctionSpec, example "{fixed: 1.0}", unit "N/m";
         /// Cubic stiffness k3(t), with the force k3 y^3.
         cubic_stiffness: Option<FunctionSpec>,
+        /// Quadratic stiffness k2(t), with the force k2 y^2: the asymmetric part of a spring.
+        quadratic_stiffness: Option<FunctionSpec>,
+            example "{basis: constant, start: 0.0}",
+            unit "N/m^2",
+            default "none";
             example "{basis: constant, start: 0.0}",
             unit "N/m^3",
             default "none";
         /// Quadratic damping c2(t), with the force c2 |y'| y'.
         quadratic_damping: Option<FunctionSpec>,
+        /// Quintic stiffness k5(t), with the force k5 y^5.
+        quintic_stiffness: Option<FunctionSpec>,
+            example "{basis: constant, start: 0.0}",
+            unit "N/m^5",
+            default "none";
             example "{basis: constant, start: 0.0}",
             unit "N s^2/m^2",
             default "none";
@@ -45,8 +55,12 @@ keys! {
         stiffness: Option<FunctionSpec>, example "{basis: constant, start: 1.0}", unit "N/m";
         /// Cubic stiffness, with the force k3 y^3.
         cubic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^3";
+        /// Quadratic stiffness, with the force k2 y^2.
+        quadratic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^2";
         /// Quadratic damping, with the force c2 |y'| y'.
         quadratic_damping: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N s^2/m^2";
+        /// Quintic stiffness, with the force k5 y^5.
+        quintic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^5";
         /// Coulomb friction, with the force f y'/sqrt(y'^2 + width^2).
         coulomb_friction: Option<FunctionSpec>, example "{basis: constant, start: 0.5, width: 0.01}", unit "N";
         /// Static force, which acts against positive y.
@@ -190,8 +204,12 @@ choice! {
         /// Cubic stiffness.
         CubicStiffness = "cubic_stiffness",
         /// Quadratic damping.
+        /// Quadratic stiffness.
+        QuadraticStiffness = "quadratic_stiffness",
         QuadraticDamping = "quadratic_damping",
         /// Coulomb friction.
+        /// Quintic stiffness.
+        QuinticStiffness = "quintic_stiffness",
         CoulombFriction = "coulomb_friction",
         /// Static force.
         Offset = "static_force",
