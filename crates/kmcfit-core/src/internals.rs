@@ -79,7 +79,7 @@ pub mod signal {
     pub use crate::signal::{
         ExcitationShape, Interpolation, SecondOrder, Signal, Spectrum, SweepLaw, band_pass,
         clipped, decimate, decimation_filter, even_spacing, high_pass, low_pass, median,
-        median_spacing, onset, two_modes,
+        median_spacing, onset, two_forced_modes, two_modes,
     };
 }
 pub mod simd {
