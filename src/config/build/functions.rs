@@ -6,7 +6,7 @@ use crate::config::spec::{
     self as config, Basis, ColumnSpec, FunctionSpec, PenaltyKind, WeightRule,
 };
 use crate::config::values::{
-    Bound, Count, KnotSpec, Number, NumberOrColumn, StartSpec, Text, Weight,
+    Bound, Count, FrictionWidth, KnotSpec, Number, NumberOrColumn, StartSpec, Text, Weight,
 };
 use crate::error::InputError;
 use kmcfit_core::internals::builder::{
@@ -125,8 +125,8 @@ pub(super) fn specification(
         )?);
     }
     Ok(match given.width {
-        Some(width) => spec.width(width.0),
-        None => spec,
+        Some(FrictionWidth::Number(width)) => spec.width(width.0),
+        Some(FrictionWidth::Auto) | None => spec,
     })
 }
 

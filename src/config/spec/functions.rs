@@ -3,7 +3,9 @@
 use crate::config::alternatives::OneOrList;
 use crate::config::choice::choice;
 use crate::config::map::keys;
-use crate::config::values::{Bound, Count, KnotSpec, Number, NumberOrColumn, StartSpec, Weight};
+use crate::config::values::{
+    Bound, Count, FrictionWidth, KnotSpec, NumberOrColumn, StartSpec, Weight,
+};
 
 keys! {
     /// Coefficient functions of the system; mass, damping and stiffness are required.
@@ -14,23 +16,23 @@ keys! {
         damping: FunctionSpec, example "{basis: constant, start: 1.0}", unit "N s/m";
         /// Stiffness k(t), with the force k y.
         stiffness: FunctionSpec, example "{fixed: 1.0}", unit "N/m";
-        /// Cubic stiffness k3(t), with the force k3 y^3.
-        cubic_stiffness: Option<FunctionSpec>,
         /// Quadratic stiffness k2(t), with the force k2 y^2: the asymmetric part of a spring.
         quadratic_stiffness: Option<FunctionSpec>,
             example "{basis: constant, start: 0.0}",
             unit "N/m^2",
             default "none";
+        /// Cubic stiffness k3(t), with the force k3 y^3.
+        cubic_stiffness: Option<FunctionSpec>,
             example "{basis: constant, start: 0.0}",
             unit "N/m^3",
             default "none";
-        /// Quadratic damping c2(t), with the force c2 |y'| y'.
-        quadratic_damping: Option<FunctionSpec>,
         /// Quintic stiffness k5(t), with the force k5 y^5.
         quintic_stiffness: Option<FunctionSpec>,
             example "{basis: constant, start: 0.0}",
             unit "N/m^5",
             default "none";
+        /// Quadratic damping c2(t), with the force c2 |y'| y'.
+        quadratic_damping: Option<FunctionSpec>,
             example "{basis: constant, start: 0.0}",
             unit "N s^2/m^2",
             default "none";
@@ -53,14 +55,14 @@ keys! {
         damping: Option<FunctionSpec>, example "{basis: constant, start: 1.0}", unit "N s/m";
         /// Stiffness k(t) of this experiment.
         stiffness: Option<FunctionSpec>, example "{basis: constant, start: 1.0}", unit "N/m";
-        /// Cubic stiffness, with the force k3 y^3.
-        cubic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^3";
         /// Quadratic stiffness, with the force k2 y^2.
         quadratic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^2";
-        /// Quadratic damping, with the force c2 |y'| y'.
-        quadratic_damping: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N s^2/m^2";
+        /// Cubic stiffness, with the force k3 y^3.
+        cubic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^3";
         /// Quintic stiffness, with the force k5 y^5.
         quintic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^5";
+        /// Quadratic damping, with the force c2 |y'| y'.
+        quadratic_damping: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N s^2/m^2";
         /// Coulomb friction, with the force f y'/sqrt(y'^2 + width^2).
         coulomb_friction: Option<FunctionSpec>, example "{basis: constant, start: 0.5, width: 0.01}", unit "N";
         /// Static force, which acts against positive y.
@@ -119,12 +121,13 @@ keys! {
             default "none",
             needs "`basis`";
         /// For Coulomb friction: velocity over which its sign is smoothed, well below the peak velocity of the
-        /// response.
-        width: Option<Number>,
+        /// response. `auto`: first a fiftieth of the root-mean-square velocity of the record, then reduced until half of it
+        /// shifts no estimate by more than a tenth of a standard error.
+        width: Option<FrictionWidth>,
             example "0.01",
             unit "m/s",
             range "greater than 0",
-            needs "coulomb_friction, which requires it";
+            needs "coulomb_friction, which requires it; `auto` also a record";
     }
 }
 
@@ -201,15 +204,15 @@ choice! {
         Damping = "damping",
         /// Stiffness k(t).
         Stiffness = "stiffness",
-        /// Cubic stiffness.
-        CubicStiffness = "cubic_stiffness",
-        /// Quadratic damping.
         /// Quadratic stiffness.
         QuadraticStiffness = "quadratic_stiffness",
-        QuadraticDamping = "quadratic_damping",
-        /// Coulomb friction.
+        /// Cubic stiffness.
+        CubicStiffness = "cubic_stiffness",
         /// Quintic stiffness.
         QuinticStiffness = "quintic_stiffness",
+        /// Quadratic damping.
+        QuadraticDamping = "quadratic_damping",
+        /// Coulomb friction.
         CoulombFriction = "coulomb_friction",
         /// Static force.
         Offset = "static_force",

@@ -3,12 +3,14 @@
 mod channel;
 mod constants;
 mod equation_error;
+mod friction_width;
 mod function;
 mod gaps;
 mod input_disturbance;
 mod plausibility;
 mod recovery;
 mod refinement;
+mod residual_mean;
 mod statistics;
 mod step_check;
 
@@ -24,6 +26,7 @@ pub use refinement::{BasisTest, CoarseBasis};
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
 
+use friction_width::width_warning;
 use gaps::gap_assessments;
 
 use crate::identifiability::{
@@ -117,6 +120,8 @@ impl FitAssessment {
             }
             let warnings = test.coarse.into_iter().map(FitWarning::CoarseBasis);
             assessment.plausibility.warnings.extend(warnings);
+            let width = width_warning(problem, theta, evaluation);
+            assessment.plausibility.warnings.extend(width);
             assessment
                 .degrees_of_freedom
                 .clone_from(&bands.degrees_of_freedom);

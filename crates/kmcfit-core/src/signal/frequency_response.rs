@@ -138,6 +138,9 @@ mod tests {
     /// A mode: frequency (Hz), damping ratio and participation factor.
     type Mode = [f64; 3];
 
+    /// Factor of the stiffness at a share of the record.
+    type Variation = fn(f64) -> f64;
+
     /// Broadband force, or a sweep from 0.3 to 5 Hz.
     fn force(seed: u64) -> Vec<f64> {
         let duration = SPACING * SAMPLES as f64;
@@ -157,7 +160,7 @@ mod tests {
         seed: u64,
         force: &[f64],
         modes: &[Mode],
-        stiffness: fn(f64) -> f64,
+        stiffness: Variation,
         cubic: f64,
     ) -> Vec<f64> {
         let h = SPACING / SUBSTEPS as f64;
@@ -206,7 +209,7 @@ mod tests {
     /// two.
     #[test]
     fn one_mode_is_one_mode() {
-        let kinds: [(fn(f64) -> f64, f64); 4] = [
+        let kinds: [(Variation, f64); 4] = [
             (|_| 1.0, 0.0),
             (|x| 1.0 + 0.3 * (TAU * x).sin(), 0.0),
             (|x| if x < 0.5 { 1.0 } else { 1.5 }, 0.0),
