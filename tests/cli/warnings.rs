@@ -320,7 +320,8 @@ fn a_mean_of_the_residuals_is_reported() {
     let model = starter("{nodes: 801}", sigma).replace("39", "3.8");
     bench.write("model.yaml", &model);
     let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report"]);
-    let said = "the residuals of the displacement of experiment 1 have a mean of 0.48 standard deviations";
+    let said =
+        "the residuals of the displacement of experiment 1 have a mean of 0.48 standard deviations";
     assert!(summary.contains(said), "{summary}");
     let remedy = "sensors: {displacement: {offset: estimate}}";
     let advice = format!(

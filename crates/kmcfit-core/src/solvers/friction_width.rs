@@ -160,8 +160,8 @@ fn largest_shift<T>(found: &RefinedFit<T>) -> Option<f64> {
     Some(in_errors.filter(|x| !x.is_nan()).fold(0.0, f64::max))
 }
 
-/// The next width for a `shift` by half the present one: at least that of stable steps on the most nodes; `None` where this is no
-/// smaller one.
+/// The next width for a `shift` by half the present one: at least that of stable steps on the most nodes; `None` where that is not
+/// smaller.
 fn narrow_width<T>(found: &RefinedFit<T>, width: f64, shift: f64, most: usize) -> Option<f64> {
     let [least, largest] = FACTORS;
     let wanted = width / (shift / AIM).clamp(least, largest);
