@@ -1,12 +1,13 @@
-//! Fits of models: with their noise, the weights chosen by a rule, and finer grids where the number of nodes is automatic.
+//! Fits of models: with their noise, the weights chosen by a rule, finer grids where the number of nodes is automatic, and smaller
+//! widths of Coulomb friction where the width is.
 
 use crate::config::{AutomaticGrid, Model, WeightSearch};
 use crate::finding::Finding;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::simulate::SimulationError;
 use kmcfit_core::internals::solvers::{
-    Fit, GridNotice, Observer, WeightPath, choose_weight_watched, fit_on_refined_grids,
-    fit_with_noise_watched,
+    Fit, GridNotice, Observer, OnNodes, WeightPath, WidthNotice, choose_weight_watched,
+    fit_on_reduced_widths, fit_on_refined_grids, fit_with_noise_watched,
 };
 
 /// A fit, and the model as fitted.
@@ -27,7 +28,8 @@ pub fn fit_model(model: &Model, watch: &mut Observer) -> Result<ModelFit, Simula
     let start = model.problem.functions.start();
     let mut run =
         |problem: &Problem, start: &[f64], watch: &mut Observer| run(model, problem, start, watch);
-    let Some(most) = model.grid.as_ref().map(AutomaticGrid::most) else {
+    let grid = model.grid.as_ref();
+    if grid.is_none() && !model.reduces_width {
         let (weights, problem, fit) = run(&model.problem, &start, watch)?;
         let model = Model {
             problem,
@@ -38,9 +40,21 @@ pub fn fit_model(model: &Model, watch: &mut Observer) -> Result<ModelFit, Simula
             weights,
             fit,
         });
+    }
+    let nodes = model.problem.system.grid.nodes();
+    let most = grid.map_or(nodes, AutomaticGrid::most);
+    let mut on_nodes = |least| match grid {
+        Some(_) => Some(model.on_nodes(least)?.problem),
+        None => (least <= nodes).then(|| model.problem.clone()),
     };
-    let mut on_nodes = |least| Some(model.on_nodes(least)?.problem);
-    let found = fit_on_refined_grids(&model.problem, &start, most, &mut on_nodes, &mut run, watch)?;
+    let (problem, on_nodes) = (&model.problem, &mut on_nodes as &mut OnNodes);
+    let (found, widths) = match model.reduces_width {
+        true => fit_on_reduced_widths(problem, &start, most, on_nodes, &mut run, watch)?,
+        false => {
+            let found = fit_on_refined_grids(problem, &start, most, on_nodes, &mut run, watch)?;
+            (found, Vec::new())
+        }
+    };
     let nodes = found.problem.system.grid.nodes();
     let is_same = nodes == model.problem.system.grid.nodes();
     let refined = (!is_same).then(|| model.on_nodes(nodes)).flatten();
@@ -52,6 +66,12 @@ pub fn fit_model(model: &Model, watch: &mut Observer) -> Result<ModelFit, Simula
         match notice {
             GridNotice::GridRefined { .. } => model.automatic.push(Finding::stated(&notice)),
             GridNotice::GridLimited { .. } => model.warnings.push(Finding::stated(&notice)),
+        }
+    }
+    for notice in widths {
+        match notice {
+            WidthNotice::WidthReduced { .. } => model.automatic.push(Finding::stated(&notice)),
+            WidthNotice::WidthLimited { .. } => model.warnings.push(Finding::stated(&notice)),
         }
     }
     Ok(ModelFit {

@@ -19,7 +19,7 @@ use kmcfit_core::internals::record::ScoreCovariance;
 use kmcfit_core::internals::simulate::{Cause, SimulationError};
 use kmcfit_core::internals::solvers::{
     ConditionFailure, GridNotice, MissingMeasurement, MissingTerm, Reason, Status,
-    UnsupportedRecord,
+    UnsupportedRecord, WidthNotice,
 };
 use kmcfit_core::internals::study::multistart::MultistartFinding;
 use kmcfit_core::internals::system::InputQuantity;
@@ -70,6 +70,12 @@ fn messages() {
     section(
         &mut list,
         "Notices on an automatic grid",
+        all.iter().map(|n| shown(n)),
+    );
+    let all = width_notices();
+    section(
+        &mut list,
+        "Notices on an automatic width of Coulomb friction",
         all.iter().map(|n| shown(n)),
     );
     let all = statuses().into_iter().map(|s| s.name().to_owned());
@@ -660,6 +666,13 @@ fn gap(other_counts: usize) -> GapAssessment {
     }
 }
 
+fn width_notices() -> Vec<WidthNotice> {
+    samples![
+        WidthNotice::WidthReduced { .. } => WidthNotice::WidthReduced { from: 0.01, width: 2.5e-4, nodes: 48_001, shift: 0.062 },
+        WidthNotice::WidthLimited { .. } => WidthNotice::WidthLimited { width: 5e-5, nodes: 480_001, shift: 0.34 },
+    ]
+}
+
 fn fit_warnings() -> Vec<FitWarning> {
     let mut all = samples![
         FitWarning::BeyondSigma { .. } => FitWarning::BeyondSigma { times: 7.5 },
@@ -679,6 +692,18 @@ fn fit_warnings() -> Vec<FitWarning> {
         FitWarning::MissingTerm(_) => FitWarning::MissingTerm(MissingTerm {
             term: CoefficientKind::QuadraticDamping, value: 0.352, t: 21.5, share: 0.031,
         }),
+        FitWarning::ResidualMean { .. } => FitWarning::ResidualMean {
+            experiment: "shaker".into(), channel: "acceleration".into(), mean: 0.021, t: 12.3, share: 0.42, or_static_force: false,
+        },
+        FitWarning::ResidualMean { .. } => FitWarning::ResidualMean {
+            experiment: "free decay".into(), channel: "displacement".into(), mean: -3e-4, t: -25.1, share: -0.81, or_static_force: true,
+        },
+        FitWarning::FrictionWidth { .. } => FitWarning::FrictionWidth {
+            estimate: "damping".into(), shift: Some(-8.25), unit: "N s/m".into(), errors: 2.14, width: 0.01,
+        },
+        FitWarning::FrictionWidth { .. } => FitWarning::FrictionWidth {
+            estimate: "stiffness".into(), shift: None, unit: String::new(), errors: 0.83, width: 0.01,
+        },
         FitWarning::Negative { .. } => FitWarning::Negative { function: "stiffness".into() },
         FitWarning::NegligibleForce { .. } => FitWarning::NegligibleForce { experiment: "shaker".into() },
     ];
@@ -852,6 +877,13 @@ fn suggestions() -> Vec<Suggestion> {
         Suggestion::StateInputSigma { .. } => Suggestion::StateInputSigma { input: "force".into(), sigma: 0.701 },
         Suggestion::OutliersLimited { .. } => Suggestion::OutliersLimited { channel: channel(), fit: 71.0 },
         Suggestion::AddTerm { .. } => Suggestion::AddTerm { term: CoefficientKind::CoulombFriction, start: 4.125 },
+        Suggestion::EstimateOffset { .. } => Suggestion::EstimateOffset {
+            channel: "acceleration".into(), experiment: "shaker".into(), or_static_force: false,
+        },
+        Suggestion::EstimateOffset { .. } => Suggestion::EstimateOffset {
+            channel: channel(), experiment: "free decay".into(), or_static_force: true,
+        },
+        Suggestion::NarrowFriction => Suggestion::NarrowFriction,
         Suggestion::FinerBasis { .. } => Suggestion::FinerBasis { function: "stiffness".into() },
         Suggestion::MoreParameters { .. } => Suggestion::MoreParameters { absent: vec!["cubic", "friction"] },
         Suggestion::Constant { .. } => Suggestion::Constant { function: "damping".into(), p_value: 0.62 },

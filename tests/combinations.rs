@@ -18,9 +18,11 @@ const BASES: [&str; 6] = [
     "basis: polynomial, degree: 2",
     "basis: b-spline, knots: 4",
 ];
-const TERMS: [&str; 5] = [
+const TERMS: [&str; 7] = [
     "",
+    "quadratic_stiffness: {basis: constant, start: 0.1}",
     "cubic_stiffness: {basis: constant, start: 0.1}",
+    "quintic_stiffness: {basis: constant, start: 0.1}",
     "quadratic_damping: {basis: constant, start: 0.1}",
     "coulomb_friction: {basis: constant, start: 0.05, width: 0.1}",
     "static_force: {basis: constant, start: 0.1}",
@@ -133,7 +135,9 @@ fn every_basis_of_every_function_ends_by_name() {
     let functions = [
         ("mass", "1.3", ""),
         ("damping", "0.3", ""),
+        ("quadratic_stiffness", "0.1", ""),
         ("cubic_stiffness", "0.1", ""),
+        ("quintic_stiffness", "0.1", ""),
         ("quadratic_damping", "0.1", ""),
         ("coulomb_friction", "0.05", ", width: 0.1"),
         ("static_force", "0.1", ""),

@@ -203,14 +203,22 @@ fn can_be_studied(file: &ModelFile, model: &Model) -> Result<(), InputError> {
     }
 }
 
-/// The model on the grid of a fit; `None` if it cannot be built.
+/// The model on the grid of a fit, with its width of Coulomb friction; `None` if it cannot be built.
 fn on_grid_of(model: &Arc<Model>, fit: &StudiedFit) -> Option<Arc<Model>> {
-    if fit.nodes == model.problem.system.grid.nodes() {
+    let system = &model.problem.system;
+    let is_same_grid = fit.nodes == system.grid.nodes();
+    if is_same_grid && fit.friction_width == system.friction_width() {
         return Some(Arc::clone(model));
     }
-    let finer = model.on_nodes(fit.nodes)?;
-    finer.check_study_memory().ok()?;
-    (finer.problem.system.grid.nodes() == fit.nodes).then(|| Arc::new(finer))
+    let mut found = match is_same_grid {
+        true => Model::clone(model),
+        false => model.on_nodes(fit.nodes)?,
+    };
+    found.check_study_memory().ok()?;
+    if let Some(width) = fit.friction_width {
+        found = found.with_friction_width(width);
+    }
+    (found.problem.system.grid.nodes() == fit.nodes).then(|| Arc::new(found))
 }
 
 /// The journal of the fit within a study. A resumed study without one starts its fit over.

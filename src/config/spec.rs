@@ -341,8 +341,12 @@ keys! {
         damping: Option<Text>, example "my_column", unit "N s/m", default "damping_N_s_per_m";
         /// Column of the stiffness.
         stiffness: Option<Text>, example "my_column", unit "N/m", default "stiffness_N_per_m";
+        /// Column of the quadratic stiffness.
+        quadratic_stiffness: Option<Text>, example "my_column", unit "N/m^2";
         /// Column of the cubic stiffness.
         cubic_stiffness: Option<Text>, example "my_column", unit "N/m^3";
+        /// Column of the quintic stiffness.
+        quintic_stiffness: Option<Text>, example "my_column", unit "N/m^5";
         /// Column of the quadratic damping.
         quadratic_damping: Option<Text>, example "my_column", unit "N s^2/m^2";
         /// Column of the Coulomb friction.

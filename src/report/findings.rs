@@ -197,7 +197,9 @@ pub fn warning(warning: &FitWarning) -> Finding {
                 CoefficientKind::Offset => "a static force",
                 CoefficientKind::CoulombFriction => "Coulomb friction",
                 CoefficientKind::QuadraticDamping => "quadratic damping",
+                CoefficientKind::QuadraticStiffness => "a quadratic stiffness",
                 CoefficientKind::CubicStiffness => "a cubic stiffness",
+                CoefficientKind::QuinticStiffness => "a quintic stiffness",
                 other => other.name(),
             },
             missing.term.name(),
@@ -206,6 +208,40 @@ pub fn warning(warning: &FitWarning) -> Finding {
             significant(missing.t, 2),
             super::suggestions::percent(100.0 * missing.share, 1),
         ),
+        FitWarning::ResidualMean {
+            experiment,
+            channel,
+            t,
+            share,
+            or_static_force,
+            ..
+        } => format!(
+            "the residuals of the {channel} of {experiment} have a mean of {} standard deviations (t = {}): {}",
+            significant(*share, 2),
+            significant(*t, 2),
+            match or_static_force {
+                true => "an offset of the sensor or a static force",
+                false => "an offset of the sensor",
+            }
+        ),
+        FitWarning::FrictionWidth {
+            estimate,
+            shift,
+            unit,
+            errors,
+            width,
+            ..
+        } => {
+            let errors = significant(*errors, 2);
+            let shift = match shift {
+                Some(shift) => format!("{} {unit} ({errors} standard errors)", significant(*shift, 2)),
+                None => format!("{errors} standard errors"),
+            };
+            format!(
+                "the estimates depend on the width of Coulomb friction: half of {} m/s shifts the {estimate} by {shift}",
+                significant(*width, 3)
+            )
+        }
         FitWarning::Negative { function } => {
             format!("the {function} is negative at most times: the system is not passive")
         }

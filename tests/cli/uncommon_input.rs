@@ -70,6 +70,36 @@ fn models() {
                 "stiffness: {basis: nodal, start: 1.0}\n  coulomb_friction: {basis: constant, start: 0.1, width: 0}",
             )],
         ),
+        changed(
+            "fit",
+            &[(DAMPING, "{basis: constant, start: 1.0, width: auto}")],
+        ),
+        changed(
+            "fit",
+            &[(
+                STIFFNESS,
+                "stiffness: {basis: nodal, start: 1.0}\n  coulomb_friction: {basis: constant, start: 0.1, width: atuo}",
+            )],
+        ),
+        changed(
+            "simulate",
+            &[
+                (DATA, ""),
+                (COLUMNS, ""),
+                ("method: midpoint", "method: midpoint, duration: 2.0"),
+                (
+                    STIFFNESS,
+                    "stiffness: {basis: nodal, start: 1.0}\n  coulomb_friction: {fixed: 0.1, width: auto}",
+                ),
+            ],
+        ),
+        changed(
+            "fit",
+            &[(
+                STIFFNESS,
+                "stiffness: {basis: nodal, start: 1.0}\n  quintic: {fixed: 0.1}",
+            )],
+        ),
         changed("fit", &[("method: lbfgs", "method: lbfgs\n  qp: clarabel")]),
         changed(
             "fit",
@@ -229,6 +259,16 @@ fn roles_of_experiments() {
             "fit",
             &[
                 ("grid: {nodes: 21", &second(friction)),
+                (STIFFNESS, &shared),
+            ],
+        ),
+        changed(
+            "fit",
+            &[
+                (
+                    "grid: {nodes: 21",
+                    &second(&friction.replace("0.2}}", "auto}}")),
+                ),
                 (STIFFNESS, &shared),
             ],
         ),

@@ -299,19 +299,87 @@ fn nodes_are_not_chosen_for_noise() {
     assert!((2e3..8e3).contains(&nodes), "{notes}");
 }
 
-/// A laser at a stand-off distance: the samples oscillate about an offset.
-#[test]
-fn a_displacement_with_an_offset_gets_an_estimated_offset() {
-    let bench = Workbench::empty();
+/// A table with a number added to its second column.
+fn shifted(table: &str, offset: f64) -> String {
     let far = |row: &str| match row.split_once(',') {
         Some((t, y)) => match y.parse::<f64>() {
-            Ok(y) => format!("{t},{}\n", y + 5.0),
+            Ok(y) => format!("{t},{}\n", y + offset),
             Err(_) => format!("{row}\n"),
         },
         None => String::new(),
     };
-    let record: String = ring_down(20, 1e-2).lines().map(far).collect();
-    bench.write("record.csv", &record);
+    table.lines().map(far).collect()
+}
+
+/// An offset of half the standard deviation of the noise is a warning, and its suggestion removes it.
+#[test]
+fn a_mean_of_the_residuals_is_reported() {
+    let bench = Workbench::empty();
+    bench.write("record.csv", &shifted(&ring_down(20, 1e-3), 3e-4));
+    let sigma = "    sigma: {displacement: estimate}\n";
+    let model = starter("{nodes: 801}", sigma).replace("39", "3.8");
+    bench.write("model.yaml", &model);
+    let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report"]);
+    let said =
+        "the residuals of the displacement of experiment 1 have a mean of 0.48 standard deviations";
+    assert!(summary.contains(said), "{summary}");
+    let remedy = "sensors: {displacement: {offset: estimate}}";
+    let advice = format!(
+        "Suggestions     displacement of experiment 1: estimate the offset of the sensor (`{remedy}`) or, nearly equivalent, \
+         a static force (`static_force: {{basis: constant, start: 0.0}}` under `functions`)\n"
+    );
+    assert!(summary.contains(&advice), "{summary}");
+    for (place, change) in [
+        (sigma, format!("{sigma}    {remedy}\n")),
+        (
+            "fit: {",
+            "  static_force: {basis: constant, start: 0.0}\nfit: {".to_owned(),
+        ),
+    ] {
+        bench.write("model.yaml", &model.replace(place, &change));
+        let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report"]);
+        assert!(!summary.contains("have a mean"), "{summary}");
+    }
+}
+
+/// Two modes under a measured force are a warning before the fit.
+#[test]
+fn two_modes_of_a_forced_record_are_reported() {
+    let bench = Workbench::empty();
+    let modes = [[1.0, 0.03], [2.6, 0.03]].map(|[frequency, ratio]: [f64; 2]| {
+        let omega = std::f64::consts::TAU * frequency;
+        [omega * omega, 2.0 * ratio * omega]
+    });
+    let step = 0.0025;
+    let mut states = [[0.0f64; 2]; 2];
+    let mut rows = String::new();
+    for i in 0..160_000u32 {
+        let force = pseudo_random(i / 20);
+        if i % 20 == 0 {
+            let y: f64 = states.iter().map(|[y, _]| y).sum();
+            rows += &format!("{},{force},{y}\n", step * f64::from(i));
+        }
+        for ([k, c], [y, v]) in modes.iter().zip(&mut states) {
+            *v += step * (force - c * *v - k * *y);
+            *y += step * *v;
+        }
+    }
+    bench.write("record.csv", &format!("t_s,F_N,y_m\n{rows}"));
+    let columns = "    columns: {displacement: y_m, force: F_N}\n    force: {interpolation: hold}\n    \
+                   sigma: {displacement: estimate}\n";
+    bench.write("model.yaml", &starter("{nodes: auto}", columns));
+    let (_, _, notes) = bench.run(&["check", "model.yaml", "--no-gradient"]);
+    assert!(
+        notes.contains("two modes vibrate in the displacement, at 1 and 2.6"),
+        "{notes}"
+    );
+}
+
+/// A laser at a stand-off distance: the samples oscillate about an offset.
+#[test]
+fn a_displacement_with_an_offset_gets_an_estimated_offset() {
+    let bench = Workbench::empty();
+    bench.write("record.csv", &shifted(&ring_down(20, 1e-2), 5.0));
     bench.run_to(0, &["init", "record.csv"]);
     let model = bench.read("record.yaml");
     assert!(

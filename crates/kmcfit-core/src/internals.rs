@@ -80,7 +80,7 @@ pub mod signal {
     pub use crate::signal::{
         ExcitationShape, Interpolation, SecondOrder, Signal, Spectrum, SweepLaw, band_pass,
         clipped, decimate, decimation_filter, even_spacing, high_pass, low_pass, median,
-        median_spacing, onset, two_modes,
+        median_spacing, onset, two_forced_modes, two_modes,
     };
 }
 pub mod simd {
@@ -97,12 +97,13 @@ pub mod solvers {
     pub use crate::solvers::{
         ActiveGroup, Attempt, BoundedValue, CheckpointStore, CheckpointUnit, ConditionFailure,
         CycleCount, ExactF64s, Fit, FitSettings, Gap, GridNotice, Initial, IterationEvent,
-        IterationRecord, Measurements, MissingMeasurement, MissingTerm, Observer, Optimality,
-        PathPoint, QpSolver, Reason, Solver, SolverState, StartProjection, StartStrategy, Status,
-        Stopping, UnsupportedRecord, WeightPath, active_constraints, choose_weight,
-        choose_weight_watched, cycles, equation_error, equation_rows, estimate_states, fit,
-        fit_from, fit_on_refined_grids, fit_with_noise, fit_with_noise_watched, missing_terms,
-        no_response, number_or_nan, predict_validation, timed,
+        IterationRecord, Measurements, MissingMeasurement, MissingTerm, Observer, OnNodes,
+        Optimality, PathPoint, QpSolver, Reason, Solver, SolverState, StartProjection,
+        StartStrategy, Status, Stopping, UnsupportedRecord, WeightPath, WidthNotice,
+        active_constraints, choose_weight, choose_weight_watched, cycles, equation_error,
+        equation_rows, estimate_states, fit, fit_from, fit_on_reduced_widths, fit_on_refined_grids,
+        fit_with_noise, fit_with_noise_watched, missing_terms, no_response, number_or_nan,
+        predict_validation, timed,
     };
 }
 pub mod study {

@@ -21,12 +21,22 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const WIDTH: f64 = 0.3;
-const TERMS: [(Response, Term, CoefficientKind); 6] = [
+const TERMS: [(Response, Term, CoefficientKind); 8] = [
     (Response::Damping, Term::Damping, CoefficientKind::Damping),
     (
         Response::Stiffness,
         Term::Stiffness,
         CoefficientKind::Stiffness,
+    ),
+    (
+        Response::QuadraticSpring,
+        Term::QuadraticStiffness,
+        CoefficientKind::QuadraticStiffness,
+    ),
+    (
+        Response::Quintic,
+        Term::QuinticStiffness,
+        CoefficientKind::QuinticStiffness,
     ),
     (
         Response::Cubic,
@@ -92,6 +102,8 @@ fn case(method: Method, nodes: usize, seed: u64) -> Case {
     let ranges = [
         (-0.5, 2.0),
         (-1.0, 5.0),
+        (-0.5, 0.5),
+        (-0.02, 0.05),
         (-0.5, 1.0),
         (-0.5, 1.0),
         (-1.0, 1.0),

@@ -551,6 +551,14 @@ fn several_experiments_share_functions_and_have_some_of_their_own() {
 fn each_nonlinear_term() {
     let others = [
         (
+            Term::QuadraticStiffness,
+            constant(CoefficientKind::QuadraticStiffness, 0.5, 0.0),
+        ),
+        (
+            Term::QuinticStiffness,
+            constant(CoefficientKind::QuinticStiffness, 0.3, 0.0),
+        ),
+        (
             Term::CubicStiffness,
             constant(CoefficientKind::CubicStiffness, 1.4, 0.0),
         ),
@@ -631,7 +639,9 @@ fn all_together() {
         terms: vec![
             Term::Damping,
             Term::Stiffness,
+            Term::QuadraticStiffness,
             Term::CubicStiffness,
+            Term::QuinticStiffness,
             Term::QuadraticDamping,
             Term::CoulombFriction { width: WIDTH },
             Term::Offset,
@@ -644,7 +654,9 @@ fn all_together() {
         functions: vec![
             damping(),
             stiffness(),
+            constant(CoefficientKind::QuadraticStiffness, 0.3, 0.0),
             constant(CoefficientKind::CubicStiffness, 0.8, 0.5),
+            constant(CoefficientKind::QuinticStiffness, 0.1, 0.0),
             constant(CoefficientKind::QuadraticDamping, 0.1, 0.0),
             constant(CoefficientKind::CoulombFriction, 0.2, 0.0),
             constant(CoefficientKind::Offset, -0.3, 0.0),

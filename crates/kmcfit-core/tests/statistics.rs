@@ -226,6 +226,17 @@ fn a_cubic_stiffness() {
 }
 
 #[test]
+fn a_quintic_stiffness() {
+    let mut setup = Setup::free(ChannelKind::Displacement);
+    setup
+        .terms
+        .push((Term::QuinticStiffness, CoefficientKind::QuinticStiffness));
+    setup.truth.push(0.8);
+    setup.start.push(Some(0.5));
+    setup.check("c, k, quintic k");
+}
+
+#[test]
 fn a_force_that_gives_the_mass() {
     let mut setup = Setup::forced(ChannelKind::Velocity);
     setup.start[0] = Some(1.2);

@@ -6,8 +6,8 @@ use crate::config::spec::{
     self as config, Basis, ColumnSpec, FunctionSpec, PenaltyKind, WeightRule,
 };
 use crate::config::values::{
-    Bound, Count, KnotSpec, KnownValue, KnownValueMap, Number, NumberOrColumn, StartSpec, Text,
-    Weight,
+    Bound, Count, FrictionWidth, KnotSpec, KnownValue, KnownValueMap, Number, NumberOrColumn,
+    StartSpec, Text, Weight,
 };
 use crate::error::InputError;
 use kmcfit_core::internals::builder::{
@@ -28,7 +28,9 @@ macro_rules! by_kind {
             CoefficientKind::Mass => Option::from(&$map.mass),
             CoefficientKind::Damping => Option::from(&$map.damping),
             CoefficientKind::Stiffness => Option::from(&$map.stiffness),
+            CoefficientKind::QuadraticStiffness => $map.quadratic_stiffness.as_ref(),
             CoefficientKind::CubicStiffness => $map.cubic_stiffness.as_ref(),
+            CoefficientKind::QuinticStiffness => $map.quintic_stiffness.as_ref(),
             CoefficientKind::QuadraticDamping => $map.quadratic_damping.as_ref(),
             CoefficientKind::CoulombFriction => $map.coulomb_friction.as_ref(),
             CoefficientKind::Offset => $map.static_force.as_ref(),
@@ -127,8 +129,8 @@ pub(super) fn specification(
         spec = spec.known_part(known(file, grid, &format!("{key}.known_part"), part)?);
     }
     Ok(match given.width {
-        Some(width) => spec.width(width.0),
-        None => spec,
+        Some(FrictionWidth::Number(width)) => spec.width(width.0),
+        Some(FrictionWidth::Auto) | None => spec,
     })
 }
 

@@ -3,6 +3,7 @@
 mod constraints;
 mod experiments;
 mod fit;
+mod friction;
 mod functions;
 mod grid;
 mod on_grid;
@@ -22,6 +23,7 @@ use crate::error::{InputError, Location};
 use crate::finding::Finding;
 use crate::memory;
 use kmcfit_core::internals::builder::{BuildError, Builder, Contradiction, listed};
+use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{FitSettings, Solver, timed};
 use kmcfit_core::internals::system::{Grid, NodalCoefficients, State};
@@ -61,6 +63,8 @@ pub struct Model {
     pub warnings: Vec<Finding>,
     /// Automatic choices, such as the number of nodes.
     pub automatic: Vec<Finding>,
+    /// True if a fit reduces the width of Coulomb friction.
+    pub reduces_width: bool,
     /// The automatic grid of a fit, which may be refined; `None` for a stated number of nodes.
     pub grid: Option<AutomaticGrid>,
     /// Source files.
@@ -129,6 +133,7 @@ fn builder(
     grid: &Grid,
     solver: Solver,
     records: Vec<Option<experiments::RawRecord>>,
+    automatic_width: Option<f64>,
 ) -> Result<(Builder, Vec<Vec<ChannelNote>>), InputError> {
     let is_limited =
         mode == BuildMode::Fit && matches!(solver, Solver::GaussNewton | Solver::ProjectedGradient);
@@ -136,6 +141,11 @@ fn builder(
     let shared = shared.map(|given| {
         let key = format!("functions.{}", given.0.name());
         let spec = functions::specification(file, grid, &key, given, is_limited)?;
+        let width = automatic_width.filter(|_| given.0 == CoefficientKind::CoulombFriction);
+        let spec = match width {
+            Some(width) => spec.width(width),
+            None => spec,
+        };
         Ok((given.0, spec))
     });
     let shared = shared.collect::<Result<_, _>>()?;
@@ -222,7 +232,8 @@ fn build_on(file: &ModelFile, mode: BuildMode, least: usize) -> Result<Model, In
     let choice = grid::build(file, mode, &records, least, &mut automatic)?;
     let grid = choice.grid;
     let solver = fit::solver(file)?;
-    let (builder, notes) = builder(file, mode, &grid, solver, records)?;
+    let automatic_width = friction::automatic_width(file, &records)?;
+    let (builder, notes) = builder(file, mode, &grid, solver, records, automatic_width)?;
     let about = |error| input_error(file, error);
     let mut built = builder.lower().map_err(about)?;
     let searches =
@@ -273,6 +284,7 @@ fn build_on(file: &ModelFile, mode: BuildMode, least: usize) -> Result<Model, In
         predictions: spec.predict.iter().flatten().map(state).collect(),
         warnings,
         automatic,
+        reduces_width: automatic_width.is_some() && solver != Solver::EquationError,
         grid: AutomaticGrid::of(file, mode, solver, choice.finer),
         source,
         preparation: Preparation {
@@ -287,6 +299,16 @@ fn build_on(file: &ModelFile, mode: BuildMode, least: usize) -> Result<Model, In
 const STUDY_PER_NODE: u64 = 8000;
 
 impl Model {
+    /// The model with another width of Coulomb friction, m/s.
+    #[must_use]
+    pub fn with_friction_width(self, width: f64) -> Self {
+        let problem = (self.problem).with(|parts| parts.system.set_friction_width(width));
+        Self {
+            problem: problem.expect("a width changes no number of nodes or functions"),
+            ..self
+        }
+    }
+
     /// Refuses a study whose memory is not available.
     ///
     /// # Errors

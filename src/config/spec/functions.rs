@@ -3,7 +3,9 @@
 use crate::config::alternatives::OneOrList;
 use crate::config::choice::choice;
 use crate::config::map::keys;
-use crate::config::values::{Bound, Count, KnotSpec, KnownValue, Number, NumberOrColumn, StartSpec, Weight};
+use crate::config::values::{
+    Bound, Count, FrictionWidth, KnotSpec, KnownValue, NumberOrColumn, StartSpec, Weight,
+};
 
 keys! {
     /// Coefficient functions of the system; mass, damping and stiffness are required.
@@ -14,10 +16,20 @@ keys! {
         damping: FunctionSpec, example "{basis: constant, start: 1.0}", unit "N s/m";
         /// Stiffness k(t), with the force k y.
         stiffness: FunctionSpec, example "{fixed: 1.0}", unit "N/m";
+        /// Quadratic stiffness k2(t), with the force k2 y^2: the asymmetric part of a spring.
+        quadratic_stiffness: Option<FunctionSpec>,
+            example "{basis: constant, start: 0.0}",
+            unit "N/m^2",
+            default "none";
         /// Cubic stiffness k3(t), with the force k3 y^3.
         cubic_stiffness: Option<FunctionSpec>,
             example "{basis: constant, start: 0.0}",
             unit "N/m^3",
+            default "none";
+        /// Quintic stiffness k5(t), with the force k5 y^5.
+        quintic_stiffness: Option<FunctionSpec>,
+            example "{basis: constant, start: 0.0}",
+            unit "N/m^5",
             default "none";
         /// Quadratic damping c2(t), with the force c2 |y'| y'.
         quadratic_damping: Option<FunctionSpec>,
@@ -43,8 +55,12 @@ keys! {
         damping: Option<FunctionSpec>, example "{basis: constant, start: 1.0}", unit "N s/m";
         /// Stiffness k(t) of this experiment.
         stiffness: Option<FunctionSpec>, example "{basis: constant, start: 1.0}", unit "N/m";
+        /// Quadratic stiffness, with the force k2 y^2.
+        quadratic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^2";
         /// Cubic stiffness, with the force k3 y^3.
         cubic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^3";
+        /// Quintic stiffness, with the force k5 y^5.
+        quintic_stiffness: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N/m^5";
         /// Quadratic damping, with the force c2 |y'| y'.
         quadratic_damping: Option<FunctionSpec>, example "{basis: constant, start: 0.0}", unit "N s^2/m^2";
         /// Coulomb friction, with the force f y'/sqrt(y'^2 + width^2).
@@ -115,12 +131,13 @@ keys! {
             default "none",
             needs "`basis`";
         /// For Coulomb friction: velocity over which its sign is smoothed, well below the peak velocity of the
-        /// response.
-        width: Option<Number>,
+        /// response. `auto`: first a fiftieth of the root-mean-square velocity of the record, then reduced until half of it
+        /// shifts no estimate by more than a tenth of a standard error.
+        width: Option<FrictionWidth>,
             example "0.01",
             unit "m/s",
             range "greater than 0",
-            needs "coulomb_friction, which requires it";
+            needs "coulomb_friction, which requires it; `auto` also a record";
     }
 }
 
@@ -197,8 +214,12 @@ choice! {
         Damping = "damping",
         /// Stiffness k(t).
         Stiffness = "stiffness",
+        /// Quadratic stiffness.
+        QuadraticStiffness = "quadratic_stiffness",
         /// Cubic stiffness.
         CubicStiffness = "cubic_stiffness",
+        /// Quintic stiffness.
+        QuinticStiffness = "quintic_stiffness",
         /// Quadratic damping.
         QuadraticDamping = "quadratic_damping",
         /// Coulomb friction.

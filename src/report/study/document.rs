@@ -75,6 +75,9 @@ pub struct StudiedFit {
     pub misfit: f64,
     /// Number of nodes.
     pub nodes: usize,
+    /// Width of Coulomb friction, m/s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction_width: Option<f64>,
     /// Parameters of the functions, then the nuisance parameters.
     pub parameters: Vec<f64>,
     /// Weights of the penalties.

@@ -18,6 +18,7 @@ impl StudiedFit {
             cost: fit.best.evaluation.cost,
             misfit: fit.best.evaluation.misfit,
             nodes: problem.system.grid.nodes(),
+            friction_width: problem.system.friction_width(),
             parameters: fit.best.parameters.clone(),
             weights: problem.penalties.iter().map(|p| p.weight).collect(),
             sigmas: problem.channels().map(sigma).collect(),

@@ -101,6 +101,17 @@ pub enum Suggestion {
         /// Start value, in its SI unit.
         start: f64,
     },
+    /// The offset of a sensor whose residuals have a mean.
+    EstimateOffset {
+        /// Kind of the channel.
+        channel: String,
+        /// Name of the experiment.
+        experiment: String,
+        /// True if a static force has the same effect.
+        or_static_force: bool,
+    },
+    /// A smaller width of Coulomb friction, on which the estimates depend.
+    NarrowFriction,
     /// A finer basis for a function whose basis is too coarse.
     FinerBasis {
         /// Name of the function.
@@ -155,8 +166,10 @@ fn typed(document: &ResultDocument) -> Vec<Suggestion> {
     let mut steps = Vec::new();
     steps.extend(about_ending(document));
     steps.extend(about_steps(document));
+    steps.extend(about_means(document));
     steps.extend(about_terms(document));
     steps.extend(about_inputs(document));
+    steps.extend(about_friction(document));
     steps.extend(about_bases(document).or_else(|| about_residuals(document)));
     if wanders(document) {
         steps.rotate_left(1);
@@ -187,6 +200,27 @@ fn about_bases(document: &ResultDocument) -> Option<Suggestion> {
     })
 }
 
+/// The sensor with the most significant mean of its residuals, unless the mean is their dominant pattern
+/// ([`about_residuals`]).
+fn about_means(document: &ResultDocument) -> Option<Suggestion> {
+    let warnings = document.identifiability.warnings.iter();
+    let means = warnings.filter(|w| w.kind == "residual_mean");
+    let t = |w: &Finding| w.quantities.get("t").and_then(serde_json::Value::as_f64);
+    let size = |w: &Finding| t(w).unwrap_or_default().abs();
+    let worst = means.max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let text = |key: &str| Some(worst.quantities.get(key)?.as_str()?.to_owned());
+    let channel = text("channel")?;
+    let is_pattern = |c: &ChannelSummary| c.pattern == Some(ResidualPattern::Offset);
+    if about_bases(document).is_none() && document.channels().any(is_pattern) {
+        return None;
+    }
+    Some(Suggestion::EstimateOffset {
+        channel,
+        experiment: text("experiment")?,
+        or_static_force: worst.quantities.get("or_static_force")?.as_bool()?,
+    })
+}
+
 /// The most significant missing term of an equation of motion.
 fn about_terms(document: &ResultDocument) -> Option<Suggestion> {
     let warnings = &document.identifiability.warnings;
@@ -196,6 +230,14 @@ fn about_terms(document: &ResultDocument) -> Option<Suggestion> {
         term: CoefficientKind::deserialize(term).ok()?,
         start: missing.quantities.get("value")?.as_f64()?,
     })
+}
+
+/// A smaller width of Coulomb friction, unless an automatic one is the smallest that the grid permits.
+fn about_friction(document: &ResultDocument) -> Option<Suggestion> {
+    let warnings = &document.identifiability.warnings;
+    let depends = warnings.iter().any(|w| w.kind == "friction_width");
+    let is_limited = document.warnings.iter().any(|w| w.kind == "width_limited");
+    (depends && !is_limited).then_some(Suggestion::NarrowFriction)
 }
 
 fn about_inputs(document: &ResultDocument) -> Option<Suggestion> {

@@ -69,7 +69,7 @@ impl fmt::Display for Suggestion {
             ),
             Suggestion::AddTerm { term, start } => {
                 let width = match term {
-                    CoefficientKind::CoulombFriction => ", width: a hundredth of the peak velocity",
+                    CoefficientKind::CoulombFriction => ", width: auto",
                     _ => "",
                 };
                 write!(
@@ -79,6 +79,25 @@ impl fmt::Display for Suggestion {
                     significant(*start, 3)
                 )
             }
+            Suggestion::EstimateOffset {
+                channel,
+                experiment,
+                or_static_force,
+            } => {
+                write!(
+                    f,
+                    "{channel} of {experiment}: estimate the offset of the sensor (`sensors: {{{channel}: {{offset: estimate}}}}`)"
+                )?;
+                match or_static_force {
+                    true => f.write_str(
+                        " or, nearly equivalent, a static force (`static_force: {basis: constant, start: 0.0}` under `functions`)",
+                    ),
+                    false => Ok(()),
+                }
+            }
+            Suggestion::NarrowFriction => f.write_str(
+                "reduce the width of Coulomb friction until the estimates do not depend on it: `width: auto`, with an automatic grid",
+            ),
             Suggestion::FinerBasis { function } => write!(
                 f,
                 "let the {function} vary more freely (`basis: b-spline`, `knots: auto`); an error of the input and a missing force term, too, appear as a coefficient that varies"

@@ -4,12 +4,14 @@ mod channel;
 mod constants;
 mod equation_error;
 mod estimates;
+mod friction_width;
 mod function;
 mod gaps;
 mod input_disturbance;
 mod plausibility;
 mod recovery;
 mod refinement;
+mod residual_mean;
 mod score_tests;
 mod statistics;
 mod step_check;
@@ -29,6 +31,7 @@ pub use statistics::{FitStatistics, statistics};
 pub use verdict::{VerdictLevel, VerdictReason, verdict_level, verdict_reasons};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
 
+use friction_width::width_warning;
 use gaps::gap_assessments;
 use score_tests::missing_term;
 
@@ -131,6 +134,8 @@ impl FitAssessment {
             }
             let warnings = test.coarse.into_iter().map(FitWarning::CoarseBasis);
             assessment.plausibility.warnings.extend(warnings);
+            let width = width_warning(problem, theta, evaluation);
+            assessment.plausibility.warnings.extend(width);
             assessment
                 .degrees_of_freedom
                 .clone_from(&bands.degrees_of_freedom);

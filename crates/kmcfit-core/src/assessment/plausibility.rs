@@ -3,6 +3,7 @@
 use super::gaps::GapAssessment;
 use super::input_disturbance::input_warnings;
 use super::refinement::CoarseBasis;
+use super::residual_mean::mean_warnings;
 use super::statistics::{FitStatistics, statistics};
 use super::step_check::{StepCheckOutcome, step_check};
 use crate::diagnostics::rms;
@@ -121,6 +122,34 @@ pub enum FitWarning {
     },
     /// The residuals of the equation of motion show a term that the model does not have.
     MissingTerm(MissingTerm),
+    /// The residuals of a channel have a mean: an offset of its sensor, or a static force.
+    ResidualMean {
+        /// Name of the experiment.
+        experiment: String,
+        /// Kind of the channel.
+        channel: String,
+        /// Mean of samples less predictions, in the SI unit of the channel.
+        mean: f64,
+        /// Mean over its standard error, which allows for autocorrelation.
+        t: f64,
+        /// Mean over the standard deviation of the residuals.
+        share: f64,
+        /// True if a static force has the same effect: the channel is a displacement, and no static force is estimated.
+        or_static_force: bool,
+    },
+    /// Half the width of Coulomb friction shifts an estimate by more than half a standard error.
+    FrictionWidth {
+        /// Name of the estimate with the largest shift.
+        estimate: String,
+        /// Its shift, in its unit; `None` for a function with several parameters.
+        shift: Option<f64>,
+        /// Unit of the shift.
+        unit: String,
+        /// The shift in standard errors.
+        errors: f64,
+        /// Width, m/s.
+        width: f64,
+    },
     /// A function is negative at most times, which violates passivity.
     Negative {
         /// Name of the function.
@@ -184,8 +213,13 @@ impl Plausibility {
             (true, false, true) => Some(FitWarning::Correlated),
             _ => None,
         };
+        let means = match unidentified.is_none() && reports_errors {
+            true => mean_warnings(problem, evaluation),
+            false => Vec::new(),
+        };
         let warnings = unexplained
             .into_iter()
+            .chain(means)
             .chain(inputs)
             .chain(optimistic)
             .chain(aliased);

@@ -12,7 +12,15 @@ pub(super) fn check(problem: &Problem) -> Result<(), BuildError> {
     let scalars = problem.functions.scalars();
     let open = |index: Option<usize>| index.is_some_and(|i| scalars[i].prior.is_none());
     let terms = &problem.system.terms;
-    let shift_is_free = |t: &Term| t.is_linear() || *t == Term::Offset;
+    // With an estimated stiffness a shifted quadratic spring is another quadratic spring.
+    let mut functions = problem.functions.iter();
+    let has_stiffness =
+        functions.any(|f| f.quantity == CoefficientKind::Stiffness && f.parameters() > 0);
+    let shift_is_free = |t: &Term| match t {
+        Term::QuadraticStiffness => has_stiffness,
+        Term::Offset => true,
+        term => term.is_linear(),
+    };
     if terms.iter().all(shift_is_free) {
         check_offsets(problem, &open)?;
     }
@@ -81,7 +89,7 @@ fn scale_is_open(problem: &Problem) -> bool {
 }
 
 /// Error for a static force together with unknown sensor offsets: a response shifted by `d`, a sensor offset lower by `d` and
-/// a force larger by `k d` give the same samples.
+/// a force larger by `k d` give the same samples; with a quadratic stiffness `k2` the stiffness then differs by `2 k2 d`.
 fn check_offsets(
     problem: &Problem,
     open: &dyn Fn(Option<usize>) -> bool,

@@ -123,10 +123,22 @@ impl Builder {
         }
     }
 
+    /// Adds a quadratic stiffness `k2` (N/m^2), the factor of `y^2`: the asymmetric part of a spring.
+    #[must_use]
+    pub fn quadratic_stiffness(self, spec: CoefficientSpec) -> Self {
+        self.coefficient(CoefficientKind::QuadraticStiffness, spec)
+    }
+
     /// Adds a cubic stiffness `k3` (N/m^3), the factor of `y^3`.
     #[must_use]
     pub fn cubic_stiffness(self, spec: CoefficientSpec) -> Self {
         self.coefficient(CoefficientKind::CubicStiffness, spec)
+    }
+
+    /// Adds a quintic stiffness `k5` (N/m^5), the factor of `y^5`.
+    #[must_use]
+    pub fn quintic_stiffness(self, spec: CoefficientSpec) -> Self {
+        self.coefficient(CoefficientKind::QuinticStiffness, spec)
     }
 
     /// Adds a quadratic damping (N s^2/m^2), the factor of `|v| v`.

@@ -12,8 +12,12 @@ pub enum CoefficientKind {
     Damping,
     /// Stiffness `k(t)`.
     Stiffness,
+    /// Quadratic stiffness, the factor of `y^2`.
+    QuadraticStiffness,
     /// Cubic stiffness, the factor of `y^3`.
     CubicStiffness,
+    /// Quintic stiffness, the factor of `y^5`.
+    QuinticStiffness,
     /// Quadratic damping, the factor of `|v| v`.
     QuadraticDamping,
     /// Coulomb friction, the factor of a smoothed sign of `v`.
@@ -24,7 +28,7 @@ pub enum CoefficientKind {
 }
 
 /// Key, symbol, unit and column header of each kind, then unit and column header for a rotation.
-const NAMES: [[&str; 6]; 7] = [
+const NAMES: [[&str; 6]; 9] = [
     ["mass", "m", "kg", "mass_kg", "kg m^2", "mass_kg_m2"],
     [
         "damping",
@@ -43,12 +47,28 @@ const NAMES: [[&str; 6]; 7] = [
         "stiffness_N_m_per_rad",
     ],
     [
+        "quadratic_stiffness",
+        "k2",
+        "N/m^2",
+        "quadratic_stiffness_N_per_m2",
+        "N m/rad^2",
+        "quadratic_stiffness_N_m_per_rad2",
+    ],
+    [
         "cubic_stiffness",
         "k3",
         "N/m^3",
         "cubic_stiffness_N_per_m3",
         "N m/rad^3",
         "cubic_stiffness_N_m_per_rad3",
+    ],
+    [
+        "quintic_stiffness",
+        "k5",
+        "N/m^5",
+        "quintic_stiffness_N_per_m5",
+        "N m/rad^5",
+        "quintic_stiffness_N_m_per_rad5",
     ],
     [
         "quadratic_damping",
@@ -108,11 +128,13 @@ impl CoefficientKind {
     }
 
     /// All kinds, in program order.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Mass,
         Self::Damping,
         Self::Stiffness,
+        Self::QuadraticStiffness,
         Self::CubicStiffness,
+        Self::QuinticStiffness,
         Self::QuadraticDamping,
         Self::CoulombFriction,
         Self::Offset,
@@ -124,7 +146,9 @@ impl CoefficientKind {
             CoefficientKind::Mass => None,
             CoefficientKind::Damping => Some(Term::Damping),
             CoefficientKind::Stiffness => Some(Term::Stiffness),
+            CoefficientKind::QuadraticStiffness => Some(Term::QuadraticStiffness),
             CoefficientKind::CubicStiffness => Some(Term::CubicStiffness),
+            CoefficientKind::QuinticStiffness => Some(Term::QuinticStiffness),
             CoefficientKind::QuadraticDamping => Some(Term::QuadraticDamping),
             CoefficientKind::CoulombFriction => Some(Term::CoulombFriction {
                 width: friction_width,

@@ -152,15 +152,23 @@ impl Information {
     /// Largest shift of a parameter by the discretisation error, in standard errors without it, with the rows `held` fixed. `None`
     /// where no error is included.
     pub fn largest_shift(&self, held: &[&ActiveRow]) -> Option<f64> {
+        let in_errors = self.shifts(held)?.into_iter();
+        let in_errors = in_errors.map(|[shift, error]| shift.abs() / error);
+        // Zero over zero for a parameter that is held or undetermined.
+        Some(in_errors.filter(|x| !x.is_nan()).fold(0.0, f64::max))
+    }
+
+    /// Shift of each parameter by the discretisation error, and its standard error without it, with the rows `held` fixed. `None`
+    /// where no error is included.
+    pub fn shifts(&self, held: &[&ActiveRow]) -> Option<Vec<[f64; 2]>> {
         self.step_error.as_ref()?;
         let columns = self.columns(&self.factor(held));
         let (shift, root) = columns.split_last()?;
-        let in_errors = shift.iter().enumerate().map(|(i, shift)| {
+        let each = shift.iter().enumerate().map(|(i, shift)| {
             let variance: f64 = root.iter().map(|column| column[i] * column[i]).sum();
-            shift.abs() / variance.sqrt()
+            [*shift, variance.sqrt()]
         });
-        // Zero over zero for a parameter that is held or undetermined.
-        Some(in_errors.filter(|x| !x.is_nan()).fold(0.0, f64::max))
+        Some(each.collect())
     }
 
     /// The shift of the estimates by the discretisation error, as a column of the covariance root.

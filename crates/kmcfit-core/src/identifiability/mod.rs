@@ -33,6 +33,7 @@ mod sensitivity;
 mod step_error;
 mod step_shift;
 mod structural_rank;
+mod width_shift;
 pub use classification::is_negligible;
 
 use crate::problem::Problem;

@@ -32,19 +32,23 @@ pub(super) fn step_error(
         let residuals: Vec<f64> = channel.residuals(predicted).collect();
         all & (rms(&residuals) < SAME_STEPS * rms(changes))
     });
-    let error = weighted(problem, changes, roots)?;
+    let error = weighted(problem, changes, roots, richardson(problem))?;
     (!is_of_these_steps).then_some(error)
 }
 
-/// Discretisation error of `changes`, the predictions on half the step less those on the whole step, weighted and whitened; `None`
-/// where it is not finite.
+/// Factor `2^p / (2^p - 1)` from the changes by half the step to the error of the whole step.
+pub(super) fn richardson(problem: &Problem) -> f64 {
+    let order = 2f64.powi(problem.system.method.order() as i32);
+    order / (order - 1.0)
+}
+
+/// Changes of the predictions of each channel, multiplied by `factor`, weighted and whitened; `None` where they are not finite.
 pub(super) fn weighted(
     problem: &Problem,
     changes: Vec<Vec<f64>>,
     roots: &[f64],
+    factor: f64,
 ) -> Option<DVector<f64>> {
-    let order = 2f64.powi(problem.system.method.order() as i32);
-    let factor = order / (order - 1.0);
     let mut error = Vec::with_capacity(roots.len());
     for (channel, mut changes) in problem.channels().zip(changes) {
         channel.whiten_rows(&mut changes);

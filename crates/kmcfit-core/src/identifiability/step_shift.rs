@@ -1,10 +1,10 @@
-//! Largest shift of the estimates by the discretisation error, in standard errors.
+//! Shifts of the estimates by changes of the predictions, such as the discretisation error, beside their standard errors.
 
 use super::active::{ActiveRow, active_rows};
 use super::covariance::Information;
 use super::directions::Directions;
 use super::sensitivity::Sensitivity;
-use super::step_error::weighted;
+use super::step_error::{richardson, weighted};
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 
@@ -18,16 +18,42 @@ impl Problem {
         evaluation: &Evaluation,
         changes: Vec<Vec<f64>>,
     ) -> Option<f64> {
+        let (information, active) =
+            self.changed_information(theta, evaluation, changes, richardson(self))?;
+        let held: Vec<&ActiveRow> = active.iter().collect();
+        information.largest_shift(&held)
+    }
+
+    /// Shift of each parameter by `changes` of the predictions of each channel, by one Gauss-Newton step, and its standard error.
+    /// `None` as for [`Problem::shift_by_steps`].
+    pub(crate) fn shifts_by(
+        &self,
+        theta: &[f64],
+        evaluation: &Evaluation,
+        changes: Vec<Vec<f64>>,
+    ) -> Option<Vec<[f64; 2]>> {
+        let (information, active) = self.changed_information(theta, evaluation, changes, 1.0)?;
+        let held: Vec<&ActiveRow> = active.iter().collect();
+        information.shifts(&held)
+    }
+
+    /// Information with `factor` times the changes as an error, and the active constraints.
+    fn changed_information(
+        &self,
+        theta: &[f64],
+        evaluation: &Evaluation,
+        changes: Vec<Vec<f64>>,
+        factor: f64,
+    ) -> Option<(Information, Vec<ActiveRow>)> {
         let n = self.parameters();
         if n == 0 || n > FEW_PARAMETERS {
             return None;
         }
         let directions = Directions::new(self, evaluation, n, n);
         let sensitivity = Sensitivity::along(self, evaluation, directions);
-        let error = weighted(self, changes, &sensitivity.roots)?;
+        let error = weighted(self, changes, &sensitivity.roots, factor)?;
         let active = active_rows(self, theta);
-        let held: Vec<&ActiveRow> = active.iter().collect();
         let information = Information::new(self, theta, sensitivity).with_error(Some(error));
-        information.largest_shift(&held)
+        Some((information, active))
     }
 }

@@ -12,6 +12,7 @@
 mod clipping;
 mod decimate;
 mod filter;
+mod frequency_response;
 mod interpolate;
 mod modes;
 mod onset;
@@ -23,6 +24,7 @@ mod spline;
 pub use clipping::clipped;
 pub use decimate::{decimate, decimation_filter};
 pub use filter::{SecondOrder, band_pass, high_pass, low_pass, zero_phase, zero_phase_transpose};
+pub use frequency_response::two_forced_modes;
 pub use interpolate::{Interpolation, Signal};
 pub use modes::two_modes;
 pub use onset::onset;

@@ -158,8 +158,20 @@ pub fn fit_on_refined_grids<T>(
 }
 
 impl<T> RefinedFit<T> {
+    /// True for a minimum that explains three quarters of the misfit of the zero response.
+    pub(super) fn is_explained(&self) -> bool {
+        let is_minimum = match self.fit.outcome.status {
+            // A limit on the ratios of J or of its gradient is no minimum and is not measured.
+            Status::Converged => self.fit.optimality.is_some(),
+            Status::Stalled => true,
+            _ => false,
+        };
+        let misfit = self.fit.best.evaluation.misfit;
+        is_minimum && misfit <= POOR * self.problem.zero_response_misfit()
+    }
+
     /// The fit on the next grid, with the work of this one.
-    fn followed_by(self, further: T, problem: Problem, fit: Fit) -> Self {
+    pub(super) fn followed_by(self, further: T, problem: Problem, fit: Fit) -> Self {
         let before = self.fit;
         Self {
             further,
@@ -173,7 +185,7 @@ impl<T> RefinedFit<T> {
     }
 }
 
-fn nodes(problem: &Problem) -> usize {
+pub(super) fn nodes(problem: &Problem) -> usize {
     problem.system.grid.nodes()
 }
 
@@ -190,14 +202,7 @@ impl GridError {
     /// The error of a fit; `None` where it is not defined, or cannot be computed.
     fn of<T>(found: &RefinedFit<T>, on_nodes: &mut OnNodes) -> Option<Self> {
         let (problem, fit) = (&found.problem, &found.fit);
-        let is_minimum = match fit.outcome.status {
-            // A limit on the ratios of J or of its gradient is no minimum and is not measured.
-            Status::Converged => fit.optimality.is_some(),
-            Status::Stalled => true,
-            _ => false,
-        };
-        let misfit = fit.best.evaluation.misfit;
-        if !is_minimum || misfit > POOR * problem.zero_response_misfit() {
+        if !found.is_explained() {
             return None;
         }
         let theta = &fit.best.parameters;
@@ -279,7 +284,7 @@ impl GridError {
 }
 
 /// Parameters of a fit for the same problem on another grid; `None` for functions with one value per node.
-fn carried<T>(found: &RefinedFit<T>, next: &Problem) -> Option<Vec<f64>> {
+pub(super) fn carried<T>(found: &RefinedFit<T>, next: &Problem) -> Option<Vec<f64>> {
     let theta = &found.fit.best.parameters;
     let nodal = |f: &crate::functions::CoefficientFunction| f.basis == Some(Basis::Nodal);
     let is_same = theta.len() == next.parameters() && !next.functions.iter().any(nodal);

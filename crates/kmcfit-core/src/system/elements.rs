@@ -7,8 +7,12 @@ pub enum Term {
     Damping,
     /// `k(t) y`, k in N/m.
     Stiffness,
+    /// `p(t) y^2`, p in N/m^2: the asymmetric part of a spring.
+    QuadraticStiffness,
     /// `p(t) y^3`, p in N/m^3.
     CubicStiffness,
+    /// `p(t) y^5`, p in N/m^5.
+    QuinticStiffness,
     /// `p(t) |v| v`, p in N s^2/m^2.
     QuadraticDamping,
     /// `p(t) v / sqrt(v^2 + width^2)`, p in N: smoothed Coulomb friction.
@@ -21,7 +25,7 @@ pub enum Term {
 }
 
 /// Largest number of terms of a system: one of each kind.
-pub const MOST_TERMS: usize = 6;
+pub const MOST_TERMS: usize = 8;
 
 impl Term {
     /// Element response `phi(y, v)`.
@@ -33,7 +37,9 @@ impl Term {
         match self {
             Term::Damping => v,
             Term::Stiffness => y,
+            Term::QuadraticStiffness => y * y,
             Term::CubicStiffness => y * y * y,
+            Term::QuinticStiffness => y * (y * y) * (y * y),
             Term::QuadraticDamping => v.abs() * v,
             Term::CoulombFriction { width } => v / (v * v + width * width).sqrt(),
             Term::Offset => 1.0,
@@ -46,7 +52,9 @@ impl Term {
         match self {
             Term::Damping => (0.0, 1.0),
             Term::Stiffness => (1.0, 0.0),
+            Term::QuadraticStiffness => (2.0 * y, 0.0),
             Term::CubicStiffness => (3.0 * y * y, 0.0),
+            Term::QuinticStiffness => (5.0 * (y * y) * (y * y), 0.0),
             Term::QuadraticDamping => (0.0, 2.0 * v.abs()),
             Term::CoulombFriction { width } => {
                 let square = v * v + width * width;

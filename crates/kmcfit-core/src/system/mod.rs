@@ -35,6 +35,23 @@ pub struct System {
 }
 
 impl System {
+    /// Width of Coulomb friction, m/s; `None` without it.
+    pub fn friction_width(&self) -> Option<f64> {
+        self.terms.iter().find_map(|term| match term {
+            Term::CoulombFriction { width } => Some(*width),
+            _ => None,
+        })
+    }
+
+    /// Sets the width of Coulomb friction, m/s.
+    pub fn set_friction_width(&mut self, width: f64) {
+        for term in &mut self.terms {
+            if let Term::CoulombFriction { width: of_term } = term {
+                *of_term = width;
+            }
+        }
+    }
+
     /// True if the response is linear in the initial state and there is no excitation.
     pub fn is_linear_and_free(&self, excitation: Option<&Excitation>) -> bool {
         let is_free = || excitation.is_none_or(Excitation::is_zero);

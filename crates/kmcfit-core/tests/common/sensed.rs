@@ -14,7 +14,9 @@ impl<D: DualNum<Primitive = f64> + Copy> Real for D {}
 pub enum Response {
     Damping,
     Stiffness,
+    QuadraticSpring,
     Cubic,
+    Quintic,
     Quadratic,
     Coulomb(f64),
     Offset,
@@ -25,7 +27,9 @@ impl Response {
         match self {
             Self::Damping => v,
             Self::Stiffness => y,
+            Self::QuadraticSpring => y.powi(2),
             Self::Cubic => y.powi(3),
+            Self::Quintic => y.powi(5),
             // |v| v without the absolute value, which is not differentiable at 0.
             Self::Quadratic if v.re() < 0.0 => -v.powi(2),
             Self::Quadratic => v.powi(2),

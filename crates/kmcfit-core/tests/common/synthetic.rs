@@ -73,7 +73,9 @@ fn response(term: Term) -> Response {
     match term {
         Term::Damping => Response::Damping,
         Term::Stiffness => Response::Stiffness,
+        Term::QuadraticStiffness => Response::QuadraticSpring,
         Term::CubicStiffness => Response::Cubic,
+        Term::QuinticStiffness => Response::Quintic,
         Term::QuadraticDamping => Response::Quadratic,
         Term::CoulombFriction { width } => Response::Coulomb(width),
         Term::Offset => Response::Offset,

@@ -9,7 +9,9 @@ use crate::config::values::NumberOrEstimate;
 use crate::finding::Finding;
 use kmcfit_core::internals::diagnostics::{detrended, outlier_indices, standard_deviation};
 use kmcfit_core::internals::record::ChannelKind;
-use kmcfit_core::internals::signal::{Interpolation, Signal, Spectrum, clipped, onset, two_modes};
+use kmcfit_core::internals::signal::{
+    Interpolation, Signal, Spectrum, clipped, onset, two_forced_modes, two_modes,
+};
 use kmcfit_core::internals::system::round_time;
 use std::f64::consts::TAU;
 
@@ -162,13 +164,18 @@ fn correlation_with_estimate(low: &RawChannel, high: &RawChannel) -> Option<f64>
     correlation.is_finite().then_some(correlation)
 }
 
-/// A free record in which two modes vibrate.
+/// A free record, or one with a measured force, in which two modes vibrate.
 fn modes(spec: &ExperimentSpec, record: &RawRecord) -> Option<DataWarning> {
-    if has_input(spec, record) {
-        return None;
-    }
+    let of_channel = |c: &RawChannel| {
+        if !has_input(spec, record) {
+            return two_modes(&c.values, c.median_spacing);
+        }
+        let force = record.excitation.force()?;
+        let force: Vec<f64> = c.times.iter().map(|t| force.value(*t)).collect();
+        two_forced_modes(&force, &c.values, c.median_spacing, c.kind as i32)
+    };
     let each = record.channels.iter().filter(|c| c.spacing.is_some());
-    let mut found = each.filter_map(|c| Some((c, two_modes(&c.values, c.median_spacing)?)));
+    let mut found = each.filter_map(|c| Some((c, of_channel(c)?)));
     let (channel, frequencies) = found.next()?;
     Some(DataWarning::TwoModes {
         channel: channel.kind.name(),

@@ -27,6 +27,17 @@ impl RawExcitation {
         self.input
     }
 
+    /// Samples of the force, if it alone acts.
+    pub fn force(&self) -> Option<&Signal> {
+        match &self.input {
+            Input {
+                force: Some(Waveform::Samples(signal)),
+                base: None,
+            } => Some(signal),
+            _ => None,
+        }
+    }
+
     /// Sampling interval of equally spaced samples, s.
     pub fn spacing(&self) -> Option<f64> {
         let force = match &self.input.force {

@@ -49,11 +49,25 @@ impl Term {
                 by_y: Derivative::One,
                 by_v: Derivative::Zero,
             },
+            Term::QuadraticStiffness => Response {
+                phi: y * y,
+                by_y: Derivative::Of(Eight::splat(arithmetic, 2.0) * y),
+                by_v: Derivative::Zero,
+            },
             Term::CubicStiffness => {
                 let square = y * y;
                 Response {
                     phi: square * y,
                     by_y: Derivative::Of(Eight::splat(arithmetic, 3.0) * square),
+                    by_v: Derivative::Zero,
+                }
+            }
+            Term::QuinticStiffness => {
+                let square = y * y;
+                let fourth = square * square;
+                Response {
+                    phi: fourth * y,
+                    by_y: Derivative::Of(Eight::splat(arithmetic, 5.0) * fourth),
                     by_v: Derivative::Zero,
                 }
             }

@@ -45,6 +45,8 @@ const CUBIC_STIFFNESS: usize = 2;
 const OFFSET: usize = 3;
 const QUADRATIC_DAMPING: usize = 4;
 const COULOMB_FRICTION: usize = 5;
+const QUADRATIC_STIFFNESS: usize = 6;
+const QUINTIC_STIFFNESS: usize = 7;
 
 /// Kinds of terms of a linear system, and of one with a cubic spring.
 const LINEAR: [bool; MOST_TERMS] = kinds(&[STIFFNESS, DAMPING]);
@@ -64,7 +66,9 @@ fn place(term: Term) -> usize {
     match term {
         Term::Stiffness => STIFFNESS,
         Term::Damping => DAMPING,
+        Term::QuadraticStiffness => QUADRATIC_STIFFNESS,
         Term::CubicStiffness => CUBIC_STIFFNESS,
+        Term::QuinticStiffness => QUINTIC_STIFFNESS,
         Term::Offset => OFFSET,
         Term::QuadraticDamping => QUADRATIC_DAMPING,
         Term::CoulombFriction { .. } => COULOMB_FRICTION,
@@ -313,7 +317,7 @@ fn step<const S: usize>(
     (*y, *v) = (y_end, v_end);
 }
 
-/// Factor `phi` of each function at one stage; for the cubic stiffness the square alone.
+/// Factor `phi` of each function at one stage; for springs of higher powers without one factor `y`.
 #[derive(Clone, Copy)]
 struct Phi([f64; MOST_TERMS]);
 
@@ -326,6 +330,12 @@ impl Phi {
         phi[DAMPING] = v;
         if there[CUBIC_STIFFNESS] {
             phi[CUBIC_STIFFNESS] = y * y;
+        }
+        if there[QUADRATIC_STIFFNESS] {
+            phi[QUADRATIC_STIFFNESS] = y;
+        }
+        if there[QUINTIC_STIFFNESS] {
+            phi[QUINTIC_STIFFNESS] = (y * y) * (y * y);
         }
         if there[QUADRATIC_DAMPING] {
             phi[QUADRATIC_DAMPING] = Term::QuadraticDamping.phi(y, v);
@@ -346,10 +356,12 @@ impl Phi {
                 sum -= rates.kinds[kind][l] * phi[kind];
             }
         }
-        if there[CUBIC_STIFFNESS] {
-            // In independent pairs.
-            let slope = rates.kinds[CUBIC_STIFFNESS][l] * phi[STIFFNESS];
-            sum -= slope * phi[CUBIC_STIFFNESS];
+        for kind in [CUBIC_STIFFNESS, QUADRATIC_STIFFNESS, QUINTIC_STIFFNESS] {
+            if there[kind] {
+                // In independent pairs.
+                let slope = rates.kinds[kind][l] * phi[STIFFNESS];
+                sum -= slope * phi[kind];
+            }
         }
         sum
     }

@@ -101,14 +101,24 @@ fn terms() -> impl Strategy<Value = Vec<Term>> {
         vec![
             Term::Damping,
             Term::Stiffness,
+            Term::QuadraticStiffness,
             Term::CubicStiffness,
+            Term::QuinticStiffness,
             Term::QuadraticDamping,
             Term::CoulombFriction { width },
             Term::Offset,
         ]
     });
+    // With the mass eight functions, one for each direction of a group of sensitivities.
     let some = all
-        .prop_flat_map(|all| prop::sample::subsequence(all, 0..=6))
+        .prop_flat_map(|all| prop::sample::subsequence(all, 0..=7))
+        .prop_map(|mut some| {
+            // A quadratic spring alone pushes away from the origin on one side.
+            if !some.contains(&Term::Stiffness) {
+                some.retain(|term| *term != Term::QuadraticStiffness);
+            }
+            some
+        })
         .prop_shuffle();
     prop_oneof![2 => Just(linear), 1 => Just(duffing), 3 => some]
 }
@@ -119,6 +129,9 @@ fn range(term: Option<&Term>) -> std::ops::Range<f64> {
         None => 0.5..3.0,
         Some(Term::Stiffness) => 0.5..5.0,
         Some(Term::Offset) => -1.0..1.0,
+        // The springs of higher powers remain weaker than the linear one: no escape, and a period of many steps.
+        Some(Term::QuadraticStiffness) => 0.0..0.02,
+        Some(Term::QuinticStiffness) => 0.0..0.01,
         Some(_) => 0.0..0.5,
     }
 }

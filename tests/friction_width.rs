@@ -1,0 +1,193 @@
+//! Automatic width of Coulomb friction: driven carts with the friction of the sign of the velocity, with sticking, from an independent
+//! integrator. The estimates of the smoothed law then agree with the truth within their intervals.
+
+use kmcfit::config::{BuildMode, ModelFile, build};
+use kmcfit::finding::Finding;
+use kmcfit::fitting::{ModelFit, fit_model};
+use kmcfit_core::internals::assessment::{FitAssessment, FitWarning};
+use kmcfit_core::internals::solvers::{Observer, Status};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+/// Mass (kg), damping (N s/m), stiffness (N/m) and friction (N).
+const TRUTH: [f64; 4] = [95.0, 190.0, 4000.0, 40.0];
+const NAMES: [&str; 4] = ["mass", "damping", "stiffness", "coulomb_friction"];
+/// Sampling interval, s.
+const SPACING: f64 = 0.01;
+const SAMPLES: usize = 2001;
+/// Steps of the data's integrator per sample: a step of 1e-5 s.
+const SUBSTEPS: usize = 1000;
+/// Noise of the displacement relative to its root mean square.
+const NOISE: f64 = 0.03;
+
+fn white(seed: u64, stream: u64, count: usize) -> Vec<f64> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(stream);
+    (0..count)
+        .map(|_| StandardNormal.sample(&mut random))
+        .collect()
+}
+
+/// Force at the samples, linear in between.
+fn force(seed: u64) -> Vec<f64> {
+    let mut smooth = 0.0;
+    let each = white(seed, 1, SAMPLES).into_iter().map(|e| {
+        smooth = 0.95 * smooth + 0.3 * e;
+        120.0 * smooth
+    });
+    each.collect()
+}
+
+/// Displacement at the samples, and the share of the time in which the cart sticks: the velocity steps without friction, and the
+/// impulse of the friction then takes up to `h F/m` of it (time stepping of Moreau), which is exact at rest.
+fn response(force: &[f64]) -> (Vec<f64>, f64) {
+    let [m, c, k, friction] = TRUTH;
+    let h = SPACING / SUBSTEPS as f64;
+    let (mut y, mut v) = (0.0, 0.0f64);
+    let mut sticks = 0;
+    let mut displacement = vec![y];
+    for pair in force.windows(2) {
+        for s in 0..SUBSTEPS {
+            let share = (s as f64 + 0.5) / SUBSTEPS as f64;
+            let f = pair[0] + share * (pair[1] - pair[0]);
+            // The midpoint rule for the smooth forces.
+            let half = v + 0.5 * h * (f - c * v - k * y) / m;
+            let free = v + h * (f - c * half - k * (y + 0.5 * h * v)) / m;
+            let held = h * friction / m;
+            let next = free.signum() * (free.abs() - held).max(0.0);
+            y += 0.5 * h * (v + next);
+            v = next;
+            sticks += usize::from(v == 0.0);
+        }
+        displacement.push(y);
+    }
+    (
+        displacement,
+        sticks as f64 / ((SAMPLES - 1) * SUBSTEPS) as f64,
+    )
+}
+
+fn write_record(folder: &Path, seed: u64) {
+    let force = force(seed);
+    let (displacement, sticks) = response(&force);
+    assert!((0.02..0.7).contains(&sticks), "{seed}: sticks for {sticks}");
+    let squares: f64 = displacement.iter().map(|y| y * y).sum();
+    let sigma = NOISE * (squares / SAMPLES as f64).sqrt();
+    let mut table = "t_s,f_N,y_m\n".to_owned();
+    let noise = white(seed, 2, SAMPLES);
+    for (i, (f, y)) in force.iter().zip(&displacement).enumerate() {
+        writeln!(table, "{},{f},{}", SPACING * i as f64, y + sigma * noise[i]).unwrap();
+    }
+    fs::write(folder.join("record.csv"), table).unwrap();
+}
+
+fn fitted(folder: &Path, width: &str, grid: &str) -> ModelFit {
+    let yaml = format!(
+        "format: 1\nexperiments:\n  - name: cart\n    data: record.csv\n    columns: {{displacement: y_m, force: f_N}}\n    \
+         sigma: {{displacement: estimate}}\n    initial: {{displacement: 0.0, velocity: 0.0}}\n{grid}functions:\n  \
+         mass: {{basis: constant, start: 120.0}}\n  damping: {{basis: constant, start: 100.0}}\n  \
+         stiffness: {{basis: constant, start: 4500.0}}\n  \
+         coulomb_friction: {{basis: constant, start: 20.0, width: {width}}}\n"
+    );
+    let file = ModelFile::parse(folder.join("model.yaml"), yaml).unwrap();
+    let model = build(&file, BuildMode::Fit).unwrap();
+    fit_model(&model, &mut Observer::new(&mut |_| {})).unwrap()
+}
+
+/// Standard errors of the estimates.
+fn errors(found: &ModelFit) -> Vec<f64> {
+    let covariance = found.model.problem.covariance(&found.fit.best.evaluation);
+    let covariance = covariance.expect("a covariance");
+    covariance.diagonal().iter().map(|x| x.sqrt()).collect()
+}
+
+fn width_of(found: &ModelFit) -> f64 {
+    let system = &found.model.problem.system;
+    system.friction_width().expect("friction")
+}
+
+fn warning(found: &ModelFit) -> Option<FitWarning> {
+    let assessment = FitAssessment::of(&found.model.problem, &found.fit, false);
+    let mut warnings = assessment.plausibility.warnings.into_iter();
+    warnings.find(|w| matches!(w, FitWarning::FrictionWidth { .. }))
+}
+
+fn has(list: &[Finding], kind: &str) -> bool {
+    list.iter().any(|finding| finding.kind == kind)
+}
+
+/// Each of the four estimates of four carts is within four standard errors (a probability of 1e-3 for all 16 together), and their
+/// root mean square error is that of noise.
+#[test]
+fn an_automatic_width_gives_the_friction_of_the_sign() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut squares = 0.0;
+    for seed in 0..4 {
+        write_record(folder.path(), seed);
+        let found = fitted(folder.path(), "auto", "");
+        assert_eq!(found.fit.outcome.status, Status::Converged);
+        let errors = errors(&found);
+        let nodes = found.model.problem.system.grid.nodes();
+        println!("{seed}: width {:.1e} m/s, {nodes} nodes", width_of(&found));
+        assert!(has(&found.model.automatic, "width_reduced"), "{seed}");
+        assert!(!has(&found.model.warnings, "width_limited"), "{seed}");
+        for (j, truth) in TRUTH.into_iter().enumerate() {
+            let estimate = found.fit.best.parameters[j];
+            let off = (estimate - truth) / errors[j];
+            println!("  {}: {estimate:.3} of {truth} ({off:+.2})", NAMES[j]);
+            assert!(off.abs() < 4.0, "{seed}: {}: {off}", NAMES[j]);
+            squares += off * off;
+        }
+        assert_eq!(warning(&found), None, "{seed}");
+    }
+    let rms = (squares / 16.0).sqrt();
+    // The 99.9 % quantile of chi-square with 16 degrees of freedom is 39.3, 1.57 squared times 16.
+    assert!(rms < 1.57, "{rms}");
+}
+
+/// A wide width is a warning that names an estimate and its shift; with an automatic one, which is advised, there is none.
+#[test]
+fn a_wide_width_is_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    write_record(folder.path(), 0);
+    let found = fitted(folder.path(), "0.02", "");
+    let Some(FitWarning::FrictionWidth {
+        estimate,
+        shift,
+        errors: in_errors,
+        width,
+        ..
+    }) = warning(&found)
+    else {
+        panic!("no warning");
+    };
+    println!("{estimate}: {shift:?}, {in_errors} standard errors");
+    assert_eq!(width, 0.02);
+    // The linearised shift is that of a fit with half the width.
+    let j = NAMES.iter().position(|name| *name == estimate).unwrap();
+    let half = fitted(folder.path(), "0.01", "");
+    let moved = half.fit.best.parameters[j] - found.fit.best.parameters[j];
+    let shift = shift.expect("a constant");
+    println!("  refitted: {moved}");
+    assert!((moved / shift - 1.0).abs() < 0.5, "{moved} {shift}");
+}
+
+/// On a stated grid the width is reduced as far as its steps are stable, and the rest is a warning.
+#[test]
+fn a_stated_grid_limits_the_width() {
+    let folder = tempfile::tempdir().unwrap();
+    write_record(folder.path(), 1);
+    let found = fitted(folder.path(), "auto", "grid: {nodes: 6001}\n");
+    assert_eq!(found.model.problem.system.grid.nodes(), 6001);
+    assert!(has(&found.model.automatic, "width_reduced"));
+    assert!(has(&found.model.warnings, "width_limited"));
+    let nodal = &found.fit.best.evaluation.nodal;
+    let system = &found.model.problem.system;
+    let least = system.least_friction_width(nodal, 6001);
+    println!("{} m/s, stable from {least}", width_of(&found));
+    assert!((width_of(&found) / least - 1.0).abs() < 0.05);
+}
