@@ -547,7 +547,6 @@ fn condition_failures() -> Vec<ConditionFailure> {
 
 fn missing_measurements() -> Vec<MissingMeasurement> {
     samples![
-        MissingMeasurement::QuadraticLoss => MissingMeasurement::QuadraticLoss,
         MissingMeasurement::KnownSensors => MissingMeasurement::KnownSensors,
         MissingMeasurement::Oscillation => MissingMeasurement::Oscillation,
         MissingMeasurement::FilteredDrive => MissingMeasurement::FilteredDrive,

@@ -22,6 +22,7 @@ pub mod compare;
 mod cost;
 mod csv;
 pub mod document;
+mod equation;
 mod estimates;
 pub mod figures;
 pub(crate) mod findings;

@@ -1,5 +1,6 @@
 //! Summary of a fit for the terminal.
 
+use super::equation::equation_residual;
 use super::document::{ChannelSummary, PenaltySummary, Prediction, ResultDocument};
 use super::estimates::estimates;
 use super::rule_names::rule_in_words;
@@ -114,13 +115,19 @@ fn write_findings(text: &mut String, document: &ResultDocument) -> std::fmt::Res
     writeln!(text)
 }
 
-/// Fit of the worst channel, of the validation records, rejected outliers and cost ratio in one line; `None` where no
-/// channel has a fit in per cent.
+/// Fit of the worst channel, or for the equation error its residual; fit of the validation records, rejected outliers and cost ratio
+/// in one line; `None` where no channel has a fit in per cent.
 fn fit(document: &ResultDocument) -> Option<String> {
-    let worst = document.worst_fit()?;
-    let mut text = match document.channels().count() {
-        1 => fit_percent(worst),
-        _ => format!("{} for the worst channel", fit_percent(worst)),
+    let mut text = match &document.equation {
+        // Its response is the smoothed record, whose fit is no measure of the model.
+        Some(balance) => equation_residual(balance, document.is_rotation()),
+        None => {
+            let worst = document.worst_fit()?;
+            match document.channels().count() {
+                1 => fit_percent(worst),
+                _ => format!("{} for the worst channel", fit_percent(worst)),
+            }
+        }
     };
     let outliers = document.channels().map(|c| c.outliers).sum::<usize>();
     if outliers > 0 {

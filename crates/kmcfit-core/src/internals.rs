@@ -95,11 +95,11 @@ pub mod solvers {
     pub use crate::problem::FEW_PARAMETERS;
     pub use crate::solvers::{
         ActiveGroup, Attempt, BoundedValue, CheckpointStore, CheckpointUnit, ConditionFailure,
-        CycleCount, ExactF64s, Fit, FitSettings, Gap, GridNotice, Initial, IterationEvent,
+        CycleCount, EquationBalance, EquationForm, EquationPart, EquationShare, ExactF64s, Fit, FitSettings, Gap, GridNotice, Initial, IterationEvent,
         IterationRecord, Measurements, MissingMeasurement, MissingTerm, Observer, Optimality,
         PathPoint, QpSolver, Reason, Solver, SolverState, StartProjection, StartStrategy, Status,
         Stopping, UnsupportedRecord, WeightPath, active_constraints, choose_weight,
-        choose_weight_watched, cycles, equation_error, equation_rows, estimate_states, fit,
+        choose_weight_watched, cycles, equation_balance, equation_error, equation_rows, estimate_states, fit,
         fit_from, fit_on_refined_grids, fit_with_noise, fit_with_noise_watched, missing_terms,
         no_response, number_or_nan, predict_validation, timed,
     };
