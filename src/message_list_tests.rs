@@ -557,7 +557,6 @@ fn condition_failures() -> Vec<ConditionFailure> {
 
 fn missing_measurements() -> Vec<MissingMeasurement> {
     samples![
-        MissingMeasurement::QuadraticLoss => MissingMeasurement::QuadraticLoss,
         MissingMeasurement::KnownSensors => MissingMeasurement::KnownSensors,
         MissingMeasurement::Oscillation => MissingMeasurement::Oscillation,
         MissingMeasurement::FilteredDrive => MissingMeasurement::FilteredDrive,
@@ -731,6 +730,10 @@ fn verdict_reasons() -> Vec<VerdictReason> {
         VerdictReason::CoarseSteps { .. } => VerdictReason::CoarseSteps { times: 3.25 },
         VerdictReason::NotConverged { .. } => VerdictReason::NotConverged { status: Status::TimeLimit },
         VerdictReason::MissingTerm(_) => VerdictReason::MissingTerm(missing),
+        VerdictReason::ResidualMean { .. } => VerdictReason::ResidualMean {
+            experiment: experiment(), channel: "displacement".into(),
+        },
+        VerdictReason::FrictionWidth { .. } => VerdictReason::FrictionWidth { estimate: "damping".into() },
         VerdictReason::SecondMode { .. } => VerdictReason::SecondMode { frequencies: [3.98, 17.21] },
         VerdictReason::Saturation { .. } => VerdictReason::Saturation { channel: "acceleration".into() },
         VerdictReason::DisturbedInput { .. } => VerdictReason::DisturbedInput {

@@ -516,7 +516,7 @@ fn records_without_an_equation_error_fail() {
         .with_channel(channel);
     let functions = Parameterization::new(constants(None), NODES, system.grid.step()).unwrap();
     let problem = Problem::new(system, functions, vec![experiment]).unwrap();
-    assert_snapshot!(Measurements::of(&problem).err().unwrap(), @"driven: the force or base cannot be filtered like the response: this needs a displacement, or equally spaced accelerations alone");
+    assert_snapshot!(Measurements::of(&problem).err().unwrap(), @"driven: the force or base cannot be filtered like the response: this needs a displacement (with a `band`, equally spaced samples of all channels at the same times), or equally spaced accelerations alone; otherwise use `method: gauss-newton`");
 }
 
 fn read(model: &str, reading: fn(f64) -> f64, count: usize) -> Result<Model, String> {
@@ -575,7 +575,7 @@ fn model_files() {
             parts.penalties[0].weight = 2.0;
         })
         .unwrap();
-    assert_snapshot!(cost_definition(&unweighted, solver), @"J = integral (m (y'' + b'') + sum p_j phi_j(y, y') - f)^2 dt over the samples, with y, y' and y'' from the samples and not from a simulation (N^2 s) + 2.0 * integral (dk/dt)^2 dt");
+    assert_snapshot!(cost_definition(&unweighted, solver, None), @"J = integral (m (y'' + b'') + sum p_j phi_j(y, y') - f)^2 dt over the samples, with y, y' and y'' from the samples and not from a simulation (N^2 s) + 2.0 * integral (dk/dt)^2 dt");
 
     let said = |text: &str| read(text, f64::cos, 401).map(|_| ()).unwrap_err();
     assert_snapshot!(said(&model(period, "{method: gauss-newton}")), @"
@@ -626,8 +626,8 @@ fn model_files() {
     ");
 }
 
-/// y = cos t solves y'' + y = 0, so with k = 1.5 the error is 0.5 cos t: the cost at the start is the
-/// integral of its square over all samples but the two at each end, where no differences are known.
+/// y = cos t solves y'' + y = 0, so with k = 1.5 the error is 0.5 cos t: in the pointwise form, which a value per node needs, the cost
+/// at the start is the integral of its square over all samples but the two at each end, where no differences are known.
 #[test]
 fn the_cost_is_the_integral_of_the_squared_error() {
     let duration = 20.0;
@@ -649,7 +649,7 @@ fn the_cost_is_the_integral_of_the_squared_error() {
         let list = vec![
             CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; nodes]),
             CoefficientFunction::fixed(CoefficientKind::Damping, vec![0.0; nodes]),
-            CoefficientFunction::constant(CoefficientKind::Stiffness, 1.5, nodes),
+            CoefficientFunction::nodal(CoefficientKind::Stiffness, vec![1.5; nodes]),
         ];
         let experiment = Experiment::free("harmonic", initial, nodes).with_channel(channel);
         let found = run(&problem_of(system, list, experiment));
@@ -662,7 +662,7 @@ fn the_cost_is_the_integral_of_the_squared_error() {
             "{stride}: {} {expected}",
             found.initial_cost
         );
-        close(&found.best.parameters, &[1.0], 1e-3);
+        close(&found.best.parameters, &vec![1.0; nodes], 1e-3);
     }
 }
 

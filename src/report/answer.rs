@@ -34,7 +34,8 @@ pub fn answer(document: &ResultDocument) -> Vec<AnswerRow> {
     let is_shown = |name: &str| is_scaled || !matches!(name, "k_over_m" | "c_over_m");
     let rows = document.estimates.0.iter();
     let rows = rows.filter(|(name, _)| is_shown(name));
-    rows.map(|(name, estimate)| row(document, name, estimate)).collect()
+    rows.map(|(name, estimate)| row(document, name, estimate))
+        .collect()
 }
 
 fn row(document: &ResultDocument, name: &str, estimate: &Estimate) -> AnswerRow {

@@ -4,7 +4,7 @@ use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::{CoefficientKind, Penalty, Prior};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Loss;
-use kmcfit_core::internals::solvers::Solver;
+use kmcfit_core::internals::solvers::{EquationForm, Solver};
 use serde::{Deserialize, Serialize};
 
 /// Kind of the misfit in J.
@@ -58,11 +58,20 @@ impl CostKind {
     }
 }
 
+/// Misfit of the equation error in the weak form.
+const WEAK_FORM: &str = "integral e^2 dt over averages e of m (y'' + b'') + sum p_j phi_j(y, y') - f by bump functions, with y, y' and \
+                         y'' from the samples and not from a simulation (N^2 s)";
+
 /// The formula of J with all factors, as [`Problem::evaluate`] computes it, or for [`Solver::EquationError`] the
-/// objective of the fit: the misfit and every penalty with its weight.
-pub fn cost_definition(problem: &Problem, solver: Solver) -> String {
+/// objective of the fit: the misfit and every penalty with its weight. `form` is that of the equation of motion, if known.
+pub fn cost_definition(problem: &Problem, solver: Solver, form: Option<EquationForm>) -> String {
     let quantities: Vec<CoefficientKind> = problem.functions.iter().map(|f| f.quantity).collect();
-    let misfit = CostKind::of(problem, solver).misfit().to_string() + &robust(problem);
+    let kind = CostKind::of(problem, solver);
+    let misfit = match (kind, form) {
+        (CostKind::EquationError, Some(EquationForm::Weak)) => WEAK_FORM,
+        _ => kind.misfit(),
+    };
+    let misfit = misfit.to_owned() + &robust(problem, kind);
     let scalars = problem.functions.scalars().iter();
     let scalars = scalars.map(|s| (s.name.clone(), s.prior));
     let known = problem.functions.iter().map(|f| (f.name(), f.prior));
@@ -85,19 +94,24 @@ pub fn cost_definition(problem: &Problem, solver: Solver) -> String {
 }
 
 /// The robust losses, as text.
-fn robust(problem: &Problem) -> String {
+fn robust(problem: &Problem, kind: CostKind) -> String {
     let mut said: Vec<String> = Vec::new();
     for channel in problem.channels() {
+        let squared = match kind {
+            CostKind::EquationError => {
+                "e^2 of an error e of the equation is s^2 u^2, u = e/s, s = 1.4826 median |e|, and u^2"
+                    .to_owned()
+            }
+            _ => format!("u^2 of the {}", channel.kind().name()),
+        };
         let words = match channel.loss() {
             Loss::Squares => continue,
             Loss::Huber { threshold } => format!(
-                ", where u^2 of the {} is 2*{threshold:?}*|u| - {threshold:?}^2 beyond |u| = \
-                 {threshold:?} (Huber)",
-                channel.kind().name()
+                ", where {squared} is 2*{threshold:?}*|u| - {threshold:?}^2 beyond |u| = \
+                 {threshold:?} (Huber)"
             ),
             Loss::StudentT { degrees } => format!(
-                ", where u^2 of the {} is ({degrees:?} + 1) ln(1 + u^2/{degrees:?}) (Student's t)",
-                channel.kind().name()
+                ", where {squared} is ({degrees:?} + 1) ln(1 + u^2/{degrees:?}) (Student's t)"
             ),
         };
         if !said.contains(&words) {

@@ -11,7 +11,8 @@ use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::simulate::SimulationError;
 use kmcfit_core::internals::solvers::{
-    Fit, MissingTerm, Solver, missing_terms, predict_validation,
+    EquationBalance, Fit, MissingTerm, Solver, Status, equation_balance, missing_terms,
+    predict_validation,
 };
 use nalgebra::DMatrix;
 
@@ -24,6 +25,8 @@ pub struct RunAssessment {
     pub(super) equation: Option<Result<EquationErrorIntervals, NoIntervals>>,
     /// Terms missing from the equation of motion, by its error; none for other fits.
     pub(super) missing_terms: Vec<MissingTerm>,
+    /// Residual of the equation of motion beside its forces, by its error; `None` for other fits, and without a minimum.
+    pub(super) balance: Option<EquationBalance>,
     /// Validation records.
     pub(super) validation: Vec<ValidationRecord>,
 }
@@ -42,6 +45,9 @@ impl RunAssessment {
                 true => Vec::new(),
                 false => missing_terms(&model.problem, &fit.best.parameters),
             },
+            balance: (!is_simulated && fit.outcome.status != Status::Failed)
+                .then(|| equation_balance(&model.problem, &fit.best.parameters))
+                .flatten(),
             validation: validation
                 .map(|out| ValidationRecord::of(model, fit, out))
                 .collect(),

@@ -23,6 +23,7 @@ pub mod compare;
 mod cost;
 mod csv;
 pub mod document;
+mod equation;
 pub mod figures;
 pub(crate) mod findings;
 mod fit_assessment;
@@ -56,7 +57,7 @@ pub use run::{FittedModel, fit_claim, json};
 pub use run_reader::Run;
 pub use summary::{prediction_table, summary};
 pub use terminal::charts;
+pub use timings::{OverheadTimings, PartSummary, TimingsSummary};
 pub use verdict::Verdict;
 #[cfg(test)]
 pub(crate) use verdict::reason_in_words;
-pub use timings::{OverheadTimings, PartSummary, TimingsSummary};

@@ -135,6 +135,7 @@ impl FittedModel<'_> {
                 .map(|a| a.statistics.clone())
                 .unwrap_or_default(),
             step_check: self.run_assessment.step_check().cloned(),
+            equation: self.run_assessment.balance.clone(),
             automatic: model.automatic.clone(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),
@@ -177,7 +178,11 @@ impl FittedModel<'_> {
                 _ => None,
             }),
             cost_kind: CostKind::of(problem, self.model.settings.solver),
-            cost_definition: cost_definition(problem, self.model.settings.solver),
+            cost_definition: {
+                let balance = self.run_assessment.balance.as_ref();
+                let solver = self.model.settings.solver;
+                cost_definition(problem, solver, balance.map(|b| b.form))
+            },
         }
     }
 

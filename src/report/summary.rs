@@ -1,7 +1,8 @@
 //! Summary of a fit for the terminal.
 
-use super::document::{ChannelSummary, PenaltySummary, Prediction, ResultDocument};
 use super::answer::answer_table;
+use super::document::{ChannelSummary, PenaltySummary, Prediction, ResultDocument};
+use super::equation::equation_residual;
 use super::rule_names::rule_in_words;
 use super::suggestions;
 use crate::finding::Finding;
@@ -28,7 +29,11 @@ pub fn summary(document: &ResultDocument, verbose: bool) -> String {
 
 /// The answer: title, verdict, estimates, fit, warnings about the data, advice.
 fn write_answer(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
-    let samples = document.experiments.iter().map(|e| e.samples).sum::<usize>();
+    let samples = document
+        .experiments
+        .iter()
+        .map(|e| e.samples)
+        .sum::<usize>();
     writeln!(
         text,
         "{}: {}, {} s",
@@ -116,21 +121,23 @@ fn write_details(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     write_attempts(text, document)
 }
 
-/// Fit of the channels: of each one up to three, else of the worst.
+/// Fit of the channel or of the worst one, or for the equation error its residual; rejected outliers and the fit of the validation records.
 fn fit(document: &ResultDocument) -> Vec<String> {
     let Some(worst) = document.worst_fit() else {
         return Vec::new();
     };
     let channels: Vec<&ChannelSummary> = document.channels().collect();
-    let mut text = match channels.as_slice() {
-        [only] => format!(
+    let mut text = match (&document.equation, channels.as_slice()) {
+        // Its response is the smoothed record, whose fit is no measure of the model.
+        (Some(balance), _) => equation_residual(balance, document.is_rotation()),
+        (None, [only]) => format!(
             "{} of {}; residual {} {} rms",
             fit_percent(worst),
             only.kind,
             significant(only.rms_residual, 3),
             only.unit
         ),
-        _ => format!("{} for the worst channel", fit_percent(worst)),
+        (None, _) => format!("{} for the worst channel", fit_percent(worst)),
     };
     let outliers = channels.iter().map(|c| c.outliers).sum::<usize>();
     if outliers > 0 {

@@ -172,6 +172,13 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
             "the residuals show {} that the model does not have",
             term_in_words(missing.term)
         ),
+        VerdictReason::ResidualMean {
+            experiment,
+            channel,
+        } => format!("the residuals of the {channel} of {experiment} have a mean"),
+        VerdictReason::FrictionWidth { estimate } => {
+            format!("the {estimate} depends on the width of Coulomb friction")
+        }
         VerdictReason::SecondMode {
             frequencies: [first, second],
         } => format!(
@@ -222,16 +229,21 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
         VerdictReason::RankDeficient {
             rank_bound,
             parameters,
-        } => format!("at most {rank_bound} of {parameters} parameter combinations are identifiable"),
+        } => {
+            format!("at most {rank_bound} of {parameters} parameter combinations are identifiable")
+        }
         VerdictReason::OnlyRatios { fixed } => match fixed.is_empty() {
-            true => "no force is measured: the samples determine ratios to the mass only".to_owned(),
+            true => {
+                "no force is measured: the samples determine ratios to the mass only".to_owned()
+            }
             false => format!(
                 "no force is measured: the samples determine ratios only, with the {} fixed by the model",
                 and_list(fixed)
             ),
         },
         VerdictReason::EquationError => {
-            "the equation error neglects the noise of the response, which biases the estimates".to_owned()
+            "the equation error neglects the noise of the response, which biases the estimates"
+                .to_owned()
         }
     };
     Finding::of(reason, text)

@@ -21,8 +21,14 @@ fn model(functions: &str, own: &str) -> Workbench {
             let at = t + h * f64::from(s);
             let a = |t: f64, y: f64, v: f64| (force(t) - damping * v - stiffness * y) / mass;
             let k1 = [v, a(at, y, v)];
-            let k2 = [v + 0.5 * h * k1[1], a(at + 0.5 * h, y + 0.5 * h * k1[0], v + 0.5 * h * k1[1])];
-            let k3 = [v + 0.5 * h * k2[1], a(at + 0.5 * h, y + 0.5 * h * k2[0], v + 0.5 * h * k2[1])];
+            let k2 = [
+                v + 0.5 * h * k1[1],
+                a(at + 0.5 * h, y + 0.5 * h * k1[0], v + 0.5 * h * k1[1]),
+            ];
+            let k3 = [
+                v + 0.5 * h * k2[1],
+                a(at + 0.5 * h, y + 0.5 * h * k2[0], v + 0.5 * h * k2[1]),
+            ];
             let k4 = [v + h * k3[1], a(at + h, y + h * k3[0], v + h * k3[1])];
             y += h / 6.0 * (k1[0] + 2.0 * k2[0] + 2.0 * k3[0] + k4[0]);
             v += h / 6.0 * (k1[1] + 2.0 * k2[1] + 2.0 * k3[1] + k4[1]);
@@ -82,7 +88,9 @@ fn a_known_value_with_a_standard_deviation_is_no_number() {
     let (code, stdout, stderr) = bench.run(&["fit", "carriage.yaml", "--out", "out"]);
     assert_eq!(code, 0, "{stdout}{stderr}");
     let found = document(&bench);
-    let cost = found["model"]["cost_definition"].as_str().unwrap_or_default();
+    let cost = found["model"]["cost_definition"]
+        .as_str()
+        .unwrap_or_default();
     assert!(cost.ends_with(" + ((mass - 3.5)/0.07)^2"), "{cost}");
 }
 
@@ -105,8 +113,14 @@ fn messages() {
     ] {
         all.push(refused(&mass(functions), ""));
     }
-    all.push(refused(UNKNOWN, "    functions: {cubic_stiffness: {known_part: 1.0}}\n"));
-    all.push(refused(UNKNOWN, "    functions: {mass: {known_part: 1.0, min: 0.0}}\n"));
+    all.push(refused(
+        UNKNOWN,
+        "    functions: {cubic_stiffness: {known_part: 1.0}}\n",
+    ));
+    all.push(refused(
+        UNKNOWN,
+        "    functions: {mass: {known_part: 1.0, min: 0.0}}\n",
+    ));
     let known = "  mass: {basis: constant, start: 1.0, known_part: 1.0}\n";
     let with = |ending: &str| {
         let bench = model(known, "");
@@ -120,9 +134,15 @@ fn messages() {
     let unsure = known.replace("1.0}\n", "{value: 1.0, sigma: 0.1}}\n");
     let bench = model(&unsure, "");
     let text = bench.read("carriage.yaml");
-    bench.write("carriage.yaml", &(text.clone() + "fit: {method: equation-error}\n"));
+    bench.write(
+        "carriage.yaml",
+        &(text.clone() + "fit: {method: equation-error}\n"),
+    );
     all.push(bench.run(&["fit", "carriage.yaml", "--out", "out"]).2);
-    bench.write("carriage.yaml", &text.replace("    sigma: {displacement: 1.0e-4}\n", ""));
+    bench.write(
+        "carriage.yaml",
+        &text.replace("    sigma: {displacement: 1.0e-4}\n", ""),
+    );
     all.push(bench.run(&["fit", "carriage.yaml", "--out", "out"]).2);
     assert_snapshot!(all.join("\n"));
 }

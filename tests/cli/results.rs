@@ -413,16 +413,24 @@ fn intervals_of_the_equation_error() {
 #[test]
 fn intervals_follow_from_the_parameters() {
     let bench = Workbench::with_shipped_models();
-    for (model, least) in [("duffing", 6), ("accelerometer", 6), ("hammer-and-shaker", 5)] {
+    for (model, least) in [
+        ("duffing", 6),
+        ("accelerometer", 6),
+        ("hammer-and-shaker", 5),
+    ] {
         let path = format!("models/{model}.yaml");
         bench.run_to(0, &["fit", &path, "--out", "out", "--no-report"]);
-        let read = |name: &str| -> Value {
-            serde_json::from_str(&bench.read(name)).expect("a document")
-        };
+        let read =
+            |name: &str| -> Value { serde_json::from_str(&bench.read(name)).expect("a document") };
         let (result, parameters) = (read("out/result.json"), read("out/parameters.json"));
         let number = |value: &Value| value.as_f64().expect("a number");
         let list = |value: &Value| -> Vec<f64> {
-            value.as_array().expect("a list").iter().map(number).collect()
+            value
+                .as_array()
+                .expect("a list")
+                .iter()
+                .map(number)
+                .collect()
         };
         let covariance = parameters["covariance"].as_array().expect("a matrix");
         let covariance: Vec<Vec<f64>> = covariance.iter().map(list).collect();
@@ -448,10 +456,17 @@ fn intervals_follow_from_the_parameters() {
             let (found, stated) = (half(name), 0.5 * (high - low));
             // The difference of the ends has a rounding error of their size.
             let rounding = 1e-15 * low.abs().max(high.abs());
-            assert!((found - stated).abs() < 1e-9 * stated + rounding, "{model}: {name} {found} {stated}");
+            assert!(
+                (found - stated).abs() < 1e-9 * stated + rounding,
+                "{model}: {name} {found} {stated}"
+            );
             compared += 1;
         }
-        for parameter in result["nuisance_parameters"].as_array().into_iter().flatten() {
+        for parameter in result["nuisance_parameters"]
+            .as_array()
+            .into_iter()
+            .flatten()
+        {
             let name = parameter["name"].as_str().expect("a name");
             let error = number(&parameter["standard_error"]);
             let stated = error * number(&parameters["estimates"][name]["quantile"]);

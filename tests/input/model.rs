@@ -8,8 +8,8 @@ use kmcfit::config::spec::{
     Basis, FitMethod, Gradient, InitialSpec, PenaltyKind, PenaltySpec, StepMethod, WeightRule,
 };
 use kmcfit::config::values::{
-    Bound, ColumnId, Count, KnotSpec, Nodes, Number, NumberOrColumn, NumberOrEstimate, Sigma,
-    StartSpec, Weight,
+    Bound, ColumnId, Count, KnotSpec, KnownValue, Nodes, Number, NumberOrColumn, NumberOrEstimate,
+    Sigma, StartSpec, Weight,
 };
 
 pub const FULL: &str = "\
@@ -91,7 +91,7 @@ fn every_key_is_read() {
     );
     assert_eq!(
         functions.stiffness.fixed,
-        Some(NumberOrColumn::Number(Number(1.0)))
+        Some(KnownValue::Number(Number(1.0)))
     );
 
     let fit = spec.fit.unwrap();

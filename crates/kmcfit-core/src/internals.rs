@@ -4,11 +4,12 @@
 pub mod assessment {
     pub use crate::assessment::{
         BEYOND_SIGMA, BasisTest, CoarseBasis, EXACT, EquationErrorIntervals, Estimate,
-        EstimateErrors, EstimateStatus, FitAssessment, FitStatistics, FitWarning, FunctionInGap, FunctionSummary, GapAssessment,
-        GapStatus, NoIntervals, POOR, Plausibility, RECOVERY_TOLERANCE, ResidualPattern, Roughness,
-        StepCheck, TruthErrors, Unidentified, VerdictLevel, VerdictReason,
-        constant_probability, diagnostics, estimates, function_summaries, is_same_truth, outliers,
-        pattern, standard_error, verdict_level, verdict_reasons,
+        EstimateErrors, EstimateStatus, FitAssessment, FitStatistics, FitWarning, FunctionInGap,
+        FunctionSummary, GapAssessment, GapStatus, NoIntervals, POOR, Plausibility,
+        RECOVERY_TOLERANCE, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
+        VerdictLevel, VerdictReason, constant_probability, diagnostics, estimates,
+        function_summaries, is_same_truth, outliers, pattern, standard_error, verdict_level,
+        verdict_reasons,
     };
 }
 pub mod builder {
@@ -96,12 +97,13 @@ pub mod solvers {
     pub use crate::problem::FEW_PARAMETERS;
     pub use crate::solvers::{
         ActiveGroup, Attempt, BoundedValue, CheckpointStore, CheckpointUnit, ConditionFailure,
-        CycleCount, ExactF64s, Fit, FitSettings, Gap, GridNotice, Initial, IterationEvent,
-        IterationRecord, Measurements, MissingMeasurement, MissingTerm, Observer, OnNodes,
-        Optimality, PathPoint, QpSolver, Reason, Solver, SolverState, StartProjection,
-        StartStrategy, Status, Stopping, UnsupportedRecord, WeightPath, WidthNotice,
-        active_constraints, choose_weight, choose_weight_watched, cycles, equation_error,
-        equation_rows, estimate_states, fit, fit_from, fit_on_reduced_widths, fit_on_refined_grids,
+        CycleCount, EquationBalance, EquationForm, EquationPart, EquationShare, ExactF64s, Fit,
+        FitSettings, Gap, GridNotice, Initial, IterationEvent, IterationRecord, Measurements,
+        MissingMeasurement, MissingTerm, Observer, OnNodes, Optimality, PathPoint, QpSolver,
+        Reason, Solver, SolverState, StartProjection, StartStrategy, Status, Stopping,
+        UnsupportedRecord, WeightPath, WidthNotice, active_constraints, choose_weight,
+        choose_weight_watched, cycles, equation_balance, equation_error, equation_rows,
+        estimate_states, fit, fit_from, fit_on_reduced_widths, fit_on_refined_grids,
         fit_with_noise, fit_with_noise_watched, missing_terms, no_response, number_or_nan,
         predict_validation, timed,
     };

@@ -104,7 +104,12 @@ impl ProblemParts {
             return Err(ProblemError::Nodes { functions, grid });
         }
         let terms = self.system.terms.len();
-        for found in self.functions.coefficient_sets().iter().map(|set| set.len()) {
+        for found in self
+            .functions
+            .coefficient_sets()
+            .iter()
+            .map(|set| set.len())
+        {
             if found != 1 + terms {
                 return Err(ProblemError::Functions { found, terms });
             }

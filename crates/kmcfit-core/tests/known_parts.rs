@@ -140,7 +140,10 @@ fn the_gradient_is_that_of_the_cost() {
         let difference = (at(step) - at(-step)) / (2.0 * step);
         // Differences of steps of 1e-5 have errors of 1e-10 and of rounding, 1e-11 of J over the step.
         let size = found.abs() + evaluation.cost / theta[j].abs();
-        assert!((found - difference).abs() < 1e-5 * size, "{j}: {found} {difference}");
+        assert!(
+            (found - difference).abs() < 1e-5 * size,
+            "{j}: {found} {difference}"
+        );
     }
 }
 
@@ -152,7 +155,11 @@ fn known_values_enter_the_covariance_as_measurements() {
     let theta = &moved(&problem);
     let samples = jacobian(&problem, theta, SIGMA);
     let mut information = samples.tr_mul(&samples);
-    let priors: Vec<(usize, f64)> = problem.functions.priors().map(|(j, p)| (j, p.sigma)).collect();
+    let priors: Vec<(usize, f64)> = problem
+        .functions
+        .priors()
+        .map(|(j, p)| (j, p.sigma))
+        .collect();
     assert_eq!(priors, [(4, 0.2), (6, 0.05)]);
     for (j, sigma) in priors {
         information[(j, j)] += sigma.powi(-2);
@@ -177,7 +184,9 @@ fn the_uncertainty_of_a_weighed_mass_is_that_of_the_stiffness() {
         velocity: 0.0,
     };
     let noise = white(1, 1, 500);
-    let exact = times.iter().map(|t| constant_coefficients((4.5, 2.0, 900.0), state, *t).0);
+    let exact = times
+        .iter()
+        .map(|t| constant_coefficients((4.5, 2.0, 900.0), state, *t).0);
     let samples: Vec<f64> = exact.zip(&noise).map(|(y, e)| y + 1e-4 * e).collect();
     let error = |mass: CoefficientSpec| {
         let system = [
@@ -198,7 +207,10 @@ fn the_uncertainty_of_a_weighed_mass_is_that_of_the_stiffness() {
     let weighed = error(CoefficientSpec::uncertain(4.5, 0.09));
     let expected = (exact * exact + 0.02 * 0.02f64).sqrt();
     // The prior of 2 % adds terms of second order, 4e-4.
-    assert!((weighed / expected - 1.0).abs() < 1e-3, "{weighed} {expected}");
+    assert!(
+        (weighed / expected - 1.0).abs() < 1e-3,
+        "{weighed} {expected}"
+    );
     assert!(exact < 1e-3, "{exact}");
 }
 

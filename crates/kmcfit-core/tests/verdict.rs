@@ -27,14 +27,17 @@ fn problem(seed: u64, further: Further) -> Problem {
     let times: Vec<f64> = (0..SAMPLES).map(|i| SPACING * i as f64).collect();
     let force = broadband(white(seed, 1, SAMPLES));
     let [m, c, k] = TRUTH;
-    let linear = response(SPACING, [0.0, 0.0], &force, |_, y, v, f| (f - c * v - k * y) / m);
+    let linear = response(SPACING, [0.0, 0.0], &force, |_, y, v, f| {
+        (f - c * v - k * y) / m
+    });
     let size = |part: usize| rms(&linear.iter().map(|state| state[part]).collect::<Vec<f64>>());
     let (y0, v0) = (size(0), size(1));
     let extra = |y: f64, v: f64| match further {
         None => 0.0,
         Some((CoefficientKind::CubicStiffness, share)) => share * k * y * (y / y0).powi(2),
-        Some((CoefficientKind::QuadraticDamping, share)) => share * k * y0 * v * v.abs() / (v0 * v0),
-        Some((CoefficientKind::Offset, share)) => share * k * y0,
+        Some((CoefficientKind::QuadraticDamping, share)) => {
+            share * k * y0 * v * v.abs() / (v0 * v0)
+        }
         // The sign of the velocity within a thousandth of its root mean square.
         Some((_, share)) => share * k * y0 * (v / (1e-3 * v0)).clamp(-1.0, 1.0),
     };
@@ -55,13 +58,16 @@ fn problem(seed: u64, further: Further) -> Problem {
         .force(&times, &force)
         .displacement(&times, &samples)
         .sigma(sigma);
-    Builder::new(system).record(record).nodes(4 * (SAMPLES - 1) + 1).build().unwrap()
+    Builder::new(system)
+        .record(record)
+        .nodes(4 * (SAMPLES - 1) + 1)
+        .build()
+        .unwrap()
 }
 
 fn assessed(problem: &Problem) -> (Problem, Fit, FitAssessment) {
     let settings = FitSettings::default();
-    let (problem, fit) =
-        fit_with_noise(problem, &problem.start(), &settings, &mut |_| {}).unwrap();
+    let (problem, fit) = fit_with_noise(problem, &problem.start(), &settings, &mut |_| {}).unwrap();
     let assessment = FitAssessment::of(&problem, &fit, true);
     (problem, fit, assessment)
 }
@@ -86,11 +92,12 @@ fn missing_terms_are_named() {
         CoefficientKind::CubicStiffness,
         CoefficientKind::QuadraticDamping,
         CoefficientKind::CoulombFriction,
-        CoefficientKind::Offset,
     ];
     for kind in kinds {
         for share in [0.005, 0.03] {
-            let found: Vec<_> = (0..20).map(|seed| named(seed, Some((kind, share)))).collect();
+            let found: Vec<_> = (0..20)
+                .map(|seed| named(seed, Some((kind, share))))
+                .collect();
             let right = found.iter().filter(|(term, _)| *term == Some(kind)).count();
             assert!(right >= 19, "{kind:?} {share}: {found:?}");
             let adequate = |(_, level): &&(_, VerdictLevel)| *level == VerdictLevel::Adequate;
@@ -114,7 +121,13 @@ fn clean_records_are_adequate() {
 fn intervals_of_ratios_follow_from_the_covariance() {
     let (problem, fit, assessment) = assessed(&problem(0, None));
     let found = estimates(&problem, &fit, assessment.bands.as_ref());
-    let get = |name: &str| &found.iter().find(|(known, _)| known == name).expect("an estimate").1;
+    let get = |name: &str| {
+        &found
+            .iter()
+            .find(|(known, _)| known == name)
+            .expect("an estimate")
+            .1
+    };
     let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
     let expected = [
         "natural_frequency",
@@ -126,9 +139,16 @@ fn intervals_of_ratios_follow_from_the_covariance() {
         "c_over_m",
     ];
     assert_eq!(names, expected);
-    assert!(found.iter().all(|(_, e)| e.status == EstimateStatus::Estimated));
+    assert!(
+        found
+            .iter()
+            .all(|(_, e)| e.status == EstimateStatus::Estimated)
+    );
     let [m, c, k] = [0, 1, 2].map(|j| fit.best.parameters[j]);
-    let covariance = assessment.covariance.as_ref().expect("identified constants");
+    let covariance = assessment
+        .covariance
+        .as_ref()
+        .expect("identified constants");
     let error = |gradient: [f64; 3]| {
         let terms = (0..9).map(|i| gradient[i / 3] * covariance[(i / 3, i % 3)] * gradient[i % 3]);
         terms.sum::<f64>().sqrt()
@@ -136,8 +156,16 @@ fn intervals_of_ratios_follow_from_the_covariance() {
     let frequency = (k / m).sqrt() / TAU;
     let zeta = 0.5 * c / (k * m).sqrt();
     let cases = [
-        ("natural_frequency", frequency, [-0.5 * frequency / m, 0.0, 0.5 * frequency / k]),
-        ("damping_ratio", zeta, [-0.5 * zeta / m, zeta / c, -0.5 * zeta / k]),
+        (
+            "natural_frequency",
+            frequency,
+            [-0.5 * frequency / m, 0.0, 0.5 * frequency / k],
+        ),
+        (
+            "damping_ratio",
+            zeta,
+            [-0.5 * zeta / m, zeta / c, -0.5 * zeta / k],
+        ),
         ("k_over_m", k / m, [-k / (m * m), 0.0, 1.0 / m]),
         ("c_over_m", c / m, [-c / (m * m), 1.0 / m, 0.0]),
         ("stiffness", k, [0.0, 0.0, 1.0]),
@@ -147,7 +175,10 @@ fn intervals_of_ratios_follow_from_the_covariance() {
         let [low, high] = estimate.ci95.expect("an interval");
         assert!((estimate.value / value - 1.0).abs() < 1e-12, "{name}");
         let half = 1.959_963_985 * error(gradient);
-        assert!((0.5 * (high - low) / half - 1.0).abs() < 1e-8, "{name}: {half} {low} {high}");
+        assert!(
+            (0.5 * (high - low) / half - 1.0).abs() < 1e-8,
+            "{name}: {half} {low} {high}"
+        );
         assert!((0.5 * (low + high) - value).abs() < 1e-9 * value, "{name}");
     }
 }
@@ -158,7 +189,9 @@ fn free_records_determine_ratios_to_an_assumed_mass() {
     let times: Vec<f64> = (0..SAMPLES).map(|i| SPACING * i as f64).collect();
     let [m, c, k] = TRUTH;
     let still = vec![0.0; SAMPLES];
-    let states = response(SPACING, [0.1, 0.0], &still, |_, y, v, f| (f - c * v - k * y) / m);
+    let states = response(SPACING, [0.1, 0.0], &still, |_, y, v, f| {
+        (f - c * v - k * y) / m
+    });
     let noise = white(0, 2, SAMPLES);
     let samples = states.iter().zip(noise).map(|([y, ..], e)| y + 1e-4 * e);
     let samples: Vec<f64> = samples.collect();
@@ -172,17 +205,28 @@ fn free_records_determine_ratios_to_an_assumed_mass() {
             .from_state(0.1, 0.0)
             .displacement(&times, &samples)
             .sigma(1e-4);
-        let problem = Builder::new(system).record(record).nodes(4 * (SAMPLES - 1) + 1).build();
+        let problem = Builder::new(system)
+            .record(record)
+            .nodes(4 * (SAMPLES - 1) + 1)
+            .build();
         let (problem, fit, assessment) = assessed(&problem.unwrap());
         let all = estimates(&problem, &fit, assessment.bands.as_ref());
         let reasons = verdict_reasons(&problem, &fit, Some(&assessment));
         (all, reasons)
     };
     let (assumed, reasons) = with(CoefficientSpec::fixed(2.0));
-    let names: Vec<&str> = assumed.iter().take(4).map(|(name, _)| name.as_str()).collect();
-    assert_eq!(names, ["natural_frequency", "damping_ratio", "k_over_m", "c_over_m"]);
+    let names: Vec<&str> = assumed
+        .iter()
+        .take(4)
+        .map(|(name, _)| name.as_str())
+        .collect();
+    assert_eq!(
+        names,
+        ["natural_frequency", "damping_ratio", "k_over_m", "c_over_m"]
+    );
     let status = |all: &[(String, _)], name: &str| {
-        let of = |(known, _): &&(String, kmcfit_core::internals::assessment::Estimate)| known == name;
+        let of =
+            |(known, _): &&(String, kmcfit_core::internals::assessment::Estimate)| known == name;
         all.iter().find(of).expect("an estimate").1.status
     };
     assert_eq!(status(&assumed, "mass"), EstimateStatus::Fixed);

@@ -56,7 +56,7 @@ keys! {
             default "1",
             range "1 or more",
             needs "equally spaced samples without gaps";
-        /// Frequency band to which samples and simulated response are filtered.
+        /// Frequency band to which samples and simulated response are filtered, for equation-error each term of the equation of motion.
         band: Option<RangeSpec>,
             example "{min: 5.0, max: 50.0}",
             unit "Hz",
@@ -65,7 +65,7 @@ keys! {
             needs "equally spaced samples without gaps";
         /// Standard deviation of the samples; without it J is the paper's integral.
         sigma: Option<SigmaSpec>, example "{displacement: 0.1}";
-        /// Loss of the residuals.
+        /// Loss of the residuals; for equation-error of those of the equation of motion.
         loss: Option<LossesSpec>,
             example "{displacement: huber}",
             default "squares",
@@ -230,7 +230,7 @@ keys! {
 }
 
 keys! {
-    /// Loss of the residuals of each channel.
+    /// Loss of the residuals of each channel; for equation-error the loss of a channel is that of the residuals of the equation of motion.
     pub struct LossesSpec (Default) = "losses", expecting "a map such as {displacement: huber}" {
         /// Loss of the displacement.
         displacement: Option<ScalarOr<LossName, LossSpec>>, example "huber", default "squares";

@@ -17,7 +17,7 @@ use crate::report::verdict::Verdict;
 use kmcfit_core::internals::assessment::{FitStatistics, FunctionSummary, StepCheck};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::CovarianceKind;
-use kmcfit_core::internals::solvers::{Optimality, Status, number_or_nan};
+use kmcfit_core::internals::solvers::{EquationBalance, Optimality, Status, number_or_nan};
 pub use kmcfit_core::internals::study::PredictionSummary as Prediction;
 use kmcfit_core::internals::system::Grid;
 use serde::{Deserialize, Serialize};
@@ -91,6 +91,9 @@ pub struct ResultDocument {
     /// Step-size check: the optimum simulated with half the step; `null` if there is no response.
     #[serde(default)]
     pub step_check: Option<StepCheck>,
+    /// Residual of the equation of motion beside its forces; absent for fits that simulate the response.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub equation: Option<EquationBalance>,
     /// Predicted free responses from other initial states.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub predictions: Vec<Prediction>,

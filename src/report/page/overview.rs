@@ -5,6 +5,7 @@ use super::table::{list, number, table};
 use crate::finding::Finding;
 use crate::report::answer::{AnswerRow, answer};
 use crate::report::document::{ChannelSummary, ResultDocument};
+use crate::report::equation::equation_residual;
 use crate::report::suggestions;
 use crate::report::summary::{count, iterations};
 use crate::report::text::{escape, prose};
@@ -18,7 +19,10 @@ pub(super) fn overview(document: &ResultDocument) -> String {
     let known = &document.identifiability;
     let mut warnings = Finding::texts(&known.warnings);
     warnings.extend(Finding::texts(&document.warnings));
+    let equation = document.equation.iter();
+    let equation = equation.map(|b| equation_residual(b, document.is_rotation()));
     let lists = [
+        ("Equation of motion", equation.collect()),
         ("Identifiability", Finding::texts(&known.findings)),
         ("Warnings", warnings),
         ("Suggestions", Finding::texts(&document.advice)),
@@ -89,7 +93,13 @@ fn facts(document: &ResultDocument) -> String {
     if document.has_ratio() {
         facts.push(("cost ratio J/J0", number(document.cost.ratio)));
     }
-    if let Some(worst) = document.worst_fit() {
+    if let Some(balance) = &document.equation {
+        let unit = if document.is_rotation() { "N m" } else { "N" };
+        facts.push((
+            "rms residual of the equation of motion",
+            format!("{} {unit}", number(balance.residual_rms)),
+        ));
+    } else if let Some(worst) = document.worst_fit() {
         let name = match document.channels().count() {
             1 => "fit",
             _ => "fit of the worst channel",

@@ -325,7 +325,13 @@ fn changes_nothing(document: &ResultDocument) -> bool {
 /// The suggestion from patterns, size and whiteness of the residuals.
 fn about_residuals(document: &ResultDocument) -> Option<Suggestion> {
     let channels = || document.channels();
-    let mut patterns = channels().filter_map(|c| Some((c, c.pattern.clone()?)));
+    // The equation error supports robust losses and bands, but estimates no sensor.
+    let is_possible = |pattern: &ResidualPattern| {
+        let is_of_sensor = matches!(pattern, ResidualPattern::Offset | ResidualPattern::Drift);
+        document.is_simulated() || !is_of_sensor
+    };
+    let pattern = |c: &ChannelSummary| c.pattern.clone().filter(is_possible);
+    let mut patterns = channels().filter_map(|c| Some((c, pattern(c)?)));
     if let Some((channel, pattern)) = patterns.next() {
         return Some(Suggestion::Pattern {
             channel: channel.kind.clone(),

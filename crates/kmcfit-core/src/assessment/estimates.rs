@@ -128,12 +128,7 @@ fn is_coefficient_of_scale(function: &CoefficientFunction) -> bool {
     !function.is_known_part && function.prior.is_none()
 }
 
-fn estimate(
-    values: &[f64],
-    band: Option<&Band>,
-    unit: &str,
-    status: EstimateStatus,
-) -> Estimate {
+fn estimate(values: &[f64], band: Option<&Band>, unit: &str, status: EstimateStatus) -> Estimate {
     let shares = trapezoid_weights(values.len(), 1.0 / (values.len() - 1).max(1) as f64);
     let value: f64 = match values.iter().all(|v| *v == values[0]) {
         true => values[0],

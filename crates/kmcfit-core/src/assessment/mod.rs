@@ -20,16 +20,16 @@ mod verdict;
 pub use crate::objective::{diagnostics, outliers};
 pub use channel::{ResidualPattern, pattern};
 pub use constants::{constant_probability, standard_error};
-pub use estimates::{Estimate, EstimateStatus, estimates};
 pub use equation_error::{EquationErrorIntervals, NoIntervals};
+pub use estimates::{Estimate, EstimateStatus, estimates};
 pub use function::{EstimateErrors, FunctionSummary, function_summaries};
 pub use gaps::{FunctionInGap, GapAssessment, GapStatus};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
 pub use recovery::{RECOVERY_TOLERANCE, Roughness, TruthErrors, is_same_truth};
 pub use refinement::{BasisTest, CoarseBasis};
 pub use statistics::{FitStatistics, statistics};
-pub use verdict::{VerdictLevel, VerdictReason, verdict_level, verdict_reasons};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
+pub use verdict::{VerdictLevel, VerdictReason, verdict_level, verdict_reasons};
 
 use friction_width::width_warning;
 use gaps::gap_assessments;

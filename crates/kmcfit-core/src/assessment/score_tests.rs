@@ -20,7 +20,7 @@ use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::ScoreCovariance;
 use crate::simd::sum::rms;
 use crate::simulate::Trajectory;
-use crate::solvers::{MissingTerm, weighted_jacobian};
+use crate::solvers::{MissingTerm, TESTED_TERMS, weighted_jacobian};
 use crate::system::Term;
 use nalgebra::{DMatrix, DVector};
 
@@ -65,8 +65,7 @@ pub(super) fn missing_term(
     let tests = kinds.iter().enumerate().filter_map(|(i, (kind, term))| {
         let column = jacobian.column(first + i).into_owned();
         let (value, t) = model.test(&extended, &column, &residuals, is_modelled)?;
-        let share = (value * force(&evaluation, *term)).abs()
-            / largest_force(problem, &evaluation);
+        let share = (value * force(&evaluation, *term)).abs() / largest_force(problem, &evaluation);
         Some(MissingTerm {
             term: *kind,
             value,
@@ -85,8 +84,13 @@ fn candidates(problem: &Problem, evaluation: &Evaluation) -> Vec<(CoefficientKin
         .collect();
     let width = WIDTH * rms(&speeds);
     let set = problem.functions.coefficient_set(0);
-    let has = |kind: CoefficientKind| set.iter().any(|f| problem.functions.get(*f).quantity == kind);
-    let kinds = CoefficientKind::ALL.into_iter().filter(|kind| !has(*kind));
+    let has = |kind: CoefficientKind| {
+        set.iter()
+            .any(|f| problem.functions.get(*f).quantity == kind)
+    };
+    let kinds = TESTED_TERMS.into_iter().filter(|kind| !has(*kind));
+    // A static force is a mean of the residuals, which has a test of its own.
+    let kinds = kinds.filter(|kind| *kind != CoefficientKind::Offset);
     let kinds = kinds.filter_map(|kind| Some((kind, kind.term(width)?)));
     kinds.filter(|_| width > 0.0 && width.is_finite()).collect()
 }
@@ -101,18 +105,24 @@ fn extended(
     let (nodes, step) = (functions.nodes(), problem.system.grid.step());
     let mut list: Vec<CoefficientFunction> = functions.iter().cloned().collect();
     let first = list.len();
-    let new = kinds.iter().map(|(kind, _)| CoefficientFunction::constant(*kind, 0.0, nodes));
+    let new = kinds
+        .iter()
+        .map(|(kind, _)| CoefficientFunction::constant(*kind, 0.0, nodes));
     list.extend(new);
     let set = |set: &CoefficientSet| {
         let all = set.iter().copied().chain(first..list.len());
-        CoefficientSet::from(all.collect::<Vec<usize>>()).with_known_parts(set.known_parts().to_vec())
+        CoefficientSet::from(all.collect::<Vec<usize>>())
+            .with_known_parts(set.known_parts().to_vec())
     };
     let sets: Vec<CoefficientSet> = functions.coefficient_sets().iter().map(set).collect();
     let longer = Parameterization::with_coefficient_sets(list, sets, nodes, step)?
         .with_scalars(functions.scalars().to_vec());
     let extended = problem.clone().with(|parts| {
         parts.functions = longer;
-        parts.system.terms.extend(kinds.iter().map(|(_, term)| *term));
+        parts
+            .system
+            .terms
+            .extend(kinds.iter().map(|(_, term)| *term));
         parts.penalties.clear();
         parts.variations.clear();
         parts.constraints = Default::default();

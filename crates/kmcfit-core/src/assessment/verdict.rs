@@ -4,9 +4,9 @@
 //! noise model, the time steps, the bases, missing force terms, gaps, the inputs, and what the samples identify. A negative damping is no
 //! reason: some systems gain energy.
 
+use super::FitAssessment;
 use super::gaps::{GapAssessment, GapStatus};
 use super::plausibility::{FitWarning, Unidentified};
-use super::FitAssessment;
 use crate::functions::CoefficientKind;
 use crate::identifiability::{
     Classification, FunctionClassification, ScaleSource, scale_source, structural_rank,
@@ -65,6 +65,18 @@ pub enum VerdictReason {
     },
     /// The residuals show a term that the model does not have.
     MissingTerm(MissingTerm),
+    /// The residuals of a channel have a mean.
+    ResidualMean {
+        /// Name of the experiment.
+        experiment: String,
+        /// Kind of the channel.
+        channel: String,
+    },
+    /// The estimates depend on the width over which Coulomb friction is smoothed.
+    FrictionWidth {
+        /// Name of the estimate with the largest shift.
+        estimate: String,
+    },
     /// Two modes vibrate in a record.
     SecondMode {
         /// Their frequencies, Hz, the stronger first.
@@ -241,6 +253,17 @@ fn of_warning(problem: &Problem, fit: &Fit, warning: &FitWarning) -> Option<Verd
             input: *input,
         },
         FitWarning::MissingTerm(term) => VerdictReason::MissingTerm(*term),
+        FitWarning::ResidualMean {
+            experiment,
+            channel,
+            ..
+        } => VerdictReason::ResidualMean {
+            experiment: experiment.clone(),
+            channel: channel.clone(),
+        },
+        FitWarning::FrictionWidth { estimate, .. } => VerdictReason::FrictionWidth {
+            estimate: estimate.clone(),
+        },
         FitWarning::Negative { function } if function == CoefficientKind::Damping.name() => {
             return None;
         }
@@ -255,16 +278,18 @@ fn of_warning(problem: &Problem, fit: &Fit, warning: &FitWarning) -> Option<Verd
 
 /// Span of a gap in which a function is not identified by the samples.
 fn open_gap(gap: &GapAssessment) -> Option<[f64; 2]> {
-    let is_open = gap.functions.iter().any(|f| f.status != GapStatus::Identified);
+    let is_open = gap
+        .functions
+        .iter()
+        .any(|f| f.status != GapStatus::Identified);
     is_open.then_some(gap.span)
 }
 
 /// Fit of the worst channel, per cent.
 fn worst_fit(problem: &Problem, fit: &Fit) -> f64 {
     let channels = problem.predicted(&fit.best.evaluation);
-    let fits = channels.map(|(channel, predicted)| {
-        crate::objective::diagnostics(channel, predicted).fit_percent
-    });
+    let fits = channels
+        .map(|(channel, predicted)| crate::objective::diagnostics(channel, predicted).fit_percent);
     fits.fold(100.0, f64::min)
 }
 

@@ -297,10 +297,11 @@ impl CoefficientSpec {
                 (key, CoefficientFunction::uncertain(kind, *prior, nodes))
             }
             CoefficientForm::Shared => {
-                return Err(
-                    BuildError::new(key, "this function has neither a start nor a fixed value")
-                        .expected("`start` for a function to be fitted, `fixed` for a known one"),
-                );
+                return Err(BuildError::new(
+                    key,
+                    "this function has neither a start nor a fixed value",
+                )
+                .expected("`start` for a function to be fitted, `fixed` for a known one"));
             }
             CoefficientForm::Estimated(basis, start) => {
                 let basis = basis.on(key, grid)?;

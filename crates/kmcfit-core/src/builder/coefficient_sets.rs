@@ -150,11 +150,16 @@ impl Builder {
     /// Error for a known part that is not known, beside a fixed value, or without the likelihood that its standard deviation needs.
     fn check_known(&self, entries: &[FunctionEntry]) -> Result<(), BuildError> {
         for entry in self.given() {
-            if entry.spec.known_part.is_some() && entry.spec.basis().is_none() && !entry.spec.is_shared() {
+            if entry.spec.known_part.is_some()
+                && entry.spec.basis().is_none()
+                && !entry.spec.is_shared()
+            {
                 let problem = "a fixed function has no known part";
-                return Err(BuildError::new(format!("{}.{KNOWN_PART}", entry.key), problem)
-                    .found("`fixed` and `known_part`")
-                    .expected("their sum as `fixed`"));
+                return Err(
+                    BuildError::new(format!("{}.{KNOWN_PART}", entry.key), problem)
+                        .found("`fixed` and `known_part`")
+                        .expected("their sum as `fixed`"),
+                );
             }
         }
         let Some(entry) = entries.iter().find(|entry| entry.spec.prior().is_some()) else {
@@ -166,7 +171,8 @@ impl Builder {
         };
         match found {
             Some(found) if !self.is_simulation => {
-                let problem = "a known value with a standard deviation needs a likelihood of the samples";
+                let problem =
+                    "a known value with a standard deviation needs a likelihood of the samples";
                 Err(BuildError::new(&entry.key, problem).found(found).expected(
                     "`sigma` in every experiment and another method, or a number without a standard deviation",
                 ))

@@ -65,7 +65,9 @@ impl Builder {
         let key = &constraint.key;
         let grid = problem.system.grid;
         constraint.check()?;
-        let set = problem.functions.coefficient_set(constraint.coefficient_set);
+        let set = problem
+            .functions
+            .coefficient_set(constraint.coefficient_set);
         let list = &problem.functions;
         let has_known_part = |kind: &CoefficientKind| {
             let known = set.known_parts().iter();

@@ -50,10 +50,7 @@ impl Parameterization {
             coefficient_sets.into_iter().map(Into::into).collect();
         let indices = |set: &CoefficientSet| set.parts().map(|(_, f)| f).collect::<Vec<_>>();
         let sets: Vec<Vec<usize>> = coefficient_sets.iter().map(indices).collect();
-        assert!(
-            !sets.is_empty(),
-            "at least the shared coefficient set"
-        );
+        assert!(!sets.is_empty(), "at least the shared coefficient set");
         assert!(
             sets.iter().flatten().all(|f| *f < list.len()),
             "coefficient sets with functions of the list"

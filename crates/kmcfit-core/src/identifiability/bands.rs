@@ -252,9 +252,7 @@ impl Maker<'_> {
         let degrees = (0..self.nodes.len()).map(|i| {
             let entries = entries(i);
             let weight = self.shares[i];
-            entries
-                .iter()
-                .for_each(|(j, a)| gradient[*j] += weight * a);
+            entries.iter().for_each(|(j, a)| gradient[*j] += weight * a);
             self.variants
                 .map_or(f64::INFINITY, |variants| variants.degrees(&entries))
         });
@@ -262,12 +260,7 @@ impl Maker<'_> {
     }
 
     /// Mean over the record of a curve with these values, with the equalities fixed.
-    fn mean(
-        &self,
-        values: &[f64],
-        linear: &LinearisedCurve,
-        gradient: Vec<f64>,
-    ) -> MeanOverRecord {
+    fn mean(&self, values: &[f64], linear: &LinearisedCurve, gradient: Vec<f64>) -> MeanOverRecord {
         let shares = DVector::from_column_slice(&self.shares);
         let sum = |values: &[f64]| values.iter().zip(&self.shares).map(|(x, w)| x * w).sum();
         let size: f64 = sum(&linear.sizes);
@@ -462,7 +455,10 @@ impl Maker<'_> {
         };
         let (m, damping, stiffness) = (at_place(0), of(Term::Damping), of(Term::Stiffness));
         let band = |name: &str, unit: &str, coefficients: &[&Vec<usize>], ratio: Ratio| {
-            let functions: Vec<usize> = coefficients.iter().flat_map(|c| c.iter().copied()).collect();
+            let functions: Vec<usize> = coefficients
+                .iter()
+                .flat_map(|c| c.iter().copied())
+                .collect();
             let at = |node: &usize| {
                 let sum = |c: &&Vec<usize>| c.iter().map(|f| values[*f][*node]).sum();
                 let at_node: Vec<f64> = coefficients.iter().map(sum).collect();

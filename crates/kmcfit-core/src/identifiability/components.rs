@@ -59,11 +59,9 @@ impl Component {
     /// Symbols of the functions, `(m, c, k)`.
     pub fn symbols(&self, problem: &Problem) -> String {
         let functions = self.functions.iter().map(|f| problem.functions.get(*f));
-        let symbol = |function: &CoefficientFunction| {
-            match &function.owner {
-                None => function.quantity.symbol().to_owned(),
-                Some(owner) => format!("{} of {owner}", function.quantity.symbol()),
-            }
+        let symbol = |function: &CoefficientFunction| match &function.owner {
+            None => function.quantity.symbol().to_owned(),
+            Some(owner) => format!("{} of {owner}", function.quantity.symbol()),
         };
         let functions = functions.filter(|function| !function.is_known_part);
         let symbols: Vec<String> = functions.map(symbol).collect();

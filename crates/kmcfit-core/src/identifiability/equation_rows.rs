@@ -1,6 +1,6 @@
-//! Covariance of the estimates of the equation error from the scores of its samples.
+//! Covariance of the estimates of the equation error from the scores of its rows.
 //!
-//! With the rows `x_i` of the equation of motion in the parameters and its residuals `e_i`, in units of the root of the cost, the
+//! With the rows `x_i` of the equation of motion in the parameters, one for each bump function of the weak form or for each sample, and its residuals `e_i`, in units of the root of the cost, the
 //! scores are `s_i = x_i e_i` and
 //!
 //! ```text
@@ -17,14 +17,14 @@ use crate::noise::KernelCovariance;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
-/// The equation of motion at the samples, linear in the parameters, at the minimum of the equation error.
+/// The equation of motion at the samples, or averaged by bump functions, linear in the parameters, at the minimum of the equation error.
 #[derive(Debug, Clone)]
 pub struct EquationRows {
-    /// Samples x parameters.
+    /// Rows x parameters.
     pub rows: DMatrix<f64>,
-    /// Residual of each sample.
+    /// Residual of each row.
     pub residuals: Vec<f64>,
-    /// Samples of each record, in time order.
+    /// Rows of each record, in time order.
     pub records: Vec<Range<usize>>,
     /// Linear forms of the parameters held besides the constraints, as columns and coefficients: nuisance parameters, and the mean of the
     /// mass where the common scale of the functions is undetermined.
@@ -33,9 +33,9 @@ pub struct EquationRows {
     pub is_scale_free: bool,
 }
 
-/// Scores of the samples of an equation error along scaled directions.
+/// Scores of the rows of an equation error along scaled directions.
 pub(super) struct Scores {
-    /// Scores, samples x directions.
+    /// Scores, rows x directions.
     scores: DMatrix<f64>,
     records: Vec<Range<usize>>,
     pub held: Vec<ActiveRow>,

@@ -25,7 +25,8 @@ pub fn scale_source(problem: &Problem) -> ScaleSource {
         return ScaleSource::Force;
     }
     let given: Vec<_> = component.given(problem).collect();
-    let is_known = |f: &&crate::functions::CoefficientFunction| f.is_known_part || f.prior.is_some();
+    let is_known =
+        |f: &&crate::functions::CoefficientFunction| f.is_known_part || f.prior.is_some();
     match given.iter().find(|f| is_known(f)) {
         Some(_) => ScaleSource::KnownValue,
         None if given.is_empty() => ScaleSource::Model,

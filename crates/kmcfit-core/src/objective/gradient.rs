@@ -174,7 +174,9 @@ impl Problem {
         let assembly = functions.coefficient_set(experiment.coefficient_set);
         let view = self.view(evaluation, e);
         if view.engine() != Engine::Prefactored
-            || !assembly.parts().all(|(_, f)| functions.is_constant_or_known(f))
+            || !assembly
+                .parts()
+                .all(|(_, f)| functions.is_constant_or_known(f))
         {
             return false;
         }

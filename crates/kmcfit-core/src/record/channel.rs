@@ -164,6 +164,32 @@ impl Channel {
         self
     }
 
+    /// The channel without its filter and with the samples as they were before it; the channel itself without a filter. `None` where
+    /// these samples are unknown ([`Channel::with_simulated`]).
+    pub(crate) fn before_filter(&self) -> Option<Self> {
+        if self.filter.is_empty() {
+            return Some(self.clone());
+        }
+        (!self.unfiltered.is_empty()).then(|| Self {
+            observed: self.unfiltered.clone(),
+            unfiltered: Vec::new(),
+            filter: Vec::new(),
+            ..self.clone()
+        })
+    }
+
+    /// The channel with other samples, which are not filtered.
+    ///
+    /// # Panics
+    /// If there is not one in place of each.
+    #[must_use]
+    pub(crate) fn with_samples(mut self, samples: Vec<f64>) -> Self {
+        assert_eq!(samples.len(), self.len(), "one in place of each");
+        self.observed = samples;
+        self.unfiltered.clear();
+        self
+    }
+
     /// The channel with changes of the input at its samples (N, or m/s^2), and of the response that is compared with its samples:
     /// `changes` are subtracted from the response in the unit of the kind.
     ///

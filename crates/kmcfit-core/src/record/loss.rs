@@ -58,7 +58,7 @@ impl Loss {
     /// Ratio of the information of samples with the normalised residuals `u` to that of the majorant, whose weights are
     /// `weight(u)`: an M-estimator has the variance `E psi^2 / (E psi')^2` of the mean in place of `1 / E weight` (Huber 1964). With
     /// scores of a known covariance the ratio is that of the curvatures, squared. 1 for least squares.
-    pub(super) fn information_ratio(self, u: &[f64], has_score_covariance: bool) -> f64 {
+    pub(crate) fn information_ratio(self, u: &[f64], has_score_covariance: bool) -> f64 {
         let mean = |of: &dyn Fn(f64) -> f64| u.iter().map(|u| of(*u)).sum::<f64>() / u.len() as f64;
         let weight = mean(&|u| self.weight(u));
         let slope = mean(&|u| self.score_slope(u)).max(0.0);

@@ -57,8 +57,10 @@ pub use history::{IterationRecord, number_or_nan};
 pub(crate) use input_errors::input_error_effect;
 pub use iterate::Iterate;
 pub(crate) use linearization::{add_penalties, add_priors, linear_predictions, weighted_jacobian};
+pub(crate) use methods::equation_error::TESTED_TERMS;
 pub use methods::equation_error::{
-    Measurements, MissingTerm, NoEquationRows, equation_error, equation_rows, missing_terms,
+    EquationBalance, EquationForm, EquationPart, EquationShare, Measurements, MissingTerm,
+    NoEquationRows, equation_balance, equation_error, equation_rows, missing_terms,
 };
 pub use no_response::no_response;
 pub use noise_estimation::{fit_with_noise, fit_with_noise_watched};

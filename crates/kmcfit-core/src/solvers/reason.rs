@@ -160,18 +160,19 @@ pub struct UnsupportedRecord {
 /// Measurement that a record lacks for its equation error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum MissingMeasurement {
-    /// A quadratic loss.
-    #[error("the equation error supports only the quadratic loss")]
-    QuadraticLoss,
     /// Sensors with known gain and offset.
-    #[error("the equation error needs known sensors: no gain, offset or drift can be estimated")]
+    #[error(
+        "the equation error needs known sensors: state gain, offset and drift, or estimate them with `method: gauss-newton`"
+    )]
     KnownSensors,
     /// An acceleration that oscillates long enough.
     #[error("the acceleration is too short or does not oscillate")]
     Oscillation,
-    /// A displacement, or equally spaced accelerations alone; force and base cannot be filtered consistently with other channels.
+    /// A displacement, or equally spaced accelerations alone, without a filter or with equally spaced samples at common times; force and
+    /// base cannot be filtered consistently with other channels.
     #[error(
-        "the force or base cannot be filtered like the response: this needs a displacement, or equally spaced accelerations alone"
+        "the force or base cannot be filtered like the response: this needs a displacement (with a `band`, equally spaced samples of \
+         all channels at the same times), or equally spaced accelerations alone; otherwise use `method: gauss-newton`"
     )]
     FilteredDrive,
     /// Samples.

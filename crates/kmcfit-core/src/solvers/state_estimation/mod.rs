@@ -8,9 +8,12 @@ mod uniform;
 
 pub(super) use band_limited::PassBand;
 pub(super) use spline::kinematics as by_spline;
+use uniform::Grouping;
+pub(super) use uniform::{Differences, fine_differences, smooth};
 
 use crate::problem::Problem;
-use crate::record::{Channel, Experiment};
+use crate::record::{Channel, Experiment, Weighting};
+use crate::simd::sum::rms;
 use crate::system::State;
 
 /// Smooth states near the samples, at some nodes of the grid.
@@ -29,6 +32,8 @@ pub(super) struct Kinematics {
     pub size: f64,
     /// Weight of a squared residual.
     pub weight: f64,
+    /// Groups of samples to which the times belong, for a single displacement at equally spaced nodes.
+    pub grouping: Option<Grouping>,
 }
 
 /// Initial state of each experiment, estimated from its samples; `None` if they are too few or start later.
@@ -62,6 +67,17 @@ fn noise_level(observed: &[f64]) -> f64 {
         .map(|w| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]);
     let squares: f64 = fourth.map(|d| d * d).sum();
     (squares / (70.0 * observed.len().saturating_sub(4).max(1) as f64)).sqrt()
+}
+
+/// Standard deviation of the noise of `values`, the samples of a channel or corrected ones: as stated, or else [`noise_level`].
+pub(super) fn noise_of(channel: &Channel, values: &[f64]) -> f64 {
+    match channel.weighting() {
+        Weighting::Sigma(sigma) => *sigma,
+        Weighting::Sigmas(sigmas) => rms(sigmas),
+        Weighting::Integral { .. } | Weighting::Trapezoid(_) | Weighting::Estimated { .. } => {
+            noise_level(values)
+        }
+    }
 }
 
 /// Samples corrected for the sensor parameters `scalars`, as from an ideal sensor on the base, and the gain.

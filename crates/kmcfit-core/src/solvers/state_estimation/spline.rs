@@ -6,7 +6,7 @@
 //! `omega^4 / (omega^4 + omega_0^4)`.
 
 use super::stencil::weights;
-use super::{Kinematics, noise_level, unsensed};
+use super::{Kinematics, noise_of, unsensed};
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 use crate::record::{Channel, ChannelKind, Experiment, Weighting};
@@ -92,6 +92,7 @@ pub fn kinematics(
         size: main.values.iter().fold(0.0f64, |m, x| m.max(x.abs())),
         weight: weight_of(main.channel),
         nodes: chosen.clone(),
+        grouping: None,
     })?;
     let response = Trajectory {
         displacement: y.clone(),
@@ -108,13 +109,7 @@ fn weight_of(channel: &Channel) -> f64 {
 impl<'a> Plain<'a> {
     fn new(channel: &'a Channel, scalars: &[f64]) -> Self {
         let (values, gain) = unsensed(channel, scalars);
-        let noise = match channel.weighting() {
-            Weighting::Sigma(sigma) => *sigma,
-            Weighting::Sigmas(sigmas) => rms(sigmas),
-            Weighting::Integral { .. } | Weighting::Trapezoid(_) | Weighting::Estimated { .. } => {
-                noise_level(&values)
-            }
-        };
+        let noise = noise_of(channel, &values);
         Self {
             channel,
             noise: (noise / gain.abs())

@@ -1,8 +1,8 @@
 //! State estimation from displacements at equally spaced nodes: smoothing, then fourth-order differences.
 
-use super::{Kinematics, noise_level};
+use super::{Kinematics, noise_of};
 use crate::qp::Subproblem;
-use crate::record::{Channel, Weighting};
+use crate::record::Channel;
 use crate::simd::sum::rms;
 use crate::system::State;
 
@@ -21,20 +21,18 @@ const NOISELESS: f64 = 1e-6;
 
 /// States at all samples but two at each end; of a long noisy record at the middles of groups of samples.
 pub fn kinematics(channel: &Channel, stride: usize, step: f64) -> Option<Kinematics> {
-    let Smoothed { y, group } = smoothed(channel)?;
+    let Smoothed { y, group, weight } = smoothed(channel)?;
     let spacing = group * stride;
     let first_node = (group - 1) / 2 * stride;
     let h = step * spacing as f64;
-    let each = |f: &dyn Fn(&[f64]) -> f64| y.windows(5).map(f).collect::<Vec<f64>>();
-    let v = each(&|w| (w[0] - 8.0 * w[1] + 8.0 * w[3] - w[4]) / (12.0 * h));
-    let a = each(&|w| (-w[0] + 16.0 * w[1] - 30.0 * w[2] + 16.0 * w[3] - w[4]) / (12.0 * h * h));
+    let Differences { y: inner, v, a } = differences(&y, h);
     let first = [-25.0, 48.0, -36.0, 16.0, -3.0];
     let slope = first.iter().zip(&y).map(|(w, y)| w * y).sum::<f64>() / (12.0 * h);
     // From the middle of the first group to the first node.
     let back = step * first_node as f64;
     Some(Kinematics {
         nodes: (2..y.len() - 2).map(|i| first_node + i * spacing).collect(),
-        y: each(&|w| w[2]),
+        y: inner,
         initial: Some(State {
             displacement: y[0] - back * slope,
             velocity: slope - back * a[0],
@@ -43,7 +41,58 @@ pub fn kinematics(channel: &Channel, stride: usize, step: f64) -> Option<Kinemat
         a,
         size: y.iter().fold(0.0f64, |m, y| m.max(y.abs())),
         weight: channel.weighting().weight(1, channel.len()) * group as f64,
+        grouping: Some(Grouping {
+            group,
+            stride,
+            smoothing: weight,
+        }),
     })
+}
+
+/// Groups of neighbouring samples, each of which is one time of a state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grouping {
+    /// Samples of a group; odd.
+    pub group: usize,
+    /// Nodes between samples.
+    pub stride: usize,
+    /// Weight of [`smooth`]; `None` where the samples are not smoothed.
+    pub smoothing: Option<f64>,
+}
+
+impl Grouping {
+    /// Means of the groups of a series with one value per sample.
+    pub fn means(self, samples: &[f64]) -> Vec<f64> {
+        if self.group == 1 {
+            return samples.to_vec();
+        }
+        let groups = samples.chunks_exact(self.group);
+        groups
+            .map(|group| group.iter().sum::<f64>() / self.group as f64)
+            .collect()
+    }
+}
+
+/// A series and its derivatives at all values but two at each end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Differences {
+    /// The series.
+    pub y: Vec<f64>,
+    /// First derivative.
+    pub v: Vec<f64>,
+    /// Second derivative.
+    pub a: Vec<f64>,
+}
+
+/// Fourth-order differences of values that are `spacing` apart.
+pub fn differences(values: &[f64], spacing: f64) -> Differences {
+    let h = spacing;
+    let each = |f: &dyn Fn(&[f64]) -> f64| values.windows(5).map(f).collect::<Vec<f64>>();
+    Differences {
+        y: each(&|w| w[2]),
+        v: each(&|w| (w[0] - 8.0 * w[1] + 8.0 * w[3] - w[4]) / (12.0 * h)),
+        a: each(&|w| (-w[0] + 16.0 * w[1] - 30.0 * w[2] + 16.0 * w[3] - w[4]) / (12.0 * h * h)),
+    }
 }
 
 /// Smoothed samples, or means of groups of them.
@@ -51,6 +100,8 @@ struct Smoothed {
     y: Vec<f64>,
     /// Samples of a group; odd, so that its middle is a sample.
     group: usize,
+    /// Weight of the third differences, if any.
+    weight: Option<f64>,
 }
 
 /// Smoothest curve (in third differences) whose distance from the samples is within their noise: the mean square of `n`
@@ -61,13 +112,7 @@ fn smoothed(channel: &Channel) -> Option<Smoothed> {
     if observed.len() < LEAST {
         return None;
     }
-    let noise = match channel.weighting() {
-        Weighting::Sigma(sigma) => *sigma,
-        Weighting::Sigmas(sigmas) => rms(sigmas),
-        Weighting::Integral { .. } | Weighting::Trapezoid(_) | Weighting::Estimated { .. } => {
-            noise_level(observed)
-        }
-    };
+    let noise = noise_of(channel, observed);
     let most = 10f64.powf(EXPONENTS[1]);
     let mut samples = observed.to_vec();
     let mut group = 1;
@@ -76,7 +121,11 @@ fn smoothed(channel: &Channel) -> Option<Smoothed> {
         // The noise of a mean.
         let noise = noise * ((1.0 + 2.0 * (2.0 / count).sqrt()) / group as f64).sqrt();
         if noise <= NOISELESS * rms(&samples) {
-            return Some(Smoothed { y: samples, group });
+            return Some(Smoothed {
+                y: samples,
+                group,
+                weight: None,
+            });
         }
         let is_long = samples.len() >= GROUP * LEAST;
         match is_long && distance(&samples, &smooth(&samples, most)?) <= noise {
@@ -88,22 +137,23 @@ fn smoothed(channel: &Channel) -> Option<Smoothed> {
                 group *= GROUP;
             }
             false => {
-                let y = smoothed_to(&samples, noise)?;
-                return Some(Smoothed { y, group });
+                let (y, weight) = smoothed_to(&samples, noise)?;
+                return Some(Smoothed { y, group, weight });
             }
         }
     }
 }
 
-/// Smoothest curve within `noise` of the samples.
-fn smoothed_to(samples: &[f64], noise: f64) -> Option<Vec<f64>> {
+/// Smoothest curve within `noise` of the samples, and its weight.
+fn smoothed_to(samples: &[f64], noise: f64) -> Option<(Vec<f64>, Option<f64>)> {
     let [mut low, mut high] = EXPONENTS;
-    let mut best = samples.to_vec();
+    let mut best = (samples.to_vec(), None);
     for _ in 0..ROUNDS {
         let middle = 0.5 * (low + high);
-        let candidate = smooth(samples, 10f64.powf(middle))?;
+        let weight = 10f64.powf(middle);
+        let candidate = smooth(samples, weight)?;
         if distance(samples, &candidate) <= noise {
-            (low, best) = (middle, candidate);
+            (low, best) = (middle, (candidate, Some(weight)));
         } else {
             high = middle;
         }
@@ -118,7 +168,7 @@ fn distance(one: &[f64], other: &[f64]) -> f64 {
 }
 
 /// Minimises `|y - observed|^2 + weight |third differences of y|^2`.
-fn smooth(observed: &[f64], weight: f64) -> Option<Vec<f64>> {
+pub fn smooth(observed: &[f64], weight: f64) -> Option<Vec<f64>> {
     let mut sub = Subproblem::new(observed.len());
     sub.elimination_order = (0..observed.len() as u32).collect();
     for (i, y) in observed.iter().enumerate() {
@@ -137,9 +187,28 @@ fn smooth(observed: &[f64], weight: f64) -> Option<Vec<f64>> {
     sub.solve_equality_constrained()
 }
 
+/// [`differences`] of eighth order, of fourth order at the two values at each end: for values without smoothing on the spacing of groups,
+/// of which a cycle may have twelve.
+pub fn fine_differences(values: &[f64], spacing: f64) -> Differences {
+    let mut all = differences(values, spacing);
+    let symmetric = |w: &[f64], sign: f64, weights: [f64; 4]| -> f64 {
+        let pair = |k: usize| w[4 + k] + sign * w[4 - k];
+        (1..=4).map(|k| weights[k - 1] * pair(k)).sum()
+    };
+    let inner = values.windows(9).enumerate();
+    for (i, w) in inner {
+        let slope = symmetric(w, -1.0, [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0]);
+        let curvature = symmetric(w, 1.0, [8.0 / 5.0, -1.0 / 5.0, 8.0 / 315.0, -1.0 / 560.0]);
+        all.v[i + 2] = slope / spacing;
+        all.a[i + 2] = (curvature - 205.0 / 72.0 * w[4]) / (spacing * spacing);
+    }
+    all
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::Weighting;
     use crate::system::Grid;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
@@ -178,6 +247,23 @@ mod tests {
             let initial = found.initial.expect("a sample at the first node");
             let [y, v, _] = quartic(0.0);
             assert!(is_close(initial.displacement, y) && is_close(initial.velocity, v));
+        }
+    }
+
+    /// On twelve samples per cycle the derivatives of a sine have errors of `(w h)^8/630` and `(w h)^8/3150`, inside.
+    #[test]
+    fn fine_differences_are_of_eighth_order() {
+        let (w, h) = (1.0, std::f64::consts::TAU / 12.0);
+        let values: Vec<f64> = (0..40).map(|i| (w * h * f64::from(i)).sin()).collect();
+        let found = fine_differences(&values, h);
+        assert_eq!(found.y, values[2..38]);
+        for i in 4..36 {
+            let (sine, cosine) = (w * h * i as f64).sin_cos();
+            let (off_v, off_a) = (found.v[i - 2] - cosine, found.a[i - 2] + sine);
+            assert!(
+                off_v.abs() < 1e-5 && off_a.abs() < 2e-6,
+                "{i}: {off_v} {off_a}"
+            );
         }
     }
 

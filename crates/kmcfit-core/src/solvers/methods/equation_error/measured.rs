@@ -1,21 +1,33 @@
 //! States and inputs of records, estimated from the samples without a simulation.
 
+use super::robust::MAD_TO_SIGMA;
 use crate::functions::Parameterization;
 use crate::objective::SimulatedRecord;
 use crate::problem::Problem;
 use crate::record::{Channel, ChannelKind, Experiment, Loss};
-use crate::signal::zero_phase;
+use crate::signal::{SecondOrder, median, zero_phase};
 use crate::simd::sum::rms;
 use crate::simulate::Trajectory;
 use crate::solvers::reason::{MissingMeasurement, UnsupportedRecord};
-use crate::solvers::state_estimation::{Kinematics, PassBand, unsensed};
-use crate::system::{Grid, NodalCoefficients, StageSamples, TimePoint};
+use crate::solvers::state_estimation::{
+    Differences, Kinematics, PassBand, fine_differences, unsensed,
+};
+use crate::system::{Grid, InputSample, NodalCoefficients, StageSamples, TimePoint};
+use std::ops::Range;
 
 /// Dominant periods omitted at either end of a record with known force or base motion: transients of the filter there are as
 /// large as the response and decay to a tenth in one period. Without a known input, the unknown input is the larger error.
 const SETTLING: f64 = 2.0;
 /// Smallest fraction of a record (1 / n) that may be omitted at either end.
 const MOST_LEFT_OUT: usize = 4;
+/// Difference of two spacings, relative to them, up to which they count as equal: times on a grid have rounding errors, gaps a
+/// spacing or more.
+const SAME_SPACING: f64 = 1e-3;
+/// Distance of an outlier from the median of itself and its neighbours, in robust standard deviations of these distances: one of a
+/// normal distribution in two million.
+const OUTLYING: f64 = 5.0;
+/// Neighbours on either side of a sample in that median.
+const NEIGHBOURS: usize = 2;
 
 /// State of an experiment at some times, with force and base acceleration.
 pub(super) struct Measured {
@@ -38,6 +50,26 @@ pub(super) struct Measured {
     pub frequency: f64,
     /// Corner of the filter that all series have passed, rad/s, if any.
     pub corner: Option<f64>,
+    /// State and inputs at the same times without smoothing, for the linear terms of the weak form; `None` where only the smoothed
+    /// ones exist.
+    pub unsmoothed: Option<Unsmoothed>,
+    /// Filter of the channels, which each term of the equation of motion passes; empty without one, and where all series have passed it.
+    pub filter: Vec<SecondOrder>,
+    /// Weight of the [smoothing](crate::solvers::state_estimation::smooth) of the state, where it is that of a series at these times.
+    pub smoothing: Option<f64>,
+    /// The same at the common times of several channels, with the state without smoothing, for the weak form; `None` where the times are
+    /// these, or no such state exists.
+    at_samples: Option<Box<Measured>>,
+}
+
+/// State and inputs without smoothing.
+pub(super) struct Unsmoothed {
+    /// Displacement (m), velocity (m/s) and acceleration (m/s^2) by differences of the samples, or of means of groups of them.
+    pub state: Differences,
+    /// Force, N, or its means over the groups.
+    pub force: Vec<f64>,
+    /// Acceleration of the base, m/s^2, or its means over the groups.
+    pub base: Vec<f64>,
 }
 
 impl Measured {
@@ -50,13 +82,6 @@ impl Measured {
         experiment: &Experiment,
         scalars: &[f64],
     ) -> Result<Self, MissingMeasurement> {
-        if experiment
-            .channels
-            .iter()
-            .any(|c| c.loss() != Loss::Squares)
-        {
-            return Err(MissingMeasurement::QuadraticLoss);
-        }
         let estimated = |c: &Channel| c.sensor().indices().iter().any(Option::is_some);
         if experiment.channels.iter().any(estimated) {
             return Err(MissingMeasurement::KnownSensors);
@@ -68,15 +93,119 @@ impl Measured {
             return Self::in_band(experiment, channel, spacing, scalars)
                 .ok_or(MissingMeasurement::Oscillation);
         }
+        let measured = match filtered_alike(experiment) {
+            Some(before) => Self::before_filter(problem, &before, experiment, scalars)?,
+            None => Self::unfiltered(problem, experiment, scalars)?,
+        };
+        let moves = measured.frequency > 0.0 && measured.frequency.is_finite();
+        moves.then_some(measured).ok_or(MissingMeasurement::Motion)
+    }
+
+    /// From channels without a filter, or without an input that would have to pass it.
+    fn unfiltered(
+        problem: &Problem,
+        experiment: &Experiment,
+        scalars: &[f64],
+    ) -> Result<Self, MissingMeasurement> {
         let anchored = |c: &Channel| c.kind() == ChannelKind::Displacement && c.filter().is_empty();
         if !experiment.is_free() && !experiment.channels.iter().any(anchored) {
             return Err(MissingMeasurement::FilteredDrive);
         }
-        let kinematics = Kinematics::of(problem, experiment, scalars);
+        let cleaned = without_outliers(experiment);
+        let kinematics = Kinematics::of(problem, &cleaned, scalars);
         let kinematics = kinematics.ok_or(MissingMeasurement::Samples)?;
-        let measured = Self::at_nodes(problem, experiment, &kinematics);
-        let moves = measured.frequency > 0.0 && measured.frequency.is_finite();
-        moves.then_some(measured).ok_or(MissingMeasurement::Motion)
+        let mut measured = Self::at_nodes(problem, experiment, &kinematics);
+        measured.unsmoothed = Unsmoothed::of_groups(problem, experiment, &kinematics);
+        measured.smoothing = kinematics.grouping.and_then(|grouping| grouping.smoothing);
+        if measured.unsmoothed.is_none() && have_common_times(experiment) {
+            let sampled = measured.sampled(experiment, scalars, problem.system.grid.step());
+            let sampled = sampled.filter(|sampled| sampled.unsmoothed.is_some());
+            measured.at_samples = sampled.map(Box::new);
+        }
+        Ok(measured)
+    }
+
+    /// From channels with one filter: the state follows from the samples `before` it, at the times of the first channel, and each term
+    /// of the equation of motion passes it.
+    fn before_filter(
+        problem: &Problem,
+        before: &Experiment,
+        experiment: &Experiment,
+        scalars: &[f64],
+    ) -> Result<Self, MissingMeasurement> {
+        let at_nodes = Self::unfiltered(problem, before, scalars)?;
+        let mut measured = at_nodes
+            .sampled(before, scalars, problem.system.grid.step())
+            .ok_or(MissingMeasurement::Samples)?;
+        measured.filter = experiment.channels[0].filter().to_vec();
+        Ok(measured)
+    }
+
+    /// State and inputs at the common, equally spaced times of the channels of an experiment without a filter, but two at each end, as
+    /// far as the times of `self` reach.
+    fn sampled(&self, experiment: &Experiment, scalars: &[f64], step: f64) -> Option<Self> {
+        let channel = experiment.channels.first()?;
+        let spacing = equal_spacing(channel.times())?;
+        let position = |place: &TimePoint| place.step as f64 + place.fraction;
+        let ends = [self.places.first()?, self.places.last()?].map(position);
+        let inner = 2..channel.len().checked_sub(2)?;
+        let within = |i: &usize| {
+            let x = position(&channel.places()[*i]);
+            ends[0] <= x && x <= ends[1]
+        };
+        let first = inner.clone().find(within)?;
+        let count = (first..inner.end).take_while(within).count();
+        let places = channel.places()[first..first + count].to_vec();
+        let [mut y, mut v, mut a] = [(); 3].map(|()| Vec::with_capacity(count));
+        let mut i = 0;
+        for place in &places {
+            let x = position(place);
+            while i + 1 < self.places.len() && position(&self.places[i + 1]) <= x {
+                i += 1;
+            }
+            let since = (x - position(&self.places[i])) * step;
+            let [at_y, at_v, at_a] = match self.places.get(i + 1) {
+                Some(next) if since > 0.0 => self.between(
+                    i,
+                    since,
+                    (position(next) - position(&self.places[i])) * step,
+                ),
+                _ => [self.y[i], self.v[i], self.a[i]],
+            };
+            y.push(at_y);
+            v.push(at_v);
+            a.push(at_a);
+        }
+        let excitation = experiment.excitation.as_ref();
+        let inputs = (first..first + count).map(|i| channel.input_at_sample(excitation, i));
+        let (force, base): (Vec<f64>, Vec<f64>) = inputs.map(|s| (s.force, s.base)).unzip();
+        let state = unsmoothed(experiment, scalars, spacing, first..first + count);
+        Some(Self {
+            places,
+            first,
+            y,
+            v,
+            a,
+            unsmoothed: state.map(|state| Unsmoothed {
+                state,
+                force: force.clone(),
+                base: base.clone(),
+            }),
+            force,
+            base,
+            weight: spacing,
+            frequency: self.frequency,
+            corner: None,
+            filter: Vec::new(),
+            smoothing: (self.smoothing)
+                .filter(|_| (self.weight / spacing - 1.0).abs() <= SAME_SPACING),
+            at_samples: None,
+        })
+    }
+
+    /// The response for the weak form.
+    pub fn in_weak_form(&self) -> &Self {
+        self.at_samples.as_deref().unwrap_or(self)
     }
 
     /// From accelerations alone: response, force and base pass the same filter.
@@ -120,6 +249,10 @@ impl Measured {
             weight: spacing,
             frequency: band.frequency,
             corner: Some(band.corner()),
+            unsmoothed: None,
+            filter: Vec::new(),
+            smoothing: None,
+            at_samples: None,
         })
     }
 
@@ -148,6 +281,35 @@ impl Measured {
             weight: stride.unwrap_or(1) as f64 * problem.system.grid.step(),
             frequency: rms(&kinematics.v) / rms(&kinematics.y),
             corner: None,
+            unsmoothed: None,
+            filter: Vec::new(),
+            smoothing: None,
+            at_samples: None,
+        }
+    }
+
+    /// Runs of equally spaced times; between them are gaps.
+    pub fn runs(&self, step: f64) -> Vec<Range<usize>> {
+        let at = |place: &TimePoint| (place.step as f64 + place.fraction) * step;
+        let mut runs: Vec<Range<usize>> = Vec::new();
+        for i in 0..self.places.len() {
+            let is_next = i > 0 && {
+                let gap = at(&self.places[i]) - at(&self.places[i - 1]);
+                (gap - self.weight).abs() <= SAME_SPACING * self.weight
+            };
+            match runs.last_mut() {
+                Some(run) if is_next => run.end = i + 1,
+                _ => runs.push(i..i + 1),
+            }
+        }
+        runs
+    }
+
+    /// A series at the times after the filter of the channels.
+    pub fn filtered(&self, series: Vec<f64>) -> Vec<f64> {
+        match self.filter.as_slice() {
+            [] => series,
+            filter => zero_phase(filter, &series),
         }
     }
 
@@ -172,11 +334,6 @@ impl Measured {
         self.places.iter().enumerate().map(error).collect()
     }
 
-    /// Integral `integral error^2 dt`.
-    pub fn misfit(&self, errors: &[f64]) -> f64 {
-        self.weight * errors.iter().map(|e| e * e).sum::<f64>()
-    }
-
     /// Response on `nodes` nodes: cubic between times, extended harmonically with the dominant frequency beyond them.
     pub fn trajectory(&self, grid: &Grid, nodes: usize) -> Trajectory {
         let mut response = Trajectory::zeros(nodes);
@@ -190,7 +347,10 @@ impl Measured {
             }
             let since = (x - at(i)) * grid.step();
             let (y, v) = match i < last && since > 0.0 {
-                true => self.between(i, since, (at(i + 1) - at(i)) * grid.step()),
+                true => {
+                    let [y, v, _] = self.between(i, since, (at(i + 1) - at(i)) * grid.step());
+                    (y, v)
+                }
                 false => self.swung_on(i, since),
             };
             response.displacement[node] = y;
@@ -206,7 +366,8 @@ impl Measured {
     }
 
     /// Cubic Hermite polynomials through displacement and velocity, and velocity and acceleration.
-    fn between(&self, i: usize, since: f64, span: f64) -> (f64, f64) {
+    /// The acceleration is the derivative of the latter.
+    fn between(&self, i: usize, since: f64, span: f64) -> [f64; 3] {
         let x = since / span;
         let cubic = |p: &[f64], d: &[f64]| {
             let (x2, x3) = (x * x, x * x * x);
@@ -215,7 +376,11 @@ impl Measured {
                 + (3.0 * x2 - 2.0 * x3) * p[i + 1]
                 + span * (x3 - x2) * d[i + 1]
         };
-        (cubic(&self.y, &self.v), cubic(&self.v, &self.a))
+        let (v, a) = (&self.v, &self.a);
+        let slope = 6.0 * (x - x * x) / span * (v[i + 1] - v[i])
+            + (1.0 - 4.0 * x + 3.0 * x * x) * a[i]
+            + (3.0 * x * x - 2.0 * x) * a[i + 1];
+        [cubic(&self.y, v), cubic(v, a), slope]
     }
 
     /// Predictions at this state.
@@ -236,8 +401,126 @@ impl Measured {
     }
 }
 
+impl Unsmoothed {
+    /// Differences of the samples of a single displacement at equally spaced nodes, in the groups of the smoothed state.
+    fn of_groups(
+        problem: &Problem,
+        experiment: &Experiment,
+        kinematics: &Kinematics,
+    ) -> Option<Self> {
+        let grouping = kinematics.grouping?;
+        let [channel] = experiment.channels.as_slice() else {
+            return None;
+        };
+        let spacing = (grouping.group * grouping.stride) as f64 * problem.system.grid.step();
+        let state = fine_differences(&grouping.means(channel.observed()), spacing);
+        let excitation = experiment.excitation.as_ref();
+        let inputs = (0..channel.len()).map(|i| match excitation {
+            Some(excitation) => excitation.input_at(channel.places()[i]),
+            None => InputSample::default(),
+        });
+        let (force, base): (Vec<f64>, Vec<f64>) = inputs.map(|s| (s.force, s.base)).unzip();
+        // As the differences, without two groups at each end.
+        let inner = |series: &[f64]| {
+            let means = grouping.means(series);
+            means[2..means.len() - 2].to_vec()
+        };
+        Some(Self {
+            force: inner(&force),
+            base: inner(&base),
+            state,
+        })
+    }
+}
+
+/// State of some samples, without the first and last two, by differences of a measured displacement and with measured velocities and
+/// accelerations in place of differences; of several channels of a kind the first. `None` without a displacement.
+fn unsmoothed(
+    experiment: &Experiment,
+    scalars: &[f64],
+    spacing: f64,
+    samples: Range<usize>,
+) -> Option<Differences> {
+    let of = |kind: ChannelKind| {
+        let channel = experiment.channels.iter().find(|c| c.kind() == kind)?;
+        Some(unsensed(channel, scalars).0)
+    };
+    let inner = |series: &[f64]| series[samples.clone()].to_vec();
+    let outer = samples.start - 2..samples.end + 2;
+    let mut state = fine_differences(&of(ChannelKind::Displacement)?[outer.clone()], spacing);
+    if let Some(velocity) = of(ChannelKind::Velocity) {
+        state.a = fine_differences(&velocity[outer], spacing).v;
+        state.v = inner(&velocity);
+    }
+    if let Some(acceleration) = of(ChannelKind::Acceleration) {
+        state.a = inner(&acceleration);
+    }
+    Some(state)
+}
+
+/// True if all channels have equally spaced samples at the same times, and no filter.
+fn have_common_times(experiment: &Experiment) -> bool {
+    let [first, ..] = experiment.channels.as_slice() else {
+        return false;
+    };
+    let is_alike = |c: &Channel| c.filter().is_empty() && c.times() == first.times();
+    experiment.channels.iter().all(is_alike) && equal_spacing(first.times()).is_some()
+}
+
+/// The experiment with the samples of its channels before their filter, where all have one filter and equally spaced samples at the
+/// same times; `None` without a filter, and where filters or times differ.
+fn filtered_alike(experiment: &Experiment) -> Option<Experiment> {
+    let [first, ..] = experiment.channels.as_slice() else {
+        return None;
+    };
+    equal_spacing(first.times())?;
+    let is_alike = |c: &Channel| c.filter() == first.filter() && c.times() == first.times();
+    let before: Option<Vec<Channel>> = match first.filter() {
+        [] => None,
+        _ => (experiment.channels.iter())
+            .map(|c| c.before_filter().filter(|_| is_alike(c)))
+            .collect(),
+    };
+    let channels = before?;
+    Some(Experiment {
+        channels,
+        ..experiment.clone()
+    })
+}
+
+/// The experiment with outliers of channels with a robust loss replaced by the median of their neighbours. The smoothed state follows
+/// from these samples; the residuals of the equation are those of the measured ones.
+fn without_outliers(experiment: &Experiment) -> Experiment {
+    let of_channel = |channel: &Channel| match channel.loss() {
+        Loss::Squares => channel.clone(),
+        Loss::Huber { .. } | Loss::StudentT { .. } => {
+            channel.clone().with_samples(cleaned(channel.observed()))
+        }
+    };
+    Experiment {
+        channels: experiment.channels.iter().map(of_channel).collect(),
+        ..experiment.clone()
+    }
+}
+
+/// Samples with each outlier replaced by the median of itself and its neighbours.
+fn cleaned(samples: &[f64]) -> Vec<f64> {
+    let medians: Vec<f64> = (0..samples.len())
+        .map(|i| {
+            let end = (i + NEIGHBOURS + 1).min(samples.len());
+            median(&samples[i.saturating_sub(NEIGHBOURS)..end])
+        })
+        .collect();
+    let distances = samples.iter().zip(&medians).map(|(y, m)| (y - m).abs());
+    let limit = OUTLYING * MAD_TO_SIGMA * median(&distances.collect::<Vec<f64>>());
+    let pairs = samples.iter().zip(&medians);
+    pairs
+        .map(|(y, m)| if (y - m).abs() > limit { *m } else { *y })
+        .collect()
+}
+
 /// Value of a function that is linear between nodes.
-fn blend(values: &[f64], place: TimePoint) -> f64 {
+pub(super) fn blend(values: &[f64], place: TimePoint) -> f64 {
     let [left, right] = [values[place.step], values[place.step + 1]];
     match place.fraction {
         0.0 => left,
@@ -426,6 +709,10 @@ mod tests {
             weight: STEP,
             frequency,
             corner: None,
+            unsmoothed: None,
+            filter: Vec::new(),
+            smoothing: None,
+            at_samples: None,
             places,
         }
     }

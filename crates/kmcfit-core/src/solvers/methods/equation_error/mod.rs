@@ -3,15 +3,24 @@
 //! With `y`, `y'`, `y''` from the samples, `m y'' + c y' + k y - f` is linear in the parameters, so with penalties and
 //! constraints its least-squares minimum is a convex problem. It needs no starting point and has no local minima of a wrong
 //! period, but noise biases it. It serves as a starting point ([`equation_error`]) for a fit that removes the bias, and as a
-//! method of its own ([`fit`]) for records that no response from known states and forces reproduces.
+//! method of its own ([`fit`]) for records that no response from known states and forces reproduces. The method integrates the equation
+//! with bump functions where the parameters are few ([`EquationForm`]); the starting point has the equation at every node.
 
+mod balance;
+mod bumps;
+mod equation;
 mod fit;
 mod measured;
 mod missing_terms;
+mod restored;
+mod robust;
 mod rows;
 
+pub use balance::{EquationBalance, EquationPart, EquationShare, equation_balance};
+pub use equation::EquationForm;
 pub(in crate::solvers) use fit::fit;
 pub use measured::Measurements;
+pub(crate) use missing_terms::TESTED_TERMS;
 pub use missing_terms::{MissingTerm, missing_terms};
 pub use rows::{NoEquationRows, equation_rows};
 
@@ -23,7 +32,8 @@ use crate::solvers::linearization::{add_penalties, add_variations};
 use crate::solvers::state_estimation::Kinematics;
 use crate::solvers::timings::{Timings, timed};
 use crate::system::quadrature::trapezoid_weights;
-use crate::system::{NodalCoefficients, Term, TimePoint};
+use crate::system::{NodalCoefficients, Term};
+use equation::Equation;
 use measured::Measured;
 
 /// Weight of the proximal term towards the start, relative to the equation error; it determines the directions that the
@@ -76,7 +86,9 @@ pub(in crate::solvers) fn from_kinematics(
         experiments.push(states.as_ref().map(|states| {
             let measured = Measured::at_nodes(problem, experiment, states);
             let root = root_weight(problem, experiment, states, start);
-            add_rows(problem, experiment, &measured, root, start, &mut sub);
+            let equation = Equation::pointwise(problem, experiment, &measured);
+            let residuals = equation.residuals_at(problem, start);
+            equation.add_rows(problem, &residuals, |_| root, &mut sub);
             measured
         }));
     }
@@ -213,36 +225,6 @@ fn nodal(problem: &Problem, experiment: &Experiment, theta: &[f64]) -> NodalCoef
         .functions
         .nodal_into(theta, experiment.coefficient_set, &mut nodal);
     nodal
-}
-
-/// Adds the equation errors, each times `root`, as residuals in the steps from `start`.
-fn add_rows(
-    problem: &Problem,
-    experiment: &Experiment,
-    measured: &Measured,
-    root: f64,
-    start: &[f64],
-    sub: &mut Subproblem,
-) {
-    let functions = &problem.functions;
-    let assembly = functions.coefficient_set(experiment.coefficient_set);
-    let errors = measured.errors(problem, &nodal(problem, experiment, start));
-    for (i, (&TimePoint { step, fraction }, error)) in
-        measured.places.iter().zip(errors).enumerate()
-    {
-        let mut entries = Vec::new();
-        for (which, f) in assembly.parts() {
-            let first = functions.ranges()[f].start;
-            let response = measured.response(problem, which, i);
-            for (side, share) in [1.0 - fraction, fraction].into_iter().enumerate() {
-                if share != 0.0 {
-                    let row = functions.get(f).design.row(step + side);
-                    entries.extend(row.map(|(j, b)| (first + j, root * b * response * share)));
-                }
-            }
-        }
-        sub.residuals.push(entries, -root * error);
-    }
 }
 
 /// Constraints of the problem, plus a fixed mean of the mass where the common scale of all functions is undetermined:

@@ -1,14 +1,14 @@
-//! The equation of motion at the samples as rows in the parameters, for the covariance of the estimates.
+//! The equation of motion as rows in the parameters, for the covariance of the estimates.
 
-use super::measured::{Measured, Measurements};
-use super::{add_rows, scale_row};
+use super::equation::Equations;
+use super::measured::Measurements;
+use super::scale_row;
 use crate::identifiability::EquationRows;
 use crate::problem::Problem;
 use crate::qp::Subproblem;
-use crate::record::Experiment;
 use nalgebra::DMatrix;
 
-/// Largest work of a covariance, samples x parameters^2: some seconds, and memory for 120,000 samples of 64 parameters.
+/// Largest work of a covariance, rows x parameters^2: some seconds, and memory for 120,000 rows of 64 parameters.
 const MOST_WORK: f64 = 5e8;
 
 /// Reason why the minimum of an equation error has no confidence intervals.
@@ -22,46 +22,39 @@ pub enum NoEquationRows {
     ScaleOverTime,
 }
 
-/// Rows and residuals of the equation of motion at the minimum `theta`, in units of the root of the cost.
+/// Rows and residuals of the equation of motion at the minimum `theta`, in the form in which the equation error is minimised and in
+/// units of the root of the cost. With a robust loss each row and residual has the root of its weight, and the rows have the factor by
+/// which the curvature of the cost differs from that of the weighted squares, so that `H^-1 S H^-1` is the covariance of the M-estimator.
 ///
 /// # Errors
 /// The reason why there are none.
 pub fn equation_rows(problem: &Problem, theta: &[f64]) -> Result<EquationRows, NoEquationRows> {
-    let scale = scale_row(problem, &problem.constraints, theta);
-    if scale.is_some() && !has_constant_mass(problem) {
-        return Err(NoEquationRows::ScaleOverTime);
-    }
-    let measurements = Measurements::with_scalars(problem, problem.scalars(theta))
-        .map_err(|_| NoEquationRows::UnsupportedRecord)?;
-    let pairs = problem.experiments.iter().zip(&measurements.experiments);
-    let pairs: Vec<(&Experiment, &Measured)> = pairs
-        .filter_map(|(experiment, measured)| Some((experiment, measured.as_ref()?)))
-        .collect();
-    let (samples, n) = (
-        pairs.iter().map(|(_, m)| m.places.len()).sum::<usize>(),
-        problem.parameters(),
-    );
-    if samples as f64 * (n * n) as f64 > MOST_WORK {
+    let measurements = measurements_at(problem, theta)?;
+    let equations = Equations::at(problem, &measurements, theta);
+    let count: usize = equations.list.iter().map(|equation| equation.len()).sum();
+    let n = problem.parameters();
+    if count as f64 * (n * n) as f64 > MOST_WORK {
         return Err(NoEquationRows::ManySamples);
     }
     let mut sub = Subproblem::new(n);
     let mut records = Vec::new();
-    for (experiment, measured) in pairs {
+    let mut curvatures = Vec::new();
+    for equation in &equations.list {
         let first = sub.residuals.len();
-        add_rows(
-            problem,
-            experiment,
-            measured,
-            measured.weight.sqrt(),
-            theta,
-            &mut sub,
-        );
+        let residuals = equation.residuals_at(problem, theta);
+        let root = |e: f64| (equation.weight() * equation.loss.weight(e)).sqrt();
+        equation.add_rows(problem, &residuals, root, &mut sub);
         records.push(first..sub.residuals.len());
+        curvatures.push(equation.loss.curvature(&residuals));
     }
-    let mut rows = DMatrix::zeros(samples, n);
-    for i in 0..samples {
-        sub.residuals.row(i).for_each(|(j, x)| rows[(i, j)] += x);
+    let mut rows = DMatrix::zeros(count, n);
+    for (record, curvature) in records.iter().zip(curvatures) {
+        for i in record.clone() {
+            let row = sub.residuals.row(i);
+            row.for_each(|(j, x)| rows[(i, j)] += curvature * x);
+        }
     }
+    let scale = scale_row(problem, &problem.constraints, theta);
     let scalars = problem.functions.scalar_range();
     let held = scalars.map(|j| vec![(j, 1.0)]).chain(scale.clone());
     Ok(EquationRows {
@@ -71,6 +64,22 @@ pub fn equation_rows(problem: &Problem, theta: &[f64]) -> Result<EquationRows, N
         held: held.collect(),
         is_scale_free: scale.is_some(),
     })
+}
+
+/// Responses of all experiments, for a minimum `theta` whose scale is determined or one number.
+///
+/// # Errors
+/// The reason why there are none.
+pub(super) fn measurements_at(
+    problem: &Problem,
+    theta: &[f64],
+) -> Result<Measurements, NoEquationRows> {
+    let scale = scale_row(problem, &problem.constraints, theta);
+    if scale.is_some() && !has_constant_mass(problem) {
+        return Err(NoEquationRows::ScaleOverTime);
+    }
+    Measurements::with_scalars(problem, problem.scalars(theta))
+        .map_err(|_| NoEquationRows::UnsupportedRecord)
 }
 
 /// True if all experiments share one constant mass: only then is the common scale one number.
