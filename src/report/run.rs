@@ -24,6 +24,9 @@ use kmcfit_core::internals::system::{Excitation, Term};
 use std::io;
 use std::time::Duration;
 
+/// Most parameters of `parameters.json`: the values of more stand in `functions.csv`.
+const MOST_PARAMETERS: usize = 10_000;
+
 /// A fitted model with its predictions and assessment.
 #[derive(Debug, Clone, Copy)]
 pub struct FittedModel<'a> {
@@ -53,7 +56,9 @@ impl FittedModel<'_> {
     ) -> io::Result<Duration> {
         let mut writing = Duration::ZERO;
         let mut write = |name: &str, text: &str| timed(&mut writing, || stage.write(name, text));
-        write("parameters.json", &json(&self.parameters(document)))?;
+        if self.model.problem.parameters() <= MOST_PARAMETERS {
+            write("parameters.json", &json(&self.parameters(document)))?;
+        }
         write("history.csv", &self.history().to_csv())?;
         write("functions.csv", &self.functions_table().to_csv())?;
         write("trajectory.csv", &self.trajectories().to_csv())?;

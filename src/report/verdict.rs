@@ -40,9 +40,17 @@ impl FittedModel<'_> {
             fit_percent,
         }));
         reasons.sort_by_key(|reason| std::cmp::Reverse(reason.level()));
+        let outcome = &self.fit.outcome;
+        let in_words = |reason: &VerdictReason| match reason {
+            // The end of the search has its own reason.
+            VerdictReason::Failed { status } | VerdictReason::NotConverged { status } => {
+                Finding::of(reason, format!("{}: {}", status.name(), outcome.reason))
+            }
+            _ => reason_in_words(reason),
+        };
         Verdict {
             level: verdict_level(&reasons),
-            reasons: reasons.iter().map(reason_in_words).collect(),
+            reasons: reasons.iter().map(in_words).collect(),
             passed: self.passed(),
         }
     }

@@ -129,6 +129,7 @@ fn killed_at_any_moment() {
         "functions.csv",
         "history.csv",
         "kmcfit-manifest.json",
+        "parameters.json",
         "result.json",
         "trajectory.csv",
     ];
@@ -203,7 +204,7 @@ fn an_interrupted_fit_is_resumed() {
     assert_eq!(child.wait().expect("it ends").code(), Some(130));
     let result: Value = serde_json::from_str(&bench.read("runs/paper/result.json")).expect("JSON");
     assert_eq!(result["outcome"]["status"], "interrupted");
-    let stdout = bench.run_to(0, &["resume", "runs/paper"]);
+    let stdout = bench.run_to(0, &["resume", "runs/paper", "--verbose"]);
     assert!(
         stdout.contains("all 3000 iterations requested were run"),
         "{stdout}"
@@ -251,7 +252,7 @@ fn resume_applies_the_same_overrides() {
             assert!(heading.contains("fit.stop.iterations=2000"), "{heading}");
             continue;
         }
-        let stdout = bench.run_to(0, &["resume", "run"]);
+        let stdout = bench.run_to(0, &["resume", "run", "--verbose"]);
         assert!(
             stdout.contains("all 2000 iterations requested were run"),
             "{stdout}"

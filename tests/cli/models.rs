@@ -169,7 +169,7 @@ fn paper() {
     assert_eq!(result["counts"]["iterations"], 1000);
     assert_eq!(result["counts"]["forward"], 50_001);
     assert!(stdout.starts_with(
-        "The paper's run, start (2, 1, 1)\ncompleted: all 1000 iterations requested were run\n"
+        "The paper's run, start (2, 1, 1): 2000 samples, 25 s\nCheck      at most 1999 of 6000 "
     ));
     let ratio = result["cost"]["ratio"].as_f64().expect("a number");
     assert!((ratio / 8.130_155_3e-5 - 1.0).abs() < 1e-7, "{ratio}");
@@ -386,7 +386,7 @@ fn the_parts_of_the_time_add_up() {
     assert!(result["seconds"].as_f64().expect("a number") < seconds("total"));
 
     let (summary, table) = stdout.split_once("\ntime ").expect("a table");
-    assert!(summary.starts_with("Small\n"), "{stdout}");
+    assert!(summary.starts_with("Small: "), "{stdout}");
     let first = |line: &str| line.split("  ").next().unwrap_or_default().to_owned();
     let rows: Vec<String> = table.lines().skip(1).take(11).map(first).collect();
     let shown = [

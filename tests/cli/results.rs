@@ -192,7 +192,17 @@ fn violated_soft_constraints_are_in_the_result_and_the_summary() {
     }
     // None of them is a hard constraint.
     assert_eq!(result["constraints"]["max_violation"], 0.0);
-    let summary = bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
+    let summary = bench.run_to(
+        0,
+        &[
+            "fit",
+            "model.yaml",
+            "--out",
+            "run",
+            "--no-report",
+            "--verbose",
+        ],
+    );
     assert!(
         summary.contains("soft constraint `stiffness(0) = 1.2` is violated by up to "),
         "{summary}"
@@ -295,7 +305,17 @@ fit: {{stop: {{iterations: 100, tolerance: 1e-12}}}}
     let data = "    data: sparse.csv\n    sigma: {displacement: 1e-8}";
     let sought = "{basis: constant, start: 130.0}";
     bench.write("model.yaml", &model(sought, data));
-    let summary = bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
+    let summary = bench.run_to(
+        0,
+        &[
+            "fit",
+            "model.yaml",
+            "--out",
+            "run",
+            "--no-report",
+            "--verbose",
+        ],
+    );
     let result: Value = serde_json::from_str(&bench.read("run/result.json")).expect("JSON");
     let attempts = result["attempts"].as_array().expect("a list");
     let starts: Vec<&Value> = attempts.iter().map(|attempt| &attempt["start"]).collect();
@@ -391,6 +411,7 @@ fn intervals_of_the_equation_error() {
         method,
         "--out",
         "run",
+        "--verbose",
     ];
     let summary = bench.run_to(0, &model);
     let kind = "heteroscedasticity- and autocorrelation-consistent covariance";

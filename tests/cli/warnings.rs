@@ -42,7 +42,7 @@ fn a_record_at_rest_is_refused() {
             "model.yaml",
             &starter(grid, "    columns: {time: t, displacement: y}\n"),
         );
-        let (code, _, stderr) = bench.run(&["fit", "model.yaml", "--no-report"]);
+        let (code, _, stderr) = bench.run(&["fit", "model.yaml", "--no-report", "--verbose"]);
         assert_eq!(code, 2, "{grid}: {stderr}");
         assert!(
             stderr.contains("columns.displacement: all samples are equal"),
@@ -71,7 +71,7 @@ fn a_negative_damping_is_reported() {
     bench.write("record.csv", &format!("t,y\n{rows}"));
     let columns = "    columns: {time: t, displacement: y}\n    sigma: {displacement: estimate}\n";
     bench.write("model.yaml", &starter("{}", columns));
-    let (_, summary, stderr) = bench.run(&["fit", "model.yaml", "--no-report"]);
+    let (_, summary, stderr) = bench.run(&["fit", "model.yaml", "--no-report", "--verbose"]);
     assert!(
         summary.contains("c is negative (95 % CI -"),
         "{summary}{stderr}"
@@ -86,7 +86,9 @@ fn a_short_record_near_the_nyquist_frequency_has_no_intervals() {
     let rows: String = (0..8).map(|i| format!("{i},{}\n", 1 - i % 2 * 2)).collect();
     bench.write("record.csv", &format!("t_s,y_m\n{rows}"));
     bench.run_to(0, &["init", "record.csv"]);
-    let summary = bench.run(&["fit", "record.yaml", "--no-report"]).1;
+    let summary = bench
+        .run(&["fit", "record.yaml", "--no-report", "--verbose"])
+        .1;
     let said = "aliasing: with 2.0 samples per period at 0.500 Hz, systems of other natural frequencies fit equally well";
     assert!(summary.contains(said), "{summary}");
 }
@@ -137,11 +139,8 @@ fn suggestions_improve_the_fit() {
         let sigma = "    sigma: {displacement: 0.001}\n";
         let spoilt = starter("{nodes: 801}", sigma).replace("start: 39", "start: 3.8");
         bench.write("model.yaml", &spoilt);
-        let (_, summary, _) = bench.run(&["fit", "model.yaml", "--no-report"]);
-        assert!(
-            summary.contains(&format!("Suggestions     {advice}\n")),
-            "{summary}"
-        );
+        let (_, summary, _) = bench.run(&["fit", "model.yaml", "--no-report", "--verbose"]);
+        assert!(summary.contains(&format!("Next   {advice}\n")), "{summary}");
         let run = Run::open(bench.path("runs/model")).expect("a run");
         let first = run.document.advice.first().expect("a suggestion");
         assert_eq!(first.kind, "pattern");
@@ -188,7 +187,7 @@ fn a_sigma_that_is_too_small_is_reported() {
     bench.write("record.csv", &ring_down(20, 1e-2));
     let model = starter("{nodes: 801}", "    sigma: {displacement: 1e-4}\n").replace("39", "3.8");
     bench.write("model.yaml", &model);
-    let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report"]);
+    let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report", "--verbose"]);
     let said = "no confidence intervals: the residuals are ";
     assert!(
         summary.contains(&format!("Warnings        {said}")),
@@ -205,7 +204,7 @@ fn a_sigma_that_is_too_small_is_reported() {
         "{study}"
     );
     bench.write("model.yaml", &model.replace("1e-4", "estimate"));
-    let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report"]);
+    let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report", "--verbose"]);
     assert!(summary.contains("stiffness is identified"), "{summary}");
 }
 
@@ -224,7 +223,7 @@ fn autocorrelated_residuals_are_reported() {
     );
     let model = starter("{nodes: 801}", "    sigma: {displacement: estimate}\n");
     bench.write("model.yaml", &model.replace("39", "3.8"));
-    let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report"]);
+    let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report", "--verbose"]);
     let said = "the residuals are autocorrelated beyond the noise model: the confidence intervals come from a \
                 heteroscedasticity- and autocorrelation-consistent covariance";
     assert!(
@@ -232,7 +231,7 @@ fn autocorrelated_residuals_are_reported() {
         "{summary}"
     );
     assert!(
-        summary.contains("Suggestions     displacement: the residuals oscillate at 0.796 Hz"),
+        summary.contains("Next   displacement: the residuals oscillate at 0.796 Hz"),
         "{summary}"
     );
 }
@@ -258,7 +257,9 @@ fn a_gap_hides_no_alias() {
             "model.yaml",
             &starter("{nodes: 2001}", "").replace("39", "7.8"),
         );
-        let summary = bench.run(&["fit", "model.yaml", "--no-report"]).1;
+        let summary = bench
+            .run(&["fit", "model.yaml", "--no-report", "--verbose"])
+            .1;
         assert_eq!(summary.contains(said), aliased, "{summary}");
     }
 }
@@ -273,7 +274,7 @@ fn samples_whose_squares_overflow_fail_with_that_reason() {
     bench.write("record.csv", &format!("t_s,y_m\n{rows}"));
     let sigma = "    sigma: {displacement: estimate}\n";
     bench.write("model.yaml", &starter("{nodes: 401}", sigma));
-    let (code, summary, _) = bench.run(&["fit", "model.yaml", "--no-report"]);
+    let (code, summary, _) = bench.run(&["fit", "model.yaml", "--no-report", "--verbose"]);
     assert_eq!(code, 3, "{summary}");
     assert!(
         summary.contains("failed: the squares of the samples overflow"),
@@ -319,13 +320,13 @@ fn a_mean_of_the_residuals_is_reported() {
     let sigma = "    sigma: {displacement: estimate}\n";
     let model = starter("{nodes: 801}", sigma).replace("39", "3.8");
     bench.write("model.yaml", &model);
-    let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report"]);
+    let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report", "--verbose"]);
     let said =
         "the residuals of the displacement of experiment 1 have a mean of 0.48 standard deviations";
     assert!(summary.contains(said), "{summary}");
     let remedy = "sensors: {displacement: {offset: estimate}}";
     let advice = format!(
-        "Suggestions     displacement of experiment 1: estimate the offset of the sensor (`{remedy}`) or, nearly equivalent, \
+        "Next   displacement of experiment 1: estimate the offset of the sensor (`{remedy}`) or, nearly equivalent, \
          a static force (`static_force: {{basis: constant, start: 0.0}}` under `functions`)\n"
     );
     assert!(summary.contains(&advice), "{summary}");
@@ -337,7 +338,7 @@ fn a_mean_of_the_residuals_is_reported() {
         ),
     ] {
         bench.write("model.yaml", &model.replace(place, &change));
-        let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report"]);
+        let summary = bench.run_to(0, &["fit", "model.yaml", "--no-report", "--verbose"]);
         assert!(!summary.contains("have a mean"), "{summary}");
     }
 }
@@ -386,7 +387,7 @@ fn a_displacement_with_an_offset_gets_an_estimated_offset() {
         model.contains("sensors: {displacement: {offset: estimate}}"),
         "{model}"
     );
-    let summary = bench.run_to(0, &["fit", "record.yaml", "--no-report"]);
+    let summary = bench.run_to(0, &["fit", "record.yaml", "--no-report", "--verbose"]);
     assert!(summary.contains("stiffness is identified"), "{summary}");
 }
 
@@ -441,7 +442,9 @@ fn a_force_of_the_wrong_sign_is_suggested() {
             .replace("start: 39", "start: 8")
             .replace("initial: estimate", initial);
         bench.write("model.yaml", &model);
-        bench.run(&["fit", "model.yaml", "--no-report"]).1
+        bench
+            .run(&["fit", "model.yaml", "--no-report", "--verbose"])
+            .1
     };
     let right = fitted(&rows[0], "initial: estimate");
     assert!(right.contains("stiffness is identified"), "{right}");
@@ -474,7 +477,7 @@ fn values_are_reported_where_they_are_identified() {
             &format!("{{basis: piecewise-constant, knots: {knots}, start: 3.8}}"),
         );
         bench.write("model.yaml", &model);
-        let (_, summary, stderr) = bench.run(&["fit", "model.yaml", "--no-report"]);
+        let (_, summary, stderr) = bench.run(&["fit", "model.yaml", "--no-report", "--verbose"]);
         let (_, line) = summary.split_once("  k").expect(&stderr);
         let line = line.split_once('\n').expect("its end").0.to_owned();
         (line, summary)
@@ -744,7 +747,7 @@ fn noise_identifies_no_system() {
         bench.write("record.csv", &format!("t_s,y_m\n{rows}"));
         let _ = std::fs::remove_file(bench.path("record.yaml"));
         bench.run_to(0, &["init", "record.csv"]);
-        let (_, summary, stderr) = bench.run(&["fit", "record.yaml", "--no-report"]);
+        let (_, summary, stderr) = bench.run(&["fit", "record.yaml", "--no-report", "--verbose"]);
         assert!(
             !summary.contains("is identified"),
             "{seed}: {summary}{stderr}"
@@ -776,7 +779,7 @@ fn steps_with_errors_above_the_residuals_are_reported() {
         .replace("start: 39", "start: 27")
         .replace("start: 0.25", "start: 10");
     bench.write("model.yaml", &model);
-    let (_, summary, _) = bench.run(&["fit", "model.yaml", "--no-report"]);
+    let (_, summary, _) = bench.run(&["fit", "model.yaml", "--no-report", "--verbose"]);
     assert!(summary.contains("times the rms residual"), "{summary}");
     assert!(!summary.contains("is identified"), "{summary}");
     assert!(
@@ -798,7 +801,7 @@ fn failed_validation_and_negative_stiffness_are_in_the_first_lines() {
                 initial: {displacement: 1, velocity: 0}\n    sigma: {displacement: 0.01}\n    validation: true\n";
     let model = starter("{nodes: 801}", held).replace("start: 39", "start: 3.8");
     bench.write("model.yaml", &model);
-    let (_, summary, stderr) = bench.run(&["fit", "model.yaml", "--no-report"]);
+    let (_, summary, stderr) = bench.run(&["fit", "model.yaml", "--no-report", "--verbose"]);
     assert!(
         summary.contains("; validation records: "),
         "{summary}{stderr}"
@@ -814,7 +817,7 @@ fn failed_validation_and_negative_stiffness_are_in_the_first_lines() {
     let model = starter("{nodes: 801}", "    sigma: {displacement: 0.01}\n")
         .replace("start: 39", "start: -0.5");
     bench.write("model.yaml", &model);
-    let (_, summary, stderr) = bench.run(&["fit", "model.yaml", "--no-report"]);
+    let (_, summary, stderr) = bench.run(&["fit", "model.yaml", "--no-report", "--verbose"]);
     assert!(
         summary.contains("the stiffness is negative at most times"),
         "{summary}{stderr}"
@@ -927,7 +930,7 @@ fn a_tone_in_the_residuals_is_named() {
     let model = starter("{nodes: 2001}", "    sigma: {displacement: estimate}\n")
         .replace("start: 39", "start: 100");
     bench.write("model.yaml", &model);
-    let (_, summary, _) = bench.run(&["fit", "model.yaml", "--no-report"]);
+    let (_, summary, _) = bench.run(&["fit", "model.yaml", "--no-report", "--verbose"]);
     let advice = "displacement: the residuals oscillate at 3.66 Hz, the response at 1.59 Hz";
     assert!(summary.contains(advice), "{summary}");
     let band = summary.split_once("(`band: ").expect("a band").1;
@@ -961,7 +964,7 @@ fn an_unknown_force_is_suggested_for_sustained_oscillations() {
     let columns = "    columns: {time: t_s, displacement: y_m}\n";
     bench.write("model.yaml", &starter("{nodes: 2000}", columns));
     let advice = "if an unmeasured force acts, fit the equation of motion instead (fit.method=equation-error)";
-    let fit = ["fit", "model.yaml", "--no-report"];
+    let fit = ["fit", "model.yaml", "--no-report", "--verbose"];
     let (_, summary, stderr) = bench.run(&fit);
     assert!(summary.contains(advice), "{summary}{stderr}");
     bench.run_to(

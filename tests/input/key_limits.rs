@@ -14,6 +14,11 @@ const BEYOND: &[(&str, &str)] = &[
     ("linear-mass", "functions.mass={fixed: 0.0}"),
     (
         "linear-mass",
+        "functions.mass={basis: constant, start: 1.0, known_part: 0.0}",
+    ),
+    ("camera", "functions.mass={fixed: {value: 1.0, sigma: 0}}"),
+    (
+        "linear-mass",
         "functions.mass={basis: constant, start: 1.0, min: 2.0, max: 1.0}",
     ),
     ("friction", "functions.coulomb_friction.width=0"),
@@ -147,6 +152,15 @@ const ALONE: &[(&str, &str)] = &[
     ("noisy", "fit.gradient=continuous"),
     ("linear-mass", "experiments.0.sample_rate=100"),
     ("camera", "experiments.0.decimate=2"),
+    ("camera", "functions.mass={fixed: {value: 1.0}}"),
+    ("camera", "functions.mass={fixed: {sigma: 1.0}}"),
+    ("camera", "functions.mass={fixed: {data: camera.csv}}"),
+    ("camera", "functions.mass={fixed: {column: mass_kg}}"),
+    ("camera", "functions.mass={fixed: 1.0, known_part: 1.0}"),
+    (
+        "linear-mass",
+        "functions.mass={fixed: {value: 1.0, sigma: 0.1}}",
+    ),
     ("linear-mass", "experiments.0.loss={displacement: huber}"),
     ("linear-mass", "experiments.0.base={interpolation: cubic}"),
     ("linear-mass", "experiments.0.validation=true"),

@@ -103,7 +103,7 @@ mod tests {
         assert_eq!(bumps.stride(), 1);
         assert_eq!(bumps.count(), 14 + 1);
         assert_eq!(bumps.samples(14).map(|(k, _)| k).min(), Some(30));
-        assert_eq!(Bumps::of(&[0..4], 4).count(), 0);
+        assert_eq!(Bumps::of(std::slice::from_ref(&(0..4)), 4).count(), 0);
     }
 
     /// Averages of a constant are the constant; spreading is the transpose of averaging.
