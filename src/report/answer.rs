@@ -53,6 +53,14 @@ fn row(document: &ResultDocument, name: &str, estimate: &Estimate) -> AnswerRow 
     } else if function.is_some_and(|f| f.at_bound) {
         status.push("at its bound".to_owned());
     }
+    let is_partly = function.filter(|f| f.verdict == Some(ClassificationKind::PartlyIdentified));
+    if let Some(range) = is_partly.and_then(|f| f.identified_range) {
+        let range = range_in_words(range).unwrap_or_else(|| significant(range[0], 4));
+        status.truncate(1);
+        status.push(format!("{range} where it is identified"));
+        value.clear();
+        interval.clear();
+    }
     if is_open {
         status = vec!["not identifiable".to_owned()];
         value.clear();

@@ -8,7 +8,8 @@
 //! p = -z^T e / z^T z,    t = p sqrt(z^T z) / s,    s^2 = (e^T e - p^2 z^T z) / (n - q - 1)
 //! ```
 //!
-//! is the estimate after one step of Gauss and Newton from the fit, without a refit (Rao 1948). Where the noise model does not describe the
+//! is the estimate after one step of Gauss and Newton from the fit (Rao 1948). A term with a large `t` is missing if a refit with it leaves white
+//! residuals. Where the noise model does not describe the
 //! residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
 
 use super::refinement::applies;
@@ -17,10 +18,10 @@ use crate::identifiability::Factorisation;
 use crate::noise::KernelCovariance;
 use crate::objective::{Evaluation, diagnostics};
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::record::ScoreCovariance;
+use crate::record::{NoiseEstimate, ScoreCovariance};
 use crate::simd::sum::rms;
 use crate::simulate::Trajectory;
-use crate::solvers::{MissingTerm, TESTED_TERMS, weighted_jacobian};
+use crate::solvers::{FitSettings, MissingTerm, TESTED_TERMS, fit_from, weighted_jacobian};
 use crate::system::Term;
 use nalgebra::{DMatrix, DVector};
 
@@ -30,6 +31,8 @@ const WIDTH: f64 = 0.01;
 const SIGNIFICANT: f64 = 4.5;
 /// Fit of a channel, per cent, below which a fit is not near the system, and a linearisation in further terms says nothing.
 const UNRELATED: f64 = 50.0;
+/// Smallest p-value of the test of whiteness of residuals that a missing term explains.
+const WHITE: f64 = 1e-3;
 /// Fewest samples per parameter.
 const SAMPLES_PER_PARAMETER: usize = 4;
 /// Part of a candidate's derivatives outside the span of the model's below which it is no candidate.
@@ -74,7 +77,28 @@ pub(super) fn missing_term(
         })
     });
     let best = tests.max_by(|a, b| a.t.abs().total_cmp(&b.t.abs()))?;
-    (best.t.abs() >= SIGNIFICANT).then_some(best)
+    (best.t.abs() >= SIGNIFICANT && is_explained(problem, theta, &best)).then_some(best)
+}
+
+/// True if a refit with the term leaves white residuals: an error of the input, a coefficient that varies and another missing term give a large
+/// `t` as well, but residuals that remain.
+fn is_explained(problem: &Problem, theta: &[f64], missing: &MissingTerm) -> bool {
+    let refit = || {
+        let evaluation = problem.evaluate(theta).ok()?;
+        let kinds = candidates(problem, &evaluation);
+        let kind = kinds.into_iter().find(|(kind, _)| *kind == missing.term)?;
+        let (mut extended, mut start) = extended(problem, theta, &[kind])?;
+        for channel in (extended.parts_mut().experiments.iter_mut()).flat_map(|e| &mut e.channels) {
+            *channel = channel.clone().with_noise(NoiseEstimate::default());
+        }
+        start[problem.functions.scalar_range().start] = missing.value;
+        let fit = fit_from(&extended, &start, &FitSettings::default()).ok()?;
+        let evaluation = &fit.best.evaluation;
+        let mut tests = (extended.predicted(evaluation))
+            .map(|(channel, predicted)| diagnostics(channel, predicted).whiteness.p_value);
+        Some(tests.all(|p| p >= WHITE))
+    };
+    refit().unwrap_or(false)
 }
 
 /// Kinds and terms that the model does not have.

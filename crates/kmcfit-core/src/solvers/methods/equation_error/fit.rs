@@ -23,11 +23,11 @@ const AGAIN: usize = 3;
 /// Relative rounding error of a term of the equation of motion, with derivatives of smoothed samples and parameters of the
 /// accuracy of a factorisation.
 const TERM_ROUNDING: f64 = 1000.0 * f64::EPSILON;
-/// Most solutions of the reweighted problem of a robust loss with a new scale each, and with the last scale. Each solution reduces the
-/// distance from the minimum by a factor of about the share of residuals beyond the threshold, a third at most.
+/// Most solutions of the reweighted problem of a robust loss with a new scale each, and with the last scale; they end earlier where
+/// the cost no longer falls.
 const SCALES: usize = 20;
 const REWEIGHTINGS: usize = 200;
-/// Most restorations of the state of nonlinear terms; four suffice for a cart with friction.
+/// Most restorations of the state of nonlinear terms; they end earlier where the cost no longer falls.
 const RESTORATIONS: usize = 8;
 /// Relative decrease of the cost of a robust loss below which it has converged: a hundredth of [`Optimality::LEAST`].
 const DECREASE: f64 = 1e-10;
