@@ -296,7 +296,7 @@ fn keys_that_a_basis_does_not_use() {
     assert_snapshot!(with("basis: b-spline, knot: 5"), @"
     m.yaml:5:37: functions.mass: unknown key
       found: `knot`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
       hint: did you mean `knots`?
     ");
 }
@@ -437,62 +437,62 @@ fn penalties() {
     assert_snapshot!(smooth("{order: 3, weight: 1}"), @"
     m.yaml:5:34: functions.mass: unknown key
       found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{order: 2, weight: -1}"), @"
     m.yaml:5:34: functions.mass: unknown key
       found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
     ");
     assert_snapshot!(smooth("[{order: 2, weight: 1}, {order: 1, weight: -0.5}]"), @"
     m.yaml:5:34: functions.mass: unknown key
       found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{order: 2, weight: discrepency}"), @"
     m.yaml:5:34: functions.mass: unknown key
       found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{order: 2, weight: 1e-3 s}"), @"
     m.yaml:5:34: functions.mass: unknown key
       found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{order: 2, weight: [1]}"), @"
     m.yaml:5:34: functions.mass: unknown key
       found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{weight: 1}"), @"
     m.yaml:5:34: functions.mass: unknown key
       found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{order: 2}"), @"
     m.yaml:5:34: functions.mass: unknown key
       found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{order: 2, weigth: 1}"), @"
     m.yaml:5:34: functions.mass: unknown key
       found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
     ");
     assert_snapshot!(smooth("2"), @"
     m.yaml:5:34: functions.mass: unknown key
       found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
     ");
     assert_snapshot!(smooth("[{order: 2, weight: 1}, 3]"), @"
     m.yaml:5:34: functions.mass: unknown key
       found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
     ");
     assert_snapshot!(smooth("{order: 1, weight: 1, reference: 2}"), @"
     m.yaml:5:34: functions.mass: unknown key
       found: `smooth`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
     ");
     let with = |text: &str| message(&format!("{{basis: nodal, start: 1, {text}}}"));
     assert_snapshot!(with("penalty: {kind: tv, weight: -1}"), @"
@@ -508,6 +508,6 @@ fn penalties() {
     assert_snapshot!(with("variation: 1"), @"
     m.yaml:5:34: functions.mass: unknown key
       found: `variation`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
     ");
 }

@@ -63,7 +63,7 @@ fn keys() {
     10 |   mass:      {basis: nodal, strat: 2.0}
        |                             ^^^^^
       found: `strat`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
       hint: did you mean `start`?
     ");
     assert_snapshot!(changed("method: midpoint", "method: midpoint, dt: 0.1"), @"

@@ -85,7 +85,7 @@ fn unknown_keys() {
     assert_snapshot!(changed("fixed: 1", "Fixed: 1"), @"
     m.yaml:18:32: functions.stiffness: unknown key
       found: `Fixed`
-      expected: one of: basis, knots, degree, start, fixed, min, max, penalty, width
+      expected: one of: basis, knots, degree, start, fixed, known_part, min, max, penalty, width
       hint: did you mean `fixed`?
     ");
     assert_snapshot!(changed("cost_ratio", "cost-ratio"), @"
@@ -439,7 +439,7 @@ fn wrong_kinds() {
     assert_snapshot!(changed("fixed: 1", "fixed: [1, 1]"), @"
     m.yaml:18:39: functions.stiffness.fixed: not a number
       found: a list
-      expected: a finite number, or a column: {data: file.csv, column: name}
+      expected: a finite number, {value: 4.5, sigma: 0.02}, or a column: {data: file.csv, column: name}
     ");
     assert_snapshot!(changed("data: start.csv", "data:"), @"
     m.yaml:17:17: the file is not valid YAML: a space or a value is missing behind this `:`
