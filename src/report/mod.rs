@@ -58,6 +58,5 @@ pub use run_reader::Run;
 pub use summary::{prediction_table, summary};
 pub use terminal::charts;
 pub use timings::{OverheadTimings, PartSummary, TimingsSummary};
-pub use verdict::Verdict;
 #[cfg(test)]
 pub(crate) use verdict::reason_in_words;

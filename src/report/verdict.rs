@@ -1,28 +1,16 @@
-//! Verdict on a fit in words: its level and its reasons, each a clause of one line.
+//! Reasons of the verdict on a fit in words, each a clause of one line.
 
-use super::document::Estimates;
+use super::document::{Estimates, Verdict};
 use super::fit_assessment::ValidationRecord;
 use super::run::FittedModel;
 use super::suggestions::percent;
 use crate::finding::Finding;
 use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::{
-    VerdictLevel, VerdictReason, estimates, verdict_level, verdict_reasons,
+    VerdictReason, estimates, verdict_level, verdict_reasons,
 };
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::solvers::Status;
-use serde::{Deserialize, Serialize};
-
-/// Verdict on a fit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Verdict {
-    /// Level: the worst of the reasons.
-    pub level: VerdictLevel,
-    /// Reasons, the most important first; for `adequate` none.
-    pub reasons: Vec<Finding>,
-    /// Tests that the fit passed, as one clause.
-    pub passed: String,
-}
 
 impl FittedModel<'_> {
     /// Verdict on the fit: reasons from its assessment, the data and the validation records.
@@ -116,33 +104,6 @@ fn of_data(warning: &Finding) -> Option<VerdictReason> {
             channel: text("channel")?,
         }),
         _ => None,
-    }
-}
-
-impl Verdict {
-    /// The verdict and its reasons, one on each line: `Check       no force is measured: ...`.
-    pub fn lines(&self) -> String {
-        let reasons = Finding::texts(&self.reasons);
-        let lines = match reasons.is_empty() {
-            true => vec![self.passed.clone()],
-            false => reasons,
-        };
-        let level = level_in_words(self.level);
-        let line = |(i, line): (usize, &String)| {
-            let level = if i == 0 { level } else { "" };
-            format!("{level:<11}{line}")
-        };
-        let lines: Vec<String> = lines.iter().enumerate().map(line).collect();
-        lines.join("\n")
-    }
-}
-
-/// A level as a word.
-pub fn level_in_words(level: VerdictLevel) -> &'static str {
-    match level {
-        VerdictLevel::Adequate => "Adequate",
-        VerdictLevel::Check => "Check",
-        VerdictLevel::Inadequate => "Inadequate",
     }
 }
 

@@ -3,17 +3,18 @@
 mod channel;
 mod estimates;
 mod fit_summaries;
+mod verdict;
 
 pub use channel::{
     ChannelSummary, IgnoredSummary, NoiseSummary, NuisanceParameter, ValidationSummary,
 };
 pub use estimates::Estimates;
 pub use fit_summaries::{AttemptSummary, PathPointSummary, PenaltySummary, WeightSummary};
+pub use verdict::{Verdict, level_in_words};
 
 use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
-use crate::report::verdict::Verdict;
 use kmcfit_core::internals::assessment::{FitStatistics, FunctionSummary, StepCheck};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::CovarianceKind;

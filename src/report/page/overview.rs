@@ -4,12 +4,11 @@
 use super::table::{list, number, table};
 use crate::finding::Finding;
 use crate::report::answer::{AnswerRow, answer};
-use crate::report::document::{ChannelSummary, ResultDocument};
+use crate::report::document::{ChannelSummary, ResultDocument, level_in_words};
 use crate::report::equation::equation_residual;
 use crate::report::suggestions;
 use crate::report::summary::{count, iterations};
 use crate::report::text::{escape, prose};
-use crate::report::verdict::level_in_words;
 use kmcfit_core::internals::assessment::{FunctionSummary, VerdictLevel};
 use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::solvers::Status;

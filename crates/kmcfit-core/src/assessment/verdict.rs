@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 pub enum VerdictLevel {
     /// All tests passed: the estimates and their intervals can be used.
     Adequate,
-    /// A reason limits the estimates or needs an engineer's judgement.
+    /// A reason limits the estimates, or an engineer must decide whether it does.
     Check,
     /// The estimates are not those of the system.
     Inadequate,
