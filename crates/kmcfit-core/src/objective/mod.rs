@@ -83,7 +83,7 @@ impl Problem {
     /// The cost is the sum of [`Channel::cost`](crate::record::Channel::cost) over the channels, of
     /// `weight |L theta - target|^2` over the penalties ([`crate::functions::Penalty`]), of `weight sum |D theta|` over the
     /// total-variation penalties ([`crate::functions::TotalVariation`]), of the soft constraints
-    /// ([`crate::constraints::RowGroup::price`]) and of the priors ([`crate::functions::ScalarParameter::price`]).
+    /// ([`crate::constraints::RowGroup::price`]) and of the priors ([`crate::functions::Prior::price`]).
     ///
     /// # Errors
     /// A [`SimulationError`] if the mass is not positive at some node, or the response or the cost overflows.
