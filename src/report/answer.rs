@@ -22,7 +22,9 @@ pub struct AnswerRow {
     pub interval: String,
     /// Unit; empty if dimensionless.
     pub unit: String,
-    /// How it was obtained, and its range over the record.
+    /// Range over the record of a quantity that varies, or where it is identified; empty for others.
+    pub range: String,
+    /// How it was obtained.
     pub status: String,
 }
 
@@ -42,41 +44,43 @@ fn row(document: &ResultDocument, name: &str, estimate: &Estimate) -> AnswerRow 
     let function = document.functions.get(name);
     let is_open = function.is_some_and(|f| f.verdict == Some(ClassificationKind::NotIdentified));
     let [mut value, mut interval] = numbers(estimate);
-    let mut status = vec![status(document, estimate)];
-    if let Some(range) = estimate.range.and_then(range_in_words) {
-        status.push(format!("mean; {range} over the record"));
+    let mut status = status(document, estimate);
+    // Known parts of single experiments are not in the shared functions.
+    let has_own_parts = (document.functions.keys())
+        .any(|name| name.starts_with("known part of ") && name.matches(" of ").count() > 1);
+    if has_own_parts && function.is_none() {
+        status += ", without the known parts of experiments";
     }
+    let mut range = estimate.range.and_then(range_in_words).unwrap_or_default();
     if is_negligible(document, name) {
         value = "0".to_owned();
         interval.clear();
-        status.truncate(1);
+        range.clear();
     } else if function.is_some_and(|f| f.at_bound) {
-        status.push("at its bound".to_owned());
+        status += ", at its bound";
     }
     let is_partly = function.filter(|f| f.verdict == Some(ClassificationKind::PartlyIdentified));
-    if let Some(range) = is_partly.and_then(|f| f.identified_range) {
-        let range = range_in_words(range).unwrap_or_else(|| significant(range[0], 4));
-        status.truncate(1);
-        status.push(format!("{range} where it is identified"));
+    if let Some(identified) = is_partly.and_then(|f| f.identified_range) {
+        let ends = range_in_words(identified);
+        let ends = ends.unwrap_or_else(|| significant(identified[0], 4));
+        range = format!("{ends} where it is identified");
         value.clear();
         interval.clear();
     }
     if is_open {
-        status = vec!["not identifiable".to_owned()];
+        "not identifiable".clone_into(&mut status);
         value.clear();
         interval.clear();
+        range.clear();
     }
-    let details = status.split_off(1).join("; ");
     AnswerRow {
         key: name.to_owned(),
         quantity: quantity(name),
         estimate: value,
         interval,
+        range,
         unit: estimate.unit.clone(),
-        status: match details.is_empty() {
-            true => status.concat(),
-            false => format!("{} ({details})", status.concat()),
-        },
+        status,
     }
 }
 
@@ -185,12 +189,17 @@ pub fn answer_table(document: &ResultDocument) -> String {
     };
     let mut text = line(["", "estimate", "95 % CI", "unit", "status"]);
     for row in &rows {
+        let status = match (row.range.as_str(), row.estimate.as_str()) {
+            ("", _) => row.status.clone(),
+            (range, "") => format!("{} ({range})", row.status),
+            (range, _) => format!("{} (mean; {range} over the record)", row.status),
+        };
         text += &line([
             &row.quantity,
             &row.estimate,
             &row.interval,
             &row.unit,
-            &row.status,
+            &status,
         ]);
     }
     text

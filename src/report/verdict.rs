@@ -39,7 +39,10 @@ impl FittedModel<'_> {
         Verdict {
             level: verdict_level(&reasons),
             reasons: reasons.iter().map(in_words).collect(),
-            passed: self.passed(),
+            passed: match reasons.is_empty() {
+                true => self.passed(),
+                false => String::new(),
+            },
         }
     }
 

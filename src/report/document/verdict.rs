@@ -11,7 +11,8 @@ pub struct Verdict {
     pub level: VerdictLevel,
     /// Reasons, the most important first; for `adequate` none.
     pub reasons: Vec<Finding>,
-    /// Tests that the fit passed, as one clause.
+    /// Tests that a fit without reasons passed, as one clause; empty with reasons.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub passed: String,
 }
 

@@ -61,12 +61,13 @@ fn answers(document: &ResultDocument) -> String {
             row.quantity,
             row.estimate,
             row.interval,
+            row.range,
             row.unit,
             row.status,
         ]
     };
     let rows: Vec<Vec<String>> = answer(document).into_iter().map(row).collect();
-    let headings = ["quantity", "estimate", "95 % CI", "unit", "status"];
+    let headings = ["quantity", "mean", "95 % CI", "range", "unit", "status"];
     table(&headings, &rows)
 }
 

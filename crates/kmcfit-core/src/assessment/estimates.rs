@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub enum EstimateStatus {
     /// From the samples.
     Estimated,
-    /// Fixed by the model.
+    /// Fixed by the model; with an interval where its standard deviation is stated.
     Fixed,
     /// The samples determine ratios only: mass, damping and stiffness scale with a value that the model assumes.
     OnlyAsRatio,
@@ -86,7 +86,7 @@ pub fn estimates(problem: &Problem, fit: &Fit, bands: Option<&Bands>) -> Vec<(St
     let functions = functions.map(|(f, (function, values))| {
         let band = bands.map(|bands| &bands.functions[f]);
         let status = match () {
-            () if function.basis.is_none() => EstimateStatus::Fixed,
+            () if function.basis.is_none() || function.prior.is_some() => EstimateStatus::Fixed,
             () if is_scaled && is_coefficient_of_scale(function) => EstimateStatus::OnlyAsRatio,
             () => EstimateStatus::Estimated,
         };

@@ -94,12 +94,16 @@ impl FitAssessment {
             classifications: Vec::new(),
         };
         let plausibility = &assessment.plausibility;
-        if tests_bases && plausibility.unidentified.is_none() {
+        if reports_errors && plausibility.unidentified.is_none() {
             let is_noise = plausibility.errors_hold && !plausibility.is_coloured;
             let is_modelled = is_noise && !plausibility.is_disturbed;
-            let missing = missing_term(problem, &best.parameters, &best.evaluation, is_modelled);
-            let missing = missing.map(FitWarning::MissingTerm);
-            assessment.plausibility.warnings.extend(missing);
+            let (theta, evaluation) = (&best.parameters, &best.evaluation);
+            // A width of friction on which estimates depend leaves residuals like those of a missing term.
+            let warning = width_warning(problem, theta, evaluation).or_else(|| {
+                let missing = || missing_term(problem, theta, evaluation, is_modelled);
+                tests_bases.then(missing)?.map(FitWarning::MissingTerm)
+            });
+            assessment.plausibility.warnings.extend(warning);
         }
         let mut gaps = Vec::new();
         if reports_errors && assessment.plausibility.errors_hold {
@@ -134,8 +138,6 @@ impl FitAssessment {
             }
             let warnings = test.coarse.into_iter().map(FitWarning::CoarseBasis);
             assessment.plausibility.warnings.extend(warnings);
-            let width = width_warning(problem, theta, evaluation);
-            assessment.plausibility.warnings.extend(width);
             assessment
                 .degrees_of_freedom
                 .clone_from(&bands.degrees_of_freedom);
