@@ -28,7 +28,8 @@ pub struct Estimate {
     pub value: f64,
     /// Smallest and largest value over the record; `None` where the quantity is not defined at some time.
     pub range: Option<[f64; 2]>,
-    /// 95 % confidence interval of the mean; `None` for a fixed quantity, one that is not identifiable, and without intervals.
+    /// 95 % confidence interval of the mean; `None` for a fixed quantity without a standard deviation, one that is not identifiable, and
+    /// without intervals.
     pub ci95: Option<[f64; 2]>,
     /// Unit; empty if dimensionless.
     pub unit: String,

@@ -9,8 +9,7 @@
 //! ```
 //!
 //! is the estimate after one step of Gauss and Newton from the fit (Rao 1948). A term with a large `t` is missing if a refit with it leaves white
-//! residuals. Where the noise model does not describe the
-//! residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
+//! residuals. Where the noise model does not describe the residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
 
 use super::refinement::applies;
 use crate::functions::{CoefficientFunction, CoefficientKind, CoefficientSet, Parameterization};

@@ -39,7 +39,7 @@ impl Parameterization {
     /// [`Parameterization::new`] with several coefficient sets, the shared one first.
     ///
     /// # Panics
-    /// If there is no coefficient set, or a set has an index outside the list or twice.
+    /// If there is no coefficient set, or a set has an index outside the list or twice, or a known part of a coefficient that it does not have.
     pub fn with_coefficient_sets(
         list: Vec<CoefficientFunction>,
         coefficient_sets: Vec<impl Into<CoefficientSet>>,
@@ -54,6 +54,14 @@ impl Parameterization {
         assert!(
             sets.iter().flatten().all(|f| *f < list.len()),
             "coefficient sets with functions of the list"
+        );
+        let has_places = |set: &CoefficientSet| {
+            let mut places = set.known_parts().iter();
+            places.all(|(place, _)| *place < set.len())
+        };
+        assert!(
+            coefficient_sets.iter().all(has_places),
+            "known parts of coefficients of their set"
         );
         let is_once = |nodal: &Vec<usize>| {
             let first = |f: &usize| nodal.iter().position(|g| g == f);
