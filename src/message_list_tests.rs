@@ -869,12 +869,13 @@ fn suspects() -> Vec<Suspect> {
 fn suggestions() -> Vec<Suggestion> {
     let channel = || "displacement".to_owned();
     let mut all = samples![
-        Suggestion::MoreIterations { .. } => Suggestion::MoreIterations { iterations: 200 },
+        Suggestion::MoreIterations => Suggestion::MoreIterations,
         Suggestion::MoreTime => Suggestion::MoreTime,
         Suggestion::Resume => Suggestion::Resume,
         Suggestion::AnotherMethod => Suggestion::AnotherMethod,
         Suggestion::AnotherStart => Suggestion::AnotherStart,
-        Suggestion::FinerSteps { .. } => Suggestion::FinerSteps { nodes: 8001.0 },
+        Suggestion::FinerSteps { automatic: false } => Suggestion::FinerSteps { automatic: false },
+        Suggestion::FinerSteps { automatic: true } => Suggestion::FinerSteps { automatic: true },
         Suggestion::LargerSigma { .. } => Suggestion::LargerSigma { times: 4.5, fit: 99.12 },
         Suggestion::NoiseLimited { .. } => Suggestion::NoiseLimited { channel: channel(), fit: 71.0 },
         Suggestion::StateInputSigma { .. } => Suggestion::StateInputSigma { input: "force".into(), sigma: 0.701 },

@@ -785,7 +785,7 @@ fn steps_with_errors_above_the_residuals_are_reported() {
     assert!(summary.contains("times the rms residual"), "{summary}");
     assert!(!summary.contains("is identified"), "{summary}");
     assert!(
-        summary.contains("the time step is too coarse: use grid.nodes="),
+        summary.contains("the time step is too coarse: use grid.nodes=auto"),
         "{summary}"
     );
 }

@@ -30,6 +30,8 @@ pub struct ProblemParts {
     pub soft: Vec<RowGroup>,
     /// Jumps found in functions, on which all estimates are conditional.
     pub jumps: Vec<Jumps>,
+    /// True where the width of Coulomb friction approximates the width zero: intervals then include its error.
+    pub friction_is_ideal: bool,
 }
 
 /// Jumps found in a function by the rule `bic` of its total variation.
@@ -196,6 +198,7 @@ impl Problem {
             constraints: Constraints::default(),
             soft: Vec::new(),
             jumps: Vec::new(),
+            friction_is_ideal: false,
         };
         parts.check().map(|()| Self(parts))
     }
@@ -207,6 +210,11 @@ impl Problem {
     pub fn with(mut self, change: impl FnOnce(&mut ProblemParts)) -> Result<Self, ProblemError> {
         change(&mut self.0);
         self.0.check().map(|()| self)
+    }
+
+    /// Lets the intervals include the error of the width of Coulomb friction.
+    pub fn idealise_friction(&mut self) {
+        self.0.friction_is_ideal = true;
     }
 
     /// Adds constraints; groups with a penalty weight are soft.

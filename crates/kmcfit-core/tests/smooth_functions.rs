@@ -184,7 +184,7 @@ fn mean(course: Course, coefficient: f64, seeds: u64) -> Mean {
     mean
 }
 
-/// The standard error of a mean over 40 seeds is about 0.8 % for a stiffness of many effective parameters.
+/// The standard error of a mean over 16 seeds is about 1.3 % for a stiffness of many effective parameters.
 #[test]
 fn bands_on_automatic_knots_cover_a_varying_stiffness() {
     for (course, coefficient) in [
@@ -193,8 +193,8 @@ fn bands_on_automatic_knots_cover_a_varying_stiffness() {
         (THREE_CYCLES, 0.0),
         (THREE_CYCLES, 0.8),
     ] {
-        let mean = mean(course, coefficient, 40);
-        assert!((0.93..=0.995).contains(&mean.bayesian), "{}", mean.bayesian);
+        let mean = mean(course, coefficient, 16);
+        assert!((0.92..=0.995).contains(&mean.bayesian), "{}", mean.bayesian);
         assert!((1.0..=1.4).contains(&mean.width), "{}", mean.width);
     }
 }
@@ -294,11 +294,11 @@ fn only_rules_with_coverage_identify_a_smoothed_function() {
 
 /// Rules on a path of weights estimate sigma and the correlation of the noise at the chosen weight: AR(1) noise with a coefficient of 0.8,
 /// whose standard deviation has a relative standard error of 4.5 % at 1000 samples, is found within four of these. The bands of
-/// cross-validation hold the stiffness at 95 % of the times on average; over 40 records, of which each has a share with a standard
-/// deviation of 22 %, mostly the common error of mass and stiffness, the mean is above 88 %.
+/// cross-validation hold the stiffness at 95 % of the times on average; over 16 records, of which each has a share with a standard
+/// deviation of 22 %, mostly the common error of mass and stiffness, the mean is above 80 %.
 #[test]
 fn path_rules_estimate_the_noise() {
-    const SEEDS: u64 = 40;
+    const SEEDS: u64 = 16;
     let data = data(ONE_CYCLE);
     let rms = (data.2.iter().map(|y| y * y).sum::<f64>() / SAMPLES as f64).sqrt();
     let (settings, rule) = (FitSettings::default(), WeightRule::Gcv);
@@ -318,7 +318,7 @@ fn path_rules_estimate_the_noise() {
         assert!(path.picks[2].is_some(), "{seed}");
         mean += coverage(&problem, &fit, ONE_CYCLE).0 / SEEDS as f64;
     }
-    assert!((0.88..=0.995).contains(&mean), "{mean}");
+    assert!((0.80..=0.995).contains(&mean), "{mean}");
 }
 
 /// The finding on the stiffness with these knots of a piecewise-linear basis.

@@ -239,6 +239,9 @@ fn build_on(file: &ModelFile, mode: BuildMode, least: usize) -> Result<Model, In
     let searches =
         built.weight_search.is_some() || built.problem.penalties.iter().any(|p| p.rule.is_some());
     let settings = fit::build(file, &built.problem, solver, searches)?;
+    if automatic_width.is_some() {
+        built.problem.idealise_friction();
+    }
     let given_start = built.problem.functions.start();
     // A simulation uses the functions as given.
     if !matches!(mode, BuildMode::Simulate { .. }) {

@@ -7,8 +7,8 @@ use crate::finding::Finding;
 use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR, ResidualPattern};
 use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
 use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 use kmcfit_core::internals::solvers::{Solver, StartStrategy, Status};
-use kmcfit_core::internals::system::Method;
 use serde::{Deserialize, Serialize};
 
 /// Residuals with a lower probability under white noise have a pattern.
@@ -25,10 +25,7 @@ const MOST: usize = 3;
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Suggestion {
     /// A larger iteration limit.
-    MoreIterations {
-        /// The limit.
-        iterations: u64,
-    },
+    MoreIterations,
     /// A larger time limit.
     MoreTime,
     /// Resuming the fit.
@@ -39,8 +36,8 @@ pub enum Suggestion {
     AnotherStart,
     /// A finer grid.
     FinerSteps {
-        /// Number of nodes.
-        nodes: f64,
+        /// True if the number of nodes can be automatic, and is not.
+        automatic: bool,
     },
     /// A loss or a sensor model for a pattern in the residuals of a channel.
     Pattern {
@@ -268,7 +265,7 @@ fn wanders(document: &ResultDocument) -> bool {
         && document.worst_fit().is_some_and(|worst| worst < POOR)
 }
 
-/// A number of nodes for which, by the order of the stepper, the step-size check passes; `None` if it passes already.
+/// A finer grid where the step-size check fails; an automatic number of nodes where a fit refines it.
 fn about_steps(document: &ResultDocument) -> Option<Suggestion> {
     let half = document.step_check.as_ref()?;
     let is_exact = document.worst_fit().is_some_and(|worst| worst > EXACT);
@@ -276,22 +273,17 @@ fn about_steps(document: &ResultDocument) -> Option<Suggestion> {
         true => 0.0,
         false => half.change_per_residual,
     };
-    // A step-size error of a tenth of the residuals is acceptable.
-    let times = (half.change_per_sample / COARSE).max(10.0 * beside_residuals);
     if half.change_per_sample <= COARSE && beside_residuals <= 1.0 {
         return None;
     }
-    let stepper = match document.model.stepper == Method::Midpoint.name() {
-        true => Method::Midpoint,
-        false => Method::Rk4,
-    };
-    // Beyond a factor of 16 the order of the stepper predicts nothing.
-    let finer = times
-        .powf(1.0 / f64::from(stepper.order()))
-        .clamp(2.0, 16.0)
-        .ceil();
-    let nodes = (document.model.nodes - 1) as f64 * finer + 1.0;
-    Some(Suggestion::FinerSteps { nodes })
+    let model = &document.model;
+    let refines = [Solver::GaussNewton, Solver::ProjectedGradient];
+    let is_refined = refines.iter().any(|solver| model.method == solver.name());
+    let is_automatic = |f: &Finding| f.kind.starts_with("nodes_from");
+    let automatic = is_refined
+        && model.parameters <= FEW_PARAMETERS
+        && !document.automatic.iter().any(is_automatic);
+    Some(Suggestion::FinerSteps { automatic })
 }
 
 /// Likeliest cause of a poor fit of a record: its input, if it has one.
@@ -383,9 +375,7 @@ fn about_residuals(document: &ResultDocument) -> Option<Suggestion> {
 fn about_ending(document: &ResultDocument) -> Option<Suggestion> {
     let is_newton = document.model.method == Solver::GaussNewton.name();
     match document.outcome.status {
-        Status::MaxIterations => Some(Suggestion::MoreIterations {
-            iterations: 10 * document.counts.iterations.max(1),
-        }),
+        Status::MaxIterations => Some(Suggestion::MoreIterations),
         Status::TimeLimit => Some(Suggestion::MoreTime),
         Status::Interrupted => Some(Suggestion::Resume),
         Status::Stalled if !is_newton => Some(Suggestion::AnotherMethod),

@@ -10,8 +10,8 @@ use std::fmt;
 impl fmt::Display for Suggestion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Suggestion::MoreIterations { iterations } => {
-                write!(f, "iteration limit reached: raise it with fit.stop.iterations={iterations}")
+            Suggestion::MoreIterations => {
+                f.write_str("iteration limit reached: raise it with fit.stop.iterations")
             }
             Suggestion::MoreTime => {
                 f.write_str("time limit reached: raise it with fit.stop.seconds")
@@ -24,8 +24,11 @@ impl fmt::Display for Suggestion {
             Suggestion::AnotherStart => f.write_str(
                 "use another starting point (fit.initial=data, or other `start` values) or soft constraints (`soft`)",
             ),
-            Suggestion::FinerSteps { nodes } => {
-                write!(f, "the time step is too coarse: use grid.nodes={nodes}")
+            Suggestion::FinerSteps { automatic: true } => {
+                f.write_str("the time step is too coarse: use grid.nodes=auto")
+            }
+            Suggestion::FinerSteps { automatic: false } => {
+                f.write_str("the time step is too coarse: use more nodes (grid.nodes)")
             }
             Suggestion::Pattern {
                 channel,

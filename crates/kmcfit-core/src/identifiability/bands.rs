@@ -122,7 +122,7 @@ impl Bands {
         let directions = Directions::new(problem, evaluation, MOST_PARAMETERS, smooth);
         let sensitivity = Sensitivity::along(problem, evaluation, directions);
         let information =
-            Information::new(problem, theta, sensitivity).with_step_error(problem, evaluation);
+            Information::new(problem, theta, sensitivity).with_numerical_error(problem, evaluation);
         Self::from_information(problem, theta, evaluation, &information, settings)
     }
 

@@ -2,17 +2,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// The matrix with a column after the others, if there is one.
-pub(super) fn with_column(root: DMatrix<f64>, column: Option<DVector<f64>>) -> DMatrix<f64> {
-    match column {
-        None => root,
-        Some(column) => {
-            let last = root.ncols();
-            let mut wider = root.insert_column(last, 0.0);
-            wider.set_column(last, &column);
-            wider
-        }
-    }
+/// The matrix with a column after the others.
+pub(super) fn with_column(root: DMatrix<f64>, column: &DVector<f64>) -> DMatrix<f64> {
+    let last = root.ncols();
+    let mut wider = root.insert_column(last, 0.0);
+    wider.set_column(last, column);
+    wider
 }
 
 /// Matrix `a` above `b`.

@@ -10,6 +10,7 @@ use super::factorisation::Factorisation;
 use super::misspecified::kernels;
 use super::sensitivity::Sensitivity;
 use super::step_error::step_error;
+use super::width_shift::width_error;
 use crate::functions::{Penalty, Prior, WeightRule};
 use crate::noise::KernelCovariance;
 use crate::objective::Evaluation;
@@ -29,8 +30,8 @@ pub(super) struct Information {
     is_bayesian: bool,
     /// Bound of the accumulated rounding error of a response as large as the largest sample.
     rounding: f64,
-    /// Discretisation error of the weighted predictions, where it is included.
-    step_error: Option<DVector<f64>>,
+    /// Numerical error of the weighted predictions, where it is included.
+    error: Option<DVector<f64>>,
     /// Samples of channels whose scores have the covariance of a kernel.
     kernels: Vec<Range<usize>>,
     /// Scores of the samples, for the kernel covariance of an equation error.
@@ -90,7 +91,7 @@ impl Information {
             is_bayesian: is_bayesian(problem),
             sensitivity,
             rounding: f64::EPSILON * largest * problem.system.grid.nodes() as f64,
-            step_error: None,
+            error: None,
             kernels: kernels(problem),
             scores: None,
         }
@@ -138,18 +139,25 @@ impl Information {
         self.scores.as_ref().map_or(&[], |scores| &scores.held)
     }
 
-    /// Includes the discretisation error of the time steps.
-    pub fn with_step_error(self, problem: &Problem, evaluation: &Evaluation) -> Self {
-        let error = step_error(problem, evaluation, &self.sensitivity.roots);
-        self.with_error(error)
+    /// Includes the discretisation error of the time steps, with that of an automatic width of friction.
+    pub fn with_numerical_error(self, problem: &Problem, evaluation: &Evaluation) -> Self {
+        let roots = &self.sensitivity.roots;
+        let error = match problem.friction_is_ideal {
+            true => width_error(problem, evaluation, roots),
+            false => step_error(problem, evaluation, roots),
+        };
+        Self { error, ..self }
     }
 
-    /// Includes this discretisation error of the weighted predictions.
-    pub fn with_error(self, step_error: Option<DVector<f64>>) -> Self {
-        Self { step_error, ..self }
+    /// Includes this error of the weighted predictions alone.
+    pub fn with_error(self, error: DVector<f64>) -> Self {
+        Self {
+            error: Some(error),
+            ..self
+        }
     }
 
-    /// Largest shift of a parameter by the discretisation error, in standard errors without it, with the rows `held` fixed. `None`
+    /// Largest shift of a parameter by the included error, in standard errors without it, with the rows `held` fixed. `None`
     /// where no error is included.
     pub fn largest_shift(&self, held: &[&ActiveRow]) -> Option<f64> {
         let in_errors = self.shifts(held)?.into_iter();
@@ -158,10 +166,10 @@ impl Information {
         Some(in_errors.filter(|x| !x.is_nan()).fold(0.0, f64::max))
     }
 
-    /// Shift of each parameter by the discretisation error, and its standard error without it, with the rows `held` fixed. `None`
+    /// Shift of each parameter by the included error, and its standard error without it, with the rows `held` fixed. `None`
     /// where no error is included.
     pub fn shifts(&self, held: &[&ActiveRow]) -> Option<Vec<[f64; 2]>> {
-        self.step_error.as_ref()?;
+        self.error.as_ref()?;
         let columns = self.columns(&self.factor(held));
         let (shift, root) = columns.split_last()?;
         let each = shift.iter().enumerate().map(|(i, shift)| {
@@ -171,12 +179,14 @@ impl Information {
         Some(each.collect())
     }
 
-    /// The shift of the estimates by the discretisation error, as a column of the covariance root.
-    fn shift(&self, inverse_root: &DMatrix<f64>) -> Option<DVector<f64>> {
-        let error = self.step_error.as_ref()?;
+    /// The covariance root with the shift of the estimates by the included error as a further column.
+    fn with_shift(&self, root: DMatrix<f64>, inverse_root: &DMatrix<f64>) -> DMatrix<f64> {
+        let Some(error) = &self.error else {
+            return root;
+        };
         // Priors, the last rows, have no such error.
         let moments = self.measured.rows(0, error.len()).tr_mul(error);
-        Some(-(inverse_root * inverse_root.tr_mul(&moments)))
+        with_column(root, &-(inverse_root * inverse_root.tr_mul(&moments)))
     }
 
     /// Rows of samples, priors and penalties, stacked.
@@ -221,7 +231,6 @@ impl Information {
                 (free * root, free * undetermined)
             }
         };
-        let shift = self.shift(&inverse_root);
         let mut answers = &self.measured * &inverse_root;
         if let Some(scores) = &self.scores {
             return kernel_root(scores, &inverse_root, answers.norm_squared(), undetermined);
@@ -243,7 +252,7 @@ impl Information {
         let is_bayesian = self.is_bayesian && variance.is_none();
         if is_bayesian && self.kernels.is_empty() {
             return CovarianceRoot {
-                root: with_column(inverse_root, shift),
+                root: self.with_shift(inverse_root.clone(), &inverse_root),
                 undetermined,
                 variance,
             };
@@ -257,7 +266,7 @@ impl Information {
             false => &inverse_root * answers.transpose(),
         };
         CovarianceRoot {
-            root: with_column(root, shift),
+            root: self.with_shift(root, &inverse_root),
             undetermined,
             variance,
         }

@@ -94,7 +94,7 @@ impl Scores {
     pub fn undetermined(&self, others: DMatrix<f64>) -> DMatrix<f64> {
         match &self.scale {
             None => others,
-            Some(scale) => with_column(others, Some(scale.clone())),
+            Some(scale) => with_column(others, scale),
         }
     }
 }

@@ -7,29 +7,57 @@
 //! delta = -H^+ J^T W (z_(w/2) - z_w)
 //! ```
 //!
-//! Both predictions are those on half the step, on which half the width is as stable as the width on the whole step.
+//! Both predictions are those on half the step, on which half the width is as stable as the width on the whole step. An error
+//! proportional to the width and to the step, which passes each reversal of the velocity, is twice the change where both are halved.
 
+use super::step_error::weighted;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
+use nalgebra::DVector;
 
 impl Problem {
     /// Shift of each parameter where the width of Coulomb friction is halved, and its standard error. `None` without friction or
     /// parameters, with more than 64 parameters, and where half the step cannot be simulated.
     pub fn shifts_by_width(&self, theta: &[f64], evaluation: &Evaluation) -> Option<Vec<[f64; 2]>> {
-        let width = self.system.friction_width()?;
-        let mut narrow = self.clone();
-        narrow.parts_mut().system.set_friction_width(0.5 * width);
-        let [wide, narrow] = [self, &narrow].map(|problem| changes(problem, evaluation));
-        let pairs = narrow?.into_iter().zip(wide?);
-        let differences = pairs.map(|(narrow, wide)| {
-            let pairs = narrow.iter().zip(&wide);
-            pairs.map(|(a, b)| a - b).collect()
-        });
-        self.shifts_by(theta, evaluation, differences.collect())
+        self.shifts_by(theta, evaluation, differences(self, evaluation)?)
     }
 }
 
-/// Changes of the predictions of each channel by half the step.
+/// Weighted and whitened error of the predictions by an automatic width of Coulomb friction and its steps, in the rows of
+/// [`Sensitivity`](super::Sensitivity) with the roots `roots`.
+pub(super) fn width_error(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    roots: &[f64],
+) -> Option<DVector<f64>> {
+    weighted(
+        problem,
+        changes(&narrower(problem)?, evaluation)?,
+        roots,
+        2.0,
+    )
+}
+
+/// Change of the predictions of each channel where the width is halved.
+fn differences(problem: &Problem, evaluation: &Evaluation) -> Option<Vec<Vec<f64>>> {
+    let [wide, narrow] = [problem, &narrower(problem)?].map(|problem| changes(problem, evaluation));
+    let pairs = narrow?.into_iter().zip(wide?);
+    let differences = pairs.map(|(narrow, wide)| {
+        let pairs = narrow.iter().zip(&wide);
+        pairs.map(|(a, b)| a - b).collect()
+    });
+    Some(differences.collect())
+}
+
+/// The problem with half the width; `None` without friction.
+fn narrower(problem: &Problem) -> Option<Problem> {
+    let width = problem.system.friction_width()?;
+    let mut narrow = problem.clone();
+    narrow.parts_mut().system.set_friction_width(0.5 * width);
+    Some(narrow)
+}
+
+/// Predictions of each channel on half the step less those of the evaluation.
 fn changes(problem: &Problem, evaluation: &Evaluation) -> Option<Vec<Vec<f64>>> {
     let refined = problem.on_half_step(evaluation).ok()??;
     Some(refined.changes.into_iter().flatten().collect())

@@ -13,7 +13,7 @@ use crate::solvers::executor::{Prepared, search};
 use crate::solvers::fit::Fit;
 use crate::solvers::settings::FitSettings;
 use crate::solvers::solve_counts::SolveCounts;
-use crate::solvers::timings::Timings;
+use crate::solvers::timings::{Timings, timed};
 use crate::system::{Excitation, Grid, StageSamples, System};
 use crate::threads;
 use std::time::Duration;
@@ -27,6 +27,8 @@ const SAMPLES: usize = 20;
 const ITERATIONS: u64 = 20;
 /// Tolerance on the truncated record, smaller than the change by the rest of the record.
 const TOLERANCE: f64 = 1e-6;
+/// Factor from one part to the next where the whole record cannot be simulated with the parameters of the first.
+const LONGER: usize = 8;
 
 /// Number of steps of a truncated start; `None` unless the records are long, all functions are constants, and the part has
 /// enough samples.
@@ -186,6 +188,7 @@ pub(in crate::solvers) fn truncated_start(
     }
 }
 
+/// Fits the first `steps`, and longer parts where the whole record cannot be simulated with the result.
 fn fit_part(
     problem: &Problem,
     steps: usize,
@@ -197,21 +200,40 @@ fn fit_part(
     short.stopping.iterations = settings.stopping.iterations.min(ITERATIONS);
     short.stopping.tolerance = Some(TOLERANCE);
     (short.stopping.cost_ratio, short.stopping.gradient_ratio) = (None, None);
-    let part = first_steps(problem, steps)?;
-    let found = watch.unreported(|watch| search(&part, start, &short, None, watch));
-    let fit = found.ok()?;
-    let clock = Instant::now();
-    let parameters = fit.best.parameters.clone();
-    let better = (parameters != start).then(|| Prepared {
-        evaluation: problem.evaluate(&parameters).ok(),
-        parameters,
-        spare: None,
-    });
-    Some(PartialFit {
-        fit,
-        better,
-        evaluating: clock.elapsed(),
-    })
+    let mut search_part = |steps, from: &[f64]| {
+        let part = first_steps(problem, steps)?;
+        let found = watch.unreported(|watch| search(&part, from, &short, None, watch));
+        found.ok()
+    };
+    let mut fit = search_part(steps, start)?;
+    let mut evaluating = Duration::ZERO;
+    let mut length = steps;
+    loop {
+        let parameters = fit.best.parameters.clone();
+        let is_moved = parameters != start;
+        let evaluate = || timed(&mut evaluating, || problem.evaluate(&parameters).ok());
+        let evaluation = is_moved.then(evaluate).flatten();
+        length *= LONGER;
+        let is_last = !is_moved || evaluation.is_some() || length >= problem.system.grid.nodes();
+        match (!is_last)
+            .then(|| search_part(length, &parameters))
+            .flatten()
+        {
+            Some(longer) => fit = longer.with_work_of(fit.counts, fit.timings, fit.elapsed),
+            None => {
+                let better = is_moved.then_some(Prepared {
+                    evaluation,
+                    parameters,
+                    spare: None,
+                });
+                return Some(PartialFit {
+                    fit,
+                    better,
+                    evaluating,
+                });
+            }
+        }
+    }
 }
 
 #[cfg(test)]
