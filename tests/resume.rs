@@ -1,7 +1,7 @@
 //! An interrupted and resumed fit is bit-identical to an uninterrupted one.
 
 use kmcfit::config::{BuildMode, Model, ModelFile, build};
-use kmcfit::results::{FIT_JOURNAL, FitJournal, Heading};
+use kmcfit::results::{FIT_JOURNAL, FitJournal, Heading, RequestedFiles};
 use kmcfit_core::internals::solvers::{
     Fit, IterationRecord, Observer, Status, WeightPath, choose_weight_watched,
     fit_with_noise_watched,
@@ -65,7 +65,7 @@ fn again_and_again(name: &str, changes: &[(&str, &str)], each: u64) {
     let (file, model) = model(name, changes);
     let whole = run(&model, None, u64::MAX);
     let place = tempfile::tempdir().expect("a folder");
-    let heading = Heading::of_model("fit", &file, false, None);
+    let heading = Heading::of_model("fit", &file, RequestedFiles::default(), None);
     let mut journal = FitJournal::begin(place.path(), &heading).expect("a journal");
     let mut times = 0;
     let found = loop {
@@ -170,7 +170,7 @@ fn an_edited_journal_does_not_change_the_result() {
     let (file, model) = model("knots", &[]);
     let whole = run(&model, None, u64::MAX);
     let place = tempfile::tempdir().expect("a folder");
-    let heading = Heading::of_model("fit", &file, false, Some(0.0));
+    let heading = Heading::of_model("fit", &file, RequestedFiles::default(), Some(0.0));
     let mut journal = FitJournal::begin(place.path(), &heading).expect("a journal");
     run(&model, Some(&mut journal), 3);
     let path = place.path().join("fit.checkpoint");

@@ -11,7 +11,7 @@ use crate::report::compare::{ComparedRun, Comparison, LeftOut};
 use crate::report::{fit_claim, json};
 use crate::results::{
     AnalysisJournal, COMPARE_JOURNAL, Claim, FitJournal, Heading, MANIFEST, OutputFolder, RESULT,
-    STUDY_JOURNAL,
+    RequestedFiles, STUDY_JOURNAL,
 };
 use kmcfit_core::internals::solvers::Status;
 use std::path::{Path, PathBuf};
@@ -316,7 +316,13 @@ impl Compared {
         }
         model.settings.interrupt = Some(Arc::clone(&self.flag));
         let progress = Progress::new(&model.settings.stopping).named(name);
-        match fit_into(folder, &model, &progress, true, journal) {
+        match fit_into(
+            folder,
+            &model,
+            &progress,
+            RequestedFiles::figures(),
+            journal,
+        ) {
             Ok((_, status)) => {
                 self.interrupted |= status == Status::Interrupted;
                 match ComparedRun::read(name, folder.path()) {
@@ -364,7 +370,7 @@ fn entry(path: &Path, name: &str) -> Result<ComparisonEntry, InputError> {
     }
     let file = ModelFile::read(path)?;
     let model = build(&file, BuildMode::Fit)?;
-    let heading = Heading::of_model("fit", &file, true, None);
+    let heading = Heading::of_model("fit", &file, RequestedFiles::figures(), None);
     Ok(ComparisonEntry::Model(Box::new(ToFit {
         file,
         model,

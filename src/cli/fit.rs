@@ -9,12 +9,12 @@ use crate::error::InputError;
 use crate::fitting::fit_model;
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
-    FittedModel, OverheadTimings, RunAssessment, TimingsSummary, charts, fit_claim, json, predict,
-    summary,
+    DRAWS, FittedModel, OverheadTimings, RunAssessment, TimingsSummary, charts, fit_claim, json,
+    predict, summary,
 };
-use crate::results::{FitJournal, Heading, OutputFolder, RESULT};
+use crate::results::{FitJournal, Heading, OutputFolder, RESULT, RequestedFiles};
 use console::Term;
-use kmcfit_core::internals::assessment::VerdictLevel;
+use kmcfit_core::internals::assessment::{NoDraws, VerdictLevel};
 use kmcfit_core::internals::simulate::SimulationError;
 use kmcfit_core::internals::solvers::{
     CheckpointStore, Fit, IterationEvent, IterationRecord, Observer, Status, WeightPath,
@@ -43,6 +43,12 @@ pub struct Arguments {
     /// Write no figures and no report.
     #[arg(long)]
     no_report: bool,
+    /// Write a row for every node into the tables over time.
+    #[arg(long)]
+    tables: bool,
+    /// Write so many draws from the distribution of the estimates to draws.csv.
+    #[arg(long, value_name = "NUMBER")]
+    draws: Option<usize>,
     /// Print the computing times.
     #[arg(long)]
     timings: bool,
@@ -63,6 +69,8 @@ pub struct Arguments {
 /// Exit codes of the verdicts with `--strict`.
 const CHECK: u8 = 4;
 const INADEQUATE: u8 = 5;
+/// Most draws: a table of some hundred megabytes.
+const MOST_DRAWS: usize = 1_000_000;
 /// Width of a chart without a terminal, columns.
 const PIPED: usize = 80;
 
@@ -83,6 +91,18 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
             .expected("seconds, 0 or greater (0: after every iteration)")
             .into());
     }
+    let draws = arguments.draws;
+    if let Some(number) = draws.filter(|number| !(1..=MOST_DRAWS).contains(number)) {
+        return Err(InputError::argument("--draws", "invalid number of draws")
+            .found(number)
+            .expected(format!("1 to {MOST_DRAWS}"))
+            .into());
+    }
+    let requested = RequestedFiles {
+        figures: !arguments.no_report,
+        tables: arguments.tables,
+        draws: draws.unwrap_or(0),
+    };
     let file = arguments.set.read(&arguments.model)?;
     let own = || Path::new("runs").join(stem(&arguments.model));
     let printed = Printed {
@@ -92,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         verbose: arguments.verbose,
         strict: arguments.strict,
     };
-    let heading = Heading::of_model("fit", &file, !arguments.no_report, arguments.checkpoint);
+    let heading = Heading::of_model("fit", &file, requested, arguments.checkpoint);
     let out = arguments.out.clone().unwrap_or_else(own);
     fit(&file, &heading, &out, &printed, false)
 }
@@ -105,7 +125,7 @@ pub(super) fn resume(
 ) -> Result<u8, CommandError> {
     let path = heading.inputs.first().cloned().unwrap_or_default();
     let file = ModelFile::read_with_overrides(path, &Override::parse_all(&heading.overrides)?)?;
-    let now = Heading::of_model("fit", &file, heading.figures, heading.checkpoint);
+    let now = Heading::of_model("fit", &file, heading.requested, heading.checkpoint);
     fit(&file, &now, place, printed, true)
 }
 
@@ -125,7 +145,7 @@ fn fit(
     let journal = open_journal(&folder, heading, is_resumed)?;
     announce(&model);
     let progress = Progress::new(&model.settings.stopping);
-    let (document, status) = fit_into(&folder, &model, &progress, heading.figures, journal)?;
+    let (document, status) = fit_into(&folder, &model, &progress, heading.requested, journal)?;
     print_results(&document, folder.path(), printed);
     if status == Status::Interrupted {
         interrupt::say_resumable(folder.path(), "fit");
@@ -203,7 +223,7 @@ pub(super) fn fit_into(
     folder: &OutputFolder,
     model: &Model,
     progress: &Progress,
-    with_figures: bool,
+    requested: RequestedFiles,
     mut journal: FitJournal,
 ) -> Result<(ResultDocument, Status), CommandError> {
     let clock = Instant::now();
@@ -238,12 +258,17 @@ pub(super) fn fit_into(
         fit: &found,
         predictions: &predictions,
         weights: path.as_ref(),
+        requested,
     };
     let mut document = run.document();
+    let draws = run.draws();
     let mut stage = folder.stage().map_err(full)?;
-    let writing = run
-        .write(&mut stage, &document, with_figures)
-        .map_err(full)?;
+    let writing = run.write(&mut stage, &document).map_err(full)?;
+    match draws {
+        Some(Ok(table)) => stage.write(DRAWS, &table.to_csv()).map_err(full)?,
+        Some(Err(reason)) => say("warning", no_draws(reason)),
+        None => {}
+    }
     let before = &model.preparation;
     let overhead = OverheadTimings {
         io: before.reading + writing,
@@ -260,6 +285,15 @@ pub(super) fn fit_into(
         FitJournal::clear(folder.path()).map_err(full)?;
     }
     Ok((document, status))
+}
+
+/// The reason for a run without draws.
+fn no_draws(reason: NoDraws) -> String {
+    match reason {
+        NoDraws::NoCovariance => "no draws: the estimates have no covariance",
+        NoDraws::Constraints => "no draws: fewer than one in a thousand satisfies the constraints",
+    }
+    .to_owned()
 }
 
 /// Runs the fit. Also returns the model as fitted, with the path of weights if a rule chose one; no model without a response.

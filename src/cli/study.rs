@@ -15,7 +15,7 @@ use crate::report::study::{
 use crate::report::{Run, json};
 use crate::results::{
     AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, RESULT,
-    STUDY_JOURNAL,
+    RequestedFiles, STUDY_JOURNAL,
 };
 use crate::text_io::quote;
 use kmcfit_core::internals::objective::Evaluation;
@@ -127,7 +127,7 @@ fn run_in(
     announce(&model);
     let flag = interrupt::flag();
     model.settings.interrupt = Some(Arc::clone(&flag));
-    let heading = Heading::of_model("study", file, true, None);
+    let heading = Heading::of_model("study", file, RequestedFiles::figures(), None);
     let claim = StudyDocument::claim()
         .journals(&[STUDY_JOURNAL, FIT_JOURNAL, CHECKPOINT])
         .inputs(inputs(file));
@@ -147,7 +147,7 @@ fn run_in(
     let mut work = StudyRun {
         model: Arc::new(model),
         folder: folder.path(),
-        heading: Heading::of_model("study", file, false, None),
+        heading: Heading::of_model("study", file, RequestedFiles::default(), None),
         is_resumed,
         journal,
         flag,

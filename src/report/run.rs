@@ -12,9 +12,10 @@ use super::fit_quality;
 use super::page::fit_page;
 use super::render;
 use super::suggestions::suggestions;
+use super::tables::{FUNCTION_ROWS, TRAJECTORY_ROWS};
 use super::timings::{OverheadTimings, TimingsSummary};
 use crate::config::{ChannelNote, Model};
-use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, Stage};
+use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, RequestedFiles, Stage};
 use kmcfit_core::internals::functions::{CoefficientFunction, WeightRule};
 use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::solvers::{
@@ -24,6 +25,8 @@ use kmcfit_core::internals::system::{Excitation, Term};
 use std::io;
 use std::time::Duration;
 
+/// Draws from the distribution of the estimates.
+pub const DRAWS: &str = "draws.csv";
 /// Most parameters of `parameters.json`: the values of more stand in `functions.csv`.
 const MOST_PARAMETERS: usize = 10_000;
 
@@ -40,6 +43,8 @@ pub struct FittedModel<'a> {
     pub weights: Option<&'a WeightPath>,
     /// Assessment of the fit.
     pub run_assessment: &'a RunAssessment,
+    /// Files that are written on request.
+    pub requested: RequestedFiles,
 }
 
 impl FittedModel<'_> {
@@ -48,12 +53,7 @@ impl FittedModel<'_> {
     ///
     /// # Errors
     /// Errors of the file system.
-    pub fn write(
-        &self,
-        stage: &mut Stage,
-        document: &ResultDocument,
-        with_figures: bool,
-    ) -> io::Result<Duration> {
+    pub fn write(&self, stage: &mut Stage, document: &ResultDocument) -> io::Result<Duration> {
         let mut writing = Duration::ZERO;
         let mut write = |name: &str, text: &str| timed(&mut writing, || stage.write(name, text));
         if self.model.problem.parameters() <= MOST_PARAMETERS {
@@ -65,7 +65,7 @@ impl FittedModel<'_> {
         for (name, table) in self.samples() {
             write(&name, &table.to_csv())?;
         }
-        if with_figures {
+        if self.requested.figures {
             for figure in self.figures() {
                 write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
             }
@@ -167,7 +167,8 @@ impl FittedModel<'_> {
             file: self.model.file.display().to_string(),
             overrides: self.model.source.overrides.clone(),
             nodes: grid.nodes(),
-            steps_per_row: self.steps_per_row(),
+            steps_per_row: self.steps_per_row(FUNCTION_ROWS),
+            steps_per_trajectory_row: self.steps_per_row(TRAJECTORY_ROWS),
             start: grid.start(),
             duration: grid.duration(),
             step: grid.step(),
@@ -379,6 +380,7 @@ pub fn fit_claim(model: &Model) -> Claim {
             "history.csv",
             "functions.csv",
             "trajectory.csv",
+            DRAWS,
             "report.html",
         ])
         .family("channels", "csv", samples.chain(["validation".to_owned()]))

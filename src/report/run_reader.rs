@@ -1,5 +1,6 @@
 //! Reading of a finished run from its output folder.
 
+use super::columns::{interval_columns, named_column};
 use super::document::{FORMAT, ResultDocument};
 use super::result_table::ResultTable;
 use crate::error::InputError;
@@ -55,7 +56,7 @@ pub struct Run {
     pub history: Vec<IterationRecord>,
     /// `functions.csv`: one row per node, on long grids per several steps; NaN for an empty field.
     pub functions: ResultTable,
-    /// `trajectory.csv`: rows as in `functions.csv`; NaN beyond the end of a record or without a sample.
+    /// `trajectory.csv`: one row per node, on long grids per several steps; NaN beyond the end of a record or without a sample.
     pub trajectory: ResultTable,
 }
 
@@ -78,13 +79,13 @@ impl Run {
         let nodes = system.grid.nodes();
         memory::check_file(&folder.join("result.json"), nodes as u64 * PER_NODE)?;
         let steps = document.model.steps_per_row.clamp(1, nodes);
-        let rows = (nodes - 1).div_ceil(steps) + 1;
-        let what = match steps {
-            1 => "node".to_owned(),
-            _ => format!("{steps} steps"),
-        };
+        let (rows, what) = rows_of(nodes, steps);
         let functions = ResultTable::read_rows(&folder.join("functions.csv"), rows, &what)?;
-        let trajectory = ResultTable::read_rows(&folder.join("trajectory.csv"), rows, &what)?;
+        let steps_of_trajectory = document.model.steps_per_trajectory_row.clamp(1, nodes);
+        let trajectory = {
+            let (rows, what) = rows_of(nodes, steps_of_trajectory);
+            ResultTable::read_rows(&folder.join("trajectory.csv"), rows, &what)?
+        };
         let has_truth = functions.headers().iter().any(|h| h.starts_with("true_"));
         Ok(Self {
             folder: folder.to_path_buf(),
@@ -104,14 +105,23 @@ impl Run {
     /// Lower and upper end of the 95 % band of a function or ratio at the nodes, by its name (`mass`, `k/m`, `damping
     /// of shaker`), in its unit; `None` if there is none.
     pub fn band(&self, name: &str) -> Option<[Vec<f64>; 2]> {
-        let name = name.replace([' ', '/', ','], "_");
+        let column = named_column(name, self.document.is_rotation())?;
         let (nodes, steps) = (self.system.grid.nodes(), self.document.model.steps_per_row);
-        let end = |side: &str| {
-            let rows = self.functions.column(&format!("{name}_{side}_95"))?;
+        let [low, high] = interval_columns(&column).map(|header| {
+            let rows = self.functions.column(&header)?;
             Some(at_nodes(rows, nodes, steps))
-        };
-        Some([end("low")?, end("high")?])
+        });
+        Some([low?, high?])
     }
+}
+
+/// Number of rows of a table with a row for each so many steps, and the distance of its rows in words.
+fn rows_of(nodes: usize, steps: usize) -> (usize, String) {
+    let what = match steps {
+        1 => "node".to_owned(),
+        _ => format!("{steps} steps"),
+    };
+    ((nodes - 1).div_ceil(steps) + 1, what)
 }
 
 fn system(

@@ -1,31 +1,69 @@
 //! The tables of a fit.
 
 use super::FittedModel;
+use super::columns::{
+    function_column, interval_columns, named_column, parameter_column, quantity_column,
+};
 use super::csv::CsvTable;
-use kmcfit_core::internals::functions::{CoefficientKind, Ratios};
+use kmcfit_core::internals::assessment::{NoDraws, draws};
+use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 use kmcfit_core::internals::solvers::IterationRecord;
 
-/// Most rows of the tables over time where a curve through them has the values in between: what spreadsheets open at once.
-const MOST_ROWS: usize = 50_000;
+/// Most rows of the functions where a curve through them has the values in between.
+pub(super) const FUNCTION_ROWS: usize = 4000;
+/// Most rows of the trajectories: what spreadsheets open at once.
+pub(super) const TRAJECTORY_ROWS: usize = 50_000;
+/// Seed of the draws.
+const DRAWS_SEED: u64 = 1;
 
 impl FittedModel<'_> {
-    /// Steps between the rows of the tables over time: 1, unless the functions have few parameters on more than [`MOST_ROWS`] nodes.
-    pub(super) fn steps_per_row(&self) -> usize {
+    /// Steps between the rows of a table of at most so many rows: 1 where all rows are requested or the functions have many parameters.
+    pub(super) fn steps_per_row(&self, most: usize) -> usize {
         let problem = &self.model.problem;
         let few = problem.functions.parameters() <= FEW_PARAMETERS;
-        match (problem.system.grid.nodes() - 1).div_ceil(MOST_ROWS) {
-            steps if few => steps,
+        match (problem.system.grid.nodes() - 1).div_ceil(most) {
+            steps if few && !self.requested.tables => steps,
             _ => 1,
         }
     }
 
-    /// The values of every node with a row in the tables over time: one in so many steps, and the last one.
-    fn rows(&self, values: &[f64]) -> Vec<f64> {
-        let steps = self.steps_per_row();
+    /// The values of every node with a row in a table of at most so many rows: one in so many steps, and the last one.
+    fn rows(&self, values: &[f64], most: usize) -> Vec<f64> {
+        let steps = self.steps_per_row(most);
         let last = values.len() - 1;
         let nodes = (0..last).step_by(steps).chain([last]);
         nodes.map(|node| values[node]).collect()
+    }
+
+    /// Draws from the distribution of the estimates, one row each: estimates, then initial states and sensor parameters; `None` where
+    /// none are requested.
+    pub fn draws(&self) -> Option<Result<CsvTable, NoDraws>> {
+        let number = Some(self.requested.draws).filter(|number| *number > 0)?;
+        Some(self.draws_table(number))
+    }
+
+    fn draws_table(&self, number: usize) -> Result<CsvTable, NoDraws> {
+        let problem = &self.model.problem;
+        let bands = self.bands().ok_or(NoDraws::NoCovariance)?;
+        let draws = draws(problem, self.fit, bands, number, DRAWS_SEED)?;
+        let numbers = (0..number).map(|i| i as f64).collect();
+        let mut table = CsvTable::new()
+            .column("chain", vec![0.0; number])
+            .column("draw", numbers);
+        for (i, (name, estimate)) in self.estimates().0.into_iter().enumerate() {
+            let column = named_column(&name, self.is_rotation());
+            let column = column.unwrap_or_else(|| parameter_column(&name, &estimate.unit));
+            let values = draws.iter().map(|draw| draw.estimates[i].1.value).collect();
+            table = table.column(column, values);
+        }
+        let scalars = problem.functions.scalars().iter();
+        for (scalar, j) in scalars.zip(problem.functions.scalar_range()) {
+            let column = parameter_column(&scalar.name, &scalar.unit);
+            let values = draws.iter().map(|draw| draw.parameters[j]).collect();
+            table = table.column(column, values);
+        }
+        Ok(table)
     }
 
     pub(super) fn history(&self) -> CsvTable {
@@ -42,52 +80,37 @@ impl FittedModel<'_> {
             .column("relative_change", column(|r| r.relative_change))
     }
 
-    /// Column header of a quantity.
-    fn column(&self, quantity: CoefficientKind) -> &'static str {
-        match self.is_rotation() {
-            true => quantity.angular_column(),
-            false => quantity.column(),
-        }
-    }
-
     pub(super) fn functions_table(&self) -> CsvTable {
+        let is_rotation = self.is_rotation();
+        let rows = |values: &[f64]| self.rows(values, FUNCTION_ROWS);
         let coefficients = &self.fit.best.evaluation.nodal;
-        let times = self.rows(&self.model.problem.system.grid.times());
+        let times = rows(&self.model.problem.system.grid.times());
         let mut table = CsvTable::new().column("t_s", times.clone());
         for (function, values) in self.named_functions() {
-            let column = self.column(function.quantity);
-            let column = match function.is_known_part {
-                true => format!("known_part_of_{column}"),
-                false => column.to_owned(),
-            };
-            let name = match &function.owner {
-                None => column,
-                // A comma would end the header.
-                Some(owner) => format!("{column} of {}", owner.replace([',', '"', '\n'], " ")),
-            };
-            table = table.column(name, self.rows(&values));
+            table = table.column(function_column(function, is_rotation), rows(&values));
         }
         let ratios = Ratios::of(coefficients);
         table = table
-            .column("k_over_m_per_s2", self.rows(&ratios.k_over_m))
-            .column("c_over_m_per_s", self.rows(&ratios.c_over_m))
-            .column("natural_frequency_Hz", self.rows(&ratios.frequency))
-            .column("damping_ratio", self.rows(&ratios.damping_ratio));
+            .column("k_over_m_per_s2", rows(&ratios.k_over_m))
+            .column("c_over_m_per_s", rows(&ratios.c_over_m))
+            .column("natural_frequency_Hz", rows(&ratios.frequency))
+            .column("damping_ratio", rows(&ratios.damping_ratio));
         if let Some(bands) = self.bands() {
             for list in [&bands.functions, &bands.ratios] {
                 for (band, [low, high]) in list.iter().zip(bands.curves(list, &times)) {
-                    let name = band.name.replace([' ', '/', ','], "_");
-                    table = table
-                        .column(format!("{name}_low_95"), low)
-                        .column(format!("{name}_high_95"), high);
+                    let Some(column) = named_column(&band.name, is_rotation) else {
+                        continue;
+                    };
+                    let [of_low, of_high] = interval_columns(&column);
+                    table = table.column(of_low, low).column(of_high, high);
                 }
             }
         }
         if let Some(truth) = &self.model.truth {
             let functions = self.model.problem.functions.iter();
             for (function, values) in functions.zip(truth.functions()) {
-                let name = format!("true_{}", self.column(function.quantity));
-                table = table.column(name, self.rows(values));
+                let name = format!("true_{}", quantity_column(function.quantity, is_rotation));
+                table = table.column(name, rows(values));
             }
         }
         table
@@ -95,7 +118,8 @@ impl FittedModel<'_> {
 
     pub(super) fn trajectories(&self) -> CsvTable {
         let problem = &self.model.problem;
-        let mut table = CsvTable::new().column("t_s", self.rows(&problem.system.grid.times()));
+        let rows = |values: &[f64]| self.rows(values, TRAJECTORY_ROWS);
+        let mut table = CsvTable::new().column("t_s", rows(&problem.system.grid.times()));
         let several = problem.experiments.len() > 1;
         let [y, v, observed_y] = match self.is_rotation() {
             true => ["y_rad", "v_rad_per_s", "observed_y_rad"],
@@ -114,7 +138,7 @@ impl FittedModel<'_> {
             let full = |values: &[f64]| {
                 let mut values = values.to_vec();
                 values.resize(problem.system.grid.nodes(), f64::NAN);
-                self.rows(&values)
+                rows(&values)
             };
             table = table
                 .column(name(y), full(&response.displacement))
@@ -126,7 +150,7 @@ impl FittedModel<'_> {
                 for (i, value) in channel.observed().iter().enumerate() {
                     observed[i * stride] = *value;
                 }
-                table = table.column(name(observed_y), self.rows(&observed));
+                table = table.column(name(observed_y), rows(&observed));
             }
         }
         table

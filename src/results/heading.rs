@@ -24,12 +24,36 @@ pub struct Heading {
     /// Overrides (`--set`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub overrides: Vec<String>,
-    /// True if figures are drawn.
-    pub figures: bool,
+    /// Files that are written on request.
+    #[serde(flatten)]
+    pub requested: RequestedFiles,
     /// Least time between two checkpoints, s, if given.
     pub checkpoint: Option<f64>,
     /// The inputs and the files that they read.
     pub sources: Vec<SourceFile>,
+}
+
+/// Files of a fit that are written on request.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RequestedFiles {
+    /// Figures and the page.
+    pub figures: bool,
+    /// One row per node in the tables over time.
+    #[serde(default)]
+    pub tables: bool,
+    /// Number of draws in `draws.csv`; 0 for none.
+    #[serde(default)]
+    pub draws: usize,
+}
+
+impl RequestedFiles {
+    /// Figures and the page only.
+    pub fn figures() -> Self {
+        Self {
+            figures: true,
+            ..Self::default()
+        }
+    }
 }
 
 /// A file on which the results depend.
@@ -50,7 +74,7 @@ impl Heading {
             command: command.into(),
             inputs,
             overrides: Vec::new(),
-            figures: true,
+            requested: RequestedFiles::figures(),
             checkpoint: None,
             sources: Vec::new(),
         }
@@ -60,12 +84,12 @@ impl Heading {
     pub fn of_model(
         command: &str,
         file: &ModelFile,
-        figures: bool,
+        requested: RequestedFiles,
         checkpoint: Option<f64>,
     ) -> Self {
         let mut heading = Self::new(command, vec![file.path.clone()]).with_model(file);
         heading.overrides = file.override_texts();
-        heading.figures = figures;
+        heading.requested = requested;
         heading.checkpoint = checkpoint;
         heading
     }

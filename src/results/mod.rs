@@ -21,7 +21,7 @@ pub use atomic::{write_together, write_whole};
 pub use claim::{Claim, RESULT};
 pub use exchange::{Stage, complete};
 pub use fit_journal::FitJournal;
-pub use heading::{Heading, SourceFile};
+pub use heading::{Heading, RequestedFiles, SourceFile};
 #[doc(hidden)]
 pub use journal::with_checksums;
 pub use journal::{CHECKPOINT, COMPARE_JOURNAL, FIT_JOURNAL, STUDY_JOURNAL};

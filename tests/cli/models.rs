@@ -228,7 +228,7 @@ fn left_behind(bench: &Workbench, run: &str) {
                     c_over_m_per_s,natural_frequency_Hz,damping_ratio,\
                     true_mass_kg,true_damping_N_s_per_m,true_stiffness_N_per_m";
     // With few parameters: lower and upper end of the band of each function and ratio.
-    let is_band = |name: &&String| name.ends_with("_low_95") || name.ends_with("_high_95");
+    let is_band = |name: &&String| name.ends_with("_lo95") || name.ends_with("_hi95");
     let bands = names.iter().filter(is_band).count();
     let few = result["model"]["parameters"]
         .as_u64()
@@ -583,4 +583,86 @@ fn two_records_and_a_force() {
     let (bench, _) = fitted("paper-forced", 0);
     let off = largest(&bench, "paper-forced", "mass_kg", &|t| t[0]);
     assert!(off < 5e-3, "{off}");
+}
+
+/// The quantiles of draws are the ends of the intervals: with 4000 draws the error of a quantile of 2.5 % is 4 % of the half-width, of which the
+/// tolerance is three.
+#[test]
+fn quantiles_of_draws_are_the_intervals() {
+    let bench = Workbench::with_shipped_models();
+    for (model, columns) in [
+        (
+            "roll-decay",
+            [
+                ("natural_frequency", "natural_frequency_Hz"),
+                ("quadratic_damping", "quadratic_damping_N_m_s2_per_rad2"),
+            ],
+        ),
+        (
+            "accelerometer",
+            [
+                ("damping_ratio", "damping_ratio"),
+                ("stiffness", "stiffness_N_per_m"),
+            ],
+        ),
+    ] {
+        let path = format!("models/{model}.yaml");
+        let line = [
+            "fit",
+            &path,
+            "--no-report",
+            "--draws",
+            "4000",
+            "--out",
+            model,
+        ];
+        bench.run_to(0, &line);
+        let result: Value =
+            serde_json::from_str(&bench.read(&format!("{model}/result.json"))).expect("JSON");
+        let draws = bench.read(&format!("{model}/draws.csv"));
+        assert_eq!(column(&draws, "draw").last(), Some(&3999.0));
+        for (name, header) in columns {
+            let interval = &result["estimates"][name]["ci95"];
+            let ends: [f64; 2] = [0, 1].map(|i| interval[i].as_f64().expect("an end"));
+            let mut values = column(&draws, header);
+            values.sort_by(f64::total_cmp);
+            let half = 0.5 * (ends[1] - ends[0]);
+            for (end, place) in ends.into_iter().zip([99, 3900]) {
+                let off = (values[place] - end).abs() / half;
+                assert!(
+                    off < 0.12,
+                    "{model} {name}: {} {end} ({off})",
+                    values[place]
+                );
+            }
+        }
+    }
+    let (code, _, stderr) = bench.run(&["fit", "models/spline.yaml", "--draws", "0"]);
+    assert_eq!(code, 2);
+    insta::assert_snapshot!(stderr, @"
+    error: --draws: invalid number of draws
+      found: 0
+      expected: 1 to 1000000
+    ");
+}
+
+/// A long grid has one row in so many steps, and with `--tables` one for every node.
+#[test]
+fn tables_of_long_grids_are_complete_on_request() {
+    let bench = Workbench::with_shipped_models();
+    let line = [
+        "fit",
+        "models/accelerometer.yaml",
+        "--no-report",
+        "--set",
+        "grid.nodes=9585",
+    ];
+    for (more, rows) in [(None, 3195 + 1), (Some("--tables"), 9585)] {
+        let line: Vec<&str> = line.into_iter().chain(more).collect();
+        bench.run_to(0, &line);
+        let functions = bench.read("runs/accelerometer/functions.csv");
+        assert_eq!(column(&functions, "t_s").len(), rows);
+        let run = kmcfit::Run::open(bench.path("runs/accelerometer")).expect("a run");
+        assert_eq!(run.coefficients.mass.len(), 9585);
+    }
 }

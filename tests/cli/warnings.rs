@@ -508,13 +508,27 @@ fn bands_contain_the_functions_on_many_nodes() {
         "{basis: piecewise-linear, knots: 5, start: 3.8}",
     );
     bench.write("model.yaml", &model);
-    bench.run_to(0, &["fit", "model.yaml", "--no-report", "--out", "out"]);
+    bench.run_to(
+        0,
+        &[
+            "fit",
+            "model.yaml",
+            "--no-report",
+            "--tables",
+            "--out",
+            "out",
+        ],
+    );
     let table = bench.read("out/functions.csv");
     let mut lines = table.lines();
     let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
     let column = |name: &str| header.iter().position(|h| *h == name).expect(name);
-    let [value, low, high] =
-        ["stiffness_N_per_m", "stiffness_low_95", "stiffness_high_95"].map(column);
+    let [value, low, high] = [
+        "stiffness_N_per_m",
+        "stiffness_N_per_m_lo95",
+        "stiffness_N_per_m_hi95",
+    ]
+    .map(column);
     let mut rows = 0;
     for line in lines {
         let numbers: Vec<f64> = line.split(',').map(|x| x.parse().expect(line)).collect();

@@ -147,12 +147,13 @@ fn finish(workshop: &Workshop) {
         predictions: &[],
         weights: None,
         run_assessment: &run_assessment,
+        requested: heading.requested,
     };
     let folder = OutputFolder::prepare(&workshop.path("run"), fit_claim(model)).expect("a folder");
     let mut stage = folder.stage().expect("room");
     let document = finished.document();
     finished
-        .write(&mut stage, &document, false)
+        .write(&mut stage, &document)
         .expect("a run is written");
     stage.write(RESULT, &json(&document)).expect("room");
     stage.commit().expect("a run");

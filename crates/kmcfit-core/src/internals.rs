@@ -3,11 +3,11 @@
 
 pub mod assessment {
     pub use crate::assessment::{
-        BEYOND_SIGMA, BasisTest, CoarseBasis, EXACT, EquationErrorIntervals, Estimate,
+        BEYOND_SIGMA, BasisTest, CoarseBasis, Draw, EXACT, EquationErrorIntervals, Estimate,
         EstimateErrors, EstimateStatus, FitAssessment, FitStatistics, FitWarning, FunctionInGap,
-        FunctionSummary, GapAssessment, GapStatus, NoIntervals, POOR, Plausibility,
+        FunctionSummary, GapAssessment, GapStatus, NoDraws, NoIntervals, POOR, Plausibility,
         RECOVERY_TOLERANCE, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
-        VerdictLevel, VerdictReason, constant_probability, diagnostics, estimates,
+        VerdictLevel, VerdictReason, constant_probability, diagnostics, draws, estimates,
         function_summaries, is_same_truth, outliers, pattern, standard_error, verdict_level,
         verdict_reasons,
     };

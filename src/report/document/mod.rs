@@ -120,9 +120,12 @@ pub struct ModelSummary {
     pub overrides: Vec<String>,
     /// Number of nodes.
     pub nodes: usize,
-    /// Steps between the rows of `functions.csv` and `trajectory.csv`: 1, more on long grids.
+    /// Steps between the rows of `functions.csv`: 1, more on long grids.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub steps_per_row: usize,
+    /// Steps between the rows of `trajectory.csv`: 1, more on long grids.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub steps_per_trajectory_row: usize,
     /// First time, s.
     pub start: f64,
     /// Length of the record, s.

@@ -4,6 +4,7 @@ use crate::functions::{CoefficientFunction, Ratios};
 use crate::identifiability::{Band, Bands, ScaleSource, scale_source};
 use crate::problem::Problem;
 use crate::solvers::{Fit, number_or_nan};
+use crate::system::NodalCoefficients;
 use crate::system::quadrature::trapezoid_weights;
 use serde::{Deserialize, Serialize};
 
@@ -78,11 +79,22 @@ const RATIOS: [RatioName; 4] = [
 /// damping ratio `c/(2 sqrt(k m))`, then the functions, then `k/m` and `c/m`; the ratios before the functions where the samples determine ratios
 /// only.
 pub fn estimates(problem: &Problem, fit: &Fit, bands: Option<&Bands>) -> Vec<(String, Estimate)> {
+    let best = &fit.best;
+    estimates_at(problem, &best.parameters, &best.evaluation.nodal, bands)
+}
+
+/// [`estimates`] with the parameters `theta` and the coefficients of the shared set.
+pub(super) fn estimates_at(
+    problem: &Problem,
+    theta: &[f64],
+    nodal: &NodalCoefficients,
+    bands: Option<&Bands>,
+) -> Vec<(String, Estimate)> {
     let is_scaled = matches!(
         scale_source(problem),
         ScaleSource::Fixed(_) | ScaleSource::Model
     );
-    let values = problem.functions.values(&fit.best.parameters);
+    let values = problem.functions.values(theta);
     let functions = problem.functions.iter().zip(&values).enumerate();
     let functions = functions.map(|(f, (function, values))| {
         let band = bands.map(|bands| &bands.functions[f]);
@@ -95,7 +107,7 @@ pub fn estimates(problem: &Problem, fit: &Fit, bands: Option<&Bands>) -> Vec<(St
         (function.name(), estimate(values, band, unit, status))
     });
     let functions: Vec<_> = functions.collect();
-    let nodal = Ratios::of(&fit.best.evaluation.nodal);
+    let nodal = Ratios::of(nodal);
     let curves = [
         nodal.frequency,
         nodal.damping_ratio,

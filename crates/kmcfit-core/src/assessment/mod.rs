@@ -2,6 +2,7 @@
 
 mod channel;
 mod constants;
+mod draws;
 mod equation_error;
 mod estimates;
 mod friction_width;
@@ -20,6 +21,7 @@ mod verdict;
 pub use crate::objective::{diagnostics, outliers};
 pub use channel::{ResidualPattern, pattern};
 pub use constants::{constant_probability, standard_error};
+pub use draws::{Draw, NoDraws, draws};
 pub use equation_error::{EquationErrorIntervals, NoIntervals};
 pub use estimates::{Estimate, EstimateStatus, estimates};
 pub use function::{EstimateErrors, FunctionSummary, function_summaries};

@@ -200,12 +200,12 @@ fn fit_part(
     short.stopping.iterations = settings.stopping.iterations.min(ITERATIONS);
     short.stopping.tolerance = Some(TOLERANCE);
     (short.stopping.cost_ratio, short.stopping.gradient_ratio) = (None, None);
-    let mut search_part = |steps, from: &[f64]| {
+    let mut search_part = |steps| {
         let part = first_steps(problem, steps)?;
-        let found = watch.unreported(|watch| search(&part, from, &short, None, watch));
+        let found = watch.unreported(|watch| search(&part, start, &short, None, watch));
         found.ok()
     };
-    let mut fit = search_part(steps, start)?;
+    let mut fit = search_part(steps)?;
     let mut evaluating = Duration::ZERO;
     let mut length = steps;
     loop {
@@ -215,10 +215,7 @@ fn fit_part(
         let evaluation = is_moved.then(evaluate).flatten();
         length *= LONGER;
         let is_last = !is_moved || evaluation.is_some() || length >= problem.system.grid.nodes();
-        match (!is_last)
-            .then(|| search_part(length, &parameters))
-            .flatten()
-        {
+        match (!is_last).then(|| search_part(length)).flatten() {
             Some(longer) => fit = longer.with_work_of(fit.counts, fit.timings, fit.elapsed),
             None => {
                 let better = is_moved.then_some(Prepared {

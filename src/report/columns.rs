@@ -1,0 +1,107 @@
+//! Column headers of functions, ratios and parameters in the tables of a run: name and unit, and `_lo95` and `_hi95` for the ends of a
+//! 95 % interval.
+
+use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind};
+
+/// Headers of the lower and the upper end of the 95 % interval of a column.
+pub(super) fn interval_columns(column: &str) -> [String; 2] {
+    ["lo95", "hi95"].map(|end| format!("{column}_{end}"))
+}
+
+/// Header of a quantity.
+pub(super) fn quantity_column(quantity: CoefficientKind, is_rotation: bool) -> &'static str {
+    match is_rotation {
+        true => quantity.angular_column(),
+        false => quantity.column(),
+    }
+}
+
+/// Header of a function; that of an experiment's own has its name.
+pub(super) fn function_column(function: &CoefficientFunction, is_rotation: bool) -> String {
+    let column = quantity_column(function.quantity, is_rotation);
+    let owner = function.owner.as_deref();
+    column_of_part(column, function.is_known_part, owner)
+}
+
+fn column_of_part(column: &str, is_known_part: bool, owner: Option<&str>) -> String {
+    let part = if is_known_part { "known_part_of_" } else { "" };
+    match owner {
+        None => format!("{part}{column}"),
+        // A comma would end the header.
+        Some(owner) => format!("{part}{column} of {}", owner.replace([',', '"', '\n'], " ")),
+    }
+}
+
+/// Header of a ratio by the name of its estimate or of its band; `None` for other names.
+pub(super) fn ratio_column(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "k/m" | "k_over_m" => "k_over_m_per_s2",
+        "c/m" | "c_over_m" => "c_over_m_per_s",
+        "natural frequency" | "natural_frequency" => "natural_frequency_Hz",
+        "damping ratio" | "damping_ratio" => "damping_ratio",
+        _ => return None,
+    })
+}
+
+/// Header of a function or ratio by its name in reports: `mass`, `k/m`, `damping of shaker`; `None` for other names.
+pub(super) fn named_column(name: &str, is_rotation: bool) -> Option<String> {
+    if let Some(column) = ratio_column(name) {
+        return Some(column.to_owned());
+    }
+    let part = name.strip_prefix("known part of ");
+    let whole = part.unwrap_or(name);
+    let (kind, owner) = match whole.split_once(" of ") {
+        Some((kind, owner)) => (kind, Some(owner)),
+        None => (whole, None),
+    };
+    let quantity = CoefficientKind::ALL
+        .into_iter()
+        .find(|q| q.name() == kind)?;
+    let column = quantity_column(quantity, is_rotation);
+    Some(column_of_part(column, part.is_some(), owner))
+}
+
+/// Header of a parameter by its name and unit: `initial_velocity_of_hammer_m_per_s`.
+pub(super) fn parameter_column(name: &str, unit: &str) -> String {
+    let unit = unit.replace('^', "").replace('/', " per ");
+    let words = format!("{name} {}", if unit == "1" { "" } else { &unit });
+    let words = words.split(|c: char| c.is_whitespace() || matches!(c, ',' | '"'));
+    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
+    words.join("_")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_functions_have_the_columns_of_the_functions() {
+        for (quantity, column) in [
+            (CoefficientKind::Mass, "mass_kg"),
+            (CoefficientKind::CubicStiffness, "cubic_stiffness_N_per_m3"),
+        ] {
+            let function = CoefficientFunction::fixed(quantity, vec![1.0]);
+            assert_eq!(function_column(&function, false), column);
+            let owned = CoefficientFunction {
+                owner: Some("block, A".into()),
+                is_known_part: true,
+                ..function
+            };
+            let header = function_column(&owned, false);
+            assert_eq!(header, format!("known_part_of_{column} of block  A"));
+            assert_eq!(named_column(&owned.name(), false), Some(header));
+        }
+        assert_eq!(
+            named_column("damping ratio", true).as_deref(),
+            Some("damping_ratio")
+        );
+        assert_eq!(named_column("friction", false), None);
+    }
+
+    #[test]
+    fn parameters_have_their_unit_in_the_column() {
+        let column = parameter_column("initial velocity of run 1", "m/s");
+        assert_eq!(column, "initial_velocity_of_run_1_m_per_s");
+        assert_eq!(parameter_column("gain of force", "1"), "gain_of_force");
+    }
+}
