@@ -43,6 +43,7 @@ mod terminal;
 mod text;
 mod timings;
 mod verdict;
+mod verify;
 
 pub use answer::{AnswerRow, answer};
 pub use chart::{Axis, Colour, Dash, Figure, Mark, Panel, Scale, Style, render};
@@ -60,3 +61,4 @@ pub use terminal::charts;
 pub use timings::{OverheadTimings, PartSummary, TimingsSummary};
 #[cfg(test)]
 pub(crate) use verdict::reason_in_words;
+pub use verify::{Check, Difference, Verification};

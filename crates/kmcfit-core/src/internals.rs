@@ -64,8 +64,8 @@ pub mod qp {
 }
 pub mod noise {
     pub use crate::noise::{
-        Correlation, CorrelationLaw, KernelCovariance, automatic_bandwidth, kernel_sum,
-        quadratic_spectral,
+        Autoregression, Correlation, CorrelationLaw, KernelCovariance, automatic_bandwidth,
+        kernel_sum, quadratic_spectral,
     };
 }
 pub mod number_format {
@@ -105,15 +105,15 @@ pub mod solvers {
         choose_weight_watched, cycles, equation_balance, equation_error, equation_rows,
         estimate_states, fit, fit_from, fit_on_reduced_widths, fit_on_refined_grids,
         fit_with_noise, fit_with_noise_watched, missing_terms, no_response, number_or_nan,
-        predict_validation, timed,
+        predict_validation, stored_fit, timed,
     };
 }
 pub mod study {
     pub use crate::study::{
         Choice, EquivalentSystem, Linear, PredictedResponse, PredictionSummary, Profile,
-        ProfileSettings, Target, bootstrap, constancy_test, equivalent_coefficients,
-        equivalent_systems, extremes, multistart, predict, prediction, profile, profile_likelihood,
-        profiles,
+        ProfileSettings, ReferenceValues, Target, bootstrap, constancy_test,
+        equivalent_coefficients, equivalent_systems, extremes, multistart, predict, prediction,
+        profile, profile_likelihood, profiles,
     };
 }
 pub mod system {

@@ -48,6 +48,11 @@ pub fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
     !unpenalised.is_regularised() && !has_active_rows(problem, theta)
 }
 
+/// True if an equality constraint holds the parameters, which the covariance of the estimates takes into account.
+pub(crate) fn has_equality_rows(problem: &Problem, theta: &[f64]) -> bool {
+    (active::active_rows(problem, theta).iter()).any(|row| row.equality)
+}
+
 /// True if some constraint holds with equality at a point.
 pub(crate) fn has_active_rows(problem: &Problem, theta: &[f64]) -> bool {
     !active::active_rows(problem, theta).is_empty()
@@ -72,4 +77,5 @@ pub(crate) use factorisation::Factorisation;
 pub use scale_source::{ScaleSource, scale_source};
 pub use scaling_ambiguity::ScalingAmbiguity;
 pub use sensitivity::{ResolvedDirection, Sensitivity, SingularSpectrum};
+pub(crate) use step_error::step_error;
 pub use structural_rank::{RankFinding, RankFindingKind, ScaleFreedom, structural_rank};

@@ -25,8 +25,10 @@ pub mod prediction;
 pub mod profile_likelihood;
 mod refit;
 mod simulate;
+mod verification;
 
 pub use equivalent_systems::{Choice, EquivalentSystem, equivalent_systems};
 pub use free_response::{PredictedResponse, PredictionSummary, predict};
 pub use functional::{Linear, Target};
 pub use profile_likelihood::{Profile, ProfileSettings, profile, profiles};
+pub use verification::ReferenceValues;
