@@ -56,11 +56,11 @@ pub struct GridSummary {
 /// Basis of a function and the place of its parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FunctionBasis {
-    name: String,
+    pub name: String,
     unit: String,
     /// Name of the basis as in a model file; `fixed` without parameters. A polynomial is a sum of Legendre polynomials on the record mapped to
     /// -1 to 1, a spline has the knots and three further ones at either end.
-    basis: String,
+    pub basis: String,
     /// Times of the knots, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub knots: Option<Vec<f64>>,

@@ -17,6 +17,7 @@ pub mod constancy_test;
 pub mod equivalent_coefficients;
 mod equivalent_systems;
 pub mod extremes;
+mod forced_prediction;
 mod free_response;
 mod functional;
 pub mod multistart;
@@ -28,6 +29,7 @@ mod simulate;
 mod verification;
 
 pub use equivalent_systems::{Choice, EquivalentSystem, equivalent_systems};
+pub use forced_prediction::{IdentifiedSystem, PredictedChannel};
 pub use free_response::{PredictedResponse, PredictionSummary, predict};
 pub use functional::{Linear, Target};
 pub use profile_likelihood::{Profile, ProfileSettings, profile, profiles};
