@@ -208,6 +208,7 @@ pub fn warning(warning: &FitWarning) -> Finding {
             significant(missing.t, 2),
             super::suggestions::percent(100.0 * missing.share, 1),
         ),
+        FitWarning::TimeOrAmplitude(rival) => super::rivals::rival_in_words(rival),
         FitWarning::ResidualMean {
             experiment,
             channel,

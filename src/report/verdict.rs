@@ -2,6 +2,7 @@
 
 use super::document::{Estimates, Verdict};
 use super::fit_assessment::ValidationRecord;
+use super::rivals::rival_in_words;
 use super::run::FittedModel;
 use super::suggestions::percent;
 use crate::finding::Finding;
@@ -117,6 +118,7 @@ pub fn term_in_words(term: CoefficientKind) -> &'static str {
         CoefficientKind::CoulombFriction => "Coulomb friction",
         CoefficientKind::QuadraticDamping => "quadratic damping",
         CoefficientKind::CubicStiffness => "a cubic stiffness",
+        CoefficientKind::QuinticStiffness => "a quintic stiffness",
         other => other.name(),
     }
 }
@@ -144,6 +146,7 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
             "the residuals show {} that the model does not have",
             term_in_words(missing.term)
         ),
+        VerdictReason::TimeOrAmplitude(rival) => rival_in_words(rival),
         VerdictReason::ResidualMean {
             experiment,
             channel,
@@ -222,7 +225,7 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
 }
 
 /// `a, b and c`.
-fn and_list(names: &[String]) -> String {
+pub fn and_list(names: &[String]) -> String {
     match names {
         [] => String::new(),
         [one] => one.clone(),

@@ -3,9 +3,9 @@
 
 pub mod assessment {
     pub use crate::assessment::{
-        BEYOND_SIGMA, BasisTest, CoarseBasis, EXACT, EquationErrorIntervals, Estimate,
-        EstimateErrors, EstimateStatus, FitAssessment, FitStatistics, FitWarning, FunctionInGap,
-        FunctionSummary, GapAssessment, GapStatus, NoIntervals, POOR, Plausibility,
+        AmplitudeRival, BEYOND_SIGMA, BasisTest, CoarseBasis, EXACT, EquationErrorIntervals,
+        Estimate, EstimateErrors, EstimateStatus, FitAssessment, FitStatistics, FitWarning,
+        FunctionInGap, FunctionSummary, GapAssessment, GapStatus, NoIntervals, POOR, Plausibility,
         RECOVERY_TOLERANCE, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
         VerdictLevel, VerdictReason, constant_probability, diagnostics, estimates,
         function_summaries, is_same_truth, outliers, pattern, standard_error, verdict_level,
@@ -34,8 +34,9 @@ pub mod diagnostics {
 }
 pub mod functions {
     pub use crate::functions::{
-        Basis, CoefficientFunction, CoefficientKind, Design, Gram, Parameterization, Penalty,
-        Prior, Ratios, ScalarParameter, ScalarValue, TotalVariation, WeightRule, basis,
+        Basis, CoefficientFunction, CoefficientKind, CoefficientSet, Design, Gram,
+        Parameterization, Penalty, Prior, Ratios, ScalarParameter, ScalarValue, TotalVariation,
+        WeightRule, basis,
     };
 }
 pub mod host {
@@ -110,10 +111,10 @@ pub mod solvers {
 }
 pub mod study {
     pub use crate::study::{
-        Choice, EquivalentSystem, Linear, PredictedResponse, PredictionSummary, Profile,
-        ProfileSettings, ReferenceValues, Target, bootstrap, constancy_test,
-        equivalent_coefficients, equivalent_systems, extremes, multistart, predict, prediction,
-        profile, profile_likelihood, profiles,
+        Choice, EquivalentSystem, IdentifiedSystem, Linear, PredictedChannel, PredictedResponse,
+        PredictionSummary, Profile, ProfileSettings, ReferenceValues, Target, bootstrap,
+        constancy_test, equivalent_coefficients, equivalent_systems, extremes, multistart, predict,
+        prediction, profile, profile_likelihood, profiles,
     };
 }
 pub mod system {

@@ -65,7 +65,8 @@ pub use classification::{
     Classification, ClassificationKind, Condition, FunctionClassification, classify_functions,
 };
 pub(crate) use classification::{
-    IDENTIFIED, condition_on_bases, condition_on_inputs, condition_on_negligible_noise, except_gap,
+    IDENTIFIED, condition_on_bases, condition_on_inputs, condition_on_negligible_noise,
+    condition_on_time, except_gap,
 };
 pub(crate) use columns::stacked;
 pub use covariance_kind::CovarianceKind;
