@@ -1,8 +1,9 @@
 //! Time or amplitude in words.
 
 use crate::number_format::significant;
-use crate::report::verdict::{and_list, term_in_words};
+use crate::report::text::and_list;
 use kmcfit_core::internals::assessment::AmplitudeRival;
+use kmcfit_core::internals::functions::CoefficientKind;
 
 /// Difference of BIC beyond which the rival is favoured.
 const FAVOURED: f64 = -10.0;
@@ -29,5 +30,18 @@ pub fn rival_in_words(rival: &AmplitudeRival) -> String {
             "{functions} {verb} with time or with amplitude: constants with {terms} explain the samples as well (BIC {size} {})",
             if d < 0.0 { "lower" } else { "higher" }
         ),
+    }
+}
+
+/// A term with its article.
+pub fn term_in_words(term: CoefficientKind) -> &'static str {
+    match term {
+        CoefficientKind::Offset => "a static force",
+        CoefficientKind::CoulombFriction => "Coulomb friction",
+        CoefficientKind::QuadraticDamping => "quadratic damping",
+        CoefficientKind::QuadraticStiffness => "a quadratic stiffness",
+        CoefficientKind::CubicStiffness => "a cubic stiffness",
+        CoefficientKind::QuinticStiffness => "a quintic stiffness",
+        other => other.name(),
     }
 }

@@ -45,7 +45,7 @@ pub struct Measures {
     /// BIC minus that of the best run; `null` without a likelihood, and where the runs have different records.
     pub bic_difference: Option<f64>,
     /// Smallest fit of a channel of the validation records, per cent; `null` without any.
-    pub held_out_fit: Option<f64>,
+    pub validation_fit: Option<f64>,
     /// Natural frequency, Hz.
     pub natural_frequency: Option<Estimate>,
     /// Damping ratio.
@@ -110,7 +110,7 @@ impl Measures {
             worst_fit: document.worst_fit(),
             likelihood: Likelihood::of(document),
             bic_difference: None,
-            held_out_fit: (document.validation.iter().flat_map(|v| &v.channels))
+            validation_fit: (document.validation.iter().flat_map(|v| &v.channels))
                 .map(|c| c.fit_percent)
                 .filter(|fit| fit.is_finite())
                 .reduce(f64::min),

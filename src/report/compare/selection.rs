@@ -19,7 +19,7 @@ const HEADERS: [&str; 9] = [
     "AICc",
     "BIC - best",
     "fit",
-    "held-out fit",
+    "validation fit",
     "f_n, Hz (95 % CI)",
     "zeta (95 % CI)",
 ];
@@ -70,7 +70,7 @@ fn row(m: &Measures) -> [String; 9] {
             false => format!("+{}", fixed(d)),
         }),
         percent(m.worst_fit),
-        percent(m.held_out_fit),
+        percent(m.validation_fit),
         interval(m.natural_frequency.as_ref()),
         interval(m.damping_ratio.as_ref()),
     ]

@@ -135,8 +135,8 @@ fn rows(runs: &[Measures]) -> Vec<QuantityRow> {
     t.add(worst, "worst_fit_percent", |m| (m.worst_fit,));
     let ratio = |m: &Measures| (m.has_ratio.then_some(m.cost_ratio),);
     t.add("J/J0", "cost_ratio", ratio);
-    t.add("held-out fit (%)", "held_out_fit_percent", |m| {
-        (m.held_out_fit,)
+    t.add("validation fit (%)", "validation_fit_percent", |m| {
+        (m.validation_fit,)
     });
     let likelihood =
         |of: fn(&Likelihood) -> f64| move |m: &Measures| (m.likelihood.as_ref().map(of),);

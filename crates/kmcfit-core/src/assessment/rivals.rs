@@ -7,7 +7,8 @@
 //! k(t) ~ k + 3/4 k3 A^2 + 5/8 k5 A^4,    c(t) ~ c + 8/(3 pi) c2 w A + 4/pi F/(w A)
 //! ```
 //!
-//! The rivals have constants for the functions that vary, and one such term for each of stiffness and damping. Each is fitted with the noise model
+//! The rivals have constants for the functions that vary, and such terms in their place: first one for a stiffness or damping that varies, then one of
+//! the other force beside the best of these. Each is fitted with the noise model
 //! of the fit, started at the regression of the functions on these powers of `A`, and compared by
 //!
 //! ```text
@@ -88,12 +89,15 @@ pub(super) fn amplitude_rival(
             let bic = rival_criterion(problem, theta, &indices, &kinds, &response)?;
             Some((bic - here, kinds)).filter(|(difference, _)| difference.is_finite())
         });
-        let best = rivals.min_by(|a, b| a.0.total_cmp(&b.0));
-        best.filter(|(difference, _)| *difference <= CLOSE)
+        rivals.min_by(|a, b| a.0.total_cmp(&b.0))
     };
-    let [single, pairs] = term_sets(problem);
-    // A pair of terms matters where no single one explains the samples.
-    let (bic_difference, terms) = best(single).or_else(|| best(pairs))?;
+    let first = best(first_terms(problem, &indices))?;
+    let second = best(with_another(problem, &first.1));
+    let (bic_difference, terms) = match second {
+        Some(second) if second.0 < first.0 => second,
+        _ => first,
+    };
+    (bic_difference <= CLOSE).then_some(())?;
     Some(AmplitudeRival {
         functions: indices
             .iter()
@@ -176,21 +180,44 @@ fn criterion(problem: &Problem, evaluation: &Evaluation, parameters: f64) -> f64
     deviance.sum::<f64>() + parameters * all.ln()
 }
 
-/// Terms of each rival that the model does not have: single ones, and pairs of one for the stiffness and one for the damping. Those of the damping
-/// are rivals of a stiffness that varies too, because a misfit of either changes both.
-fn term_sets(problem: &Problem) -> [Vec<Vec<CoefficientKind>>; 2] {
+/// Terms of a list that the model does not have.
+fn absent(problem: &Problem, kinds: [CoefficientKind; 2]) -> Vec<CoefficientKind> {
     let has = |kind: &CoefficientKind| problem.functions.iter().any(|f| f.quantity == *kind);
-    let [stiffness, damping] = [STIFFNESS, DAMPING].map(|kinds| {
-        kinds
-            .into_iter()
-            .filter(|kind| !has(kind))
-            .collect::<Vec<_>>()
-    });
-    let single = stiffness.iter().chain(&damping).map(|kind| vec![*kind]);
-    let pairs = stiffness
-        .iter()
-        .flat_map(|k| damping.iter().map(|c| vec![*k, *c]));
-    [single.collect(), pairs.collect()]
+    kinds.into_iter().filter(|kind| !has(kind)).collect()
+}
+
+/// Terms of the first rivals: one in place of a stiffness or a damping that varies, a pair where both vary, any single one beside a mass.
+fn first_terms(problem: &Problem, indices: &[usize]) -> Vec<Vec<CoefficientKind>> {
+    let varies = |kind: CoefficientKind| {
+        let mut quantities = indices.iter().map(|i| problem.functions.get(*i).quantity);
+        quantities.any(|quantity| quantity == kind)
+    };
+    let [stiffness, damping] = [STIFFNESS, DAMPING].map(|kinds| absent(problem, kinds));
+    let single = |kinds: &[CoefficientKind]| kinds.iter().map(|kind| vec![*kind]).collect();
+    match [CoefficientKind::Stiffness, CoefficientKind::Damping].map(varies) {
+        [true, true] => {
+            let pairs = stiffness
+                .iter()
+                .flat_map(|k| damping.iter().map(|c| vec![*k, *c]));
+            pairs.collect()
+        }
+        [true, false] => single(&stiffness),
+        [false, true] => single(&damping),
+        [false, false] => single(&[stiffness, damping].concat()),
+    }
+}
+
+/// A single term with each one of the other force, whose misfit changes both; none beside a pair.
+fn with_another(problem: &Problem, terms: &[CoefficientKind]) -> Vec<Vec<CoefficientKind>> {
+    let [term] = terms else {
+        return Vec::new();
+    };
+    let others = match STIFFNESS.contains(term) {
+        true => DAMPING,
+        false => STIFFNESS,
+    };
+    let others = absent(problem, others).into_iter();
+    others.map(|other| vec![*term, other]).collect()
 }
 
 /// Amplitude and frequency of the response at the nodes.
