@@ -6,8 +6,8 @@ use crate::report::findings;
 use crate::report::reason_in_words;
 use crate::report::suggestions::{Suggestion, Suspect};
 use kmcfit_core::internals::assessment::{
-    CoarseBasis, FitWarning, FunctionInGap, GapAssessment, GapStatus, NoIntervals, ResidualPattern,
-    Unidentified, VerdictReason,
+    AmplitudeRival, CoarseBasis, FitWarning, FunctionInGap, GapAssessment, GapStatus, NoIntervals,
+    ResidualPattern, Unidentified, VerdictReason,
 };
 use kmcfit_core::internals::builder::BuildNotice;
 use kmcfit_core::internals::diagnostics::{UntestedReason, Whiteness, WhitenessResult};
@@ -691,6 +691,7 @@ fn fit_warnings() -> Vec<FitWarning> {
         FitWarning::MissingTerm(_) => FitWarning::MissingTerm(MissingTerm {
             term: CoefficientKind::QuadraticDamping, value: 0.352, t: 21.5, share: 0.031,
         }),
+        FitWarning::TimeOrAmplitude(_) => FitWarning::TimeOrAmplitude(rival(-3.14)),
         FitWarning::ResidualMean { .. } => FitWarning::ResidualMean {
             experiment: "shaker".into(), channel: "acceleration".into(), mean: 0.021, t: 12.3, share: 0.42, or_static_force: false,
         },
@@ -730,6 +731,8 @@ fn verdict_reasons() -> Vec<VerdictReason> {
         VerdictReason::CoarseSteps { .. } => VerdictReason::CoarseSteps { times: 3.25 },
         VerdictReason::NotConverged { .. } => VerdictReason::NotConverged { status: Status::TimeLimit },
         VerdictReason::MissingTerm(_) => VerdictReason::MissingTerm(missing),
+        VerdictReason::TimeOrAmplitude(_) => VerdictReason::TimeOrAmplitude(rival(2.72)),
+        VerdictReason::TimeOrAmplitude(_) => VerdictReason::TimeOrAmplitude(rival(-52.0)),
         VerdictReason::ResidualMean { .. } => VerdictReason::ResidualMean {
             experiment: experiment(), channel: "displacement".into(),
         },
@@ -761,6 +764,18 @@ fn verdict_reasons() -> Vec<VerdictReason> {
         VerdictReason::OnlyRatios { .. } => VerdictReason::OnlyRatios { fixed: Vec::new() },
         VerdictReason::EquationError => VerdictReason::EquationError,
     ]
+}
+
+fn rival(bic_difference: f64) -> AmplitudeRival {
+    AmplitudeRival {
+        functions: vec!["stiffness".into(), "damping".into()],
+        terms: vec![
+            CoefficientKind::QuinticStiffness,
+            CoefficientKind::CoulombFriction,
+        ],
+        bic_difference,
+        indices: vec![1, 2],
+    }
 }
 
 fn unidentified() -> Vec<Unidentified> {
@@ -822,6 +837,7 @@ fn conditions() -> Vec<Condition> {
         Condition::Input => Condition::Input,
         Condition::NegligibleNoise => Condition::NegligibleNoise,
         Condition::Jumps => Condition::Jumps,
+        Condition::Time => Condition::Time,
     ]
 }
 
@@ -887,6 +903,7 @@ fn suggestions() -> Vec<Suggestion> {
         Suggestion::EstimateOffset { .. } => Suggestion::EstimateOffset {
             channel: channel(), experiment: "free decay".into(), or_static_force: true,
         },
+        Suggestion::SecondAmplitude => Suggestion::SecondAmplitude,
         Suggestion::NarrowFriction => Suggestion::NarrowFriction,
         Suggestion::FinerBasis { .. } => Suggestion::FinerBasis { function: "stiffness".into() },
         Suggestion::MoreParameters { .. } => Suggestion::MoreParameters { absent: vec!["cubic", "friction"] },

@@ -3,9 +3,10 @@
 use super::fit::{fit_into, note_discarded, open_journal};
 use super::progress::Progress;
 use super::{
-    CommandError, NOT_CONVERGED, OK, exit_code, inputs, interrupt, print, say, unwritable,
+    CommandError, NOT_CONVERGED, OK, Overrides, exit_code, inputs, interrupt, print, say,
+    unwritable,
 };
-use crate::config::{BuildMode, Model, ModelFile, Sequence, build};
+use crate::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
 use crate::error::InputError;
 use crate::report::compare::{ComparedRun, Comparison, LeftOut};
 use crate::report::{fit_claim, json};
@@ -28,28 +29,36 @@ pub struct Arguments {
     /// Folder for the comparison, with a folder for each fitted model.
     #[arg(long, default_value = "runs/compare")]
     out: PathBuf,
+    #[command(flatten)]
+    set: Overrides,
     /// Print the comparison as JSON instead of the table.
     #[arg(long)]
     json: bool,
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
-    compare(&arguments.runs, &arguments.out, arguments.json, false)
+    let set = arguments.set.parse()?;
+    if arguments.runs.iter().all(|path| path.is_dir()) {
+        arguments.set.refuse("folders of finished runs")?;
+    }
+    compare(&arguments.runs, &set, &arguments.out, arguments.json, false)
 }
 
 /// Resumes an unfinished comparison.
 pub(super) fn resume(place: &Path, as_json: bool) -> Result<u8, CommandError> {
-    let runs = AnalysisJournal::heading(place, COMPARE_JOURNAL)?.inputs;
-    compare(&runs, place, as_json, true)
+    let heading = AnalysisJournal::heading(place, COMPARE_JOURNAL)?;
+    let set = Override::parse_all(&heading.overrides)?;
+    compare(&heading.inputs, &set, place, as_json, true)
 }
 
 fn compare(
     runs: &[PathBuf],
+    set: &[Override],
     out: &Path,
     as_json: bool,
     is_resumed: bool,
 ) -> Result<u8, CommandError> {
-    let job = Job::of_runs(runs, out)?;
+    let job = Job::of_runs(runs, set, out)?;
     let folder = OutputFolder::prepare(out, job.claim())?;
     job.run(&folder, as_json, is_resumed)
 }
@@ -61,7 +70,7 @@ pub(super) fn prepare(parent: &OutputFolder, name: &str) -> Result<OutputFolder,
 
 /// Compares models and runs in a folder that was prepared.
 pub(super) fn run_in(folder: &OutputFolder, runs: &[PathBuf]) -> Result<u8, CommandError> {
-    Job::of_runs(runs, folder.path())?.run(folder, false, false)
+    Job::of_runs(runs, &[], folder.path())?.run(folder, false, false)
 }
 
 /// Fits the models of a sequence one after another and compares them on one page.
@@ -74,7 +83,7 @@ pub(super) fn run_sequence(
 ) -> Result<u8, CommandError> {
     let heading = Heading::new("study", vec![path.to_path_buf()]).with_file(path.into());
     let job = Job {
-        entries: entries(&sequence.models, out)?,
+        entries: entries(&sequence.models, &[], out)?,
         heading,
         journal: STUDY_JOURNAL,
         sequence: Some(sequence),
@@ -138,10 +147,13 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    fn of_runs(runs: &[PathBuf], out: &Path) -> Result<Self, InputError> {
+    fn of_runs(runs: &[PathBuf], set: &[Override], out: &Path) -> Result<Self, InputError> {
         Ok(Self {
-            entries: entries(runs, out)?,
-            heading: Heading::new("compare", runs.to_vec()),
+            entries: entries(runs, set, out)?,
+            heading: Heading {
+                overrides: set.iter().map(Override::to_string).collect(),
+                ..Heading::new("compare", runs.to_vec())
+            },
             journal: COMPARE_JOURNAL,
             sequence: None,
         })
@@ -252,10 +264,14 @@ fn show(comparison: &Comparison, sequence: Option<&Sequence>, interrupted: bool,
 }
 
 /// The arguments with their names. All errors in them are found before anything is run or written.
-fn entries(runs: &[PathBuf], out: &Path) -> Result<Vec<(String, ComparisonEntry)>, InputError> {
+fn entries(
+    runs: &[PathBuf],
+    set: &[Override],
+    out: &Path,
+) -> Result<Vec<(String, ComparisonEntry)>, InputError> {
     let entries = runs.iter().zip(names(runs, out));
     entries
-        .map(|(path, name)| Ok((name.clone(), entry(path, &name)?)))
+        .map(|(path, name)| Ok((name.clone(), entry(path, set, &name)?)))
         .collect()
 }
 
@@ -348,7 +364,7 @@ impl Compared {
     }
 }
 
-fn entry(path: &Path, name: &str) -> Result<ComparisonEntry, InputError> {
+fn entry(path: &Path, set: &[Override], name: &str) -> Result<ComparisonEntry, InputError> {
     const EXPECTED: &str = "a model file (YAML), or the folder of a finished run";
     if path.is_dir() {
         return Ok(ComparisonEntry::Run(Box::new(ComparedRun::read(
@@ -368,7 +384,7 @@ fn entry(path: &Path, name: &str) -> Result<ComparisonEntry, InputError> {
                 .hint(format!("give its folder: {folder}")),
         );
     }
-    let file = ModelFile::read(path)?;
+    let file = ModelFile::read_with_overrides(path, set)?;
     let model = build(&file, BuildMode::Fit)?;
     let heading = Heading::of_model("fit", &file, RequestedFiles::figures(), None);
     Ok(ComparisonEntry::Model(Box::new(ToFit {

@@ -326,7 +326,7 @@ pub(super) fn search(
 }
 
 /// Predictions of the model file; a failed one has its reason.
-fn predictions(model: &Model, found: &Fit) -> Vec<Prediction> {
+pub(super) fn predictions(model: &Model, found: &Fit) -> Vec<Prediction> {
     let coefficients = &found.best.evaluation.nodal;
     let system = &model.problem.system;
     let one = |state: &State| {

@@ -18,6 +18,7 @@ mod schema;
 mod shell;
 mod simulate;
 mod study;
+mod verify;
 
 use crate::config::{Model, ModelFile};
 use crate::error::InputError;
@@ -50,6 +51,7 @@ enum Command {
     Check(check::Arguments),
     Predict(predict::Arguments),
     Compare(compare::Arguments),
+    Verify(verify::Arguments),
     Study(study::Arguments),
     Resume(resume::Arguments),
     Init(init::Arguments),
@@ -122,6 +124,7 @@ pub fn main() -> ExitCode {
         Command::Check(arguments) => check::run(&arguments),
         Command::Predict(arguments) => predict::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Verify(arguments) => verify::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::Resume(arguments) => resume::run(&arguments),
         Command::Init(arguments) => init::run(&arguments),

@@ -1,23 +1,43 @@
-//! `kmcfit predict`: simulates the free response of an identified system from other initial states.
+//! `kmcfit predict`: simulates an identified system under another force or motion of the base, or its free response from other initial
+//! states.
 
 use super::{CommandError, OK, print, unwritable};
+use crate::config::NewRecord;
 use crate::error::InputError;
 use crate::report::{
-    CsvTable, PredictedResponse, Run, figures, json, predict, prediction_table, render,
+    CsvTable, Figure, ForcedPredictions, PredictedResponse, Run, figures, json, predict,
+    prediction_table, render,
 };
 use crate::results::{Claim, OutputFolder};
+use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::system::State;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Predict the free response of an identified system from other initial states.
+/// Predict the response of an identified system to another force, motion of the base or initial state.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  kmcfit predict runs/model --initial 3.3,1.0 --initial 0,2")]
+#[command(
+    after_help = "Examples:\n  kmcfit predict runs/model --force new.csv\n  kmcfit predict runs/model --initial 3.3,1.0 --initial 0,2"
+)]
 pub struct Arguments {
     /// Folder of a finished run.
     run: PathBuf,
-    /// Initial displacement (m or rad) and velocity (m/s or rad/s); may be repeated.
-    #[arg(long, value_name = "Y,V", required = true, allow_hyphen_values = true)]
+    /// Table of a force over time; measured responses in it score the prediction.
+    #[arg(long, value_name = "FILE")]
+    force: Option<PathBuf>,
+    /// Table of the acceleration or displacement of the base over time.
+    #[arg(long, value_name = "FILE")]
+    base: Option<PathBuf>,
+    /// Initial displacement (m or rad) and velocity (m/s or rad/s); may be repeated [default under a force: at rest].
+    #[arg(
+        long,
+        value_name = "Y,V",
+        required_unless_present_any = ["force", "base"],
+        allow_hyphen_values = true
+    )]
     initial: Vec<String>,
+    /// Predicted quantity; may be repeated [default: those measured in the files, or the first channel of the run].
+    #[arg(long, value_name = "CHANNEL", value_parser = ["displacement", "velocity", "acceleration"])]
+    channel: Vec<String>,
     /// Folder for the table and the figure of the responses.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -35,13 +55,27 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         .iter()
         .map(|text| state(text))
         .collect::<Result<_, _>>()?;
-    let run = Run::open(&arguments.run)?;
-    let folder = (arguments.out.as_deref())
-        .map(|out| {
-            let claim = Claim::new("predict").files(FILES);
-            OutputFolder::prepare(out, claim)
-        })
-        .transpose()?;
+    let run = open(&arguments.run)?;
+    let files = || arguments.force.iter().chain(&arguments.base).cloned();
+    let prepare = || {
+        let out = arguments.out.as_deref();
+        let claim = || Claim::new("predict").files(FILES).inputs(files());
+        out.map(|out| OutputFolder::prepare(out, claim()))
+            .transpose()
+    };
+    if files().next().is_some() {
+        return forced(arguments, &run, states, prepare);
+    }
+    if !arguments.channel.is_empty() {
+        return Err(InputError::argument(
+            "--channel",
+            "a free response is predicted as a displacement",
+        )
+        .found(arguments.channel.join(", "))
+        .expected("`--force FILE` or `--base FILE` with `--channel`")
+        .into());
+    }
+    let folder = prepare()?;
     let responses = predict(&run.system, &run.coefficients, run.truth.as_ref(), &states).map_err(
         |breakdown| CommandError::Numerical(format!("--initial: no response: {breakdown}")),
     )?;
@@ -58,6 +92,51 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     match arguments.json {
         true => print(&json(&summaries)),
         false => print(&prediction_table(&summaries, run.document.is_rotation())),
+    }
+    Ok(OK)
+}
+
+/// Opens a run; a model file in its place is answered with the commands that make one.
+fn open(path: &Path) -> Result<Run, InputError> {
+    let extension = path.extension().and_then(|e| e.to_str());
+    if path.is_file() && matches!(extension, Some("yaml" | "yml")) {
+        let model = path.display();
+        let stem = super::stem(path);
+        return Err(InputError::file(path, "a model file in place of a run")
+            .expected("the folder of a finished run, as written by `kmcfit fit`")
+            .hint(format!(
+                "fit it first: `kmcfit fit {model}`, then `kmcfit predict runs/{stem} …`"
+            )));
+    }
+    Run::open(path)
+}
+
+/// Predicts the response under the inputs of files.
+fn forced(
+    arguments: &Arguments,
+    run: &Run,
+    mut states: Vec<State>,
+    prepare: impl Fn() -> Result<Option<OutputFolder>, InputError>,
+) -> Result<u8, CommandError> {
+    let record = NewRecord::read(arguments.force.as_deref(), arguments.base.as_deref())?;
+    if states.is_empty() {
+        states.push(State {
+            displacement: 0.0,
+            velocity: 0.0,
+        });
+    }
+    let wanted = |kind: &ChannelKind| arguments.channel.iter().any(|name| name == kind.name());
+    let kinds: Vec<ChannelKind> = ChannelKind::ALL.into_iter().filter(wanted).collect();
+    let found = ForcedPredictions::of(run, &record, &states, &kinds)?;
+    let folder = prepare()?;
+    let predictions = found.map_err(CommandError::Numerical)?;
+    if let Some(folder) = folder {
+        write_files(&folder, &predictions.csv(), &predictions.figure())
+            .map_err(|error| unwritable(folder.path(), &error))?;
+    }
+    match arguments.json {
+        true => print(&json(&predictions.summaries())),
+        false => print(&predictions.table()),
     }
     Ok(OK)
 }
@@ -96,10 +175,13 @@ fn write(
             );
         }
     }
-    let figure = figures::predictions(times, responses);
+    write_files(folder, &table, &figures::predictions(times, responses))
+}
+
+fn write_files(folder: &OutputFolder, table: &CsvTable, figure: &Figure) -> std::io::Result<()> {
     let mut stage = folder.stage()?;
     let [table_name, figure_name] = FILES;
     stage.write(table_name, &table.to_csv())?;
-    stage.write(figure_name, &render(&figure))?;
+    stage.write(figure_name, &render(figure))?;
     stage.commit()
 }

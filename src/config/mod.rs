@@ -14,6 +14,7 @@ pub mod key_documentation;
 pub mod key_positions;
 mod map;
 mod model_file;
+mod new_record;
 mod overrides;
 mod reader;
 mod scaffold;
@@ -31,6 +32,7 @@ pub use build::{
     StudyPlan, StudyTarget, WeightSearch, build,
 };
 pub use model_file::ModelFile;
+pub use new_record::{MeasuredChannel, NewRecord};
 pub use overrides::Override;
 pub use scaffold::{Scaffold, scaffold};
 pub use sequence::Sequence;

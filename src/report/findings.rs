@@ -5,7 +5,6 @@ use crate::number_format::{resolved, significant, times_in_words};
 use kmcfit_core::internals::assessment::{
     CoarseBasis, FitWarning, GapAssessment, GapStatus, NoIntervals, Unidentified,
 };
-use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::{
     Classification, FunctionClassification, RankFinding, span_words,
 };
@@ -193,21 +192,14 @@ pub fn warning(warning: &FitWarning) -> Finding {
         FitWarning::MissingTerm(missing) => format!(
             "the residuals of the equation of motion show {} that the model does not have: {} = {} {} (t = {}), {} of the largest \
              term; the other estimates are biased by it",
-            match missing.term {
-                CoefficientKind::Offset => "a static force",
-                CoefficientKind::CoulombFriction => "Coulomb friction",
-                CoefficientKind::QuadraticDamping => "quadratic damping",
-                CoefficientKind::QuadraticStiffness => "a quadratic stiffness",
-                CoefficientKind::CubicStiffness => "a cubic stiffness",
-                CoefficientKind::QuinticStiffness => "a quintic stiffness",
-                other => other.name(),
-            },
+            super::rivals::term_in_words(missing.term),
             missing.term.name(),
             significant(missing.value, 3),
             missing.term.unit(),
             significant(missing.t, 2),
             super::suggestions::percent(100.0 * missing.share, 1),
         ),
+        FitWarning::TimeOrAmplitude(rival) => super::rivals::rival_in_words(rival),
         FitWarning::ResidualMean {
             experiment,
             channel,

@@ -1,69 +1,83 @@
 //! `parameters.json`: all parameters of a fit with their covariance, so that every printed interval can be computed again.
 
-use super::document::{NoiseSummary, ResultDocument};
+use super::document::{FORMAT, NoiseSummary, ResultDocument};
 use super::run::FittedModel;
+use crate::error::InputError;
+use crate::text_io::{JSON, read_text_within};
 use kmcfit_core::internals::diagnostics::student_half_width;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction};
 use kmcfit_core::internals::identifiability::{Band, CovarianceKind};
-use serde::Serialize;
+use kmcfit_core::internals::noise::{Autoregression, Correlation, CorrelationLaw};
+use kmcfit_core::internals::record::{Channel, NoiseEstimate, ScoreCovariance};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Longest document, bytes.
+const LONGEST: u64 = 1 << 26;
 
 /// The document. Vectors and the covariance have one entry for each parameter: those of the functions in the order of `functions`, then
 /// initial states and sensor parameters.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParametersDocument {
     /// Version of the format.
     format: u32,
     /// Version of kmcfit.
-    version: &'static str,
+    version: String,
     /// Names: `stiffness` for a constant, `stiffness[2]` for the third parameter of its basis.
-    names: Vec<String>,
+    pub names: Vec<String>,
     /// Values, in the unit of the function or parameter.
-    values: Vec<f64>,
+    pub values: Vec<f64>,
     units: Vec<String>,
     /// Lower and upper bound of each parameter; `null` without one.
     bounds: Vec<[Option<f64>; 2]>,
     /// Covariance of the estimates; `null` with more than 64 parameters and where a combination is not identifiable.
-    covariance: Option<Vec<Vec<f64>>>,
+    pub covariance: Option<Vec<Vec<f64>>>,
     /// Kind of the covariance: `information`, `penalised`, `bayesian` or `kernel`.
-    covariance_kind: Option<CovarianceKind>,
+    pub covariance_kind: Option<CovarianceKind>,
     /// Start (s), length (s) and number of nodes of the time grid.
-    grid: GridSummary,
-    functions: Vec<FunctionBasis>,
+    pub grid: GridSummary,
+    pub functions: Vec<FunctionBasis>,
     /// For each estimate of `result.json` with an interval, and each initial state and sensor parameter, what its half-width is made of.
     estimates: BTreeMap<String, EstimateError>,
     /// Noise of each channel.
-    noise: Vec<ChannelNoise>,
+    pub noise: Vec<ChannelNoise>,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct GridSummary {
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GridSummary {
     start: f64,
     duration: f64,
     nodes: usize,
 }
 
 /// Basis of a function and the place of its parameters.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct FunctionBasis {
-    name: String,
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FunctionBasis {
+    pub name: String,
     unit: String,
     /// Name of the basis as in a model file; `fixed` without parameters. A polynomial is a sum of Legendre polynomials on the record mapped to
     /// -1 to 1, a spline has the knots and three further ones at either end.
-    basis: &'static str,
+    pub basis: String,
     /// Times of the knots, s.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    knots: Option<Vec<f64>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub knots: Option<Vec<f64>>,
     /// Index of the first parameter, and their number.
-    first: usize,
-    count: usize,
+    pub first: usize,
+    /// Number of parameters.
+    pub count: usize,
     /// Value that is added to the basis, where it is the same at all times and not zero.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    offset: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset: Option<f64>,
+    /// True for jumps found by the rule `bic`.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub has_jumps: bool,
 }
 
 /// The half-width of a 95 % interval is `quantile sqrt(g^T C g + basis_error^2)` with the gradient `g` and the covariance `C`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct EstimateError {
     /// Derivatives of the estimate in the parameters.
     gradient: Vec<f64>,
@@ -73,14 +87,89 @@ struct EstimateError {
     quantile: f64,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct ChannelNoise {
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ChannelNoise {
     experiment: String,
     channel: String,
     /// Standard deviation, where it is the same for all samples.
-    sigma: Option<f64>,
+    pub sigma: Option<f64>,
     /// Correlation; `null` for white noise.
-    correlation: Option<NoiseSummary>,
+    pub correlation: Option<NoiseSummary>,
+    /// Partial autocorrelations of an autoregressive process, from which its coefficients follow.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    partial_autocorrelations: Vec<f64>,
+    /// Covariance of the estimated noise parameters: the logarithm of sigma, then the inverse hyperbolic tangents of the partial
+    /// autocorrelations or the logarithm of the correlation time. The degrees of freedom of the intervals follow from it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    noise_covariance: Vec<Vec<f64>>,
+    /// Covariance of the scores: `model`, or `kernel` for innovations that are not white.
+    #[serde(default, skip_serializing_if = "is_model")]
+    pub scores: ScoreCovariance,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn is_model(scores: &ScoreCovariance) -> bool {
+    *scores == ScoreCovariance::Model
+}
+
+impl ChannelNoise {
+    /// Correlation of samples at `times`.
+    pub fn law(&self, times: &[f64]) -> Option<Correlation> {
+        let stored = self.correlation.as_ref()?;
+        let law = match stored.correlation_time {
+            Some(time) => CorrelationLaw::Exponential { time },
+            None => {
+                let partial = self.partial_autocorrelations.clone();
+                CorrelationLaw::Autoregressive(Autoregression::new(partial)?)
+            }
+        };
+        Correlation::new(law, times)
+    }
+
+    /// Covariance of the noise parameters; without rows where the noise counts as known.
+    pub fn covariance(&self) -> DMatrix<f64> {
+        let n = self.noise_covariance.len();
+        let entry = |i: usize, j: usize| self.noise_covariance[i].get(j).copied().unwrap_or(0.0);
+        DMatrix::from_fn(n, n, entry)
+    }
+}
+
+impl ParametersDocument {
+    /// Reads the document of a run; also as JSON, with unknown keys.
+    ///
+    /// # Errors
+    /// If it is missing or not one that `kmcfit fit` writes.
+    pub fn read(folder: &Path) -> Result<(Self, Value), InputError> {
+        const EXPECTED: &str = "the parameters of a run, as written by `kmcfit fit`";
+        let path = folder.join("parameters.json");
+        if !path.exists() {
+            return Err(InputError::file(&path, "no such file")
+                .expected(EXPECTED)
+                .hint("fits with more than 10,000 parameters write none; fits of earlier versions must be repeated"));
+        }
+        let damaged = |error: serde_json::Error| {
+            InputError::file(&path, "the parameters are damaged")
+                .found(error)
+                .expected(EXPECTED)
+        };
+        let text = read_text_within(&path, "the parameters of a run", LONGEST, JSON)?;
+        let value: Value = serde_json::from_str(&text).map_err(damaged)?;
+        let document = Self::deserialize(&value).map_err(damaged)?;
+        let n = document.names.len();
+        let is_square = |rows: &Vec<Vec<f64>>| rows.len() == n && rows.iter().all(|r| r.len() == n);
+        let fits = document.values.len() == n
+            && document.format == FORMAT
+            && document.covariance.as_ref().is_none_or(is_square)
+            && document.functions.iter().all(|f| f.first + f.count <= n);
+        match fits {
+            true => Ok((document, value)),
+            false => Err(InputError::file(&path, "the parameters are damaged")
+                .found(format!(
+                    "lists of other lengths than {n}, the number of names"
+                ))
+                .expected(EXPECTED)),
+        }
+    }
 }
 
 impl FittedModel<'_> {
@@ -91,7 +180,7 @@ impl FittedModel<'_> {
         let grid = &problem.system.grid;
         let bands = self.bands();
         let (mut names, mut units, mut bases) = (Vec::new(), Vec::new(), Vec::new());
-        for (function, range) in functions.iter().zip(functions.ranges()) {
+        for (f, (function, range)) in functions.iter().zip(functions.ranges()).enumerate() {
             let unit = self.unit(function).to_owned();
             let name = |i: usize| match range.len() {
                 1 => function.name(),
@@ -102,11 +191,12 @@ impl FittedModel<'_> {
             bases.push(FunctionBasis {
                 name: function.name(),
                 unit,
-                basis: function.basis.as_ref().map_or("fixed", Basis::name),
+                basis: function.basis.as_ref().map_or("fixed", Basis::name).into(),
                 knots: knots(function),
                 first: range.start,
                 count: range.len(),
                 offset: offset(function),
+                has_jumps: problem.jumps.iter().any(|jumps| jumps.function == f),
             });
         }
         names.extend(functions.scalars().iter().map(|s| s.name.clone()));
@@ -114,7 +204,7 @@ impl FittedModel<'_> {
         let covariance = bands.and_then(|bands| bands.covariance.as_ref());
         ParametersDocument {
             format: 1,
-            version: env!("CARGO_PKG_VERSION"),
+            version: env!("CARGO_PKG_VERSION").into(),
             values: self.fit.best.parameters.clone(),
             bounds: self.bounds(),
             covariance: covariance.map(|c| {
@@ -136,7 +226,7 @@ impl FittedModel<'_> {
             names,
             units,
             functions: bases,
-            noise: noise(document),
+            noise: noise(document, problem.channels().map(Channel::noise)),
         }
     }
 
@@ -220,14 +310,30 @@ fn offset(function: &CoefficientFunction) -> Option<f64> {
     (is_same && first != 0.0).then_some(first)
 }
 
-fn noise(document: &ResultDocument) -> Vec<ChannelNoise> {
-    let each = document.experiments.iter().flat_map(|experiment| {
-        experiment.channels.iter().map(|channel| ChannelNoise {
-            experiment: experiment.name.clone(),
-            channel: channel.kind.clone(),
-            sigma: channel.sigma,
-            correlation: channel.noise.clone(),
-        })
+fn noise<'a>(
+    document: &ResultDocument,
+    estimates: impl Iterator<Item = &'a NoiseEstimate>,
+) -> Vec<ChannelNoise> {
+    let channels = document.experiments.iter().flat_map(|experiment| {
+        let channels = experiment.channels.iter();
+        channels.map(|channel| (experiment.name.clone(), channel))
     });
+    let each = channels
+        .zip(estimates)
+        .map(|((experiment, channel), noise)| {
+            let rows = noise.covariance.row_iter();
+            ChannelNoise {
+                experiment,
+                channel: channel.kind.clone(),
+                sigma: channel.sigma,
+                correlation: channel.noise.clone(),
+                partial_autocorrelations: match noise.correlation.as_ref().map(Correlation::law) {
+                    Some(CorrelationLaw::Autoregressive(process)) => process.partial().to_vec(),
+                    _ => Vec::new(),
+                },
+                noise_covariance: rows.map(|row| row.iter().copied().collect()).collect(),
+                scores: noise.scores,
+            }
+        });
     each.collect()
 }

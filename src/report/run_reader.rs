@@ -254,7 +254,7 @@ fn coefficients(
 }
 
 /// Values at all nodes from `rows` at every so many steps and at the end, linear in between.
-fn at_nodes(rows: Vec<f64>, nodes: usize, steps: usize) -> Vec<f64> {
+pub(super) fn at_nodes(rows: Vec<f64>, nodes: usize, steps: usize) -> Vec<f64> {
     if steps <= 1 {
         return rows;
     }

@@ -2,14 +2,15 @@
 
 use super::document::{Estimates, Verdict};
 use super::fit_assessment::ValidationRecord;
+use super::rivals::{rival_in_words, term_in_words};
 use super::run::FittedModel;
 use super::suggestions::percent;
+use super::text::and_list;
 use crate::finding::Finding;
 use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::{
     VerdictReason, estimates, verdict_level, verdict_reasons,
 };
-use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::solvers::Status;
 
 impl FittedModel<'_> {
@@ -110,17 +111,6 @@ fn of_data(warning: &Finding) -> Option<VerdictReason> {
     }
 }
 
-/// A missing term with its article.
-pub fn term_in_words(term: CoefficientKind) -> &'static str {
-    match term {
-        CoefficientKind::Offset => "a static force",
-        CoefficientKind::CoulombFriction => "Coulomb friction",
-        CoefficientKind::QuadraticDamping => "quadratic damping",
-        CoefficientKind::CubicStiffness => "a cubic stiffness",
-        other => other.name(),
-    }
-}
-
 /// A reason as a clause.
 pub fn reason_in_words(reason: &VerdictReason) -> Finding {
     let text = match reason {
@@ -144,6 +134,7 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
             "the residuals show {} that the model does not have",
             term_in_words(missing.term)
         ),
+        VerdictReason::TimeOrAmplitude(rival) => rival_in_words(rival),
         VerdictReason::ResidualMean {
             experiment,
             channel,
@@ -219,13 +210,4 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
         }
     };
     Finding::of(reason, text)
-}
-
-/// `a, b and c`.
-fn and_list(names: &[String]) -> String {
-    match names {
-        [] => String::new(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
 }

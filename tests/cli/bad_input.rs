@@ -714,12 +714,13 @@ fn predict_arguments() {
       expected: the folder of a finished run, as written by `kmcfit fit`
     ");
     assert_snapshot!(from("model.yaml", "1,0"), @"
-    error: model.yaml: no such folder
+    error: model.yaml: a model file in place of a run
       expected: the folder of a finished run, as written by `kmcfit fit`
+      hint: fit it first: `kmcfit fit model.yaml`, then `kmcfit predict runs/model …`
     ");
     assert_snapshot!(refused(&bench, &["predict", "run"]), @"
     error: kmcfit predict: --initial <Y,V> is missing
-      expected: kmcfit predict [OPTIONS] --initial <Y,V> <RUN>
+      expected: kmcfit predict [OPTIONS] <RUN>
       hint: `kmcfit predict --help` lists the arguments
     ");
     bench.write("other/result.json", "{}");

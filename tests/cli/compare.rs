@@ -1,6 +1,6 @@
 //! `kmcfit compare`: table, figures and page of several runs.
 
-use crate::workbench::Workbench;
+use crate::workbench::{Workbench, column};
 use insta::assert_snapshot;
 use roxmltree::{Document, Node, ParsingOptions};
 use serde_json::Value;
@@ -151,6 +151,12 @@ fn the_table() {
         free: One value per step
           response fitted (J/J0 [tiny]), but not by the true system: error of k/m 77 %, error of c/m 1142 %
 
+        model      parameters  log-likelihood  AICc     BIC - best  fit      validation fit  f_n, Hz (95 % CI)             zeta (95 % CI)
+        twice      2           3291.4          -6578.8  0           100.0 %  –               0.15915 (0.15903 to 0.15928)  0.05 (0.0499769 to 0.0500231)
+        constants  2           3102.7          -6201.3  +377.5      100.0 %  –               0.15915 (0.15903 to 0.15928)  0.05 (0.0499768 to 0.0500231)
+
+        The data favour `twice` over `constants` decisively (difference of BIC 380).
+
                                              constants      twice       free
         status                               converged  converged  converged
         method                                   lbfgs      lbfgs      lbfgs
@@ -159,6 +165,14 @@ fn the_table() {
         misfit (m² s)                           [tiny]     [tiny]     [tiny]
         worst fit of a channel (%)               100.0      100.0      99.89
         J/J0                                    [tiny]     [tiny]     [tiny]
+        log-likelihood                            3103       3291          –
+        AICc                                     -6201      -6579          –
+        BIC                                      -6195      -6572          –
+        BIC - best                               377.5          0          –
+        f_n (Hz)                                0.1592     0.1592     0.1492
+          +- (95 %) (Hz)                      1.232e-4   1.232e-4          –
+        zeta                                   0.05000    0.05000     0.3011
+          +- (95 %)                           2.314e-5   2.314e-5          –
         iterations                                   9          7         69
         time (s) [seconds]
         max error of m (kg)                          0      1.000      1.926
@@ -225,6 +239,15 @@ fn files() {
     misfit_unit
     worst_fit_percent
     cost_ratio
+    validation_fit_percent
+    log_likelihood
+    aicc
+    bic
+    bic_difference
+    natural_frequency_Hz
+    natural_frequency_half_width_Hz
+    damping_ratio
+    damping_ratio_half_width
     iterations
     seconds_s
     mass_error_kg
@@ -552,4 +575,87 @@ fn interrupt() {
     let records = records(&bench.read("runs/compare/compare.csv"));
     let statuses: Vec<&str> = records.iter().map(|r| r["status"].as_str()).collect();
     assert_eq!(statuses, ["converged", "interrupted"]);
+}
+
+/// The criteria of a comparison follow from the residuals in the tables, and a linear spring is rejected within a cubic one.
+#[test]
+fn models_are_selected_by_their_likelihood() {
+    let bench = Workbench::with_shipped_models();
+    let model = bench.read("models/duffing.yaml");
+    let lines = model
+        .lines()
+        .filter(|line| !line.contains("cubic_stiffness"));
+    let linear: Vec<&str> = lines.collect();
+    bench.write("models/linear.yaml", &(linear.join("\n") + "\n"));
+    let compare = ["compare", "models/duffing.yaml", "models/linear.yaml"];
+    let found: Value =
+        serde_json::from_str(&bench.run_to(0, &[&compare[..], &["--json"]].concat()))
+            .expect("JSON");
+    let number = |pointer: &str| {
+        found
+            .pointer(pointer)
+            .and_then(Value::as_f64)
+            .expect(pointer)
+    };
+    for (i, name) in ["duffing", "linear"].into_iter().enumerate() {
+        let text = bench.read(&format!("runs/compare/{name}/channels/1-displacement.csv"));
+        let residuals = column(&text, "residual");
+        let n = residuals.len() as f64;
+        let squares: f64 = residuals.iter().map(|r| r * r).sum();
+        let expected = -0.5 * n * ((std::f64::consts::TAU * squares / n).ln() + 1.0);
+        let result: Value =
+            serde_json::from_str(&bench.read(&format!("runs/compare/{name}/result.json")))
+                .expect("JSON");
+        let noise = result.pointer("/experiments/0/channels/0/noise");
+        if noise.is_some() {
+            // Autocorrelated residuals have another likelihood.
+            continue;
+        }
+        let likelihood = number(&format!("/runs/{i}/likelihood/log_likelihood"));
+        assert!(
+            (likelihood - expected).abs() < 1e-6 * expected.abs(),
+            "{name}"
+        );
+        let k = number(&format!("/runs/{i}/parameters"));
+        let bic = number(&format!("/runs/{i}/likelihood/bic"));
+        assert!((bic - (k * n.ln() - 2.0 * expected)).abs() < 1e-6 * bic.abs());
+        let aicc = number(&format!("/runs/{i}/likelihood/aicc"));
+        let correction = 2.0 * k + 2.0 * k * (k + 1.0) / (n - k - 1.0);
+        assert!((aicc - (correction - 2.0 * expected)).abs() < 1e-6 * aicc.abs());
+    }
+    assert_eq!(number("/runs/0/bic_difference"), 0.0);
+    assert!(number("/runs/1/bic_difference") > 10.0);
+    let said = bench.run_to(0, &compare);
+    assert!(
+        said.contains("The data favour `duffing` over `linear` decisively"),
+        "{said}"
+    );
+    assert!(said.contains("BIC - best"), "{said}");
+}
+
+/// `--set` applies to every model file.
+#[test]
+fn overrides_apply_to_all_models() {
+    let bench = Workbench::with_small_model();
+    bench.write("other.yaml", &bench.read("model.yaml"));
+    let compare = [
+        "compare",
+        "model.yaml",
+        "other.yaml",
+        "--set",
+        "fit.stop.iterations=3",
+        "--json",
+    ];
+    let found: Value = serde_json::from_str(&bench.run_to(0, &compare)).expect("JSON");
+    for i in 0..2 {
+        assert_eq!(found["runs"][i]["iterations"], 3);
+    }
+    let (code, _, stderr) = bench.run(&[
+        "compare",
+        "runs/compare/model",
+        "--set",
+        "fit.stop.iterations=3",
+    ]);
+    assert_eq!(code, 2);
+    assert_snapshot!(stderr);
 }

@@ -19,5 +19,6 @@ mod sequence;
 mod simulate;
 mod study;
 mod uncommon_input;
+mod verify;
 mod warnings;
 mod workbench;

@@ -127,3 +127,121 @@ fn the_plot_draws_samples_and_functions() {
         .filter(|line| line.contains('┤') || line.contains('│') || line.contains('|'));
     assert!(drawn.count() >= 25, "{charts}");
 }
+
+/// The record of a fit as a new one: its force file scores the prediction, whose band with noise holds about 95 % of the samples.
+#[test]
+fn a_force_of_a_file_predicts_and_scores() {
+    let bench = Workbench::with_shipped_models();
+    bench.run_to(0, &["fit", "models/friction.yaml", "--no-report"]);
+    let result: Value =
+        serde_json::from_str(&bench.read("runs/friction/result.json")).expect("JSON");
+    let state = |i: usize| {
+        let pointer = format!("/nuisance_parameters/{i}/value");
+        result
+            .pointer(&pointer)
+            .and_then(Value::as_f64)
+            .unwrap_or(0.0)
+    };
+    let initial = format!("{},{}", state(0), state(1));
+    let predict = [
+        "predict",
+        "runs/friction",
+        "--force",
+        "data/friction.csv",
+        "--initial",
+        &initial,
+        "--out",
+        "predicted",
+    ];
+    let found: Value =
+        serde_json::from_str(&bench.run_to(0, &[&predict[..], &["--json"]].concat()))
+            .expect("JSON");
+    let number = |key: &str| found.pointer(key).and_then(Value::as_f64).expect(key);
+    let stated = result
+        .pointer("/experiments/0/channels/0/fit_percent")
+        .and_then(Value::as_f64)
+        .expect("a fit");
+    assert!((number("/0/score/fit_percent") - stated).abs() < 0.1);
+    // Of 1201 samples the share within a 95 % band has a standard deviation of 0.6 %.
+    assert!((0.93..0.97).contains(&number("/0/score/within_band")));
+    let table_of_curves = bench.read("predicted/predictions.csv");
+    assert_eq!(
+        table(&table_of_curves).0,
+        [
+            "t_s",
+            "displacement_m",
+            "displacement_low_95_m",
+            "displacement_high_95_m",
+            "displacement_sample_low_95_m",
+            "displacement_sample_high_95_m",
+            "displacement_measured_m"
+        ]
+    );
+    let svg = bench.read("predicted/figures/predictions.svg");
+    roxmltree::Document::parse(&svg).expect("XML");
+}
+
+/// An acceleration under a motion of the base is absolute, as that of the fit.
+#[test]
+fn a_motion_of_the_base_predicts_the_absolute_acceleration() {
+    let bench = Workbench::with_shipped_models();
+    bench.run_to(0, &["fit", "models/shaking-table.yaml", "--no-report"]);
+    let predict = [
+        "predict",
+        "runs/shaking-table",
+        "--base",
+        "data/table.csv",
+        "--json",
+    ];
+    let found: Value = serde_json::from_str(&bench.run_to(0, &predict)).expect("JSON");
+    let fit = found
+        .pointer("/0/score/fit_percent")
+        .and_then(Value::as_f64);
+    assert!(fit.expect("a fit") > 95.0, "{found}");
+    assert_eq!(found[0]["channel"], "acceleration");
+}
+
+/// Coefficients that vary are identified over their own record alone; every other mistake has its place and what is expected.
+#[test]
+fn mistakes_of_inputs() {
+    let bench = Workbench::with_shipped_models();
+    bench.run_to(0, &["fit", "models/friction.yaml", "--no-report"]);
+    bench.run_to(0, &["fit", "models/linear-mass.yaml", "--no-report"]);
+    bench.write("short.csv", "t_s,f_N\n0,1\n1,2\n");
+    bench.write("gaps.csv", "t_s,f_N\n0,1\n1,\n2,1\n3,1\n");
+    bench.write("long.csv", "t_s,f_N\n0,1\n10,1\n20,1\n40,1\n");
+    bench.write("base.csv", "t_s,base_acc_m_per_s2\n0,1\n1,2\n2,1\n");
+    bench.write("times.csv", "t_s,f_N\n0,1\n2,2\n1,1\n3,1\n");
+    let refused = |arguments: &[&str]| {
+        let before = bench.contents();
+        let (code, stdout, stderr) = bench.run(arguments);
+        assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?} {stderr}");
+        assert_eq!(bench.contents(), before);
+        stderr
+    };
+    let of = |run: &str, more: &[&str]| {
+        let first = ["predict", run, "--out", "out"];
+        refused(&[&first[..], more].concat())
+    };
+    let run = "runs/friction";
+    assert_snapshot!(of("models/friction.yaml", &["--force", "short.csv"]));
+    assert_snapshot!(of(run, &["--force", "nowhere.csv"]));
+    assert_snapshot!(of(run, &["--force", "data/paper.csv"]));
+    assert_snapshot!(of(run, &["--base", "data/friction.csv"]));
+    assert_snapshot!(of(run, &["--force", "short.csv"]));
+    assert_snapshot!(of(run, &["--force", "gaps.csv"]));
+    assert_snapshot!(of(run, &["--force", "times.csv"]));
+    assert_snapshot!(of(run, &["--force", "long.csv", "--base", "base.csv"]));
+    assert_snapshot!(of("runs/linear-mass", &["--force", "long.csv"]));
+    assert_snapshot!(of(run, &["--force", "long.csv", "--channel", "acc"]));
+    assert_snapshot!(of(run, &["--initial", "1,0", "--channel", "velocity"]));
+    assert_snapshot!(of(run, &["--forse", "long.csv"]));
+    bench.write("far.csv", "t_s,f_N\n0,1\n1e7,1\n2e7,1\n3e7,1\n");
+    assert_snapshot!(of(run, &["--force", "far.csv"]));
+    let parameters = bench.read("runs/friction/parameters.json");
+    bench.write(
+        "runs/friction/parameters.json",
+        &parameters.replacen("\"name\": \"damping\"", "\"name\": \"dumping\"", 1),
+    );
+    assert_snapshot!(of(run, &["--force", "data/friction.csv"]));
+}

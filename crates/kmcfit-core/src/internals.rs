@@ -3,13 +3,13 @@
 
 pub mod assessment {
     pub use crate::assessment::{
-        BEYOND_SIGMA, BasisTest, CoarseBasis, Draw, EXACT, EquationErrorIntervals, Estimate,
-        EstimateErrors, EstimateStatus, FitAssessment, FitStatistics, FitWarning, FunctionInGap,
-        FunctionSummary, GapAssessment, GapStatus, NoDraws, NoIntervals, POOR, Plausibility,
-        RECOVERY_TOLERANCE, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
-        VerdictLevel, VerdictReason, constant_probability, diagnostics, draws, estimates,
-        function_summaries, is_same_truth, outliers, pattern, standard_error, verdict_level,
-        verdict_reasons,
+        AmplitudeRival, BEYOND_SIGMA, BasisTest, CoarseBasis, Draw, EXACT, EquationErrorIntervals,
+        Estimate, EstimateErrors, EstimateStatus, FitAssessment, FitStatistics, FitWarning,
+        FunctionInGap, FunctionSummary, GapAssessment, GapStatus, NoDraws, NoIntervals, POOR,
+        Plausibility, RECOVERY_TOLERANCE, ResidualPattern, Roughness, StepCheck, TruthErrors,
+        Unidentified, VerdictLevel, VerdictReason, constant_probability, diagnostics, draws,
+        estimates, function_summaries, is_same_truth, outliers, pattern, standard_error,
+        verdict_level, verdict_reasons,
     };
 }
 pub mod builder {
@@ -34,8 +34,9 @@ pub mod diagnostics {
 }
 pub mod functions {
     pub use crate::functions::{
-        Basis, CoefficientFunction, CoefficientKind, Design, Gram, Parameterization, Penalty,
-        Prior, Ratios, ScalarParameter, ScalarValue, TotalVariation, WeightRule, basis,
+        Basis, CoefficientFunction, CoefficientKind, CoefficientSet, Design, Gram,
+        Parameterization, Penalty, Prior, Ratios, ScalarParameter, ScalarValue, TotalVariation,
+        WeightRule, basis,
     };
 }
 pub mod host {
@@ -64,8 +65,8 @@ pub mod qp {
 }
 pub mod noise {
     pub use crate::noise::{
-        Correlation, CorrelationLaw, KernelCovariance, automatic_bandwidth, kernel_sum,
-        quadratic_spectral,
+        Autoregression, Correlation, CorrelationLaw, KernelCovariance, automatic_bandwidth,
+        kernel_sum, quadratic_spectral,
     };
 }
 pub mod number_format {
@@ -105,15 +106,15 @@ pub mod solvers {
         choose_weight_watched, cycles, equation_balance, equation_error, equation_rows,
         estimate_states, fit, fit_from, fit_on_reduced_widths, fit_on_refined_grids,
         fit_with_noise, fit_with_noise_watched, missing_terms, no_response, number_or_nan,
-        predict_validation, timed,
+        predict_validation, stored_fit, timed,
     };
 }
 pub mod study {
     pub use crate::study::{
-        Choice, EquivalentSystem, Linear, PredictedResponse, PredictionSummary, Profile,
-        ProfileSettings, Target, bootstrap, constancy_test, equivalent_coefficients,
-        equivalent_systems, extremes, multistart, predict, prediction, profile, profile_likelihood,
-        profiles,
+        Choice, EquivalentSystem, IdentifiedSystem, Linear, PredictedChannel, PredictedResponse,
+        PredictionSummary, Profile, ProfileSettings, ReferenceValues, Target, bootstrap,
+        constancy_test, equivalent_coefficients, equivalent_systems, extremes, multistart, predict,
+        prediction, profile, profile_likelihood, profiles,
     };
 }
 pub mod system {

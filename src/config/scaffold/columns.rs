@@ -113,6 +113,30 @@ pub struct ColumnAssignment {
 
 impl ColumnAssignment {
     pub fn of(table: &Table, sample_rate: Option<f64>) -> Result<Self, InputError> {
+        let mut columns = Self::known(table, sample_rate)?;
+        if columns.channels().next().is_none() {
+            columns.guess(table)?;
+        }
+        columns.check_units(table)?;
+        Ok(columns)
+    }
+
+    /// The columns with recognised names or units and the column of times; none of them need be a channel.
+    pub fn without_guess(table: &Table) -> Result<Self, InputError> {
+        let columns = Self::known(table, None)?;
+        columns.check_units(table)?;
+        Ok(columns)
+    }
+
+    fn check_units(&self, table: &Table) -> Result<(), InputError> {
+        for column in &self.used {
+            let correct = |error: InputError| error.hint("correct one of them in the file");
+            table.check_stated_unit(column.index).map_err(correct)?;
+        }
+        Ok(())
+    }
+
+    fn known(table: &Table, sample_rate: Option<f64>) -> Result<Self, InputError> {
         let mut numeric = Vec::new();
         for i in 0..table.width() {
             match table.samples(i) {
@@ -144,13 +168,6 @@ impl ColumnAssignment {
                 Some(column) if column.role != Role::Time => columns.take(table, column)?,
                 _ => columns.unused.push(index),
             }
-        }
-        if columns.channels().next().is_none() {
-            columns.guess(table)?;
-        }
-        for column in &columns.used {
-            let correct = |error: InputError| error.hint("correct one of them in the file");
-            table.check_stated_unit(column.index).map_err(correct)?;
         }
         Ok(columns)
     }

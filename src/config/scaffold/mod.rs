@@ -10,7 +10,7 @@ use crate::error::InputError;
 use crate::memory;
 use crate::number_format::significant;
 use crate::tables::Table;
-use columns::{ColumnAssignment, Role};
+pub(super) use columns::{ColumnAssignment, Role};
 use record_summary::RecordSummary;
 use std::path::Path;
 

@@ -117,10 +117,22 @@ fn overlay(figure: Figure, runs: &[ComparedRun], curves: &[Curve]) -> Figure {
         let thick = Style::new(Colour::Grey).width(5.0);
         let truths = truths.iter().zip(&real);
         let truths = truths.map(|((label, run, _), y)| Mark::line(label, &run.times(), y, thick));
+        let bands = runs.iter().enumerate().filter_map(|(i, run)| {
+            let [low, high] = run.finished.band(band_name(label))?;
+            let caption = format!("{} 95 %", run.name);
+            let is_finite = low.iter().chain(&high).all(|x| x.is_finite());
+            is_finite.then(|| Mark::band(caption, &run.times(), &low, &high, Colour::nth(i)))
+        });
+        let bands: Vec<Mark> = bands.collect();
         let found = runs.iter().zip(&found).enumerate();
         let found = found.map(|(i, (run, y))| Mark::line(&run.name, &run.times(), y, style(i)));
-        panel.marks(truths).marks(found)
+        panel.marks(bands).marks(truths).marks(found)
     }))
+}
+
+/// Name of the band of a curve: `mass` of `mass m`.
+fn band_name(label: &str) -> &str {
+    label.split(' ').next().unwrap_or(label)
 }
 
 /// Share of the nodes, at either end of the sorted values of a run, that can be spikes.

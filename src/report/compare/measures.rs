@@ -1,11 +1,12 @@
 //! Compared quantities of one run.
 
+use super::likelihood::Likelihood;
 use super::run::ComparedRun;
 use super::verdict::{ResponseFit, verdict};
 use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::document::Prediction;
-use kmcfit_core::internals::assessment::{RECOVERY_TOLERANCE, Roughness, TruthErrors};
+use kmcfit_core::internals::assessment::{Estimate, RECOVERY_TOLERANCE, Roughness, TruthErrors};
 use kmcfit_core::internals::solvers::Status;
 use serde::Serialize;
 
@@ -39,6 +40,16 @@ pub struct Measures {
     pub misfit_unit: &'static str,
     /// Smallest fit of a channel, per cent; `null` if no channel has one.
     pub worst_fit: Option<f64>,
+    /// Likelihood and criteria; `null` without a likelihood.
+    pub likelihood: Option<Likelihood>,
+    /// BIC minus that of the best run; `null` without a likelihood, and where the runs have different records.
+    pub bic_difference: Option<f64>,
+    /// Smallest fit of a channel of the validation records, per cent; `null` without any.
+    pub validation_fit: Option<f64>,
+    /// Natural frequency, Hz.
+    pub natural_frequency: Option<Estimate>,
+    /// Damping ratio.
+    pub damping_ratio: Option<Estimate>,
     /// True if the displacement is an angle; kg, N and m then denote kg m², N m and rad.
     pub is_rotation: bool,
     /// True if `J/J0` is meaningful: not if sigma was estimated.
@@ -97,6 +108,14 @@ impl Measures {
                 (CostKind::Integral | CostKind::Mixed, true) => "rad^2 s",
             },
             worst_fit: document.worst_fit(),
+            likelihood: Likelihood::of(document),
+            bic_difference: None,
+            validation_fit: (document.validation.iter().flat_map(|v| &v.channels))
+                .map(|c| c.fit_percent)
+                .filter(|fit| fit.is_finite())
+                .reduce(f64::min),
+            natural_frequency: document.estimates.get("natural_frequency").cloned(),
+            damping_ratio: document.estimates.get("damping_ratio").cloned(),
             is_rotation: document.is_rotation(),
             has_ratio: document.has_ratio(),
             cost_ratio: document.cost.ratio,

@@ -5,13 +5,16 @@
 
 mod conclusions;
 mod figures;
+mod likelihood;
 mod measures;
 mod page;
 mod run;
+mod selection;
 mod table;
 mod text;
 mod verdict;
 
+pub use likelihood::{Likelihood, LikelihoodRatio};
 pub use measures::Measures;
 pub use run::{ComparedRun, MatchedResponse};
 
@@ -39,6 +42,7 @@ const FORMAT: u32 = 1;
 pub struct Comparison {
     runs: Vec<ComparedRun>,
     measures: Vec<Measures>,
+    likelihood_ratios: Vec<LikelihoodRatio>,
     left_out: Vec<LeftOut>,
     sequence: Option<String>,
 }
@@ -61,6 +65,9 @@ pub struct ComparisonDocument<'a> {
     pub version: &'static str,
     /// The runs in the order of the arguments.
     pub runs: &'a [Measures],
+    /// Likelihood-ratio tests of the runs that another one contains.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    pub likelihood_ratios: &'a [LikelihoodRatio],
     /// The runs without a result.
     pub left_out: &'a [LeftOut],
 }
@@ -68,9 +75,23 @@ pub struct ComparisonDocument<'a> {
 impl Comparison {
     /// The comparison of these runs.
     pub fn new(runs: Vec<ComparedRun>, left_out: Vec<LeftOut>) -> Self {
+        let mut measures: Vec<Measures> = runs.iter().map(Measures::of).collect();
+        let is_same =
+            (runs.first()).is_some_and(|first| runs.iter().all(|run| run.has_records_of(first)));
+        let mut likelihood_ratios = Vec::new();
+        if is_same {
+            let bic = |m: &Measures| m.likelihood.map(|l| l.bic);
+            let best = measures.iter().filter_map(bic).reduce(f64::min);
+            for m in &mut measures {
+                m.bic_difference = bic(m).zip(best).map(|(bic, best)| bic - best);
+            }
+            let likelihoods: Vec<_> = measures.iter().map(|m| m.likelihood).collect();
+            likelihood_ratios = likelihood::likelihood_ratios(&runs, &likelihoods);
+        }
         Self {
-            measures: runs.iter().map(Measures::of).collect(),
+            measures,
             runs,
+            likelihood_ratios,
             left_out,
             sequence: None,
         }
@@ -114,6 +135,7 @@ impl Comparison {
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION"),
             runs: &self.measures,
+            likelihood_ratios: &self.likelihood_ratios,
             left_out: &self.left_out,
         }
     }

@@ -3,6 +3,7 @@
 use super::conclusions::conclusions;
 use super::figures::{self, style};
 use super::measures::Measures;
+use super::selection;
 use super::table::{QuantityRow, known_rows};
 use super::{CLOSE, Comparison, MATCHED};
 use crate::report::chart::{Style, sample};
@@ -35,6 +36,11 @@ pub(super) fn page(comparison: &Comparison) -> String {
             escape(&left_out.name),
             prose(&left_out.reason)
         );
+    }
+    let sentences = selection::sentences(comparison);
+    if !sentences.is_empty() {
+        body += "<h2>Model selection</h2>\n";
+        body += &shell::list(&sentences);
     }
     body += "<h2>Table</h2>\n";
     body += &table(&comparison.measures);

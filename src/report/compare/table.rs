@@ -1,9 +1,10 @@
 //! Table of a comparison: one row for each quantity, one cell for each run, for terminal, CSV and page.
 
 use super::ROUNDING;
+use super::likelihood::Likelihood;
 use super::measures::Measures;
 use crate::report::document::Prediction;
-use kmcfit_core::internals::assessment::TruthErrors;
+use kmcfit_core::internals::assessment::{Estimate, TruthErrors};
 
 /// One quantity of all runs.
 #[derive(Debug, Clone, PartialEq)]
@@ -134,6 +135,32 @@ fn rows(runs: &[Measures]) -> Vec<QuantityRow> {
     t.add(worst, "worst_fit_percent", |m| (m.worst_fit,));
     let ratio = |m: &Measures| (m.has_ratio.then_some(m.cost_ratio),);
     t.add("J/J0", "cost_ratio", ratio);
+    t.add("validation fit (%)", "validation_fit_percent", |m| {
+        (m.validation_fit,)
+    });
+    let likelihood =
+        |of: fn(&Likelihood) -> f64| move |m: &Measures| (m.likelihood.as_ref().map(of),);
+    t.add(
+        "log-likelihood",
+        "log_likelihood",
+        likelihood(|l| l.log_likelihood),
+    );
+    t.add("AICc", "aicc", likelihood(|l| l.aicc));
+    t.add("BIC", "bic", likelihood(|l| l.bic));
+    t.add("BIC - best", "bic_difference", |m| (m.bic_difference,));
+    let hertz = ["Hz", "Hz"];
+    let value = |e: &Option<Estimate>| e.as_ref().map(|e| e.value);
+    let half = |e: &Option<Estimate>| e.as_ref()?.ci95.map(|[low, high]| 0.5 * (high - low));
+    t.add_in(hertz, "f_n", "natural_frequency", |m| {
+        value(&m.natural_frequency)
+    });
+    t.add_in(hertz, "  +- (95 %)", "natural_frequency_half_width", |m| {
+        half(&m.natural_frequency)
+    });
+    t.add("zeta", "damping_ratio", |m| (value(&m.damping_ratio),));
+    t.add("  +- (95 %)", "damping_ratio_half_width", |m| {
+        (half(&m.damping_ratio),)
+    });
     t.add("iterations", "iterations", |m| m.iterations);
     t.add_in(["s", "s"], "time", "seconds", |m| m.seconds);
     let (mass, damping, stiffness) = (units.mass, units.damping, units.stiffness);

@@ -1,6 +1,7 @@
 //! A comparison as text for the terminal.
 
 use super::Comparison;
+use super::selection;
 use super::table::{QuantityRow, known_rows};
 use crate::report::text::clean;
 use std::fmt::Write;
@@ -14,6 +15,13 @@ pub(super) fn text(comparison: &Comparison) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
     let _ = write_runs(&mut text, comparison);
+    let selection = selection::table(&comparison.measures);
+    if !selection.is_empty() {
+        let _ = write!(text, "\n{}\n", plain_lines(&selection));
+        for sentence in selection::sentences(comparison) {
+            let _ = writeln!(text, "{}", plain(&sentence));
+        }
+    }
     let names: Vec<String> = (comparison.measures.iter())
         .map(|m| plain(&m.name))
         .collect();
@@ -39,6 +47,11 @@ fn write_runs(text: &mut String, comparison: &Comparison) -> std::fmt::Result {
 /// One line without control characters.
 fn plain(text: &str) -> String {
     clean(text).replace(['\n', '\t'], " ")
+}
+
+/// Lines without control characters.
+fn plain_lines(text: &str) -> String {
+    text.lines().map(|line| plain(line) + "\n").collect()
 }
 
 fn write_table(text: &mut String, names: &[String], rows: &[QuantityRow]) -> std::fmt::Result {

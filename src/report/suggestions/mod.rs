@@ -98,6 +98,8 @@ pub enum Suggestion {
         /// Start value, in its SI unit.
         start: f64,
     },
+    /// A record at a second amplitude, which separates a dependence on time from one on the amplitude.
+    SecondAmplitude,
     /// The offset of a sensor whose residuals have a mean.
     EstimateOffset {
         /// Kind of the channel.
@@ -165,6 +167,9 @@ fn typed(document: &ResultDocument) -> Vec<Suggestion> {
     steps.extend(about_steps(document));
     steps.extend(about_means(document));
     steps.extend(about_terms(document));
+    let warnings = &document.identifiability.warnings;
+    let has_rival = warnings.iter().any(|w| w.kind == "time_or_amplitude");
+    steps.extend(has_rival.then_some(Suggestion::SecondAmplitude));
     steps.extend(about_inputs(document));
     steps.extend(about_friction(document));
     steps.extend(about_bases(document).or_else(|| about_residuals(document)));

@@ -82,6 +82,9 @@ impl fmt::Display for Suggestion {
                     significant(*start, 3)
                 )
             }
+            Suggestion::SecondAmplitude => f.write_str(
+                "measure a record at a second amplitude (half or twice) and fit both: it shows whether the coefficients depend on time or on amplitude",
+            ),
             Suggestion::EstimateOffset {
                 channel,
                 experiment,

@@ -13,6 +13,7 @@ mod plausibility;
 mod recovery;
 mod refinement;
 mod residual_mean;
+mod rivals;
 mod score_tests;
 mod statistics;
 mod step_check;
@@ -29,17 +30,19 @@ pub use gaps::{FunctionInGap, GapAssessment, GapStatus};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
 pub use recovery::{RECOVERY_TOLERANCE, Roughness, TruthErrors, is_same_truth};
 pub use refinement::{BasisTest, CoarseBasis};
+pub use rivals::AmplitudeRival;
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
 pub use verdict::{VerdictLevel, VerdictReason, verdict_level, verdict_reasons};
 
 use friction_width::width_warning;
 use gaps::gap_assessments;
+use rivals::amplitude_rival;
 use score_tests::missing_term;
 
 use crate::identifiability::{
     BandSettings, Bands, FunctionClassification, classify_functions, condition_on_bases,
-    condition_on_inputs, except_gap,
+    condition_on_inputs, condition_on_time, except_gap,
 };
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::{Fit, Status};
@@ -138,16 +141,22 @@ impl FitAssessment {
                     &bands,
                 );
             }
+            if !problem.penalties.is_empty() {
+                assessment.effective_parameters = problem.effective_parameters(theta, evaluation);
+            }
+            let effective = assessment.effective_parameters.as_deref();
+            let covariance = bands.covariance.as_ref().filter(|_| tests_bases);
+            let rival = amplitude_rival(problem, theta, evaluation, covariance, effective);
+            if let Some(rival) = rival {
+                condition_on_time(problem, &mut assessment.classifications, &rival.indices);
+                (assessment.plausibility.warnings).push(FitWarning::TimeOrAmplitude(rival));
+            }
             let warnings = test.coarse.into_iter().map(FitWarning::CoarseBasis);
             assessment.plausibility.warnings.extend(warnings);
             assessment
                 .degrees_of_freedom
                 .clone_from(&bands.degrees_of_freedom);
             assessment.covariance = bands.covariance.clone();
-            if !problem.penalties.is_empty() {
-                assessment.effective_parameters =
-                    problem.effective_parameters(&best.parameters, &best.evaluation);
-            }
             assessment.bands = Some(bands);
         } else if few {
             gaps = gap_assessments(problem, fit, None);

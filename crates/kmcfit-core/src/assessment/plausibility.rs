@@ -4,6 +4,7 @@ use super::gaps::GapAssessment;
 use super::input_disturbance::input_warnings;
 use super::refinement::CoarseBasis;
 use super::residual_mean::mean_warnings;
+use super::rivals::AmplitudeRival;
 use super::statistics::{FitStatistics, statistics};
 use super::step_check::{StepCheckOutcome, step_check};
 use crate::diagnostics::rms;
@@ -122,6 +123,8 @@ pub enum FitWarning {
     },
     /// The residuals of the equation of motion show a term that the model does not have.
     MissingTerm(MissingTerm),
+    /// Constants and terms that depend on the amplitude explain the samples as well as functions that vary with time.
+    TimeOrAmplitude(AmplitudeRival),
     /// The residuals of a channel have a mean: an offset of its sensor, or a static force.
     ResidualMean {
         /// Name of the experiment.

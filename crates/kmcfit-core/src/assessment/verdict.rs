@@ -7,6 +7,7 @@
 use super::FitAssessment;
 use super::gaps::{GapAssessment, GapStatus};
 use super::plausibility::{FitWarning, Unidentified};
+use super::rivals::AmplitudeRival;
 use crate::functions::CoefficientKind;
 use crate::identifiability::{
     Classification, FunctionClassification, ScaleSource, scale_source, structural_rank,
@@ -65,6 +66,8 @@ pub enum VerdictReason {
     },
     /// The residuals show a term that the model does not have.
     MissingTerm(MissingTerm),
+    /// Functions that vary with time, or constants and terms that depend on the amplitude.
+    TimeOrAmplitude(AmplitudeRival),
     /// The residuals of a channel have a mean.
     ResidualMean {
         /// Name of the experiment.
@@ -253,6 +256,7 @@ fn of_warning(problem: &Problem, fit: &Fit, warning: &FitWarning) -> Option<Verd
             input: *input,
         },
         FitWarning::MissingTerm(term) => VerdictReason::MissingTerm(*term),
+        FitWarning::TimeOrAmplitude(rival) => VerdictReason::TimeOrAmplitude(rival.clone()),
         FitWarning::ResidualMean {
             experiment,
             channel,

@@ -26,6 +26,7 @@ pub use ratios::Ratios;
 pub use scalar::{Prior, ScalarParameter, ScalarValue};
 pub use total_variation::TotalVariation;
 
+use crate::rows::Rows;
 use crate::system::Grid;
 
 /// One coefficient function with its start.
@@ -131,6 +132,40 @@ impl CoefficientFunction {
         match &self.owner {
             None => format!("{part}{}", self.quantity.name()),
             Some(owner) => format!("{part}{} of {owner}", self.quantity.name()),
+        }
+    }
+
+    /// The function on another grid: linear between the nodes of `from`, constant beyond its ends.
+    #[must_use]
+    pub fn resampled(&self, from: &Grid, to: &Grid) -> Self {
+        let last = from.nodes() - 1;
+        let place = |i: usize| {
+            let x = (to.time(i) - from.start()) / from.step();
+            let x = x.clamp(0.0, last as f64);
+            let step = (x as usize).min(last - 1);
+            (step, x - step as f64)
+        };
+        let offset = (0..to.nodes()).map(place).map(|(step, x)| {
+            let [left, right] = [self.offset[step], self.offset[step + 1]];
+            left * (1.0 - x) + right * x
+        });
+        let design = match &self.design {
+            Design::Empty => Design::Empty,
+            Design::Constant { .. } => Design::Constant { nodes: to.nodes() },
+            Design::Identity | Design::Sparse(_) => {
+                let mut rows = Rows::of_width(self.parameters());
+                for (step, x) in (0..to.nodes()).map(place) {
+                    let left = self.design.row(step).map(|(j, b)| (j, (1.0 - x) * b));
+                    let right = self.design.row(step + 1).map(|(j, b)| (j, x * b));
+                    rows.push(left.chain(right), 0.0);
+                }
+                Design::Sparse(rows)
+            }
+        };
+        Self {
+            offset: offset.collect(),
+            design,
+            ..self.clone()
         }
     }
 

@@ -83,6 +83,8 @@ pub enum Condition {
     NegligibleNoise,
     /// The number and the times of the jumps found.
     Jumps,
+    /// A dependence on time: one on the amplitude explains the samples as well.
+    Time,
 }
 
 /// Kind of a [`Classification`].
@@ -153,6 +155,9 @@ impl Condition {
             Self::Jumps => format!(
                 "{name} is identified conditionally on the number and times of the jumps: {half}; the interval excludes their uncertainty"
             ),
+            Self::Time => format!(
+                "{name} is identified conditionally on a dependence on time: {half}; one on the amplitude explains the samples as well"
+            ),
             Self::NegligibleNoise => format!(
                 "{name} is identified conditionally on negligible noise of the measured response: {half}"
             ),
@@ -178,6 +183,17 @@ pub(crate) fn condition_on_bases(
 ) {
     for classification in of_functions(problem, classifications, coarse) {
         classification.depends_on(Condition::Basis);
+    }
+}
+
+/// Makes the identified functions `varying`, and the ratios with them, conditional on a dependence on time.
+pub(crate) fn condition_on_time(
+    problem: &Problem,
+    classifications: &mut [FunctionClassification],
+    varying: &[usize],
+) {
+    for classification in of_functions(problem, classifications, varying) {
+        classification.depends_on(Condition::Time);
     }
 }
 

@@ -48,6 +48,11 @@ pub fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
     !unpenalised.is_regularised() && !has_active_rows(problem, theta)
 }
 
+/// True if an equality constraint holds the parameters, which the covariance of the estimates takes into account.
+pub(crate) fn has_equality_rows(problem: &Problem, theta: &[f64]) -> bool {
+    (active::active_rows(problem, theta).iter()).any(|row| row.equality)
+}
+
 /// True if some constraint holds with equality at a point.
 pub(crate) fn has_active_rows(problem: &Problem, theta: &[f64]) -> bool {
     !active::active_rows(problem, theta).is_empty()
@@ -60,7 +65,8 @@ pub use classification::{
     Classification, ClassificationKind, Condition, FunctionClassification, classify_functions,
 };
 pub(crate) use classification::{
-    IDENTIFIED, condition_on_bases, condition_on_inputs, condition_on_negligible_noise, except_gap,
+    IDENTIFIED, condition_on_bases, condition_on_inputs, condition_on_negligible_noise,
+    condition_on_time, except_gap,
 };
 pub(crate) use columns::stacked;
 pub use covariance_kind::CovarianceKind;
@@ -72,4 +78,5 @@ pub(crate) use factorisation::Factorisation;
 pub use scale_source::{ScaleSource, scale_source};
 pub use scaling_ambiguity::ScalingAmbiguity;
 pub use sensitivity::{ResolvedDirection, Sensitivity, SingularSpectrum};
+pub(crate) use step_error::step_error;
 pub use structural_rank::{RankFinding, RankFindingKind, ScaleFreedom, structural_rank};

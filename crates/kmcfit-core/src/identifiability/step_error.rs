@@ -20,7 +20,7 @@ const SAME_STEPS: f64 = 1e-6;
 
 /// Weighted and whitened discretisation error of all predictions, in the rows of [`Sensitivity`](super::Sensitivity) with the roots
 /// `roots`; `None` where half the step cannot be simulated or the samples were simulated with the same steps.
-pub(super) fn step_error(
+pub(crate) fn step_error(
     problem: &Problem,
     evaluation: &Evaluation,
     roots: &[f64],

@@ -12,7 +12,7 @@ use crate::system::{Excitation, State};
 use nalgebra::{DMatrix, DVector};
 
 /// Half-width of the 95 % interval of a normal variable, in standard deviations.
-const Z_95: f64 = 1.959_963_984_540_054;
+pub(super) const Z_95: f64 = 1.959_963_984_540_054;
 
 /// Initial state and excitation of a prediction.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,6 +7,7 @@ mod bootstrap;
 mod constancy_test;
 mod equivalent;
 mod extremes;
+mod forced;
 mod multistart;
 mod prediction;
 mod problems;

@@ -18,6 +18,7 @@ mod rows;
 
 pub use balance::{EquationBalance, EquationPart, EquationShare, equation_balance};
 pub use equation::EquationForm;
+pub(crate) use fit::at as equation_error_at;
 pub(in crate::solvers) use fit::fit;
 pub use measured::Measurements;
 pub(crate) use missing_terms::TESTED_TERMS;

@@ -1,0 +1,398 @@
+//! Predictions of a fitted system under a new excitation: table, figure, CSV and JSON.
+
+mod identified;
+
+use super::chart::{Colour, Figure, Mark, Panel, Style};
+use super::csv::CsvTable;
+use super::run_reader::Run;
+use crate::config::NewRecord;
+use crate::error::InputError;
+use crate::number_format::significant;
+use identified::{SystemOfRun, system_of};
+use kmcfit_core::internals::diagnostics::{rms, standard_deviation};
+use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Input, Weighting};
+use kmcfit_core::internals::study::PredictedChannel;
+use kmcfit_core::internals::system::{Grid, InputSample, State};
+use serde::Serialize;
+
+/// Most nodes of a prediction.
+const MOST_NODES: usize = 5_000_000;
+
+/// Responses to one excitation from several initial states.
+pub struct ForcedPredictions {
+    cases: Vec<Case>,
+    is_rotation: bool,
+}
+
+/// Response from one initial state.
+struct Case {
+    initial: State,
+    channels: Vec<PredictedChannel>,
+    is_measured: Vec<bool>,
+}
+
+/// Key numbers of one predicted channel; for a rotation in rad in place of m.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ForcedSummary {
+    /// Initial displacement, m.
+    pub displacement: f64,
+    /// Initial velocity, m/s.
+    pub velocity: f64,
+    /// `displacement` or `velocity`, relative to the base, or the absolute `acceleration`.
+    pub channel: &'static str,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Number of predicted samples.
+    pub samples: usize,
+    /// Largest absolute value.
+    pub largest: f64,
+    /// Largest half-width of the 95 % band by the errors of the parameters; `null` without a covariance.
+    pub half_width: Option<f64>,
+    /// Standard deviation of the noise of a sample, where the run has this channel with a sigma.
+    pub sigma: Option<f64>,
+    /// Comparison with the measurements of the file, if any.
+    pub score: Option<Score>,
+}
+
+/// Comparison of a prediction with measurements.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Score {
+    /// Root-mean-square residual.
+    pub rms_residual: f64,
+    /// `100 (1 - |residual| / |sample - mean|)`.
+    pub fit_percent: f64,
+    /// Share of the samples within their 95 % band, noise included; `null` without covariance or sigma.
+    pub within_band: Option<f64>,
+}
+
+impl ForcedPredictions {
+    /// Predicts the channels `kinds` (those measured in the files, or the first of the run, where empty) of a run under the inputs of
+    /// `record` from each of the states.
+    ///
+    /// # Errors
+    /// If `parameters.json` is missing or damaged, the coefficients are not identified over the times of the inputs, or the grid is too
+    /// long; a numerical failure of the simulation is the inner result.
+    pub fn of(
+        run: &Run,
+        record: &NewRecord,
+        states: &[State],
+        kinds: &[ChannelKind],
+    ) -> Result<Result<Self, String>, InputError> {
+        let system = system_of(run)?;
+        let grid = grid(run, &system, record)?;
+        let mut cases = Vec::new();
+        for state in states {
+            let (experiment, is_measured) = experiment(&system, record, *state, kinds, &grid);
+            let sigmas: Vec<Option<f64>> = (experiment.channels.iter())
+                .map(|channel| system.sigma(channel.kind()))
+                .collect();
+            let Some(problem) = system.identified.problem(grid, experiment) else {
+                return Err(InputError::file(
+                    run.folder.join("parameters.json"),
+                    "the parameters do not describe the system of the run",
+                )
+                .found("other functions than terms")
+                .expected("the parameters of this run"));
+            };
+            match system.identified.predict(&problem, &sigmas) {
+                Err(breakdown) => return Ok(Err(format!("no response: {breakdown}"))),
+                Ok(channels) => cases.push(Case {
+                    initial: *state,
+                    channels,
+                    is_measured,
+                }),
+            }
+        }
+        Ok(Ok(Self {
+            cases,
+            is_rotation: run.document.is_rotation(),
+        }))
+    }
+
+    /// Key numbers of all channels.
+    pub fn summaries(&self) -> Vec<ForcedSummary> {
+        let each = self.cases.iter().flat_map(|case| {
+            let channels = case.channels.iter().zip(&case.is_measured);
+            channels.map(|(channel, is_measured)| self.summary(case.initial, channel, *is_measured))
+        });
+        each.collect()
+    }
+
+    fn summary(
+        &self,
+        initial: State,
+        channel: &PredictedChannel,
+        is_measured: bool,
+    ) -> ForcedSummary {
+        let largest = |values: &[f64]| values.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        let halves = channel.band().map(|band| {
+            let halves: Vec<f64> = band.iter().map(|[low, high]| 0.5 * (high - low)).collect();
+            largest(&halves)
+        });
+        ForcedSummary {
+            displacement: initial.displacement,
+            velocity: initial.velocity,
+            channel: channel.channel.kind().name(),
+            unit: channel.channel.kind().unit_of(self.is_rotation),
+            samples: channel.values.len(),
+            largest: largest(&channel.values),
+            half_width: halves,
+            sigma: channel.sigma,
+            score: is_measured.then(|| {
+                let residuals: Vec<f64> = channel.channel.residuals(&channel.values).collect();
+                let spread = standard_deviation(channel.channel.observed());
+                Score {
+                    rms_residual: rms(&residuals),
+                    fit_percent: 100.0 * (1.0 - rms(&residuals) / spread),
+                    within_band: channel.share_within(),
+                }
+            }),
+        }
+    }
+
+    /// The key numbers as a table.
+    pub fn table(&self) -> String {
+        let summaries = self.summaries();
+        let has_score = summaries.iter().any(|s| s.score.is_some());
+        let mut rows = vec![
+            [
+                "y(0)",
+                "v(0)",
+                "channel",
+                "unit",
+                "peak",
+                "95 % band",
+                "sigma",
+            ]
+            .map(String::from)
+            .to_vec(),
+        ];
+        if has_score {
+            rows[0].extend(["rms residual", "fit", "within band"].map(String::from));
+        }
+        let shown = |x: Option<f64>| x.map_or("unknown".to_owned(), |x| significant(x, 4));
+        for s in &summaries {
+            let mut row = vec![
+                significant(s.displacement, 6),
+                significant(s.velocity, 6),
+                s.channel.to_owned(),
+                s.unit.to_owned(),
+                significant(s.largest, 4),
+                s.half_width
+                    .map_or("unknown".into(), |x| format!("+- {}", significant(x, 2))),
+                shown(s.sigma),
+            ];
+            if let Some(score) = &s.score {
+                row.push(significant(score.rms_residual, 4));
+                row.push(format!("{:.1} %", score.fit_percent));
+                let within = score
+                    .within_band
+                    .map(|share| format!("{:.1} %", 100.0 * share));
+                row.push(within.unwrap_or_else(|| "unknown".into()));
+            }
+            rows.push(row);
+        }
+        aligned(&rows)
+    }
+
+    /// All curves: times, predictions, bands and measurements of each channel and initial state.
+    pub fn csv(&self) -> CsvTable {
+        let mut table = CsvTable::new();
+        let mut times: Option<&[f64]> = None;
+        for (i, case) in self.cases.iter().enumerate() {
+            for (channel, is_measured) in case.channels.iter().zip(&case.is_measured) {
+                let kind = channel.channel.kind();
+                let number = match self.cases.len() {
+                    1 => String::new(),
+                    _ => format!("_{}", i + 1),
+                };
+                let own = channel.channel.times();
+                if times != Some(own) {
+                    let name = match times {
+                        None => "t_s".to_owned(),
+                        Some(_) => format!("{}_t_s{number}", kind.name()),
+                    };
+                    table = table.column(name, own.to_vec());
+                    times = Some(own);
+                }
+                let unit = kind
+                    .unit_of(self.is_rotation)
+                    .replace('/', "_per_")
+                    .replace('^', "");
+                let name = |part: &str| format!("{}{part}_{unit}{number}", kind.name());
+                table = table.column(name(""), channel.values.clone());
+                for (part, band) in [("", channel.band()), ("_sample", channel.sample_band())] {
+                    for (side, end) in ["low", "high"].iter().zip(0..2) {
+                        let values = band.iter().flatten().map(|ends| ends[end]).collect();
+                        if band.is_some() {
+                            table = table.column(name(&format!("{part}_{side}_95")), values);
+                        }
+                    }
+                }
+                if *is_measured {
+                    table = table.column(name("_measured"), channel.channel.observed().to_vec());
+                }
+            }
+        }
+        table
+    }
+
+    /// The figure: a panel for each channel and initial state.
+    pub fn figure(&self) -> Figure {
+        let panels = self.cases.iter().flat_map(|case| {
+            let channels = case.channels.iter().zip(&case.is_measured);
+            channels.map(|(channel, is_measured)| self.panel(case.initial, channel, *is_measured))
+        });
+        Figure::new(
+            "predictions",
+            "Predictions",
+            "Predicted response against time with 95 % bands: parameters, and a sample with noise.",
+        )
+        .panels(panels)
+    }
+
+    fn panel(&self, initial: State, channel: &PredictedChannel, is_measured: bool) -> Panel {
+        let kind = channel.channel.kind();
+        let t = channel.channel.times();
+        let mut panel = Panel::of_time(
+            format!("{} {}", kind.name(), kind.symbol()),
+            kind.unit_of(self.is_rotation),
+        )
+        .title(format!(
+            "from y = {}, v = {}",
+            initial.displacement, initial.velocity
+        ));
+        let bands = [
+            ("95 % of samples", channel.sample_band(), Colour::Grey),
+            ("95 % band", channel.band(), Colour::Sky),
+        ];
+        for (label, band, colour) in bands {
+            if let Some(band) = band {
+                let [low, high]: [Vec<f64>; 2] =
+                    [0, 1].map(|end| band.iter().map(|ends| ends[end]).collect());
+                panel = panel.mark(Mark::band(label, t, &low, &high, colour));
+            }
+        }
+        if is_measured {
+            let style = Style::new(Colour::Black);
+            panel = panel.mark(Mark::line("measured", t, channel.channel.observed(), style));
+        }
+        panel.mark(Mark::line(
+            "predicted",
+            t,
+            &channel.values,
+            Style::new(Colour::Vermillion),
+        ))
+    }
+}
+
+/// Columns aligned, the first two and numbers to the right.
+fn aligned(rows: &[Vec<String>]) -> String {
+    let width = |j: usize| {
+        let cells = rows.iter().filter_map(|row| row.get(j));
+        cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+    };
+    let mut text = String::new();
+    for row in rows {
+        let cells = row.iter().enumerate().map(|(j, cell)| {
+            let width = width(j);
+            format!("{cell:>width$}")
+        });
+        text += &cells.collect::<Vec<_>>().join("  ");
+        text.push('\n');
+    }
+    text
+}
+
+/// The grid of a prediction over the inputs: steps of at most those of the fit and of the samples of the inputs.
+fn grid(run: &Run, system: &SystemOfRun, record: &NewRecord) -> Result<Grid, InputError> {
+    let of_fit = &system.identified.system.grid;
+    let [from, to] = record.span;
+    let file = record.files.first().cloned().unwrap_or_default();
+    let (start, end) = (of_fit.start(), of_fit.start() + of_fit.duration());
+    let slack = of_fit.step();
+    if !system.identified.is_constant() && (from < start - slack || to > end + slack) {
+        return Err(InputError::file(
+            &file,
+            "the coefficients vary with time and are identified over their record only",
+        )
+        .found(format!("inputs from {from} s to {to} s"))
+        .expected(format!(
+            "times from {start} s to {end} s, those of the record of {}",
+            run.folder.display()
+        )));
+    }
+    let step = of_fit.step().min(record.spacing);
+    let nodes = ((to - from) / step).ceil() + 1.0;
+    let grid = (nodes <= MOST_NODES as f64)
+        .then(|| Grid::new(from, to - from, (nodes as usize).max(Grid::FEWEST_NODES)))
+        .flatten();
+    grid.ok_or_else(|| {
+        InputError::file(&file, "too long for the time step of the run")
+            .found(format!("{nodes} nodes with steps of {step:e} s"))
+            .expected(format!("at most {MOST_NODES} nodes"))
+    })
+}
+
+/// The record with its channels; true for those with measurements.
+fn experiment(
+    system: &SystemOfRun,
+    record: &NewRecord,
+    state: State,
+    kinds: &[ChannelKind],
+    grid: &Grid,
+) -> (Experiment, Vec<bool>) {
+    let nodes = grid.nodes();
+    let mut experiment = Experiment::free("prediction", state, nodes);
+    experiment.excitation = Some(record.input.on(grid, nodes));
+    experiment.input = record.input.clone();
+    let measured: Vec<ChannelKind> = record.measured.iter().map(|m| m.kind).collect();
+    let kinds = match (kinds, measured.as_slice()) {
+        ([], []) => vec![system.kind],
+        ([], measured) => measured.to_vec(),
+        (kinds, _) => kinds.to_vec(),
+    };
+    let mut is_measured = Vec::new();
+    for kind in kinds {
+        let samples = record.measured.iter().find(|m| m.kind == kind);
+        let weighting = Weighting::Sigma(1.0);
+        let channel = samples.and_then(|m| {
+            Channel::new(
+                kind,
+                m.times.clone(),
+                m.values.clone(),
+                weighting.clone(),
+                grid,
+                nodes,
+            )
+        });
+        is_measured.push(channel.is_some());
+        let at_nodes = || {
+            let zeros = vec![0.0; nodes];
+            Channel::new(kind, grid.times(), zeros, weighting.clone(), grid, nodes)
+        };
+        let channel = channel.or_else(at_nodes);
+        let channel = channel.map(|channel| with_inputs(channel, &record.input));
+        experiment.channels.extend(channel);
+    }
+    (experiment, is_measured)
+}
+
+/// The channel with the inputs at its samples. Accelerations are absolute, as in model files; other quantities are relative to the base.
+fn with_inputs(channel: Channel, input: &Input) -> Channel {
+    if channel.kind() != ChannelKind::Acceleration {
+        return channel;
+    }
+    let times = channel.times().to_vec();
+    let inputs = times.iter().map(|t| InputSample {
+        force: input.force_at(*t),
+        base: input.base_acceleration_at(*t),
+    });
+    let bases = times.iter().map(|t| input.base_acceleration_at(*t));
+    let bases: Vec<f64> = bases.collect();
+    let channel = channel.with_inputs_at_samples(inputs.collect());
+    match input.base.is_some() {
+        true => channel.with_base(bases),
+        false => channel,
+    }
+}

@@ -1,0 +1,47 @@
+//! Time or amplitude in words.
+
+use crate::number_format::significant;
+use crate::report::text::and_list;
+use kmcfit_core::internals::assessment::AmplitudeRival;
+use kmcfit_core::internals::functions::CoefficientKind;
+
+/// Difference of BIC beyond which the rival is favoured.
+const FAVOURED: f64 = -10.0;
+
+/// The rival as a clause: the functions that vary, the terms that depend on the amplitude, and the difference of BIC.
+pub fn rival_in_words(rival: &AmplitudeRival) -> String {
+    let terms: Vec<String> = rival
+        .terms
+        .iter()
+        .map(|term| term_in_words(*term).to_owned())
+        .collect();
+    let functions = and_list(&rival.functions);
+    let verb = match rival.functions.len() {
+        1 => "varies",
+        _ => "vary",
+    };
+    let terms = and_list(&terms);
+    let size = significant(rival.bic_difference.abs(), 2);
+    match rival.bic_difference {
+        d if d < FAVOURED => format!(
+            "{functions} {verb} with amplitude rather than time: constants with {terms} explain the samples better (BIC {size} lower)"
+        ),
+        d => format!(
+            "{functions} {verb} with time or with amplitude: constants with {terms} explain the samples as well (BIC {size} {})",
+            if d < 0.0 { "lower" } else { "higher" }
+        ),
+    }
+}
+
+/// A term with its article.
+pub fn term_in_words(term: CoefficientKind) -> &'static str {
+    match term {
+        CoefficientKind::Offset => "a static force",
+        CoefficientKind::CoulombFriction => "Coulomb friction",
+        CoefficientKind::QuadraticDamping => "quadratic damping",
+        CoefficientKind::QuadraticStiffness => "a quadratic stiffness",
+        CoefficientKind::CubicStiffness => "a cubic stiffness",
+        CoefficientKind::QuinticStiffness => "a quintic stiffness",
+        other => other.name(),
+    }
+}
