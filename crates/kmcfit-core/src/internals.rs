@@ -6,7 +6,7 @@ pub mod assessment {
         BEYOND_SIGMA, BasisTest, CoarseBasis, EXACT, EquationErrorIntervals, Estimate,
         EstimateErrors, EstimateStatus, FitAssessment, FitStatistics, FitWarning, FunctionInGap,
         FunctionSummary, GapAssessment, GapStatus, NoIntervals, POOR, Plausibility,
-        RECOVERY_TOLERANCE, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
+        RECOVERY_TOLERANCE, RecordError, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
         VerdictLevel, VerdictReason, constant_probability, diagnostics, estimates,
         function_summaries, is_same_truth, outliers, pattern, standard_error, verdict_level,
         verdict_reasons,

@@ -2,6 +2,7 @@
 
 use super::gaps::GapAssessment;
 use super::input_disturbance::input_warnings;
+use super::record_errors::RecordError;
 use super::refinement::CoarseBasis;
 use super::residual_mean::mean_warnings;
 use super::statistics::{FitStatistics, statistics};
@@ -122,6 +123,13 @@ pub enum FitWarning {
     },
     /// The residuals of the equation of motion show a term that the model does not have.
     MissingTerm(MissingTerm),
+    /// Two modes explain the samples of a record.
+    SecondMode {
+        /// Name of the experiment.
+        experiment: String,
+        /// Their natural frequencies, Hz, the stronger first.
+        frequencies: [f64; 2],
+    },
     /// The residuals of a channel have a mean: an offset of its sensor, or a static force.
     ResidualMean {
         /// Name of the experiment.
@@ -160,6 +168,9 @@ pub enum FitWarning {
         /// Name of the experiment.
         experiment: String,
     },
+    /// An error of a record explains the residuals.
+    #[serde(untagged)]
+    RecordError(RecordError),
 }
 
 /// Plausibility of a fit.

@@ -1,4 +1,5 @@
-//! Force terms that the residuals of a simulated response show and the model does not have: score tests, one for each candidate.
+//! Force terms that the residuals of a simulated response show and the model does not have, and errors of the records: score tests, one for
+//! each candidate.
 //!
 //! The equation of motion is extended by a constant coefficient `p` of each term that the model lacks, at `p = 0`, where the response is
 //! that of the fit. With the derivatives `J` of the weighted and whitened residuals `r` in the parameters of the model and `d` in `p`, and the
@@ -9,8 +10,10 @@
 //! ```
 //!
 //! is the estimate after one step of Gauss and Newton from the fit (Rao 1948). A term with a large `t` is missing if a refit with it leaves white
-//! residuals. Where the noise model does not describe the residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
+//! residuals; so are a delay, a difference of clocks and a gain, with their [own derivatives](super::record_errors). Where the noise model does not describe the residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
 
+use super::FitWarning;
+use super::record_errors::{self, RecordParameter};
 use super::refinement::applies;
 use crate::functions::{CoefficientFunction, CoefficientKind, CoefficientSet, Parameterization};
 use crate::identifiability::Factorisation;
@@ -31,52 +34,79 @@ const SIGNIFICANT: f64 = 4.5;
 /// Fit of a channel, per cent, below which a fit is not near the system, and a linearisation in further terms says nothing.
 const UNRELATED: f64 = 50.0;
 /// Smallest p-value of the test of whiteness of residuals that a missing term explains.
-const WHITE: f64 = 1e-3;
+pub(super) const WHITE: f64 = 1e-3;
+/// Number of the most significant candidates that are refitted.
+const REFITTED: usize = 3;
 /// Fewest samples per parameter.
 const SAMPLES_PER_PARAMETER: usize = 4;
 /// Part of a candidate's derivatives outside the span of the model's below which it is no candidate.
 const APART: f64 = 1e-6;
 
-/// The most significant missing term at the optimum `theta`; `None` where the residuals show none, and where the test does not apply: without a
-/// likelihood, at an active constraint, for residuals at machine precision or as large as the response, and with few samples or many
-/// parameters. `is_modelled` is true for residuals that the noise model describes.
-pub(super) fn missing_term(
+/// A candidate for what the model lacks.
+enum Candidate {
+    Term(CoefficientKind, Term),
+    Record(RecordParameter),
+}
+
+/// The most significant missing term or error of a record at the optimum `theta`; `None` where the residuals show none, and where the test
+/// does not apply: without a likelihood, at an active constraint, for residuals at machine precision or as large as the response, and with few
+/// samples or many parameters. `is_modelled` is true for residuals that the noise model describes.
+pub(super) fn missing(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
     is_modelled: bool,
-) -> Option<MissingTerm> {
+) -> Option<FitWarning> {
     let is_few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
     let is_long = problem.sample_count() >= SAMPLES_PER_PARAMETER * problem.parameters();
     (is_few && is_long && applies(problem, theta, evaluation)).then_some(())?;
-    let mut fits = (problem.predicted(evaluation))
-        .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent);
-    fits.all(|fit| fit > UNRELATED).then_some(())?;
+    (record_errors::worst_fit(problem, evaluation) > UNRELATED).then_some(())?;
     let kinds = candidates(problem, evaluation);
-    (!kinds.is_empty()).then_some(())?;
     let (extended, at) = extended(problem, theta, &kinds)?;
     let evaluation = extended.evaluate(&at).ok()?;
     let jacobian = weighted_jacobian(&extended, &evaluation);
-    let residuals = (extended.predicted(&evaluation))
-        .flat_map(|(channel, predicted)| channel.majorant(predicted).weighted);
-    let residuals = DVector::from_vec(residuals.collect());
+    let residuals = weighted_residuals(&extended, &evaluation);
     let first = problem.functions.scalar_range().start;
     let is_new = |j: &usize| (first..first + kinds.len()).contains(j);
     let own: Vec<usize> = (0..jacobian.ncols()).filter(|j| !is_new(j)).collect();
     let model = Span::of(&jacobian.select_columns(&own));
-    let tests = kinds.iter().enumerate().filter_map(|(i, (kind, term))| {
+    let terms = kinds.iter().enumerate().map(|(i, (kind, term))| {
         let column = jacobian.column(first + i).into_owned();
-        let (value, t) = model.test(&extended, &column, &residuals, is_modelled)?;
-        let share = (value * force(&evaluation, *term)).abs() / largest_force(problem, &evaluation);
-        Some(MissingTerm {
-            term: *kind,
-            value,
-            t,
-            share,
-        })
+        (Candidate::Term(*kind, *term), column)
     });
-    let best = tests.max_by(|a, b| a.t.abs().total_cmp(&b.t.abs()))?;
-    (best.t.abs() >= SIGNIFICANT && is_explained(problem, theta, &best)).then_some(best)
+    let of_records = record_errors::parameters(problem).into_iter();
+    let of_records = of_records.filter_map(|parameter| {
+        let column = record_errors::column(&extended, &evaluation, parameter)?;
+        Some((Candidate::Record(parameter), DVector::from_vec(column)))
+    });
+    let tests = terms.chain(of_records).filter_map(|(candidate, column)| {
+        let (value, t) = model.test(&extended, &column, &residuals, is_modelled)?;
+        (t.abs() >= SIGNIFICANT).then_some((candidate, value, t))
+    });
+    let mut tests: Vec<_> = tests.collect();
+    tests.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
+    tests.into_iter().take(REFITTED).find_map(|(candidate, value, t)| match candidate {
+        Candidate::Term(kind, term) => {
+            let share = (value * force(&evaluation, term)).abs() / largest_force(problem, &evaluation);
+            let missing = MissingTerm {
+                term: kind,
+                value,
+                t,
+                share,
+            };
+            is_explained(problem, theta, &missing).then_some(FitWarning::MissingTerm(missing))
+        }
+        Candidate::Record(parameter) => {
+            record_errors::small_error(problem, theta, parameter, value).map(FitWarning::RecordError)
+        }
+    })
+}
+
+/// Weighted and whitened residuals of all channels.
+fn weighted_residuals(problem: &Problem, evaluation: &Evaluation) -> DVector<f64> {
+    let each = (problem.predicted(evaluation))
+        .flat_map(|(channel, predicted)| channel.majorant(predicted).weighted);
+    DVector::from_vec(each.collect())
 }
 
 /// True if a refit with the term leaves white residuals: an error of the input, a coefficient that varies and another missing term give a large
@@ -161,11 +191,22 @@ fn extended(
 }
 
 /// Orthonormal basis of the derivatives of the model.
-struct Span {
+pub(super) struct Span {
     basis: DMatrix<f64>,
 }
 
 impl Span {
+    /// Estimate of a parameter with the derivatives `column` beside those of the model, and its ratio to the standard error.
+    pub(super) fn score(
+        problem: &Problem,
+        evaluation: &Evaluation,
+        column: Vec<f64>,
+    ) -> Option<(f64, f64)> {
+        let residuals = weighted_residuals(problem, evaluation);
+        let model = Self::of(&weighted_jacobian(problem, evaluation));
+        model.test(problem, &DVector::from_vec(column), &residuals, true)
+    }
+
     fn of(jacobian: &DMatrix<f64>) -> Self {
         let mut scaled = jacobian.clone();
         for mut column in scaled.column_iter_mut() {

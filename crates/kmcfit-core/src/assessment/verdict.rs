@@ -7,11 +7,14 @@
 use super::FitAssessment;
 use super::gaps::{GapAssessment, GapStatus};
 use super::plausibility::{FitWarning, Unidentified};
+use super::record_errors::RecordError;
 use crate::functions::CoefficientKind;
 use crate::identifiability::{
     Classification, FunctionClassification, ScaleSource, scale_source, structural_rank,
 };
 use crate::problem::Problem;
+use crate::record::Channel;
+use crate::signal::clipped;
 use crate::solvers::{Fit, MissingTerm, Status};
 use crate::system::InputQuantity;
 use serde::{Deserialize, Serialize};
@@ -154,6 +157,9 @@ pub enum VerdictReason {
     },
     /// The equation error neglects the noise of the response, which biases its estimates.
     EquationError,
+    /// An error of a record explains the residuals.
+    #[serde(untagged)]
+    RecordError(RecordError),
 }
 
 impl VerdictReason {
@@ -164,7 +170,8 @@ impl VerdictReason {
             | Self::NoSystem { .. }
             | Self::PoorFit { .. }
             | Self::BeyondSigma { .. }
-            | Self::CoarseSteps { .. } => VerdictLevel::Inadequate,
+            | Self::CoarseSteps { .. }
+            | Self::RecordError(RecordError::InputSign { .. }) => VerdictLevel::Inadequate,
             _ => VerdictLevel::Check,
         }
     }
@@ -187,18 +194,17 @@ pub fn verdict_reasons(
     reasons.extend(ending(fit.outcome.status));
     if let Some(assessment) = assessment {
         let plausibility = &assessment.plausibility;
+        // A missing term, a second mode or an error of a record explains other reasons.
+        let (causes, others): (Vec<_>, Vec<_>) = plausibility.warnings.iter().partition(is_cause);
+        let others = others.into_iter();
+        reasons.extend(causes.into_iter().filter_map(|w| of_warning(problem, fit, w)));
         match &plausibility.unidentified {
             Some(Unidentified::Failed) => {}
             Some(reason) => reasons.push(VerdictReason::NoSystem {
                 reason: reason.clone(),
             }),
             None => {
-                // A missing term explains other reasons.
-                let is_term = |w: &&FitWarning| matches!(w, FitWarning::MissingTerm(_));
-                let (terms, others): (Vec<_>, Vec<_>) =
-                    plausibility.warnings.iter().partition(is_term);
-                let warnings = terms.into_iter().chain(others);
-                reasons.extend(warnings.filter_map(|w| of_warning(problem, fit, w)));
+                reasons.extend(others.filter_map(|w| of_warning(problem, fit, w)));
                 reasons.extend(of_classifications(&assessment.classifications));
                 let is_classified = !assessment.classifications.is_empty();
                 reasons.extend(of_rank(problem, is_classified));
@@ -210,8 +216,30 @@ pub fn verdict_reasons(
     if !reasons.iter().any(is_rank) {
         reasons.extend(of_scale(problem));
     }
+    reasons.extend(saturations(problem));
     reasons.sort_by_key(|reason| std::cmp::Reverse(reason.level()));
     reasons
+}
+
+/// True for warnings that name the cause of others.
+fn is_cause(warning: &&FitWarning) -> bool {
+    matches!(
+        warning,
+        FitWarning::MissingTerm(_) | FitWarning::SecondMode { .. } | FitWarning::RecordError(_)
+    )
+}
+
+/// Channels in which many samples equal the largest one.
+fn saturations(problem: &Problem) -> Vec<VerdictReason> {
+    let is_cut = |c: &&Channel| {
+        let plain = c.before_filter();
+        plain.is_some_and(|plain| clipped(plain.observed()).is_some())
+    };
+    let each = problem.channels().filter(is_cut);
+    let each = each.map(|c| VerdictReason::Saturation {
+        channel: c.kind().name().to_owned(),
+    });
+    each.collect()
 }
 
 fn ending(status: Status) -> Option<VerdictReason> {
@@ -253,6 +281,10 @@ fn of_warning(problem: &Problem, fit: &Fit, warning: &FitWarning) -> Option<Verd
             input: *input,
         },
         FitWarning::MissingTerm(term) => VerdictReason::MissingTerm(*term),
+        FitWarning::SecondMode { frequencies, .. } => VerdictReason::SecondMode {
+            frequencies: *frequencies,
+        },
+        FitWarning::RecordError(error) => VerdictReason::RecordError(error.clone()),
         FitWarning::ResidualMean {
             experiment,
             channel,
