@@ -13,6 +13,7 @@ use kmcfit_core::internals::assessment::{
 };
 use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record, ScalarSpec};
 use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, NoiseModel, Weighting};
@@ -34,7 +35,7 @@ const SATURATED: f64 = 2.0;
 /// Coulomb friction relative to the root mean square of the spring force.
 const FRICTION: f64 = 0.05;
 /// Fall of the stiffness in a gap of two periods.
-const FALL: f64 = 0.15;
+const FALL: f64 = 0.25;
 
 /// A defect of the model or of the data.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,7 +74,9 @@ impl Case {
         let frequency = 0.5 * 40f64.powf(between(0.0, 1.0));
         let mass = 0.5 * 40f64.powf(between(0.0, 1.0));
         let ratio = between(0.01, 0.05);
-        let spacing = 1.0 / (frequency * between(12.0, 30.0));
+        // A gap of two periods holds two knots of a spline with at most 64 parameters.
+        let fewest = if kind == Kind::Gap { 20.0 } else { 12.0 };
+        let spacing = 1.0 / (frequency * between(fewest, 30.0));
         let draws = [(); 3].map(|()| between(0.0, 1.0));
         let omega = TAU * frequency;
         let can_be_free = matches!(
@@ -113,7 +116,6 @@ impl Case {
         });
         let size = |part: usize| rms(&linear.iter().map(|s| s[part]).collect::<Vec<f64>>());
         let (y0, v0) = (size(0), size(1));
-        let gap = self.gap();
         let run = |acceleration: &dyn Fn(f64, f64, f64, f64) -> f64| {
             response(self.spacing, start, force, acceleration)
         };
@@ -129,13 +131,21 @@ impl Case {
                     (f - c * v - k * y - friction * sign) / m
                 })
             }
-            Kind::Gap => run(&|t, y, v, f| {
-                let share = ((t - gap[0]) / (gap[1] - gap[0])).clamp(0.0, 1.0);
-                let smooth = share * share * (3.0 - 2.0 * share);
-                (f - c * v - k * (1.0 - FALL * smooth) * y) / m
-            }),
+            Kind::Gap => run(&|t, y, v, f| (f - c * v - self.stiffness_at(t) * y) / m),
             _ => linear,
         }
+    }
+
+    fn periods(&self) -> f64 {
+        self.frequency * self.spacing * SAMPLES as f64
+    }
+
+    /// Stiffness at a time, N/m; it falls in the gap.
+    fn stiffness_at(&self, time: f64) -> f64 {
+        let [from, to] = self.gap();
+        let share = ((time - from) / (to - from)).clamp(0.0, 1.0);
+        let smooth = share * share * (3.0 - 2.0 * share);
+        self.stiffness * (1.0 - FALL * smooth)
     }
 
     /// The gap, two periods long, s.
@@ -257,12 +267,37 @@ impl Case {
             false => CoefficientSpec::constant(0.9 * self.mass),
         };
         let stiffness = match self.kind {
-            Kind::Gap => CoefficientSpec::b_spline(40, self.stiffness),
+            Kind::Gap => CoefficientSpec::b_spline(self.periods() as usize, self.stiffness),
             _ => CoefficientSpec::constant(1.1 * self.stiffness),
         };
         let parts = [mass, CoefficientSpec::constant(0.7 * self.damping), stiffness];
         let builder = Builder::new(parts).record(record);
         (builder.nodes(2 * (SAMPLES - 1) + 1).build().unwrap(), sigma)
+    }
+
+    /// Standard deviation of the noise that a model of its correlation leaves.
+    fn innovations(&self, sigma: f64) -> f64 {
+        match self.kind {
+            Kind::Coloured => sigma * (1.0 - CORRELATION * CORRELATION).sqrt(),
+            _ => sigma,
+        }
+    }
+
+    /// Largest error of the stiffness in the gap, in the median standard error outside of it.
+    fn error_in_gap(&self, bands: Option<&Bands>, evaluation: &Evaluation) -> f64 {
+        let Some(bands) = bands else {
+            return f64::INFINITY;
+        };
+        let [from, to] = self.gap();
+        let is_inside = |t: f64| (from..to).contains(&t);
+        let errors = bands.times.iter().zip(&bands.functions[2].standard_error);
+        let mut outside: Vec<f64> = errors.filter(|(t, _)| !is_inside(**t)).map(|(_, e)| *e).collect();
+        outside.sort_by(f64::total_cmp);
+        let step = self.spacing / 2.0;
+        let stiffness = evaluation.nodal.coefficients[1].iter().enumerate();
+        let inside = stiffness.map(|(i, k)| (step * i as f64, *k)).filter(|(t, _)| is_inside(*t));
+        let most = inside.map(|(t, k)| (k - self.stiffness_at(t)).abs()).fold(0.0, f64::max);
+        most / outside[outside.len() / 2]
     }
 
     fn verdict(&self) -> Found {
@@ -285,12 +320,15 @@ impl Case {
             let [low, high] = estimate.ci95?;
             Some((estimate.value - truth).abs() / ((high - low) / (2.0 * 1.96)))
         });
-        let shift = shifts.reduce(f64::max).unwrap_or(f64::INFINITY);
+        let shift = match self.kind {
+            Kind::Gap => self.error_in_gap(assessment.bands.as_ref(), &fit.best.evaluation),
+            _ => shifts.reduce(f64::max).unwrap_or(f64::INFINITY),
+        };
         Found {
             level: verdict_level(&reasons),
             reasons,
             shift,
-            residual: residual(&problem, &fit.best.evaluation) / sigma,
+            residual: residual(&problem, &fit.best.evaluation) / self.innovations(sigma),
         }
     }
 }
@@ -306,9 +344,10 @@ fn residual(problem: &Problem, evaluation: &Evaluation) -> f64 {
 struct Found {
     level: VerdictLevel,
     reasons: Vec<VerdictReason>,
-    /// Largest error of mass, damping and stiffness in standard errors; infinite without standard errors.
+    /// Largest error of mass, damping and stiffness in standard errors, infinite without them; with a gap that of the stiffness in it, in
+    /// standard errors outside.
     shift: f64,
-    /// Root mean square of the residuals over sigma of the noise.
+    /// Root mean square of the residuals over sigma of the noise, or over that of its innovations.
     residual: f64,
 }
 

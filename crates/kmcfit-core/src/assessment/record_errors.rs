@@ -42,7 +42,7 @@ const MOST: usize = 100;
 /// Smallest ratio of a factor, or of its inverse, to 1 that is named.
 const FACTOR: f64 = 1.05;
 /// Ratio of the residuals with and without an error below which it explains them although they are not white.
-const EXPLAINED: f64 = 0.5;
+pub(super) const EXPLAINED: f64 = 0.5;
 
 /// An error of a record.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -231,7 +231,7 @@ fn with_clock(problem: &Problem, e: usize, clock: Clock) -> Option<Problem> {
     moved.ok()
 }
 
-fn without_correlation(experiments: &mut [Experiment]) {
+pub(super) fn without_correlation(experiments: &mut [Experiment]) {
     for channel in experiments.iter_mut().flat_map(|e| &mut e.channels) {
         *channel = channel.clone().with_noise(NoiseEstimate::default());
     }
@@ -325,13 +325,13 @@ fn factor(problem: &Problem, e: usize, c: usize, gain: f64) -> RecordError {
 }
 
 /// A fit of a changed problem.
-struct Refit {
+pub(super) struct Refit {
     problem: Problem,
     fit: Fit,
 }
 
 impl Refit {
-    fn of(problem: Problem, start: &[f64]) -> Option<Self> {
+    pub(super) fn of(problem: Problem, start: &[f64]) -> Option<Self> {
         let fit = fit_from(&problem, start, &FitSettings::default()).ok()?;
         Some(Self { problem, fit })
     }
@@ -341,15 +341,19 @@ impl Refit {
     }
 
     /// True if the residuals of all channels are white.
-    fn is_white(&self) -> bool {
+    pub(super) fn is_white(&self) -> bool {
         let mut each = self.problem.predicted(self.evaluation());
         each.all(|(channel, predicted)| diagnostics(channel, predicted).whiteness.p_value >= WHITE)
     }
 
+    /// Largest root mean square of the residuals of a channel relative to its samples.
+    pub(super) fn worst_misfit(&self) -> f64 {
+        worst_misfit(&self.problem, self.evaluation())
+    }
+
     /// True if the residuals are white, or small beside those of `before` where the fit is good.
     fn explains(&self, problem: &Problem, before: &Evaluation) -> bool {
-        let is_smaller = worst_misfit(&self.problem, self.evaluation())
-            < EXPLAINED * worst_misfit(problem, before);
+        let is_smaller = self.worst_misfit() < EXPLAINED * worst_misfit(problem, before);
         is_smaller && (self.is_white() || worst_fit(&self.problem, self.evaluation()) >= POOR)
     }
 }
@@ -362,7 +366,7 @@ pub(super) fn worst_fit(problem: &Problem, evaluation: &Evaluation) -> f64 {
 }
 
 /// Largest root mean square of the residuals of a channel relative to its samples.
-fn worst_misfit(problem: &Problem, evaluation: &Evaluation) -> f64 {
+pub(super) fn worst_misfit(problem: &Problem, evaluation: &Evaluation) -> f64 {
     let each = problem.predicted(evaluation).map(|(channel, predicted)| {
         let residuals: Vec<f64> = channel.residuals(predicted).collect();
         rms(&residuals) / rms(channel.observed())
@@ -512,7 +516,11 @@ fn large_clock(
     let period = 1.0 / spectrum.dominant();
     let duration = problem.system.grid.time(experiment.nodes - 1) - problem.system.grid.start();
     let beginning = problem.truncated(BEGINNING).with(|parts| without_correlation(&mut parts.experiments));
-    let beginning = Refit::of(beginning.ok()?, theta)?.fit.best.parameters;
+    let beginning = beginning.ok()?;
+    let both = [theta.to_vec(), problem.start()].into_iter();
+    let both = both.filter_map(|start| Refit::of(beginning.clone(), &start));
+    let beginning = both.min_by(|a, b| a.worst_misfit().total_cmp(&b.worst_misfit()))?;
+    let beginning = beginning.fit.best.parameters;
     let in_beginning = problem.evaluate(&beginning).ok()?;
     let step = APART * period / duration;
     let rate = best(problem, &in_beginning, e, LARGEST_RATE, step, |rate| Clock {

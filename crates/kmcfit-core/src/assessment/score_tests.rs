@@ -10,20 +10,22 @@
 //! ```
 //!
 //! is the estimate after one step of Gauss and Newton from the fit (Rao 1948). A term with a large `t` is missing if a refit with it leaves white
-//! residuals; so are a delay, a difference of clocks and a gain, with their [own derivatives](super::record_errors). Where the noise model does not describe the residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
+//! residuals, or the smallest of all refits and at most half of those before; so are a delay, a difference of clocks and a gain, with their [own derivatives](super::record_errors). Where the noise model does not describe the residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
 
 use super::FitWarning;
-use super::record_errors::{self, RecordParameter};
+use super::record_errors::{
+    self, EXPLAINED, RecordParameter, Refit, without_correlation, worst_misfit,
+};
 use super::refinement::applies;
 use crate::functions::{CoefficientFunction, CoefficientKind, CoefficientSet, Parameterization};
 use crate::identifiability::Factorisation;
 use crate::noise::KernelCovariance;
-use crate::objective::{Evaluation, diagnostics};
+use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::record::{NoiseEstimate, ScoreCovariance};
+use crate::record::ScoreCovariance;
 use crate::simd::sum::rms;
 use crate::simulate::Trajectory;
-use crate::solvers::{FitSettings, MissingTerm, TESTED_TERMS, fit_from, weighted_jacobian};
+use crate::solvers::{MissingTerm, TESTED_TERMS, weighted_jacobian};
 use crate::system::Term;
 use nalgebra::{DMatrix, DVector};
 
@@ -85,21 +87,39 @@ pub(super) fn missing(
     });
     let mut tests: Vec<_> = tests.collect();
     tests.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
-    tests.into_iter().take(REFITTED).find_map(|(candidate, value, t)| match candidate {
-        Candidate::Term(kind, term) => {
-            let share = (value * force(&evaluation, term)).abs() / largest_force(problem, &evaluation);
-            let missing = MissingTerm {
-                term: kind,
-                value,
-                t,
-                share,
-            };
-            is_explained(problem, theta, &missing).then_some(FitWarning::MissingTerm(missing))
+    let mut best: Option<(f64, MissingTerm)> = None;
+    for (candidate, value, t) in tests.into_iter().take(REFITTED) {
+        match candidate {
+            Candidate::Term(kind, term) => {
+                let size = (value * force(&evaluation, term)).abs();
+                let missing = MissingTerm {
+                    term: kind,
+                    value,
+                    t,
+                    share: size / largest_force(problem, &evaluation),
+                };
+                let Some(refit) = refit(problem, theta, &missing) else {
+                    continue;
+                };
+                if refit.is_white() {
+                    return Some(FitWarning::MissingTerm(missing));
+                }
+                let misfit = refit.worst_misfit();
+                if best.is_none_or(|(least, _)| misfit < least) {
+                    best = Some((misfit, missing));
+                }
+            }
+            Candidate::Record(parameter) => {
+                let error = record_errors::small_error(problem, theta, parameter, value);
+                if let Some(error) = error {
+                    return Some(FitWarning::RecordError(error));
+                }
+            }
         }
-        Candidate::Record(parameter) => {
-            record_errors::small_error(problem, theta, parameter, value).map(FitWarning::RecordError)
-        }
-    })
+    }
+    let before = worst_misfit(problem, &evaluation);
+    let (_, missing) = best.filter(|(misfit, _)| *misfit < EXPLAINED * before)?;
+    Some(FitWarning::MissingTerm(missing))
 }
 
 /// Weighted and whitened residuals of all channels.
@@ -109,25 +129,26 @@ fn weighted_residuals(problem: &Problem, evaluation: &Evaluation) -> DVector<f64
     DVector::from_vec(each.collect())
 }
 
-/// True if a refit with the term leaves white residuals: an error of the input, a coefficient that varies and another missing term give a large
-/// `t` as well, but residuals that remain.
-fn is_explained(problem: &Problem, theta: &[f64], missing: &MissingTerm) -> bool {
-    let refit = || {
-        let evaluation = problem.evaluate(theta).ok()?;
-        let kinds = candidates(problem, &evaluation);
-        let kind = kinds.into_iter().find(|(kind, _)| *kind == missing.term)?;
+/// Refit with a term, from the optimum or else from the start, whichever ends lower. The term is missing if it leaves white residuals: an error
+/// of the input, a coefficient that varies and another missing term give a large `t` as well, but residuals that remain.
+fn refit(problem: &Problem, theta: &[f64], missing: &MissingTerm) -> Option<Refit> {
+    let evaluation = problem.evaluate(theta).ok()?;
+    let kinds = candidates(problem, &evaluation);
+    let kind = kinds.into_iter().find(|(kind, _)| *kind == missing.term)?;
+    let from = |theta: &[f64]| {
         let (mut extended, mut start) = extended(problem, theta, &[kind])?;
-        for channel in (extended.parts_mut().experiments.iter_mut()).flat_map(|e| &mut e.channels) {
-            *channel = channel.clone().with_noise(NoiseEstimate::default());
-        }
+        without_correlation(&mut extended.parts_mut().experiments);
         start[problem.functions.scalar_range().start] = missing.value;
-        let fit = fit_from(&extended, &start, &FitSettings::default()).ok()?;
-        let evaluation = &fit.best.evaluation;
-        let mut tests = (extended.predicted(evaluation))
-            .map(|(channel, predicted)| diagnostics(channel, predicted).whiteness.p_value);
-        Some(tests.all(|p| p >= WHITE))
+        Refit::of(extended, &start)
     };
-    refit().unwrap_or(false)
+    let near = from(theta);
+    match near {
+        Some(near) if near.is_white() => Some(near),
+        near => {
+            let both = near.into_iter().chain(from(&problem.start()));
+            both.min_by(|a, b| a.worst_misfit().total_cmp(&b.worst_misfit()))
+        }
+    }
 }
 
 /// Kinds and terms that the model does not have.
