@@ -83,10 +83,12 @@ pub(super) fn missing(
     });
     let tests = terms.chain(of_records).filter_map(|(candidate, column)| {
         let (value, t) = model.test(&extended, &column, &residuals, is_modelled)?;
-        (t.abs() >= SIGNIFICANT).then_some((candidate, value, t))
+        Some((candidate, value, t))
     });
     let mut tests: Vec<_> = tests.collect();
     tests.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
+    // Far from the optimum of the right candidate another one may be more significant: friction resembles a negative quadratic damping.
+    (tests.first()?.2.abs() >= SIGNIFICANT).then_some(())?;
     let mut best: Option<(f64, MissingTerm)> = None;
     for (candidate, value, t) in tests.into_iter().take(REFITTED) {
         match candidate {
