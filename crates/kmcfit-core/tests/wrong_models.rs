@@ -1,6 +1,6 @@
 //! Verdicts on fits of wrong models and of wrong data, and on fits of right ones: random oscillators of 0.5 to 20 Hz with damping ratios of 1
 //! to 5 %, 1000 samples, 12 to 30 in a period, with 2 % noise whose sigma is estimated; data by an independent integrator. Seeds are 0, 1,
-//! 2, ...; `KMCFIT_CASES` is the number of seeds of each kind (20 by default, 200 in `.ci/long verdict`), and `KMCFIT_SHOW` prints each case.
+//! 2, ...; `KMCFIT_CASES` is the number of seeds of each kind (10 by default, 200 in `.ci/long verdict`), and `KMCFIT_SHOW` prints each case.
 //!
 //! Each kind has a size at which it shifts an estimate by at least 5 standard errors or leaves a fifth more residual than the noise, in the
 //! median of its cases; [`Found::size`] measures both.
@@ -9,15 +9,17 @@ mod common;
 
 use common::forced::{broadband, response, rms, white};
 use kmcfit_core::internals::assessment::{
-    FitAssessment, RecordError, VerdictLevel, VerdictReason, estimates, verdict_level, verdict_reasons,
+    ClassicalEstimate, FitAssessment, RecordError, VerdictLevel, VerdictReason, estimates,
+    verdict_level, verdict_reasons,
 };
 use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record, ScalarSpec};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::record::{ChannelKind, NoiseModel, Weighting};
+use kmcfit_core::internals::record::{Channel, ChannelKind, NoiseModel, Weighting};
 use kmcfit_core::internals::solvers::{FitSettings, fit_with_noise};
+use kmcfit_core::internals::system::InputSample;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
@@ -121,9 +123,7 @@ impl Case {
         };
         match self.kind {
             // The viscous damping that dissipates as much at the root mean square of the velocity.
-            Kind::QuadraticDamping => {
-                run(&|_, y, v, f| (f - c / v0 * v * v.abs() - k * y) / m)
-            }
+            Kind::QuadraticDamping => run(&|_, y, v, f| (f - c / v0 * v * v.abs() - k * y) / m),
             Kind::Friction => {
                 let friction = FRICTION * k * y0;
                 run(&|_, y, v, f| {
@@ -201,13 +201,23 @@ impl Case {
     fn channel(&self, kind: ChannelKind, states: &[[f64; 3]]) -> (ChannelSpec, f64) {
         let exact: Vec<f64> = states.iter().map(|s| s[kind as usize]).collect();
         let sigma = NOISE * rms(&exact);
-        let rho = if self.kind == Kind::Coloured { CORRELATION } else { 0.0 };
+        let rho = if self.kind == Kind::Coloured {
+            CORRELATION
+        } else {
+            0.0
+        };
         let mut noise = 0.0;
-        let noise = white(self.seed, 2 + kind as u64, SAMPLES).into_iter().map(|e| {
-            noise = rho * noise + (1.0 - rho * rho).sqrt() * e;
-            noise
-        });
-        let mut samples: Vec<f64> = exact.iter().zip(noise).map(|(y, e)| y + sigma * e).collect();
+        let noise = white(self.seed, 2 + kind as u64, SAMPLES)
+            .into_iter()
+            .map(|e| {
+                noise = rho * noise + (1.0 - rho * rho).sqrt() * e;
+                noise
+            });
+        let mut samples: Vec<f64> = exact
+            .iter()
+            .zip(noise)
+            .map(|(y, e)| y + sigma * e)
+            .collect();
         let times = self.times();
         if self.kind == Kind::Saturation {
             let limit = SATURATED * rms(&exact);
@@ -250,7 +260,11 @@ impl Case {
                 prior: None,
             })),
             false => {
-                let sign = if self.kind == Kind::ForceSign { -1.0 } else { 1.0 };
+                let sign = if self.kind == Kind::ForceSign {
+                    -1.0
+                } else {
+                    1.0
+                };
                 let force: Vec<f64> = force.iter().map(|f| sign * f).collect();
                 record.from_state(0.0, 0.0).force(&self.times(), &force)
             }
@@ -270,9 +284,76 @@ impl Case {
             Kind::Gap => CoefficientSpec::b_spline(self.periods() as usize, self.stiffness),
             _ => CoefficientSpec::constant(1.1 * self.stiffness),
         };
-        let parts = [mass, CoefficientSpec::constant(0.7 * self.damping), stiffness];
+        let parts = [
+            mass,
+            CoefficientSpec::constant(0.7 * self.damping),
+            stiffness,
+        ];
         let builder = Builder::new(parts).record(record);
         (builder.nodes(2 * (SAMPLES - 1) + 1).build().unwrap(), sigma)
+    }
+
+    /// The problem after the remedy of an error of its record: times of the response, or gains of its sensors, as the advice states them.
+    fn corrected(&self, error: &RecordError) -> Problem {
+        let problem = self.problem().0;
+        let grid = problem.system.grid;
+        let force = problem.experiments[0].input.clone();
+        let corrected = problem.with(|parts| {
+            let experiment = &mut parts.experiments[0];
+            let nodes = experiment.nodes;
+            for channel in &mut experiment.channels {
+                let kind = channel.kind();
+                let (scale, delay, gain) = match error {
+                    RecordError::Delay { delay, .. } => (1.0, *delay, 1.0),
+                    RecordError::ClockDifference { percent, .. } => {
+                        (1.0 + 0.01 * percent, 0.0, 1.0)
+                    }
+                    RecordError::InputSign { .. } => (1.0, 0.0, -1.0),
+                    RecordError::ChannelFactor {
+                        channel, factor, ..
+                    } => (1.0, 0.0, if channel == kind.name() { *factor } else { 1.0 }),
+                };
+                let times = channel.times().iter().map(|t| scale * t - delay);
+                let samples = times.zip(channel.observed().iter().map(|y| y / gain));
+                let end = grid.time(nodes - 1);
+                let (times, samples): (Vec<f64>, Vec<f64>) =
+                    samples.filter(|(t, _)| (0.0..=end).contains(t)).unzip();
+                let inputs = times.iter().map(|t| InputSample {
+                    force: force.force_at(*t),
+                    base: 0.0,
+                });
+                let inputs = inputs.collect();
+                let weighting = channel.weighting().clone();
+                let made = Channel::new(kind, times, samples, weighting, &grid, nodes);
+                *channel = made.unwrap().with_inputs_at_samples(inputs);
+            }
+        });
+        corrected.unwrap()
+    }
+
+    /// Root mean square error of the displacement to another force by the estimates of a problem, relative to that of the displacement.
+    fn misfit_of_prediction(&self, problem: &Problem) -> f64 {
+        let settings = FitSettings::default();
+        let (_, fit) = fit_with_noise(problem, &problem.start(), &settings, &mut |_| {}).unwrap();
+        let force = broadband(white(self.seed, 9, SAMPLES));
+        let response_of = |[m, c, k]: [f64; 3]| -> Vec<f64> {
+            let states = response(self.spacing, [0.0, 0.0], &force, |_, y, v, f| {
+                (f - c * v - k * y) / m
+            });
+            states.iter().map(|s| s[0]).collect()
+        };
+        let estimate = [0, 1, 2].map(|j| fit.best.parameters[j]);
+        let truth = response_of([self.mass, self.damping, self.stiffness]);
+        let errors = response_of(estimate)
+            .into_iter()
+            .zip(&truth)
+            .map(|(a, b)| a - b);
+        let error = rms(&errors.collect::<Vec<f64>>()) / rms(&truth);
+        if error.is_finite() {
+            error
+        } else {
+            f64::INFINITY
+        }
     }
 
     /// Standard deviation of the noise that a model of its correlation leaves.
@@ -291,12 +372,19 @@ impl Case {
         let [from, to] = self.gap();
         let is_inside = |t: f64| (from..to).contains(&t);
         let errors = bands.times.iter().zip(&bands.functions[2].standard_error);
-        let mut outside: Vec<f64> = errors.filter(|(t, _)| !is_inside(**t)).map(|(_, e)| *e).collect();
+        let mut outside: Vec<f64> = errors
+            .filter(|(t, _)| !is_inside(**t))
+            .map(|(_, e)| *e)
+            .collect();
         outside.sort_by(f64::total_cmp);
         let step = self.spacing / 2.0;
         let stiffness = evaluation.nodal.coefficients[1].iter().enumerate();
-        let inside = stiffness.map(|(i, k)| (step * i as f64, *k)).filter(|(t, _)| is_inside(*t));
-        let most = inside.map(|(t, k)| (k - self.stiffness_at(t)).abs()).fold(0.0, f64::max);
+        let inside = stiffness
+            .map(|(i, k)| (step * i as f64, *k))
+            .filter(|(t, _)| is_inside(*t));
+        let most = inside
+            .map(|(t, k)| (k - self.stiffness_at(t)).abs())
+            .fold(0.0, f64::max);
         most / outside[outside.len() / 2]
     }
 
@@ -325,6 +413,7 @@ impl Case {
             _ => shifts.reduce(f64::max).unwrap_or(f64::INFINITY),
         };
         Found {
+            classical: assessment.classical.clone(),
             level: verdict_level(&reasons),
             reasons,
             shift,
@@ -342,6 +431,7 @@ fn residual(problem: &Problem, evaluation: &Evaluation) -> f64 {
 
 /// Verdict on a fit.
 struct Found {
+    classical: Option<ClassicalEstimate>,
     level: VerdictLevel,
     reasons: Vec<VerdictReason>,
     /// Largest error of mass, damping and stiffness in standard errors, infinite without them; with a gap that of the stiffness in it, in
@@ -353,6 +443,7 @@ struct Found {
 
 /// Counts of a kind.
 struct Counts {
+    found: Vec<Found>,
     cases: usize,
     right: usize,
     levels: [usize; 3],
@@ -361,7 +452,7 @@ struct Counts {
 
 fn cases() -> u64 {
     let given = std::env::var("KMCFIT_CASES").ok();
-    given.map_or(20, |text| text.parse().expect("a number of cases"))
+    given.map_or(10, |text| text.parse().expect("a number of cases"))
 }
 
 fn count(kind: Kind, is_right: impl Fn(&VerdictReason) -> bool) -> Counts {
@@ -370,7 +461,13 @@ fn count(kind: Kind, is_right: impl Fn(&VerdictReason) -> bool) -> Counts {
         .map(|seed| {
             let found = Case::new(kind, seed).verdict();
             if shows {
-                let Found { level, reasons, shift, residual } = &found;
+                let Found {
+                    level,
+                    reasons,
+                    shift,
+                    residual,
+                    ..
+                } = &found;
                 println!("{kind:?} {seed}: {level:?} {shift:.1} {residual:.2} {reasons:?}");
             }
             found
@@ -384,9 +481,18 @@ fn count(kind: Kind, is_right: impl Fn(&VerdictReason) -> bool) -> Counts {
     let at = |level: VerdictLevel| found.iter().filter(|f| f.level == level).count();
     let counts = Counts {
         cases: found.len(),
-        right: found.iter().filter(|f| f.reasons.iter().any(&is_right)).count(),
-        levels: [VerdictLevel::Adequate, VerdictLevel::Check, VerdictLevel::Inadequate].map(at),
+        right: found
+            .iter()
+            .filter(|f| f.reasons.iter().any(&is_right))
+            .count(),
+        levels: [
+            VerdictLevel::Adequate,
+            VerdictLevel::Check,
+            VerdictLevel::Inadequate,
+        ]
+        .map(at),
         size: [middle(&|f| f.shift), middle(&|f| f.residual)],
+        found,
     };
     let [adequate, check, inadequate] = counts.levels;
     println!(
@@ -400,33 +506,109 @@ fn count(kind: Kind, is_right: impl Fn(&VerdictReason) -> bool) -> Counts {
 fn assert_found(kind: Kind, is_right: impl Fn(&VerdictReason) -> bool) {
     let counts = count(kind, is_right);
     assert_eq!(counts.levels[0], 0, "{kind:?} is adequate");
-    assert!(10 * counts.right >= 8 * counts.cases, "{kind:?}: {}", counts.right);
+    assert!(
+        10 * counts.right >= 8 * counts.cases,
+        "{kind:?}: {}",
+        counts.right
+    );
     let [shift, residual] = counts.size;
-    assert!(shift >= 5.0 || residual >= 1.2, "{kind:?}: {shift} {residual}");
+    assert!(
+        shift >= 5.0 || residual >= 1.2,
+        "{kind:?}: {shift} {residual}"
+    );
 }
 
-/// At most 17 of 200 clean records have a reason, 5 of 20: the 99.9 % limits of a true rate of 4 %.
+/// At most 17 of 200 clean records have a reason, 3 of 10: the 99.9 % limits of a true rate of 4 %. A classical estimate exists for most records,
+/// and its intervals contain the truth in at least nine of ten of them: they include the errors of the method, at a confidence of 95 %.
 #[test]
 fn clean_records_are_adequate() {
     let counts = count(Kind::Clean, |_| true);
-    let most = if counts.cases >= 200 { 17 * counts.cases / 200 } else { 5 };
-    assert!(counts.cases - counts.levels[0] <= most, "{:?}", counts.levels);
+    let most = if counts.cases >= 200 {
+        17 * counts.cases / 200
+    } else {
+        3
+    };
+    assert!(
+        counts.cases - counts.levels[0] <= most,
+        "{:?}",
+        counts.levels
+    );
+    let (mut all, mut right, mut damped) = (0, 0, 0);
+    for (seed, found) in counts.found.iter().enumerate() {
+        let Some(classical) = &found.classical else {
+            continue;
+        };
+        let case = Case::new(Kind::Clean, seed as u64);
+        let ratio = 0.5 * case.damping / (case.mass * case.stiffness).sqrt();
+        let holds = |[low, high]: [f64; 2], truth: f64| (low..=high).contains(&truth);
+        let of_damping = classical.damping_interval;
+        all += 1;
+        damped += usize::from(of_damping.is_some());
+        let is_right = holds(classical.frequency_interval, case.frequency)
+            && of_damping.is_none_or(|interval| holds(interval, ratio));
+        right += usize::from(is_right);
+        if !is_right {
+            println!("classical {seed}: {} {ratio} {classical:?}", case.frequency);
+        }
+    }
+    println!(
+        "| Classical | {all} of {}, {damped} with a damping ratio | | | | {right} | | |",
+        counts.cases
+    );
+    assert!(
+        2 * all > counts.cases && 10 * right >= 9 * all,
+        "{all} {right}"
+    );
+}
+
+/// The remedy of each reason about a record improves the prediction of another record of the system: the response to another force, without
+/// noise and defect, by the estimates before and after. The fit of the prediction is then at least 95 per cent.
+#[test]
+fn corrected_records_predict_another_record() {
+    for kind in [
+        Kind::Clocks,
+        Kind::Delay,
+        Kind::ForceSign,
+        Kind::Factor(1000.0),
+    ] {
+        // Of two channels that disagree the wrong one shows only where the mass is known, as it is for even seeds.
+        for seed in [0, 2, 4] {
+            let case = Case::new(kind, seed);
+            let before = case.misfit_of_prediction(&case.problem().0);
+            let found = case.verdict();
+            let errors = found.reasons.iter().filter_map(|reason| match reason {
+                VerdictReason::RecordError(error) => Some(error),
+                _ => None,
+            });
+            let Some(error) = errors.last() else {
+                panic!("{kind:?} {seed}: {:?}", found.reasons);
+            };
+            let after = case.misfit_of_prediction(&case.corrected(error));
+            println!("{kind:?} {seed}: {before:.3} {after:.4}");
+            assert!(
+                after < 0.05 && after < 0.5 * before,
+                "{kind:?} {seed}: {before} {after}"
+            );
+        }
+    }
 }
 
 #[test]
 fn quadratic_damping_as_viscous() {
     let of = CoefficientKind::QuadraticDamping;
-    assert_found(Kind::QuadraticDamping, |reason| {
-        matches!(reason, VerdictReason::MissingTerm(missing) if missing.term == of)
-    });
+    assert_found(
+        Kind::QuadraticDamping,
+        |reason| matches!(reason, VerdictReason::MissingTerm(missing) if missing.term == of),
+    );
 }
 
 #[test]
 fn friction_left_out() {
     let of = CoefficientKind::CoulombFriction;
-    assert_found(Kind::Friction, |reason| {
-        matches!(reason, VerdictReason::MissingTerm(missing) if missing.term == of)
-    });
+    assert_found(
+        Kind::Friction,
+        |reason| matches!(reason, VerdictReason::MissingTerm(missing) if missing.term == of),
+    );
 }
 
 #[test]
@@ -466,14 +648,19 @@ fn a_delay() {
 #[test]
 fn the_sign_of_the_force() {
     assert_found(Kind::ForceSign, |reason| {
-        matches!(reason, VerdictReason::RecordError(RecordError::InputSign { .. }))
+        matches!(
+            reason,
+            VerdictReason::RecordError(RecordError::InputSign { .. })
+        )
     });
 }
 
 /// True for a factor of the acceleration, or the inverse of one of the displacement, within a tenth.
 fn is_factor(reason: &VerdictReason, expected: f64) -> bool {
     match reason {
-        VerdictReason::RecordError(RecordError::ChannelFactor { channel, factor, .. }) => {
+        VerdictReason::RecordError(RecordError::ChannelFactor {
+            channel, factor, ..
+        }) => {
             let factor = match channel.as_str() {
                 "displacement" => 1.0 / factor,
                 _ => *factor,
@@ -496,7 +683,9 @@ fn one_of_two_channels_in_g() {
 
 #[test]
 fn a_gap_of_two_periods_under_a_spline() {
-    assert_found(Kind::Gap, |reason| matches!(reason, VerdictReason::Gap { .. }));
+    assert_found(Kind::Gap, |reason| {
+        matches!(reason, VerdictReason::Gap { .. })
+    });
 }
 
 #[test]

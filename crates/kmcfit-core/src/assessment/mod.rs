@@ -1,6 +1,7 @@
 //! Assessment of a fit: statistics of the residuals, step-size check, plausibility, standard errors and bands.
 
 mod channel;
+mod classical;
 mod constants;
 mod equation_error;
 mod estimates;
@@ -21,6 +22,7 @@ mod verdict;
 
 pub use crate::objective::{diagnostics, outliers};
 pub use channel::{ResidualPattern, pattern};
+pub use classical::{ClassicalEstimate, ClassicalMethod};
 pub use constants::{constant_probability, standard_error};
 pub use equation_error::{EquationErrorIntervals, NoIntervals};
 pub use estimates::{Estimate, EstimateStatus, estimates};
@@ -32,8 +34,12 @@ pub use recovery::{RECOVERY_TOLERANCE, Roughness, TruthErrors, is_same_truth};
 pub use refinement::{BasisTest, CoarseBasis};
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
-pub use verdict::{VerdictLevel, VerdictReason, verdict_level, verdict_reasons};
+pub use verdict::{
+    VerdictAssumption, VerdictLevel, VerdictReason, verdict_assumptions, verdict_level,
+    verdict_reasons,
+};
 
+use classical::classical_estimate;
 use friction_width::width_warning;
 use gaps::gap_assessments;
 use record_errors::large_error;
@@ -67,6 +73,8 @@ pub struct FitAssessment {
     pub bands: Option<Bands>,
     /// Classification of functions and ratios by their bands.
     pub classifications: Vec<FunctionClassification>,
+    /// Natural frequency and damping ratio by a classical method, where a record allows it.
+    pub classical: Option<ClassicalEstimate>,
 }
 
 impl FitAssessment {
@@ -97,6 +105,7 @@ impl FitAssessment {
             degrees_of_freedom: vec![f64::INFINITY; problem.parameters()],
             bands: None,
             classifications: Vec::new(),
+            classical: None,
         };
         if reports_errors && fit.outcome.status != Status::Failed {
             let causes = causes(problem, fit, &assessment.plausibility, tests_bases);
@@ -147,6 +156,13 @@ impl FitAssessment {
         } else if few {
             gaps = gap_assessments(problem, fit, None);
         }
+        if fit.outcome.status != Status::Failed {
+            assessment.classical =
+                classical_estimate(problem, &best.evaluation, assessment.bands.as_ref());
+        }
+        let disagrees = assessment.classical.iter().filter(|c| !c.agrees).cloned();
+        let disagrees = disagrees.map(FitWarning::ClassicalDisagrees);
+        assessment.plausibility.warnings.extend(disagrees);
         let gaps = gaps.into_iter().map(FitWarning::Gap);
         assessment.plausibility.warnings.extend(gaps);
         assessment

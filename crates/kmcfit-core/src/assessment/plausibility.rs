@@ -1,5 +1,6 @@
 //! Plausibility of a fit: conditions under which its optimum identifies no system, and warnings about its intervals.
 
+use super::classical::ClassicalEstimate;
 use super::gaps::GapAssessment;
 use super::input_disturbance::input_warnings;
 use super::record_errors::RecordError;
@@ -168,6 +169,8 @@ pub enum FitWarning {
         /// Name of the experiment.
         experiment: String,
     },
+    /// A classical estimate and that of the fit differ by more than their intervals.
+    ClassicalDisagrees(ClassicalEstimate),
     /// An error of a record explains the residuals.
     #[serde(untagged)]
     RecordError(RecordError),

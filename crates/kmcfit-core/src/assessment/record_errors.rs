@@ -139,7 +139,11 @@ pub(super) fn column(
                     let start = problem.system.grid.start();
                     let slopes = slopes(problem, evaluation, e, channel, predicted)?;
                     let ages = channel.times().iter().map(|t| t - start);
-                    slopes.iter().zip(ages).map(|(slope, age)| slope * age).collect()
+                    slopes
+                        .iter()
+                        .zip(ages)
+                        .map(|(slope, age)| slope * age)
+                        .collect()
                 }
                 _ => vec![0.0; channel.len()],
             };
@@ -189,13 +193,25 @@ fn predict(problem: &Problem, evaluation: &Evaluation, e: usize, channel: &Chann
 
 /// A channel with the times of its samples on another clock, without the samples before or after the response; `None` for a sensor of
 /// absolute motion, and for weights or filters that do not allow it.
-fn on_clock(experiment: &Experiment, channel: &Channel, grid: &Grid, clock: Clock) -> Option<Channel> {
+fn on_clock(
+    experiment: &Experiment,
+    channel: &Channel,
+    grid: &Grid,
+    clock: Clock,
+) -> Option<Channel> {
     let is_possible = channel.base().is_empty()
-        && matches!(channel.weighting(), Weighting::Sigma(_) | Weighting::Estimated { .. });
+        && matches!(
+            channel.weighting(),
+            Weighting::Sigma(_) | Weighting::Estimated { .. }
+        );
     let plain = channel.before_filter().filter(|_| is_possible)?;
     let (start, end) = (grid.start(), grid.time(experiment.nodes - 1));
     let at = |t: &f64| start + (1.0 + clock.rate) * (t - start) - clock.delay;
-    let samples = plain.times().iter().map(at).zip(plain.observed().iter().copied());
+    let samples = plain
+        .times()
+        .iter()
+        .map(at)
+        .zip(plain.observed().iter().copied());
     let (times, values): (Vec<f64>, Vec<f64>) =
         samples.filter(|(t, _)| (start..=end).contains(t)).unzip();
     let inputs = times.iter().map(|t| InputSample {
@@ -204,7 +220,14 @@ fn on_clock(experiment: &Experiment, channel: &Channel, grid: &Grid, clock: Cloc
     });
     let inputs: Vec<InputSample> = inputs.collect();
     let weighting = plain.weighting().clone();
-    let moved = Channel::new(plain.kind(), times, values, weighting, grid, experiment.nodes)?;
+    let moved = Channel::new(
+        plain.kind(),
+        times,
+        values,
+        weighting,
+        grid,
+        experiment.nodes,
+    )?;
     let moved = moved.with_loss(plain.loss()).with_sensor(plain.sensor());
     let moved = match channel.inputs_at_samples() {
         Some(_) => moved.with_inputs_at_samples(inputs),
@@ -221,8 +244,9 @@ fn with_clock(problem: &Problem, e: usize, clock: Clock) -> Option<Problem> {
     let experiment = &problem.experiments[e];
     let grid = &problem.system.grid;
     let channels = experiment.channels.iter();
-    let channels: Option<Vec<Channel>> =
-        channels.map(|c| on_clock(experiment, c, grid, clock)).collect();
+    let channels: Option<Vec<Channel>> = channels
+        .map(|c| on_clock(experiment, c, grid, clock))
+        .collect();
     let channels = channels?;
     let moved = problem.clone().with(|parts| {
         parts.experiments[e].channels = channels;
@@ -299,7 +323,10 @@ fn is_factor(gain: f64) -> bool {
 
 fn delay(problem: &Problem, e: usize, clock: Clock) -> RecordError {
     let experiment = &problem.experiments[e];
-    let spacing = experiment.channels.first().map(|c| median_spacing(c.times()));
+    let spacing = experiment
+        .channels
+        .first()
+        .map(|c| median_spacing(c.times()));
     RecordError::Delay {
         experiment: experiment.name.clone(),
         delay: clock.delay,
@@ -442,11 +469,17 @@ pub(super) fn large_error(
 /// True for an experiment with an input in which mass and stiffness are negative at most times.
 fn is_reversed(problem: &Problem, evaluation: &Evaluation, e: usize) -> bool {
     let experiment = &problem.experiments[e];
-    let set = problem.functions.coefficient_set(experiment.coefficient_set);
+    let set = problem
+        .functions
+        .coefficient_set(experiment.coefficient_set);
     let values = evaluation.nodal_of(experiment.coefficient_set).functions();
-    let mut kinds = set.iter().map(|f| problem.functions.get(*f).quantity).zip(values);
+    let mut kinds = set
+        .iter()
+        .map(|f| problem.functions.get(*f).quantity)
+        .zip(values);
     let is_passive = [CoefficientKind::Mass, CoefficientKind::Stiffness];
-    let is_negative = |values: &[f64]| 2 * values.iter().filter(|v| **v < 0.0).count() > values.len();
+    let is_negative =
+        |values: &[f64]| 2 * values.iter().filter(|v| **v < 0.0).count() > values.len();
     !experiment.is_free()
         && kinds.all(|(kind, values)| !is_passive.contains(&kind) || is_negative(values))
 }
@@ -463,9 +496,11 @@ fn reversed_input(problem: &Problem, evaluation: &Evaluation, e: usize) -> Optio
         }
     });
     let refit = Refit::of(changed.ok()?, &problem.start())?;
-    refit.explains(problem, evaluation).then(|| RecordError::InputSign {
-        experiment: experiment.name.clone(),
-    })
+    refit
+        .explains(problem, evaluation)
+        .then(|| RecordError::InputSign {
+            experiment: experiment.name.clone(),
+        })
 }
 
 /// A channel of an experiment off by a factor: with its gain estimated the fit is good.
@@ -490,8 +525,8 @@ fn factor_of_channel(
             let product = |a: &[f64]| a.iter().zip(predicted).map(|(a, b)| a * b).sum::<f64>();
             let gain = product(channel.observed()) / product(predicted);
             let is_open = channel.sensor().gain.index().is_none() && gain.is_normal();
-            let Some((gain, refit)) = (is_open.then_some(()))
-                .and_then(|()| with_best_gain(problem, &start, e, c, gain))
+            let Some((gain, refit)) =
+                (is_open.then_some(())).and_then(|()| with_best_gain(problem, &start, e, c, gain))
             else {
                 continue;
             };
@@ -511,11 +546,16 @@ fn large_clock(
     e: usize,
 ) -> Option<RecordError> {
     let experiment = &problem.experiments[e];
-    let channel = experiment.channels.first().filter(|_| !experiment.is_free())?;
+    let channel = experiment
+        .channels
+        .first()
+        .filter(|_| !experiment.is_free())?;
     let spectrum = Spectrum::of(channel.observed(), median_spacing(channel.times()))?;
     let period = 1.0 / spectrum.dominant();
     let duration = problem.system.grid.time(experiment.nodes - 1) - problem.system.grid.start();
-    let beginning = problem.truncated(BEGINNING).with(|parts| without_correlation(&mut parts.experiments));
+    let beginning = problem
+        .truncated(BEGINNING)
+        .with(|parts| without_correlation(&mut parts.experiments));
     let beginning = beginning.ok()?;
     let both = [theta.to_vec(), problem.start()].into_iter();
     let both = both.filter_map(|start| Refit::of(beginning.clone(), &start));
@@ -523,23 +563,30 @@ fn large_clock(
     let beginning = beginning.fit.best.parameters;
     let in_beginning = problem.evaluate(&beginning).ok()?;
     let step = APART * period / duration;
-    let rate = best(problem, &in_beginning, e, LARGEST_RATE, step, |rate| Clock {
-        rate,
-        delay: 0.0,
+    let rate = best(problem, &in_beginning, e, LARGEST_RATE, step, |rate| {
+        Clock { rate, delay: 0.0 }
     });
     let delay_of = |delay: f64| Clock { rate: 0.0, delay };
     let step = APART * period;
-    let late = best(problem, evaluation, e, LARGEST_DELAY * period, step, delay_of);
-    let rate = rate.and_then(|clock| {
-        on_best_clock(problem, &beginning, RecordParameter::Rate(e), clock)
-    });
+    let late = best(
+        problem,
+        evaluation,
+        e,
+        LARGEST_DELAY * period,
+        step,
+        delay_of,
+    );
+    let rate =
+        rate.and_then(|clock| on_best_clock(problem, &beginning, RecordParameter::Rate(e), clock));
     if let Some((clock, refit)) = rate
         && refit.explains(problem, evaluation)
     {
         return Some(difference(problem, e, clock));
     }
     let (clock, refit) = on_best_clock(problem, theta, RecordParameter::Delay(e), late?)?;
-    refit.explains(problem, evaluation).then(|| delay(problem, e, clock))
+    refit
+        .explains(problem, evaluation)
+        .then(|| delay(problem, e, clock))
 }
 
 /// The clock other than that of the record, up to `most` in steps, with the largest correlation of samples and predictions.
@@ -554,7 +601,9 @@ fn best(
     let experiment = &problem.experiments[e];
     let channel = experiment.channels.first()?;
     let count = ((most / step) as usize).min(MOST) as i64;
-    let clocks = (-count..=count).filter(|i| *i != 0).map(|i| clock(step * i as f64));
+    let clocks = (-count..=count)
+        .filter(|i| *i != 0)
+        .map(|i| clock(step * i as f64));
     let each = clocks.filter_map(|clock| {
         let moved = on_clock(experiment, channel, &problem.system.grid, clock)?;
         let predicted = predict(problem, evaluation, e, &moved);

@@ -88,7 +88,8 @@ fn second_mode(problem: &Problem, evaluation: &Evaluation, e: usize) -> Option<[
     let order = channel.correlation().map_or(0, |c| c.order());
     let more = 2.0 + found.columns as f64 - order as f64;
     let gain = n * (before / after).ln() - more * n.ln();
-    let is_explained = mean_square(&residuals) > SMALLER * after || record.is_white(channel, &found);
+    let is_explained =
+        mean_square(&residuals) > SMALLER * after || record.is_white(channel, &found);
     let [low, high] = [modes[0][0].min(modes[1][0]), modes[0][0].max(modes[1][0])];
     let is_resolved = low > FEWEST_PERIODS / (spacing * n) && high < 0.5 / spacing;
     let are_modes = high > (1.0 + APART) * low && modes.iter().all(|m| m[1] < DAMPED);
@@ -131,7 +132,11 @@ impl<'a> Samples<'a> {
         let input = excitation.map(|excitation| {
             let at = |i: usize| {
                 let sample = channel.input_at_sample(Some(excitation), i);
-                if excitation.base.is_some() { sample.base } else { sample.force }
+                if excitation.base.is_some() {
+                    sample.base
+                } else {
+                    sample.force
+                }
             };
             (0..count).map(at).collect()
         });
@@ -152,8 +157,7 @@ impl<'a> Samples<'a> {
             let spectrum = Spectrum::of(values, self.spacing)?;
             let each = spectrum.frequencies().zip(spectrum.density());
             let is_apart = |f: f64| {
-                f > FEWEST_PERIODS * spectrum.resolution()
-                    && (f / beside - 1.0).abs() > APART
+                f > FEWEST_PERIODS * spectrum.resolution() && (f / beside - 1.0).abs() > APART
             };
             let apart = each.filter(|(f, _)| is_apart(*f));
             apart.max_by(|a, b| a.1.total_cmp(b.1)).map(|(f, _)| f)
@@ -166,14 +170,22 @@ impl<'a> Samples<'a> {
         pairs.extend(peaks(self.observed, first).map(|second| [first, second]));
         pairs.extend(peaks(residuals, first).map(|second| [first, second]));
         pairs.dedup();
-        Some(pairs.into_iter().map(|pair| pair.map(|f| [f, START])).collect())
+        Some(
+            pairs
+                .into_iter()
+                .map(|pair| pair.map(|f| [f, START]))
+                .collect(),
+        )
     }
 
     /// Local minimum of the sum of squares from a start.
     fn search(&self, start: [Mode; 2]) -> Option<([Mode; 2], Sum)> {
         let mut logs: [f64; 4] = std::array::from_fn(|i| start[i / 2][i % 2].ln());
         let modes = |logs: &[f64; 4]| -> [Mode; 2] {
-            [[logs[0].exp(), logs[1].exp()], [logs[2].exp(), logs[3].exp()]]
+            [
+                [logs[0].exp(), logs[1].exp()],
+                [logs[2].exp(), logs[3].exp()],
+            ]
         };
         let mut found = self.sum(modes(&logs))?;
         let mut damping = 1e-2;
@@ -199,7 +211,10 @@ impl<'a> Samples<'a> {
             // A factor of 2 at most.
             let moved: [f64; 4] = std::array::from_fn(|j| logs[j] - step[j].clamp(-0.7, 0.7));
             let is_possible = moved[1] < 0.0 && moved[3] < 0.0;
-            match self.sum(modes(&moved)).filter(|s| is_possible && s.square < found.square) {
+            match self
+                .sum(modes(&moved))
+                .filter(|s| is_possible && s.square < found.square)
+            {
                 Some(next) => {
                     let is_at_rest = next.square > (1.0 - AT_REST) * found.square;
                     (logs, found) = (moved, next);
@@ -294,7 +309,9 @@ impl<'a> Samples<'a> {
     fn is_white(&self, channel: &Channel, found: &Sum) -> bool {
         let pairs = self.observed.iter().zip(&found.residuals);
         let predicted: Vec<f64> = pairs.map(|(y, r)| y - r).collect();
-        let plain = channel.first(predicted.len()).with_noise(Default::default());
+        let plain = channel
+            .first(predicted.len())
+            .with_noise(Default::default());
         diagnostics(&plain, &predicted).whiteness.p_value >= WHITE
     }
 }

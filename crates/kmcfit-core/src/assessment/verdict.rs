@@ -5,6 +5,7 @@
 //! reason: some systems gain energy.
 
 use super::FitAssessment;
+use super::classical::ClassicalEstimate;
 use super::gaps::{GapAssessment, GapStatus};
 use super::plausibility::{FitWarning, Unidentified};
 use super::record_errors::RecordError;
@@ -157,9 +158,52 @@ pub enum VerdictReason {
     },
     /// The equation error neglects the noise of the response, which biases its estimates.
     EquationError,
+    /// A classical estimate and that of the fit differ by more than their intervals.
+    ClassicalDisagrees(ClassicalEstimate),
     /// An error of a record explains the residuals.
     #[serde(untagged)]
     RecordError(RecordError),
+}
+
+/// An assumption of a verdict that the records cannot test.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum VerdictAssumption {
+    /// The clock of a record, on which all its columns are.
+    Clock {
+        /// Name of the experiment.
+        experiment: String,
+    },
+    /// The unit of the only channel of a record with an input.
+    Unit {
+        /// Name of the experiment.
+        experiment: String,
+        /// Kind of the channel.
+        channel: String,
+    },
+}
+
+/// Assumptions of the verdict on a fit: an error of the clock scales all frequencies, and one of the unit of an only channel the mass, the
+/// damping and the stiffness.
+pub fn verdict_assumptions(problem: &Problem) -> Vec<VerdictAssumption> {
+    let each = problem
+        .experiments
+        .iter()
+        .filter(|e| e.has_samples())
+        .flat_map(|e| {
+            let clock = VerdictAssumption::Clock {
+                experiment: e.name.clone(),
+            };
+            let unit = match (e.is_free(), e.channels.as_slice()) {
+                (false, [channel]) => Some(VerdictAssumption::Unit {
+                    experiment: e.name.clone(),
+                    channel: channel.kind().name().to_owned(),
+                }),
+                _ => None,
+            };
+            std::iter::once(clock).chain(unit)
+        });
+    each.collect()
 }
 
 impl VerdictReason {
@@ -197,7 +241,11 @@ pub fn verdict_reasons(
         // A missing term, a second mode or an error of a record explains other reasons.
         let (causes, others): (Vec<_>, Vec<_>) = plausibility.warnings.iter().partition(is_cause);
         let others = others.into_iter();
-        reasons.extend(causes.into_iter().filter_map(|w| of_warning(problem, fit, w)));
+        reasons.extend(
+            causes
+                .into_iter()
+                .filter_map(|w| of_warning(problem, fit, w)),
+        );
         match &plausibility.unidentified {
             Some(Unidentified::Failed) => {}
             Some(reason) => reasons.push(VerdictReason::NoSystem {
@@ -284,6 +332,7 @@ fn of_warning(problem: &Problem, fit: &Fit, warning: &FitWarning) -> Option<Verd
         FitWarning::SecondMode { frequencies, .. } => VerdictReason::SecondMode {
             frequencies: *frequencies,
         },
+        FitWarning::ClassicalDisagrees(e) => VerdictReason::ClassicalDisagrees(e.clone()),
         FitWarning::RecordError(error) => VerdictReason::RecordError(error.clone()),
         FitWarning::ResidualMean {
             experiment,
