@@ -29,9 +29,9 @@ const ABOVE_NOISE: f64 = 8.0;
 /// Factor of standard errors for half differences that share an extreme: their correlation is one half.
 const SHARED: f64 = std::f64::consts::SQRT_2;
 /// Smallest half-power width in frequency spacings.
-const RESOLVED: f64 = 4.0;
-/// Width of the window of the spectra, in frequency spacings, by which a half-power width appears wider at most.
-const WINDOW: f64 = 1.5;
+const RESOLVED: f64 = 15.0;
+/// Frequency spacings by which leakage widens a half-power width at most: measured on records whose segments are shorter than the decay.
+const WINDOW: f64 = 6.0;
 
 /// Method of a classical estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -176,7 +176,11 @@ fn decrement(
     };
     let zeta = ratio(fall);
     let undamped = |half: f64| 0.5 / half / (1.0 - zeta * zeta).sqrt();
-    let [low, high] = [-1.0, 1.0].map(|sign| ratio(fall - sign * quantile * fall_error));
+    // The largest of several noisy samples is too large by about the noise, relatively more at the end of the decay.
+    let raised: Vec<f64> = halves.iter().map(|a| noise / a).collect();
+    let [bias, _] = slope(&raised, &weights)?;
+    let margin = quantile * fall_error + bias.abs();
+    let [low, high] = [-1.0, 1.0].map(|sign| ratio(fall - sign * margin));
     let [slow, fast] = [-1.0, 1.0].map(|sign| undamped(half - sign * quantile * half_error));
     (half > quantile * half_error && zeta.is_finite()).then(|| ClassicalEstimate {
         experiment: experiment.name.clone(),
