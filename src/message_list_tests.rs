@@ -3,11 +3,12 @@
 
 use crate::config::DataWarning;
 use crate::report::findings;
-use crate::report::reason_in_words;
 use crate::report::suggestions::{Suggestion, Suspect};
+use crate::report::{assumption, reason_in_words};
 use kmcfit_core::internals::assessment::{
-    AmplitudeRival, CoarseBasis, FitWarning, FunctionInGap, GapAssessment, GapStatus, NoIntervals,
-    ResidualPattern, Unidentified, VerdictReason,
+    AmplitudeRival, ClassicalEstimate, ClassicalMethod, CoarseBasis, FitWarning, FunctionInGap,
+    GapAssessment, GapStatus, NoIntervals, RecordError, ResidualPattern, Unidentified,
+    VerdictAssumption, VerdictReason,
 };
 use kmcfit_core::internals::builder::BuildNotice;
 use kmcfit_core::internals::diagnostics::{UntestedReason, Whiteness, WhitenessResult};
@@ -92,6 +93,9 @@ fn messages() {
     let all = verdict_reasons();
     let all = all.iter().map(|r| reason_in_words(r).text);
     section(&mut list, "Reasons of a verdict", all);
+    let all = verdict_assumptions();
+    let all = all.iter().map(|a| assumption(a).text);
+    section(&mut list, "Assumptions of a verdict", all);
     let all = unidentified();
     let all = all.iter().map(|u| findings::unidentified(u).text);
     section(&mut list, "No system identified", all);
@@ -706,13 +710,51 @@ fn fit_warnings() -> Vec<FitWarning> {
         },
         FitWarning::Negative { .. } => FitWarning::Negative { function: "stiffness".into() },
         FitWarning::NegligibleForce { .. } => FitWarning::NegligibleForce { experiment: "shaker".into() },
+        FitWarning::SecondMode { .. } => FitWarning::SecondMode { experiment: "shaker".into(), frequencies: [3.98, 17.21] },
+        FitWarning::ClassicalDisagrees(_) => FitWarning::ClassicalDisagrees(classical()),
+        FitWarning::RecordError(_) => FitWarning::RecordError(record_errors()[0].clone()),
     ];
+    all.extend(
+        record_errors()
+            .into_iter()
+            .skip(1)
+            .map(FitWarning::RecordError),
+    );
     let halves = coarse_basis(Some([1520.0, 1498.5]));
     all.push(FitWarning::CoarseBasis(halves));
     all.push(FitWarning::Gap(gap(1)));
     let covariance = ScoreCovariance::Kernel;
     all.push(FitWarning::Coloured { covariance });
     all
+}
+
+fn classical() -> ClassicalEstimate {
+    ClassicalEstimate {
+        experiment: "shaker".into(),
+        method: ClassicalMethod::LogarithmicDecrement,
+        frequency: 3.982,
+        frequency_interval: [3.979, 3.985],
+        damping_ratio: Some(0.0251),
+        damping_interval: Some([0.0243, 0.0259]),
+        agrees: false,
+    }
+}
+
+fn record_errors() -> Vec<RecordError> {
+    let experiment = || "shaker".to_owned();
+    samples![
+        RecordError::Delay { .. } => RecordError::Delay { experiment: experiment(), delay: 0.0125, samples: 2.5 },
+        RecordError::Delay { .. } => RecordError::Delay { experiment: experiment(), delay: -0.0125, samples: -2.5 },
+        RecordError::ClockDifference { .. } => RecordError::ClockDifference { experiment: experiment(), percent: 0.998 },
+        RecordError::ClockDifference { .. } => RecordError::ClockDifference { experiment: experiment(), percent: -0.998 },
+        RecordError::InputSign { .. } => RecordError::InputSign { experiment: experiment() },
+        RecordError::ChannelFactor { .. } => RecordError::ChannelFactor {
+            experiment: experiment(), channel: "acceleration".into(), factor: 1000.3, beside_others: true,
+        },
+        RecordError::ChannelFactor { .. } => RecordError::ChannelFactor {
+            experiment: experiment(), channel: "displacement".into(), factor: 9.806, beside_others: false,
+        },
+    ]
 }
 
 fn verdict_reasons() -> Vec<VerdictReason> {
@@ -763,6 +805,16 @@ fn verdict_reasons() -> Vec<VerdictReason> {
         VerdictReason::OnlyRatios { .. } => VerdictReason::OnlyRatios { fixed: vec!["mass".into()] },
         VerdictReason::OnlyRatios { .. } => VerdictReason::OnlyRatios { fixed: Vec::new() },
         VerdictReason::EquationError => VerdictReason::EquationError,
+        VerdictReason::ClassicalDisagrees(_) => VerdictReason::ClassicalDisagrees(classical()),
+        VerdictReason::RecordError(_) => VerdictReason::RecordError(record_errors()[0].clone()),
+    ]
+}
+
+fn verdict_assumptions() -> Vec<VerdictAssumption> {
+    let experiment = || "shaker".to_owned();
+    samples![
+        VerdictAssumption::Clock { .. } => VerdictAssumption::Clock { experiment: experiment() },
+        VerdictAssumption::Unit { .. } => VerdictAssumption::Unit { experiment: experiment(), channel: "displacement".into() },
     ]
 }
 
@@ -904,6 +956,13 @@ fn suggestions() -> Vec<Suggestion> {
             channel: channel(), experiment: "free decay".into(), or_static_force: true,
         },
         Suggestion::SecondAmplitude => Suggestion::SecondAmplitude,
+        Suggestion::ScaleChannel { .. } => Suggestion::ScaleChannel { channel: "acceleration".into(), factor: 0.101_97 },
+        Suggestion::ReverseInput { .. } => Suggestion::ReverseInput {
+            experiment: "shaker".into(), channels: vec![channel(), "acceleration".into()],
+        },
+        Suggestion::ShiftTimes { .. } => Suggestion::ShiftTimes { experiment: "shaker".into(), delay: 0.0125 },
+        Suggestion::ShiftTimes { .. } => Suggestion::ShiftTimes { experiment: "shaker".into(), delay: -0.0125 },
+        Suggestion::ScaleTimes { .. } => Suggestion::ScaleTimes { experiment: "shaker".into(), percent: -0.85 },
         Suggestion::NarrowFriction => Suggestion::NarrowFriction,
         Suggestion::FinerBasis { .. } => Suggestion::FinerBasis { function: "stiffness".into() },
         Suggestion::MoreParameters { .. } => Suggestion::MoreParameters { absent: vec!["cubic", "friction"] },

@@ -3,7 +3,8 @@
 use crate::finding::Finding;
 use crate::number_format::{resolved, significant, times_in_words};
 use kmcfit_core::internals::assessment::{
-    CoarseBasis, FitWarning, GapAssessment, GapStatus, NoIntervals, Unidentified,
+    ClassicalEstimate, ClassicalMethod, CoarseBasis, FitWarning, GapAssessment, GapStatus,
+    NoIntervals, RecordError, Unidentified,
 };
 use kmcfit_core::internals::identifiability::{
     Classification, FunctionClassification, RankFinding, span_words,
@@ -200,6 +201,16 @@ pub fn warning(warning: &FitWarning) -> Finding {
             super::suggestions::percent(100.0 * missing.share, 1),
         ),
         FitWarning::TimeOrAmplitude(rival) => super::rivals::rival_in_words(rival),
+        FitWarning::SecondMode {
+            experiment,
+            frequencies: [first, second],
+        } => format!(
+            "two modes, at {} and {} Hz, explain the samples of {experiment}; the model has one",
+            significant(*first, 3),
+            significant(*second, 3)
+        ),
+        FitWarning::RecordError(error) => record_error(error),
+        FitWarning::ClassicalDisagrees(estimate) => classical(estimate),
         FitWarning::ResidualMean {
             experiment,
             channel,
@@ -242,6 +253,70 @@ pub fn warning(warning: &FitWarning) -> Finding {
         ),
     };
     Finding::of(warning, text)
+}
+
+/// A classical estimate beside that of the fit, as a clause.
+pub fn classical(estimate: &ClassicalEstimate) -> String {
+    let [names, of_damping] = match estimate.method {
+        ClassicalMethod::LogarithmicDecrement => ["extremes of the decay", "logarithmic decrement"],
+        ClassicalMethod::FrequencyResponse => ["FRF peak", "half-power damping"],
+    };
+    let number = |value: f64, [low, high]: [f64; 2]| {
+        let [value, ..] = resolved([value, low, high], 0.5 * (high - low));
+        value
+    };
+    let damping = estimate.damping_ratio.zip(estimate.damping_interval);
+    let damping =
+        damping.map(|(value, interval)| format!(", {of_damping} {}", number(value, interval)));
+    format!(
+        "{names} {} Hz{}: {}",
+        number(estimate.frequency, estimate.frequency_interval),
+        damping.unwrap_or_default(),
+        match estimate.agrees {
+            true => "agree with the estimates",
+            false => "disagree with the estimates beyond both intervals",
+        }
+    )
+}
+
+/// An error of a record that explains the residuals, as a clause.
+pub fn record_error(error: &RecordError) -> String {
+    match error {
+        RecordError::Delay {
+            experiment,
+            delay,
+            samples,
+        } => format!(
+            "the response of {experiment} {} its input by {} s ({} samples)",
+            if *delay > 0.0 { "lags" } else { "leads" },
+            significant(delay.abs(), 3),
+            significant(samples.abs(), 3)
+        ),
+        RecordError::ClockDifference {
+            experiment,
+            percent,
+        } => format!(
+            "the clocks of input and response of {experiment} differ: the times of the response are {} % too {}",
+            significant(percent.abs(), 3),
+            if *percent > 0.0 { "short" } else { "long" }
+        ),
+        RecordError::InputSign { experiment } => {
+            format!("the input of {experiment} has the wrong sign")
+        }
+        RecordError::ChannelFactor {
+            experiment,
+            channel,
+            factor,
+            beside_others,
+        } => format!(
+            "the {channel} of {experiment} is {} times {}",
+            significant(*factor, 4),
+            match beside_others {
+                true => "what its other channels and the model give",
+                false => "what its input and the model give",
+            }
+        ),
+    }
 }
 
 fn p_in_words(p: f64) -> String {

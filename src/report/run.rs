@@ -88,6 +88,7 @@ impl FittedModel<'_> {
             version: env!("CARGO_PKG_VERSION").into(),
             verdict: Some(self.verdict()),
             estimates: self.estimates(),
+            classical: (self.run_assessment.assessment.as_ref()).and_then(|a| a.classical.clone()),
             model: self.model_summary(),
             outcome: OutcomeSummary {
                 status: fit.outcome.status,

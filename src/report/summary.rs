@@ -3,6 +3,7 @@
 use super::answer::answer_table;
 use super::document::{ChannelSummary, PenaltySummary, Prediction, ResultDocument};
 use super::equation::equation_residual;
+use super::findings;
 use super::rule_names::rule_in_words;
 use super::suggestions;
 use crate::finding::Finding;
@@ -96,7 +97,10 @@ fn write_details(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
         document.seconds
     )?;
     let known = &document.identifiability;
+    let assumed = document.verdict.iter().flat_map(|v| v.assumptions.clone());
+    let assumed: Vec<Finding> = assumed.collect();
     for (heading, findings) in [
+        ("Assumptions", &assumed),
         ("Identifiability", &known.findings),
         ("Warnings", &known.warnings),
     ] {
@@ -147,7 +151,8 @@ fn fit(document: &ResultDocument) -> Vec<String> {
     if let Some(worst) = validation.map(|c| c.fit_percent).reduce(f64::min) {
         text += &format!("; validation records: {}", fit_percent(worst));
     }
-    vec![text]
+    let classical = document.classical.as_ref().map(findings::classical);
+    std::iter::once(text).chain(classical).collect()
 }
 
 fn fit_percent(fit: f64) -> String {

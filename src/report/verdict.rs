@@ -9,7 +9,8 @@ use super::text::and_list;
 use crate::finding::Finding;
 use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::{
-    VerdictReason, estimates, verdict_level, verdict_reasons,
+    VerdictAssumption, VerdictLevel, VerdictReason, estimates, verdict_assumptions, verdict_level,
+    verdict_reasons,
 };
 use kmcfit_core::internals::solvers::Status;
 
@@ -21,7 +22,10 @@ impl FittedModel<'_> {
         let mut reasons = verdict_reasons(problem, self.fit, assessment);
         let missing = self.run_assessment.missing_terms.iter();
         reasons.extend(missing.map(|term| VerdictReason::MissingTerm(*term)));
-        reasons.extend(self.model.warnings.iter().filter_map(of_data));
+        let has_mode = |r: &VerdictReason| matches!(r, VerdictReason::SecondMode { .. });
+        if !reasons.iter().any(has_mode) {
+            reasons.extend(self.model.warnings.iter().find_map(two_modes));
+        }
         let poor = self.run_assessment.validation.iter();
         let poor = poor.filter_map(ValidationRecord::poor);
         reasons.extend(poor.map(|(name, fit_percent)| VerdictReason::NotPredicted {
@@ -37,8 +41,14 @@ impl FittedModel<'_> {
             }
             _ => reason_in_words(reason),
         };
+        let level = verdict_level(&reasons);
+        let assumptions = match level {
+            VerdictLevel::Inadequate => Vec::new(),
+            _ => verdict_assumptions(problem),
+        };
         Verdict {
-            level: verdict_level(&reasons),
+            level,
+            assumptions: assumptions.iter().map(assumption).collect(),
             reasons: reasons.iter().map(in_words).collect(),
             passed: match reasons.is_empty() {
                 true => self.passed(),
@@ -93,22 +103,14 @@ fn is_ratio(name: &str) -> bool {
     )
 }
 
-/// Reason from a warning about the data.
-fn of_data(warning: &Finding) -> Option<VerdictReason> {
-    let text = |name: &str| Some(warning.quantities.get(name)?.as_str()?.to_owned());
-    match warning.kind.as_str() {
-        "two_modes" => {
-            let frequencies = warning.quantities.get("frequencies")?.as_array()?;
-            let frequencies: Vec<f64> = frequencies.iter().filter_map(|f| f.as_f64()).collect();
-            Some(VerdictReason::SecondMode {
-                frequencies: frequencies.try_into().ok()?,
-            })
-        }
-        "saturation" => Some(VerdictReason::Saturation {
-            channel: text("channel")?,
-        }),
-        _ => None,
-    }
+/// Second mode from a warning about the data.
+fn two_modes(warning: &Finding) -> Option<VerdictReason> {
+    (warning.kind == "two_modes").then_some(())?;
+    let frequencies = warning.quantities.get("frequencies")?.as_array()?;
+    let frequencies: Vec<f64> = frequencies.iter().filter_map(|f| f.as_f64()).collect();
+    Some(VerdictReason::SecondMode {
+        frequencies: frequencies.try_into().ok()?,
+    })
 }
 
 /// A reason as a clause.
@@ -149,6 +151,8 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
             significant(*second, 3),
             significant(*first, 3)
         ),
+        VerdictReason::RecordError(error) => super::findings::record_error(error),
+        VerdictReason::ClassicalDisagrees(estimate) => super::findings::classical(estimate),
         VerdictReason::Saturation { channel } => {
             format!("the {channel} saturates: many samples equal the largest one")
         }
@@ -210,4 +214,21 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
         }
     };
     Finding::of(reason, text)
+}
+
+/// An assumption of a verdict as a sentence.
+pub fn assumption(assumption: &VerdictAssumption) -> Finding {
+    let text = match assumption {
+        VerdictAssumption::Clock { experiment } => format!(
+            "the clock of {experiment} is right: an error of its rate changes all frequencies by as much"
+        ),
+        VerdictAssumption::Unit {
+            experiment,
+            channel,
+        } => format!(
+            "the units of the {channel} and of the input of {experiment} are right: an error of either changes mass, damping and \
+             stiffness by the same factor"
+        ),
+    };
+    Finding::of(assumption, text)
 }

@@ -15,7 +15,9 @@ pub use verdict::{Verdict, level_in_words};
 use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
-use kmcfit_core::internals::assessment::{FitStatistics, FunctionSummary, StepCheck};
+use kmcfit_core::internals::assessment::{
+    ClassicalEstimate, FitStatistics, FunctionSummary, StepCheck,
+};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::CovarianceKind;
 use kmcfit_core::internals::solvers::{EquationBalance, Optimality, Status, number_or_nan};
@@ -42,6 +44,9 @@ pub struct ResultDocument {
     /// Estimates of the natural frequency, the damping ratio, the functions and ratios; none for a fit that failed.
     #[serde(default, skip_serializing_if = "Estimates::is_empty")]
     pub estimates: Estimates,
+    /// Natural frequency and damping ratio by a classical method, where a record and the model allow it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub classical: Option<ClassicalEstimate>,
     /// Model, grid and method.
     pub model: ModelSummary,
     /// Status and reason of the end.

@@ -14,6 +14,9 @@ pub struct Verdict {
     /// Tests that a fit without reasons passed, as one clause; empty with reasons.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub passed: String,
+    /// Assumptions that the records cannot test; none where the verdict is `inadequate`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub assumptions: Vec<Finding>,
 }
 
 impl Verdict {

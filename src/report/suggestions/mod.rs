@@ -109,6 +109,34 @@ pub enum Suggestion {
         /// True if a static force has the same effect.
         or_static_force: bool,
     },
+    /// Correction of the unit or the scale of a channel.
+    ScaleChannel {
+        /// Kind of the channel.
+        channel: String,
+        /// Samples over the response.
+        factor: f64,
+    },
+    /// Correction of the sign of an input.
+    ReverseInput {
+        /// Name of the experiment.
+        experiment: String,
+        /// Kinds of its channels.
+        channels: Vec<String>,
+    },
+    /// Correction of the times of the response for a delay.
+    ShiftTimes {
+        /// Name of the experiment.
+        experiment: String,
+        /// The delay, s.
+        delay: f64,
+    },
+    /// Correction of the times of the response for a clock at another rate.
+    ScaleTimes {
+        /// Name of the experiment.
+        experiment: String,
+        /// Excess of the time in the system over that on the clock of the response, per cent.
+        percent: f64,
+    },
     /// A smaller width of Coulomb friction, on which the estimates depend.
     NarrowFriction,
     /// A finer basis for a function whose basis is too coarse.
@@ -165,6 +193,9 @@ fn typed(document: &ResultDocument) -> Vec<Suggestion> {
     let mut steps = Vec::new();
     steps.extend(about_ending(document));
     steps.extend(about_steps(document));
+    let of_record = about_records(document);
+    let is_explained = of_record.is_some();
+    steps.extend(of_record);
     steps.extend(about_means(document));
     steps.extend(about_terms(document));
     let warnings = &document.identifiability.warnings;
@@ -172,7 +203,10 @@ fn typed(document: &ResultDocument) -> Vec<Suggestion> {
     steps.extend(has_rival.then_some(Suggestion::SecondAmplitude));
     steps.extend(about_inputs(document));
     steps.extend(about_friction(document));
-    steps.extend(about_bases(document).or_else(|| about_residuals(document)));
+    // An error of the record explains the residuals.
+    if !is_explained {
+        steps.extend(about_bases(document).or_else(|| about_residuals(document)));
+    }
     if wanders(document) {
         steps.rotate_left(1);
     }
@@ -190,6 +224,41 @@ fn typed(document: &ResultDocument) -> Vec<Suggestion> {
     }
     steps.truncate(MOST);
     steps
+}
+
+/// Correction of an error of a record.
+fn about_records(document: &ResultDocument) -> Option<Suggestion> {
+    document
+        .identifiability
+        .warnings
+        .iter()
+        .find_map(|warning| {
+            let text = |key: &str| Some(warning.quantities.get(key)?.as_str()?.to_owned());
+            let number = |key: &str| warning.quantities.get(key)?.as_f64();
+            let experiment = text("experiment");
+            Some(match warning.kind.as_str() {
+                "channel_factor" => Suggestion::ScaleChannel {
+                    channel: text("channel")?,
+                    factor: number("factor")?,
+                },
+                "input_sign" => Suggestion::ReverseInput {
+                    channels: (document.experiments.iter())
+                        .filter(|e| Some(&e.name) == experiment.as_ref())
+                        .flat_map(|e| e.channels.iter().map(|c| c.kind.clone()))
+                        .collect(),
+                    experiment: experiment?,
+                },
+                "delay" => Suggestion::ShiftTimes {
+                    experiment: experiment?,
+                    delay: number("delay")?,
+                },
+                "clock_difference" => Suggestion::ScaleTimes {
+                    experiment: experiment?,
+                    percent: number("percent")?,
+                },
+                _ => return None,
+            })
+        })
 }
 
 /// The first function whose basis is too coarse.

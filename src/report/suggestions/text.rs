@@ -101,6 +101,39 @@ impl fmt::Display for Suggestion {
                     false => Ok(()),
                 }
             }
+            Suggestion::ScaleChannel { channel, factor } => write!(
+                f,
+                "correct the unit of the {channel} or of the other channels and the input (`units`), or state the gain of its sensor: `sensors: {{{channel}: {{gain: {}}}}}`",
+                significant(*factor, 4)
+            ),
+            Suggestion::ReverseInput {
+                experiment,
+                channels,
+            } => {
+                let each: Vec<String> = (channels.iter())
+                    .map(|channel| format!("{channel}: {{gain: -1}}"))
+                    .collect();
+                write!(
+                    f,
+                    "reverse the sign of the input of {experiment} in its file, or that of the response: `sensors: {{{}}}`",
+                    each.join(", ")
+                )
+            }
+            Suggestion::ShiftTimes { experiment, delay } => write!(
+                f,
+                "align input and response of {experiment} in the file: {} {} s {} the times of the response",
+                if *delay > 0.0 { "subtract" } else { "add" },
+                significant(delay.abs(), 3),
+                if *delay > 0.0 { "from" } else { "to" }
+            ),
+            Suggestion::ScaleTimes {
+                experiment,
+                percent,
+            } => write!(
+                f,
+                "put input and response of {experiment} on one clock in the file: multiply the times of the response by {}",
+                significant(1.0 + 0.01 * percent, 6)
+            ),
             Suggestion::NarrowFriction => f.write_str(
                 "reduce the width of Coulomb friction until the estimates do not depend on it: `width: auto`, with an automatic grid",
             ),

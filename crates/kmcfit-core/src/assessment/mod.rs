@@ -1,6 +1,7 @@
 //! Assessment of a fit: statistics of the residuals, step-size check, plausibility, standard errors and bands.
 
 mod channel;
+mod classical;
 mod constants;
 mod draws;
 mod equation_error;
@@ -10,17 +11,20 @@ mod function;
 mod gaps;
 mod input_disturbance;
 mod plausibility;
+mod record_errors;
 mod recovery;
 mod refinement;
 mod residual_mean;
 mod rivals;
 mod score_tests;
+mod second_mode;
 mod statistics;
 mod step_check;
 mod verdict;
 
 pub use crate::objective::{diagnostics, outliers};
 pub use channel::{ResidualPattern, pattern};
+pub use classical::{ClassicalEstimate, ClassicalMethod};
 pub use constants::{constant_probability, standard_error};
 pub use draws::{Draw, NoDraws, draws};
 pub use equation_error::{EquationErrorIntervals, NoIntervals};
@@ -28,17 +32,24 @@ pub use estimates::{Estimate, EstimateStatus, estimates};
 pub use function::{EstimateErrors, FunctionSummary, function_summaries};
 pub use gaps::{FunctionInGap, GapAssessment, GapStatus};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
+pub use record_errors::RecordError;
 pub use recovery::{RECOVERY_TOLERANCE, Roughness, TruthErrors, is_same_truth};
 pub use refinement::{BasisTest, CoarseBasis};
 pub use rivals::AmplitudeRival;
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
-pub use verdict::{VerdictLevel, VerdictReason, verdict_level, verdict_reasons};
+pub use verdict::{
+    VerdictAssumption, VerdictLevel, VerdictReason, verdict_assumptions, verdict_level,
+    verdict_reasons,
+};
 
+use classical::classical_estimate;
 use friction_width::width_warning;
 use gaps::gap_assessments;
+use record_errors::large_error;
 use rivals::amplitude_rival;
-use score_tests::missing_term;
+use score_tests::missing;
+use second_mode::second_modes;
 
 use crate::identifiability::{
     BandSettings, Bands, FunctionClassification, classify_functions, condition_on_bases,
@@ -67,6 +78,8 @@ pub struct FitAssessment {
     pub bands: Option<Bands>,
     /// Classification of functions and ratios by their bands.
     pub classifications: Vec<FunctionClassification>,
+    /// Natural frequency and damping ratio by a classical method, where a record allows it.
+    pub classical: Option<ClassicalEstimate>,
 }
 
 impl FitAssessment {
@@ -97,18 +110,11 @@ impl FitAssessment {
             degrees_of_freedom: vec![f64::INFINITY; problem.parameters()],
             bands: None,
             classifications: Vec::new(),
+            classical: None,
         };
-        let plausibility = &assessment.plausibility;
-        if reports_errors && plausibility.unidentified.is_none() {
-            let is_noise = plausibility.errors_hold && !plausibility.is_coloured;
-            let is_modelled = is_noise && !plausibility.is_disturbed;
-            let (theta, evaluation) = (&best.parameters, &best.evaluation);
-            // A width of friction on which estimates depend leaves residuals like those of a missing term.
-            let warning = width_warning(problem, theta, evaluation).or_else(|| {
-                let missing = || missing_term(problem, theta, evaluation, is_modelled);
-                tests_bases.then(missing)?.map(FitWarning::MissingTerm)
-            });
-            assessment.plausibility.warnings.extend(warning);
+        if reports_errors && fit.outcome.status != Status::Failed {
+            let causes = causes(problem, fit, &assessment.plausibility, tests_bases);
+            assessment.plausibility.warnings.extend(causes);
         }
         let mut gaps = Vec::new();
         if reports_errors && assessment.plausibility.errors_hold {
@@ -161,6 +167,13 @@ impl FitAssessment {
         } else if few {
             gaps = gap_assessments(problem, fit, None);
         }
+        if fit.outcome.status != Status::Failed {
+            assessment.classical =
+                classical_estimate(problem, &best.evaluation, assessment.bands.as_ref());
+        }
+        let disagrees = assessment.classical.iter().filter(|c| !c.agrees).cloned();
+        let disagrees = disagrees.map(FitWarning::ClassicalDisagrees);
+        assessment.plausibility.warnings.extend(disagrees);
         let gaps = gaps.into_iter().map(FitWarning::Gap);
         assessment.plausibility.warnings.extend(gaps);
         assessment
@@ -175,5 +188,34 @@ impl FitAssessment {
             effective_parameters: self.effective_parameters.as_deref(),
             tests_constants: !self.plausibility.is_coloured,
         }
+    }
+}
+
+/// Causes of residuals that the model does not explain: the width of friction and, with `tests` of finer models, a missing term, an error of a
+/// record, or a second mode.
+fn causes(
+    problem: &Problem,
+    fit: &Fit,
+    plausibility: &Plausibility,
+    tests: bool,
+) -> Vec<FitWarning> {
+    let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);
+    let is_noise = plausibility.errors_hold && !plausibility.is_coloured;
+    let is_modelled = is_noise && !plausibility.is_disturbed;
+    let is_system = plausibility.unidentified.is_none();
+    // A width of friction on which estimates depend leaves residuals like those of a missing term.
+    let width = is_system.then(|| width_warning(problem, theta, evaluation));
+    let small = || {
+        let found = || missing(problem, theta, evaluation, is_modelled);
+        is_system.then(found).flatten()
+    };
+    let large = || large_error(problem, theta, evaluation).map(FitWarning::RecordError);
+    match (width.flatten(), tests) {
+        (Some(width), _) => vec![width],
+        (None, false) => Vec::new(),
+        (None, true) => match small().or_else(large) {
+            Some(cause) => vec![cause],
+            None => second_modes(problem, evaluation),
+        },
     }
 }

@@ -1,7 +1,9 @@
 //! Plausibility of a fit: conditions under which its optimum identifies no system, and warnings about its intervals.
 
+use super::classical::ClassicalEstimate;
 use super::gaps::GapAssessment;
 use super::input_disturbance::input_warnings;
+use super::record_errors::RecordError;
 use super::refinement::CoarseBasis;
 use super::residual_mean::mean_warnings;
 use super::rivals::AmplitudeRival;
@@ -125,6 +127,13 @@ pub enum FitWarning {
     MissingTerm(MissingTerm),
     /// Constants and terms that depend on the amplitude explain the samples as well as functions that vary with time.
     TimeOrAmplitude(AmplitudeRival),
+    /// Two modes explain the samples of a record.
+    SecondMode {
+        /// Name of the experiment.
+        experiment: String,
+        /// Their natural frequencies, Hz, the stronger first.
+        frequencies: [f64; 2],
+    },
     /// The residuals of a channel have a mean: an offset of its sensor, or a static force.
     ResidualMean {
         /// Name of the experiment.
@@ -163,6 +172,11 @@ pub enum FitWarning {
         /// Name of the experiment.
         experiment: String,
     },
+    /// A classical estimate and that of the fit differ by more than their intervals.
+    ClassicalDisagrees(ClassicalEstimate),
+    /// An error of a record explains the residuals.
+    #[serde(untagged)]
+    RecordError(RecordError),
 }
 
 /// Plausibility of a fit.

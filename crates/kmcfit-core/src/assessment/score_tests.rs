@@ -1,4 +1,5 @@
-//! Force terms that the residuals of a simulated response show and the model does not have: score tests, one for each candidate.
+//! Force terms that the residuals of a simulated response show and the model does not have, and errors of the records: score tests, one for
+//! each candidate.
 //!
 //! The equation of motion is extended by a constant coefficient `p` of each term that the model lacks, at `p = 0`, where the response is
 //! that of the fit. With the derivatives `J` of the weighted and whitened residuals `r` in the parameters of the model and `d` in `p`, and the
@@ -9,18 +10,22 @@
 //! ```
 //!
 //! is the estimate after one step of Gauss and Newton from the fit (Rao 1948). A term with a large `t` is missing if a refit with it leaves white
-//! residuals. Where the noise model does not describe the residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
+//! residuals, or the smallest of all refits and at most half of those before; so are a delay, a difference of clocks and a gain, with their [own derivatives](super::record_errors). Where the noise model does not describe the residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
 
+use super::FitWarning;
+use super::record_errors::{
+    self, EXPLAINED, RecordParameter, Refit, without_correlation, worst_misfit,
+};
 use super::refinement::applies;
 use crate::functions::{CoefficientFunction, CoefficientKind, CoefficientSet, Parameterization};
 use crate::identifiability::Factorisation;
 use crate::noise::KernelCovariance;
-use crate::objective::{Evaluation, diagnostics};
+use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::record::{NoiseEstimate, ScoreCovariance};
+use crate::record::ScoreCovariance;
 use crate::simd::sum::rms;
 use crate::simulate::Trajectory;
-use crate::solvers::{FitSettings, MissingTerm, TESTED_TERMS, fit_from, weighted_jacobian};
+use crate::solvers::{MissingTerm, TESTED_TERMS, weighted_jacobian};
 use crate::system::Term;
 use nalgebra::{DMatrix, DVector};
 
@@ -31,73 +36,121 @@ const SIGNIFICANT: f64 = 4.5;
 /// Fit of a channel, per cent, below which a fit is not near the system, and a linearisation in further terms says nothing.
 const UNRELATED: f64 = 50.0;
 /// Smallest p-value of the test of whiteness of residuals that a missing term explains.
-const WHITE: f64 = 1e-3;
+pub(super) const WHITE: f64 = 1e-3;
+/// Number of the most significant candidates that are refitted.
+const REFITTED: usize = 3;
 /// Fewest samples per parameter.
 const SAMPLES_PER_PARAMETER: usize = 4;
 /// Part of a candidate's derivatives outside the span of the model's below which it is no candidate.
 const APART: f64 = 1e-6;
 
-/// The most significant missing term at the optimum `theta`; `None` where the residuals show none, and where the test does not apply: without a
-/// likelihood, at an active constraint, for residuals at machine precision or as large as the response, and with few samples or many
-/// parameters. `is_modelled` is true for residuals that the noise model describes.
-pub(super) fn missing_term(
+/// A candidate for what the model lacks.
+enum Candidate {
+    Term(CoefficientKind, Term),
+    Record(RecordParameter),
+}
+
+/// The most significant missing term or error of a record at the optimum `theta`; `None` where the residuals show none, and where the test
+/// does not apply: without a likelihood, at an active constraint, for residuals at machine precision or as large as the response, and with few
+/// samples or many parameters. `is_modelled` is true for residuals that the noise model describes.
+pub(super) fn missing(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
     is_modelled: bool,
-) -> Option<MissingTerm> {
+) -> Option<FitWarning> {
     let is_few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
     let is_long = problem.sample_count() >= SAMPLES_PER_PARAMETER * problem.parameters();
     (is_few && is_long && applies(problem, theta, evaluation)).then_some(())?;
-    let mut fits = (problem.predicted(evaluation))
-        .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent);
-    fits.all(|fit| fit > UNRELATED).then_some(())?;
+    (record_errors::worst_fit(problem, evaluation) > UNRELATED).then_some(())?;
     let kinds = candidates(problem, evaluation);
-    (!kinds.is_empty()).then_some(())?;
     let (extended, at) = extended(problem, theta, &kinds)?;
     let evaluation = extended.evaluate(&at).ok()?;
     let jacobian = weighted_jacobian(&extended, &evaluation);
-    let residuals = (extended.predicted(&evaluation))
-        .flat_map(|(channel, predicted)| channel.majorant(predicted).weighted);
-    let residuals = DVector::from_vec(residuals.collect());
+    let residuals = weighted_residuals(&extended, &evaluation);
     let first = problem.functions.scalar_range().start;
     let is_new = |j: &usize| (first..first + kinds.len()).contains(j);
     let own: Vec<usize> = (0..jacobian.ncols()).filter(|j| !is_new(j)).collect();
     let model = Span::of(&jacobian.select_columns(&own));
-    let tests = kinds.iter().enumerate().filter_map(|(i, (kind, term))| {
+    let terms = kinds.iter().enumerate().map(|(i, (kind, term))| {
         let column = jacobian.column(first + i).into_owned();
-        let (value, t) = model.test(&extended, &column, &residuals, is_modelled)?;
-        let share = (value * force(&evaluation, *term)).abs() / largest_force(problem, &evaluation);
-        Some(MissingTerm {
-            term: *kind,
-            value,
-            t,
-            share,
-        })
+        (Candidate::Term(*kind, *term), column)
     });
-    let best = tests.max_by(|a, b| a.t.abs().total_cmp(&b.t.abs()))?;
-    (best.t.abs() >= SIGNIFICANT && is_explained(problem, theta, &best)).then_some(best)
+    let of_records = record_errors::parameters(problem).into_iter();
+    let of_records = of_records.filter_map(|parameter| {
+        let column = record_errors::column(&extended, &evaluation, parameter)?;
+        Some((Candidate::Record(parameter), DVector::from_vec(column)))
+    });
+    let tests = terms.chain(of_records).filter_map(|(candidate, column)| {
+        let (value, t) = model.test(&extended, &column, &residuals, is_modelled)?;
+        Some((candidate, value, t))
+    });
+    let mut tests: Vec<_> = tests.collect();
+    tests.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
+    // Far from the optimum of the right candidate another one may be more significant: friction resembles a negative quadratic damping.
+    (tests.first()?.2.abs() >= SIGNIFICANT).then_some(())?;
+    let mut best: Option<(f64, MissingTerm)> = None;
+    for (candidate, value, t) in tests.into_iter().take(REFITTED) {
+        match candidate {
+            Candidate::Term(kind, term) => {
+                let size = (value * force(&evaluation, term)).abs();
+                let missing = MissingTerm {
+                    term: kind,
+                    value,
+                    t,
+                    share: size / largest_force(problem, &evaluation),
+                };
+                let Some(refit) = refit(problem, theta, &missing) else {
+                    continue;
+                };
+                if refit.is_white() {
+                    return Some(FitWarning::MissingTerm(missing));
+                }
+                let misfit = refit.worst_misfit();
+                if best.is_none_or(|(least, _)| misfit < least) {
+                    best = Some((misfit, missing));
+                }
+            }
+            Candidate::Record(parameter) => {
+                let error = record_errors::small_error(problem, theta, parameter, value);
+                if let Some(error) = error {
+                    return Some(FitWarning::RecordError(error));
+                }
+            }
+        }
+    }
+    let before = worst_misfit(problem, &evaluation);
+    let (_, missing) = best.filter(|(misfit, _)| *misfit < EXPLAINED * before)?;
+    Some(FitWarning::MissingTerm(missing))
 }
 
-/// True if a refit with the term leaves white residuals: an error of the input, a coefficient that varies and another missing term give a large
-/// `t` as well, but residuals that remain.
-fn is_explained(problem: &Problem, theta: &[f64], missing: &MissingTerm) -> bool {
-    let refit = || {
-        let evaluation = problem.evaluate(theta).ok()?;
-        let kinds = candidates(problem, &evaluation);
-        let kind = kinds.into_iter().find(|(kind, _)| *kind == missing.term)?;
+/// Weighted and whitened residuals of all channels.
+fn weighted_residuals(problem: &Problem, evaluation: &Evaluation) -> DVector<f64> {
+    let each = (problem.predicted(evaluation))
+        .flat_map(|(channel, predicted)| channel.majorant(predicted).weighted);
+    DVector::from_vec(each.collect())
+}
+
+/// Refit with a term, from the optimum or else from the start, whichever ends lower. The term is missing if it leaves white residuals: an error
+/// of the input, a coefficient that varies and another missing term give a large `t` as well, but residuals that remain.
+fn refit(problem: &Problem, theta: &[f64], missing: &MissingTerm) -> Option<Refit> {
+    let evaluation = problem.evaluate(theta).ok()?;
+    let kinds = candidates(problem, &evaluation);
+    let kind = kinds.into_iter().find(|(kind, _)| *kind == missing.term)?;
+    let from = |theta: &[f64]| {
         let (mut extended, mut start) = extended(problem, theta, &[kind])?;
-        for channel in (extended.parts_mut().experiments.iter_mut()).flat_map(|e| &mut e.channels) {
-            *channel = channel.clone().with_noise(NoiseEstimate::default());
-        }
+        without_correlation(&mut extended.parts_mut().experiments);
         start[problem.functions.scalar_range().start] = missing.value;
-        let fit = fit_from(&extended, &start, &FitSettings::default()).ok()?;
-        let evaluation = &fit.best.evaluation;
-        let mut tests = (extended.predicted(evaluation))
-            .map(|(channel, predicted)| diagnostics(channel, predicted).whiteness.p_value);
-        Some(tests.all(|p| p >= WHITE))
+        Refit::of(extended, &start)
     };
-    refit().unwrap_or(false)
+    let near = from(theta);
+    match near {
+        Some(near) if near.is_white() => Some(near),
+        near => {
+            let both = near.into_iter().chain(from(&problem.start()));
+            both.min_by(|a, b| a.worst_misfit().total_cmp(&b.worst_misfit()))
+        }
+    }
 }
 
 /// Kinds and terms that the model does not have.
@@ -161,11 +214,22 @@ fn extended(
 }
 
 /// Orthonormal basis of the derivatives of the model.
-struct Span {
+pub(super) struct Span {
     basis: DMatrix<f64>,
 }
 
 impl Span {
+    /// Estimate of a parameter with the derivatives `column` beside those of the model, and its ratio to the standard error.
+    pub(super) fn score(
+        problem: &Problem,
+        evaluation: &Evaluation,
+        column: Vec<f64>,
+    ) -> Option<(f64, f64)> {
+        let residuals = weighted_residuals(problem, evaluation);
+        let model = Self::of(&weighted_jacobian(problem, evaluation));
+        model.test(problem, &DVector::from_vec(column), &residuals, true)
+    }
+
     fn of(jacobian: &DMatrix<f64>) -> Self {
         let mut scaled = jacobian.clone();
         for mut column in scaled.column_iter_mut() {

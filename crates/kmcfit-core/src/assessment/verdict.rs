@@ -5,14 +5,18 @@
 //! reason: some systems gain energy.
 
 use super::FitAssessment;
+use super::classical::ClassicalEstimate;
 use super::gaps::{GapAssessment, GapStatus};
 use super::plausibility::{FitWarning, Unidentified};
+use super::record_errors::RecordError;
 use super::rivals::AmplitudeRival;
 use crate::functions::CoefficientKind;
 use crate::identifiability::{
     Classification, FunctionClassification, ScaleSource, scale_source, structural_rank,
 };
 use crate::problem::Problem;
+use crate::record::Channel;
+use crate::signal::clipped;
 use crate::solvers::{Fit, MissingTerm, Status};
 use crate::system::InputQuantity;
 use serde::{Deserialize, Serialize};
@@ -157,6 +161,52 @@ pub enum VerdictReason {
     },
     /// The equation error neglects the noise of the response, which biases its estimates.
     EquationError,
+    /// A classical estimate and that of the fit differ by more than their intervals.
+    ClassicalDisagrees(ClassicalEstimate),
+    /// An error of a record explains the residuals.
+    #[serde(untagged)]
+    RecordError(RecordError),
+}
+
+/// An assumption of a verdict that the records cannot test.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum VerdictAssumption {
+    /// The clock of a record, on which all its columns are.
+    Clock {
+        /// Name of the experiment.
+        experiment: String,
+    },
+    /// The unit of the only channel of a record with an input.
+    Unit {
+        /// Name of the experiment.
+        experiment: String,
+        /// Kind of the channel.
+        channel: String,
+    },
+}
+
+/// Assumptions of the verdict on a fit: an error of the clock scales all frequencies, and one of the unit of an only channel the mass, the
+/// damping and the stiffness.
+pub fn verdict_assumptions(problem: &Problem) -> Vec<VerdictAssumption> {
+    let each = problem
+        .experiments
+        .iter()
+        .filter(|e| e.has_samples())
+        .flat_map(|e| {
+            let clock = VerdictAssumption::Clock {
+                experiment: e.name.clone(),
+            };
+            let unit = match (e.is_free(), e.channels.as_slice()) {
+                (false, [channel]) => Some(VerdictAssumption::Unit {
+                    experiment: e.name.clone(),
+                    channel: channel.kind().name().to_owned(),
+                }),
+                _ => None,
+            };
+            std::iter::once(clock).chain(unit)
+        });
+    each.collect()
 }
 
 impl VerdictReason {
@@ -167,7 +217,8 @@ impl VerdictReason {
             | Self::NoSystem { .. }
             | Self::PoorFit { .. }
             | Self::BeyondSigma { .. }
-            | Self::CoarseSteps { .. } => VerdictLevel::Inadequate,
+            | Self::CoarseSteps { .. }
+            | Self::RecordError(RecordError::InputSign { .. }) => VerdictLevel::Inadequate,
             _ => VerdictLevel::Check,
         }
     }
@@ -190,18 +241,21 @@ pub fn verdict_reasons(
     reasons.extend(ending(fit.outcome.status));
     if let Some(assessment) = assessment {
         let plausibility = &assessment.plausibility;
+        // A missing term, a second mode or an error of a record explains other reasons.
+        let (causes, others): (Vec<_>, Vec<_>) = plausibility.warnings.iter().partition(is_cause);
+        let others = others.into_iter();
+        reasons.extend(
+            causes
+                .into_iter()
+                .filter_map(|w| of_warning(problem, fit, w)),
+        );
         match &plausibility.unidentified {
             Some(Unidentified::Failed) => {}
             Some(reason) => reasons.push(VerdictReason::NoSystem {
                 reason: reason.clone(),
             }),
             None => {
-                // A missing term explains other reasons.
-                let is_term = |w: &&FitWarning| matches!(w, FitWarning::MissingTerm(_));
-                let (terms, others): (Vec<_>, Vec<_>) =
-                    plausibility.warnings.iter().partition(is_term);
-                let warnings = terms.into_iter().chain(others);
-                reasons.extend(warnings.filter_map(|w| of_warning(problem, fit, w)));
+                reasons.extend(others.filter_map(|w| of_warning(problem, fit, w)));
                 reasons.extend(of_classifications(&assessment.classifications));
                 let is_classified = !assessment.classifications.is_empty();
                 reasons.extend(of_rank(problem, is_classified));
@@ -213,8 +267,30 @@ pub fn verdict_reasons(
     if !reasons.iter().any(is_rank) {
         reasons.extend(of_scale(problem));
     }
+    reasons.extend(saturations(problem));
     reasons.sort_by_key(|reason| std::cmp::Reverse(reason.level()));
     reasons
+}
+
+/// True for warnings that name the cause of others.
+fn is_cause(warning: &&FitWarning) -> bool {
+    matches!(
+        warning,
+        FitWarning::MissingTerm(_) | FitWarning::SecondMode { .. } | FitWarning::RecordError(_)
+    )
+}
+
+/// Channels in which many samples equal the largest one.
+fn saturations(problem: &Problem) -> Vec<VerdictReason> {
+    let is_cut = |c: &&Channel| {
+        let plain = c.before_filter();
+        plain.is_some_and(|plain| clipped(plain.observed()).is_some())
+    };
+    let each = problem.channels().filter(is_cut);
+    let each = each.map(|c| VerdictReason::Saturation {
+        channel: c.kind().name().to_owned(),
+    });
+    each.collect()
 }
 
 fn ending(status: Status) -> Option<VerdictReason> {
@@ -257,6 +333,11 @@ fn of_warning(problem: &Problem, fit: &Fit, warning: &FitWarning) -> Option<Verd
         },
         FitWarning::MissingTerm(term) => VerdictReason::MissingTerm(*term),
         FitWarning::TimeOrAmplitude(rival) => VerdictReason::TimeOrAmplitude(rival.clone()),
+        FitWarning::SecondMode { frequencies, .. } => VerdictReason::SecondMode {
+            frequencies: *frequencies,
+        },
+        FitWarning::ClassicalDisagrees(e) => VerdictReason::ClassicalDisagrees(e.clone()),
+        FitWarning::RecordError(error) => VerdictReason::RecordError(error.clone()),
         FitWarning::ResidualMean {
             experiment,
             channel,

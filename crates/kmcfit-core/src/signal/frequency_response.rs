@@ -17,6 +17,8 @@ use std::f64::consts::TAU;
 
 /// Number of segments, which overlap by half.
 const SEGMENTS: usize = 9;
+/// Number of independent segments: Hann windows that overlap by half leave 0.6 of them.
+const INDEPENDENT: f64 = 0.6 * SEGMENTS as f64;
 /// Fewest samples of a segment.
 const FEWEST: usize = 64;
 /// Smallest coherence at which the frequency response is used.
@@ -41,40 +43,42 @@ pub fn two_forced_modes(
     spacing: f64,
     derivatives: i32,
 ) -> Option<[f64; 2]> {
-    let found = FrequencyResponse::of(force, response, spacing, derivatives)?;
+    let found = Mobility::of(force, response, spacing, derivatives)?;
     let peak = |bins: &mut dyn Iterator<Item = usize>| {
         let usable = bins.filter(|k| found.is_usable(*k));
-        usable.max_by(|a, b| found.mobility[*a].total_cmp(&found.mobility[*b]))
+        usable.max_by(|a, b| found.squares[*a].total_cmp(&found.squares[*b]))
     };
-    let bins = APART..found.mobility.len() - APART;
+    let bins = APART..found.squares.len() - APART;
     let first = peak(&mut bins.clone())?;
     let width = ((WIDTH * first as f64) as usize).max(APART);
     let second = peak(&mut bins.filter(|k| k.abs_diff(first) > width))?;
     let [low, high] = [first.min(second), first.max(second)];
-    let means = found.mobility[low..=high].windows(3);
+    let means = found.squares[low..=high].windows(3);
     let between = means.map(|w| w.iter().sum::<f64>() / 3.0);
     let lowest = between.fold(f64::INFINITY, f64::min);
-    let of_second = found.mobility[second];
+    let of_second = found.squares[second];
     let around = second - APART / 2..=second + APART / 2;
-    let is_peak = around.into_iter().all(|k| found.mobility[k] <= of_second);
+    let is_peak = around.into_iter().all(|k| found.squares[k] <= of_second);
     let is_mode =
-        is_peak && of_second > WEAKEST * found.mobility[first] && lowest < DEEPEST * of_second;
+        is_peak && of_second > WEAKEST * found.squares[first] && lowest < DEEPEST * of_second;
     is_mode.then(|| [first, second].map(|k| k as f64 * found.resolution))
 }
 
-/// Frequency response at the frequencies of a segment.
-struct FrequencyResponse {
+/// Mobility `y'/x` of a response at the frequencies of a segment.
+pub struct Mobility {
     /// Frequency spacing, Hz.
-    resolution: f64,
+    pub resolution: f64,
     /// Squared mobility.
-    mobility: Vec<f64>,
+    pub squares: Vec<f64>,
     coherence: Vec<f64>,
     /// Density of the force relative to its median.
     drive: Vec<f64>,
 }
 
-impl FrequencyResponse {
-    fn of(force: &[f64], response: &[f64], spacing: f64, derivatives: i32) -> Option<Self> {
+impl Mobility {
+    /// Mobility of the response to a force; `derivatives` is the order of the derivative of the displacement that the response is. `None` for too
+    /// few samples.
+    pub fn of(force: &[f64], response: &[f64], spacing: f64, derivatives: i32) -> Option<Self> {
         let length = 2 * force.len().min(response.len()) / (SEGMENTS + 1);
         let is_finite = force.iter().chain(response).all(|x| x.is_finite());
         if length < FEWEST || !is_finite {
@@ -112,7 +116,7 @@ impl FrequencyResponse {
         };
         Some(Self {
             resolution,
-            mobility: sums.iter().enumerate().map(squared).collect(),
+            squares: sums.iter().enumerate().map(squared).collect(),
             coherence: (sums.iter())
                 .map(|(xx, yy, xy)| xy.norm_sqr() / (xx * yy))
                 .collect(),
@@ -120,8 +124,20 @@ impl FrequencyResponse {
         })
     }
 
+    /// Frequency of the largest mobility among those at which the force drives the response and the coherence is high.
+    pub fn peak(&self) -> Option<usize> {
+        let usable = (APART..self.squares.len() - APART).filter(|k| self.is_usable(*k));
+        usable.max_by(|a, b| self.squares[*a].total_cmp(&self.squares[*b]))
+    }
+
+    /// Relative standard deviation of the squared mobility by noise and leakage (Bendat and Piersol 2010, Table 9.6).
+    pub fn scatter(&self, k: usize) -> f64 {
+        let coherence = self.coherence[k].clamp(f64::MIN_POSITIVE, 1.0);
+        2.0 * ((1.0 - coherence) / (2.0 * INDEPENDENT * coherence)).sqrt()
+    }
+
     fn is_usable(&self, k: usize) -> bool {
-        self.coherence[k] >= COHERENT && self.drive[k] >= DRIVEN && self.mobility[k].is_finite()
+        self.coherence[k] >= COHERENT && self.drive[k] >= DRIVEN && self.squares[k].is_finite()
     }
 }
 
