@@ -12,7 +12,7 @@ use crate::error::InputError;
 use crate::report::study::{
     self, AnalysisFailure, Optimum, StudiedFit, StudyDocument, structural_rank,
 };
-use crate::report::{Run, json};
+use crate::report::{Run, json, rebuilt_fit};
 use crate::results::{
     AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, RESULT,
     RequestedFiles, STUDY_JOURNAL,
@@ -32,7 +32,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  kmcfit study model.yaml --threads 4")]
 pub struct Arguments {
-    /// Model file or sequence (YAML), or the folder of a finished run, whose model is fitted again.
+    /// Model file or sequence (YAML), or the folder of a finished run, whose fit is studied.
     model: PathBuf,
     /// Folder for the results [default: runs/NAME-study].
     #[arg(long)]
@@ -56,7 +56,10 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     if arguments.model.is_dir() {
         let run = Run::open(&arguments.model)?;
         let mut overrides = Override::parse_all(&run.document.model.overrides)?;
-        overrides.extend(arguments.set.parse()?);
+        let further = arguments.set.parse()?;
+        // Other values give another fit.
+        let finished = further.is_empty().then(|| finished_fit(&run)).flatten();
+        overrides.extend(further);
         let model = Path::new(&run.document.model.file);
         if !model.exists() {
             let result = arguments.model.join(RESULT);
@@ -68,7 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
                 .into());
         }
         let file = ModelFile::read_with_overrides(model, &overrides)?;
-        return run_in(&file, &out, arguments.json, threads, false);
+        return run_in(&file, &out, arguments.json, threads, finished, false);
     }
     match Sequence::read(&arguments.model)? {
         Some(sequence) => {
@@ -77,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         }
         None => {
             let file = arguments.set.read(&arguments.model)?;
-            run_in(&file, &out, arguments.json, threads, false)
+            run_in(&file, &out, arguments.json, threads, None, false)
         }
     }
 }
@@ -97,7 +100,7 @@ pub(super) fn resume(
         Some(sequence) => run_sequence(&model, &sequence, folder, as_json, true),
         None => {
             let file = ModelFile::read_with_overrides(&model, &Override::parse_all(&overrides)?)?;
-            run_in(&file, folder, as_json, threads, true)
+            run_in(&file, folder, as_json, threads, None, true)
         }
     }
 }
@@ -119,6 +122,7 @@ fn run_in(
     out: &Path,
     as_json: bool,
     threads: usize,
+    finished: Option<StudiedFit>,
     is_resumed: bool,
 ) -> Result<u8, CommandError> {
     let mut model = build(file, BuildMode::Fit)?;
@@ -149,6 +153,7 @@ fn run_in(
         folder: folder.path(),
         heading: Heading::of_model("study", file, RequestedFiles::default(), None),
         is_resumed,
+        finished,
         journal,
         flag,
         threads,
@@ -183,6 +188,14 @@ fn run_in(
         (true, Some(fit)) => exit_code(fit.status),
         (true, None) => NOT_CONVERGED,
     })
+}
+
+/// The fit of a finished run; `None` where it cannot be rebuilt, is not at its end, or has no parameters: then the model is fitted again.
+fn finished_fit(run: &Run) -> Option<StudiedFit> {
+    let is_at_end = run.document.outcome.status == Status::Converged;
+    let (model, fit) = is_at_end.then(|| rebuilt_fit(run).ok()).flatten()?;
+    say("note", "starting from the fit of this run");
+    Some(StudiedFit::of(&model.problem, &fit))
 }
 
 /// Checks that the fit simulates a response and has parameters.
@@ -251,6 +264,8 @@ struct StudyRun<'a> {
     /// Heading of the journal of the fit.
     heading: Heading,
     is_resumed: bool,
+    /// The fit of a finished run.
+    finished: Option<StudiedFit>,
     journal: AnalysisJournal,
     flag: Arc<AtomicBool>,
     threads: usize,
@@ -368,8 +383,12 @@ impl StudyRun<'_> {
         let progress = Progress::new(&model.settings.stopping);
         let (folder, heading, is_resumed) = (self.folder, &self.heading, self.is_resumed);
         let flag = Arc::clone(&self.flag);
+        let finished = self.finished.take();
         let mut interrupted = None;
         let compute = || {
+            if let Some(finished) = finished {
+                return Ok(finished);
+            }
             let mut journal = fit_journal(folder, heading, is_resumed);
             let journal = journal.as_mut().map(|j| j as &mut dyn CheckpointStore);
             let (weighted, _, found) = search(&model, &progress, journal)?;

@@ -65,4 +65,4 @@ pub use terminal::charts;
 pub use timings::{OverheadTimings, PartSummary, TimingsSummary};
 #[cfg(test)]
 pub(crate) use verdict::{assumption, reason_in_words};
-pub use verify::{Check, Difference, Verification};
+pub use verify::{Check, Difference, Verification, rebuilt_fit};

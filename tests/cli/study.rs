@@ -240,6 +240,36 @@ fn a_record_at_rest_is_refused() {
     assert!(stderr.contains("found: 101 samples, all 0 m\n"), "{stderr}");
 }
 
+/// A study of a run starts from its fit: the analyses equal those of a study of its model, which fits again.
+#[test]
+fn a_study_of_a_run_starts_from_its_fit() {
+    let bench = bench();
+    bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
+    bench.run_to(0, &["study", "model.yaml", "--out", "of-model"]);
+    let (code, _, stderr) = bench.run(&["study", "run", "--out", "of-run"]);
+    assert_eq!(code, 0, "{stderr}");
+    assert!(
+        stderr.contains("starting from the fit of this run"),
+        "{stderr}"
+    );
+    let [of_model, of_run] = ["of-model", "of-run"].map(|folder| document(&bench, folder));
+    for key in ["sensitivity", "bands", "extremes", "predictions"] {
+        assert_eq!(of_model[key], of_run[key], "{key}");
+    }
+    // With other values the model is fitted again.
+    let other = [
+        "study",
+        "run",
+        "--out",
+        "again",
+        "--set",
+        "functions.damping.start=0.2",
+    ];
+    let (code, _, stderr) = bench.run(&other);
+    assert_eq!(code, 0, "{stderr}");
+    assert!(!stderr.contains("starting from the fit"), "{stderr}");
+}
+
 /// The model file of a run is relative to the folder of the fit.
 #[test]
 fn a_run_of_another_folder() {

@@ -346,6 +346,9 @@ pub struct PredictionRecord {
     pub envelope: Option<Vec<[f64; 2]>>,
     /// The extreme system with the largest difference of displacement.
     pub furthest: Option<FurthestSystem>,
+    /// Extreme systems without a bounded response, which are not in the envelope.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unbounded: Vec<String>,
 }
 
 /// The extreme system whose response differs most from the prediction.

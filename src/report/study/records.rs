@@ -429,6 +429,7 @@ fn predictions(model: &Model, at: Optimum, extremes: &[Extreme]) -> Vec<Predicti
             envelope: found.worst,
             furthest: (found.furthest)
                 .map(|(name, difference)| FurthestSystem { name, difference }),
+            unbounded: found.unbounded,
         })
     });
     each.collect()

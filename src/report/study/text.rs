@@ -6,6 +6,7 @@ use super::{
 };
 use crate::finding::Finding;
 use crate::number_format::{resolved, significant};
+use kmcfit_core::internals::study::prediction::BOUNDED;
 
 /// Most extremes that are listed because their search did not converge.
 const MOST_LISTED: usize = 6;
@@ -200,6 +201,14 @@ fn interval(b: &BootstrapRecord) -> String {
 }
 
 fn prediction(p: &PredictionRecord) -> String {
+    if !p.unbounded.is_empty() {
+        return format!(
+            "{}: the records do not limit this response: {} data-consistent systems, the first with the {}, move more than {BOUNDED} times as far as the fit",
+            p.name,
+            p.unbounded.len(),
+            p.unbounded[0]
+        );
+    }
     match &p.furthest {
         Some(furthest) if furthest.difference == 0.0 => format!(
             "{}: the extreme systems have the response of the fit",

@@ -25,6 +25,7 @@ use kmcfit_core::internals::record::{Channel, Weighting};
 use kmcfit_core::internals::solvers::{Fit, Solver};
 use kmcfit_core::internals::study::ReferenceValues;
 use nalgebra::DMatrix;
+pub use rebuild::rebuilt_fit;
 use rebuild::{Rebuilt, rebuilt};
 use serde::Serialize;
 use serde_json::Value;

@@ -8,6 +8,16 @@ use kmcfit_core::internals::problem::ProblemParts;
 use kmcfit_core::internals::record::{Channel, NoiseEstimate, Weighting};
 use kmcfit_core::internals::solvers::{Fit, stored_fit};
 
+/// The model of a run as fitted and its fit, from its model file, data and `parameters.json`.
+///
+/// # Errors
+/// As [`rebuilt`], and if `parameters.json` cannot be read.
+pub fn rebuilt_fit(run: &Run) -> Result<(Model, Fit), InputError> {
+    let (parameters, _) = ParametersDocument::read(&run.folder)?;
+    let Rebuilt { model, fit } = rebuilt(run, &parameters)?;
+    Ok((model, fit))
+}
+
 /// The model of a run as fitted, and its fit at the stored parameters.
 pub(super) struct Rebuilt {
     pub model: Model,

@@ -5,6 +5,7 @@
 //! data-consistent extreme systems ([`super::extremes`]).
 
 use super::extremes::Extreme;
+use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, Weighting};
 use crate::simulate::{SimulationError, Trajectory};
@@ -13,6 +14,9 @@ use nalgebra::{DMatrix, DVector};
 
 /// Half-width of the 95 % interval of a normal variable, in standard deviations.
 pub(super) const Z_95: f64 = 1.959_963_984_540_054;
+
+/// Largest displacement of an extreme system beside that of the optimum which is a prediction: beyond it the records do not limit the response.
+pub const BOUNDED: f64 = 10.0;
 
 /// Initial state and excitation of a prediction.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,8 +59,8 @@ pub struct Prediction {
     pub worst: Option<Vec<[f64; 2]>>,
     /// Name of the extreme system with the largest difference from the optimum, and the difference, m.
     pub furthest: Option<(String, f64)>,
-    /// Extreme systems whose simulation fails.
-    pub no_response: Vec<String>,
+    /// Extreme systems without a bounded response: the simulation fails, or the displacement exceeds [`BOUNDED`] times that of the optimum.
+    pub unbounded: Vec<String>,
 }
 
 /// Predicts `run` at the parameters `theta`, with the confidence band of `covariance` and the envelope of `extremes`.
@@ -99,10 +103,16 @@ pub fn predict(
     });
     let mut envelope: Vec<[f64; 2]> = y.iter().map(|y| [*y, *y]).collect();
     let mut furthest: Option<(String, f64)> = None;
-    let mut no_response = Vec::new();
+    let mut unbounded = Vec::new();
+    let most = BOUNDED * y.iter().fold(0.0f64, |most, y| most.max(y.abs()));
     for extreme in extremes {
-        let Ok(other) = seen.evaluate(&extreme.parameters) else {
-            no_response.push(extreme.name());
+        let other = seen.evaluate(&extreme.parameters).ok();
+        let is_bounded = |e: &Evaluation| {
+            let mut all = e.trajectories[0].displacement.iter();
+            all.all(|y| y.abs() <= most)
+        };
+        let Some(other) = other.filter(is_bounded) else {
+            unbounded.push(extreme.name());
             continue;
         };
         let mut distance = 0.0f64;
@@ -121,7 +131,7 @@ pub fn predict(
         band,
         worst: furthest.is_some().then_some(envelope),
         furthest,
-        no_response,
+        unbounded,
         response,
     })
 }

@@ -57,7 +57,7 @@ fn the_band_of_a_prediction_agrees_with_refits() {
     .unwrap();
     let band = found.band.as_ref().unwrap();
     let worst = found.worst.as_ref().unwrap();
-    assert!(found.no_response.is_empty());
+    assert!(found.unbounded.is_empty());
     assert_eq!(band[0], [-0.5, -0.5], "the state at the start is known");
 
     let refits = bootstrap(
