@@ -695,7 +695,7 @@ fn fit_warnings() -> Vec<FitWarning> {
         FitWarning::MissingTerm(_) => FitWarning::MissingTerm(MissingTerm {
             term: CoefficientKind::QuadraticDamping, value: 0.352, t: 21.5, share: 0.031,
         }),
-        FitWarning::TimeOrAmplitude(_) => FitWarning::TimeOrAmplitude(rival(-3.14)),
+        FitWarning::TimeOrAmplitude(_) => FitWarning::TimeOrAmplitude(rival(-3.2)),
         FitWarning::ResidualMean { .. } => FitWarning::ResidualMean {
             experiment: "shaker".into(), channel: "acceleration".into(), mean: 0.021, t: 12.3, share: 0.42, or_static_force: false,
         },
@@ -773,7 +773,7 @@ fn verdict_reasons() -> Vec<VerdictReason> {
         VerdictReason::CoarseSteps { .. } => VerdictReason::CoarseSteps { times: 3.25 },
         VerdictReason::NotConverged { .. } => VerdictReason::NotConverged { status: Status::TimeLimit },
         VerdictReason::MissingTerm(_) => VerdictReason::MissingTerm(missing),
-        VerdictReason::TimeOrAmplitude(_) => VerdictReason::TimeOrAmplitude(rival(2.72)),
+        VerdictReason::TimeOrAmplitude(_) => VerdictReason::TimeOrAmplitude(rival(2.9)),
         VerdictReason::TimeOrAmplitude(_) => VerdictReason::TimeOrAmplitude(rival(-52.0)),
         VerdictReason::ResidualMean { .. } => VerdictReason::ResidualMean {
             experiment: experiment(), channel: "displacement".into(),
