@@ -355,7 +355,7 @@ fn attempt_summary(attempt: &Attempt) -> AttemptSummary {
         start: attempt.start.name().into(),
         initial_cost: known(attempt.initial_cost),
         cost: known(attempt.cost),
-        iterations: attempt.iterations,
+        iterations: attempt.history.len() as u64,
         status: attempt.outcome.status,
     }
 }

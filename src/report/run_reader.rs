@@ -52,7 +52,7 @@ pub struct Run {
     pub coefficients: NodalCoefficients,
     /// True nodal coefficients, if the model names them.
     pub truth: Option<NodalCoefficients>,
-    /// `history.csv`: one row per iteration.
+    /// The rows of `history.csv` of the search with the result, one per iteration.
     pub history: Vec<IterationRecord>,
     /// `functions.csv`: one row per node, on long grids per several steps; NaN for an empty field.
     pub functions: ResultTable,
@@ -204,9 +204,22 @@ fn document(folder: &Path, value: &Value) -> Result<ResultDocument, InputError> 
 }
 
 fn history(folder: &Path, iterations: u64) -> Result<Vec<IterationRecord>, InputError> {
-    let rows = usize::try_from(iterations).unwrap_or(usize::MAX);
-    let table = ResultTable::read_rows(&folder.join("history.csv"), rows, "iteration")?;
-    let column = |name: &str| table.required(name);
+    let path = folder.join("history.csv");
+    let table = ResultTable::read(&path)?;
+    let attempts = table.required("attempt")?;
+    let last: Vec<usize> = (0..attempts.len())
+        .filter(|row| attempts[*row] == 0.0)
+        .collect();
+    let rows = last.len();
+    if rows as u64 != iterations {
+        return Err(InputError::file(path, "the table does not fit the result")
+            .found(format!("{rows} rows of attempt 0"))
+            .expected(format!("{iterations}, one per iteration")));
+    }
+    let column = |name: &str| {
+        let all = table.required(name)?;
+        Ok::<Vec<f64>, InputError>(last.iter().map(|row| all[*row]).collect())
+    };
     let ratio = "gradient_norm_squared_ratio";
     let (cost, cost_ratio, gradient) = (column("cost")?, column("cost_ratio")?, column(ratio)?);
     let (step, change) = (column("step")?, column("relative_change")?);

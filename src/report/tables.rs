@@ -66,9 +66,20 @@ impl FittedModel<'_> {
         Ok(table)
     }
 
+    /// Iterations of the attempts by their number in `attempts` of the result document, then those of the search with the result as attempt 0.
     pub(super) fn history(&self) -> CsvTable {
-        let column = |f: fn(&IterationRecord) -> f64| self.fit.history.iter().map(f).collect();
+        let last = &self.fit.history;
+        let attempts = (1..).zip(&self.fit.attempts);
+        // The attempt that gave the result has its rows once.
+        let others = attempts.filter(|(_, attempt)| attempt.history != *last);
+        let others = others.map(|(number, attempt)| (number, &attempt.history));
+        let all = others.chain([(0, last)]);
+        let rows: Vec<(i32, &IterationRecord)> = all
+            .flat_map(|(number, rows)| rows.iter().map(move |row| (number, row)))
+            .collect();
+        let column = |f: fn(&IterationRecord) -> f64| rows.iter().map(|(_, r)| f(r)).collect();
         CsvTable::new()
+            .column("attempt", rows.iter().map(|(n, _)| f64::from(*n)).collect())
             .column("iteration", column(|r| r.iteration as f64))
             .column("cost", column(|r| r.cost))
             .column("cost_ratio", column(|r| r.cost_ratio))

@@ -77,7 +77,7 @@ pub struct Attempt {
     /// Cost at the end; NaN if the simulation at the starting point failed.
     pub cost: f64,
     /// Iterations.
-    pub iterations: u64,
+    pub history: Vec<IterationRecord>,
     /// Outcome.
     pub outcome: Outcome,
 }
@@ -89,7 +89,7 @@ impl Attempt {
             start,
             initial_cost: fit.started_from,
             cost: fit.best.evaluation.cost,
-            iterations: fit.history.len() as u64,
+            history: fit.history.clone(),
             outcome: fit.outcome.clone(),
         }
     }
@@ -100,7 +100,7 @@ impl Attempt {
             start,
             initial_cost: f64::NAN,
             cost: f64::NAN,
-            iterations: 0,
+            history: Vec::new(),
             outcome: Outcome::new(Status::Failed, Reason::NoResponse(breakdown)),
         }
     }
