@@ -97,7 +97,7 @@ fn the_growing_horizon_finds_a_period_that_the_other_starts_miss() {
     let iterations: u64 = found
         .attempts
         .iter()
-        .map(|attempt| attempt.iterations)
+        .map(|attempt| attempt.history.len() as u64)
         .sum();
     assert!(
         found.counts.adjoint >= iterations + 3 + 3,

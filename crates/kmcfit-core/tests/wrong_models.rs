@@ -250,7 +250,7 @@ impl Case {
         let kinds: &[ChannelKind] = match self.kind {
             Kind::Factor(_) => &[ChannelKind::Displacement, ChannelKind::Acceleration],
             Kind::Gap => &[ChannelKind::Displacement],
-            _ if self.seed % 2 == 0 => &[ChannelKind::Displacement],
+            _ if self.seed.is_multiple_of(2) => &[ChannelKind::Displacement],
             _ => &[ChannelKind::Acceleration],
         };
         let mut record = Record::new("record");
@@ -276,7 +276,7 @@ impl Case {
             sigma = noise;
         }
         // Half of the masses are weighed.
-        let mass = match self.is_free || self.seed % 2 == 0 {
+        let mass = match self.is_free || self.seed.is_multiple_of(2) {
             true => CoefficientSpec::uncertain(self.mass, 0.01 * self.mass),
             false => CoefficientSpec::constant(0.9 * self.mass),
         };
@@ -580,11 +580,11 @@ fn corrected_records_predict_another_record() {
                 _ => case.misfit_of_prediction(&case.problem().0),
             };
             let found = case.verdict();
-            let errors = found.reasons.iter().filter_map(|reason| match reason {
+            let mut errors = found.reasons.iter().filter_map(|reason| match reason {
                 VerdictReason::RecordError(error) => Some(error),
                 _ => None,
             });
-            let Some(error) = errors.last() else {
+            let Some(error) = errors.next_back() else {
                 panic!("{kind:?} {seed}: {:?}", found.reasons);
             };
             let after = case.misfit_of_prediction(&case.corrected(error));

@@ -3,7 +3,7 @@
 use super::classical::ClassicalEstimate;
 use super::gaps::GapAssessment;
 use super::input_disturbance::input_warnings;
-use super::record_errors::RecordError;
+use super::record_error::RecordError;
 use super::refinement::CoarseBasis;
 use super::residual_mean::mean_warnings;
 use super::rivals::AmplitudeRival;

@@ -10,24 +10,22 @@
 //! ```
 //!
 //! is the estimate after one step of Gauss and Newton from the fit (Rao 1948). A term with a large `t` is missing if a refit with it leaves white
-//! residuals, or the smallest of all refits and at most half of those before; so are a delay, a difference of clocks and a gain, with their [own derivatives](super::record_errors). Where the noise model does not describe the residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
+//! residuals, or the smallest of all refits and at most half of those before; so are a delay, a difference of clocks and a gain, with their [own derivatives](super::record_parameters). Where the noise model does not describe the residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
 
 use super::FitWarning;
-use super::record_errors::{
-    self, EXPLAINED, RecordParameter, Refit, without_correlation, worst_misfit,
-};
+use super::record_errors::small_error;
+use super::record_parameters::{self, RecordParameter};
 use super::refinement::applies;
+use super::refit::{EXPLAINED, Refit, without_correlation, worst_fit, worst_misfit};
+use super::span::{Span, weighted_residuals};
 use crate::functions::{CoefficientFunction, CoefficientKind, CoefficientSet, Parameterization};
-use crate::identifiability::Factorisation;
-use crate::noise::KernelCovariance;
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::record::ScoreCovariance;
 use crate::simd::sum::rms;
 use crate::simulate::Trajectory;
 use crate::solvers::{MissingTerm, TESTED_TERMS, weighted_jacobian};
 use crate::system::Term;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// Width of the sign of the velocity in the candidate for Coulomb friction, relative to the root mean square of the velocity.
 const WIDTH: f64 = 0.01;
@@ -35,14 +33,10 @@ const WIDTH: f64 = 0.01;
 const SIGNIFICANT: f64 = 4.5;
 /// Fit of a channel, per cent, below which a fit is not near the system, and a linearisation in further terms says nothing.
 const UNRELATED: f64 = 50.0;
-/// Smallest p-value of the test of whiteness of residuals that a missing term explains.
-pub(super) const WHITE: f64 = 1e-3;
 /// Number of the most significant candidates that are refitted.
 const REFITTED: usize = 3;
 /// Fewest samples per parameter.
 const SAMPLES_PER_PARAMETER: usize = 4;
-/// Part of a candidate's derivatives outside the span of the model's below which it is no candidate.
-const APART: f64 = 1e-6;
 
 /// A candidate for what the model lacks.
 enum Candidate {
@@ -62,7 +56,7 @@ pub(super) fn missing(
     let is_few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
     let is_long = problem.sample_count() >= SAMPLES_PER_PARAMETER * problem.parameters();
     (is_few && is_long && applies(problem, theta, evaluation)).then_some(())?;
-    (record_errors::worst_fit(problem, evaluation) > UNRELATED).then_some(())?;
+    (worst_fit(problem, evaluation) > UNRELATED).then_some(())?;
     let kinds = candidates(problem, evaluation);
     let (extended, at) = extended(problem, theta, &kinds)?;
     let evaluation = extended.evaluate(&at).ok()?;
@@ -76,9 +70,9 @@ pub(super) fn missing(
         let column = jacobian.column(first + i).into_owned();
         (Candidate::Term(*kind, *term), column)
     });
-    let of_records = record_errors::parameters(problem).into_iter();
+    let of_records = record_parameters::parameters(problem).into_iter();
     let of_records = of_records.filter_map(|parameter| {
-        let column = record_errors::column(&extended, &evaluation, parameter)?;
+        let column = record_parameters::column(&extended, &evaluation, parameter)?;
         Some((Candidate::Record(parameter), DVector::from_vec(column)))
     });
     let tests = terms.chain(of_records).filter_map(|(candidate, column)| {
@@ -112,7 +106,7 @@ pub(super) fn missing(
                 }
             }
             Candidate::Record(parameter) => {
-                let error = record_errors::small_error(problem, theta, parameter, value);
+                let error = small_error(problem, theta, parameter, value);
                 if let Some(error) = error {
                     return Some(FitWarning::RecordError(error));
                 }
@@ -122,13 +116,6 @@ pub(super) fn missing(
     let before = worst_misfit(problem, &evaluation);
     let (_, missing) = best.filter(|(misfit, _)| *misfit < EXPLAINED * before)?;
     Some(FitWarning::MissingTerm(missing))
-}
-
-/// Weighted and whitened residuals of all channels.
-fn weighted_residuals(problem: &Problem, evaluation: &Evaluation) -> DVector<f64> {
-    let each = (problem.predicted(evaluation))
-        .flat_map(|(channel, predicted)| channel.majorant(predicted).weighted);
-    DVector::from_vec(each.collect())
 }
 
 /// Refit with a term, from the optimum or else from the start, whichever ends lower. The term is missing if it leaves white residuals: an error
@@ -211,67 +198,6 @@ fn extended(
         extended.ok()?,
         [&theta[..scalars], &zeros, &theta[scalars..]].concat(),
     ))
-}
-
-/// Orthonormal basis of the derivatives of the model.
-pub(super) struct Span {
-    basis: DMatrix<f64>,
-}
-
-impl Span {
-    /// Estimate of a parameter with the derivatives `column` beside those of the model, and its ratio to the standard error.
-    pub(super) fn score(
-        problem: &Problem,
-        evaluation: &Evaluation,
-        column: Vec<f64>,
-    ) -> Option<(f64, f64)> {
-        let residuals = weighted_residuals(problem, evaluation);
-        let model = Self::of(&weighted_jacobian(problem, evaluation));
-        model.test(problem, &DVector::from_vec(column), &residuals, true)
-    }
-
-    fn of(jacobian: &DMatrix<f64>) -> Self {
-        let mut scaled = jacobian.clone();
-        for mut column in scaled.column_iter_mut() {
-            let size = column.norm().max(f64::MIN_POSITIVE);
-            column /= size;
-        }
-        let root = Factorisation::of(&scaled).inverse_root();
-        Self {
-            basis: scaled * root,
-        }
-    }
-
-    fn orthogonal(&self, vector: &DVector<f64>) -> DVector<f64> {
-        vector - &self.basis * self.basis.tr_mul(vector)
-    }
-
-    /// Estimate of the coefficient with the derivatives `column`, and its ratio to the standard error.
-    fn test(
-        &self,
-        problem: &Problem,
-        column: &DVector<f64>,
-        residuals: &DVector<f64>,
-        is_modelled: bool,
-    ) -> Option<(f64, f64)> {
-        let (z, e) = (self.orthogonal(column), self.orthogonal(residuals));
-        let square = z.norm_squared();
-        (square > APART * APART * column.norm_squared()).then_some(())?;
-        let value = -z.dot(&e) / square;
-        let rest = &e + value * &z;
-        let estimated = (self.basis.ncols() + 1) as f64;
-        let is_kernel = |c: &crate::record::Channel| c.noise().scores == ScoreCovariance::Kernel;
-        let variance = match !is_modelled || problem.channels().any(is_kernel) {
-            true => {
-                let scores = DMatrix::from_columns(&[z.component_mul(&rest)]);
-                let found = KernelCovariance::of(&scores, &problem.channel_samples(), estimated)?;
-                found.sum[(0, 0)] / (square * square)
-            }
-            false => rest.norm_squared() / (rest.len() as f64 - estimated) / square,
-        };
-        let error = variance.max(0.0).sqrt();
-        (error > 0.0).then(|| (value, value / error))
-    }
 }
 
 /// Root mean square of `phi` of a term over all records.

@@ -49,9 +49,17 @@ const SMALL: f64 = 1e-4;
 /// Natural frequency (Hz) and damping ratio.
 type Mode = [f64; 2];
 
-/// Warnings about second modes, at most one for each experiment.
+/// Warnings about second modes where the coefficients are constant, at most one for each experiment.
 pub(super) fn second_modes(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
-    if problem.parameters() > FEW_PARAMETERS {
+    // A coefficient that varies spreads one mode over a band.
+    let functions = &problem.functions;
+    let is_constant = |values: &[f64]| values.iter().all(|v| *v == values[0]);
+    let is_steady = (functions
+        .coefficient_set(0)
+        .iter()
+        .all(|f| functions.is_constant_or_known(*f)))
+        && evaluation.nodal.functions().all(is_constant);
+    if problem.parameters() > FEW_PARAMETERS || !is_steady {
         return Vec::new();
     }
     let each = (0..problem.experiments.len()).filter_map(|e| {

@@ -8,7 +8,7 @@ use super::FitAssessment;
 use super::classical::ClassicalEstimate;
 use super::gaps::{GapAssessment, GapStatus};
 use super::plausibility::{FitWarning, Unidentified};
-use super::record_errors::RecordError;
+use super::record_error::RecordError;
 use super::rivals::AmplitudeRival;
 use crate::functions::CoefficientKind;
 use crate::identifiability::{

@@ -185,7 +185,7 @@ fn iterations(found: &Fit) -> u64 {
     let attempts: u64 = found
         .attempts
         .iter()
-        .map(|attempt| attempt.iterations)
+        .map(|attempt| attempt.history.len() as u64)
         .sum();
     attempts.max(found.history.len() as u64)
 }

@@ -49,7 +49,7 @@ fn a_continued_fit_has_the_work_of_both() {
     let [attempt] = attempts.as_slice() else {
         panic!("{attempts:?}");
     };
-    assert_eq!((attempt.iterations, attempt.initial_cost), (3, cost));
+    assert_eq!((attempt.history.len(), attempt.initial_cost), (3, cost));
     // Every iteration of steepest descent has at least one gradient.
     assert!(whole.counts.adjoint >= before.adjoint + 3);
     assert!(whole.timings.start >= hours && whole.timings.adjoint > Duration::ZERO);

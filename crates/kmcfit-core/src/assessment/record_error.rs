@@ -1,0 +1,41 @@
+//! Errors of a record that no parameter of the model explains.
+
+use serde::Serialize;
+
+/// An error of a record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum RecordError {
+    /// The response is recorded later than the input; earlier if negative.
+    Delay {
+        /// Name of the experiment.
+        experiment: String,
+        /// The delay, s.
+        delay: f64,
+        /// The delay in samples of the first channel.
+        samples: f64,
+    },
+    /// The clocks of input and response run at different rates.
+    ClockDifference {
+        /// Name of the experiment.
+        experiment: String,
+        /// Excess of the time in the system over that on the clock of the response, per cent.
+        percent: f64,
+    },
+    /// The input acts against its sign.
+    InputSign {
+        /// Name of the experiment.
+        experiment: String,
+    },
+    /// The samples of a channel are a multiple of the response.
+    ChannelFactor {
+        /// Name of the experiment.
+        experiment: String,
+        /// Kind of the channel.
+        channel: String,
+        /// Samples over the response.
+        factor: f64,
+        /// True if other channels of the record agree with the model without it.
+        beside_others: bool,
+    },
+}

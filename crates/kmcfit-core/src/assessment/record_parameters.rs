@@ -1,0 +1,222 @@
+//! Parameters of a record besides those of the model: delay and rate of the clock of its response, and gains of its channels.
+//!
+//! With the response on its own clock, sample `i` at the time `t_i` of the record shows the system at
+//!
+//! ```text
+//! t = t_0 + (1 + rate) (t_i - t_0) - delay
+//! ```
+//!
+//! so that the predictions `p` have the derivatives `-p'` in the delay, `(t_i - t_0) p'` in the rate, and `p` in a gain of the channel.
+
+use super::refit::without_correlation;
+use crate::functions::{ScalarParameter, ScalarValue};
+use crate::objective::{Evaluation, SimulatedRecord};
+use crate::problem::Problem;
+use crate::record::{Channel, Experiment, Sensor, Weighting};
+use crate::system::{Grid, InputSample};
+
+/// Share of a step by which the clock of the response is moved for derivatives.
+const SMALL: f64 = 0.01;
+
+/// Clock of a response relative to that of its input.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Clock {
+    /// Delay of the response, s.
+    pub delay: f64,
+    /// Relative difference of the rates.
+    pub rate: f64,
+}
+
+/// A parameter of a record besides those of the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum RecordParameter {
+    /// Delay of the response of an experiment.
+    Delay(usize),
+    /// Difference of the rates of the clocks of an experiment.
+    Rate(usize),
+    /// Gain of a channel of an experiment.
+    Gain(usize, usize),
+}
+
+/// Parameters of the records that errors of the data may need: clocks of records with a measured input, and gains of channels where an
+/// input or another channel shows them.
+pub(super) fn parameters(problem: &Problem) -> Vec<RecordParameter> {
+    let mut found = Vec::new();
+    for (e, experiment) in problem.experiments.iter().enumerate() {
+        if !experiment.is_free() {
+            found.extend([RecordParameter::Delay(e), RecordParameter::Rate(e)]);
+        }
+        if !experiment.is_free() || experiment.channels.len() > 1 {
+            let open = experiment.channels.iter().enumerate();
+            let open = open.filter(|(_, c)| c.sensor().gain.index().is_none());
+            found.extend(open.map(|(c, _)| RecordParameter::Gain(e, c)));
+        }
+    }
+    found
+}
+
+/// Derivatives of the weighted and whitened predictions of all channels in a parameter of a record; for a gain in its logarithm.
+pub(super) fn column(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    parameter: RecordParameter,
+) -> Option<Vec<f64>> {
+    let mut all = Vec::with_capacity(problem.sample_count());
+    for (e, experiment) in problem.experiments.iter().enumerate() {
+        for (c, channel) in experiment.channels.iter().enumerate() {
+            let predicted = &evaluation.predictions[e][c];
+            let mut rows = match parameter {
+                RecordParameter::Gain(of, which) if (of, which) == (e, c) => predicted.clone(),
+                RecordParameter::Delay(of) if of == e => {
+                    let slopes = slopes(problem, evaluation, e, channel, predicted)?;
+                    slopes.iter().map(|slope| -slope).collect()
+                }
+                RecordParameter::Rate(of) if of == e => {
+                    let start = problem.system.grid.start();
+                    let slopes = slopes(problem, evaluation, e, channel, predicted)?;
+                    let ages = channel.times().iter().map(|t| t - start);
+                    slopes
+                        .iter()
+                        .zip(ages)
+                        .map(|(slope, age)| slope * age)
+                        .collect()
+                }
+                _ => vec![0.0; channel.len()],
+            };
+            channel.whiten_rows(&mut rows);
+            let roots = channel.majorant(predicted).roots;
+            all.extend(rows.iter().zip(roots).map(|(row, root)| row * root));
+        }
+    }
+    Some(all)
+}
+
+/// Derivatives of the predictions of a channel in time.
+fn slopes(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    e: usize,
+    channel: &Channel,
+    predicted: &[f64],
+) -> Option<Vec<f64>> {
+    let small = SMALL * problem.system.grid.step();
+    let clock = Clock {
+        delay: -small,
+        rate: 0.0,
+    };
+    let experiment = &problem.experiments[e];
+    let later = on_clock(experiment, channel, &problem.system.grid, clock)?;
+    let later = predict(problem, evaluation, e, &later);
+    let mut slopes: Vec<f64> = (later.iter().zip(predicted))
+        .map(|(later, now)| (later - now) / small)
+        .collect();
+    // A sample at the end of the record has no later one.
+    slopes.resize(predicted.len(), slopes.last().copied()?);
+    Some(slopes)
+}
+
+/// Predictions of a channel by the response of an evaluation.
+pub(super) fn predict(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    e: usize,
+    channel: &Channel,
+) -> Vec<f64> {
+    let experiment = &problem.experiments[e];
+    channel.predict(SimulatedRecord {
+        system: &problem.system,
+        nodal: evaluation.nodal_of(experiment.coefficient_set),
+        excitation: experiment.excitation.as_ref(),
+        response: &evaluation.trajectories[e],
+        scalars: &evaluation.scalars,
+    })
+}
+
+/// A channel with the times of its samples on another clock, without the samples before or after the response; `None` for a sensor of
+/// absolute motion, and for weights or filters that do not allow it.
+pub(super) fn on_clock(
+    experiment: &Experiment,
+    channel: &Channel,
+    grid: &Grid,
+    clock: Clock,
+) -> Option<Channel> {
+    let is_possible = channel.base().is_empty()
+        && matches!(
+            channel.weighting(),
+            Weighting::Sigma(_) | Weighting::Estimated { .. }
+        );
+    let plain = channel.before_filter().filter(|_| is_possible)?;
+    let (start, end) = (grid.start(), grid.time(experiment.nodes - 1));
+    let at = |t: &f64| start + (1.0 + clock.rate) * (t - start) - clock.delay;
+    let samples = plain
+        .times()
+        .iter()
+        .map(at)
+        .zip(plain.observed().iter().copied());
+    let (times, values): (Vec<f64>, Vec<f64>) =
+        samples.filter(|(t, _)| (start..=end).contains(t)).unzip();
+    let inputs = times.iter().map(|t| InputSample {
+        force: experiment.input.force_at(*t),
+        base: experiment.input.base_acceleration_at(*t),
+    });
+    let inputs: Vec<InputSample> = inputs.collect();
+    let weighting = plain.weighting().clone();
+    let moved = Channel::new(
+        plain.kind(),
+        times,
+        values,
+        weighting,
+        grid,
+        experiment.nodes,
+    )?;
+    let moved = moved.with_loss(plain.loss()).with_sensor(plain.sensor());
+    let moved = match channel.inputs_at_samples() {
+        Some(_) => moved.with_inputs_at_samples(inputs),
+        None => moved,
+    };
+    Some(match channel.filter() {
+        [] => moved,
+        filter => moved.with_filter(filter.to_vec()),
+    })
+}
+
+/// The problem with the channels of an experiment on another clock, and white noise.
+pub(super) fn with_clock(problem: &Problem, e: usize, clock: Clock) -> Option<Problem> {
+    let experiment = &problem.experiments[e];
+    let grid = &problem.system.grid;
+    let channels = experiment.channels.iter();
+    let channels: Option<Vec<Channel>> = channels
+        .map(|c| on_clock(experiment, c, grid, clock))
+        .collect();
+    let channels = channels?;
+    let moved = problem.clone().with(|parts| {
+        parts.experiments[e].channels = channels;
+        without_correlation(&mut parts.experiments);
+    });
+    moved.ok()
+}
+
+/// The problem with the gain of a channel estimated, as the last scalar.
+pub(super) fn with_gain(problem: &Problem, e: usize, c: usize, start: f64) -> Option<Problem> {
+    let mut scalars = problem.functions.scalars().to_vec();
+    let index = scalars.len();
+    scalars.push(ScalarParameter {
+        name: "gain".to_owned(),
+        unit: String::new(),
+        start,
+        size: start.abs(),
+        prior: None,
+    });
+    let changed = problem.clone().with(|parts| {
+        parts.functions = parts.functions.clone().with_scalars(scalars);
+        without_correlation(&mut parts.experiments);
+        let channel = &mut parts.experiments[e].channels[c];
+        let gain = ScalarValue::Estimated(index);
+        let sensor = Sensor {
+            gain,
+            ..channel.sensor()
+        };
+        *channel = channel.clone().with_sensor(sensor);
+    });
+    changed.ok()
+}

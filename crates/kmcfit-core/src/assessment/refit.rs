@@ -1,0 +1,70 @@
+//! Refits of a changed problem, and the judgement whether they explain the residuals.
+
+use super::plausibility::POOR;
+use crate::objective::{Evaluation, diagnostics};
+use crate::problem::Problem;
+use crate::record::{Experiment, NoiseEstimate};
+use crate::simd::sum::rms;
+use crate::solvers::{Fit, FitSettings, fit_from};
+
+/// Smallest p-value of the test of whiteness of residuals that a change explains.
+const WHITE: f64 = 1e-3;
+/// Ratio of the residuals with and without an error below which it explains them although they are not white.
+pub(super) const EXPLAINED: f64 = 0.5;
+
+/// A fit of a changed problem.
+pub(super) struct Refit {
+    pub problem: Problem,
+    pub fit: Fit,
+}
+
+impl Refit {
+    pub(super) fn of(problem: Problem, start: &[f64]) -> Option<Self> {
+        let fit = fit_from(&problem, start, &FitSettings::default()).ok()?;
+        Some(Self { problem, fit })
+    }
+
+    pub(super) fn evaluation(&self) -> &Evaluation {
+        &self.fit.best.evaluation
+    }
+
+    /// True if the residuals of all channels are white.
+    pub(super) fn is_white(&self) -> bool {
+        let mut each = self.problem.predicted(self.evaluation());
+        each.all(|(channel, predicted)| diagnostics(channel, predicted).whiteness.p_value >= WHITE)
+    }
+
+    /// Largest root mean square of the residuals of a channel relative to its samples.
+    pub(super) fn worst_misfit(&self) -> f64 {
+        worst_misfit(&self.problem, self.evaluation())
+    }
+
+    /// True if the residuals are white, or small beside those of `before` where the fit is good.
+    pub(super) fn explains(&self, problem: &Problem, before: &Evaluation) -> bool {
+        let is_smaller = self.worst_misfit() < EXPLAINED * worst_misfit(problem, before);
+        is_smaller && (self.is_white() || worst_fit(&self.problem, self.evaluation()) >= POOR)
+    }
+}
+
+/// Fit of the worst channel, per cent.
+pub(super) fn worst_fit(problem: &Problem, evaluation: &Evaluation) -> f64 {
+    let fits = (problem.predicted(evaluation))
+        .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent);
+    fits.fold(100.0, f64::min)
+}
+
+/// Largest root mean square of the residuals of a channel relative to its samples.
+pub(super) fn worst_misfit(problem: &Problem, evaluation: &Evaluation) -> f64 {
+    let each = problem.predicted(evaluation).map(|(channel, predicted)| {
+        let residuals: Vec<f64> = channel.residuals(predicted).collect();
+        rms(&residuals) / rms(channel.observed())
+    });
+    each.fold(0.0, f64::max)
+}
+
+/// Sets white noise for all channels.
+pub(super) fn without_correlation(experiments: &mut [Experiment]) {
+    for channel in experiments.iter_mut().flat_map(|e| &mut e.channels) {
+        *channel = channel.clone().with_noise(NoiseEstimate::default());
+    }
+}

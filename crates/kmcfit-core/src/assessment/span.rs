@@ -1,0 +1,80 @@
+//! Derivatives of a model at its optimum, and score tests of a further parameter beside them.
+
+use crate::identifiability::Factorisation;
+use crate::noise::KernelCovariance;
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::record::ScoreCovariance;
+use crate::solvers::weighted_jacobian;
+use nalgebra::{DMatrix, DVector};
+
+/// Part of a candidate's derivatives outside the span of the model's below which it is no candidate.
+const APART: f64 = 1e-6;
+
+/// Weighted and whitened residuals of all channels.
+pub(super) fn weighted_residuals(problem: &Problem, evaluation: &Evaluation) -> DVector<f64> {
+    let each = (problem.predicted(evaluation))
+        .flat_map(|(channel, predicted)| channel.majorant(predicted).weighted);
+    DVector::from_vec(each.collect())
+}
+
+/// Orthonormal basis of the derivatives of the model.
+pub(super) struct Span {
+    basis: DMatrix<f64>,
+}
+
+impl Span {
+    /// Estimate of a parameter with the derivatives `column` beside those of the model, and its ratio to the standard error.
+    pub(super) fn score(
+        problem: &Problem,
+        evaluation: &Evaluation,
+        column: Vec<f64>,
+    ) -> Option<(f64, f64)> {
+        let residuals = weighted_residuals(problem, evaluation);
+        let model = Self::of(&weighted_jacobian(problem, evaluation));
+        model.test(problem, &DVector::from_vec(column), &residuals, true)
+    }
+
+    pub(super) fn of(jacobian: &DMatrix<f64>) -> Self {
+        let mut scaled = jacobian.clone();
+        for mut column in scaled.column_iter_mut() {
+            let size = column.norm().max(f64::MIN_POSITIVE);
+            column /= size;
+        }
+        let root = Factorisation::of(&scaled).inverse_root();
+        Self {
+            basis: scaled * root,
+        }
+    }
+
+    fn orthogonal(&self, vector: &DVector<f64>) -> DVector<f64> {
+        vector - &self.basis * self.basis.tr_mul(vector)
+    }
+
+    /// Estimate of the coefficient with the derivatives `column`, and its ratio to the standard error.
+    pub(super) fn test(
+        &self,
+        problem: &Problem,
+        column: &DVector<f64>,
+        residuals: &DVector<f64>,
+        is_modelled: bool,
+    ) -> Option<(f64, f64)> {
+        let (z, e) = (self.orthogonal(column), self.orthogonal(residuals));
+        let square = z.norm_squared();
+        (square > APART * APART * column.norm_squared()).then_some(())?;
+        let value = -z.dot(&e) / square;
+        let rest = &e + value * &z;
+        let estimated = (self.basis.ncols() + 1) as f64;
+        let is_kernel = |c: &crate::record::Channel| c.noise().scores == ScoreCovariance::Kernel;
+        let variance = match !is_modelled || problem.channels().any(is_kernel) {
+            true => {
+                let scores = DMatrix::from_columns(&[z.component_mul(&rest)]);
+                let found = KernelCovariance::of(&scores, &problem.channel_samples(), estimated)?;
+                found.sum[(0, 0)] / (square * square)
+            }
+            false => rest.norm_squared() / (rest.len() as f64 - estimated) / square,
+        };
+        let error = variance.max(0.0).sqrt();
+        (error > 0.0).then(|| (value, value / error))
+    }
+}
