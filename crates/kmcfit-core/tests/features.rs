@@ -371,7 +371,7 @@ impl Case {
             found
                 .attempts
                 .iter()
-                .map(|r| (r.start, r.iterations, r.initial_cost, r.cost))
+                .map(|r| (r.start, r.history.len(), r.initial_cost, r.cost))
                 .collect::<Vec<_>>()
         );
         assert!(

@@ -90,7 +90,7 @@ impl Case {
                 found
                     .attempts
                     .iter()
-                    .map(|r| (r.start, r.iterations))
+                    .map(|r| (r.start, r.history.len()))
                     .collect::<Vec<_>>()
             );
         }
