@@ -59,4 +59,4 @@ pub use summary::{prediction_table, summary};
 pub use terminal::charts;
 pub use timings::{OverheadTimings, PartSummary, TimingsSummary};
 #[cfg(test)]
-pub(crate) use verdict::reason_in_words;
+pub(crate) use verdict::{assumption, reason_in_words};
