@@ -805,6 +805,7 @@ fn verdict_reasons() -> Vec<VerdictReason> {
         VerdictReason::OnlyRatios { .. } => VerdictReason::OnlyRatios { fixed: vec!["mass".into()] },
         VerdictReason::OnlyRatios { .. } => VerdictReason::OnlyRatios { fixed: Vec::new() },
         VerdictReason::EquationError => VerdictReason::EquationError,
+        VerdictReason::EquationResidual { .. } => VerdictReason::EquationResidual { share: 0.48 },
         VerdictReason::ClassicalDisagrees(_) => VerdictReason::ClassicalDisagrees(classical()),
         VerdictReason::RecordError(_) => VerdictReason::RecordError(record_errors()[0].clone()),
     ]

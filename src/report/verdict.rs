@@ -12,7 +12,7 @@ use kmcfit_core::internals::assessment::{
     VerdictAssumption, VerdictLevel, VerdictReason, estimates, verdict_assumptions, verdict_level,
     verdict_reasons,
 };
-use kmcfit_core::internals::solvers::Status;
+use kmcfit_core::internals::solvers::{EquationBalance, Status};
 
 impl FittedModel<'_> {
     /// Verdict on the fit: reasons from its assessment, the data and the validation records.
@@ -22,6 +22,8 @@ impl FittedModel<'_> {
         let mut reasons = verdict_reasons(problem, self.fit, assessment);
         let missing = self.run_assessment.missing_terms.iter();
         reasons.extend(missing.map(|term| VerdictReason::MissingTerm(*term)));
+        let balance = self.run_assessment.balance.as_ref();
+        reasons.extend(balance.and_then(of_balance));
         let has_mode = |r: &VerdictReason| matches!(r, VerdictReason::SecondMode { .. });
         if !reasons.iter().any(has_mode) {
             reasons.extend(self.model.warnings.iter().find_map(two_modes));
@@ -93,6 +95,17 @@ impl FittedModel<'_> {
         }
         Estimates(found)
     }
+}
+
+/// Smallest share of the largest force that is a large residual of the equation of motion.
+const LARGE_RESIDUAL: f64 = 0.3;
+
+/// Reason from the residual of the equation of motion.
+fn of_balance(balance: &EquationBalance) -> Option<VerdictReason> {
+    let shares = balance.parts.iter().map(|part| part.residual_share);
+    let share = shares.fold(f64::INFINITY, f64::min);
+    let is_large = share.is_finite() && share > LARGE_RESIDUAL;
+    is_large.then_some(VerdictReason::EquationResidual { share })
 }
 
 /// True for the ratios among the estimates.
@@ -208,6 +221,10 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
                 and_list(fixed)
             ),
         },
+        VerdictReason::EquationResidual { share } => format!(
+            "the residual of the equation of motion is {} of its largest force",
+            percent(100.0 * share, 0)
+        ),
         VerdictReason::EquationError => {
             "the equation error neglects the noise of the response, which biases the estimates"
                 .to_owned()

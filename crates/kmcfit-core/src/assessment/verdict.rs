@@ -161,6 +161,11 @@ pub enum VerdictReason {
     },
     /// The equation error neglects the noise of the response, which biases its estimates.
     EquationError,
+    /// The residual of the equation of motion is a large share of its largest force.
+    EquationResidual {
+        /// Root mean square of the residual relative to that of the largest force.
+        share: f64,
+    },
     /// A classical estimate and that of the fit differ by more than their intervals.
     ClassicalDisagrees(ClassicalEstimate),
     /// An error of a record explains the residuals.
