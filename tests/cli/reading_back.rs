@@ -93,6 +93,11 @@ fn damaged_runs() {
         }
         std::fs::write(&path, &whole).expect("room");
     }
+    let history = bench.read("run/history.csv");
+    let (rest, _) = history.trim_end().rsplit_once('\n').expect("rows");
+    bench.write("run/history.csv", &format!("{rest}\n"));
+    insta::assert_snapshot!(refused().replace(&folder.display().to_string(), "run"), @"");
+    bench.write("run/history.csv", &history);
     let functions = bench.read("run/functions.csv");
     let spoil = |from: &str, to: &str| {
         assert!(functions.contains(from));

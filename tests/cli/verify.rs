@@ -258,6 +258,14 @@ fn mistakes() {
         &parameters.replacen("mass[0]", "mass\", \"more", 1),
     );
     assert_snapshot!(refused(&["verify", "run"]));
+    let edited = |edit: &dyn Fn(&mut Value)| {
+        let mut document: Value = serde_json::from_str(&parameters).expect("JSON");
+        edit(&mut document);
+        bench.write("run/parameters.json", &document.to_string());
+        refused(&["verify", "run"])
+    };
+    assert_snapshot!(edited(&|p| p["functions"][0]["has_jumps"] = true.into()), @"");
+    assert_snapshot!(edited(&|p| p["values"][0] = (-1e300).into()), @"");
     bench.write("run/parameters.json", "{}");
     assert_snapshot!(refused(&["verify", "run"]));
     fs::remove_file(bench.path("run/parameters.json")).expect("removed");
