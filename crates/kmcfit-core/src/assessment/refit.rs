@@ -1,4 +1,4 @@
-//! Refits of a changed problem, and the judgement whether they explain the residuals.
+//! Refits of a changed problem, and the test whether they explain the residuals.
 
 use super::plausibility::POOR;
 use crate::objective::{Evaluation, diagnostics};
