@@ -7,7 +7,7 @@ use crate::report::suggestions::{Suggestion, Suspect};
 use crate::report::{assumption, reason_in_words};
 use kmcfit_core::internals::assessment::{
     AmplitudeRival, ClassicalEstimate, ClassicalMethod, CoarseBasis, FitWarning, FunctionInGap,
-    GapAssessment, GapStatus, NoIntervals, RecordError, ResidualPattern, Unidentified,
+    GapAssessment, GapStatus, Implausible, NoIntervals, RecordError, ResidualPattern, Unidentified,
     VerdictAssumption, VerdictReason,
 };
 use kmcfit_core::internals::builder::BuildNotice;
@@ -806,6 +806,9 @@ fn verdict_reasons() -> Vec<VerdictReason> {
         VerdictReason::OnlyRatios { .. } => VerdictReason::OnlyRatios { fixed: vec!["mass".into()] },
         VerdictReason::OnlyRatios { .. } => VerdictReason::OnlyRatios { fixed: Vec::new() },
         VerdictReason::EquationError => VerdictReason::EquationError,
+        VerdictReason::ImplausibleUnits(_) => VerdictReason::ImplausibleUnits(Implausible::NaturalFrequency { value: 0.002 }),
+        VerdictReason::ImplausibleUnits(_) => VerdictReason::ImplausibleUnits(Implausible::Velocity { value: 48.0 }),
+        VerdictReason::ImplausibleUnits(_) => VerdictReason::ImplausibleUnits(Implausible::Displacement { value: 12.0 }),
         VerdictReason::EquationResidual { .. } => VerdictReason::EquationResidual { share: 0.48 },
         VerdictReason::ClassicalDisagrees(_) => VerdictReason::ClassicalDisagrees(classical()),
         VerdictReason::RecordError(_) => VerdictReason::RecordError(record_errors()[0].clone()),

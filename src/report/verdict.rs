@@ -9,8 +9,8 @@ use super::text::and_list;
 use crate::finding::Finding;
 use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::{
-    VerdictAssumption, VerdictLevel, VerdictReason, estimates, verdict_assumptions, verdict_level,
-    verdict_reasons,
+    Implausible, VerdictAssumption, VerdictLevel, VerdictReason, estimates, verdict_assumptions,
+    verdict_level, verdict_reasons,
 };
 use kmcfit_core::internals::solvers::{EquationBalance, Status};
 
@@ -22,6 +22,7 @@ impl FittedModel<'_> {
         let mut reasons = verdict_reasons(problem, self.fit, assessment);
         let missing = self.run_assessment.missing_terms.iter();
         reasons.extend(missing.map(|term| VerdictReason::MissingTerm(*term)));
+        reasons.extend(self.implausible().map(VerdictReason::ImplausibleUnits));
         let balance = self.run_assessment.balance.as_ref();
         reasons.extend(balance.and_then(of_balance));
         let has_mode = |r: &VerdictReason| matches!(r, VerdictReason::SecondMode { .. });
@@ -57,6 +58,24 @@ impl FittedModel<'_> {
                 false => String::new(),
             },
         }
+    }
+
+    /// A quantity outside the range of mechanical systems, where the fit identifies a system.
+    fn implausible(&self) -> Option<Implausible> {
+        let assessment = self.run_assessment.assessment.as_ref()?;
+        let is_system = assessment.plausibility.unidentified.is_none();
+        let estimates = is_system.then(|| self.estimates())?;
+        let mut all = estimates.0.iter();
+        let frequency = all.find(|(name, _)| name == "natural_frequency")?.1.value;
+        let largest = |list: &[f64]| list.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        let responses = self.fit.best.evaluation.trajectories.iter();
+        let response = responses.fold([0.0f64; 2], |most, response| {
+            [
+                most[0].max(largest(&response.displacement)),
+                most[1].max(largest(&response.velocity)),
+            ]
+        });
+        Implausible::of(frequency, (!self.is_rotation()).then_some(response))
     }
 
     /// The tests that a fit without reasons passed.
@@ -221,6 +240,17 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
                 and_list(fixed)
             ),
         },
+        VerdictReason::ImplausibleUnits(implausible) => {
+            let (quantity, value, unit) = match implausible {
+                Implausible::NaturalFrequency { value } => ("natural frequency", value, "Hz"),
+                Implausible::Velocity { value } => ("largest velocity", value, "m/s"),
+                Implausible::Displacement { value } => ("largest displacement", value, "m"),
+            };
+            format!(
+                "a {quantity} of {} {unit} is implausible: check the units of time and displacement",
+                significant(*value, 2)
+            )
+        }
         VerdictReason::EquationResidual { share } => format!(
             "the residual of the equation of motion is {} of its largest force",
             percent(100.0 * share, 0)

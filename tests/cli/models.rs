@@ -213,7 +213,7 @@ fn left_behind(bench: &Workbench, run: &str) {
     let nodes = result["model"]["nodes"].as_u64().expect("a count") as usize;
 
     let history = read("history.csv");
-    let first = "iteration,cost,cost_ratio,gradient_norm_squared_ratio,step";
+    let first = "attempt,iteration,cost,cost_ratio,gradient_norm_squared_ratio,step";
     assert!(history.starts_with(first), "{history}");
     let numbers: Vec<f64> = (1..=result["counts"]["iterations"].as_u64().expect("a count"))
         .map(|i| i as f64)

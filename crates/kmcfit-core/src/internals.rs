@@ -6,11 +6,11 @@ pub mod assessment {
         AmplitudeRival, BEYOND_SIGMA, BasisTest, ClassicalEstimate, ClassicalMethod, CoarseBasis,
         Draw, EXACT, EquationErrorIntervals, Estimate, EstimateErrors, EstimateStatus,
         FitAssessment, FitStatistics, FitWarning, FunctionInGap, FunctionSummary, GapAssessment,
-        GapStatus, NoDraws, NoIntervals, POOR, Plausibility, RECOVERY_TOLERANCE, RecordError,
-        ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified, VerdictAssumption,
-        VerdictLevel, VerdictReason, constant_probability, diagnostics, draws, estimates,
-        function_summaries, is_same_truth, outliers, pattern, standard_error, verdict_assumptions,
-        verdict_level, verdict_reasons,
+        GapStatus, Implausible, NoDraws, NoIntervals, POOR, Plausibility, RECOVERY_TOLERANCE,
+        RecordError, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
+        VerdictAssumption, VerdictLevel, VerdictReason, constant_probability, diagnostics, draws,
+        estimates, function_summaries, is_same_truth, outliers, pattern, standard_error,
+        verdict_assumptions, verdict_level, verdict_reasons,
     };
 }
 pub mod builder {

@@ -43,8 +43,8 @@ pub use rivals::AmplitudeRival;
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
 pub use verdict::{
-    VerdictAssumption, VerdictLevel, VerdictReason, verdict_assumptions, verdict_level,
-    verdict_reasons,
+    Implausible, VerdictAssumption, VerdictLevel, VerdictReason, verdict_assumptions,
+    verdict_level, verdict_reasons,
 };
 
 use classical::classical_estimate;

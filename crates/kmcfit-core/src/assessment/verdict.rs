@@ -166,11 +166,60 @@ pub enum VerdictReason {
         /// Root mean square of the residual relative to that of the largest force.
         share: f64,
     },
+    /// The natural frequency or the response is outside the range of mechanical systems.
+    ImplausibleUnits(Implausible),
     /// A classical estimate and that of the fit differ by more than their intervals.
     ClassicalDisagrees(ClassicalEstimate),
     /// An error of a record explains the residuals.
     #[serde(untagged)]
     RecordError(RecordError),
+}
+
+/// A quantity outside the range of mechanical systems, which points to a wrong unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(tag = "quantity", rename_all = "snake_case")]
+pub enum Implausible {
+    /// Natural frequency, Hz, outside [`Implausible::FREQUENCIES`].
+    NaturalFrequency {
+        /// Its mean, Hz.
+        value: f64,
+    },
+    /// Largest velocity of the fitted response, m/s, above [`Implausible::VELOCITY`].
+    Velocity {
+        /// The velocity, m/s.
+        value: f64,
+    },
+    /// Largest displacement of the fitted response, m, above [`Implausible::DISPLACEMENT`].
+    Displacement {
+        /// The displacement, m.
+        value: f64,
+    },
+}
+
+impl Implausible {
+    /// Natural frequencies of mechanical systems, Hz: from moored platforms and long bridges (0.01 to 0.1 Hz) to small resonators.
+    pub const FREQUENCIES: [f64; 2] = [0.005, 1e6];
+    /// Largest velocity of a vibration, m/s: above those of strong earthquakes (3 m/s) and of shock tests (10 m/s).
+    pub const VELOCITY: f64 = 30.0;
+    /// Largest displacement of a vibration, m.
+    pub const DISPLACEMENT: f64 = 10.0;
+
+    /// The first implausible quantity of a response with the mean natural frequency `frequency` (Hz) and these largest displacement (m) and
+    /// velocity (m/s); of a rotation only the frequency is judged.
+    pub fn of(frequency: f64, response: Option<[f64; 2]>) -> Option<Self> {
+        let [least, most] = Self::FREQUENCIES;
+        if frequency.is_finite() && !(least..=most).contains(&frequency) {
+            return Some(Self::NaturalFrequency { value: frequency });
+        }
+        let [displacement, velocity] = response?;
+        match () {
+            () if velocity > Self::VELOCITY => Some(Self::Velocity { value: velocity }),
+            () if displacement > Self::DISPLACEMENT => Some(Self::Displacement {
+                value: displacement,
+            }),
+            () => None,
+        }
+    }
 }
 
 /// An assumption of a verdict that the records cannot test.
