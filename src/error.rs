@@ -32,6 +32,15 @@ pub enum Location {
         /// Column name, for an error in one column.
         column: Option<String>,
     },
+    /// A sample of a binary file.
+    Sample {
+        /// The file.
+        file: PathBuf,
+        /// Number of the sample, from 1.
+        sample: usize,
+        /// Path of the channel in the file, for an error in one channel.
+        channel: Option<String>,
+    },
 }
 
 impl fmt::Display for Location {
@@ -46,6 +55,17 @@ impl fmt::Display for Location {
                 write!(f, "{}:{line}", file.display())?;
                 match column {
                     Some(column) => write!(f, ": column `{column}`"),
+                    None => Ok(()),
+                }
+            }
+            Location::Sample {
+                file,
+                sample,
+                channel,
+            } => {
+                write!(f, "{}: sample {sample}", file.display())?;
+                match channel {
+                    Some(channel) => write!(f, " of `{channel}`"),
                     None => Ok(()),
                 }
             }

@@ -27,6 +27,7 @@ mod escape;
 mod faults;
 pub mod finding;
 pub mod fitting;
+pub mod formats;
 pub mod guide;
 mod memory;
 #[cfg(test)]

@@ -331,8 +331,13 @@ fn collect(snapshot: &str, found: &mut BTreeSet<String>) {
 /// The problem of an error, behind its location and key.
 fn problem(message: &str) -> &str {
     let first = message.lines().next().unwrap_or_default();
-    let is_place =
-        |part: &str| !part.contains(' ') || part.contains(": row") || part.starts_with("row ");
+    let is_place = |part: &str| {
+        !part.contains(' ')
+            || part.contains(": row")
+            || ["row ", "sample "]
+                .iter()
+                .any(|place| part.starts_with(place))
+    };
     let mut rest = first;
     while let Some((_, behind)) = rest.split_once(": ").filter(|(place, _)| is_place(place)) {
         rest = behind;

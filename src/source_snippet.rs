@@ -48,7 +48,7 @@ impl Excerpt {
                 let [start, end] = field(&text, error.found.as_deref().unwrap_or_default());
                 Some(Self::new(*line, &text, start, end))
             }
-            Location::Argument(_) | Location::File(_) => None,
+            Location::Argument(_) | Location::File(_) | Location::Sample { .. } => None,
         }
     }
 

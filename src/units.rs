@@ -155,6 +155,64 @@ impl Unit {
     }
 }
 
+/// A unit with a factor: samples in multiples of it, as `50 g` for an accelerometer whose full scale is 50 g.
+///
+/// ```
+/// use kmcfit::units::{Quantity, ScaledUnit};
+/// let scaled = ScaledUnit::parse(Quantity::Force, "250 N")?;
+/// assert_eq!((scaled.factor(), scaled.unit.symbol()), (250.0, "N"));
+/// assert_eq!(ScaledUnit::parse(Quantity::Force, "kN")?.factor(), 1000.0);
+/// assert!(ScaledUnit::parse(Quantity::Force, "0 N").is_err());
+/// # Ok::<(), kmcfit::error::InputError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScaledUnit {
+    /// Number of units in one of the file.
+    pub scale: f64,
+    /// The unit.
+    pub unit: Unit,
+}
+
+impl From<Unit> for ScaledUnit {
+    fn from(unit: Unit) -> Self {
+        Self { scale: 1.0, unit }
+    }
+}
+
+impl ScaledUnit {
+    /// The unit that a text names, with the number before it, if any.
+    ///
+    /// # Errors
+    ///
+    /// As [`Unit::parse`], and when the number is zero or not finite.
+    pub fn parse(kind: Quantity, text: &str) -> Result<Self, InputError> {
+        let (scale, unit) = split_factor(text);
+        if scale == 0.0 || !scale.is_finite() {
+            let place = format!("unit of the {}", kind.name());
+            return Err(InputError::argument(place, "invalid factor of a unit")
+                .found(quote(text))
+                .expected("a finite number other than 0 before the unit, as in `50 g`"));
+        }
+        let unit = Unit::parse(kind, unit)?;
+        Ok(Self { scale, unit })
+    }
+
+    /// Factor from the numbers of the file to SI.
+    pub fn factor(&self) -> f64 {
+        self.scale * self.unit.factor()
+    }
+}
+
+/// The number before a unit, 1 without one, and the unit.
+pub(crate) fn split_factor(text: &str) -> (f64, &str) {
+    let text = text.trim();
+    let factor = text.split_once(' ').and_then(|(number, unit)| {
+        let factor: f64 = number.parse().ok()?;
+        Some((factor, unit.trim()))
+    });
+    factor.unwrap_or((1.0, text))
+}
+
 /// The error for a text that is no unit of this kind.
 fn unknown(kind: Quantity, text: &str) -> InputError {
     let error = InputError::argument(format!("unit of the {}", kind.name()), "unknown unit")

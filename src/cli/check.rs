@@ -1,18 +1,22 @@
 //! `kmcfit check`: validates a model and its data, and compares its gradient with finite differences over step sizes and grids.
 
+use super::check_file;
 use super::{CommandError, NOT_CONVERGED, OK, Overrides, announce, inputs, print, say, unwritable};
 use crate::config::{BuildMode, Model, build};
+use crate::formats::has_data_extension;
 use crate::report::{CsvTable, figures, render};
 use crate::results::{Claim, OutputFolder};
 use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
 use kmcfit_core::internals::simulate::SimulationError;
 use std::path::PathBuf;
 
-/// Validate a model and its data, then compare its gradient with finite differences.
+/// Validate a model and its data, then compare its gradient with finite differences; list the columns of a data file.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  kmcfit check model.yaml --nodes 500,1000,2000")]
+#[command(
+    after_help = "Example:\n  kmcfit check model.yaml --nodes 500,1000,2000\n  kmcfit check record.mat                       list its variables"
+)]
 pub struct Arguments {
-    /// Model file (YAML).
+    /// Model file (YAML), or a data file.
     model: PathBuf,
     /// Numbers of nodes for the check [default: that of the model].
     #[arg(long, value_delimiter = ',', value_name = "N,N,...")]
@@ -35,6 +39,9 @@ fn no_response(breakdown: SimulationError) -> CommandError {
 const FILES: [&str; 2] = ["gradient.csv", "figures/gradient.svg"];
 
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
+    if has_data_extension(&arguments.model) {
+        return Ok(check_file::run(&arguments.model)?);
+    }
     let file = arguments.set.read(&arguments.model)?;
     let model = build(&file, BuildMode::Fit)?;
     announce(&model);

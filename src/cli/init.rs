@@ -15,7 +15,7 @@ const SCHEMA: &str = "kmcfit.schema.json";
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  kmcfit init record.csv --sample-rate 250")]
 pub struct Arguments {
-    /// Record (CSV or another text table).
+    /// Record (CSV or another text table, NumPy, MATLAB, TDMS, WAV, UFF).
     data: PathBuf,
     /// Model file [default: beside the record, with its name].
     #[arg(long, value_name = "MODEL")]
@@ -23,6 +23,9 @@ pub struct Arguments {
     /// Sampling rate, Hz, if the file has no column of times.
     #[arg(long, value_name = "HZ")]
     sample_rate: Option<f64>,
+    /// Full scale of each channel of a file without units, as in `"50 g,200 N"`; `-` for a channel that is not used.
+    #[arg(long, value_name = "UNITS")]
+    units: Option<String>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
@@ -41,7 +44,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     }
     if arguments.data.is_dir() {
         return Err(InputError::file(&arguments.data, "this is a folder")
-            .expected("a record (CSV or another text table)")
+            .expected("a record: a text table, or a file of NumPy, MATLAB, TDMS, WAV or UFF")
             .into());
     }
     let out = match &arguments.out {
@@ -54,7 +57,8 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
             .into());
     }
     let folder = out.parent().unwrap_or(Path::new(""));
-    let scaffold = scaffold(&arguments.data, &named_from(folder, &arguments.data), rate)?;
+    let data = named_from(folder, &arguments.data);
+    let scaffold = scaffold(&arguments.data, &data, rate, arguments.units.as_deref())?;
     // The written model must be readable.
     ModelFile::parse(&out, scaffold.text.as_str())?;
     let schema = folder.join(SCHEMA);

@@ -34,7 +34,7 @@ pub use build::{
 pub use model_file::ModelFile;
 pub use new_record::{MeasuredChannel, NewRecord};
 pub use overrides::Override;
-pub use scaffold::{Scaffold, scaffold};
+pub use scaffold::{Scaffold, rate, recognised, scaffold};
 pub use sequence::Sequence;
 pub use source::{DataFile, ModelSource};
 pub use values::{Number, NumberOrColumn, Text};

@@ -116,7 +116,7 @@ struct InputFile {
 impl InputFile {
     fn read(path: &Path) -> Result<Self, InputError> {
         let table = Table::read(path)?;
-        let columns = ColumnAssignment::without_guess(&table)?;
+        let columns = ColumnAssignment::without_guess(&table, None)?;
         let time = columns.find(Role::Time).ok_or_else(|| {
             InputError::file(path, "no column of times").expected("a column of times in s")
         })?;

@@ -41,16 +41,23 @@ impl Table {
     pub fn find(&self, column: &ColumnName) -> Result<usize, InputError> {
         match column {
             ColumnName::Name(name) => self.find_name(name),
-            ColumnName::Number(number) => match number.checked_sub(1) {
+            ColumnName::Number(number) => match self.index_of(*number) {
                 Some(index) if index < self.width() => Ok(index),
-                _ => Err(InputError::file(self.path(), "no such column number")
-                    .found(number)
-                    .expected(match self.width() {
-                        1 => "1: there is one column".to_owned(),
-                        width => format!("1 to {width}"),
-                    })),
+                _ => Err(self.no_such_number(*number)),
             },
         }
+    }
+
+    pub(super) fn no_such_number(&self, number: usize) -> InputError {
+        if let Some(error) = self.of_other_times(&ColumnName::Number(number)) {
+            return error;
+        }
+        InputError::file(self.path(), "no such column number")
+            .found(number)
+            .expected(match self.numbered() {
+                1 => "1: there is one column".to_owned(),
+                width => format!("1 to {width}"),
+            })
     }
 
     /// Label of a column in messages: its name or, without one, its number from 1.
@@ -100,15 +107,22 @@ impl Table {
     }
 
     fn no_such(&self, name: &str) -> InputError {
+        let own = ColumnName::from(name);
+        if let Some(error) = self
+            .of_other_times(&own)
+            .or_else(|| self.unusable_error(name))
+        {
+            return error;
+        }
         let error = InputError::file(self.path(), "there is no such column").found(quote(name));
         if self.headers().is_empty() {
             return error
                 .expected(numbers(self.width()))
                 .hint("the file has no column names: give the column by its number");
         }
-        let names = || self.headers().iter().map(String::as_str);
+        let names = || self.all_names();
         let bare = names().map(|header| split_unit(header).0);
-        let hint = did_you_mean(name, names().chain(bare));
+        let hint = did_you_mean(name, names().chain(bare)).or_else(|| self.by_last_part(name));
         error.expected(one_of(names())).hint_if(hint)
     }
 }

@@ -15,7 +15,7 @@ use crate::text_io::quote;
 /// assert_eq!(table.column("a")?, [1.5, 1.4]);
 /// assert_eq!(table.unit(1), Some("m/s²"));
 /// assert_eq!(
-///     table.format().to_string(),
+///     table.format_in_words(),
 ///     "UTF-8; separated by semicolons; decimal comma; column names in line 2; units in line 3"
 /// );
 /// # Ok::<(), kmcfit::error::InputError>(())
@@ -35,6 +35,19 @@ pub struct TableFormat {
 }
 
 impl TableFormat {
+    /// The name of the first given property.
+    pub(super) fn first_given(&self) -> Option<&'static str> {
+        let given = [
+            (self.delimiter.is_some(), "delimiter"),
+            (self.decimal.is_some(), "decimal"),
+            (self.skip.is_some(), "skip"),
+            (self.header.is_some(), "header"),
+            (self.units_row.is_some(), "units_row"),
+        ];
+        let given = given.into_iter().find(|(is_given, _)| *is_given);
+        given.map(|(_, name)| name)
+    }
+
     /// Refuses invalid delimiters and decimal signs.
     pub(super) fn check(&self) -> Result<(), InputError> {
         if let Some(sign) = self.decimal

@@ -1,5 +1,7 @@
-//! Tables of samples: reading of text files as data loggers write them, checks of their times, and resampling.
+//! Tables of samples: reading of text files and of the channels of binary files as data loggers write them, checks of their
+//! times, and resampling.
 
+mod channels;
 mod columns;
 mod detect;
 mod encoding;

@@ -72,16 +72,19 @@ impl Table {
         if !stated.is_contradiction() {
             return Ok(());
         }
-        let line = |line: Option<usize>| line.unwrap_or(1);
         let problem = format!("two units for the column {}", quote(&self.label(index)));
-        let units_row = line(self.format().units_row);
+        let [row, header] = [stated.row, stated.header].map(|unit| quote(unit.unwrap_or_default()));
+        let Some(format) = self.text_format() else {
+            return Err(InputError::file(self.path(), problem)
+                .found(format!("{row} as its unit, {header} in its name"))
+                .expected("the same unit in both, or in one of them"));
+        };
+        let line = |line: Option<usize>| line.unwrap_or(1);
+        let units_row = line(format.units_row);
         Err(InputError::line(self.path(), units_row, 1, problem)
             .found(format!(
-                "{} in the row of units (line {}), {} in the column name (line {})",
-                quote(stated.row.unwrap_or_default()),
-                units_row,
-                quote(stated.header.unwrap_or_default()),
-                line(self.format().header)
+                "{row} in the row of units (line {units_row}), {header} in the column name (line {})",
+                line(format.header)
             ))
             .expected("the same unit in both, or in one of them"))
     }

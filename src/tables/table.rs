@@ -1,10 +1,11 @@
-//! A table of numeric columns, parsed from a text file.
+//! A table of numeric columns, parsed from a text file or made from the channels of a binary one.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
 
+use super::channels::ChannelOrigin;
 use super::detect::{Layout, detect};
 use super::encoding::decode;
 use super::field::{self, Field};
@@ -12,6 +13,7 @@ use super::format::{Detected, TableFormat};
 use super::rows::{CsvText, with_newlines};
 use super::table_memory::TableMemory;
 use crate::error::{InputError, Location};
+use crate::formats;
 use crate::text_io::{LONGEST_TABLE, check_lines, listed, quote, read_bytes, read_bytes_from};
 
 /// Most columns: each takes some hundred bytes beside its fields.
@@ -30,43 +32,61 @@ const TABLE: &str = "a CSV file with one row of column names and rows of numbers
 /// any system are accepted. A column that is not used may hold text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    path: PathBuf,
-    format: Detected,
-    headers: Vec<String>,
-    units: Vec<String>,
-    columns: Vec<ColumnValues>,
-    lines: Vec<usize>,
+    pub(super) path: PathBuf,
+    pub(super) origin: Origin,
+    pub(super) headers: Vec<String>,
+    pub(super) units: Vec<String>,
+    pub(super) columns: Vec<ColumnValues>,
+    pub(super) lines: Vec<usize>,
+}
+
+/// Source of a table.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Origin {
+    /// A text file of this format.
+    Text(Detected),
+    /// Channels of a binary file.
+    Channels(ChannelOrigin),
 }
 
 /// Samples of a column, NaN if missing, up to the first invalid field.
 #[derive(Debug, Clone, PartialEq, Default)]
-struct ColumnValues {
-    samples: Vec<f64>,
+pub(super) struct ColumnValues {
+    pub samples: Vec<f64>,
     /// The first field that is not a finite number.
-    unnumbered: Option<InputError>,
+    pub unnumbered: Option<InputError>,
     /// The first field that is neither a finite number nor missing.
-    unreadable: Option<InputError>,
+    pub unreadable: Option<InputError>,
 }
 
 impl Table {
-    /// Reads a table from a file; its format is detected.
+    /// Reads a table from a text file or a binary file of a data logger; its format is detected.
     ///
     /// # Errors
     ///
-    /// When there is no such file, it is not text, or [`parse`](Self::parse) fails.
+    /// When there is no such file, or [`parse`](Self::parse) fails.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
         Self::read_with_overrides(path, &TableFormat::default())
     }
 
-    /// Reads a table of a given format from a file.
+    /// Reads a table from a file; `format` states the format of text.
     ///
     /// # Errors
     ///
-    /// When there is no such file, it is not text, or [`parse_with`](Self::parse_with) fails.
+    /// When there is no such file, or [`parse_with`](Self::parse_with) fails.
     pub fn read_with_overrides(
         path: impl AsRef<Path>,
         format: &TableFormat,
     ) -> Result<Self, InputError> {
+        Self::only(Self::read_all(path, format)?)
+    }
+
+    /// Reads all tables of a file: one of a text file; of a binary file one for each set of channels with the same times.
+    ///
+    /// # Errors
+    ///
+    /// As [`read_with_overrides`](Self::read_with_overrides), apart from the choice of a set.
+    pub fn read_all(path: impl AsRef<Path>, format: &TableFormat) -> Result<Vec<Self>, InputError> {
         let path = path.as_ref();
         Self::from_bytes(path, read_bytes(path, TABLE, LONGEST_TABLE)?, format)
     }
@@ -83,7 +103,8 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// When it is not text, has no rows, rows of different length, or two columns with the same name.
+    /// For a text: when it has no rows, rows of different length, or two columns with the same name. For a binary file: when it
+    /// is damaged, is of a format that is not read, or has several sets of channels with different times.
     pub fn parse(path: impl AsRef<Path>, reader: impl Read) -> Result<Self, InputError> {
         Self::parse_with(path, reader, &TableFormat::default())
     }
@@ -99,7 +120,8 @@ impl Table {
         format: &TableFormat,
     ) -> Result<Self, InputError> {
         let path = path.as_ref();
-        Self::from_bytes(path, read_bytes_from(path, reader, LONGEST_TABLE)?, format)
+        let bytes = read_bytes_from(path, reader, LONGEST_TABLE)?;
+        Self::only(Self::from_bytes(path, bytes, format)?)
     }
 
     /// The path, as given.
@@ -107,9 +129,20 @@ impl Table {
         &self.path
     }
 
-    /// The detected format.
-    pub fn format(&self) -> &Detected {
-        &self.format
+    /// The detected format of a text; `None` for a binary file.
+    pub fn text_format(&self) -> Option<&Detected> {
+        match &self.origin {
+            Origin::Text(format) => Some(format),
+            Origin::Channels(_) => None,
+        }
+    }
+
+    /// The format of the file, in words.
+    pub fn format_in_words(&self) -> String {
+        match &self.origin {
+            Origin::Text(format) => format.to_string(),
+            Origin::Channels(origin) => origin.format().to_string(),
+        }
     }
 
     /// Names of the columns, in order; empty where the file has none.
@@ -122,7 +155,7 @@ impl Table {
         &self.units
     }
 
-    /// Line in the file of each data row, from 1.
+    /// Line in the file of each data row, from 1; of a binary file the number of the sample.
     pub fn lines(&self) -> &[usize] {
         &self.lines
     }
@@ -184,35 +217,63 @@ impl Table {
 
     /// Location of a data row, counted from 0, for errors.
     pub fn place(&self, row: usize, column: Option<&str>) -> Location {
-        Location::Row {
-            file: self.path.clone(),
-            line: self.lines.get(row).copied().unwrap_or_default(),
-            column: column.map(str::to_owned),
+        let (file, column) = (self.path.clone(), column.map(str::to_owned));
+        let line = self.lines.get(row).copied().unwrap_or_default();
+        match self.origin {
+            Origin::Text(_) => Location::Row { file, line, column },
+            Origin::Channels(_) => Location::Sample {
+                file,
+                sample: line,
+                channel: column,
+            },
+        }
+    }
+
+    /// A data row, counted from 0, in words: `line 12`, or `sample 12` of a binary file.
+    pub fn row_in_words(&self, row: usize) -> String {
+        let line = self.lines.get(row).copied().unwrap_or_default();
+        match self.origin {
+            Origin::Text(_) => format!("line {line}"),
+            Origin::Channels(_) => format!("sample {line}"),
         }
     }
 
     fn at(&self, index: usize) -> Result<&ColumnValues, InputError> {
-        let index = self.find(&super::ColumnName::Number(index.saturating_add(1)))?;
-        Ok(&self.columns[index])
+        match self.columns.get(index) {
+            Some(column) => Ok(column),
+            None => Err(self.no_such_number(index.saturating_add(1))),
+        }
     }
 
-    fn from_bytes(path: &Path, bytes: Vec<u8>, format: &TableFormat) -> Result<Self, InputError> {
+    fn from_bytes(
+        path: &Path,
+        bytes: Vec<u8>,
+        format: &TableFormat,
+    ) -> Result<Vec<Self>, InputError> {
         format.check()?;
+        match formats::recognise(path, &bytes)? {
+            Some(binary) => Self::from_binary(path, &bytes, binary, format),
+            None => Ok(vec![Self::from_text(path, bytes, format)?]),
+        }
+    }
+
+    fn from_text(path: &Path, bytes: Vec<u8>, format: &TableFormat) -> Result<Self, InputError> {
         let (text, encoding) = decode(path, bytes)?;
         let text = with_newlines(text);
         check_lines(path, &text)?;
         let layout = detect(path, &text, format);
         let skipped = format.skip.unwrap_or(0);
+        let mut detected = Detected {
+            encoding,
+            delimiter: layout.delimiter,
+            decimal: layout.decimal,
+            skipped,
+            header: None,
+            units_row: None,
+        };
         let mut table = Self {
             path: path.to_path_buf(),
-            format: Detected {
-                encoding,
-                delimiter: layout.delimiter,
-                decimal: layout.decimal,
-                skipped,
-                header: None,
-                units_row: None,
-            },
+            origin: Origin::Text(detected),
             headers: Vec::new(),
             units: Vec::new(),
             columns: Vec::new(),
@@ -223,7 +284,8 @@ impl Table {
         room.check(width)?;
         table.lines = room.list(width)?;
         let source = CsvText::new(&text, skipped, layout.delimiter);
-        table.fill(&source, &layout, room)?;
+        table.fill(&source, &layout, room, &mut detected)?;
+        table.origin = Origin::Text(detected);
         Ok(table)
     }
 
@@ -232,6 +294,7 @@ impl Table {
         source: &CsvText,
         layout: &Layout,
         room: TableMemory,
+        format: &mut Detected,
     ) -> Result<(), InputError> {
         let path = self.path.clone();
         let mut rows = source.rows(&path);
@@ -244,23 +307,23 @@ impl Table {
                 check_headers(&path, line, &fields, layout.decimal)?;
                 self.headers = fields.iter().map(str::to_owned).collect();
                 self.columns = columns(fields.len(), room)?;
-                self.format.header = Some(line);
+                format.header = Some(line);
             } else if row == layout.units {
                 self.units = fields.iter().map(str::to_owned).collect();
-                self.format.units_row = Some(line);
+                format.units_row = Some(line);
             } else if count >= layout.data {
                 self.push(line, &fields, layout, room)?;
             }
             count += 1;
         }
         let first = self.lines.first().copied();
-        match (self.format.header.or(first), first) {
-            (None, _) => Err(empty(&path, self.format.skipped)),
+        match (format.header.or(first), first) {
+            (None, _) => Err(empty(&path, format.skipped)),
             (_, None) => Err(InputError::file(&path, "the file has no data")
                 .found("a row of column names only")
                 .expected(TABLE)),
             (Some(head), _) => {
-                self.format.skipped = head - 1;
+                format.skipped = head - 1;
                 Ok(())
             }
         }

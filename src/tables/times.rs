@@ -127,9 +127,9 @@ fn not_increasing(table: &Table, column: &str, times: &[f64], row: usize) -> Inp
         true => "two rows with the same time",
         false => "the times do not increase",
     };
-    let line = table.lines().get(row - 1).copied().unwrap_or_default();
+    let row_before = table.row_in_words(row - 1);
     InputError::new(table.place(row, Some(column)), problem)
-        .found(format!("{here} after {before} in line {line}"))
+        .found(format!("{here} after {before} in {row_before}"))
         .expected(format!("a time greater than {before}"))
 }
 

@@ -8,6 +8,7 @@ mod compare;
 mod data_files;
 mod durable;
 mod ending;
+mod formats;
 mod known_parts;
 mod measured_input;
 mod models;

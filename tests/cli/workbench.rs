@@ -133,7 +133,9 @@ fn collect(root: &Path, below: &Path, found: &mut BTreeMap<String, String>) {
         let path = root.join(&name);
         let content = match path.is_dir() {
             true => "a folder".to_owned(),
-            false => fs::read_to_string(&path).expect("a file can be read"),
+            false => {
+                String::from_utf8_lossy(&fs::read(&path).expect("a file can be read")).into_owned()
+            }
         };
         found.insert(name.display().to_string(), content);
         if path.is_dir() {

@@ -13,6 +13,7 @@ pub fn seeds(target: &str) -> Vec<(String, Vec<u8>)> {
     assert!(!seeds.is_empty(), "the corpus of {target}");
     match target {
         "model" => seeds.extend(files("models")),
+        "channels" => seeds.extend(files("tests/formats")),
         "table" => {
             let cut = |(name, mut bytes): (String, Vec<u8>)| {
                 bytes.truncate(LONGEST);

@@ -5,6 +5,7 @@ use kmcfit::Run;
 use kmcfit::config::values::{Count, Nodes};
 use kmcfit::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
 use kmcfit::error::InputError;
+use kmcfit::formats::{self, recognise};
 use kmcfit::report::study::StudyDocument;
 use kmcfit::report::{FittedModel, RunAssessment, fit_claim, json, predict};
 use kmcfit::results::{
@@ -36,7 +37,7 @@ pub enum Verdict {
 pub static KINDS: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
 /// All targets, by the names of their folders in the corpus.
-pub const TARGETS: [(&str, Target); 8] = [
+pub const TARGETS: [(&str, Target); 9] = [
     ("model", model),
     ("table", table),
     ("run", run),
@@ -45,6 +46,7 @@ pub const TARGETS: [(&str, Target); 8] = [
     ("yaml", yaml),
     ("override", overrides),
     ("sequence", sequence),
+    ("channels", channels),
 ];
 
 /// Largest number of nodes on which a model is built; larger ones are reduced to limit the time.
@@ -343,7 +345,9 @@ fn columns(table: &Table) {
     assert!(table.rows() > 0 && table.rows() == table.lines().len());
     assert!(table.lines().is_sorted());
     for index in 0..table.width().min(20) {
-        assert_eq!(table.find(&ColumnName::Number(index + 1)), Ok(index));
+        if let Some(number) = table.number(index) {
+            assert_eq!(table.find(&ColumnName::Number(number)), Ok(index));
+        }
         table.unit(index);
         let _ = table.check_stated_unit(index);
         if let Ok(samples) = table.samples(index) {
@@ -353,6 +357,37 @@ fn columns(table: &Table) {
     for name in table.headers().iter().take(20) {
         if let Err(error) = times::equally_spaced(table, name) {
             told(&error);
+        }
+    }
+}
+
+/// A binary file of a data logger: its channels, and the tables made of them.
+pub fn channels(bytes: &[u8]) -> Verdict {
+    // Version 4 of MATLAB is recognised by the ending of the name.
+    let path = Path::new(if bytes.len() % 2 == 0 { "t" } else { "t.mat" });
+    let format = match recognise(path, bytes) {
+        Err(error) => return told(&error),
+        Ok(None) => return Verdict::Refused,
+        Ok(Some(format)) => format,
+    };
+    match formats::read(path, bytes, format) {
+        Err(error) => return told(&error),
+        Ok(found) => {
+            let names: BTreeSet<&str> = found.channels.iter().map(|c| &*c.name).collect();
+            assert_eq!(names.len(), found.channels.len(), "names are unique");
+            for channel in &found.channels {
+                assert!(!channel.values.is_empty());
+                if let Some(sampling) = channel.sampling {
+                    assert!(sampling.time(1) >= sampling.time(0));
+                }
+            }
+        }
+    }
+    match Table::parse(path, bytes) {
+        Err(error) => told(&error),
+        Ok(table) => {
+            columns(&table);
+            Verdict::Accepted
         }
     }
 }

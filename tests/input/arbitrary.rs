@@ -128,7 +128,7 @@ fn read_table(bytes: &[u8]) {
 
 fn read_table_with(bytes: &[u8], format: &TableFormat) {
     if let Ok(table) = Table::parse_with("t.csv", bytes, format) {
-        assert!(!table.format().to_string().is_empty());
+        assert!(!table.format_in_words().is_empty());
         assert!(table.rows() > 0);
         for index in 0..table.width() {
             assert_eq!(table.find(&ColumnName::Number(index + 1)), Ok(index));

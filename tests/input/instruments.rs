@@ -20,7 +20,7 @@ fn table_with(text: &str, format: &TableFormat) -> Table {
 
 /// Detected separators, the lines of names and units, and the lines of the data.
 fn found(table: &Table) -> (char, char, Option<usize>, Option<usize>, &[usize]) {
-    let format = table.format();
+    let format = table.text_format().expect("a text");
     (
         format.delimiter,
         format.decimal,
@@ -46,7 +46,7 @@ fn delimiters_and_decimal_signs_are_detected() {
         ("\"t\";\"y\"\n\"0,5\";\"-1,5\"\n\"1,0\";\"2,5\"\n", ';', ','),
     ] {
         let table = table(text);
-        let format = table.format();
+        let format = table.text_format().expect("a text");
         assert_eq!(
             (format.delimiter, format.decimal),
             (delimiter, decimal),
@@ -85,10 +85,10 @@ s;m/s²
     assert_eq!((table.unit(0), table.unit(1)), (Some("s"), Some("m/s²")));
     assert_eq!(table.column("Acceleration").unwrap(), [1.5, 1.25]);
     assert_eq!(
-        table.format().to_string(),
+        table.format_in_words(),
         "UTF-8; separated by semicolons; decimal comma; column names in line 7; units in line 8"
     );
-    assert_eq!(table.format().skipped, 6);
+    assert_eq!(table.text_format().expect("a text").skipped, 6);
 }
 
 #[test]
@@ -163,7 +163,7 @@ fn files_without_names_have_numbered_columns() {
         assert_eq!(times::equally_spaced_at(&table, 0).unwrap(), 0.5, "{text}");
     }
     let words = "UTF-8; separated by commas; decimal point; no column names, data from line 1";
-    assert_eq!(table("0,1\n").format().to_string(), words);
+    assert_eq!(table("0,1\n").format_in_words(), words);
 }
 
 #[test]
@@ -191,7 +191,7 @@ fn encodings_are_read() {
         (utf16, Encoding::Utf16),
     ] {
         let table = table(&bytes);
-        assert_eq!(table.format().encoding, encoding);
+        assert_eq!(table.text_format().expect("a text").encoding, encoding);
         assert_eq!(table.unit(1), Some("m/s²"), "{encoding}");
         assert_eq!(table.column("a").unwrap(), [1.5], "{encoding}");
     }

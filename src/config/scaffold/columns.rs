@@ -104,6 +104,13 @@ pub struct UsedColumn {
     has_unit: bool,
 }
 
+impl UsedColumn {
+    /// Key of its role in the model file.
+    fn key(&self) -> &'static str {
+        self.role.key()
+    }
+}
+
 /// Columns of a table by role, and unused columns.
 #[derive(Debug)]
 pub struct ColumnAssignment {
@@ -122,8 +129,8 @@ impl ColumnAssignment {
     }
 
     /// The columns with recognised names or units and the column of times; none of them need be a channel.
-    pub fn without_guess(table: &Table) -> Result<Self, InputError> {
-        let columns = Self::known(table, None)?;
+    pub fn without_guess(table: &Table, sample_rate: Option<f64>) -> Result<Self, InputError> {
+        let columns = Self::known(table, sample_rate)?;
         columns.check_units(table)?;
         Ok(columns)
     }
@@ -211,7 +218,7 @@ impl ColumnAssignment {
                 .found(format!("no number in the column `{label}`"))
                 .expected("at least one sample"));
         }
-        let is_open = |i: &usize| !is_foreign(table.headers().get(*i).map_or("", String::as_str));
+        let is_open = |i: &usize| !is_foreign(table.quantity_name(*i));
         let Some(place) = self.unused.iter().position(is_open) else {
             let names = (0..table.width()).map(|i| table.label(i));
             return Err(InputError::file(
@@ -261,12 +268,15 @@ impl ColumnAssignment {
         format!("{{{}}}", pairs.collect::<Vec<_>>().join(", "))
     }
 
-    /// The units that the model file states, as a YAML map: those that the file does not state in a recognised form.
-    pub fn units(&self) -> Option<String> {
-        let pairs: Vec<String> = (self.used.iter())
-            .filter(|c| c.state_unit || !c.has_unit)
-            .map(|c| format!("{}: {}", c.role.key(), quoted(c.unit.symbol())))
-            .collect();
+    /// The units that the model file states, as a YAML map: those that the file does not state in a recognised form, and those
+    /// of calibrated columns.
+    pub fn units(&self, table: &Table) -> Option<String> {
+        let unit = |c: &UsedColumn| match table.calibration(c.index) {
+            Some(calibration) => Some(calibration.to_owned()),
+            None => (c.state_unit || !c.has_unit).then(|| c.unit.symbol().to_owned()),
+        };
+        let pair = |c| Some(format!("{}: {}", UsedColumn::key(c), quoted(&unit(c)?)));
+        let pairs: Vec<String> = self.used.iter().filter_map(pair).collect();
         (!pairs.is_empty()).then(|| format!("{{{}}}", pairs.join(", ")))
     }
 
@@ -324,6 +334,11 @@ impl ColumnAssignment {
     }
 }
 
+/// Quantity and unit of a column as its name and stated unit give them.
+pub fn recognised(table: &Table, index: usize) -> Option<(Role, Unit)> {
+    known(table, index).map(|column| (column.role, column.unit))
+}
+
 /// Column of times and sampling rate, Hz; `None` without a column of increasing times.
 pub fn rate(table: &Table) -> Option<(usize, f64)> {
     (0..table.width()).find_map(|i| {
@@ -364,8 +379,7 @@ fn time(table: &Table, numeric: &[usize]) -> Result<UsedColumn, InputError> {
 
 /// Role and unit of a column from its name and stated unit.
 fn known(table: &Table, index: usize) -> Option<UsedColumn> {
-    let label = table.headers().get(index).map_or("", String::as_str);
-    let (label, is_base) = without_base(label);
+    let (label, is_base) = without_base(table.quantity_name(index));
     let by_name = role_of(&label.to_lowercase());
     let stated = table.stated_unit(index);
     let roles = [

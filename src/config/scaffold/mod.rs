@@ -3,14 +3,17 @@
 //! Columns are assigned by units, then by names; the start value of the stiffness follows from the dominant frequency.
 //! Quantities that the table does not determine (the mass in a free decay) get a placeholder and a comment.
 
+mod calibration;
 mod columns;
 mod record_summary;
 
 use crate::error::InputError;
 use crate::memory;
 use crate::number_format::significant;
-use crate::tables::Table;
-pub(super) use columns::{ColumnAssignment, Role};
+use crate::tables::{Table, TableFormat};
+use crate::text_io::{listed, quote};
+pub(super) use columns::ColumnAssignment;
+pub use columns::{Role, rate, recognised};
 use record_summary::RecordSummary;
 use std::path::Path;
 
@@ -36,14 +39,19 @@ pub struct Scaffold {
 }
 
 /// A model file for the table at `csv`, under the name `data`. `sample_rate` is the sampling rate in Hz of a table
-/// without a column of times.
+/// without a column of times; `units` has the value and unit of the full scale of each channel of a file without units,
+/// separated by commas.
 ///
 /// # Errors
 /// When the table cannot be read, has no times or no measured response, or a column cannot be converted to samples.
-pub fn scaffold(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Scaffold, InputError> {
-    let table = Table::read(csv)?;
+pub fn scaffold(
+    csv: &Path,
+    data: &str,
+    sample_rate: Option<f64>,
+    units: Option<&str>,
+) -> Result<Scaffold, InputError> {
+    let (table, columns) = record(csv, sample_rate, units)?;
     memory::check_file(csv, table.rows() as u64 * PER_ROW)?;
-    let columns = ColumnAssignment::of(&table, sample_rate)?;
     let record = RecordSummary::of(&table, &columns, sample_rate)?;
     let mut found = vec![format!(
         "{} samples over {} s, {}",
@@ -58,6 +66,11 @@ pub fn scaffold(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Scaf
         );
     }
     found.extend(columns.in_words(&table));
+    let others: Vec<String> = table.channels_of_other_times().map(quote).collect();
+    if !others.is_empty() {
+        let others = listed(others.iter().map(String::as_str));
+        found.push(format!("not used, of another length or rate: {others}"));
+    }
     if let Some((count, first)) = record.outliers {
         let outliers = match count {
             1 => "1 outlier".to_owned(),
@@ -92,6 +105,38 @@ pub fn scaffold(csv: &Path, data: &str, sample_rate: Option<f64>) -> Result<Scaf
         text: text(&table, data, &columns, &record, sample_rate),
         found,
     })
+}
+
+/// The table of a file with its columns; of several sets of channels the only one with times and a measured response.
+fn record(
+    csv: &Path,
+    sample_rate: Option<f64>,
+    units: Option<&str>,
+) -> Result<(Table, ColumnAssignment), InputError> {
+    let mut tables = Table::read_all(csv, &TableFormat::default())?;
+    if let Some(units) = units {
+        for table in &mut tables {
+            calibration::apply(table, units)?;
+        }
+    }
+    let has_samples = tables.iter().any(|table| table.rows() > 1);
+    tables.retain(|table| !has_samples || table.rows() > 1);
+    if let [table] = tables.as_slice() {
+        let columns = ColumnAssignment::of(table, sample_rate)?;
+        return Ok((tables.remove(0), columns));
+    }
+    let mut found = Vec::new();
+    for (i, table) in tables.iter().enumerate() {
+        let columns = ColumnAssignment::without_guess(table, sample_rate);
+        let columns = columns
+            .ok()
+            .filter(|columns| columns.channels().next().is_some());
+        found.extend(columns.map(|columns| (i, columns)));
+    }
+    match (found.pop(), found.is_empty()) {
+        (Some((i, columns)), true) => Ok((tables.remove(i), columns)),
+        _ => Err(Table::several(&tables)),
+    }
 }
 
 fn text(
@@ -155,7 +200,7 @@ fn keys(
             "by name or by number from 1",
         ),
         ("    sample_rate", sample_rate.map(|r| r.to_string()), "Hz"),
-        ("    units", columns.units(), &columns.units_comment()),
+        ("    units", columns.units(table), &columns.units_comment()),
         (
             "    window",
             record.begins.map(|begins| format!("{{min: {begins}}}")),

@@ -14,9 +14,9 @@ keys! {
     pub struct ExperimentSpec = "experiment", expecting "a map such as {name: free decay, data: file.csv, initial: {displacement: 3.3, velocity: 1.0}}" {
         /// Name for reports.
         name: Option<Text>, example "free decay", default "experiment 1, experiment 2, …";
-        /// Data file, relative to the model file; a simulation needs none.
+        /// Data file, relative to the model file: a text table, or a file of NumPy, MATLAB, TDMS, WAV or UFF; a simulation needs none.
         data: Option<Text>, example "record.csv";
-        /// Format of the data file, where automatic detection fails.
+        /// Format of a text table, where automatic detection fails.
         format: Option<FileFormatSpec>,
             example "{delimiter: semicolon, decimal: comma}",
             default "detected",
@@ -26,13 +26,13 @@ keys! {
             example "{time: t_s, displacement: y_m}",
             default "{time: t_s, displacement: y_m}",
             needs "`data`";
-        /// Sampling rate, in place of a column of times.
+        /// Sampling rate, in place of a column of times or of the rate that the file states.
         sample_rate: Option<Number>,
             example "1000.0",
             unit "Hz",
             range "1e-12 to 1e12",
             needs "`data`; excludes `columns.time`";
-        /// Units of the columns, converted to SI.
+        /// Units of the columns, converted to SI; `50 g` for samples in multiples of 50 g, such as fractions of full scale.
         units: Option<UnitsSpec>,
             example "{displacement: mm}",
             default "as stated in the file, else SI",
@@ -168,7 +168,7 @@ keys! {
         column: ColumnId, example "y_m";
         /// Column of the times.
         time: Option<ColumnId>, example "t_s", default "that of the experiment";
-        /// Sampling rate, in place of a column of times.
+        /// Sampling rate, in place of a column of times or of the rate that the file states.
         sample_rate: Option<Number>,
             example "1000.0",
             unit "Hz",

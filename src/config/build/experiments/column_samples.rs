@@ -69,7 +69,7 @@ pub fn read(
         ScalarOr::Scalar(id) => (id, None),
         ScalarOr::Map(source) => (&source.column, Some(source)),
     };
-    let table = table(file, spec, &experiment, &column_key, own)?;
+    let table = table(file, spec, wanted, &column_key, (id, own))?;
     let column_key = match own {
         Some(_) => format!("{column_key}.column"),
         None => column_key,
@@ -93,7 +93,7 @@ pub fn read(
             let found = table
                 .find(&ColumnName::from(name))
                 .map_err(asked_for(file, key))?;
-            column(found).same_as(unit, key, warnings);
+            column(found).same_as(unit.unit, key, warnings);
             Some(table.samples(found).map_err(asked_for(file, key))?)
         }
         None => None,
@@ -118,27 +118,33 @@ pub fn read(
         values: inside.iter().map(|&r| factor * values[r]).collect(),
         beside: beside.map(|b| inside.iter().map(|&r| factor * b[r]).collect()),
         outside: times.values.len() - inside.len(),
-        unit,
+        unit: unit.unit,
         label,
-        format: table.format().to_string(),
+        format: table.format_in_words(),
     })
 }
 
-/// The file of a column: its own, or that of the experiment.
+/// The table of a column: of its own file, or of that of the experiment.
 fn table(
     file: &ModelFile,
     spec: &ExperimentSpec,
-    experiment: &str,
+    wanted: &ColumnRequest,
     column_key: &str,
-    own: Option<&SourceSpec>,
+    (id, own): (&ColumnId, Option<&SourceSpec>),
 ) -> Result<Table, InputError> {
+    let experiment = &format!("experiments[{}]", wanted.experiment);
+    let time = own.and_then(|s| s.time.as_ref());
+    let time = time.or_else(|| spec.columns.as_ref()?.time.as_ref());
+    let mut columns = vec![column_name(id)];
+    columns.extend(time.map(column_name));
+    columns.extend(wanted.beside.map(|(name, _)| ColumnName::from(name)));
     let own = own.and_then(|s| s.data.as_ref());
-    let key = format!("{}.data", own.map_or(experiment, |_| column_key));
+    let key = format!("{}.data", own.map_or(&**experiment, |_| column_key));
     let data = own.or(spec.data.as_ref()).ok_or_else(|| {
         file.error_at(experiment, "this experiment has no data")
             .expected("`data`, a CSV file with the samples")
     })?;
-    Table::read_with_overrides(file.resolve(&data.0), &format(spec))
+    Table::read_with_columns(file.resolve(&data.0), &format(spec), &columns)
         .map_err(|error| about_format(file, experiment, error))
         .map_err(asked_for(file, &key))
 }
@@ -248,7 +254,10 @@ fn times(
     let default = ColumnId::Name(TIME_COLUMN.to_owned());
     let id = own_column.or(shared_column).unwrap_or(&default);
     let key = format!("{experiment}.columns.time");
-    let index = table.find(&column_name(id)).map_err(|error| {
+    // A file that states its sampling rate needs no column of times.
+    let stated = table.time_column().filter(|_| std::ptr::eq(id, &default));
+    let index = stated.map_or_else(|| table.find(&column_name(id)), Ok);
+    let index = index.map_err(|error| {
         let error = asked_for(file, &key)(error);
         match own_column.or(shared_column) {
             None => error.hint("name it with `columns: {time: …}`, or give `sample_rate: …`"),

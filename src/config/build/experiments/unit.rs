@@ -6,7 +6,7 @@ use crate::config::values::Text;
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::tables::Table;
-use crate::units::{Quantity, Unit};
+use crate::units::{Quantity, ScaledUnit, Unit};
 
 /// A column of a table, its keys in the model file and its kind of quantity.
 pub(super) struct QuantityColumn<'a> {
@@ -24,32 +24,48 @@ pub(super) struct QuantityColumn<'a> {
 
 impl QuantityColumn<'_> {
     /// Unit of the column: from the model file, else from the row of units or the name in the table, else SI. A
-    /// differing unit in the table gives a warning.
+    /// differing unit in the table gives a warning. A unit of the model file can have a factor.
     ///
     /// # Errors
     /// If the model's unit is not of this kind of quantity, or the table alone states two units.
-    pub fn unit(&self, warnings: &mut Vec<Finding>) -> Result<Unit, InputError> {
+    pub fn unit(&self, warnings: &mut Vec<Finding>) -> Result<ScaledUnit, InputError> {
+        if let Some(text) = self.given {
+            return self.given_unit(text, warnings);
+        }
+        self.stated_unit(warnings).map(ScaledUnit::from)
+    }
+
+    fn given_unit(
+        &self,
+        text: &Text,
+        warnings: &mut Vec<Finding>,
+    ) -> Result<ScaledUnit, InputError> {
+        let Self { name, kind, .. } = *self;
+        let units_key = format!("{}.units.{name}", self.experiment);
+        let scaled = ScaledUnit::parse(kind, &text.0)
+            .map_err(|error| self.file.error_about(&units_key, error))?;
+        let stated = self.table.stated_unit(self.index);
+        let other = stated.explicit(kind).or(stated.suffix(kind));
+        let unit = scaled.unit;
+        if let Some(other) = other.filter(|other| other.factor() != unit.factor()) {
+            let warning = DataWarning::UnitDiffersFromFile {
+                column: self.table.label(self.index),
+                used: unit.symbol().into(),
+                stated: other.symbol().into(),
+            };
+            warnings.push(warning.at(&units_key));
+        }
+        Ok(scaled)
+    }
+
+    /// The unit that the table states, else that of SI.
+    fn stated_unit(&self, warnings: &mut Vec<Finding>) -> Result<Unit, InputError> {
         let Self { name, kind, .. } = *self;
         let stated = self.table.stated_unit(self.index);
-        let units_key = format!("{}.units.{name}", self.experiment);
         let columns_key = format!("{}.columns.{name}", self.experiment);
         let label = self.table.label(self.index);
         let (si, suffix) = (Unit::si(kind), stated.suffix(kind));
         let differs = |unit: &Unit, used: Unit| unit.factor() != used.factor();
-        if let Some(text) = self.given {
-            let unit = Unit::parse(kind, &text.0)
-                .map_err(|error| self.file.error_about(&units_key, error))?;
-            let other = stated.explicit(kind).or(suffix);
-            if let Some(other) = other.filter(|other| differs(other, unit)) {
-                let warning = DataWarning::UnitDiffersFromFile {
-                    column: label,
-                    used: unit.symbol().into(),
-                    stated: other.symbol().into(),
-                };
-                warnings.push(warning.at(&units_key));
-            }
-            return Ok(unit);
-        }
         self.table.check_stated_unit(self.index).map_err(|error| {
             let way_out = format!("state the unit in the model: `units: {{{name}: …}}`");
             error.key(&*columns_key).hint(way_out)

@@ -1,0 +1,90 @@
+//! `kmcfit check FILE`: lists the columns, variables or channels of a data file.
+
+use super::{OK, print};
+use crate::config::{rate, recognised};
+use crate::error::InputError;
+use crate::number_format::significant;
+use crate::report::shell_quoted;
+use crate::tables::{Table, TableFormat};
+use std::path::Path;
+
+/// Lists a data file.
+///
+/// # Errors
+/// When it cannot be read.
+pub(super) fn run(path: &Path) -> Result<u8, InputError> {
+    let tables = Table::read_all(path, &TableFormat::default())?;
+    let mut text = format!("{}: {}\n", path.display(), format_of(&tables));
+    let mut rows =
+        vec![["column", "name", "quantity", "unit", "samples", "rate"].map(str::to_owned)];
+    for table in &tables {
+        rows.extend((0..table.width()).map(|index| row(table, index)));
+    }
+    text += &aligned(&rows);
+    for other in tables.first().map_or(&[][..], Table::unusable) {
+        text += &format!("not usable: `{}`, {}\n", other.name, other.content);
+        if let Some(hint) = &other.hint {
+            text += &format!("  {hint}\n");
+        }
+    }
+    let file = shell_quoted(&path.display().to_string());
+    print(&format!("{text}`kmcfit init {file}` writes a model file\n"));
+    Ok(OK)
+}
+
+fn format_of(tables: &[Table]) -> String {
+    tables
+        .first()
+        .map(Table::format_in_words)
+        .unwrap_or_default()
+}
+
+/// Number, name, quantity, unit, number of samples and sampling rate of a column.
+fn row(table: &Table, index: usize) -> [String; 6] {
+    // A single number is no record.
+    let known = recognised(table, index).filter(|_| table.rows() > 1);
+    let stated = table.unit(index).map(str::to_owned);
+    let unit = known.map(|(_, unit)| unit.symbol().to_owned());
+    let samples = match table.samples(index) {
+        Ok(samples) => {
+            let missing = samples.iter().filter(|x| x.is_nan()).count();
+            match missing {
+                0 => samples.len().to_string(),
+                missing => format!("{}, {missing} missing", samples.len()),
+            }
+        }
+        Err(_) => "not numbers".to_owned(),
+    };
+    let rate = rate(table).map(|(_, rate)| format!("{} Hz", significant(rate, 6)));
+    [
+        table
+            .number(index)
+            .map_or("-".to_owned(), |n| n.to_string()),
+        table.label(index),
+        known.map_or("-".to_owned(), |(role, _)| role.key().replace('_', " ")),
+        match (&stated, known) {
+            (None, None) => "-".to_owned(),
+            (Some(stated), _) => stated.clone(),
+            (None, Some(_)) => unit.map_or_else(String::new, |unit| format!("{unit} (assumed)")),
+        },
+        samples,
+        rate.unwrap_or_else(|| "-".to_owned()),
+    ]
+}
+
+/// Rows in columns of equal width, indented.
+fn aligned(rows: &[[String; 6]]) -> String {
+    let width = |column: usize| {
+        let widths = rows.iter().map(|row| row[column].chars().count());
+        widths.max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..6).map(width).collect();
+    let mut text = String::new();
+    for row in rows {
+        let cells = row.iter().zip(&widths);
+        let cells = cells.map(|(cell, width)| format!("{cell:<width$}"));
+        let line = cells.collect::<Vec<_>>().join("  ");
+        text += &format!("  {}\n", line.trim_end());
+    }
+    text
+}

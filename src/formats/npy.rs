@@ -1,0 +1,247 @@
+//! Arrays of NumPy: `.npy`, format versions 1 to 3.
+//!
+//! Layout: magic, version, length of the header, header (a Python dictionary with the type, order and shape), numbers.
+//! Reference: numpy.lib.format.
+
+use std::path::Path;
+
+use super::Channels;
+use super::array::Array;
+use super::budget::Budget;
+use super::bytes::Bytes;
+use super::number::{ByteOrder, NumberType};
+use super::python_literal::Literal;
+use crate::error::InputError;
+use crate::text_io::quote;
+
+/// First bytes of a file.
+pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
+
+/// Remedy for arrays of Python objects.
+const NO_OBJECTS: &str = "Python objects are stored as pickles, which can run code: save the numbers with `numpy.savez(file, force=force.astype(float))`";
+
+/// Reads a file with one array, which is named as the file.
+pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Channels, InputError> {
+    let name = path.file_stem().map(|stem| stem.to_string_lossy());
+    let mut channels = Channels::default();
+    add(
+        path,
+        bytes,
+        &name.unwrap_or_default(),
+        budget,
+        &mut channels,
+    )?;
+    Ok(channels)
+}
+
+/// Adds the channels of an array with a name.
+pub(super) fn add(
+    path: &Path,
+    bytes: &[u8],
+    name: &str,
+    budget: &mut Budget,
+    channels: &mut Channels,
+) -> Result<(), InputError> {
+    let what = format!("the array {}", quote(name));
+    let mut bytes = Bytes::new(path, bytes, ByteOrder::Little);
+    let header = header(path, &mut bytes, &what)?;
+    budget.name(name)?;
+    let (rows, columns) = match *header.shape {
+        [] => (1, 1),
+        [rows] => (rows, 1),
+        [rows, columns] => (rows, columns),
+        _ => {
+            let content = format!("an array with {} dimensions", header.shape.len());
+            channels.refuse(
+                name,
+                content,
+                Some("save arrays with one or two dimensions"),
+            );
+            return Ok(());
+        }
+    };
+    let count = rows.saturating_mul(columns);
+    match header.descr {
+        Literal::Text(descr) => match number(&descr) {
+            Ok((kind, order)) => {
+                let length = count.saturating_mul(kind.size() as u64);
+                let array = Array {
+                    bytes: bytes.take(length, &what)?,
+                    kind,
+                    order,
+                    rows: rows as usize,
+                    columns: columns as usize,
+                    column_major: header.is_fortran,
+                };
+                array.add_to(channels, name, None, budget)
+            }
+            Err((content, hint)) => {
+                channels.refuse(name, content, hint);
+                Ok(())
+            }
+        },
+        Literal::List(fields) => structured(name, &fields, bytes, count, budget, channels),
+        _ => Err(invalid(
+            path,
+            &what,
+            "another type than a text or a list of fields",
+        )),
+    }
+}
+
+struct Header {
+    descr: Literal,
+    is_fortran: bool,
+    shape: Vec<u64>,
+}
+
+fn header(path: &Path, bytes: &mut Bytes, what: &str) -> Result<Header, InputError> {
+    let start = bytes.take(8, what)?;
+    if !start.starts_with(MAGIC) {
+        return Err(invalid(path, what, "no magic of NumPy"));
+    }
+    let length = match start.get(6) {
+        Some(1) => u64::from(bytes.u16(what)?),
+        Some(2 | 3) => u64::from(bytes.u32(what)?),
+        version => {
+            let version = version.copied().unwrap_or_default();
+            return Err(invalid(
+                path,
+                what,
+                &format!("version {version} of the format"),
+            ));
+        }
+    };
+    let text = String::from_utf8_lossy(bytes.take(length, what)?);
+    parse_header(&text)
+        .ok_or_else(|| invalid(path, what, &format!("the header {}", quote(text.trim()))))
+}
+
+fn parse_header(text: &str) -> Option<Header> {
+    let header = Literal::parse(text)?;
+    let Literal::List(shape) = header.get("shape")? else {
+        return None;
+    };
+    let length = |literal: &Literal| match literal {
+        Literal::Integer(length) => Some(*length),
+        _ => None,
+    };
+    Some(Header {
+        descr: header.get("descr")?.clone(),
+        is_fortran: *header.get("fortran_order")? == Literal::Bool(true),
+        shape: shape.iter().map(length).collect::<Option<_>>()?,
+    })
+}
+
+fn invalid(path: &Path, what: &str, found: &str) -> InputError {
+    InputError::file(path, format!("invalid header of {what}"))
+        .found(found)
+        .expected("the header of a NumPy array, version 1 to 3, with `descr`, `fortran_order` and `shape`")
+}
+
+/// Type and byte order of `<f8` and the like; otherwise the content as a noun, and a remedy.
+fn number(descr: &str) -> Result<(NumberType, ByteOrder), (String, Option<&'static str>)> {
+    let (order, code) = match descr.split_at_checked(1) {
+        Some((">", code)) => (ByteOrder::Big, code),
+        Some(("<" | "|" | "=", code)) => (ByteOrder::Little, code),
+        _ => (ByteOrder::Little, descr),
+    };
+    let kind = match code {
+        "b1" | "?" | "u1" | "B" => NumberType::U8,
+        "i1" | "b" => NumberType::I8,
+        "i2" => NumberType::I16,
+        "i4" => NumberType::I32,
+        "i8" => NumberType::I64,
+        "u2" => NumberType::U16,
+        "u4" => NumberType::U32,
+        "u8" => NumberType::U64,
+        "f2" => NumberType::F16,
+        "f4" => NumberType::F32,
+        "f8" => NumberType::F64,
+        _ => return Err(no_number(descr, code)),
+    };
+    Ok((kind, order))
+}
+
+fn no_number(descr: &str, code: &str) -> (String, Option<&'static str>) {
+    match code.chars().next() {
+        Some('O') => ("Python objects".to_owned(), Some(NO_OBJECTS)),
+        Some('c') => (
+            "complex numbers".to_owned(),
+            Some("save the real samples in time"),
+        ),
+        Some('U' | 'S' | 'a') => ("texts".to_owned(), None),
+        Some('M' | 'm') => (
+            "dates".to_owned(),
+            Some("save seconds: `(t - t[0]) / numpy.timedelta64(1, 's')`"),
+        ),
+        _ => (
+            format!("numbers of the type {}", quote(descr)),
+            Some("save them as double precision: `x.astype(float)`"),
+        ),
+    }
+}
+
+/// Adds the fields of a structured array, each as a channel `name.field`.
+fn structured(
+    name: &str,
+    fields: &[Literal],
+    mut bytes: Bytes,
+    count: u64,
+    budget: &mut Budget,
+    channels: &mut Channels,
+) -> Result<(), InputError> {
+    let mut stride = 0;
+    let mut used = Vec::new();
+    for field in fields {
+        let simple = match field {
+            Literal::List(parts) => match parts.as_slice() {
+                [Literal::Text(field), Literal::Text(descr)] => Some((field, descr)),
+                _ => None,
+            },
+            _ => None,
+        };
+        let Some((field, (descr, size))) =
+            simple.and_then(|(field, descr)| Some((field, (descr, size_of_type(descr)?))))
+        else {
+            channels.refuse(
+                name,
+                "a structured array with nested fields or objects",
+                Some("save its fields as arrays: `numpy.savez(file, force=a['force'])`"),
+            );
+            return Ok(());
+        };
+        used.push((field, descr, stride));
+        stride += size;
+    }
+    let stride = stride as usize;
+    let data = bytes.take(
+        count.saturating_mul(stride as u64),
+        &format!("the array {}", quote(name)),
+    )?;
+    for (field, descr, offset) in used {
+        let path = format!("{name}.{field}");
+        budget.name(&path)?;
+        match number(descr) {
+            Ok(_) if count == 0 => channels.refuse(&path, "an empty array", None),
+            Ok((kind, order)) => {
+                let mut values = budget.list(count as usize)?;
+                values.extend(kind.values(data, order, offset as usize, stride));
+                channels.push(&path, None, None, values);
+            }
+            Err((content, hint)) => channels.refuse(&path, content, hint),
+        }
+    }
+    Ok(())
+}
+
+/// Bytes of a field of type `<f8`, `|S12` or `<U5`; `None` for objects and others.
+fn size_of_type(descr: &str) -> Option<u64> {
+    let digits = descr.trim_start_matches(|c: char| !c.is_ascii_digit());
+    let size: u64 = digits.parse().ok().filter(|size| *size <= 1 << 20)?;
+    match descr.contains('O') || descr.contains('V') {
+        true => None,
+        // A letter takes four bytes.
+        false => Some(size * if descr.contains('U') { 4 } else { 1 }),
+    }
+}

@@ -1,0 +1,164 @@
+//! Recognition of the format of a file by its first bytes.
+
+use std::fmt;
+use std::path::Path;
+
+use super::{mat4, mat5, npy, tdms, uff};
+use crate::error::InputError;
+
+/// Format of a binary file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Array of NumPy.
+    Npy,
+    /// Zip archive of arrays of NumPy.
+    Npz,
+    /// Sound file.
+    Wav,
+    /// Universal file.
+    Uff,
+    /// MATLAB, version 4.
+    Mat4,
+    /// MATLAB, versions 5 to 7.
+    Mat5,
+    /// MATLAB, version 7.3; refused.
+    Mat73,
+    /// LabVIEW.
+    Tdms,
+    /// Index file of LabVIEW; refused.
+    TdmsIndex,
+    /// HDF5; refused.
+    Hdf5,
+    /// Apache Parquet; refused.
+    Parquet,
+    /// Compressed by gzip; refused.
+    Gzip,
+    /// Pickle of Python; refused.
+    Pickle,
+    /// Workbook of Excel before 2007; refused.
+    Workbook,
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Npy => "NumPy array",
+            Self::Npz => "NumPy archive",
+            Self::Wav => "WAV file",
+            Self::Uff => "universal file",
+            Self::Mat4 => "MATLAB file, version 4",
+            Self::Mat5 => "MATLAB file, version 5 to 7",
+            Self::Mat73 => "MATLAB file, version 7.3",
+            Self::Tdms => "TDMS file",
+            Self::TdmsIndex => "index of a TDMS file",
+            Self::Hdf5 => "HDF5 file",
+            Self::Parquet => "Parquet file",
+            Self::Gzip => "file compressed by gzip",
+            Self::Pickle => "pickle of Python",
+            Self::Workbook => "workbook of a spreadsheet",
+        })
+    }
+}
+
+/// Extensions of binary files, in lower case, and the formats that they stand for.
+const EXTENSIONS: [(&str, &[Format]); 8] = [
+    ("npy", &[Format::Npy]),
+    ("npz", &[Format::Npz]),
+    ("wav", &[Format::Wav]),
+    ("uff", &[Format::Uff]),
+    ("unv", &[Format::Uff]),
+    (
+        "mat",
+        &[Format::Mat5, Format::Mat4, Format::Mat73, Format::Hdf5],
+    ),
+    ("tdms", &[Format::Tdms]),
+    ("parquet", &[Format::Parquet]),
+];
+
+/// Extensions of text tables and of binary files, in lower case.
+pub const DATA_EXTENSIONS: [&str; 13] = [
+    "csv", "tsv", "txt", "dat", "asc", "npy", "npz", "wav", "uff", "unv", "mat", "tdms", "parquet",
+];
+
+fn extension(path: &Path) -> Option<String> {
+    Some(path.extension()?.to_str()?.to_ascii_lowercase())
+}
+
+/// True for the extension of a data file, text or binary.
+pub fn has_data_extension(path: &Path) -> bool {
+    extension(path).is_some_and(|own| DATA_EXTENSIONS.contains(&own.as_str()))
+}
+
+/// The format of a file that begins with `bytes`, or `None` for text.
+///
+/// # Errors
+/// When its extension is that of another format.
+pub fn recognise(path: &Path, bytes: &[u8]) -> Result<Option<Format>, InputError> {
+    let extension = extension(path).unwrap_or_default();
+    let stated = EXTENSIONS.iter().find(|(own, _)| *own == extension);
+    let mut found = by_content(bytes);
+    // Version 4 of MATLAB has no magic; text does not begin with its zeros.
+    if found.is_none() && extension == "mat" && mat4::begins_so(bytes) {
+        found = Some(Format::Mat4);
+    }
+    let Some((_, formats)) = stated else {
+        return Ok(found);
+    };
+    if found.is_some_and(|found| formats.contains(&found)) {
+        return Ok(found);
+    }
+    let expected = formats.first().map(ToString::to_string).unwrap_or_default();
+    let problem = format!("the file is no {expected}, although its name ends with .{extension}");
+    let error =
+        InputError::file(path, problem).expected(format!("the first bytes of a {expected}"));
+    Err(match found {
+        Some(found) => error
+            .found(format!("a {found}"))
+            .hint("rename the file to its format"),
+        None if bytes.is_empty() => error.found("an empty file"),
+        None => error
+            .found(match bytes.iter().take(1000).all(|byte| *byte >= b'\t') {
+                true => "text".to_owned(),
+                false => format!("the bytes {}", hexadecimal(bytes)),
+            })
+            .hint("if it is a text table, rename it to .txt"),
+    })
+}
+
+/// The first bytes, as `50 4b 03 04`.
+fn hexadecimal(bytes: &[u8]) -> String {
+    let bytes = bytes.iter().take(8).map(|byte| format!("{byte:02x}"));
+    bytes.collect::<Vec<_>>().join(" ")
+}
+
+fn by_content(bytes: &[u8]) -> Option<Format> {
+    let magic: [(&[u8], Format); 13] = [
+        (npy::MAGIC, Format::Npy),
+        (b"PK\x03\x04", Format::Npz),
+        (b"PK\x05\x06", Format::Npz),
+        (tdms::MAGIC, Format::Tdms),
+        (b"TDSh", Format::TdmsIndex),
+        (b"MATLAB 7.3 MAT-file", Format::Mat73),
+        (b"MATLAB 5.0 MAT-file", Format::Mat5),
+        (b"\x89HDF\r\n\x1a\n", Format::Hdf5),
+        (b"PAR1", Format::Parquet),
+        (b"\x1f\x8b\x08", Format::Gzip),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", Format::Workbook),
+        (b"\x80\x04\x95", Format::Pickle),
+        (b"\x80\x05\x95", Format::Pickle),
+    ];
+    let found = magic.iter().find(|(magic, _)| bytes.starts_with(magic));
+    if let Some((_, format)) = found {
+        return Some(*format);
+    }
+    let form = bytes.get(8..12);
+    if form == Some(b"WAVE") && (bytes.starts_with(b"RIFF") || bytes.starts_with(b"RF64")) {
+        return Some(Format::Wav);
+    }
+    // Programs other than MATLAB write another text before version and byte order.
+    let version = bytes.get(mat5::HEADER - 4..mat5::HEADER);
+    if matches!(version, Some(b"\x00\x01IM" | b"\x01\x00MI")) {
+        return Some(Format::Mat5);
+    }
+    uff::begins_so(bytes).then_some(Format::Uff)
+}

@@ -1,0 +1,50 @@
+//! Messages about files that hold no record that can be read.
+
+use std::path::Path;
+
+use super::{Format, Unusable, mat_class};
+use crate::error::InputError;
+use crate::text_io::quote;
+
+/// Content that is expected of a data file.
+const EXPECTED: &str =
+    "a text table, or a file of NumPy, MATLAB (version 4 to 7), LabVIEW (TDMS), WAV or UFF";
+
+/// The error for a format that is refused as a whole.
+pub(super) fn whole(path: &Path, format: Format) -> InputError {
+    let hint = match format {
+        Format::Mat73 | Format::Hdf5 => mat_class::save_as_version_7(path),
+        Format::Parquet => {
+            "in Python: `pandas.read_parquet(file).to_csv('record.csv', index=False)`".into()
+        }
+        Format::TdmsIndex => "read the file with the ending .tdms beside it".into(),
+        Format::Gzip => "decompress it: `gunzip FILE`".into(),
+        Format::Pickle => {
+            "a pickle can run code: save the numbers with `numpy.savez(file, t=t, y=y)`".into()
+        }
+        _ => "save the sheet as CSV".into(),
+    };
+    InputError::file(path, format!("this is a {format}, which is not read"))
+        .expected(EXPECTED)
+        .hint(hint)
+}
+
+/// The error for a file without a usable channel.
+pub(super) fn nothing(path: &Path, format: Format, unusable: &[Unusable]) -> InputError {
+    let error = InputError::file(
+        path,
+        format!("the {format} has no samples that can be used"),
+    )
+    .expected("arrays or channels of real numbers");
+    match unusable.first() {
+        None => error.found("no variable or channel"),
+        Some(first) => {
+            let more = match unusable.len() {
+                1 => String::new(),
+                count => format!("; {} more", count - 1),
+            };
+            let found = format!("{}: {}{more}", quote(&first.name), first.content);
+            error.found(found).hint_if(first.hint.clone())
+        }
+    }
+}

@@ -1,0 +1,330 @@
+//! Files of LabVIEW: TDMS, versions 1 and 2.
+//!
+//! A file is a sequence of segments, each with descriptions of objects and chunks of raw data; what a segment does not describe again
+//! is as in the segment before. Reference: National Instruments, "TDMS File Format Internal Structure".
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::budget::Budget;
+use super::bytes::Bytes;
+use super::number::ByteOrder;
+use super::tdms_meta::{Properties, Property, RawData, RawIndex, SampleType, dotted, object};
+use super::{Channels, Sampling};
+use crate::error::InputError;
+
+/// First bytes of a segment.
+pub(super) const MAGIC: &[u8] = b"TDSm";
+/// Flags of a segment.
+const HAS_META: u32 = 1 << 1;
+const NEW_LIST: u32 = 1 << 2;
+const HAS_RAW: u32 = 1 << 3;
+const INTERLEAVED: u32 = 1 << 5;
+const BIG_ENDIAN: u32 = 1 << 6;
+const HAS_DAQMX: u32 = 1 << 7;
+/// Length of a segment whose writing was interrupted.
+const UNFINISHED: u64 = u64::MAX;
+
+/// A channel over all segments.
+struct Track {
+    name: String,
+    properties: Properties,
+    index: Option<RawIndex>,
+    values: Vec<f64>,
+    /// Content, unless numbers.
+    other: Option<&'static str>,
+    /// Seconds of the first timestamp.
+    epoch: Option<u64>,
+    /// True with raw data in the current segment.
+    is_active: bool,
+}
+
+#[derive(Default)]
+struct Tracks {
+    all: Vec<Track>,
+    by_path: BTreeMap<String, usize>,
+    /// Channels with raw data in the current segment.
+    active: Vec<usize>,
+}
+
+pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Channels, InputError> {
+    let mut file = Bytes::new(path, bytes, ByteOrder::Little);
+    let mut tracks = Tracks::default();
+    let mut unread = 0;
+    while !file.is_empty() {
+        unread = segment(path, &mut file, &mut tracks, budget)?;
+    }
+    let mut channels = Channels::default();
+    if unread > 0 {
+        let content = format!("{unread} bytes of a segment whose writing was interrupted");
+        channels.refuse("end of the file", content, None);
+    }
+    for track in tracks.all {
+        track.finish(&mut channels);
+    }
+    Ok(channels)
+}
+
+/// Reads a segment and returns the number of bytes of an unfinished chunk at its end.
+fn segment(
+    path: &Path,
+    file: &mut Bytes,
+    tracks: &mut Tracks,
+    budget: &mut Budget,
+) -> Result<usize, InputError> {
+    let what = "the beginning of a segment";
+    let mut lead = file.part(28, what)?;
+    if lead.take(4, what)? != MAGIC {
+        return Err(budget.damaged(what).expected("the letters `TDSm`"));
+    }
+    let flags = lead.u32(what)?;
+    if flags & BIG_ENDIAN != 0 {
+        lead.order = ByteOrder::Big;
+    }
+    lead.take(4, what)?;
+    let (length, raw_at) = (lead.u64(what)?, lead.u64(what)?);
+    let stated = match length {
+        UNFINISHED => file.left() as u64,
+        length => length,
+    };
+    let mut segment = file.part(stated, "a segment")?;
+    segment.order = lead.order;
+    if flags & HAS_META != 0 {
+        let mut meta = segment.part(raw_at, "the descriptions of a segment")?;
+        tracks.describe(path, &mut meta, flags & NEW_LIST != 0, budget)?;
+    } else {
+        segment.take(raw_at, "the descriptions of a segment")?;
+    }
+    if flags & HAS_DAQMX != 0 {
+        return Err(daqmx(path));
+    }
+    let left = match flags & HAS_RAW != 0 {
+        true => tracks.raw(&mut segment, flags & INTERLEAVED != 0, budget)?,
+        false => 0,
+    };
+    match left > 0 && length != UNFINISHED {
+        true => Err(budget
+            .damaged("a segment")
+            .found(format!("{left} bytes after its last chunk of samples"))),
+        false => Ok(left),
+    }
+}
+
+fn daqmx(path: &Path) -> InputError {
+    InputError::file(path, "raw samples of NI-DAQmx are not supported")
+        .found("a TDMS file logged by NI-DAQmx itself")
+        .expected("samples with their scale applied")
+        .hint("in Python: `nptdms.TdmsFile.read(file).as_dataframe().to_csv(...)`; or open and save it in DIAdem")
+}
+
+impl Tracks {
+    /// Reads the descriptions of a segment.
+    fn describe(
+        &mut self,
+        path: &Path,
+        meta: &mut Bytes,
+        is_new: bool,
+        budget: &mut Budget,
+    ) -> Result<(), InputError> {
+        if is_new {
+            for place in self.active.drain(..) {
+                if let Some(track) = self.all.get_mut(place) {
+                    track.is_active = false;
+                }
+            }
+        }
+        for _ in 0..meta.u32("the descriptions of a segment")? {
+            let object = object(meta)?;
+            if matches!(object.raw, RawData::Daqmx) {
+                return Err(daqmx(path));
+            }
+            let Some(name) = dotted(&object.path) else {
+                continue;
+            };
+            let place = match self.by_path.get(&object.path) {
+                Some(place) => *place,
+                None => {
+                    budget.name(&name)?;
+                    self.by_path.insert(object.path, self.all.len());
+                    self.all.push(Track::new(name));
+                    self.all.len() - 1
+                }
+            };
+            let Some(track) = self.all.get_mut(place) else {
+                continue;
+            };
+            track.properties.extend(object.properties);
+            match object.raw {
+                RawData::New(index) => track.index = Some(index),
+                RawData::Same | RawData::None | RawData::Daqmx => {}
+            }
+            let has_raw = !matches!(object.raw, RawData::None);
+            if has_raw && !track.is_active {
+                self.active.push(place);
+            } else if !has_raw && track.is_active {
+                self.active.retain(|active| *active != place);
+            }
+            track.is_active = has_raw;
+        }
+        Ok(())
+    }
+
+    /// Reads the chunks of a segment and returns the number of bytes that make no whole chunk.
+    fn raw(
+        &mut self,
+        raw: &mut Bytes,
+        interleaved: bool,
+        budget: &mut Budget,
+    ) -> Result<usize, InputError> {
+        let indices: Vec<(usize, RawIndex)> = (self.active.iter())
+            .filter_map(|place| Some((*place, self.all.get(*place)?.index?)))
+            .filter(|(_, index)| index.size > 0)
+            .collect();
+        let sizes = indices.iter().map(|(_, index)| index.size);
+        let chunk = sizes.fold(0, u64::saturating_add);
+        if chunk == 0 {
+            return Ok(raw.left());
+        }
+        let chunks = raw.left() as u64 / chunk;
+        if interleaved {
+            let count = indices.first().map_or(0, |(_, index)| index.count);
+            if indices.iter().any(|(_, index)| index.count != count) {
+                return Err(budget
+                    .damaged("a segment")
+                    .found("interleaved channels of different length"));
+            }
+            let data = raw.take(chunks * chunk, "the samples of a segment")?;
+            let stride = chunk / count.max(1);
+            let mut offset = 0;
+            for (place, index) in indices {
+                if let Some(track) = self.all.get_mut(place) {
+                    track.add(
+                        data,
+                        raw.order,
+                        offset as usize,
+                        stride as usize,
+                        index.kind,
+                        budget,
+                    )?;
+                }
+                offset += index.kind.size();
+            }
+            return Ok(raw.left());
+        }
+        for _ in 0..chunks {
+            for (place, index) in &indices {
+                let data = raw.take(index.size, "the samples of a segment")?;
+                if let Some(track) = self.all.get_mut(*place) {
+                    let stride = index.kind.size() as usize;
+                    track.add(data, raw.order, 0, stride, index.kind, budget)?;
+                }
+            }
+        }
+        Ok(raw.left())
+    }
+}
+
+impl Track {
+    fn new(name: String) -> Self {
+        Self {
+            name,
+            properties: Properties::new(),
+            index: None,
+            values: Vec::new(),
+            other: None,
+            epoch: None,
+            is_active: false,
+        }
+    }
+
+    fn add(
+        &mut self,
+        data: &[u8],
+        order: ByteOrder,
+        offset: usize,
+        stride: usize,
+        kind: SampleType,
+        budget: &mut Budget,
+    ) -> Result<(), InputError> {
+        match kind {
+            SampleType::Number(kind) => {
+                budget.grow(&mut self.values, data.len() / stride.max(1))?;
+                self.values.extend(kind.values(data, order, offset, stride));
+            }
+            SampleType::Timestamp => {
+                budget.grow(&mut self.values, data.len() / stride.max(1))?;
+                for record in data.chunks_exact(stride.max(1)) {
+                    let time = record.get(offset..).unwrap_or_default();
+                    let time = self.seconds(time, order);
+                    self.values.push(time);
+                }
+            }
+            SampleType::Other(content, _) => self.other = Some(content),
+        }
+        Ok(())
+    }
+
+    /// Seconds of a timestamp since the whole second of the first one.
+    fn seconds(&mut self, bytes: &[u8], order: ByteOrder) -> f64 {
+        let half = |at: usize| {
+            let half: [u8; 8] = bytes.get(at..at + 8)?.try_into().ok()?;
+            Some(match order {
+                ByteOrder::Little => u64::from_le_bytes(half),
+                ByteOrder::Big => u64::from_be_bytes(half),
+            })
+        };
+        let (low, high) = (half(0).unwrap_or(0), half(8).unwrap_or(0));
+        let (fraction, seconds) = match order {
+            ByteOrder::Little => (low, high),
+            ByteOrder::Big => (high, low),
+        };
+        let epoch = *self.epoch.get_or_insert(seconds);
+        seconds.wrapping_sub(epoch) as i64 as f64 + fraction as f64 / 2f64.powi(64)
+    }
+
+    fn number(&self, name: &str) -> Option<f64> {
+        match self.properties.get(name)? {
+            Property::Number(number) => Some(*number),
+            _ => None,
+        }
+    }
+
+    fn text(&self, name: &str) -> Option<&str> {
+        match self.properties.get(name)? {
+            Property::Text(text) => Some(text),
+            _ => None,
+        }
+    }
+
+    /// Adds the channel to those of the file, with its scale applied.
+    fn finish(mut self, channels: &mut Channels) {
+        if let Some(other) = self.other {
+            return channels.refuse(&self.name, other, None);
+        }
+        if self.values.is_empty() {
+            return channels.refuse(&self.name, "no samples", None);
+        }
+        let scales = self.number("NI_Number_Of_Scales").unwrap_or(0.0);
+        if scales > 0.0 && self.text("NI_Scaling_Status") != Some("scaled") {
+            let kind = self.text("NI_Scale[0]_Scale_Type").unwrap_or("unknown");
+            let slope = self.number("NI_Scale[0]_Linear_Slope");
+            let (Some(slope), 1.0, "Linear") = (slope, scales, kind) else {
+                let content = format!("raw samples with {scales} scales, the first of type {kind}");
+                let hint = "save the scaled samples; one linear scale is supported";
+                return channels.refuse(&self.name, content, Some(hint));
+            };
+            let zero = self.number("NI_Scale[0]_Linear_Y_Intercept").unwrap_or(0.0);
+            for value in &mut self.values {
+                *value = slope * *value + zero;
+            }
+        }
+        let sampling = self.number("wf_increment").and_then(|step| {
+            Sampling::interval(self.number("wf_start_offset").unwrap_or(0.0), step)
+        });
+        let unit = match self.epoch {
+            Some(_) => Some("s".to_owned()),
+            None => self.text("unit_string").map(str::to_owned),
+        };
+        channels.push(&self.name, unit, sampling, std::mem::take(&mut self.values));
+    }
+}

@@ -1,0 +1,375 @@
+//! Tables from the channels of a binary file: one for each set of channels with the same times.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::table::{ColumnValues, Origin};
+use super::{ColumnName, Table, TableFormat, field};
+use crate::error::{InputError, Location};
+use crate::formats::{self, Channel, Channels, Format, Sampling, Unusable, last_part};
+use crate::memory;
+use crate::number_format::significant;
+use crate::text_io::{listed, quote};
+
+/// Names of the column of times that is made from a sampling rate or interval; the second where a channel has the first.
+const TIME: [&str; 2] = ["time", "sampling time"];
+/// Numbers stored for each sample beside the columns, as for text.
+const BESIDE: usize = 14;
+
+/// The channels of a file.
+#[derive(Debug, PartialEq)]
+struct ChannelFile {
+    format: Format,
+    /// Names of all usable channels, in the order of the file, and the index of the set of each.
+    names: Vec<(String, usize)>,
+    /// Number of samples and sampling of each set.
+    sets: Vec<(usize, Option<Sampling>)>,
+    unusable: Vec<Unusable>,
+}
+
+/// Source of a table of channels.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ChannelOrigin {
+    file: Arc<ChannelFile>,
+    set: usize,
+    /// Number of each column in the file, from 1; 0 for times made from a sampling rate or interval.
+    numbers: Vec<usize>,
+    /// Factor and unit of the samples, where they were calibrated.
+    calibrations: Vec<Option<String>>,
+}
+
+impl ChannelOrigin {
+    pub fn format(&self) -> Format {
+        self.file.format
+    }
+}
+
+impl Table {
+    /// Tables of a binary file.
+    pub(super) fn from_binary(
+        path: &Path,
+        bytes: &[u8],
+        binary: Format,
+        format: &TableFormat,
+    ) -> Result<Vec<Self>, InputError> {
+        if let Some(given) = format.first_given() {
+            return Err(InputError::argument(
+                given,
+                "a format of text is stated for a binary file",
+            )
+            .found(format!("{}, a {binary}", path.display()))
+            .expected("a text table, or no `format`"));
+        }
+        let Channels { channels, unusable } = formats::read(path, bytes, binary)?;
+        let mut keys = BTreeMap::new();
+        let mut file = ChannelFile {
+            format: binary,
+            names: Vec::new(),
+            sets: Vec::new(),
+            unusable,
+        };
+        let mut members: Vec<Vec<(usize, Channel)>> = Vec::new();
+        for (i, channel) in channels.into_iter().enumerate() {
+            let length = channel.values.len();
+            let key = (length, channel.sampling.map(Sampling::key));
+            let set = *keys.entry(key).or_insert(members.len());
+            if set == members.len() {
+                members.push(Vec::new());
+                file.sets.push((length, channel.sampling));
+            }
+            file.names.push((channel.name.clone(), set));
+            if let Some(members) = members.get_mut(set) {
+                members.push((i + 1, channel));
+            }
+        }
+        let file = Arc::new(file);
+        let tables = members.into_iter().enumerate();
+        tables
+            .map(|(set, members)| Self::of_set(path, &file, set, members))
+            .collect()
+    }
+
+    fn of_set(
+        path: &Path,
+        file: &Arc<ChannelFile>,
+        set: usize,
+        members: Vec<(usize, Channel)>,
+    ) -> Result<Self, InputError> {
+        let (rows, sampling) = file.sets.get(set).copied().unwrap_or_default();
+        let numbers = rows.saturating_mul(members.len() + BESIDE);
+        memory::check_file(path, numbers.saturating_mul(size_of::<f64>()) as u64)?;
+        let mut table = Self {
+            path: path.to_path_buf(),
+            origin: Origin::Channels(ChannelOrigin {
+                file: Arc::clone(file),
+                set,
+                numbers: members.iter().map(|(number, _)| *number).collect(),
+                calibrations: Vec::new(),
+            }),
+            headers: Vec::new(),
+            units: Vec::new(),
+            columns: Vec::new(),
+            lines: (1..=rows).collect(),
+        };
+        for (_, channel) in members {
+            table.push_channel(channel);
+        }
+        if let Some(sampling) = sampling {
+            let is_taken = |name: &&&str| table.headers.iter().any(|header| header == **name);
+            let name = TIME.iter().find(|name| !is_taken(name)).unwrap_or(&TIME[1]);
+            table.push_channel(Channel {
+                name: (*name).to_owned(),
+                unit: Some("s".to_owned()),
+                sampling: None,
+                values: (0..rows).map(|i| sampling.time(i)).collect(),
+            });
+            if let Origin::Channels(origin) = &mut table.origin {
+                origin.numbers.push(0);
+            }
+        }
+        Ok(table)
+    }
+
+    fn push_channel(&mut self, channel: Channel) {
+        let place = |row: usize| Location::Sample {
+            file: self.path.clone(),
+            sample: row + 1,
+            channel: Some(channel.name.clone()),
+        };
+        let samples = channel.values;
+        let unnumbered = samples.iter().position(|x| !x.is_finite());
+        let unreadable = samples.iter().position(|x| x.is_infinite());
+        let text = |row: usize| {
+            samples
+                .get(row)
+                .map(ToString::to_string)
+                .unwrap_or_default()
+        };
+        self.columns.push(ColumnValues {
+            unnumbered: unnumbered.map(|row| field::not_a_number(place(row), &text(row), '.')),
+            unreadable: unreadable.map(|row| {
+                InputError::new(place(row), "not a finite number")
+                    .found(quote(&text(row)))
+                    .expected("a finite number, or NaN for a missing sample")
+            }),
+            samples,
+        });
+        self.headers.push(channel.name);
+        self.units.push(channel.unit.unwrap_or_default());
+    }
+
+    /// The table of a file that has the columns.
+    ///
+    /// A binary file can have several sets of channels with different times; the one with the most of these columns is taken, so
+    /// that [`find`](Self::find) reports those that it lacks.
+    ///
+    /// # Errors
+    /// As [`read_all`](Self::read_all).
+    pub fn read_with_columns(
+        path: impl AsRef<Path>,
+        format: &TableFormat,
+        columns: &[ColumnName],
+    ) -> Result<Self, InputError> {
+        let mut best: Option<(usize, Self)> = None;
+        for table in Self::read_all(path.as_ref(), format)? {
+            let count = columns.iter().filter(|c| table.find(c).is_ok()).count();
+            if best.as_ref().is_none_or(|(most, _)| count > *most) {
+                best = Some((count, table));
+            }
+        }
+        best.map(|(_, table)| table)
+            .ok_or_else(|| Self::several(&[]))
+    }
+
+    /// The only table of a file, apart from single numbers beside it.
+    pub(super) fn only(tables: Vec<Self>) -> Result<Self, InputError> {
+        let has_samples = tables.iter().any(|table| table.rows() > 1);
+        let mut found = tables;
+        found.retain(|table| !has_samples || table.rows() > 1);
+        match (found.pop(), found.first()) {
+            (Some(only), None) => Ok(only),
+            (Some(last), Some(_)) => {
+                found.push(last);
+                Err(Self::several(&found))
+            }
+            (None, _) => Err(Self::several(&[])),
+        }
+    }
+
+    /// The error for a file with several sets of channels, none of which is named.
+    pub fn several(tables: &[Self]) -> InputError {
+        let sets = tables.iter().map(|table| {
+            let names = (0..table.width()).filter(|i| Some(*i) != table.time_column());
+            let names: Vec<String> = names.map(|i| quote(&table.label(i))).collect();
+            format!(
+                "{} ({})",
+                listed(names.iter().map(String::as_str)),
+                table.set_in_words()
+            )
+        });
+        let found = sets.collect::<Vec<_>>().join("; ");
+        let path = tables.first().map(Self::path).unwrap_or(Path::new(""));
+        InputError::file(
+            path,
+            "the file has several sets of channels with different times",
+        )
+        .found(found)
+        .expected("columns of one of them, named in a model file")
+        .hint("`kmcfit check FILE` lists them; `columns: {time: …, displacement: …}` names them")
+    }
+
+    /// Number of samples and sampling rate, in words.
+    pub fn set_in_words(&self) -> String {
+        let rate = match self.sampling() {
+            Some(sampling) => {
+                let rate = 1.0 / (sampling.time(1) - sampling.time(0));
+                format!(" at {} Hz", significant(rate, 6))
+            }
+            None => String::new(),
+        };
+        match self.rows() {
+            1 => "1 sample".to_owned(),
+            rows => format!("{rows} samples{rate}"),
+        }
+    }
+
+    fn channel_origin(&self) -> Option<&ChannelOrigin> {
+        match &self.origin {
+            Origin::Text(_) => None,
+            Origin::Channels(origin) => Some(origin),
+        }
+    }
+
+    fn sampling(&self) -> Option<Sampling> {
+        let origin = self.channel_origin()?;
+        origin.file.sets.get(origin.set)?.1
+    }
+
+    /// Index of the column of times that was made from the sampling rate or interval of the file.
+    pub fn time_column(&self) -> Option<usize> {
+        self.sampling()?;
+        self.width().checked_sub(1)
+    }
+
+    /// Names of the channels of the file with other times.
+    pub fn channels_of_other_times(&self) -> impl Iterator<Item = &str> + Clone {
+        self.channel_origin().into_iter().flat_map(|origin| {
+            let others = origin.file.names.iter();
+            let others = others.filter(|(_, set)| *set != origin.set);
+            others.map(|(name, _)| name.as_str())
+        })
+    }
+
+    /// Variables of the file that hold no samples in time.
+    pub fn unusable(&self) -> &[Unusable] {
+        self.channel_origin()
+            .map_or(&[], |origin| &origin.file.unusable)
+    }
+
+    /// Name by which the quantity of a column is recognised: the last part of the path in a binary file.
+    pub fn quantity_name(&self, index: usize) -> &str {
+        let header = self.headers().get(index).map_or("", String::as_str);
+        match self.channel_origin() {
+            Some(_) => last_part(header),
+            None => header,
+        }
+    }
+
+    /// Number of a column in the file, from 1; `None` for times made from a sampling rate or interval.
+    pub fn number(&self, index: usize) -> Option<usize> {
+        match self.channel_origin() {
+            Some(origin) => origin.numbers.get(index).copied().filter(|n| *n > 0),
+            None => Some(index + 1),
+        }
+    }
+
+    /// Index of the column with this number in the file, from 1.
+    pub(super) fn index_of(&self, number: usize) -> Option<usize> {
+        let index = number.checked_sub(1)?;
+        match self.channel_origin() {
+            Some(origin) => origin.numbers.iter().position(|own| *own == number),
+            None => Some(index),
+        }
+    }
+
+    /// Number of columns that have a number in the file.
+    pub(super) fn numbered(&self) -> usize {
+        self.channel_origin()
+            .map_or(self.width(), |origin| origin.file.names.len())
+    }
+
+    /// Names of all columns; of a binary file those of all sets of channels.
+    pub(super) fn all_names(&self) -> impl Iterator<Item = &str> + Clone {
+        let own = self.headers().iter().map(String::as_str);
+        own.chain(self.channels_of_other_times())
+    }
+
+    /// The name of the channel whose path ends with `name`, as a remedy.
+    pub(super) fn by_last_part(&self, name: &str) -> Option<String> {
+        self.channel_origin()?;
+        let mut found = self.all_names().filter(|path| last_part(path) == name);
+        let first = found.next()?;
+        Some(format!("did you mean `{first}`?"))
+    }
+
+    /// The error for a channel of another set.
+    pub(super) fn of_other_times(&self, column: &ColumnName) -> Option<InputError> {
+        let origin = self.channel_origin()?;
+        let names = &origin.file.names;
+        let (name, set) = match column {
+            ColumnName::Name(wanted) => names.iter().find(|(name, _)| name == wanted),
+            ColumnName::Number(number) => names.get(number.checked_sub(1)?),
+        }?;
+        let (length, sampling) = origin.file.sets.get(*set)?;
+        let rate = match sampling {
+            Some(_) => ", at times of its own",
+            None => "",
+        };
+        let own = self.headers().first().map_or("", String::as_str);
+        Some(
+            InputError::file(self.path(), "the columns have different times")
+                .found(format!("{}: {length} samples{rate}", quote(name)))
+                .expected(format!("{}, as {}", self.set_in_words(), quote(own)))
+                .hint("name columns of the same length and rate; another channel can have its own `data` and `time`"),
+        )
+    }
+
+    /// The error for a variable that holds no samples.
+    pub(super) fn unusable_error(&self, name: &str) -> Option<InputError> {
+        let found = self.unusable().iter().find(|other| other.name == name)?;
+        Some(
+            InputError::file(
+                self.path(),
+                format!("{} holds no samples in time", quote(name)),
+            )
+            .found(&found.content)
+            .expected("real numbers")
+            .hint_if(found.hint.clone()),
+        )
+    }
+
+    /// Multiplies the samples of a column by the value of its full scale, `factor`, in this unit.
+    pub fn calibrate(&mut self, index: usize, factor: f64, unit: &str) {
+        let width = self.width();
+        if let (Some(column), Some(stated)) =
+            (self.columns.get_mut(index), self.units.get_mut(index))
+        {
+            column.samples.iter_mut().for_each(|x| *x *= factor);
+            unit.clone_into(stated);
+        }
+        if let Origin::Channels(origin) = &mut self.origin {
+            origin.calibrations.resize(width, None);
+            if let Some(place) = origin.calibrations.get_mut(index) {
+                let text = format!("{factor} {unit}");
+                *place = Some(text.strip_prefix("1 ").unwrap_or(&text).to_owned());
+            }
+        }
+    }
+
+    /// Factor and unit of a calibrated column, as the key `units` states them.
+    pub fn calibration(&self, index: usize) -> Option<&str> {
+        let calibrations = &self.channel_origin()?.calibrations;
+        calibrations.get(index)?.as_deref()
+    }
+}
