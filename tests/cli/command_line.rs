@@ -142,7 +142,7 @@ fn invalid_arguments_have_found_expected_and_hint() {
     $ kmcfit fti model.yaml
     error: kmcfit: unknown command
       found: `fti`
-      expected: one of: fit, simulate, check, predict, compare, study, resume, init, explain, schema, demo, completions, man
+      expected: one of: fit, simulate, check, predict, compare, verify, study, resume, init, explain, schema, demo, completions, man
       hint: did you mean `fit`?
 
     $ kmcfit --jsn
@@ -212,7 +212,7 @@ fn invalid_arguments_have_found_expected_and_hint() {
 
     $ kmcfit init .
     error: .: this is a folder
-      expected: a record (CSV or another text table)
+      expected: a record: a text table, or a file of NumPy, MATLAB, TDMS, WAV or UFF
 
     $ kmcfit explain functions.penalty
     error: explain: unknown key
