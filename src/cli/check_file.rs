@@ -43,8 +43,12 @@ fn format_of(tables: &[Table]) -> String {
 fn row(table: &Table, index: usize) -> [String; 6] {
     // A single number is no record.
     let known = recognised(table, index).filter(|_| table.rows() > 1);
-    let stated = table.unit(index).map(str::to_owned);
-    let unit = known.map(|(_, unit)| unit.symbol().to_owned());
+    let unit = match (known, table.unit(index)) {
+        (Some((_, unit, true)), _) => unit.symbol().to_owned(),
+        (_, Some(stated)) => stated.to_owned(),
+        (Some((_, unit, false)), None) => format!("{} (assumed)", unit.symbol()),
+        (None, None) => "-".to_owned(),
+    };
     let samples = match table.samples(index) {
         Ok(samples) => {
             let missing = samples.iter().filter(|x| x.is_nan()).count();
@@ -55,18 +59,16 @@ fn row(table: &Table, index: usize) -> [String; 6] {
         }
         Err(_) => "not numbers".to_owned(),
     };
-    let rate = rate(table).map(|(_, rate)| format!("{} Hz", significant(rate, 6)));
+    let rate = rate(table)
+        .filter(|_| table.rows() > 1)
+        .map(|(_, rate)| format!("{} Hz", significant(rate, 6)));
     [
         table
             .number(index)
             .map_or("-".to_owned(), |n| n.to_string()),
         table.label(index),
-        known.map_or("-".to_owned(), |(role, _)| role.key().replace('_', " ")),
-        match (&stated, known) {
-            (None, None) => "-".to_owned(),
-            (Some(stated), _) => stated.clone(),
-            (None, Some(_)) => unit.map_or_else(String::new, |unit| format!("{unit} (assumed)")),
-        },
+        known.map_or("-".to_owned(), |(role, ..)| role.key().replace('_', " ")),
+        unit,
         samples,
         rate.unwrap_or_else(|| "-".to_owned()),
     ]

@@ -70,7 +70,7 @@ fn matrix(
             return Err(error.found(format!("the type {code}")));
         }
     };
-    let size = u64::from(rows) * u64::from(columns) * kind.size() as u64;
+    let size = (u64::from(rows) * u64::from(columns)).saturating_mul(kind.size() as u64);
     let data = file.take(size, &what)?;
     if imaginary != 0 {
         file.take(size, &what)?;

@@ -85,10 +85,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Cha
         let mut words = first.split_whitespace();
         match words.next() {
             Some("58") => function(&mut lines, units, &mut channels, budget)?,
-            Some("58b") => {
-                let words: Vec<u64> = words.filter_map(|word| word.parse().ok()).collect();
-                binary_function(&mut lines, &words, units, &mut channels, budget)?;
-            }
+            Some("58b") => binary_function(&mut lines, &first, units, &mut channels, budget)?,
             Some("164") => units = unit_factors(&mut lines),
             _ => {}
         }
@@ -181,17 +178,20 @@ fn split(line: &str, widths: [usize; 2]) -> Option<Vec<f64>> {
     Some(found)
 }
 
-/// A function with binary numbers; `words` are byte order, format of numbers, lines of the header and bytes.
+/// A function with binary numbers; its first line has byte order, format of numbers, lines of the header and bytes.
 fn binary_function(
     lines: &mut Lines,
-    words: &[u64],
+    first: &str,
     units: Option<UnitFactors>,
     channels: &mut Channels,
     budget: &mut Budget,
 ) -> Result<(), InputError> {
-    let &[order, format, _, stated, ..] = words else {
+    let words = first.split_whitespace().skip(1).take(4);
+    let words: Option<Vec<u64>> = words.map(|word| word.parse().ok()).collect();
+    let Some(&[order, format, _, stated]) = words.as_deref() else {
         return Err(lines
             .error("invalid first line of data set 58b")
+            .found(quote(first.trim()))
             .expected("byte order, format of numbers, lines of the header and bytes of the data"));
     };
     if format != u64::from(IEEE) {

@@ -35,9 +35,8 @@ pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Cha
         let size = file.u32("a chunk")?;
         match id {
             b"fmt " => {
-                encoding = Some(encoding_of(
-                    &mut file.part(u64::from(size), "the chunk `fmt `")?,
-                )?)
+                let mut chunk = file.part(u64::from(size), "the chunk `fmt `")?;
+                encoding = Some(encoding_of(&mut chunk)?);
             }
             b"ds64" => {
                 let mut chunk = file.part(u64::from(size), "the chunk `ds64`")?;

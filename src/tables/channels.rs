@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::table::{ColumnValues, Origin};
+use super::origin::{ChannelFile, ChannelOrigin, ColumnValues, Origin};
 use super::{ColumnName, Table, TableFormat, field};
 use crate::error::{InputError, Location};
 use crate::formats::{self, Channel, Channels, Format, Sampling, Unusable, last_part};
@@ -17,39 +17,11 @@ const TIME: [&str; 2] = ["time", "sampling time"];
 /// Numbers stored for each sample beside the columns, as for text.
 const BESIDE: usize = 14;
 
-/// The channels of a file.
-#[derive(Debug, PartialEq)]
-struct ChannelFile {
-    format: Format,
-    /// Names of all usable channels, in the order of the file, and the index of the set of each.
-    names: Vec<(String, usize)>,
-    /// Number of samples and sampling of each set.
-    sets: Vec<(usize, Option<Sampling>)>,
-    unusable: Vec<Unusable>,
-}
-
-/// Source of a table of channels.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct ChannelOrigin {
-    file: Arc<ChannelFile>,
-    set: usize,
-    /// Number of each column in the file, from 1; 0 for times made from a sampling rate or interval.
-    numbers: Vec<usize>,
-    /// Factor and unit of the samples, where they were calibrated.
-    calibrations: Vec<Option<String>>,
-}
-
-impl ChannelOrigin {
-    pub fn format(&self) -> Format {
-        self.file.format
-    }
-}
-
 impl Table {
     /// Tables of a binary file.
     pub(super) fn from_binary(
         path: &Path,
-        bytes: &[u8],
+        bytes: Vec<u8>,
         binary: Format,
         format: &TableFormat,
     ) -> Result<Vec<Self>, InputError> {
@@ -61,7 +33,9 @@ impl Table {
             .found(format!("{}, a {binary}", path.display()))
             .expected("a text table, or no `format`"));
         }
-        let Channels { channels, unusable } = formats::read(path, bytes, binary)?;
+        let Channels { channels, unusable } = formats::read(path, &bytes, binary)?;
+        // The numbers take as much again.
+        drop(bytes);
         let mut keys = BTreeMap::new();
         let mut file = ChannelFile {
             format: binary,
@@ -209,7 +183,7 @@ impl Table {
             )
         });
         let found = sets.collect::<Vec<_>>().join("; ");
-        let path = tables.first().map(Self::path).unwrap_or(Path::new(""));
+        let path = tables.first().map_or(Path::new(""), Self::path);
         InputError::file(
             path,
             "the file has several sets of channels with different times",
@@ -326,10 +300,11 @@ impl Table {
             Some(_) => ", at times of its own",
             None => "",
         };
+        let samples = if *length == 1 { "sample" } else { "samples" };
         let own = self.headers().first().map_or("", String::as_str);
         Some(
             InputError::file(self.path(), "the columns have different times")
-                .found(format!("{}: {length} samples{rate}", quote(name)))
+                .found(format!("{}: {length} {samples}{rate}", quote(name)))
                 .expected(format!("{}, as {}", self.set_in_words(), quote(own)))
                 .hint("name columns of the same length and rate; another channel can have its own `data` and `time`"),
         )

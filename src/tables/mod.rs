@@ -7,6 +7,7 @@ mod detect;
 mod encoding;
 mod field;
 mod format;
+mod origin;
 mod resample;
 mod rows;
 mod stated;

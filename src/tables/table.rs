@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
 
-use super::channels::ChannelOrigin;
 use super::detect::{Layout, detect};
 use super::encoding::decode;
 use super::field::{self, Field};
 use super::format::{Detected, TableFormat};
+use super::origin::{ColumnValues, Origin};
 use super::rows::{CsvText, with_newlines};
 use super::table_memory::TableMemory;
 use crate::error::{InputError, Location};
@@ -38,25 +38,6 @@ pub struct Table {
     pub(super) units: Vec<String>,
     pub(super) columns: Vec<ColumnValues>,
     pub(super) lines: Vec<usize>,
-}
-
-/// Source of a table.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Origin {
-    /// A text file of this format.
-    Text(Detected),
-    /// Channels of a binary file.
-    Channels(ChannelOrigin),
-}
-
-/// Samples of a column, NaN if missing, up to the first invalid field.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct ColumnValues {
-    pub samples: Vec<f64>,
-    /// The first field that is not a finite number.
-    pub unnumbered: Option<InputError>,
-    /// The first field that is neither a finite number nor missing.
-    pub unreadable: Option<InputError>,
 }
 
 impl Table {
@@ -252,7 +233,7 @@ impl Table {
     ) -> Result<Vec<Self>, InputError> {
         format.check()?;
         match formats::recognise(path, &bytes)? {
-            Some(binary) => Self::from_binary(path, &bytes, binary, format),
+            Some(binary) => Self::from_binary(path, bytes, binary, format),
             None => Ok(vec![Self::from_text(path, bytes, format)?]),
         }
     }

@@ -115,13 +115,73 @@ fn lists_of_channels() {
         assert_eq!(bench.contents(), before, "something was written");
         text
     };
-    assert_snapshot!(list("v5.mat"), @"");
-    assert_snapshot!(list("v7.mat"), @"");
-    assert_snapshot!(list("record.npz"), @"");
-    assert_snapshot!(list("record.tdms"), @"");
-    assert_snapshot!(list("record.uff"), @"");
-    assert_snapshot!(list("record.wav"), @"");
-    assert_snapshot!(list("record.csv"), @"");
+    assert_snapshot!(list("v5.mat"), @"
+    v5.mat: MATLAB file (version 5 to 7)
+      column  name               quantity      unit         samples  rate
+      1       test.time          time          s (assumed)  193      64 Hz
+      2       test.displacement  displacement  m (assumed)  193      64 Hz
+      3       test.force         force         N (assumed)  193      64 Hz
+      4       fs                 -             -            1        -
+    not usable: `test.operator`, text
+    `kmcfit init v5.mat` writes a model file
+    ");
+    assert_snapshot!(list("v7.mat"), @"
+    v7.mat: MATLAB file (version 5 to 7)
+      column  name                       quantity      unit         samples  rate
+      1       bench.runs.2.time          time          s (assumed)  193      64 Hz
+      2       bench.runs.2.displacement  displacement  m (assumed)  193      64 Hz
+      3       bench.runs.2.force         force         N (assumed)  193      64 Hz
+    not usable: `bench.runs.1`, text
+    not usable: `bench.runs.2.operator`, text
+    not usable: `bench.spectrum`, complex numbers
+      save the real samples in time, for instance `real(x)`
+    `kmcfit init v7.mat` writes a model file
+    ");
+    assert_snapshot!(list("record.npz"), @"
+    record.npz: NumPy archive
+      column  name          quantity      unit         samples  rate
+      1       time          time          s (assumed)  193      64 Hz
+      2       displacement  displacement  m (assumed)  193      64 Hz
+      3       force         force         N (assumed)  193      64 Hz
+      4       rate          -             -            1        -
+    not usable: `note`, texts
+    `kmcfit init record.npz` writes a model file
+    ");
+    assert_snapshot!(list("record.tdms"), @"
+    record.tdms: TDMS file
+      column  name                 quantity      unit  samples  rate
+      1       Test 1.displacement  displacement  m     193      64 Hz
+      2       Test 1.force         force         N     193      64 Hz
+      -       time                 time          s     193      64 Hz
+    not usable: `Notes.remarks`, texts
+    `kmcfit init record.tdms` writes a model file
+    ");
+    assert_snapshot!(list("record.uff"), @"
+    record.uff: universal file
+      column  name               quantity      unit  samples  rate
+      1       displacement_12+Z  displacement  m     193      64 Hz
+      2       force_7+Z          force         N     193      64 Hz
+      -       time               time          s     193      64 Hz
+    not usable: `frequency_response_function_12+Z`, a frequency response function of complex numbers
+      kmcfit reads records in time: export the time histories
+    `kmcfit init record.uff` writes a model file
+    ");
+    assert_snapshot!(list("record.wav"), @"
+    record.wav: WAV file
+      column  name       quantity  unit  samples  rate
+      1       channel 1  -         -     193      64 Hz
+      2       channel 2  -         -     193      64 Hz
+      -       time       time      s     193      64 Hz
+    `kmcfit init record.wav` writes a model file
+    ");
+    assert_snapshot!(list("record.csv"), @"
+    record.csv: UTF-8; separated by commas; decimal point; column names in line 1
+      column  name          quantity      unit         samples  rate
+      1       time          time          s (assumed)  193      64 Hz
+      2       displacement  displacement  m (assumed)  193      64 Hz
+      3       force         force         N (assumed)  193      64 Hz
+    `kmcfit init record.csv` writes a model file
+    ");
 }
 
 /// Model files from binary files: quantities by the last part of a path.
@@ -142,12 +202,24 @@ fn model_files() {
         let keys = keys.map(|line| line.split("  #").next().unwrap_or_default().trim());
         keys.collect::<Vec<_>>().join("\n")
     };
-    assert_snapshot!(init(&["v5.mat"]), @"");
-    assert_snapshot!(init(&["v7.mat"]), @"");
-    assert_snapshot!(init(&["record.npy"]), @"");
-    assert_snapshot!(init(&["record.tdms"]), @"");
-    assert_snapshot!(init(&["binary.uff"]), @"");
-    assert_snapshot!(init(&["record.wav", "--units", "32000 mm,32 N"]), @"");
+    assert_snapshot!(init(&["v5.mat"]), @"
+    columns: {time: test.time, displacement: test.displacement, force: test.force}
+    units: {time: s, displacement: m, force: N}
+    ");
+    assert_snapshot!(init(&["v7.mat"]), @"
+    columns: {time: bench.runs.2.time, displacement: bench.runs.2.displacement, force: bench.runs.2.force}
+    units: {time: s, displacement: m, force: N}
+    ");
+    assert_snapshot!(init(&["record.npy"]), @"
+    columns: {time: record.time, displacement: record.displacement, force: record.force}
+    units: {time: s, displacement: m, force: N}
+    ");
+    assert_snapshot!(init(&["record.tdms"]), @"columns: {time: time, displacement: Test 1.displacement, force: Test 1.force}");
+    assert_snapshot!(init(&["binary.uff"]), @r#"columns: {time: time, displacement: "displacement_12+Z", force: "force_7+Z"}"#);
+    assert_snapshot!(init(&["record.wav", "--units", "32000 mm,32 N"]), @r#"
+    columns: {time: time, displacement: channel 1, force: channel 2}
+    units: {displacement: "32000 mm", force: "32 N"}
+    "#);
 }
 
 /// A file of these bytes.
@@ -168,19 +240,55 @@ fn refused(bench: &Workbench, arguments: &[&str]) -> String {
 #[test]
 fn refused_files() {
     let bench = bench();
-    assert_snapshot!(refused(&bench, &["check", "v73.mat"]), @"");
-    assert_snapshot!(refused(&bench, &["init", "objects.npy"]), @"");
-    assert_snapshot!(refused(&bench, &["check", "frf.unv"]), @"");
+    assert_snapshot!(refused(&bench, &["check", "v73.mat"]), @"
+    error: v73.mat: this is a MATLAB file (version 7.3), which is not read
+      expected: a text table, or a file of NumPy, MATLAB (version 4 to 7), LabVIEW (TDMS), WAV or UFF
+      hint: in MATLAB: `load('v73.mat'); save('v73.mat', '-v7')`
+    ");
+    assert_snapshot!(refused(&bench, &["init", "objects.npy"]), @"
+    error: objects.npy: the NumPy array has no samples that can be used
+      found: `objects`: Python objects
+      expected: arrays or channels of real numbers
+      hint: Python objects are stored as pickles, which can run code: save the numbers with `numpy.savez(file, force=force.astype(float))`
+    ");
+    assert_snapshot!(refused(&bench, &["check", "frf.unv"]), @"
+    error: frf.unv: the universal file has no samples that can be used
+      found: `frequency_response_function_12+Z`: a frequency response function of complex numbers
+      expected: arrays or channels of real numbers
+      hint: kmcfit reads records in time: export the time histories
+    ");
     with_bytes(&bench, "a.parquet", b"PAR1....PAR1");
-    assert_snapshot!(refused(&bench, &["check", "a.parquet"]), @"");
+    assert_snapshot!(refused(&bench, &["check", "a.parquet"]), @"
+    error: a.parquet: this is a Parquet file, which is not read
+      expected: a text table, or a file of NumPy, MATLAB (version 4 to 7), LabVIEW (TDMS), WAV or UFF
+      hint: in Python: `pandas.read_parquet(file).to_csv('record.csv', index=False)`
+    ");
     with_bytes(&bench, "a.csv", b"\x1f\x8b\x08\0");
-    assert_snapshot!(refused(&bench, &["check", "a.csv"]), @"");
+    assert_snapshot!(refused(&bench, &["check", "a.csv"]), @"
+    error: a.csv: this is a file compressed by gzip, which is not read
+      expected: a text table, or a file of NumPy, MATLAB (version 4 to 7), LabVIEW (TDMS), WAV or UFF
+      hint: decompress it: `gunzip FILE`
+    ");
     with_bytes(&bench, "a.npy", b"t,y\n0,1\n");
-    assert_snapshot!(refused(&bench, &["check", "a.npy"]), @"");
+    assert_snapshot!(refused(&bench, &["check", "a.npy"]), @"
+    error: a.npy: the file is no NumPy array, although its name ends with .npy
+      found: text
+      expected: the first bytes of a NumPy array
+      hint: if it is a text table, rename it to .txt
+    ");
     fs::copy(bench.path("record.wav"), bench.path("a.mat")).expect("room");
-    assert_snapshot!(refused(&bench, &["check", "a.mat"]), @"");
+    assert_snapshot!(refused(&bench, &["check", "a.mat"]), @"
+    error: a.mat: the file is no MATLAB file (version 5 to 7), although its name ends with .mat
+      found: a WAV file
+      expected: the first bytes of a MATLAB file (version 5 to 7)
+      hint: rename the file to its format
+    ");
     fs::copy(bench.path("book.xlsx"), bench.path("book.npz")).expect("room");
-    assert_snapshot!(refused(&bench, &["check", "book.npz"]), @"");
+    assert_snapshot!(refused(&bench, &["check", "book.npz"]), @"
+    error: book.npz: this is a workbook of a spreadsheet, which is not read
+      expected: a text table, or a file of NumPy, MATLAB (version 4 to 7), LabVIEW (TDMS), WAV or UFF
+      hint: save the sheet as CSV
+    ");
 }
 
 /// The message about a changed file of `tests/formats/`.
@@ -204,15 +312,64 @@ fn replace<'a>(from: &'a [u8], to: &'a [u8]) -> impl Fn(&mut Vec<u8>) + 'a {
 #[test]
 fn truncated_files() {
     let cut = |file: &str| changed(file, file, |bytes| bytes.truncate(bytes.len() * 2 / 3));
-    assert_snapshot!(cut("record.npy"), @"");
-    assert_snapshot!(cut("record.npz"), @"");
-    assert_snapshot!(cut("v4.mat"), @"");
-    assert_snapshot!(cut("v5.mat"), @"");
-    assert_snapshot!(cut("v7.mat"), @"");
-    assert_snapshot!(cut("record.tdms"), @"");
-    assert_snapshot!(cut("record.wav"), @"");
-    assert_snapshot!(cut("record.uff"), @"");
-    assert_snapshot!(cut("binary.uff"), @"");
+    assert_snapshot!(cut("record.npy"), @"
+    error: record.npy: the file is truncated in the array `record`
+      found: 3024 bytes from byte 192 on
+      expected: 4632 bytes
+      hint: copy or export the file again
+    ");
+    assert_snapshot!(cut("record.npz"), @"
+    error: record.npz: the file is truncated in the list of the archive's files
+      found: no end record of a zip archive
+      expected: a list of its files at the end of the archive
+      hint: copy or export the file again
+    ");
+    assert_snapshot!(cut("v4.mat"), @"
+    error: v4.mat: the file is truncated in the variable `record`
+      found: 3079 bytes from byte 27 on
+      expected: 4632 bytes
+      hint: copy or export the file again
+    ");
+    assert_snapshot!(cut("v5.mat"), @"
+    error: v5.mat: the file is truncated in a variable
+      found: 3314 bytes from byte 136 on
+      expected: 4976 bytes
+      hint: copy or export the file again
+    ");
+    assert_snapshot!(cut("v7.mat"), @"
+    error: v7.mat: the file is truncated in a variable
+      found: 997 bytes from byte 136 on
+      expected: 1564 bytes
+      hint: copy or export the file again
+    ");
+    assert_snapshot!(cut("record.tdms"), @"
+    error: record.tdms: the file is truncated in a segment
+      found: 499 bytes from byte 1631 on
+      expected: 1565 bytes
+      hint: copy or export the file again
+    ");
+    assert_snapshot!(cut("record.wav"), @"
+    error: record.wav: the file is truncated in the samples
+      found: 500 bytes from byte 44 on
+      expected: 772 bytes
+      hint: copy or export the file again
+    ");
+    assert_snapshot!(cut("record.uff"), @"
+    error: record.uff:100:1: the file is truncated in data set 58
+        |
+    100 |   -1.53496093750e+01  -1.50898437500e+01  -1.46591796875e+01  -1.4058
+        | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+      found: the end of the file
+      expected: the lines of the data set, and a line `-1`
+    ");
+    assert_snapshot!(cut("binary.uff"), @"
+    error: binary.uff:31:1: the file is truncated in data set 58
+       |
+    31 |         13    0    0    0 NONE
+       | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+      found: the end of the file
+      expected: the lines of the data set, and a line `-1`
+    ");
 }
 
 /// Files with a changed byte, or that state lengths which they do not have.
@@ -220,9 +377,27 @@ fn truncated_files() {
 fn damaged_files_of_numpy() {
     let header = "'shape': (193,), }        ";
     let shape = |to: &'static str| replace(header.as_bytes(), to.as_bytes());
-    assert_snapshot!(changed("record.npy", "text.npy", shape("'shape': (1e3,), }        ")), @"");
-    assert_snapshot!(changed("record.npy", "long.npy", shape("'shape': (999999999999,), }")), @"");
-    assert_snapshot!(changed("record.npz", "crc.npz", |bytes| bytes[100] ^= 0x55), @"");
+    assert_snapshot!(changed("record.npy", "text.npy", shape("'shape': (1e3,), }        ")), @"
+    error: text.npy: invalid header of the array `text`
+      found: the header `{'descr': [('time', '<f8'), ('displaceme…`
+      expected: the header of a NumPy array, version 1 to 3, with `descr`, `fortran_order` and `shape`
+    ");
+    assert_snapshot!(changed("record.npy", "long.npy", shape("'shape': (999999999999,), }")), @"
+    error: long.npy: the file is truncated in the array `long`
+      found: 4633 bytes from byte 192 on
+      expected: 23999999999976 bytes
+      hint: copy or export the file again
+    ");
+    assert_snapshot!(changed("record.npz", "crc.npz", |bytes| bytes[100] ^= 0x55), @"
+    error: crc.npz: the file is damaged: the file `time.npy`
+      found: data that cannot be decompressed
+      hint: export or copy the file again
+    ");
+    assert_snapshot!(changed("stored.npz", "checksum.npz", |bytes| bytes[300] ^= 0x55), @"
+    error: checksum.npz: the file is damaged: the file `record.npy`
+      found: another checksum than the archive states
+      hint: export or copy the file again
+    ");
     // In the list of the archive: flags, method, and length of the first array.
     let in_list = |at: usize, value: u8| {
         move |bytes: &mut Vec<u8>| {
@@ -230,38 +405,75 @@ fn damaged_files_of_numpy() {
             bytes[list.expect("the list") + at] = value;
         }
     };
-    assert_snapshot!(changed("stored.npz", "encrypted.npz", in_list(8, 1)), @"");
-    assert_snapshot!(changed("stored.npz", "lzma.npz", in_list(10, 14)), @"");
-    assert_snapshot!(changed("record.npz", "short.npz", in_list(24, 7)), @"");
-    assert_snapshot!(changed("record.npz", "bomb.npz", in_list(27, 0x7f)), @"");
+    assert_snapshot!(changed("stored.npz", "encrypted.npz", in_list(8, 1)), @"
+    error: encrypted.npz: an encrypted file of the archive
+      found: `record.npy`
+      expected: files without a password, as `numpy.savez` writes them
+    ");
+    assert_snapshot!(changed("stored.npz", "lzma.npz", in_list(10, 14)), @"
+    error: lzma.npz: a compression method that is not supported
+      found: method 14 of `record.npy`
+      expected: stored or deflated files, as `numpy.savez` and `numpy.savez_compressed` write them
+    ");
+    assert_snapshot!(changed("record.npz", "short.npz", in_list(24, 7)), @"
+    error: short.npz: the file is damaged: the file `time.npy`
+      found: more than the 1543 bytes that the file states
+      hint: export or copy the file again
+    ");
+    assert_snapshot!(changed("record.npz", "bomb.npz", in_list(27, 0x7f)), @"
+    error: bomb.npz: the file expands to more than a file of its length may
+      found: the file `time.npy`, which expands to 2130708104 bytes
+      expected: at most 2115968 numbers: 8 for each of the 2352 bytes of the file and 2097152 besides
+    ");
 }
 
 #[test]
 fn damaged_files_of_matlab() {
-    assert_snapshot!(changed("v7.mat", "zlib.mat", |bytes| bytes[200] ^= 0x55), @"");
+    assert_snapshot!(changed("v7.mat", "zlib.mat", |bytes| bytes[200] ^= 0x55), @"
+    error: zlib.mat: the file is damaged: a variable
+      found: data that cannot be decompressed
+      hint: export or copy the file again
+    ");
     let dims = |bytes: &mut Vec<u8>| {
         bytes.truncate(128);
         let mut matrix = matrix(b"y", 30);
         matrix[32] = 31;
         bytes.extend(matrix);
     };
-    assert_snapshot!(changed("v5.mat", "dims.mat", dims), @"");
+    assert_snapshot!(changed("v5.mat", "dims.mat", dims), @"
+    error: dims.mat: the file is damaged: the variable `y`
+      found: 240 bytes for 31 x 1 numbers
+      expected: 248 bytes
+      hint: export or copy the file again
+    ");
     let long = |bytes: &mut Vec<u8>| {
         bytes.truncate(128);
         bytes.extend(matrix(&[b'a'; 2000], 30));
     };
-    assert_snapshot!(changed("v5.mat", "name.mat", long), @"");
+    assert_snapshot!(changed("v5.mat", "name.mat", long), @"
+    error: name.mat: the name of a variable is too long
+      found: 2000 bytes: `aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa…`
+      expected: at most 1000 bytes
+    ");
     let many = |bytes: &mut Vec<u8>| {
         bytes.truncate(128);
         (0..=10_000).for_each(|_| bytes.extend(matrix(b"a", 1)));
     };
-    assert_snapshot!(changed("v5.mat", "many.mat", many), @"");
+    assert_snapshot!(changed("v5.mat", "many.mat", many), @"
+    error: many.mat: the file has too many variables
+      found: more than 10000
+      expected: at most 10000
+    ");
     let deep = |bytes: &mut Vec<u8>| {
         bytes.truncate(128);
         let nested = (0..40).fold(matrix(b"", 1), |inner, _| array(1, b"c", 1, &inner));
         bytes.extend(nested);
     };
-    assert_snapshot!(changed("v5.mat", "deep.mat", deep), @"");
+    assert_snapshot!(changed("v5.mat", "deep.mat", deep), @"
+    error: deep.mat: structs and cells are nested too deeply
+      found: `c.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.…`
+      expected: at most 32 levels
+    ");
     // 40 MB of zeros in 40 kB.
     let bomb = |bytes: &mut Vec<u8>| {
         bytes.truncate(128);
@@ -269,7 +481,11 @@ fn damaged_files_of_matlab() {
         bytes.extend([15u32.to_le_bytes(), (zeros.len() as u32).to_le_bytes()].concat());
         bytes.extend(zeros);
     };
-    assert_snapshot!(changed("v5.mat", "bomb.mat", bomb), @"");
+    assert_snapshot!(changed("v5.mat", "bomb.mat", bomb), @"
+    error: bomb.mat: the file expands to more than a file of its length may
+      found: a variable, which expands to more than 19273536 bytes
+      expected: at most 2409192 numbers: 8 for each of the 39005 bytes of the file and 2097152 besides
+    ");
 }
 
 /// An object of MATLAB: its class gives the lines that export it.
@@ -288,39 +504,137 @@ fn objects_of_matlab() {
             bytes.extend(element(14, &parts.concat()));
         }
     };
-    assert_snapshot!(changed("v5.mat", "run.mat", object("timetable")), @"");
-    assert_snapshot!(changed("v5.mat", "run.mat", object("table")), @"");
-    assert_snapshot!(changed("v5.mat", "run.mat", object("timeseries")), @"");
-    assert_snapshot!(changed("v5.mat", "run.mat", object("datetime")), @"");
-    assert_snapshot!(changed("v5.mat", "run.mat", object("duration")), @"");
-    assert_snapshot!(changed("v5.mat", "run.mat", object("idpoly")), @"");
+    assert_snapshot!(changed("v5.mat", "run.mat", object("timetable")), @"
+    error: run.mat: the MATLAB file (version 5 to 7) has no samples that can be used
+      found: `TT`: an object of the class `timetable`
+      expected: arrays or channels of real numbers
+      hint: in MATLAB: `S = table2struct(timetable2table(TT), 'ToScalar', true); S.Time = seconds(S.Time - S.Time(1)); save('run.mat', 'S', '-v7')`
+    ");
+    assert_snapshot!(changed("v5.mat", "run.mat", object("table")), @"
+    error: run.mat: the MATLAB file (version 5 to 7) has no samples that can be used
+      found: `TT`: an object of the class `table`
+      expected: arrays or channels of real numbers
+      hint: in MATLAB: `S = table2struct(TT, 'ToScalar', true); save('run.mat', 'S', '-v7')`
+    ");
+    assert_snapshot!(changed("v5.mat", "run.mat", object("timeseries")), @"
+    error: run.mat: the MATLAB file (version 5 to 7) has no samples that can be used
+      found: `TT`: an object of the class `timeseries`
+      expected: arrays or channels of real numbers
+      hint: in MATLAB: `S.time = TT.Time; S.data = squeeze(TT.Data); save('run.mat', 'S', '-v7')`
+    ");
+    assert_snapshot!(changed("v5.mat", "run.mat", object("datetime")), @"
+    error: run.mat: the MATLAB file (version 5 to 7) has no samples that can be used
+      found: `TT`: an object of the class `datetime`
+      expected: arrays or channels of real numbers
+      hint: in MATLAB: `S.time = seconds(TT - TT(1)); save('run.mat', 'S', '-v7')`
+    ");
+    assert_snapshot!(changed("v5.mat", "run.mat", object("duration")), @"
+    error: run.mat: the MATLAB file (version 5 to 7) has no samples that can be used
+      found: `TT`: an object of the class `duration`
+      expected: arrays or channels of real numbers
+      hint: in MATLAB: `S.time = seconds(TT); save('run.mat', 'S', '-v7')`
+    ");
+    assert_snapshot!(changed("v5.mat", "run.mat", object("idpoly")), @"
+    error: run.mat: the MATLAB file (version 5 to 7) has no samples that can be used
+      found: `TT`: an object of the class `idpoly`
+      expected: arrays or channels of real numbers
+      hint: in MATLAB: `S = struct(TT); save('run.mat', 'S', '-v7')`
+    ");
 }
 
 #[test]
 fn damaged_files_of_loggers() {
-    assert_snapshot!(changed("record.wav", "a-law.wav", |bytes| bytes[20] = 6), @"");
-    assert_snapshot!(changed("record.wav", "channels.wav", |bytes| bytes[22] = 0), @"");
-    assert_snapshot!(changed("record.wav", "empty.wav", |bytes| bytes.truncate(36)), @"");
-    assert_snapshot!(changed("record.tdms", "daqmx.tdms", |bytes| bytes[4] |= 0x80), @"");
+    assert_snapshot!(changed("record.wav", "a-law.wav", |bytes| bytes[20] = 6), @"
+    error: a-law.wav: an encoding of samples that is not supported
+      found: 16 bits of A-law
+      expected: 8, 16, 24 or 32 bits of integers, or 32 or 64 bits of floating-point numbers
+      hint: export the samples without compression
+    ");
+    assert_snapshot!(changed("record.wav", "channels.wav", |bytes| bytes[22] = 0), @"
+    error: channels.wav: invalid header of a WAV file
+      found: 0 channels at 64 Hz
+      expected: at least 1 channel, and a sampling rate greater than 0
+    ");
+    assert_snapshot!(changed("record.wav", "empty.wav", |bytes| bytes.truncate(36)), @"
+    error: empty.wav: the file has no samples
+      found: a WAV file without the chunks `fmt ` and `data`
+      expected: both, in this order
+    ");
+    assert_snapshot!(changed("record.tdms", "daqmx.tdms", |bytes| bytes[4] |= 0x80), @"
+    error: daqmx.tdms: raw samples of NI-DAQmx are not supported
+      found: a TDMS file logged by NI-DAQmx itself
+      expected: samples with their scale applied
+      hint: in Python: `nptdms.TdmsFile.read(file).as_dataframe().to_csv(...)`; or open and save it in DIAdem
+    ");
     let kind = replace(&[10, 0, 0, 0, 1, 0, 0, 0], &[0x77, 0, 0, 0, 1, 0, 0, 0]);
-    assert_snapshot!(changed("record.tdms", "kind.tdms", kind), @"");
-    assert_snapshot!(changed("record.tdms", "segment.tdms", |bytes| bytes.extend(b"end of the file and more bytes")), @"");
+    assert_snapshot!(changed("record.tdms", "kind.tdms", kind), @"
+    error: kind.tdms: a type of samples that is not supported
+      found: type 0x77
+      expected: integers, floating-point numbers, texts or timestamps
+    ");
+    assert_snapshot!(changed("record.tdms", "segment.tdms", |bytes| bytes.extend(b"end of the file and more bytes")), @"
+    error: segment.tdms: the file is damaged: the beginning of a segment
+      expected: the letters `TDSm`
+      hint: export or copy the file again
+    ");
 }
 
 #[test]
 fn damaged_universal_files() {
     let number = replace(b"2.14843750000e-02", b"2.1484375000Oe-02");
-    assert_snapshot!(changed("record.uff", "letter.uff", number), @"");
+    assert_snapshot!(changed("record.uff", "letter.uff", number), @"
+    error: letter.uff:21:1: not a number in data set 58
+       |
+    21 |    6.83593750000e-03   1.07421875000e-02   1.56250000000e-02   2.1484375000Oe-02
+       | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+      found: `6.83593750000e-03   1.07421875000e-02   …`
+      expected: numbers in columns of 13 (single precision) or 20 (double precision)
+    ");
     let count = replace(b"         4       193", b"         4       199");
-    assert_snapshot!(changed("record.uff", "few.uff", count), @"");
-    assert_snapshot!(changed("record.uff", "form.uff", replace(b"         4       193", b"      four       193")), @"");
+    assert_snapshot!(changed("record.uff", "few.uff", count), @"
+    error: few.uff:69:1: data set 58 has too few numbers
+       |
+    69 |     -1
+       | ^^^^^^
+      found: 193 numbers
+      expected: 199 numbers, as its header states
+    ");
+    assert_snapshot!(changed("record.uff", "form.uff", replace(b"         4       193", b"      four       193")), @"
+    error: form.uff:15:1: invalid header of data set 58
+       |
+    15 |       four       193         1  0.00000e+00  1.56250e-02  0.00000e+00
+       | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+      found: `      four       193         1  0.00000e…`
+      expected: type, number of samples, spacing, first abscissa and increment in columns of 10, 10, 10, 13 and 13
+    ");
     let count = replace(b"         4       193", b"         4       199");
-    assert_snapshot!(changed("binary.uff", "few.uff", count), @"");
+    assert_snapshot!(changed("binary.uff", "few.uff", count), @"
+    error: few.uff:19:1: data set 58b has another length than its header states
+       |
+    19 |          0    0    0    0 NONE                 NONE
+       | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+      found: 1544 bytes
+      expected: 199 samples of 8 bytes
+    ");
     let format = |from: &'static [u8], to: &'static [u8]| {
         changed("binary.uff", "form.uff", replace(from, to))
     };
-    assert_snapshot!(format(b"58b     1     2", b"58b     1     3"), @"");
-    assert_snapshot!(format(b"58b     1     2  ", b"58b     x     y z"), @"");
+    assert_snapshot!(format(b"58b     1     2", b"58b     1     3"), @"
+    error: form.uff:8:1: numbers of a format that is not supported
+      |
+    8 |     58b     1     3          11        1544     0     0           0           0
+      | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+      found: format 3 (1 DEC VMS, 3 IBM 5/370)
+      expected: 2 (IEEE 754)
+    ");
+    assert_snapshot!(format(b"58b     1     2  ", b"58b     x     y z"), @"
+    error: form.uff:8:1: invalid first line of data set 58b
+      |
+    8 |     58b     x     y z        11        1544     0     0           0           0
+      | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+      found: `58b     x     y z        11        1544 …`
+      expected: byte order, format of numbers, lines of the header and bytes of the data
+    ");
 }
 
 /// Choices of columns in a model file.
@@ -331,20 +645,86 @@ fn choices_of_columns() {
         bench.write("model.yaml", &MODEL.replace("DATA", data));
         refused(&bench, &["fit", "model.yaml"])
     };
-    assert_snapshot!(choose("data: v5.mat\n    columns: {time: test.time, displacement: test.displacment}"), @"");
-    assert_snapshot!(choose("data: v5.mat\n    columns: {time: time, displacement: test.displacement}"), @"");
-    assert_snapshot!(choose("data: v5.mat\n    columns: {time: test.time, displacement: fs}"), @"");
-    assert_snapshot!(choose("data: v5.mat\n    columns: {time: test.time, displacement: 9}"), @"");
-    assert_snapshot!(choose("data: v7.mat\n    columns: {time: bench.runs.2.time, displacement: bench.spectrum}"), @"");
+    assert_snapshot!(choose("data: v5.mat\n    columns: {time: test.time, displacement: test.displacment}"), @"
+    error: model.yaml:5:46: experiments[0].columns.displacement: v5.mat: there is no such column
+      |
+    5 |     columns: {time: test.time, displacement: test.displacment}
+      |                                              ^^^^^^^^^^^^^^^^
+      found: `test.displacment`
+      expected: one of: test.time, test.displacement, test.force, fs
+      hint: did you mean `test.displacement`?
+    ");
+    assert_snapshot!(choose("data: v5.mat\n    columns: {time: time, displacement: test.displacement}"), @"
+    error: model.yaml:5:21: experiments[0].columns.time: v5.mat: there is no such column
+      |
+    5 |     columns: {time: time, displacement: test.displacement}
+      |                     ^^^^
+      found: `time`
+      expected: one of: test.time, test.displacement, test.force, fs
+      hint: did you mean `test.time`?
+    ");
+    assert_snapshot!(choose("data: v5.mat\n    columns: {time: test.time, displacement: fs}"), @"
+    error: model.yaml:5:46: experiments[0].columns.displacement: v5.mat: the columns have different times
+      |
+    5 |     columns: {time: test.time, displacement: fs}
+      |                                              ^^
+      found: `fs`: 1 sample
+      expected: 193 samples, as `test.time`
+      hint: name columns of the same length and rate; another channel can have its own `data` and `time`
+    ");
+    assert_snapshot!(choose("data: v5.mat\n    columns: {time: test.time, displacement: 9}"), @"
+    error: model.yaml:5:46: experiments[0].columns.displacement: v5.mat: no such column number
+      |
+    5 |     columns: {time: test.time, displacement: 9}
+      |                                              ^
+      found: 9
+      expected: 1 to 4
+    ");
+    assert_snapshot!(choose("data: v7.mat\n    columns: {time: bench.runs.2.time, displacement: bench.spectrum}"), @"
+    error: model.yaml:5:54: experiments[0].columns.displacement: v7.mat: `bench.spectrum` holds no samples in time
+      |
+    5 |     columns: {time: bench.runs.2.time, displacement: bench.spectrum}
+      |                                                      ^^^^^^^^^^^^^^
+      found: complex numbers
+      expected: real numbers
+      hint: save the real samples in time, for instance `real(x)`
+    ");
     assert_snapshot!(
         choose("data: v5.mat\n    format: {decimal: comma}\n    columns: {time: test.time, displacement: test.displacement}"),
-        @""
+        @"
+    error: model.yaml:5:23: experiments[0].format.decimal: a format of text is stated for a binary file
+      |
+    5 |     format: {decimal: comma}
+      |                       ^^^^^
+      found: v5.mat, a MATLAB file (version 5 to 7)
+      expected: a text table, or no `format`
+    "
     );
-    assert_snapshot!(choose("data: record.wav\n    columns: {displacement: 1}\n    units: {displacement: 0 m}"), @"");
+    assert_snapshot!(choose("data: record.wav\n    columns: {displacement: 1}\n    units: {displacement: 0 m}"), @"
+    error: model.yaml:6:27: experiments[0].units.displacement: invalid factor of a unit
+      |
+    6 |     units: {displacement: 0 m}
+      |                           ^^^
+      found: `0 m`
+      expected: a finite number other than 0 before the unit, as in `50 g`
+    ");
     let init = |units: &str| refused(&bench, &["init", "record.wav", "--units", units]);
-    assert_snapshot!(init("50 g"), @"");
-    assert_snapshot!(init("50 gg,1 N"), @"");
-    assert_snapshot!(refused(&bench, &["init", "v5.mat", "--units", "50 g"]), @"");
+    assert_snapshot!(init("50 g"), @"
+    error: --units: another number of units than channels
+      found: 1 in `50 g`
+      expected: 2, separated by commas; `-` for a channel that is not used
+    ");
+    assert_snapshot!(init("50 gg,1 N"), @"
+    error: --units: not a full scale and its unit
+      found: `50 gg`
+      expected: a number and one of: m, mm, cm, µm, in, ft, rad, mrad, deg, V, m/s, mm/s, cm/s, in/s, ft/s, rad/s, deg/s, V, m/s², mm/s², g, mg, gal, in/s², ft/s², rad/s², deg/s², V, N, kN and 9 more
+    ");
+    assert_snapshot!(refused(&bench, &["init", "v5.mat", "--units", "50 g"]), @"
+    error: --units: the file has no full scale
+      found: v5.mat, a MATLAB file (version 5 to 7)
+      expected: a file of channels with a sampling rate and without units (WAV)
+      hint: state units in the model file: `units: {acceleration: g}`
+    ");
     // Two records of different length, of which none is named.
     let mut bytes = fs::read(bench.path("v5.mat")).expect("a file");
     bytes.truncate(128);
@@ -353,7 +733,12 @@ fn choices_of_columns() {
     bytes.extend(matrix(b"t", 30));
     bytes.extend(matrix(b"y", 30));
     with_bytes(&bench, "two.mat", &bytes);
-    assert_snapshot!(refused(&bench, &["init", "two.mat"]), @"");
+    assert_snapshot!(refused(&bench, &["init", "two.mat"]), @"
+    error: two.mat: the file has several sets of channels with different times
+      found: `time`, `acc` (40 samples); `t`, `y` (30 samples)
+      expected: columns of one of them, named in a model file
+      hint: `kmcfit check FILE` lists them; `columns: {time: …, displacement: …}` names them
+    ");
 }
 
 /// An element of version 5 of MATLAB.
@@ -400,7 +785,16 @@ fn samples_that_are_no_numbers() {
     };
     with(f64::NAN);
     let (_, stdout, _) = bench.run(&["check", "model.yaml", "--no-gradient"]);
-    assert_snapshot!(stdout, @"");
+    assert_snapshot!(stdout, @"
+    record: 192 samples of the displacement in m (MATLAB file (version 4))
+    record: 1 samples of the displacement not used: missing
+    model: 193 nodes over 3 s (rk4), 3 parameters, gauss-newton
+    the model and its data are valid
+    ");
     with(f64::INFINITY);
-    assert_snapshot!(refused(&bench, &["check", "model.yaml"]), @"");
+    assert_snapshot!(refused(&bench, &["check", "model.yaml"]), @"
+    error: v4.mat: sample 11 of `record.2`: not a finite number
+      found: `inf`
+      expected: a finite number, or NaN for a missing sample
+    ");
 }

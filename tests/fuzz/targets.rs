@@ -363,8 +363,9 @@ fn columns(table: &Table) {
 
 /// A binary file of a data logger: its channels, and the tables made of them.
 pub fn channels(bytes: &[u8]) -> Verdict {
+    let any = recognise(Path::new("t"), bytes).ok().flatten();
     // Version 4 of MATLAB is recognised by the ending of the name.
-    let path = Path::new(if bytes.len() % 2 == 0 { "t" } else { "t.mat" });
+    let path = Path::new(if any.is_some() { "t" } else { "t.mat" });
     let format = match recognise(path, bytes) {
         Err(error) => return told(&error),
         Ok(None) => return Verdict::Refused,

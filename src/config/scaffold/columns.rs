@@ -104,13 +104,6 @@ pub struct UsedColumn {
     has_unit: bool,
 }
 
-impl UsedColumn {
-    /// Key of its role in the model file.
-    fn key(&self) -> &'static str {
-        self.role.key()
-    }
-}
-
 /// Columns of a table by role, and unused columns.
 #[derive(Debug)]
 pub struct ColumnAssignment {
@@ -275,7 +268,7 @@ impl ColumnAssignment {
             Some(calibration) => Some(calibration.to_owned()),
             None => (c.state_unit || !c.has_unit).then(|| c.unit.symbol().to_owned()),
         };
-        let pair = |c| Some(format!("{}: {}", UsedColumn::key(c), quoted(&unit(c)?)));
+        let pair = |c: &UsedColumn| Some(format!("{}: {}", c.role.key(), quoted(&unit(c)?)));
         let pairs: Vec<String> = self.used.iter().filter_map(pair).collect();
         (!pairs.is_empty()).then(|| format!("{{{}}}", pairs.join(", ")))
     }
@@ -334,9 +327,9 @@ impl ColumnAssignment {
     }
 }
 
-/// Quantity and unit of a column as its name and stated unit give them.
-pub fn recognised(table: &Table, index: usize) -> Option<(Role, Unit)> {
-    known(table, index).map(|column| (column.role, column.unit))
+/// Quantity and unit of a column as its name and stated unit give them, and true if the file states the unit.
+pub fn recognised(table: &Table, index: usize) -> Option<(Role, Unit, bool)> {
+    known(table, index).map(|column| (column.role, column.unit, column.has_unit))
 }
 
 /// Column of times and sampling rate, Hz; `None` without a column of increasing times.
