@@ -264,8 +264,18 @@ fn mistakes() {
         bench.write("run/parameters.json", &document.to_string());
         refused(&["verify", "run"])
     };
-    assert_snapshot!(edited(&|p| p["functions"][0]["has_jumps"] = true.into()), @"");
-    assert_snapshot!(edited(&|p| p["values"][0] = (-1e300).into()), @"");
+    assert_snapshot!(edited(&|p| p["functions"][0]["has_jumps"] = true.into()), @"
+    error: run: this kind of fit cannot be verified
+      found: a coefficient with jumps found by `bic`
+      expected: a fit that its parameters and the noise of its channels describe
+      hint: fit the model again into another folder and compare the result documents
+    ");
+    assert_snapshot!(edited(&|p| p["values"][0] = (-1e300).into()), @"
+    error: model.yaml: the model file does not give the model of the run
+      found: the mass is -1e300 kg at t = 0 s, not positive
+      expected: a response, as in run
+      hint: the model file or its data have changed since the fit: fit again
+    ");
     bench.write("run/parameters.json", "{}");
     assert_snapshot!(refused(&["verify", "run"]));
     fs::remove_file(bench.path("run/parameters.json")).expect("removed");
