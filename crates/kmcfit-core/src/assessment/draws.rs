@@ -1,7 +1,7 @@
 //! Draws from the distribution of the estimates.
 //!
 //! Parameters are normally distributed about the estimates with their covariance, or by Student's t distribution where sigma is estimated from
-//! few samples, and draws that violate a constraint are repeated. Every draw gives the estimates of [`estimates`](super::estimates); the error of
+//! few samples, and draws that violate a constraint are repeated. Every draw gives the estimates of the record; the error of
 //! interpolation between knots is not included.
 
 use super::estimates::{Estimate, estimates_at};
@@ -32,7 +32,7 @@ pub enum NoDraws {
 pub struct Draw {
     /// Parameters.
     pub parameters: Vec<f64>,
-    /// Estimates in the order of [`estimates`](super::estimates).
+    /// Estimates in the order of `estimates`.
     pub estimates: Vec<(String, Estimate)>,
 }
 
