@@ -1,7 +1,7 @@
 //! Binary files of data loggers and numerical programs: recognition by the first bytes, and reading into channels.
 //!
 //! Each file reads one format. A reader compares every length with the bytes that remain before it allocates, and takes memory
-//! for numbers from a [`Budget`], which bounds what compressed files expand to.
+//! for numbers from a `Budget`, which bounds what compressed files expand to.
 
 mod array;
 mod budget;
@@ -91,7 +91,7 @@ impl Channels {
 /// Reads a file of a given format; messages name `path`.
 ///
 /// # Errors
-/// When the file is truncated or damaged, states lengths that it does not have, expands beyond the limits of [`Budget`] or the
+/// When the file is truncated or damaged, states lengths that it does not have, expands beyond the limits of `Budget` or the
 /// available memory, or is of a kind that is refused as a whole.
 pub fn read(path: &Path, bytes: &[u8], format: Format) -> Result<Channels, InputError> {
     let mut budget = Budget::new(path, bytes.len());

@@ -11,7 +11,7 @@ use kmcfit_core::internals::solvers::{Fit, stored_fit};
 /// The model of a run as fitted and its fit, from its model file, data and `parameters.json`.
 ///
 /// # Errors
-/// As [`rebuilt`], and if `parameters.json` cannot be read.
+/// If model file, data or `parameters.json` are missing or invalid or belong to another model; for fits that cannot be rebuilt.
 pub fn rebuilt_fit(run: &Run) -> Result<(Model, Fit), InputError> {
     let (parameters, _) = ParametersDocument::read(&run.folder)?;
     let Rebuilt { model, fit } = rebuilt(run, &parameters)?;
