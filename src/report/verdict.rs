@@ -279,3 +279,33 @@ pub fn assumption(assumption: &VerdictAssumption) -> Finding {
     };
     Finding::of(assumption, text)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kmcfit_core::internals::solvers::{EquationForm, EquationPart, EquationShare};
+
+    #[test]
+    fn a_residual_is_judged_beside_the_largest_force() {
+        let reason = |residual: f64| {
+            let share = |part, rms| EquationShare {
+                part,
+                rms,
+                residual_share: residual / rms,
+            };
+            of_balance(&EquationBalance {
+                form: EquationForm::Weak,
+                bump_lengths: Vec::new(),
+                residual_rms: residual,
+                parts: vec![
+                    share(EquationPart::Damping, 5.0),
+                    share(EquationPart::Inertia, 100.0),
+                ],
+            })
+        };
+        // More than the damping, but a tenth of the inertia.
+        assert_eq!(reason(10.0), None);
+        let large = VerdictReason::EquationResidual { share: 0.48 };
+        assert_eq!(reason(48.0), Some(large));
+    }
+}

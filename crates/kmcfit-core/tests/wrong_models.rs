@@ -502,13 +502,10 @@ fn count(kind: Kind, is_right: impl Fn(&VerdictReason) -> bool) -> Counts {
     counts
 }
 
-/// At most 1 % adequate (docs/long/verdict.md has the three of 2400 that are), the right reason in at least 80 %, and of the stated size.
+/// Never adequate, with the right reason in at least 80 %, and of the stated size. With 200 seeds two kinds miss the first: docs/long/verdict.md.
 fn assert_found(kind: Kind, is_right: impl Fn(&VerdictReason) -> bool) {
     let counts = count(kind, is_right);
-    assert!(
-        100 * counts.levels[0] <= counts.cases,
-        "{kind:?} is adequate"
-    );
+    assert_eq!(counts.levels[0], 0, "{kind:?} is adequate");
     assert!(
         10 * counts.right >= 8 * counts.cases,
         "{kind:?}: {}",

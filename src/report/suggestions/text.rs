@@ -239,10 +239,9 @@ fn write_pattern(
             write!(
                 f,
                 "{channel}: the residuals oscillate at {} Hz, the response at {} Hz (mains hum or another mode): restrict \
-                 the frequency band (`band: {{{end}: {}}}`)",
+                 the frequency band (`band` with a `{end}` between the two)",
                 significant(*frequency, 3),
-                significant(*beside, 3),
-                significant((frequency * beside).sqrt(), 2)
+                significant(*beside, 3)
             )
         }
         ResidualPattern::Drift => write!(

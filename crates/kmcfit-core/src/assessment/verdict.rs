@@ -465,3 +465,23 @@ fn of_scale(problem: &Problem) -> Option<VerdictReason> {
         ScaleSource::Model => Some(VerdictReason::OnlyRatios { fixed: Vec::new() }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Milliseconds read as seconds, and millimetres as metres: 2 Hz and 4 mm become 0.002 Hz, or 4 m with 50 m/s.
+    #[test]
+    fn wrong_units_of_a_record_are_implausible() {
+        let slow = Implausible::NaturalFrequency { value: 0.002 };
+        assert_eq!(Implausible::of(0.002, Some([0.004, 5e-5])), Some(slow));
+        let fast = Implausible::Velocity { value: 50.0 };
+        assert_eq!(Implausible::of(2.0, Some([4.0, 50.0])), Some(fast));
+        let far = Implausible::Displacement { value: 40.0 };
+        assert_eq!(Implausible::of(0.02, Some([40.0, 5.0])), Some(far));
+        // In the right units, for a rotation, and without a natural frequency.
+        assert_eq!(Implausible::of(2.0, Some([0.004, 0.05])), None);
+        assert_eq!(Implausible::of(2.0, None), None);
+        assert_eq!(Implausible::of(f64::NAN, Some([0.004, 0.05])), None);
+    }
+}

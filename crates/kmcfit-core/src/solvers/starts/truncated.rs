@@ -265,6 +265,33 @@ mod tests {
         Problem::new(system, functions, vec![record]).expect("a problem")
     }
 
+    /// Samples that grow by e^10 within the first 2048 of 100,000 steps, and then decay: with the constants of the first steps the response of
+    /// the whole record overflows, and with those of a longer part it does not.
+    #[test]
+    fn a_part_without_a_response_of_the_whole_record_is_extended() {
+        let nodes = 100_001;
+        let mut problem = free_decay(nodes, 4);
+        let grid = problem.system.grid;
+        let (growth, turn) = (10.0 / grid.time(2048), grid.time(2048));
+        let sample = |t: f64| {
+            let size = (growth * t.min(turn) - 0.05 * (t - turn).max(0.0)).exp();
+            size * (20f64.sqrt() * t).cos()
+        };
+        let samples = (0..nodes).step_by(4).map(|i| sample(grid.time(i)));
+        let channel = &mut problem.parts_mut().experiments[0].channels[0];
+        *channel = channel.clone().with_samples(samples.collect());
+        let start = problem.start();
+        let mut ignore = |_: &_| {};
+        let mut watch = Observer::new(&mut ignore);
+        let settings = FitSettings::default();
+        let first = first_steps(&problem, 2048).expect("a part");
+        let of_first = search(&first, &start, &settings, None, &mut watch).expect("a response");
+        assert!(problem.evaluate(&of_first.best.parameters).is_err());
+        let found = truncated_start(&problem, 2048, &start, &settings, &mut watch);
+        let prepared = found.start.expect("a start");
+        assert!(prepared.evaluation.is_some(), "{:?}", prepared.parameters);
+    }
+
     /// Two parameters need 40 samples. The first sample is at node 0, so `n` steps have `ceil(n / stride)` of them.
     #[test]
     fn the_truncated_record_has_2048_steps_or_4096_if_samples_are_few() {
