@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Runs the NumPy reader of docs/results.md on runs of shipped models: the intervals that it prints are those of result.json.
+"""Runs the readers of docs/results.md, in NumPy and where GNU Octave is installed in MATLAB's language, on runs of shipped models: the
+intervals that they print are those of result.json. Models with more parameters have their covariance in other files.
 
 Usage: .ci/readers.py KMCFIT
 """
@@ -8,6 +9,7 @@ import io
 import json
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -15,39 +17,105 @@ import tempfile
 MODELS = ["accelerometer", "hammer-and-shaker", "roll-decay", "spline"]
 
 
-def reader(root):
+# A mass on 80 knots, and one value per node.
+LARGE = """
+format: 1
+title: many parameters
+experiments:
+  - name: free decay
+    data: {data}/noisy.csv
+    columns: {{time: t_s, displacement: y_m}}
+    sigma: {{displacement: 0.1}}
+    initial: {{displacement: 3.3, velocity: 1.0}}
+grid: {{nodes: 2000, method: midpoint}}
+functions:
+  mass:      {{basis: {basis}, start: 2.0, penalty: {{kind: tikhonov, order: 2, weight: reml}}}}
+  damping:   {{basis: constant, start: 0.1}}
+  stiffness: {{fixed: 1.0}}
+"""
+
+
+def readers(root):
     text = (root / "docs" / "results.md").read_text()
-    block = re.search(r"```python\n(.*?)```", text, re.S).group(1)
-    lines = [line for line in block.splitlines() if line.strip()]
-    assert len(lines) <= 20, len(lines)
-    return block
+    first, second = re.findall(r"```python\n(.*?)```", text, re.S)
+    for block in (first, second):
+        lines = [line for line in block.splitlines() if line.strip()]
+        assert len(lines) <= 20, len(lines)
+    return first, second, re.search(r"```matlab\n(.*?)```", text, re.S).group(1)
+
+
+def printed(code, run):
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        exec(code.replace("runs/accelerometer", str(run)).replace("runs/noisy", str(run)), {})
+    return out.getvalue()
+
+
+def octave(code, run):
+    script = run / "reader.m"
+    script.write_text(code.replace("runs/accelerometer", str(run)))
+    found = subprocess.run(["octave-cli", "--norc", script], capture_output=True, text=True)
+    return found.stdout
+
+
+def check(text, run, width):
+    """Compares the lines `name value low to high` with result.json; the number of intervals."""
+    rows = {line[:width].strip(): line[width:].split() for line in text.splitlines()}
+    result = json.loads((run / "result.json").read_text())
+    count = 0
+    for name, estimate in result["estimates"].items():
+        if estimate["ci95"] is None:
+            continue
+        found = [float(rows[name][1]), float(rows[name][3])]
+        for end, expected in zip(found, estimate["ci95"]):
+            # The readers print nine digits.
+            size = max(map(abs, estimate["ci95"]))
+            assert abs(end - expected) < 2e-8 * size, (name, found, estimate)
+        count += 1
+    return count
+
+
+def fit(program, model, run, *options):
+    command = [program, "fit", model, "--out", run, "--no-report", "--json", *options]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+
+
+def large(program, root, basis, folder):
+    model = folder / "large.yaml"
+    model.write_text(LARGE.format(data=root / "data", basis=basis))
+    fit(program, model, folder / "run", "--tables")
+    return folder / "run"
 
 
 def main(program):
     root = pathlib.Path(__file__).resolve().parent.parent
-    code = reader(root)
-    checked = 0
+    first, second, matlab = readers(root)
+    checked, by_octave = 0, 0
     for model in MODELS:
         with tempfile.TemporaryDirectory() as folder:
             run = pathlib.Path(folder) / "run"
-            path = root / "models" / f"{model}.yaml"
-            subprocess.run([program, "fit", path, "--out", run, "--no-report", "--json"], check=True, stdout=subprocess.DEVNULL)
-            printed = io.StringIO()
-            with contextlib.redirect_stdout(printed):
-                exec(code.replace("runs/accelerometer", str(run)), {})
-            result = json.loads((run / "result.json").read_text())
-        rows = {line[:44].strip(): line[44:].split() for line in printed.getvalue().splitlines()}
-        for name, estimate in result["estimates"].items():
-            if estimate["ci95"] is None:
-                continue
-            found = [float(rows[name][1]), float(rows[name][3])]
-            for end, expected in zip(found, estimate["ci95"]):
-                # The reader prints nine digits.
-                size = max(map(abs, estimate["ci95"]))
-                assert abs(end - expected) < 2e-8 * size, (model, name, found, estimate)
-            checked += 1
+            fit(program, root / "models" / f"{model}.yaml", run)
+            checked += check(printed(first, run), run, 44)
+            if shutil.which("octave-cli"):
+                by_octave += check(octave(matlab, run), run, 24)
     assert checked >= 12, checked
-    print(f"{checked} intervals computed again by NumPy")
+    with tempfile.TemporaryDirectory() as folder:
+        run = large(program, root, "b-spline, knots: 80", pathlib.Path(folder))
+        found = check(printed(first, run), run, 44)
+        assert found >= 4, found
+        checked += found
+    with tempfile.TemporaryDirectory() as folder:
+        run = large(program, root, "nodal", pathlib.Path(folder))
+        p, estimates = [json.loads((run / f"{name}.json").read_text()) for name in ("parameters", "result")]
+        for (name, error), row in zip(p["estimates"].items(), enumerate(p["estimate_covariance"])):
+            half = error["quantile"] * (row[1][row[0]] + error["basis_error"] ** 2) ** 0.5
+            low, high = estimates["estimates"][name]["ci95"]
+            assert abs(half - 0.5 * (high - low)) < 1e-9 * half, (name, half, low, high)
+            checked += 1
+        # The stored variance also contains the error of the time steps.
+        ratio = float(printed(second, run)) / p["variances"][0]
+        assert 0.98 < ratio <= 1.0 + 1e-9, ratio
+    print(f"{checked} intervals computed again by NumPy, {by_octave} by Octave, and a variance from the factor")
 
 
 if __name__ == "__main__":

@@ -26,7 +26,11 @@ pub(crate) fn resolved<const N: usize>(numbers: [f64; N], half: f64) -> [String;
         true => {
             let decimals = decimals.clamp(1.0, 14.0) as usize;
             let unit = 10f64.powi(exponent as i32);
-            numbers.map(|x| format!("{:.decimals$}e{exponent}", x / unit))
+            let smallest = 0.5 * unit * 0.1f64.powi(decimals as i32);
+            numbers.map(|x| match x.abs() < smallest {
+                true => "0".to_owned(),
+                false => format!("{:.decimals$}e{exponent}", x / unit),
+            })
         }
         false => numbers.map(|x| significant(x, 4)),
     }
@@ -53,6 +57,10 @@ mod tests {
         assert_eq!(
             resolved([1.2e8, 1.1e8, 1.3e8], 1e7),
             ["1.20e8", "1.10e8", "1.30e8"]
+        );
+        assert_eq!(
+            resolved([1e-10, -1.3e-4, 1.3e-4], 1.3e-4),
+            ["0", "-1.3e-4", "1.3e-4"]
         );
     }
 }

@@ -26,6 +26,7 @@ impl FittedModel<'_> {
             assumptions: assumptions(problem),
             covariance: (self.run_assessment.bands())
                 .map(|bands| bands.covariance_kind)
+                .or(self.large_covariance().map(|large| large.kind))
                 .unwrap_or_default(),
             ..IdentifiabilitySummary::default()
         };

@@ -3,10 +3,10 @@
 use super::channel_view::ChannelView;
 use crate::config::{HoldOut, Model};
 use kmcfit_core::internals::assessment::{
-    EquationErrorIntervals, EstimateErrors, FitAssessment, NoIntervals, POOR, StepCheck,
-    diagnostics,
+    EquationErrorIntervals, EstimateErrors, FitAssessment, LargeCovariance, NoIntervals, POOR,
+    StepCheck, diagnostics,
 };
-use kmcfit_core::internals::identifiability::Bands;
+use kmcfit_core::internals::identifiability::{Bands, Means};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::simulate::SimulationError;
@@ -14,7 +14,6 @@ use kmcfit_core::internals::solvers::{
     EquationBalance, Fit, MissingTerm, Solver, Status, equation_balance, missing_terms,
     predict_validation,
 };
-use nalgebra::DMatrix;
 
 /// Assessment of a fit, computed once for all its documents.
 #[derive(Debug, Clone)]
@@ -54,9 +53,26 @@ impl RunAssessment {
         }
     }
 
-    /// Covariance of the parameters, if standard errors are meaningful.
-    pub(super) fn covariance(&self) -> Option<&DMatrix<f64>> {
-        self.assessment.as_ref()?.covariance.as_ref()
+    /// Variances of the parameters of a simulated response, if standard errors are meaningful.
+    pub(super) fn variances(&self) -> Option<Vec<f64>> {
+        let assessment = self.assessment.as_ref()?;
+        match (&assessment.covariance, &assessment.large_covariance) {
+            (Some(covariance), _) => Some(covariance.diagonal().iter().copied().collect()),
+            (None, large) => large.as_ref().map(|large| large.variances.clone()),
+        }
+    }
+
+    /// Covariance of more than 64 parameters, if standard errors are meaningful.
+    pub(super) fn large_covariance(&self) -> Option<&LargeCovariance> {
+        self.assessment.as_ref()?.large_covariance.as_ref()
+    }
+
+    /// Means over the record with their standard errors, where these are meaningful.
+    pub(super) fn means(&self) -> Option<Means<'_>> {
+        match &self.assessment {
+            Some(assessment) => assessment.means(),
+            None => self.bands().map(Bands::means),
+        }
     }
 
     /// Bands of functions and ratios, if standard errors are meaningful.

@@ -10,7 +10,6 @@ use kmcfit_core::internals::noise::{Correlation, CorrelationLaw};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Loss, Weighting};
-use nalgebra::DMatrix;
 
 /// One channel with its predictions.
 pub fn channel(view: &ChannelView) -> ChannelSummary {
@@ -79,7 +78,7 @@ fn noise(correlation: &Correlation) -> NoiseSummary {
 pub fn scalars(
     problem: &Problem,
     evaluation: &Evaluation,
-    covariance: Option<&DMatrix<f64>>,
+    variances: Option<&[f64]>,
     degrees: &[f64],
 ) -> Vec<NuisanceParameter> {
     let range = problem.functions.scalar_range();
@@ -89,9 +88,9 @@ pub fn scalars(
             name: scalar.name.clone(),
             unit: scalar.unit.clone(),
             value: *value,
-            standard_error: covariance.map(|c| c[(index, index)].sqrt()),
+            standard_error: variances.map(|variances| variances[index].sqrt()),
             degrees_of_freedom: (degrees.get(index).copied())
-                .filter(|d| covariance.is_some() && d.is_finite()),
+                .filter(|d| variances.is_some() && d.is_finite()),
         })
         .collect()
 }
@@ -109,9 +108,10 @@ pub(super) fn validation(held: &ValidationRecord) -> ValidationSummary {
     match &held.found {
         Ok((problem, evaluation)) => {
             let covariance = problem.covariance(evaluation);
+            let variances = covariance.map(|c| c.diagonal().iter().copied().collect::<Vec<_>>());
             let degrees = problem.degrees_of_freedom(evaluation);
             summary.nuisance_parameters =
-                scalars(problem, evaluation, covariance.as_ref(), &degrees);
+                scalars(problem, evaluation, variances.as_deref(), &degrees);
         }
         Err(breakdown) => summary.failure = Some(breakdown.to_string()),
     }

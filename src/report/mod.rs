@@ -30,6 +30,7 @@ pub(crate) mod findings;
 mod fit_assessment;
 mod fit_figures;
 mod fit_quality;
+mod npy;
 mod page;
 mod parameters;
 mod prediction;

@@ -1,12 +1,13 @@
 //! `parameters.json`: all parameters of a fit with their covariance, so that every printed interval can be computed again.
 
 use super::document::{FORMAT, NoiseSummary, ResultDocument};
-use super::run::FittedModel;
+use super::run::{COVARIANCE, FittedModel};
 use crate::error::InputError;
 use crate::text_io::{JSON, read_text_within};
+use kmcfit_core::internals::assessment::{LargeCovariance, MOST_WITH_COVARIANCE};
 use kmcfit_core::internals::diagnostics::student_half_width;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction};
-use kmcfit_core::internals::identifiability::{Band, CovarianceKind};
+use kmcfit_core::internals::identifiability::{CovarianceKind, MeanOverRecord, Means};
 use kmcfit_core::internals::noise::{Autoregression, Correlation, CorrelationLaw};
 use kmcfit_core::internals::record::{Channel, NoiseEstimate, ScoreCovariance};
 use nalgebra::DMatrix;
@@ -35,6 +36,12 @@ pub struct ParametersDocument {
     bounds: Vec<[Option<f64>; 2]>,
     /// Covariance of the estimates; `null` with more than 64 parameters and where a combination is not identifiable.
     pub covariance: Option<Vec<Vec<f64>>>,
+    /// File with the covariance of 65 to 1000 parameters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance_file: Option<String>,
+    /// Variances of more than 1000 parameters.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub variances: Vec<f64>,
     /// Kind of the covariance: `information`, `penalised`, `bayesian` or `kernel`.
     pub covariance_kind: Option<CovarianceKind>,
     /// Start (s), length (s) and number of nodes of the time grid.
@@ -42,6 +49,9 @@ pub struct ParametersDocument {
     pub functions: Vec<FunctionBasis>,
     /// For each estimate of `result.json` with an interval, and each initial state and sensor parameter, what its half-width is made of.
     estimates: BTreeMap<String, EstimateError>,
+    /// Covariance of these estimates with more than 1000 parameters, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    estimate_covariance: Vec<Vec<f64>>,
     /// Noise of each channel.
     pub noise: Vec<ChannelNoise>,
 }
@@ -76,10 +86,12 @@ pub struct FunctionBasis {
     pub has_jumps: bool,
 }
 
-/// The half-width of a 95 % interval is `quantile sqrt(g^T C g + basis_error^2)` with the gradient `g` and the covariance `C`.
+/// The half-width of a 95 % interval is `quantile sqrt(g^T C g + basis_error^2)` with the gradient `g` and the covariance `C`; with more than
+/// 1000 parameters `g^T C g` is on the diagonal of `estimate_covariance`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct EstimateError {
-    /// Derivatives of the estimate in the parameters.
+    /// Derivatives of the estimate in the parameters; none with more than 1000 of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     gradient: Vec<f64>,
     /// Error of linear interpolation between knots.
     basis_error: f64,
@@ -202,6 +214,14 @@ impl FittedModel<'_> {
         names.extend(functions.scalars().iter().map(|s| s.name.clone()));
         units.extend(functions.scalars().iter().map(|s| s.unit.clone()));
         let covariance = bands.and_then(|bands| bands.covariance.as_ref());
+        let large = self.large_covariance();
+        let kind = bands
+            .filter(|_| covariance.is_some())
+            .map(|bands| bands.covariance_kind);
+        let estimates = match covariance.is_some() || large.is_some() {
+            true => self.estimate_errors(document, &names),
+            false => BTreeMap::new(),
+        };
         ParametersDocument {
             format: 1,
             version: env!("CARGO_PKG_VERSION").into(),
@@ -211,18 +231,21 @@ impl FittedModel<'_> {
                 let row = |i: usize| c.row(i).iter().copied().collect();
                 (0..c.nrows()).map(row).collect()
             }),
-            covariance_kind: bands
-                .filter(|_| covariance.is_some())
-                .map(|bands| bands.covariance_kind),
+            covariance_file: large
+                .filter(|large| large.covariance.is_some())
+                .map(|_| COVARIANCE.to_owned()),
+            variances: match large {
+                Some(large) if large.covariance.is_none() => large.variances.clone(),
+                _ => Vec::new(),
+            },
+            covariance_kind: kind.or(large.map(|large| large.kind)),
             grid: GridSummary {
                 start: grid.start(),
                 duration: grid.duration(),
                 nodes: grid.nodes(),
             },
-            estimates: match covariance {
-                Some(_) => self.estimate_errors(document, &names),
-                None => BTreeMap::new(),
-            },
+            estimate_covariance: self.estimate_covariance(&estimates),
+            estimates,
             names,
             units,
             functions: bases,
@@ -249,33 +272,86 @@ impl FittedModel<'_> {
         bounds
     }
 
+    /// Mean of the estimate with this name.
+    fn mean<'a>(&self, means: &Means<'a>, name: &str) -> Option<&'a MeanOverRecord> {
+        let index = self.mean_index(means, name)?;
+        let ratios = means.ratios.iter().map(|(_, mean)| *mean);
+        means.functions.iter().copied().chain(ratios).nth(index)
+    }
+
+    /// Its place among the means of functions, then of ratios.
+    fn mean_index(&self, means: &Means, name: &str) -> Option<usize> {
+        let band = match name {
+            "natural_frequency" => "natural frequency",
+            "damping_ratio" => "damping ratio",
+            "k_over_m" => "k/m",
+            "c_over_m" => "c/m",
+            _ => return (self.model.problem.functions.iter()).position(|f| f.name() == name),
+        };
+        let place = means.ratios.iter().position(|(ratio, _)| *ratio == band)?;
+        Some(means.functions.len() + place)
+    }
+
+    /// Covariance of the estimates of more than 1000 parameters.
+    fn estimate_covariance(&self, errors: &BTreeMap<String, EstimateError>) -> Vec<Vec<f64>> {
+        let large = self.large_covariance().filter(|c| c.covariance.is_none());
+        let Some(large) = large else {
+            return Vec::new();
+        };
+        let means = large.means();
+        let places = errors
+            .keys()
+            .filter_map(|name| self.mean_index(&means, name));
+        let places: Vec<usize> = places.collect();
+        let row = |i: &usize| {
+            let entry = |j: &usize| large.covariance_of_means[(*i, *j)];
+            places.iter().map(entry).collect()
+        };
+        places.iter().map(row).collect()
+    }
+
+    /// Covariance of more than 64 parameters.
+    pub(super) fn large_covariance(&self) -> Option<&LargeCovariance> {
+        self.run_assessment.large_covariance()
+    }
+
+    /// Entries of the factor of the normal matrix: row, variable, value, and the variance of the row's error, 1 or 0.
+    pub(super) fn factor(&self) -> Option<DMatrix<f64>> {
+        let factor = self.large_covariance()?.factor.as_ref()?;
+        let entries: Vec<f64> = factor
+            .entries()
+            .flat_map(|e| {
+                let variance = f64::from(u8::from(!e.is_exact));
+                [e.row as f64, e.variable as f64, e.value, variance]
+            })
+            .collect();
+        Some(DMatrix::from_vec(4, entries.len() / 4, entries))
+    }
+
     fn estimate_errors(
         &self,
         document: &ResultDocument,
         names: &[String],
     ) -> BTreeMap<String, EstimateError> {
         let mut errors = BTreeMap::new();
-        let Some(bands) = self.bands() else {
-            return errors;
+        let is_large = names.len() > MOST_WITH_COVARIANCE;
+        let error = |mean: &MeanOverRecord| EstimateError {
+            gradient: match is_large {
+                true => Vec::new(),
+                false => mean.gradient.clone(),
+            },
+            basis_error: mean.basis_error,
+            quantile: student_half_width(mean.degrees),
         };
-        let ratio = |name: &str| match name {
-            "natural_frequency" => bands.ratio("natural frequency"),
-            "damping_ratio" => bands.ratio("damping ratio"),
-            "k_over_m" => bands.ratio("k/m"),
-            "c_over_m" => bands.ratio("c/m"),
-            _ => None,
-        };
-        let function = |name: &str| bands.functions.iter().find(|band| band.name == name);
-        let error = |band: &Band| EstimateError {
-            gradient: band.mean.gradient.clone(),
-            basis_error: band.mean.basis_error,
-            quantile: student_half_width(band.mean.degrees),
-        };
+        let means = self.run_assessment.means();
         for (name, estimate) in &document.estimates.0 {
-            let band = ratio(name).or_else(|| function(name));
-            if let (Some(band), Some(_)) = (band, estimate.ci95) {
-                errors.insert(name.clone(), error(band));
+            let mean = means.as_ref().and_then(|means| self.mean(means, name));
+            if let (Some(mean), Some(_)) = (mean, estimate.ci95) {
+                errors.insert(name.clone(), error(mean));
             }
+        }
+        if is_large {
+            return errors;
         }
         for parameter in &document.nuisance_parameters {
             let index = names.iter().position(|name| *name == parameter.name);

@@ -9,6 +9,7 @@ use super::document::{
 };
 use super::fit_assessment::RunAssessment;
 use super::fit_quality;
+use super::npy::npy;
 use super::page::fit_page;
 use super::render;
 use super::suggestions::suggestions;
@@ -27,6 +28,10 @@ use std::time::Duration;
 
 /// Draws from the distribution of the estimates.
 pub const DRAWS: &str = "draws.csv";
+/// Covariance of more than 64 parameters.
+pub(super) const COVARIANCE: &str = "covariance.npy";
+/// Factor of the normal matrix of many parameters.
+const FACTOR: &str = "factor.npy";
 /// Most parameters of `parameters.json`: the values of more stand in `functions.csv`.
 const MOST_PARAMETERS: usize = 10_000;
 
@@ -55,21 +60,33 @@ impl FittedModel<'_> {
     /// Errors of the file system.
     pub fn write(&self, stage: &mut Stage, document: &ResultDocument) -> io::Result<Duration> {
         let mut writing = Duration::ZERO;
-        let mut write = |name: &str, text: &str| timed(&mut writing, || stage.write(name, text));
+        let mut write = |name: &str, bytes: &[u8]| timed(&mut writing, || stage.write(name, bytes));
         if self.model.problem.parameters() <= MOST_PARAMETERS {
-            write("parameters.json", &json(&self.parameters(document)))?;
+            write(
+                "parameters.json",
+                json(&self.parameters(document)).as_bytes(),
+            )?;
         }
-        write("history.csv", &self.history().to_csv())?;
-        write("functions.csv", &self.functions_table().to_csv())?;
-        write("trajectory.csv", &self.trajectories().to_csv())?;
+        if let Some(covariance) = self.large_covariance().and_then(|c| c.covariance.as_ref()) {
+            write(COVARIANCE, &npy(covariance))?;
+        }
+        if let Some(factor) = self.factor().filter(|_| self.requested.tables) {
+            write(FACTOR, &npy(&factor))?;
+        }
+        write("history.csv", self.history().to_csv().as_bytes())?;
+        write("functions.csv", self.functions_table().to_csv().as_bytes())?;
+        write("trajectory.csv", self.trajectories().to_csv().as_bytes())?;
         for (name, table) in self.samples() {
-            write(&name, &table.to_csv())?;
+            write(&name, table.to_csv().as_bytes())?;
         }
         if self.requested.figures {
             for figure in self.figures() {
-                write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
+                write(
+                    &format!("figures/{}.svg", figure.name),
+                    render(&figure).as_bytes(),
+                )?;
             }
-            write("report.html", &self.page(document))?;
+            write("report.html", self.page(document).as_bytes())?;
         }
         Ok(writing)
     }
@@ -130,10 +147,15 @@ impl FittedModel<'_> {
                 .collect(),
             nuisance_parameters: match self.is_simulated() {
                 true => {
-                    let covariance = self.run_assessment.covariance();
+                    let variances = self.run_assessment.variances();
                     let degrees = (self.run_assessment.assessment.as_ref())
                         .map_or(&[][..], |a| &a.degrees_of_freedom);
-                    fit_quality::scalars(&model.problem, &fit.best.evaluation, covariance, degrees)
+                    fit_quality::scalars(
+                        &model.problem,
+                        &fit.best.evaluation,
+                        variances.as_deref(),
+                        degrees,
+                    )
                 }
                 false => Vec::new(),
             },
@@ -378,6 +400,8 @@ pub fn fit_claim(model: &Model) -> Claim {
         .files([
             RESULT,
             "parameters.json",
+            COVARIANCE,
+            FACTOR,
             "history.csv",
             "functions.csv",
             "trajectory.csv",

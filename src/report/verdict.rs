@@ -105,7 +105,7 @@ impl FittedModel<'_> {
             return Estimates::default();
         }
         let problem = &self.model.problem;
-        let mut found = estimates(problem, self.fit, self.bands());
+        let mut found = estimates(problem, self.fit, self.run_assessment.means().as_ref());
         for ((_, estimate), function) in (found.iter_mut())
             .filter(|(name, _)| !is_ratio(name))
             .zip(problem.functions.iter())

@@ -65,19 +65,20 @@ impl<'a> Stage<'a> {
     ///
     /// # Errors
     /// Errors of the file system.
-    pub fn write(&mut self, name: &str, contents: &str) -> io::Result<()> {
+    pub fn write(&mut self, name: &str, contents: impl AsRef<[u8]>) -> io::Result<()> {
+        let contents = contents.as_ref();
         debug_assert!(self.claim.covers(name), "{name} was not claimed");
         self.add(name, contents)?;
         self.records
-            .insert(name.to_owned(), FileRecord::of(contents.as_bytes()));
+            .insert(name.to_owned(), FileRecord::of(contents));
         Ok(())
     }
 
-    fn add(&mut self, name: &str, contents: &str) -> io::Result<()> {
+    fn add(&mut self, name: &str, contents: &[u8]) -> io::Result<()> {
         let path = self.work.path().join(NEW).join(name);
         system::create_folders(folder_of(&path))?;
         let file = system::create_new(&path)?;
-        system::write_all(&file, contents.as_bytes())?;
+        system::write_all(&file, contents)?;
         self.unsynced.push(file);
         self.names.push(name.to_owned());
         match self.unsynced.len() < AT_ONCE {
@@ -113,7 +114,7 @@ impl<'a> Stage<'a> {
         let refused = |error: InputError| io::Error::other(error.to_string());
         let before = Manifest::read(self.folder).map_err(refused)?;
         let manifest = Manifest::new(self.claim.command, self.records.clone());
-        self.add(MANIFEST, &manifest.text())?;
+        self.add(MANIFEST, manifest.text().as_bytes())?;
         self.sync()?;
         let plan = self.plan(before.as_ref(), &manifest)?;
         let text = serde_json::to_string(&plan).map_err(io::Error::other)?;

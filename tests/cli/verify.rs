@@ -295,3 +295,44 @@ fn a_changed_record_is_found() {
     let said = bench.run_to(3, &["verify", "run"]);
     assert!(said.contains("cost"), "{said}");
 }
+
+/// The covariance of 65 to 1000 parameters stands in its own file.
+#[test]
+fn an_edited_covariance_file_is_found() {
+    let bench = Workbench::with_shipped_models();
+    let yaml = "format: 1
+title: many knots
+experiments:
+  - name: free decay
+    data: data/noisy.csv
+    columns: {time: t_s, displacement: y_m}
+    sigma: {displacement: 0.1}
+    initial: {displacement: 3.3, velocity: 1.0}
+grid: {nodes: 500, method: rk4}
+functions:
+  mass: {basis: b-spline, knots: 80, start: 2.0, penalty: {kind: tikhonov, order: 2, weight: 0.1}}
+  damping: {basis: constant, start: 0.1}
+  stiffness: {fixed: 1.0}
+";
+    bench.write("many.yaml", yaml);
+    bench.run_to(0, &["fit", "many.yaml", "--no-report"]);
+    bench.run_to(0, &["verify", "runs/many"]);
+    let path = bench.path("runs/many/covariance.npy");
+    let mut bytes = fs::read(&path).expect("a file");
+    // A variance: the last of the 83 x 83 numbers.
+    let end = bytes.len();
+    let mut last = [0; 8];
+    last.copy_from_slice(&bytes[end - 8..]);
+    let edited = f64::from_le_bytes(last) * (1.0 + 1e-5);
+    bytes[end - 8..].copy_from_slice(&edited.to_le_bytes());
+    fs::write(&path, &bytes).expect("written");
+    let said = bench.run_to(3, &["verify", "runs/many"]);
+    assert!(
+        said.contains("covariance") && said.contains("does not hold"),
+        "{said}"
+    );
+    fs::write(&path, &bytes[..end - 8]).expect("written");
+    let (code, _, error) = bench.run(&["verify", "runs/many"]);
+    assert_eq!(code, 2);
+    assert!(error.contains("the matrix is damaged"), "{error}");
+}

@@ -6,11 +6,11 @@ pub mod assessment {
         AmplitudeRival, BEYOND_SIGMA, BasisTest, ClassicalEstimate, ClassicalMethod, CoarseBasis,
         Draw, EXACT, EquationErrorIntervals, Estimate, EstimateErrors, EstimateStatus,
         FitAssessment, FitStatistics, FitWarning, FunctionInGap, FunctionSummary, GapAssessment,
-        GapStatus, Implausible, NoDraws, NoIntervals, POOR, Plausibility, RECOVERY_TOLERANCE,
-        RecordError, ResidualPattern, Roughness, StepCheck, TruthErrors, Unidentified,
-        VerdictAssumption, VerdictLevel, VerdictReason, constant_probability, diagnostics, draws,
-        estimates, function_summaries, is_same_truth, outliers, pattern, standard_error,
-        verdict_assumptions, verdict_level, verdict_reasons,
+        GapStatus, Implausible, LargeCovariance, MOST_WITH_COVARIANCE, NoDraws, NoIntervals, POOR,
+        Plausibility, RECOVERY_TOLERANCE, RecordError, ResidualPattern, Roughness, StepCheck,
+        TruthErrors, Unidentified, VerdictAssumption, VerdictLevel, VerdictReason,
+        constant_probability, diagnostics, draws, estimates, function_summaries, is_same_truth,
+        outliers, pattern, standard_error, verdict_assumptions, verdict_level, verdict_reasons,
     };
 }
 pub mod builder {
@@ -47,9 +47,9 @@ pub mod identifiability {
     pub use crate::identifiability::{
         Band, BandSettings, BandSide, Bands, CandidateChannel, CandidateExperiment, Classification,
         ClassificationKind, Condition, CovarianceKind, EquationRows, FunctionClassification, Gain,
-        RankFinding, RankFindingKind, Ranked, ResolvedDirection, ScaleFreedom, ScalingAmbiguity,
-        Sensitivity, SingularSpectrum, anchors, classify_functions, is_negligible, is_unhindered,
-        rank_experiments, residual_spread, structural_rank,
+        MeanOverRecord, Means, RankFinding, RankFindingKind, Ranked, ResolvedDirection,
+        ScaleFreedom, ScalingAmbiguity, Sensitivity, SingularSpectrum, anchors, classify_functions,
+        is_negligible, is_unhindered, rank_experiments, residual_spread, structural_rank,
     };
     pub use crate::spans::span_words;
 }

@@ -120,7 +120,7 @@ fn clean_records_are_adequate() {
 #[test]
 fn intervals_of_ratios_follow_from_the_covariance() {
     let (problem, fit, assessment) = assessed(&problem(0, None));
-    let found = estimates(&problem, &fit, assessment.bands.as_ref());
+    let found = estimates(&problem, &fit, assessment.means().as_ref());
     let get = |name: &str| {
         &found
             .iter()
@@ -210,7 +210,7 @@ fn free_records_determine_ratios_to_an_assumed_mass() {
             .nodes(4 * (SAMPLES - 1) + 1)
             .build();
         let (problem, fit, assessment) = assessed(&problem.unwrap());
-        let all = estimates(&problem, &fit, assessment.bands.as_ref());
+        let all = estimates(&problem, &fit, assessment.means().as_ref());
         let reasons = verdict_reasons(&problem, &fit, Some(&assessment));
         (all, reasons)
     };

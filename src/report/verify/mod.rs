@@ -13,9 +13,10 @@ pub use difference::Difference;
 
 use super::document::{Prediction, ResultDocument};
 use super::fit_assessment::RunAssessment;
+use super::npy::read_npy;
 use super::parameters::ParametersDocument;
 use super::result_table::ResultTable;
-use super::run::FittedModel;
+use super::run::{COVARIANCE, FittedModel};
 use super::run_reader::Run;
 use crate::config::Model;
 use crate::error::InputError;
@@ -33,7 +34,7 @@ use serde_json::Value;
 /// Cost beside that of the start that is rounding.
 const EXACT: f64 = 1e-13;
 /// Largest difference of a covariance by normal equations, in the product of the standard deviations.
-const COVARIANCE: f64 = 1e-6;
+const COVARIANCE_TOLERANCE: f64 = 1e-6;
 /// Largest relative difference of a sigma from that of the residuals: fit and estimation alternate until it changes by 1e-6.
 const SIGMA: f64 = 1e-5;
 /// Largest difference of the norms of two gradients, relative to that at the start.
@@ -197,6 +198,7 @@ impl Again<'_> {
             None => self.gradient(&reference),
         });
         checks.extend(self.covariance(&reference));
+        checks.extend(self.large_covariance()?);
         checks.extend(self.noise(&reference));
         Ok(checks)
     }
@@ -256,18 +258,22 @@ impl Again<'_> {
     fn covariance(&self, reference: &ReferenceValues) -> Option<Check> {
         let stored = self.parameters.covariance.as_ref()?;
         let n = stored.len();
-        let size = format!("{n} x {n}");
+        let stored = DMatrix::from_fn(n, n, |i, j| stored[i][j]);
         // A covariance of another kind has the factorisation of the fit.
         let of_fit = || self.fitted.bands()?.covariance.as_ref();
         let found = reference.covariance.as_ref().or_else(of_fit)?;
-        let off = covariance_difference(stored, found);
-        Some(Check {
-            name: "covariance",
-            stored: size.clone(),
-            recomputed: size,
-            difference: Some(off),
-            holds: off <= COVARIANCE,
-        })
+        Some(covariance_check(&stored, found))
+    }
+
+    /// Covariance of 65 to 1000 parameters in its file. Its standard errors are those of a dense decomposition in the tests.
+    fn large_covariance(&self) -> Result<Option<Check>, InputError> {
+        let large = self.fitted.large_covariance();
+        let Some(found) = large.and_then(|large| large.covariance.as_ref()) else {
+            return Ok(None);
+        };
+        let path = self.run.folder.join(COVARIANCE);
+        let stored = read_npy(&path, found.nrows(), found.ncols())?;
+        Ok(Some(covariance_check(&stored, found)))
     }
 
     /// Sigmas of the residuals of channels with white noise. Weights of penalties change the degrees of freedom.
@@ -393,19 +399,33 @@ fn is_estimated(channel: &Channel) -> bool {
     matches!(channel.weighting(), Weighting::Estimated { .. })
 }
 
-/// Largest difference of two covariances, in the product of the standard deviations.
-fn covariance_difference(stored: &[Vec<f64>], found: &DMatrix<f64>) -> f64 {
-    if stored.len() != found.nrows() || stored.iter().any(|row| row.len() != found.ncols()) {
-        return f64::INFINITY;
-    }
-    let mut largest = 0.0f64;
-    for (i, row) in stored.iter().enumerate() {
-        for (j, entry) in row.iter().enumerate() {
-            let size = (found[(i, i)] * found[(j, j)]).sqrt();
-            largest = largest.max((entry - found[(i, j)]).abs() / size);
+/// Compares two covariances of the same size by their largest difference, in the product of the standard deviations.
+fn covariance_check(stored: &DMatrix<f64>, found: &DMatrix<f64>) -> Check {
+    let size = |of: &DMatrix<f64>| format!("{} x {}", of.nrows(), of.ncols());
+    let deviation = |i: usize| found[(i, i)].sqrt();
+    let off = match stored.shape() == found.shape() {
+        true => {
+            let pairs = (0..found.nrows()).flat_map(|i| (0..found.ncols()).map(move |j| (i, j)));
+            let each = pairs.map(|(i, j)| {
+                let off = (stored[(i, j)] - found[(i, j)]).abs();
+                // Parameters held by an equality have no variance.
+                match () {
+                    () if off == 0.0 => 0.0,
+                    () if off.is_nan() => f64::INFINITY,
+                    () => off / (deviation(i) * deviation(j)),
+                }
+            });
+            each.fold(0.0, f64::max)
         }
+        false => f64::INFINITY,
+    };
+    Check {
+        name: "covariance",
+        stored: size(stored),
+        recomputed: size(found),
+        difference: Some(off),
+        holds: off <= COVARIANCE_TOLERANCE,
     }
-    largest
 }
 
 fn has_gap(document: &ResultDocument) -> bool {

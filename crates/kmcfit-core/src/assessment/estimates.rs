@@ -1,7 +1,7 @@
 //! The answer of a fit: estimates of natural frequency, damping ratio, coefficients and ratios with their confidence intervals.
 
 use crate::functions::{CoefficientFunction, Ratios};
-use crate::identifiability::{Band, Bands, ScaleSource, scale_source};
+use crate::identifiability::{MeanOverRecord, Means, ScaleSource, scale_source};
 use crate::problem::Problem;
 use crate::solvers::{Fit, number_or_nan};
 use crate::system::NodalCoefficients;
@@ -78,9 +78,13 @@ const RATIOS: [RatioName; 4] = [
 /// Estimates at the end of a fit with their names, the most important first: natural frequency (of the linear part, `sqrt(k/m)/(2 pi)`) and
 /// damping ratio `c/(2 sqrt(k m))`, then the functions, then `k/m` and `c/m`; the ratios before the functions where the samples determine ratios
 /// only.
-pub fn estimates(problem: &Problem, fit: &Fit, bands: Option<&Bands>) -> Vec<(String, Estimate)> {
+pub fn estimates(
+    problem: &Problem,
+    fit: &Fit,
+    means: Option<&Means<'_>>,
+) -> Vec<(String, Estimate)> {
     let best = &fit.best;
-    estimates_at(problem, &best.parameters, &best.evaluation.nodal, bands)
+    estimates_at(problem, &best.parameters, &best.evaluation.nodal, means)
 }
 
 /// [`estimates`] with the parameters `theta` and the coefficients of the shared set.
@@ -88,7 +92,7 @@ pub(super) fn estimates_at(
     problem: &Problem,
     theta: &[f64],
     nodal: &NodalCoefficients,
-    bands: Option<&Bands>,
+    means: Option<&Means<'_>>,
 ) -> Vec<(String, Estimate)> {
     let is_scaled = matches!(
         scale_source(problem),
@@ -97,14 +101,14 @@ pub(super) fn estimates_at(
     let values = problem.functions.values(theta);
     let functions = problem.functions.iter().zip(&values).enumerate();
     let functions = functions.map(|(f, (function, values))| {
-        let band = bands.map(|bands| &bands.functions[f]);
+        let mean = means.map(|means| means.functions[f]);
         let status = match () {
             () if function.basis.is_none() || function.prior.is_some() => EstimateStatus::Fixed,
             () if is_scaled && is_coefficient_of_scale(function) => EstimateStatus::OnlyAsRatio,
             () => EstimateStatus::Estimated,
         };
         let unit = function.quantity.unit();
-        (function.name(), estimate(values, band, unit, status))
+        (function.name(), estimate(values, mean, unit, status))
     });
     let functions: Vec<_> = functions.collect();
     let nodal = Ratios::of(nodal);
@@ -120,12 +124,12 @@ pub(super) fn estimates_at(
         parts.all(|(_, f)| problem.functions.get(f).basis.is_none())
     };
     let ratios = RATIOS.iter().zip(&curves).map(|(ratio, values)| {
-        let band = bands.and_then(|bands| bands.ratio(ratio.band));
+        let mean = means.and_then(|means| means.ratio(ratio.band));
         let status = match is_fixed(ratio.places) {
             true => EstimateStatus::Fixed,
             false => EstimateStatus::Estimated,
         };
-        let estimate = estimate(values, band, ratio.unit, status);
+        let estimate = estimate(values, mean, ratio.unit, status);
         (ratio.name.to_owned(), estimate)
     });
     let mut first: Vec<_> = ratios.collect();
@@ -141,14 +145,19 @@ fn is_coefficient_of_scale(function: &CoefficientFunction) -> bool {
     !function.is_known_part && function.prior.is_none()
 }
 
-fn estimate(values: &[f64], band: Option<&Band>, unit: &str, status: EstimateStatus) -> Estimate {
+fn estimate(
+    values: &[f64],
+    mean: Option<&MeanOverRecord>,
+    unit: &str,
+    status: EstimateStatus,
+) -> Estimate {
     let shares = trapezoid_weights(values.len(), 1.0 / (values.len() - 1).max(1) as f64);
     let value: f64 = match values.iter().all(|v| *v == values[0]) {
         true => values[0],
         false => values.iter().zip(shares).map(|(v, w)| v * w).sum(),
     };
-    let half = band.and_then(|band| {
-        let [low, high] = band.mean.interval()?;
+    let half = mean.and_then(|mean| {
+        let [low, high] = mean.interval()?;
         Some(0.5 * (high - low))
     });
     let is_defined = values.iter().all(|v| v.is_finite());

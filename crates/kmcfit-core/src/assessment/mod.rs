@@ -10,6 +10,7 @@ mod friction_width;
 mod function;
 mod gaps;
 mod input_disturbance;
+mod large_covariance;
 mod plausibility;
 mod record_error;
 mod record_errors;
@@ -35,6 +36,7 @@ pub use equation_error::{EquationErrorIntervals, NoIntervals};
 pub use estimates::{Estimate, EstimateStatus, estimates};
 pub use function::{EstimateErrors, FunctionSummary, function_summaries};
 pub use gaps::{FunctionInGap, GapAssessment, GapStatus};
+pub use large_covariance::{LargeCovariance, MOST_WITH_COVARIANCE};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
 pub use record_error::RecordError;
 pub use recovery::{RECOVERY_TOLERANCE, Roughness, TruthErrors, is_same_truth};
@@ -56,7 +58,7 @@ use score_tests::missing;
 use second_mode::second_modes;
 
 use crate::identifiability::{
-    BandSettings, Bands, FunctionClassification, classify_functions, condition_on_bases,
+    BandSettings, Bands, FunctionClassification, Means, classify_functions, condition_on_bases,
     condition_on_inputs, condition_on_time, except_gap,
 };
 use crate::problem::{FEW_PARAMETERS, Problem};
@@ -80,6 +82,8 @@ pub struct FitAssessment {
     pub effective_parameters: Option<Vec<f64>>,
     /// Bands of functions and ratios, where standard errors are meaningful.
     pub bands: Option<Bands>,
+    /// Covariance of the estimates with more than 64 parameters, where standard errors are meaningful.
+    pub large_covariance: Option<LargeCovariance>,
     /// Classification of functions and ratios by their bands.
     pub classifications: Vec<FunctionClassification>,
     /// Natural frequency and damping ratio by a classical method, where a record allows it.
@@ -113,6 +117,7 @@ impl FitAssessment {
             effective_parameters: None,
             degrees_of_freedom: vec![f64::INFINITY; problem.parameters()],
             bands: None,
+            large_covariance: None,
             classifications: Vec::new(),
             classical: None,
         };
@@ -170,6 +175,9 @@ impl FitAssessment {
             assessment.bands = Some(bands);
         } else if few {
             gaps = gap_assessments(problem, fit, None);
+        } else if assessment.plausibility.errors_hold && !assessment.plausibility.is_coloured {
+            assessment.large_covariance =
+                LargeCovariance::of(problem, &best.parameters, &best.evaluation);
         }
         if fit.outcome.status != Status::Failed {
             assessment.classical =
@@ -181,6 +189,13 @@ impl FitAssessment {
         let gaps = gaps.into_iter().map(FitWarning::Gap);
         assessment.plausibility.warnings.extend(gaps);
         assessment
+    }
+
+    /// Means over the record with their standard errors, where these are meaningful.
+    pub fn means(&self) -> Option<Means<'_>> {
+        let of_bands = self.bands.as_ref().map(Bands::means);
+        let large = self.large_covariance.as_ref();
+        of_bands.or_else(|| large.map(LargeCovariance::means))
     }
 
     /// Errors of the estimates, for the summaries of the functions.

@@ -35,12 +35,12 @@ use super::degrees::{NoiseVariants, degrees_of_parameters};
 use super::directions::Directions;
 use super::equation_rows::EquationRows;
 use super::linearised_curve::{LinearisedCurve, combine};
-use super::ratios::{Ratio, damping_ratio, frequency, over_mass};
+use super::means::Means;
+use super::ratios::{RatioOfSet, ratios_of_set};
 use super::sensitivity::Sensitivity;
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::spans::{span_words, spans};
-use crate::system::Term;
 use crate::system::quadrature::trapezoid_weights;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
@@ -206,6 +206,16 @@ impl Bands {
             degrees_of_freedom: degrees_of_parameters(problem, maker.variants),
             notes,
             times: maker.times,
+        }
+    }
+
+    /// Means over the record.
+    pub fn means(&self) -> Means<'_> {
+        Means {
+            functions: self.functions.iter().map(|band| &band.mean).collect(),
+            ratios: (self.ratios.iter())
+                .map(|band| (band.name.as_str(), &band.mean))
+                .collect(),
         }
     }
 
@@ -442,31 +452,9 @@ impl Maker<'_> {
 
     /// Ratios of the shared coefficient set, by the delta method.
     fn ratios(&self, values: &[Vec<f64>], linearised: &[LinearisedCurve]) -> Vec<Band> {
-        let set = self.problem.functions.coefficient_set(0);
-        let terms = &self.problem.system.terms;
-        // The functions of a coefficient: its own and its known parts.
-        let at_place = |place: usize| -> Vec<usize> {
-            let parts = set.parts().filter(|(other, _)| *other == place);
-            parts.map(|(_, f)| f).collect()
-        };
-        let of = |term: Term| {
-            let place = terms.iter().position(|t| *t == term)?;
-            Some(at_place(place + 1))
-        };
-        let (m, damping, stiffness) = (at_place(0), of(Term::Damping), of(Term::Stiffness));
-        let band = |name: &str, unit: &str, coefficients: &[&Vec<usize>], ratio: Ratio| {
-            let functions: Vec<usize> = coefficients
-                .iter()
-                .flat_map(|c| c.iter().copied())
-                .collect();
-            let at = |node: &usize| {
-                let sum = |c: &&Vec<usize>| c.iter().map(|f| values[*f][*node]).sum();
-                let at_node: Vec<f64> = coefficients.iter().map(sum).collect();
-                let (ratio, slopes) = ratio(&at_node);
-                let each = coefficients.iter().zip(slopes);
-                let each = each.flat_map(|(c, slope)| c.iter().map(move |_| slope));
-                (ratio, each.collect::<Vec<f64>>())
-            };
+        let band = |ratio: &RatioOfSet| {
+            let functions = ratio.functions();
+            let at = |node: &usize| ratio.at(values, *node);
             let (ratios, slopes): (Vec<_>, Vec<_>) = self.nodes.iter().map(at).unzip();
             let linear = combine(linearised, &functions, &slopes);
             let entries = |i: usize| -> Vec<(usize, f64)> {
@@ -476,16 +464,14 @@ impl Maker<'_> {
                     .collect()
             };
             let degrees = self.degrees(&entries);
-            self.band(name.into(), unit, ratios, &linear, (degrees, None))
+            self.band(
+                ratio.name.into(),
+                ratio.unit,
+                ratios,
+                &linear,
+                (degrees, None),
+            )
         };
-        let mut bands = Vec::new();
-        bands.extend((stiffness.iter()).map(|k| band("k/m", "1/s^2", &[k, &m], over_mass)));
-        bands.extend((damping.iter()).map(|c| band("c/m", "1/s", &[c, &m], over_mass)));
-        if let Some(k) = &stiffness {
-            bands.push(band("natural frequency", "Hz", &[k, &m], frequency));
-            let ratio = |c| band("damping ratio", "", &[c, k, &m], damping_ratio);
-            bands.extend(damping.iter().map(ratio));
-        }
-        bands
+        ratios_of_set(self.problem).iter().map(band).collect()
     }
 }

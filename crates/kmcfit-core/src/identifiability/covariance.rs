@@ -357,7 +357,7 @@ fn kernel_root(
 }
 
 /// True if the intervals of a problem are Bayesian: some penalty has a rule that gives coverage.
-pub(super) fn is_bayesian(problem: &Problem) -> bool {
+pub(crate) fn is_bayesian(problem: &Problem) -> bool {
     let rules = problem.penalties.iter().filter_map(|p| p.rule);
     rules.into_iter().any(WeightRule::gives_coverage)
 }

@@ -25,6 +25,7 @@ mod equation_rows;
 mod experiments;
 mod factorisation;
 mod linearised_curve;
+mod means;
 mod misspecified;
 mod ratios;
 mod scale_source;
@@ -59,7 +60,7 @@ pub(crate) fn has_active_rows(problem: &Problem, theta: &[f64]) -> bool {
 }
 
 pub use anchors::anchors;
-pub use band::{Band, BandSide};
+pub use band::{Band, BandSide, MeanOverRecord};
 pub use bands::{BandSettings, Bands};
 pub use classification::{
     Classification, ClassificationKind, Condition, FunctionClassification, classify_functions,
@@ -69,12 +70,15 @@ pub(crate) use classification::{
     condition_on_time, except_gap,
 };
 pub(crate) use columns::stacked;
+pub(crate) use covariance::is_bayesian;
 pub use covariance_kind::CovarianceKind;
 pub use equation_rows::EquationRows;
 pub use experiments::{
     CandidateChannel, CandidateExperiment, Gain, Ranked, rank_experiments, residual_spread,
 };
 pub(crate) use factorisation::Factorisation;
+pub use means::Means;
+pub(crate) use means::means_at;
 pub use scale_source::{ScaleSource, scale_source};
 pub use scaling_ambiguity::ScalingAmbiguity;
 pub use sensitivity::{ResolvedDirection, Sensitivity, SingularSpectrum};

@@ -1,6 +1,74 @@
 //! Ratios of coefficients at one time, with their derivatives for the delta method.
 
+use crate::problem::Problem;
+use crate::system::Term;
 use std::f64::consts::TAU;
+
+/// A ratio of the shared coefficient set.
+pub struct RatioOfSet {
+    /// Name of its band.
+    pub name: &'static str,
+    pub unit: &'static str,
+    /// For each of its coefficients the functions whose sum it is.
+    pub coefficients: Vec<Vec<usize>>,
+    pub ratio: Ratio,
+}
+
+/// `k/m`, `c/m`, natural frequency and damping ratio of the shared coefficient set, as far as the system has these terms.
+pub fn ratios_of_set(problem: &Problem) -> Vec<RatioOfSet> {
+    let set = problem.functions.coefficient_set(0);
+    let terms = &problem.system.terms;
+    // The functions of a coefficient: its own and its known parts.
+    let at_place = |place: usize| -> Vec<usize> {
+        let parts = set.parts().filter(|(other, _)| *other == place);
+        parts.map(|(_, f)| f).collect()
+    };
+    let of = |term: Term| {
+        let place = terms.iter().position(|t| *t == term)?;
+        Some(at_place(place + 1))
+    };
+    let (m, damping, stiffness) = (at_place(0), of(Term::Damping), of(Term::Stiffness));
+    let of_set = |name, unit, coefficients: &[&Vec<usize>], ratio| RatioOfSet {
+        name,
+        unit,
+        coefficients: coefficients.iter().copied().cloned().collect(),
+        ratio,
+    };
+    let mut ratios = Vec::new();
+    ratios.extend(
+        stiffness
+            .iter()
+            .map(|k| of_set("k/m", "1/s^2", &[k, &m], over_mass as Ratio)),
+    );
+    ratios.extend(
+        damping
+            .iter()
+            .map(|c| of_set("c/m", "1/s", &[c, &m], over_mass as Ratio)),
+    );
+    if let Some(k) = &stiffness {
+        ratios.push(of_set("natural frequency", "Hz", &[k, &m], frequency));
+        let of_damping = |c| of_set("damping ratio", "", &[c, k, &m], damping_ratio as Ratio);
+        ratios.extend(damping.iter().map(of_damping));
+    }
+    ratios
+}
+
+impl RatioOfSet {
+    /// All functions of the ratio.
+    pub fn functions(&self) -> Vec<usize> {
+        self.coefficients.iter().flatten().copied().collect()
+    }
+
+    /// The ratio at `node`, and its slopes in the [`functions`](Self::functions), whose `values` are given by function and node.
+    pub fn at(&self, values: &[Vec<f64>], node: usize) -> (f64, Vec<f64>) {
+        let sum = |c: &Vec<usize>| c.iter().map(|f| values[*f][node]).sum();
+        let at_node: Vec<f64> = self.coefficients.iter().map(sum).collect();
+        let (value, slopes) = (self.ratio)(&at_node);
+        let each = self.coefficients.iter().zip(slopes);
+        let each = each.flat_map(|(c, slope)| c.iter().map(move |_| slope));
+        (value, each.collect())
+    }
+}
 
 /// A ratio at a node: its value and its derivatives with respect to the coefficients.
 pub type Ratio = fn(&[f64]) -> (f64, Vec<f64>);

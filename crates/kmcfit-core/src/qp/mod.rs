@@ -19,6 +19,7 @@ mod solve;
 mod stages;
 mod subproblem;
 
+pub use chain::BandedFactor;
 pub use kkt::Kkt;
 pub use primal_dual::PrimalDual;
 pub use projection::{project, project_within};

@@ -57,7 +57,9 @@ pub use grid_refinement::{GridNotice, OnNodes, fit_on_refined_grids};
 pub use history::{IterationRecord, number_or_nan};
 pub(crate) use input_errors::input_error_effect;
 pub use iterate::Iterate;
-pub(crate) use linearization::{add_penalties, add_priors, linear_predictions, weighted_jacobian};
+pub(crate) use linearization::{
+    add_penalties, add_priors, add_soft, linear_predictions, weighted_jacobian,
+};
 pub(crate) use methods::equation_error::TESTED_TERMS;
 pub use methods::equation_error::{
     EquationBalance, EquationForm, EquationPart, EquationShare, Measurements, MissingTerm,

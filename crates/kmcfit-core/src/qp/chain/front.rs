@@ -84,6 +84,16 @@ impl Front {
         }
     }
 
+    /// Places of the variables of the present block: first those that are eliminated in it.
+    pub fn columns(&self) -> &[u32] {
+        &self.columns
+    }
+
+    /// Number of variables that are eliminated in the present block.
+    pub fn own(&self) -> usize {
+        self.own
+    }
+
     /// Registers a variable of the following rows.
     pub fn meet(&mut self, place: u32) {
         if self.met[place as usize] != self.block {
@@ -168,7 +178,7 @@ impl Front {
                 return None;
             }
             if own {
-                factor.push(column, &self.columns, self.rows.row(top - 1));
+                factor.push(column, &self.columns, self.rows.row(top - 1), false);
                 left = top;
             }
         }
@@ -200,7 +210,7 @@ impl Front {
         let n = self.ties.len();
         self.ties.swap(tie, n - 1);
         let (rest, pivot) = self.ties.split_last();
-        factor.push(column, &self.columns, pivot);
+        factor.push(column, &self.columns, pivot, true);
         for row in rest.chain(self.rows.iter_mut()) {
             let share = row[column] / pivot[column];
             if share != 0.0 {

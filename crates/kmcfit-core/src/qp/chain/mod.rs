@@ -6,9 +6,12 @@
 //! `F^T F` nor a regularisation costs digits, whatever the magnitudes of the rows, and time and memory are proportional to the
 //! number of variables.
 
+mod banded_factor;
 mod front;
 mod frontal_rows;
 mod triangular_rows;
+
+pub use banded_factor::BandedFactor;
 
 use super::Subproblem;
 use crate::constraints::Rows;

@@ -10,7 +10,7 @@ mod tests;
 
 pub(super) use halves::{halfway, in_halves};
 pub(super) use penalties::add_variations;
-pub(crate) use penalties::{add_penalties, add_priors};
+pub(crate) use penalties::{add_penalties, add_priors, add_soft};
 pub(super) use reduced::Reduced;
 pub(crate) use reduced::weighted_jacobian;
 
@@ -19,7 +19,6 @@ use crate::objective::{Evaluation, Gradient};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::qp::Subproblem;
 use crate::record::Loss;
-use penalties::add_soft;
 use reduced::of_whole_jacobian;
 
 /// Linearised predictions of an iterate.

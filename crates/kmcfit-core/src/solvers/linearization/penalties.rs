@@ -46,7 +46,7 @@ pub(in crate::solvers) fn add_variations(
 }
 
 /// Adds the rows of soft constraints violated at `parameters` as residuals.
-pub(super) fn add_soft(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
+pub(crate) fn add_soft(problem: &Problem, parameters: &[f64], sub: &mut Subproblem) {
     for group in &problem.soft {
         let root = group.row_weight().sqrt();
         for i in 0..group.rows.len() {

@@ -1,0 +1,227 @@
+//! Covariance of the estimates of a fit with many parameters, from the banded factor of its normal matrix.
+//!
+//! The covariance is that of [`Bands`](crate::identifiability::Bands): `H^-1 M H^-1` with penalties, where `H = J^T W J + R` and `M` is
+//! the part of the samples and priors, `H^-1` where the rule of the penalties gives coverage; equality constraints hold exactly,
+//! inequalities are neglected. A combination `g` of the parameters takes two substitutions: with `a = H^-1 g` its variance is
+//! `g^T a`, or the squared norm of the rows of samples and priors times `a`. The shift of the estimates by the discretisation error of
+//! the time steps is added as there.
+
+use crate::identifiability::{
+    CovarianceKind, MeanOverRecord, Means, is_bayesian, means_at, step_error,
+};
+use crate::objective::Evaluation;
+use crate::problem::{FEW_PARAMETERS, Problem};
+use crate::qp::{BandedFactor, Subproblem};
+use crate::record::{Loss, ScoreCovariance};
+use crate::solvers::{add_penalties, add_priors, add_soft, linear_predictions};
+use nalgebra::DMatrix;
+
+/// Largest number of parameters with a full covariance.
+pub const MOST_WITH_COVARIANCE: usize = 1000;
+/// Largest number of parameters whose factor is kept.
+const MOST_WITH_FACTOR: usize = 10_000;
+/// Relative change of the penalties in the differences of variances.
+const STEP: f64 = 1e-2;
+
+/// Covariance of the estimates of a fit with more than 64 parameters.
+#[derive(Debug, Clone)]
+pub struct LargeCovariance {
+    /// Kind of the covariance.
+    pub kind: CovarianceKind,
+    /// Variance of each parameter.
+    pub variances: Vec<f64>,
+    /// Covariance of the parameters, up to 1000 of them.
+    pub covariance: Option<DMatrix<f64>>,
+    functions: Vec<MeanOverRecord>,
+    ratios: Vec<(&'static str, MeanOverRecord)>,
+    /// Covariance of the means of functions, then of ratios.
+    pub covariance_of_means: DMatrix<f64>,
+    /// Factor of the normal matrix of parameters and states, up to 10,000 parameters.
+    pub factor: Option<BandedFactor>,
+}
+
+impl LargeCovariance {
+    /// Covariance at the minimum `theta`, evaluated in `evaluation`. `None` with up to 64 parameters; for samples without sigma, with a
+    /// robust loss or residuals that their noise model does not make white; and where the normal matrix has no banded factor: it is
+    /// singular, or functions with many parameters overlap in time.
+    pub fn of(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Option<Self> {
+        let is_gaussian = problem.channels().all(|channel| {
+            channel.weighting().is_sigma()
+                && channel.loss() == Loss::Squares
+                && channel.noise().scores == ScoreCovariance::Model
+        });
+        (problem.parameters() > FEW_PARAMETERS && is_gaussian).then_some(())?;
+        let normal = NormalMatrix::of(problem, theta, evaluation, 1.0)?;
+        let shift = normal.shift(problem, evaluation);
+        let (mut functions, mut ratios) = means_at(problem, theta);
+        let means = functions.iter().chain(ratios.iter().map(|(_, mean)| mean));
+        let gradients: Vec<&[f64]> = means.map(|mean| mean.gradient.as_slice()).collect();
+        let covariance_of_means = normal.covariance(&gradients, &shift);
+        let all = functions
+            .iter_mut()
+            .chain(ratios.iter_mut().map(|(_, mean)| mean));
+        for (i, mean) in all.enumerate() {
+            let error = covariance_of_means[(i, i)].max(0.0).sqrt();
+            mean.standard_error = error.hypot(mean.basis_error);
+        }
+        let covariance = (problem.parameters() <= MOST_WITH_COVARIANCE)
+            .then(|| normal.covariance_of_parameters(&shift));
+        let variances = match &covariance {
+            Some(covariance) => covariance.diagonal().iter().copied().collect(),
+            None => normal.variances(problem, theta, evaluation, &shift)?,
+        };
+        let is_known = |variance: &f64| variance.is_finite() && *variance >= 0.0;
+        variances.iter().all(is_known).then(|| Self {
+            kind: normal.kind,
+            variances,
+            covariance,
+            functions,
+            ratios,
+            covariance_of_means,
+            factor: (problem.parameters() <= MOST_WITH_FACTOR).then_some(normal.factor),
+        })
+    }
+
+    /// Means over the record, with their standard errors.
+    pub fn means(&self) -> Means<'_> {
+        Means {
+            functions: self.functions.iter().collect(),
+            ratios: (self.ratios.iter())
+                .map(|(name, mean)| (*name, mean))
+                .collect(),
+        }
+    }
+}
+
+/// Linearised rows at a minimum, in parameters and states, and the factor of their normal matrix.
+struct NormalMatrix {
+    sub: Subproblem,
+    factor: BandedFactor,
+    parameters: usize,
+    samples: usize,
+    /// Number of rows of samples and priors, which come first.
+    measured: usize,
+    kind: CovarianceKind,
+}
+
+impl NormalMatrix {
+    /// The normal matrix with the penalties multiplied by `factor`.
+    fn of(problem: &Problem, theta: &[f64], evaluation: &Evaluation, factor: f64) -> Option<Self> {
+        let mut scaled = problem.clone();
+        for penalty in &mut scaled.parts_mut().penalties {
+            penalty.weight *= factor;
+        }
+        let mut sub = linear_predictions(problem, evaluation);
+        let samples = sub.residuals.len();
+        add_priors(problem, theta, &mut sub);
+        let measured = sub.residuals.len();
+        add_penalties(&scaled, theta, &mut sub);
+        add_soft(problem, theta, &mut sub);
+        sub.constrain(&problem.constraints, theta);
+        let is_pulled = sub.residuals.len() > measured;
+        Some(Self {
+            factor: BandedFactor::of(&sub)?,
+            sub,
+            parameters: problem.parameters(),
+            samples,
+            measured,
+            kind: match (is_pulled, is_bayesian(problem)) {
+                (false, _) => CovarianceKind::Information,
+                (true, true) => CovarianceKind::Bayesian,
+                (true, false) => CovarianceKind::Penalised,
+            },
+        })
+    }
+
+    /// Product of the covariance and the combination `gradient` of the parameters.
+    fn times(&self, gradient: &[f64]) -> Vec<f64> {
+        let entries = |vector: &[f64]| -> Vec<(usize, f64)> {
+            let all = vector.iter().copied().enumerate();
+            all.filter(|(_, a)| *a != 0.0).collect()
+        };
+        let (mut product, _) = self.factor.times(&entries(gradient));
+        if self.kind == CovarianceKind::Penalised {
+            let mut rows = self.sub.residuals.multiply(&product);
+            rows[self.measured..].fill(0.0);
+            let mut moments = vec![0.0; self.sub.variables];
+            (self.sub.residuals).transpose_multiply_add(&rows, &mut moments);
+            product = self.factor.times(&entries(&moments)).0;
+        }
+        product.truncate(self.parameters);
+        product
+    }
+
+    /// Shift of the parameters by the discretisation error of the time steps; zero without one.
+    fn shift(&self, problem: &Problem, evaluation: &Evaluation) -> Vec<f64> {
+        let predicted = problem.predicted(evaluation);
+        let roots: Vec<f64> = predicted
+            .flat_map(|(channel, predicted)| channel.majorant(predicted).roots)
+            .collect();
+        let error = step_error(problem, evaluation, &roots).filter(|e| e.len() == self.samples);
+        let Some(error) = error else {
+            return vec![0.0; self.parameters];
+        };
+        let mut rows = vec![0.0; self.sub.residuals.len()];
+        let samples = rows[..self.samples].iter_mut();
+        samples.zip(error.iter()).for_each(|(row, e)| *row = -e);
+        let mut moments = vec![0.0; self.sub.variables];
+        (self.sub.residuals).transpose_multiply_add(&rows, &mut moments);
+        let entries: Vec<(usize, f64)> = moments.into_iter().enumerate().collect();
+        let (mut shift, _) = self.factor.times(&entries);
+        shift.truncate(self.parameters);
+        shift
+    }
+
+    /// Covariance of combinations of the parameters.
+    fn covariance(&self, gradients: &[&[f64]], shift: &[f64]) -> DMatrix<f64> {
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let products: Vec<Vec<f64>> = gradients.iter().map(|g| self.times(g)).collect();
+        let shifts: Vec<f64> = gradients.iter().map(|g| dot(g, shift)).collect();
+        let n = gradients.len();
+        let once = DMatrix::from_fn(n, n, |i, j| {
+            dot(gradients[i], &products[j]) + shifts[i] * shifts[j]
+        });
+        0.5 * (&once + once.transpose())
+    }
+
+    fn covariance_of_parameters(&self, shift: &[f64]) -> DMatrix<f64> {
+        let n = self.parameters;
+        let mut once = DMatrix::zeros(n, n);
+        let mut unit = vec![0.0; n];
+        for (j, mut column) in once.column_iter_mut().enumerate() {
+            unit[j] = 1.0;
+            let product = self.times(&unit);
+            unit[j] = 0.0;
+            for (i, (entry, c)) in column.iter_mut().zip(product).enumerate() {
+                *entry = c + shift[i] * shift[j];
+            }
+        }
+        0.5 * (&once + once.transpose())
+    }
+
+    /// Variances of the parameters. `H^-1 M H^-1 = H^-1 + d/de (M + (1 + e) R)^-1` at `e = 0`: those of penalised estimates are
+    /// computed by differences of four further factors, with a relative error of about the fourth power of the step.
+    fn variances(
+        &self,
+        problem: &Problem,
+        theta: &[f64],
+        evaluation: &Evaluation,
+        shift: &[f64],
+    ) -> Option<Vec<f64>> {
+        let mut variances = self.factor.variances();
+        variances.truncate(self.parameters);
+        if self.kind == CovarianceKind::Penalised {
+            for (times, weight) in [(-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)] {
+                let moved = Self::of(problem, theta, evaluation, 1.0 + times * STEP)?;
+                let slope = weight / (12.0 * STEP);
+                for (variance, moved) in variances.iter_mut().zip(moved.factor.variances()) {
+                    *variance += slope * moved;
+                }
+            }
+        }
+        for (variance, shift) in variances.iter_mut().zip(shift) {
+            *variance += shift * shift;
+        }
+        Some(variances)
+    }
+}
