@@ -695,6 +695,9 @@ fn fit_warnings() -> Vec<FitWarning> {
         FitWarning::DisturbedInput { .. } => FitWarning::DisturbedInput {
             experiment: "shaker".into(), input: InputQuantity::Force, sigma: 0.701, share: 0.052,
         },
+        FitWarning::CoherentResiduals { .. } => FitWarning::CoherentResiduals {
+            experiment: "shaker".into(), channel: "acceleration".into(), input: InputQuantity::Force, share: 0.123,
+        },
         FitWarning::ContradictedInputSigma { .. } => FitWarning::ContradictedInputSigma {
             experiment: "shaker".into(), input: InputQuantity::BaseAcceleration, given: 0.1, likely: 0.048,
         },
@@ -790,6 +793,9 @@ fn verdict_reasons() -> Vec<VerdictReason> {
         VerdictReason::Saturation { .. } => VerdictReason::Saturation { channel: "acceleration".into() },
         VerdictReason::DisturbedInput { .. } => VerdictReason::DisturbedInput {
             experiment: experiment(), input: InputQuantity::Force,
+        },
+        VerdictReason::CoherentResiduals { .. } => VerdictReason::CoherentResiduals {
+            channel: "acceleration".into(), input: InputQuantity::Force, share: 0.123,
         },
         VerdictReason::ContradictedInputSigma { .. } => VerdictReason::ContradictedInputSigma {
             experiment: experiment(), input: InputQuantity::Force,

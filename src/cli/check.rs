@@ -165,7 +165,7 @@ fn report_result(curves: &[GradientCheck]) -> u8 {
 fn write(folder: &OutputFolder, curves: &[GradientCheck]) -> std::io::Result<()> {
     let [table_name, figure_name] = FILES;
     let mut stage = folder.stage()?;
-    stage.write(figure_name, &render(&figures::gradient_error(curves)))?;
+    stage.write(figure_name, render(&figures::gradient_error(curves)))?;
     let steps = curves.iter().flat_map(|curve| curve.step.iter().copied());
     let mut steps: Vec<f64> = steps.collect();
     steps.sort_by(|a, b| b.total_cmp(a));
@@ -182,6 +182,6 @@ fn write(folder: &OutputFolder, curves: &[GradientCheck]) -> std::io::Result<()>
             steps.iter().map(error_at).collect(),
         );
     }
-    stage.write(table_name, &table.to_csv())?;
+    stage.write(table_name, table.to_csv())?;
     stage.commit()
 }

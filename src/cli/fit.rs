@@ -240,7 +240,7 @@ pub(super) fn fit_into(
         Err(reason) => {
             let document = FailureDocument::new(&model.title, &reason);
             let mut stage = folder.stage().map_err(full)?;
-            stage.write(RESULT, &json(&document)).map_err(full)?;
+            stage.write(RESULT, json(&document)).map_err(full)?;
             stage.commit().map_err(full)?;
             FitJournal::clear(folder.path()).map_err(full)?;
             return Err(CommandError::Numerical(reason));
@@ -265,7 +265,7 @@ pub(super) fn fit_into(
     let mut stage = folder.stage().map_err(full)?;
     let writing = run.write(&mut stage, &document).map_err(full)?;
     match draws {
-        Some(Ok(table)) => stage.write(DRAWS, &table.to_csv()).map_err(full)?,
+        Some(Ok(table)) => stage.write(DRAWS, table.to_csv()).map_err(full)?,
         Some(Err(reason)) => say("warning", no_draws(reason)),
         None => {}
     }
@@ -278,7 +278,7 @@ pub(super) fn fit_into(
     // The time of a resumed fit includes its earlier parts.
     let total = (before.total + clock.elapsed()).max(overhead.sum() + found.elapsed);
     document.timings = TimingsSummary::new(&found, &overhead, total);
-    stage.write(RESULT, &json(&document)).map_err(full)?;
+    stage.write(RESULT, json(&document)).map_err(full)?;
     stage.commit().map_err(full)?;
     let status = found.outcome.status;
     if status != Status::Interrupted {

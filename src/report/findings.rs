@@ -178,6 +178,17 @@ pub fn warning(warning: &FitWarning) -> Finding {
                 super::suggestions::percent(100.0 * share, 1)
             )
         }
+        FitWarning::CoherentResiduals {
+            experiment,
+            channel,
+            input,
+            share,
+        } => format!(
+            "{} of the variance of the residuals of the {channel} of {experiment} is coherent with the {}, after the noise model: \
+             a second mode, a missing force term or a delay; the confidence intervals exclude it",
+            super::suggestions::percent(100.0 * share, 0),
+            input.name().replace('_', " ")
+        ),
         FitWarning::ContradictedInputSigma {
             experiment,
             input,

@@ -191,6 +191,15 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
         VerdictReason::DisturbedInput { experiment, .. } => format!(
             "a disturbance enters through the equation of motion of {experiment}: force sensor, unmeasured drive or missing term"
         ),
+        VerdictReason::CoherentResiduals {
+            channel,
+            input,
+            share,
+        } => format!(
+            "{} of the variance of the {channel}'s residuals is coherent with the {}: dynamics are missing from the model",
+            percent(100.0 * share, 0),
+            input.name().replace('_', " ")
+        ),
         VerdictReason::ContradictedInputSigma { experiment, input } => format!(
             "the residuals contradict the stated sigma of the {} of {experiment}",
             input.name().replace('_', " ")

@@ -157,7 +157,7 @@ fn finish(workshop: &Workshop) {
     finished
         .write(&mut stage, &document)
         .expect("a run is written");
-    stage.write(RESULT, &json(&document)).expect("room");
+    stage.write(RESULT, json(&document)).expect("room");
     stage.commit().expect("a run");
 }
 

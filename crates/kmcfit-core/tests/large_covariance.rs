@@ -103,10 +103,7 @@ fn standard_errors_are_those_of_dense_decompositions() {
         spline,
     ]);
     let cases = [
-        (
-            CovarianceKind::Penalised,
-            nodal(0.05, 200, 1, given.clone()),
-        ),
+        (CovarianceKind::Penalised, nodal(0.05, 200, 1, given)),
         (
             CovarianceKind::Penalised,
             nodal(0.05, 200, 1, given).constrain(start),

@@ -36,6 +36,8 @@ const DELAY: f64 = 1.0;
 const SATURATED: f64 = 2.0;
 /// Coulomb friction relative to the root mean square of the spring force.
 const FRICTION: f64 = 0.05;
+/// Part of a second mode whose residuals the noise model describes.
+const WEAK: f64 = 0.1;
 /// Fall of the stiffness in a gap of two periods.
 const FALL: f64 = 0.25;
 
@@ -45,6 +47,7 @@ enum Kind {
     Clean,
     QuadraticDamping,
     SecondMode,
+    WeakMode,
     Saturation,
     Clocks,
     Delay,
@@ -159,9 +162,13 @@ impl Case {
         let states = self.first_mode(force);
         let (m, c, k) = (self.mass, self.damping, self.stiffness);
         match self.kind {
-            Kind::SecondMode => {
+            Kind::SecondMode | Kind::WeakMode => {
                 let ratio = 1.4 + 1.2 * self.draws[0];
-                let part = (0.3 + 0.5 * self.draws[1]) * (self.draws[2] - 0.5).signum();
+                let size = match self.kind {
+                    Kind::SecondMode => 0.3 + 0.5 * self.draws[1],
+                    _ => WEAK,
+                };
+                let part = size * (self.draws[2] - 0.5).signum();
                 let start = [if self.is_free { part } else { 0.0 }, 0.0];
                 let second = response(self.spacing, start, force, |_, y, v, f| {
                     (part * f - c * ratio * v - k * ratio * ratio * y) / m
@@ -619,6 +626,17 @@ fn friction_left_out() {
 fn a_second_mode() {
     assert_found(Kind::SecondMode, |reason| {
         matches!(reason, VerdictReason::SecondMode { .. })
+    });
+}
+
+/// A mode with a tenth of the first one's part: the noise model makes the residuals white, and the force is coherent with them.
+#[test]
+fn a_weak_second_mode() {
+    assert_found(Kind::WeakMode, |reason| {
+        matches!(
+            reason,
+            VerdictReason::CoherentResiduals { .. } | VerdictReason::SecondMode { .. }
+        )
     });
 }
 

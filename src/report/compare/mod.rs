@@ -175,10 +175,10 @@ impl Comparison {
     pub fn write(&self, folder: &OutputFolder) -> io::Result<()> {
         let mut stage = folder.stage()?;
         for figure in figures::all(self) {
-            stage.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
+            stage.write(&format!("figures/{}.svg", figure.name), render(&figure))?;
         }
-        stage.write("compare.csv", &self.to_csv())?;
-        stage.write("compare.html", &self.to_html())?;
+        stage.write("compare.csv", self.to_csv())?;
+        stage.write("compare.html", self.to_html())?;
         stage.commit()
     }
 }

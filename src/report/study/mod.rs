@@ -41,10 +41,10 @@ impl StudyDocument {
     pub fn write(&self, folder: &OutputFolder) -> io::Result<()> {
         let mut stage = folder.stage()?;
         for figure in figures::all(self) {
-            stage.write(&format!("figures/{}.svg", figure.name), &render(&figure))?;
+            stage.write(&format!("figures/{}.svg", figure.name), render(&figure))?;
         }
-        stage.write("study.html", &page::page(self))?;
-        stage.write("study.json", &json(self))?;
+        stage.write("study.html", page::page(self))?;
+        stage.write("study.json", json(self))?;
         stage.commit()
     }
 }

@@ -12,17 +12,14 @@
 //! from the equation leave such residuals alike.
 
 use super::FitWarning;
+use super::input_correlation::measured;
 use crate::diagnostics::{SIGNIFICANCE, standard_deviation};
 use crate::noise::{Correlation, InputErrors};
 use crate::objective::{Evaluation, diagnostics};
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::record::{
-    BaseMotion, Channel, Experiment, InputError, InputErrorKind, Loss, NoiseModel, Waveform,
-};
-use crate::signal::Signal;
+use crate::record::{Channel, Experiment, InputError, InputErrorKind, Loss, NoiseModel};
 use crate::simd::sum::rms;
 use crate::solvers::input_error_effect;
-use crate::system::InputQuantity;
 
 /// Ratio of a stated sigma to the likely one, or its inverse, above which it is contradicted.
 const CONTRADICTED: f64 = 1.3;
@@ -151,17 +148,6 @@ fn disturbed(
 /// True for residuals without significant autocorrelation, which leave no evidence of a disturbance.
 fn is_white(channel: &Channel, predicted: &[f64]) -> bool {
     diagnostics(channel, predicted).whiteness.p_value >= SIGNIFICANCE
-}
-
-/// The measured input of an experiment, where there is one.
-fn measured(experiment: &Experiment) -> Option<(InputQuantity, &Signal)> {
-    match (&experiment.input.force, &experiment.input.base) {
-        (Some(Waveform::Samples(signal)), None) => Some((InputQuantity::Force, signal)),
-        (None, Some(BaseMotion::Acceleration(signal))) => {
-            Some((InputQuantity::BaseAcceleration, signal))
-        }
-        _ => None,
-    }
 }
 
 fn mean_square(values: &[f64]) -> f64 {

@@ -9,6 +9,7 @@ mod estimates;
 mod friction_width;
 mod function;
 mod gaps;
+mod input_correlation;
 mod input_disturbance;
 mod large_covariance;
 mod plausibility;

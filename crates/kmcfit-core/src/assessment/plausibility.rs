@@ -2,6 +2,7 @@
 
 use super::classical::ClassicalEstimate;
 use super::gaps::GapAssessment;
+use super::input_correlation::coherent_residuals;
 use super::input_disturbance::input_warnings;
 use super::record_error::RecordError;
 use super::refinement::CoarseBasis;
@@ -110,6 +111,17 @@ pub enum FitWarning {
         /// Sigma of errors of the input that leave such residuals, in its SI unit.
         sigma: f64,
         /// The same relative to the input, root mean square.
+        share: f64,
+    },
+    /// The innovations of a channel are coherent with a measured input: dynamics are missing from the model.
+    CoherentResiduals {
+        /// Name of the experiment.
+        experiment: String,
+        /// Kind of the channel.
+        channel: String,
+        /// The input.
+        input: InputQuantity,
+        /// Share of their variance.
         share: f64,
     },
     /// The residuals contradict the stated sigma of an input.
@@ -230,6 +242,11 @@ impl Plausibility {
             (true, false, true) => Some(FitWarning::Correlated),
             _ => None,
         };
+        // Coloured residuals, and errors of the input itself, have their own warnings.
+        let coherent = match errors_hold && reports_errors && !coloured && !is_disturbed {
+            true => coherent_residuals(problem, evaluation),
+            false => None,
+        };
         let means = match unidentified.is_none() && reports_errors {
             true => mean_warnings(problem, evaluation),
             false => Vec::new(),
@@ -238,6 +255,7 @@ impl Plausibility {
             .into_iter()
             .chain(means)
             .chain(inputs)
+            .chain(coherent)
             .chain(optimistic)
             .chain(aliased);
         Self {

@@ -101,6 +101,15 @@ pub enum VerdictReason {
         /// The input.
         input: InputQuantity,
     },
+    /// The innovations of a channel are coherent with a measured input.
+    CoherentResiduals {
+        /// Kind of the channel.
+        channel: String,
+        /// The input.
+        input: InputQuantity,
+        /// Share of their variance.
+        share: f64,
+    },
     /// The residuals contradict the stated sigma of an input.
     ContradictedInputSigma {
         /// Name of the experiment.
@@ -297,7 +306,10 @@ pub fn verdict_reasons(
         let plausibility = &assessment.plausibility;
         // A missing term, a second mode or an error of a record explains other reasons.
         let (causes, others): (Vec<_>, Vec<_>) = plausibility.warnings.iter().partition(is_cause);
-        let others = others.into_iter();
+        let is_explained = !causes.is_empty();
+        let is_new =
+            |w: &&FitWarning| !(is_explained && matches!(w, FitWarning::CoherentResiduals { .. }));
+        let others = others.into_iter().filter(is_new);
         reasons.extend(
             causes
                 .into_iter()
@@ -378,6 +390,16 @@ fn of_warning(problem: &Problem, fit: &Fit, warning: &FitWarning) -> Option<Verd
         } => VerdictReason::DisturbedInput {
             experiment: experiment.clone(),
             input: *input,
+        },
+        FitWarning::CoherentResiduals {
+            channel,
+            input,
+            share,
+            ..
+        } => VerdictReason::CoherentResiduals {
+            channel: channel.clone(),
+            input: *input,
+            share: *share,
         },
         FitWarning::ContradictedInputSigma {
             experiment, input, ..

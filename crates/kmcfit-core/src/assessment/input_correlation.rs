@@ -1,0 +1,152 @@
+//! Coherence of the residuals with a measured input: dynamics that the model does not have, also where a noise model makes the residuals
+//! white.
+//!
+//! The innovations `e` of a channel are regressed on the input `u` at the time of the sample and before,
+//!
+//! ```text
+//! e_i = sum_l h_l u(t_i - l dt) + ...,    n R^2 ~ chi-square with the rank of the regressors
+//! ```
+//!
+//! for innovations independent of the input (score test; Ljung 1999, section 16.6). The squared multiple correlation `R^2` is the share of
+//! the variance of the innovations that is coherent with the input.
+
+use super::FitWarning;
+use crate::identifiability::Factorisation;
+use crate::objective::{Evaluation, diagnostics};
+use crate::problem::Problem;
+use crate::record::{BaseMotion, Channel, Experiment, Loss, Waveform};
+use crate::signal::Signal;
+use crate::system::InputQuantity;
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// Number of lags, in samples: two to four periods at usual sampling rates.
+const LAGS: usize = 40;
+/// Most samples that are judged.
+const MOST_SAMPLES: usize = 20_000;
+/// Probability below which innovations are coherent with the input.
+const CERTAIN: f64 = 1e-5;
+/// Smallest share of their variance that is named.
+const SHARE: f64 = 0.02;
+/// Singular values below this share of the largest one add no regressor.
+const RANK: f64 = 1e-3;
+/// Fit, per cent, above which residuals are errors of the time steps, which follow the input.
+const EXACT: f64 = 99.9;
+
+/// The channel whose innovations have the largest share that is coherent with the input of their experiment.
+pub(super) fn coherent_residuals(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
+    let experiments = problem.experiments.iter().zip(&evaluation.predictions);
+    let all = experiments.flat_map(|(experiment, predictions)| {
+        let channels = experiment.channels.iter().zip(predictions);
+        channels.filter_map(move |(channel, predicted)| {
+            let (input, signal) = measured(experiment)?;
+            let share = coherent_share(channel, predicted, signal)?;
+            Some((share, experiment, channel, input))
+        })
+    });
+    let (share, experiment, channel, input) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(FitWarning::CoherentResiduals {
+        experiment: experiment.name.clone(),
+        channel: channel.kind().name().to_owned(),
+        input,
+        share,
+    })
+}
+
+/// The measured input of an experiment with one input.
+pub(super) fn measured(experiment: &Experiment) -> Option<(InputQuantity, &Signal)> {
+    match (&experiment.input.force, &experiment.input.base) {
+        (Some(Waveform::Samples(signal)), None) => Some((InputQuantity::Force, signal)),
+        (None, Some(BaseMotion::Acceleration(signal))) => {
+            Some((InputQuantity::BaseAcceleration, signal))
+        }
+        _ => None,
+    }
+}
+
+/// Share of the innovations of a channel that is coherent with the input; `None` where it is not significant, and for samples at unequal
+/// intervals, without sigma or with a robust loss.
+fn coherent_share(channel: &Channel, predicted: &[f64], input: &Signal) -> Option<f64> {
+    let times = channel.times();
+    let count = times.len().checked_sub(LAGS)?.min(MOST_SAMPLES);
+    let spacing = times.get(1)? - times[0];
+    let is_even = times
+        .windows(2)
+        .all(|pair| ((pair[1] - pair[0]) / spacing - 1.0).abs() < 0.01);
+    let is_judged = is_even
+        && count > 10 * LAGS
+        && channel.weighting().is_sigma()
+        && channel.loss() == Loss::Squares
+        && diagnostics(channel, predicted).fit_percent < EXACT;
+    is_judged.then_some(())?;
+    let innovations = DVector::from_vec(channel.majorant(predicted).weighted);
+    let innovations = innovations.rows(LAGS, count);
+    let at_samples: Vec<f64> = times.iter().map(|t| input.value(*t)).collect();
+    let mean = at_samples.iter().sum::<f64>() / at_samples.len() as f64;
+    let regressors = DMatrix::from_fn(count, LAGS, |i, l| at_samples[LAGS + i - l] - mean);
+    let factorisation = Factorisation::of(&regressors).above(RANK);
+    let moments = regressors.tr_mul(&innovations);
+    let explained = factorisation.inverse_root().tr_mul(&moments).norm_squared();
+    let share = explained / innovations.norm_squared();
+    let law = ChiSquared::new(factorisation.rank as f64).ok()?;
+    let probability = 1.0 - law.cdf(count as f64 * share);
+    (probability < CERTAIN && share > SHARE).then_some(share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, CoefficientSpec, Record};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn white(seed: u64, count: usize) -> Vec<f64> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        (0..count)
+            .map(|_| StandardNormal.sample(&mut random))
+            .collect()
+    }
+
+    /// The right system, whose samples are its response, white noise of unit variance, and a multiple of the force three samples before.
+    fn share(seed: u64, factor: f64) -> Option<f64> {
+        let count = 1000;
+        let times: Vec<f64> = (0..count).map(|i| 0.05 * i as f64).collect();
+        let force = white(seed, count);
+        let start = [2.0, 3.0, 50.0].map(CoefficientSpec::constant);
+        let record = |samples: &[f64]| {
+            let record = Record::new("shaker")
+                .from_state(0.0, 0.0)
+                .force(&times, &force);
+            let record = record.displacement(&times, samples).sigma(1.0);
+            let builder = Builder::new(start.clone()).record(record);
+            builder.build().unwrap()
+        };
+        let simulated = record(&vec![0.0; count])
+            .evaluate(&[2.0, 3.0, 50.0])
+            .unwrap();
+        let noise = white(1000 + seed, count);
+        let samples = simulated.predictions[0][0].iter().zip(noise).enumerate();
+        let samples: Vec<f64> = samples
+            .map(|(i, (y, e))| y + e + i.checked_sub(3).map_or(0.0, |j: usize| factor * force[j]))
+            .collect();
+        let problem = record(&samples);
+        let evaluation = problem.evaluate(&[2.0, 3.0, 50.0]).unwrap();
+        match coherent_residuals(&problem, &evaluation)? {
+            FitWarning::CoherentResiduals { share, .. } => Some(share),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// A part of 0.3 times the force has the share `0.09 / 1.09` of the variance, to which chance adds `40 / n`; the standard error is about
+    /// `2 sqrt(R^2 (1 - R^2) / n) = 0.02`.
+    #[test]
+    fn a_part_of_the_force_is_found_and_noise_is_not() {
+        for seed in 0..20 {
+            assert_eq!(share(seed, 0.0), None, "{seed}");
+            let expected = 0.09 / 1.09 + 40.0 / 960.0;
+            let found = share(seed, 0.3).expect("a coherent part");
+            assert!((found - expected).abs() < 0.06, "{seed}: {found}");
+        }
+    }
+}
