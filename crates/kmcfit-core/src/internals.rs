@@ -47,9 +47,10 @@ pub mod identifiability {
     pub use crate::identifiability::{
         Band, BandSettings, BandSide, Bands, CandidateChannel, CandidateExperiment, Classification,
         ClassificationKind, Condition, CovarianceKind, EquationRows, FunctionClassification, Gain,
-        MeanOverRecord, Means, RankFinding, RankFindingKind, Ranked, ResolvedDirection,
-        ScaleFreedom, ScalingAmbiguity, Sensitivity, SingularSpectrum, anchors, classify_functions,
-        is_negligible, is_unhindered, rank_experiments, residual_spread, structural_rank,
+        MeanOverRecord, Means, RankFinding, RankFindingKind, Ranked, RelativeChange,
+        ResolvedDirection, ScaleFreedom, ScalingAmbiguity, Sensitivity, SingularSpectrum, anchors,
+        classify_functions, is_negligible, is_unhindered, rank_experiments, residual_spread,
+        structural_rank,
     };
     pub use crate::spans::span_words;
 }

@@ -3,13 +3,15 @@
 use super::document::*;
 use crate::config::{Candidate, Equivalent, Model, StudyPlan, StudyTarget};
 use crate::finding::Finding;
+use crate::number_format::{resolved, significant};
 use crate::report::findings;
 use kmcfit_core::internals::assessment::Plausibility;
 use kmcfit_core::internals::diagnostics::{chi_square_one, normal_half_width};
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::identifiability::{
-    self, Band, BandSettings, Bands, CandidateChannel, ScalingAmbiguity, Sensitivity, anchors,
-    classify_functions, rank_experiments, residual_spread,
+    self, Band, BandSettings, Bands, CandidateChannel, Classification, FunctionClassification,
+    RelativeChange, ScalingAmbiguity, Sensitivity, anchors, classify_functions, rank_experiments,
+    residual_spread,
 };
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
@@ -129,14 +131,80 @@ pub fn bands(at: Optimum, plan: &StudyPlan, truth: Option<&NodalCoefficients>) -
         notes,
         classification: (judged.into_iter())
             .map(|j| ClassificationRecord {
+                text: with_numbers(at, &bands, &j),
                 verdict: j.verdict.name().into(),
                 name: j.name,
-                text: j.sentence,
             })
             .collect(),
         turning_points,
         zero_crossings,
     }
+}
+
+/// A classification with the mean over the record, its interval, and for a function that varies its largest change.
+fn with_numbers(at: Optimum, bands: &Bands, found: &FunctionClassification) -> String {
+    let is_identified = matches!(
+        found.verdict,
+        Classification::Identified { .. } | Classification::Conditional { .. }
+    );
+    let means = bands.means();
+    let place = (at.problem.functions.iter()).position(|f| f.name() == found.name);
+    let mean = match place {
+        Some(f) => means.functions.get(f).copied(),
+        None => means.ratio(&found.name),
+    };
+    let (Some(mean), true) = (mean, is_identified) else {
+        return found.sentence.clone();
+    };
+    let Some([low, high]) = mean.interval() else {
+        return found.sentence.clone();
+    };
+    let list = bands.functions.iter().chain(&bands.ratios);
+    let band = list.into_iter().find(|band| band.name == found.name);
+    let is_constant = |band: &Band| band.values.iter().all(|x| *x == band.values[0]);
+    let of_mean = match band.is_some_and(is_constant) {
+        true => "",
+        false => "mean ",
+    };
+    let unit = band.map_or("", |band| band.unit.as_str());
+    let half = 0.5 * (high - low);
+    let [value, low, high] = resolved([mean.value, low, high], half);
+    let mut text = format!(
+        "{}: {of_mean}{value} {unit} (95 % CI {low} to {high})",
+        found.name
+    );
+    if mean.value.abs() < half {
+        text += ", does not differ from zero";
+    }
+    let change = place.and_then(|f| bands.relative_change(at.problem, at.theta, f));
+    text += &change.map(change_in_words).unwrap_or_default();
+    let on = match &found.verdict {
+        Classification::Conditional { .. } => format!("; {}", found.sentence),
+        _ => String::new(),
+    };
+    text + &on
+}
+
+/// `; falls by 18 % (95 % CI 17 to 19 %) between 4 s and 9 s`.
+fn change_in_words(change: RelativeChange) -> String {
+    let [from, to] = change.times.map(|t| significant(t, 3));
+    let [low, high] = change.interval;
+    let half = 50.0 * (high - low);
+    if low <= 0.0 && high >= 0.0 {
+        let [low, high] = resolved([100.0 * low, 100.0 * high], half);
+        return format!(
+            "; its change between {from} s and {to} s is not significant (95 % CI {low} to {high} %)"
+        );
+    }
+    let sign = 100.0 * change.relative.signum();
+    let mut numbers = [sign * change.relative, sign * low, sign * high];
+    numbers[1..].sort_by(f64::total_cmp);
+    let [size, low, high] = resolved(numbers, half);
+    let verb = match change.relative < 0.0 {
+        true => "falls",
+        false => "rises",
+    };
+    format!("; {verb} by {size} % (95 % CI {low} to {high} %) between {from} s and {to} s")
 }
 
 fn band_record(band: &Band, factor: f64, truth: Option<&[f64]>) -> BandRecord {

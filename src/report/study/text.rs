@@ -51,15 +51,21 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
             study.sensitivity.iter().flat_map(sensitivity).collect(),
         ),
         (
-            "Identifiability of functions and ratios",
+            "Identifiability of functions and ratios, within the model",
             study.bands.iter().flat_map(bands).collect(),
         ),
         (
             "Likelihood profiles",
             lines(&study.profiles, |p| p.text.clone()),
         ),
-        ("Data-consistent extremes", extremes(study)),
-        ("Equivalent systems", equivalent_systems(study)),
+        (
+            "Data-consistent extremes, within the model",
+            extremes(study),
+        ),
+        (
+            "Equivalent systems, in a wider model",
+            equivalent_systems(study),
+        ),
         (
             "Fits from random starting points",
             multistart

@@ -14,14 +14,20 @@
 use super::columns::stacked;
 use super::covariance::Information;
 use super::factorisation::Factorisation;
+use super::means::means_at;
 use super::scaling_ambiguity::ScalingAmbiguity;
 use super::sensitivity::Sensitivity;
-use crate::diagnostics::rms;
+use crate::diagnostics::{NORMAL_975, rms};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::{Channel, ChannelKind, Experiment, Weighting};
 use crate::system::{Excitation, State};
 use nalgebra::{DMatrix, DVector};
+
+/// Share of the slope of a mean in undetermined combinations from which the mean is undetermined.
+const HIDDEN: f64 = 1e-6;
+/// Ratio of half-widths, after to before, above which no gain is named.
+const GAINED: f64 = 0.99;
 
 /// Measured channel of a candidate, with a sample at every node.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,6 +79,19 @@ pub struct Gain {
     pub average: f64,
     /// E: ratio of the largest.
     pub worst: f64,
+    /// The function whose mean over the record gains most, where all samples have a sigma.
+    pub narrowed: Option<Narrowed>,
+}
+
+/// Half-width of the 95 % interval of the mean of a function, relative to the mean.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Narrowed {
+    /// Name of the function.
+    pub function: String,
+    /// With the existing records.
+    pub before: f64,
+    /// With the candidate.
+    pub after: f64,
 }
 
 /// A candidate with its gain, or the reason for a failed simulation.
@@ -101,7 +120,19 @@ impl Ranked {
                     many => format!("{many} additional parameter combinations{scale}"),
                 };
                 let factor = format!("{:.3}", gain.volume);
-                match (gain.new_directions, factor == "1.000") {
+                let narrowed = gain.narrowed.as_ref().map(|of| {
+                    let [before, after] = [of.before, of.after].map(|share| {
+                        let percent = 100.0 * share;
+                        let digits = (1.0 - percent.log10().floor()).clamp(0.0, 6.0) as usize;
+                        format!("{percent:.digits$}")
+                    });
+                    format!(
+                        "; the 95 % half-width of the mean {} falls from {before} to {after} %",
+                        of.function
+                    )
+                });
+                let narrowed = narrowed.unwrap_or_default();
+                let gained = match (gain.new_directions, factor == "1.000") {
                     (0, true) => format!(
                         "`{}`: {more}; standard errors unchanged (factor {factor})",
                         self.name
@@ -114,7 +145,8 @@ impl Ranked {
                         "`{}`: {more}; standard errors of the others change by a factor {factor}",
                         self.name
                     ),
-                }
+                };
+                gained + &narrowed
             }
         }
     }
@@ -151,7 +183,9 @@ pub fn rank_experiments(
         let before = &known.singular_values[..determined];
         let old = DMatrix::from_diagonal(&DVector::from_column_slice(before));
         let both = stacked(&old, &(&added * known.determined()));
-        let after = Factorisation::of(&both).singular_values;
+        let with_candidate = Factorisation::of(&both);
+        let narrowed = narrowed(problem, theta, &information, [&known, &with_candidate]);
+        let after = with_candidate.singular_values;
         let inverse = |values: &[f64]| values.iter().map(|s| 1.0 / (s * s)).sum::<f64>();
         let shrinks = |ratio: f64| if determined == 0 { 1.0 } else { ratio };
         let logs = before.iter().zip(&after).map(|(s, t)| s.ln() - t.ln());
@@ -166,6 +200,7 @@ pub fn rank_experiments(
                 (Some(s), Some(t)) => s / t,
                 _ => 1.0,
             },
+            narrowed,
         })
     };
     let each = candidates.iter().map(|candidate| Ranked {
@@ -182,6 +217,42 @@ pub fn rank_experiments(
         (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2))
     });
     ranked
+}
+
+/// The estimated function whose mean is determined by the existing records (their rows factorised first) and gains most by a candidate
+/// (second, in the combinations that the first determines).
+fn narrowed(
+    problem: &Problem,
+    theta: &[f64],
+    information: &Information,
+    [known, with_candidate]: [&Factorisation; 2],
+) -> Option<Narrowed> {
+    let has_sigmas = problem.channels().all(|c| c.weighting().is_sigma());
+    has_sigmas.then_some(())?;
+    let directions = &information.sensitivity().directions;
+    let (means, _) = means_at(problem, theta);
+    let all = means.iter().zip(problem.functions.iter());
+    let each = all.filter_map(|(mean, function)| {
+        let entries = mean.gradient.iter().copied().enumerate();
+        let along = DVector::from_vec(directions.row(entries));
+        let inside = known.determined().tr_mul(&along);
+        let hidden = (along.norm_squared() - inside.norm_squared())
+            .max(0.0)
+            .sqrt();
+        (inside.norm() > 0.0 && hidden <= HIDDEN * along.norm()).then_some(())?;
+        let before = known.inverse_root().tr_mul(&along).norm();
+        let after = with_candidate.inverse_root().tr_mul(&inside).norm();
+        let half = |error: f64| NORMAL_975 * error / mean.value.abs();
+        Some(Narrowed {
+            function: function.name(),
+            before: half(before),
+            after: half(after),
+        })
+    });
+    let ratio = |of: &Narrowed| of.after / of.before;
+    let best = each.filter(|of| ratio(of).is_finite());
+    let best = best.min_by(|a, b| ratio(a).total_cmp(&ratio(b)))?;
+    (ratio(&best) < GAINED).then_some(best)
 }
 
 /// True if one more record reduces the scaling ambiguity.

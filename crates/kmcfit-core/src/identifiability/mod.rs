@@ -14,6 +14,7 @@ mod band_curves;
 mod band_notes;
 mod bands;
 mod basis_error;
+mod change;
 mod classification;
 mod columns;
 mod components;
@@ -62,6 +63,7 @@ pub(crate) fn has_active_rows(problem: &Problem, theta: &[f64]) -> bool {
 pub use anchors::anchors;
 pub use band::{Band, BandSide, MeanOverRecord};
 pub use bands::{BandSettings, Bands};
+pub use change::RelativeChange;
 pub use classification::{
     Classification, ClassificationKind, Condition, FunctionClassification, classify_functions,
 };
