@@ -981,8 +981,8 @@ fn suggestions() -> Vec<Suggestion> {
         Suggestion::ShiftTimes { .. } => Suggestion::ShiftTimes { experiment: "shaker".into(), delay: -0.0125 },
         Suggestion::ScaleTimes { .. } => Suggestion::ScaleTimes { experiment: "shaker".into(), percent: -0.85 },
         Suggestion::NarrowFriction => Suggestion::NarrowFriction,
-        Suggestion::FinerBasis { .. } => Suggestion::FinerBasis { function: "stiffness".into() },
-        Suggestion::MoreParameters { .. } => Suggestion::MoreParameters { absent: vec!["cubic", "friction"] },
+        Suggestion::FinerBasis { .. } => Suggestion::FinerBasis { function: "stiffness".into(), without_sigma: false },
+        Suggestion::FinerBasis { .. } => Suggestion::FinerBasis { function: "stiffness".into(), without_sigma: true },
         Suggestion::Constant { .. } => Suggestion::Constant { function: "damping".into(), p_value: 0.62 },
         Suggestion::StudyUnidentifiable { .. } => Suggestion::StudyUnidentifiable {
             parameters: 6000, rank_bound: 1999, can_be_simpler: true,
@@ -994,7 +994,7 @@ fn suggestions() -> Vec<Suggestion> {
             channel: channel(), has_sigma: false, pattern: ResidualPattern::Offset,
         },
         Suggestion::Mismatch { .. } => Suggestion::Mismatch {
-            channel: Some((channel(), "shaker".into())), fit: 12.0, start_from_data: true, suspect: Suspect::Functions, absent: vec![],
+            channel: Some((channel(), "shaker".into())), fit: 12.0, start_from_data: true, suspect: Suspect::Functions, absent: vec![], without_sigma: false,
         },
     ];
     all.extend(patterns().into_iter().map(|pattern| Suggestion::Pattern {
@@ -1008,6 +1008,7 @@ fn suggestions() -> Vec<Suggestion> {
         start_from_data: false,
         suspect,
         absent: vec!["cubic"],
+        without_sigma: false,
     }));
     all
 }

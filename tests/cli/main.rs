@@ -1,5 +1,6 @@
 //! The program as a process: exit code, output and files for given arguments.
 
+mod advice;
 mod arithmetic;
 mod bad_input;
 mod check;

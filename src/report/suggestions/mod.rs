@@ -2,6 +2,7 @@
 
 mod text;
 
+use super::cost::CostKind;
 use super::document::{ChannelSummary, ExperimentSummary, ResultDocument};
 use crate::finding::Finding;
 use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR, ResidualPattern};
@@ -83,6 +84,9 @@ pub enum Suggestion {
         suspect: Suspect,
         /// Force terms that the model lacks.
         absent: Vec<&'static str>,
+        /// True if automatic knots need a sigma.
+        #[serde(skip)]
+        without_sigma: bool,
     },
     /// The sigma of a measured input whose errors explain the residuals.
     StateInputSigma {
@@ -143,11 +147,9 @@ pub enum Suggestion {
     FinerBasis {
         /// Name of the function.
         function: String,
-    },
-    /// More parameters or terms for autocorrelated residuals.
-    MoreParameters {
-        /// Force terms that the model lacks.
-        absent: Vec<&'static str>,
+        /// True if automatic knots need a sigma.
+        #[serde(skip)]
+        without_sigma: bool,
     },
     /// A constant in place of a function.
     Constant {
@@ -268,6 +270,7 @@ fn about_bases(document: &ResultDocument) -> Option<Suggestion> {
     let function = coarse.quantities.get("function")?.as_str()?;
     Some(Suggestion::FinerBasis {
         function: function.to_owned(),
+        without_sigma: without_sigma(document),
     })
 }
 
@@ -419,12 +422,7 @@ fn about_residuals(document: &ResultDocument) -> Option<Suggestion> {
     let named = document.experiments.iter();
     let mut named = named.flat_map(|e| e.channels.iter().map(move |c| (e, c)));
     let poor = |c: &ChannelSummary| c.fit_percent.is_finite() && c.fit_percent < POOR;
-    let Some((record, channel)) = named.find(|(_, channel)| poor(channel)) else {
-        let absent = absent(document);
-        let is_explained = about_inputs(document).is_some();
-        return (!is_explained && channels().any(is_coloured))
-            .then_some(Suggestion::MoreParameters { absent });
-    };
+    let (record, channel) = named.find(|(_, channel)| poor(channel))?;
     let fit = channel.fit_percent;
     let kind = channel.kind.clone();
     let has_outliers = |sigma: f64| channel.rms_residual > BEYOND_SIGMA * sigma;
@@ -443,7 +441,16 @@ fn about_residuals(document: &ResultDocument) -> Option<Suggestion> {
         start_from_data: !tried && document.is_simulated(),
         suspect: suspect(document, record),
         absent: absent(document),
+        without_sigma: without_sigma(document),
     })
+}
+
+/// True if automatic knots need a sigma: for a fit of the response without one in some channel.
+fn without_sigma(document: &ResultDocument) -> bool {
+    matches!(
+        document.model.cost_kind,
+        CostKind::Integral | CostKind::Mixed
+    )
 }
 
 fn about_ending(document: &ResultDocument) -> Option<Suggestion> {
@@ -453,6 +460,8 @@ fn about_ending(document: &ResultDocument) -> Option<Suggestion> {
         Status::TimeLimit => Some(Suggestion::MoreTime),
         Status::Interrupted => Some(Suggestion::Resume),
         Status::Stalled if !is_newton => Some(Suggestion::AnotherMethod),
+        // The minimum of an equation error does not depend on the start.
+        Status::Infeasible if !document.is_simulated() => None,
         Status::Stalled | Status::Infeasible | Status::Failed => Some(Suggestion::AnotherStart),
         Status::Converged | Status::Completed => None,
     }

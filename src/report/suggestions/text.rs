@@ -57,12 +57,13 @@ impl fmt::Display for Suggestion {
                 start_from_data,
                 suspect,
                 absent,
+                without_sigma,
             } => {
                 write_fit(f, channel.as_ref(), *fit)?;
                 if *start_from_data {
                     f.write_str("start from the record (fit.initial=data), or ")?;
                 }
-                write_suspect(f, suspect, &more_parameters(absent))
+                write_suspect(f, suspect, &more_parameters(absent, *without_sigma))
             }
             Suggestion::StateInputSigma { input, sigma } => write!(
                 f,
@@ -137,13 +138,14 @@ impl fmt::Display for Suggestion {
             Suggestion::NarrowFriction => f.write_str(
                 "reduce the width of Coulomb friction until the estimates do not depend on it: `width: auto`, with an automatic grid",
             ),
-            Suggestion::FinerBasis { function } => write!(
+            Suggestion::FinerBasis {
+                function,
+                without_sigma,
+            } => write!(
                 f,
-                "let the {function} vary more freely (`basis: b-spline`, `knots: auto`); an error of the input and a missing force term, too, appear as a coefficient that varies"
+                "let the {function} vary more freely ({}); an error of the input and a missing force term, too, appear as a coefficient that varies",
+                spline(*without_sigma)
             ),
-            Suggestion::MoreParameters { absent } => {
-                write!(f, "the residuals are autocorrelated: {}", more_parameters(absent))
-            }
             Suggestion::Constant { function, p_value } => write!(
                 f,
                 "a constant {function} is not rejected (Wald test, p = {}): use `basis: constant` without `knots` and `penalty`",
@@ -198,14 +200,22 @@ fn write_suspect(f: &mut fmt::Formatter<'_>, suspect: &Suspect, more: &str) -> f
 }
 
 /// More parameters of the functions, and the terms that the model lacks.
-fn more_parameters(absent: &[&str]) -> String {
-    let functions = "let a coefficient vary (`basis: b-spline`, `knots: auto`)";
+fn more_parameters(absent: &[&str], without_sigma: bool) -> String {
+    let functions = format!("let a coefficient vary ({})", spline(without_sigma));
     let terms = absent
         .join(", ")
         .replace("friction", "friction with its width");
     match absent.is_empty() {
-        true => functions.into(),
+        true => functions,
         false => format!("{functions} or add a force term ({terms})"),
+    }
+}
+
+/// A spline with automatic knots, which need a sigma in every experiment.
+fn spline(without_sigma: bool) -> &'static str {
+    match without_sigma {
+        true => "`basis: b-spline`, `knots: auto`, with `sigma` in every experiment",
+        false => "`basis: b-spline`, `knots: auto`",
     }
 }
 
