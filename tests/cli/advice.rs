@@ -350,23 +350,23 @@ const LINEAR: System = System {
 fn each_kind_improves_the_prediction_of_another_record() {
     let mut failed = Vec::new();
     for case in CASES {
-        let bench = Workbench::empty();
-        bench.write("fitted.csv", &record(&case.system, 1, NOISE, case.defect));
-        bench.write("second.csv", &record(&case.system, 2, 0.0, same));
-        let wrong = replaced(MODEL, case.wrong, None);
-        let (result, before) = fitted(&bench, &wrong);
-        let advice = result["advice"].as_array().into_iter().flatten();
-        let mut advice = advice.filter(|a| a["kind"] == case.kind);
-        let Some(found) = advice.next() else {
-            let found = [
-                &result["advice"],
-                &result["outcome"],
-                &result["verdict"]["reasons"],
-            ];
-            failed.push(format!("{}: {found:#?}", case.kind));
-            continue;
+        // Noise decides single comparisons of two unbiased estimates.
+        let seeds = if case.kind == "state_input_sigma" {
+            8
+        } else {
+            1
         };
-        let (_, after) = fitted(&bench, &replaced(&wrong, case.remedy, Some(found)));
+        let (mut before, mut after) = (0.0, 0.0);
+        for seed in 1..=seeds {
+            match case.residuals(seed) {
+                Ok([wrong, corrected]) => {
+                    before += wrong * wrong;
+                    after += corrected * corrected;
+                }
+                Err(other) => failed.push(format!("{} {seed}: {other}", case.kind)),
+            }
+        }
+        let [before, after] = [before, after].map(f64::sqrt);
         let improves = format!("{}: {before:.4e} -> {after:.4e}", case.kind);
         println!("{improves}");
         if after >= 0.98 * before {
@@ -374,4 +374,30 @@ fn each_kind_improves_the_prediction_of_another_record() {
         }
     }
     assert!(failed.is_empty(), "{}", failed.join("\n"));
+}
+
+impl Case {
+    /// Residuals of the validation record before and after the remedy; what the fit says where the advice is not given.
+    fn residuals(&self, seed: u64) -> Result<[f64; 2], String> {
+        let bench = Workbench::empty();
+        bench.write(
+            "fitted.csv",
+            &record(&self.system, seed, NOISE, self.defect),
+        );
+        bench.write("second.csv", &record(&self.system, seed + 100, 0.0, same));
+        let wrong = replaced(MODEL, self.wrong, None);
+        let (result, before) = fitted(&bench, &wrong);
+        let advice = result["advice"].as_array().into_iter().flatten();
+        let mut advice = advice.filter(|a| a["kind"] == self.kind);
+        let Some(found) = advice.next() else {
+            let found = [
+                &result["advice"],
+                &result["outcome"],
+                &result["verdict"]["reasons"],
+            ];
+            return Err(format!("{found:#?}"));
+        };
+        let (_, after) = fitted(&bench, &replaced(&wrong, self.remedy, Some(found)));
+        Ok([before, after])
+    }
 }
