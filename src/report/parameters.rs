@@ -1,6 +1,7 @@
 //! `parameters.json`: all parameters of a fit with their covariance, so that every printed interval can be computed again.
 
 use super::document::{FORMAT, NoiseSummary, ResultDocument};
+use super::ratios;
 use super::run::FittedModel;
 use crate::error::InputError;
 use crate::text_io::{JSON, read_text_within};
@@ -272,7 +273,7 @@ impl FittedModel<'_> {
             quantile: student_half_width(band.mean.degrees),
         };
         for (name, estimate) in &document.estimates.0 {
-            let band = ratio(name).or_else(|| function(name));
+            let band = ratio(name).or_else(|| function(&ratios::function_of(name)));
             if let (Some(band), Some(_)) = (band, estimate.ci95) {
                 errors.insert(name.clone(), error(band));
             }
