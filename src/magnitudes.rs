@@ -350,7 +350,7 @@ mod tests {
         }
     }
 
-    /// A line at 0.05 Hz over 400 periods beside noise: 50 Hz in ms. A decay at that frequency is broad.
+    /// A line at 0.05 Hz over 400 periods beside noise: 50 Hz in ms. A decay at that frequency is broad; no unit is smaller than µs.
     #[test]
     fn mains_hum_shows_milliseconds() {
         let seconds = unit(Quantity::Time, "s");
@@ -367,7 +367,7 @@ mod tests {
             |i: usize| (-0.01 * TAU * 0.05 * i as f64).exp() * (TAU * 0.05 * i as f64).sin();
         let decay: Vec<f64> = (0..8000).map(|i| 0.02 * noise(i) + decay(i)).collect();
         assert_eq!(mains_hum(&decay, 1.0, seconds), None);
-        assert_eq!(mains_hum(&hum, 1.0, unit(Quantity::Time, "ms")), None);
+        assert_eq!(mains_hum(&hum, 1.0, unit(Quantity::Time, "µs")), None);
     }
 
     #[test]
