@@ -25,8 +25,8 @@ const MOST_GAPS: usize = 3;
 pub fn overview(model: &Model) -> String {
     let mut lines = Vec::new();
     let own = model.problem.experiments.iter().zip(&model.notes);
-    let held_out = model.validation.iter().map(|v| (&v.experiment, &v.notes));
-    for (experiment, notes) in own.chain(held_out) {
+    let validation = model.validation.iter().map(|v| (&v.experiment, &v.notes));
+    for (experiment, notes) in own.chain(validation) {
         for (channel, note) in experiment.channels.iter().zip(notes) {
             lines.extend(of_channel(experiment, channel, note));
         }
