@@ -29,6 +29,7 @@ pub mod finding;
 pub mod fitting;
 pub mod formats;
 pub mod guide;
+mod magnitudes;
 mod memory;
 #[cfg(test)]
 mod message_list_tests;

@@ -61,6 +61,8 @@ fn models_are_valid_and_their_gradients_exact() {
         fs::write(clone.path().join("models/shown.yaml"), model.text()).expect("a file");
         let printed = output(clone.path(), "kmcfit check models/shown.yaml");
         assert!(printed.contains(expected), "{printed}");
+        assert!(!printed.contains("no response"), "{printed}");
+        let printed = output(clone.path(), "kmcfit check models/shown.yaml --gradient");
         let verdict = "the discrete gradient is exact: smallest relative error below 1e-6\n";
         assert!(printed.ends_with(verdict), "{printed}");
         let printed = output(clone.path(), "kmcfit fit models/shown.yaml");

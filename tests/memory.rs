@@ -126,7 +126,7 @@ fn small_models_are_fitted_or_refused() {
     let commands: [&[&str]; 13] = [
         &["fit", "small.yaml", "--out", "a"],
         &["simulate", "small.yaml", "--out", "s.csv"],
-        &["check", "small.yaml"],
+        &["check", "small.yaml", "--gradient"],
         &["predict", "run", "--initial", "1,0", "--out", "p"],
         &["compare", "small.yaml", "run", "--out", "c"],
         &["study", "study.yaml", "--threads", "2", "--out", "t"],
@@ -174,7 +174,7 @@ fn large_models_are_refused_and_the_older_run_stays_whole() {
             "--out",
             "run/functions.csv",
         ],
-        &["check", "small.yaml", "--nodes", "21,5000000"],
+        &["check", "small.yaml", "--gradient", "--nodes", "21,5000000"],
         &["compare", "large.yaml", "--out", "run"],
         &["study", "large.yaml", "--out", "run"],
         // A fit of it would fit into the largest limit; a study takes more.
@@ -265,7 +265,7 @@ fn long_records_are_read_or_refused() {
     let (mut read, mut refused) = (0, 0);
     for limit in LIMITS {
         for arguments in [
-            &["check", "long.yaml", "--no-gradient"][..],
+            &["check", "long.yaml"][..],
             &["init", "long.csv", "--out", "new.yaml"][..],
         ] {
             let (code, said) = bench.run(Some(limit), arguments);

@@ -118,6 +118,15 @@ fn forced(
     mut states: Vec<State>,
     prepare: impl Fn() -> Result<Option<OutputFolder>, InputError>,
 ) -> Result<u8, CommandError> {
+    if run.document.model.mass_unknown
+        && let Some(force) = &arguments.force
+    {
+        return Err(InputError::argument("--force", "the mass of the fitted system is unknown")
+            .found(force.display())
+            .expected("a motion of the base: `--base FILE`; the response to a force depends on the mass")
+            .hint("fit with the mass: `--set functions.mass.fixed=4.5` (kg)")
+            .into());
+    }
     let record = NewRecord::read(arguments.force.as_deref(), arguments.base.as_deref())?;
     if states.is_empty() {
         states.push(State {

@@ -7,6 +7,7 @@
 pub mod alternatives;
 mod build;
 mod choice;
+mod dominant;
 mod expansion;
 mod input_limits;
 pub mod key;
@@ -25,7 +26,6 @@ mod syntax;
 pub mod values;
 mod yaml_errors;
 
-#[cfg(test)]
 pub(crate) use build::DataWarning;
 pub use build::{
     AutomaticGrid, BuildMode, Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation,
@@ -34,7 +34,9 @@ pub use build::{
 pub use model_file::ModelFile;
 pub use new_record::{MeasuredChannel, NewRecord};
 pub use overrides::Override;
-pub use scaffold::{Scaffold, rate, recognised, scaffold};
+pub use scaffold::{
+    Question, Role, Scaffold, Source, Statements, questions, rate, recognised, scaffold,
+};
 pub use sequence::Sequence;
 pub use source::{DataFile, ModelSource};
 pub use values::{Number, NumberOrColumn, Text};

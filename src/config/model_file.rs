@@ -8,13 +8,11 @@ use super::overrides::Override;
 use super::spec::ModelSpec;
 use super::yaml_errors;
 use crate::error::InputError;
+use crate::formats::has_data_extension;
 use crate::text_io::read_text;
 
 /// Expected contents of a model file, for messages.
 const MODEL_FILE: &str = "a model file (YAML)";
-
-/// File name extensions of tables of samples.
-const TABLE_EXTENSIONS: [&str; 4] = ["csv", "tsv", "txt", "dat"];
 
 /// Most experiments. Each reads its own files, so a short text could need more memory than is available.
 const MOST_EXPERIMENTS: usize = 2000;
@@ -44,16 +42,20 @@ impl ModelFile {
     pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
         let path = path.as_ref();
         check_path(path)?;
-        let text = read_text(path, MODEL_FILE, LONGEST_MODEL)?;
-        let is_table = (path.extension().and_then(|extension| extension.to_str()))
-            .is_some_and(|extension| TABLE_EXTENSIONS.contains(&extension));
-        Self::parse(path, text).map_err(|error| match is_table {
-            true => error.hint(format!(
-                "for a record, `kmcfit init {}` writes a model file",
-                path.display()
-            )),
-            false => error,
-        })
+        let has_keys = |text: &str| text.lines().any(|line| line.starts_with("format:"));
+        let text = read_text(path, MODEL_FILE, LONGEST_MODEL);
+        let is_record = path.is_file()
+            && has_data_extension(path)
+            && !text.as_ref().is_ok_and(|text| has_keys(text));
+        match is_record {
+            true => Err(InputError::file(path, "a record in place of a model file")
+                .expected(MODEL_FILE)
+                .hint(format!(
+                    "`kmcfit init {}` writes a model file for the record",
+                    path.display()
+                ))),
+            false => Self::parse(path, text?),
+        }
     }
 
     /// Reads a model file and applies overrides.

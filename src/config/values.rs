@@ -17,6 +17,8 @@ use std::path::Path;
 const NO_BOUND: &str = "none";
 /// The word for an estimated value.
 const ESTIMATE: &str = "estimate";
+/// The word for a mass that is not known.
+const UNKNOWN: &str = "unknown";
 
 /// The version of the file format: 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -391,20 +393,32 @@ keys! {
     }
 }
 
-/// Known values of a function: a number, a number with its standard deviation, or a column of a file.
+/// Known values of a function: a number, a number with its standard deviation, or a column of a file; or a mass that is not known.
 #[derive(Debug, Clone, PartialEq)]
 pub enum KnownValue {
     /// The same number at all times.
     Number(Number),
     /// Number with its standard deviation, or values over time.
     Map(KnownValueMap),
+    /// Not known: all other coefficients are ratios to this mass.
+    Unknown,
 }
 
 impl Value for KnownValue {
-    const KIND: ValueType = ValueType::AnyOf(&[ValueType::Number, KnownValueMap::KIND]);
+    const KIND: ValueType = ValueType::AnyOf(&[
+        ValueType::Number,
+        ValueType::Word(UNKNOWN),
+        KnownValueMap::KIND,
+    ]);
     fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
-        let expected = "a finite number, {value: 4.5, sigma: 0.02}, or a column: {data: file.csv, column: name}";
-        number_or(scalar, expected).map(Self::Number)
+        let expected = "a finite number, {value: 4.5, sigma: 0.02}, a column: {data: file.csv, column: name}, or for a mass `unknown`";
+        match scalar {
+            Scalar::Text(UNKNOWN) => Ok(Self::Unknown),
+            Scalar::Text(word) if number_in(word).is_none() => Err(scalar
+                .refused("neither a number nor `unknown`", expected)
+                .suggest(did_you_mean(word, [UNKNOWN]))),
+            other => number_or(other, expected).map(Self::Number),
+        }
     }
     fn map<'de, A: MapAccess<'de>>(map: A, report: &Report) -> Result<Self, A::Error> {
         KnownValueMap::map(map, report).map(Self::Map)

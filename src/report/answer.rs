@@ -1,6 +1,7 @@
 //! The answer of a fit as a table: estimates with their confidence intervals, units and status.
 
 use super::document::ResultDocument;
+use super::ratios;
 use crate::number_format::{resolved, significant};
 use kmcfit_core::internals::assessment::{Estimate, EstimateStatus};
 use kmcfit_core::internals::functions::CoefficientKind;
@@ -31,8 +32,9 @@ pub struct AnswerRow {
 /// The rows of the answer: natural frequency and damping ratio, then the coefficients; with ratios only the ratios to the mass before what the
 /// model assumes.
 pub fn answer(document: &ResultDocument) -> Vec<AnswerRow> {
-    let is_scaled = (document.estimates.0.iter())
-        .any(|(_, estimate)| estimate.status == EstimateStatus::OnlyAsRatio);
+    let is_scaled = document.model.mass_unknown
+        || (document.estimates.0.iter())
+            .any(|(_, estimate)| estimate.status == EstimateStatus::OnlyAsRatio);
     let is_shown = |name: &str| is_scaled || !matches!(name, "k_over_m" | "c_over_m");
     let rows = document.estimates.0.iter();
     let rows = rows.filter(|(name, _)| is_shown(name));
@@ -41,7 +43,7 @@ pub fn answer(document: &ResultDocument) -> Vec<AnswerRow> {
 }
 
 fn row(document: &ResultDocument, name: &str, estimate: &Estimate) -> AnswerRow {
-    let function = document.functions.get(name);
+    let function = document.functions.get(&ratios::function_of(name));
     let is_open = function.is_some_and(|f| f.verdict == Some(ClassificationKind::NotIdentified));
     let [mut value, mut interval] = numbers(estimate);
     let mut status = status(document, estimate);
@@ -110,7 +112,7 @@ fn is_negligible(document: &ResultDocument, name: &str) -> bool {
     let function = match name {
         "damping_ratio" | "c_over_m" => "damping",
         "natural_frequency" | "k_over_m" => "stiffness",
-        name => name,
+        name => &ratios::function_of(name),
     };
     (document.functions.get(function)).is_some_and(|function| function.negligible)
 }
@@ -160,6 +162,10 @@ pub fn quantity(name: &str) -> String {
     };
     if !ratio.is_empty() {
         return ratio.to_owned();
+    }
+    let coefficient = ratios::function_of(name);
+    if coefficient != name {
+        return format!("{} / mass", coefficient.replace('_', " "));
     }
     let (first, owner) = match name.split_once(" of ") {
         Some((first, owner)) if first != "known part" => (first, format!(" of {owner}")),

@@ -1,6 +1,7 @@
 //! `parameters.json`: all parameters of a fit with their covariance, so that every printed interval can be computed again.
 
 use super::document::{FORMAT, NoiseSummary, ResultDocument};
+use super::ratios;
 use super::run::{COVARIANCE, FittedModel};
 use crate::error::InputError;
 use crate::text_io::{JSON, read_text_within};
@@ -286,7 +287,11 @@ impl FittedModel<'_> {
             "damping_ratio" => "damping ratio",
             "k_over_m" => "k/m",
             "c_over_m" => "c/m",
-            _ => return (self.model.problem.functions.iter()).position(|f| f.name() == name),
+            _ => {
+                let function = ratios::function_of(name);
+                let mut functions = self.model.problem.functions.iter();
+                return functions.position(|f| f.name() == function);
+            }
         };
         let place = means.ratios.iter().position(|(ratio, _)| *ratio == band)?;
         Some(means.functions.len() + place)

@@ -11,6 +11,7 @@ use super::fit_assessment::RunAssessment;
 use super::fit_quality;
 use super::npy::npy;
 use super::page::fit_page;
+use super::ratios;
 use super::render;
 use super::suggestions::suggestions;
 use super::tables::{FUNCTION_ROWS, TRAJECTORY_ROWS};
@@ -50,6 +51,23 @@ pub struct FittedModel<'a> {
     pub run_assessment: &'a RunAssessment,
     /// Files that are written on request.
     pub requested: RequestedFiles,
+}
+
+impl Model {
+    /// SI unit of a function, for a rotation if the channels are angles; per unit of the mass if this is unknown.
+    pub(super) fn unit(&self, function: &CoefficientFunction) -> &'static str {
+        match self.is_rotation() {
+            is_rotation if self.has_unknown_mass => ratios::unit(function.quantity, is_rotation),
+            true => function.quantity.angular_unit(),
+            false => function.quantity.unit(),
+        }
+    }
+
+    /// True if the channels are angles.
+    pub(super) fn is_rotation(&self) -> bool {
+        let mut units = self.notes.iter().flatten().map(|note| note.unit);
+        units.any(|unit| unit.is_angular())
+    }
 }
 
 impl FittedModel<'_> {
@@ -199,6 +217,7 @@ impl FittedModel<'_> {
             method: self.model.settings.solver.name().into(),
             gradient: self.model.settings.gradient.name().into(),
             parameters: problem.parameters(),
+            mass_unknown: self.model.has_unknown_mass,
             terms: (problem.functions.coefficient_set(0).iter().skip(1))
                 .map(|f| problem.functions.get(*f).quantity.name().into())
                 .collect(),
@@ -326,18 +345,14 @@ impl FittedModel<'_> {
             .collect()
     }
 
-    /// SI unit of a function, for a rotation if the channels are angles.
+    /// SI unit of a function, for a rotation if the channels are angles; per unit of the mass if this is unknown.
     pub(super) fn unit(&self, function: &CoefficientFunction) -> &'static str {
-        match self.is_rotation() {
-            true => function.quantity.angular_unit(),
-            false => function.quantity.unit(),
-        }
+        self.model.unit(function)
     }
 
     /// True if the channels are angles.
     pub(super) fn is_rotation(&self) -> bool {
-        let mut units = self.model.notes.iter().flatten().map(|note| note.unit);
-        units.any(|unit| unit.is_angular())
+        self.model.is_rotation()
     }
 
     /// A channel with its prediction.

@@ -4,6 +4,7 @@ use super::answer::answer_table;
 use super::document::{ChannelSummary, PenaltySummary, Prediction, ResultDocument};
 use super::equation::equation_residual;
 use super::findings;
+use super::model_assumptions::{MASS_UNKNOWN, UNITS_ASSUMED};
 use super::rule_names::rule_in_words;
 use super::suggestions;
 use crate::finding::Finding;
@@ -50,6 +51,8 @@ fn write_answer(text: &mut String, document: &ResultDocument) -> std::fmt::Resul
     }
     writeln!(text)?;
     let lists = [
+        ("Mass", assumed(document, MASS_UNKNOWN)),
+        ("Units", assumed(document, UNITS_ASSUMED)),
         ("Fit", fit(document)),
         ("Truth", truth(document).into_iter().collect()),
         ("Data", Finding::texts(&document.warnings)),
@@ -62,6 +65,13 @@ fn write_answer(text: &mut String, document: &ResultDocument) -> std::fmt::Resul
         }
     }
     Ok(())
+}
+
+/// Assumptions of a kind.
+fn assumed(document: &ResultDocument, kind: &str) -> Vec<String> {
+    let all = document.verdict.iter().flat_map(|v| &v.assumptions);
+    let of_kind = all.filter(|assumption| assumption.kind == kind);
+    of_kind.map(|assumption| assumption.text.clone()).collect()
 }
 
 /// Largest errors against the true system, where it is known.

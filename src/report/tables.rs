@@ -51,7 +51,10 @@ impl FittedModel<'_> {
         let mut table = CsvTable::new()
             .column("chain", vec![0.0; number])
             .column("draw", numbers);
-        for (i, (name, estimate)) in self.estimates().0.into_iter().enumerate() {
+        for (i, (name, estimate)) in self.all_estimates().into_iter().enumerate() {
+            let Some(name) = self.stated_name(&name) else {
+                continue;
+            };
             let column = named_column(&name, self.is_rotation());
             let column = column.unwrap_or_else(|| parameter_column(&name, &estimate.unit));
             let values = draws.iter().map(|draw| draw.estimates[i].1.value).collect();

@@ -2,15 +2,18 @@
 
 use super::document::{Estimates, Verdict};
 use super::fit_assessment::ValidationRecord;
+use super::model_assumptions::{assumed_units, unknown_mass};
+use super::ratios;
 use super::rivals::{rival_in_words, term_in_words};
 use super::run::FittedModel;
 use super::suggestions::percent;
 use super::text::and_list;
+use crate::config::DataWarning;
 use crate::finding::Finding;
 use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::{
-    Implausible, VerdictAssumption, VerdictLevel, VerdictReason, estimates, verdict_assumptions,
-    verdict_level, verdict_reasons,
+    Estimate, EstimateStatus, Implausible, VerdictAssumption, VerdictLevel, VerdictReason,
+    estimates, verdict_assumptions, verdict_level, verdict_reasons,
 };
 use kmcfit_core::internals::solvers::{EquationBalance, Status};
 
@@ -22,7 +25,16 @@ impl FittedModel<'_> {
         let mut reasons = verdict_reasons(problem, self.fit, assessment);
         let missing = self.run_assessment.missing_terms.iter();
         reasons.extend(missing.map(|term| VerdictReason::MissingTerm(*term)));
+        if self.model.has_unknown_mass {
+            // Ratios are what is reported.
+            reasons.retain(|reason| !matches!(reason, VerdictReason::OnlyRatios { .. }));
+        }
         reasons.extend(self.implausible().map(VerdictReason::ImplausibleUnits));
+        let has_units = |r: &VerdictReason| matches!(r, VerdictReason::ImplausibleUnits(_));
+        let is_doubtful = |w: &Finding| DataWarning::DOUBTFUL_UNITS.contains(&w.kind.as_str());
+        if !reasons.iter().any(has_units) && self.model.warnings.iter().any(is_doubtful) {
+            reasons.push(VerdictReason::DoubtfulUnits);
+        }
         let balance = self.run_assessment.balance.as_ref();
         reasons.extend(balance.and_then(of_balance));
         let has_mode = |r: &VerdictReason| matches!(r, VerdictReason::SecondMode { .. });
@@ -49,9 +61,12 @@ impl FittedModel<'_> {
             VerdictLevel::Inadequate => Vec::new(),
             _ => verdict_assumptions(problem),
         };
+        let stated = [unknown_mass(self.model), assumed_units(self.model)];
         Verdict {
             level,
-            assumptions: assumptions.iter().map(assumption).collect(),
+            assumptions: (stated.into_iter().flatten())
+                .chain(assumptions.iter().map(assumption))
+                .collect(),
             reasons: reasons.iter().map(in_words).collect(),
             passed: match reasons.is_empty() {
                 true => self.passed(),
@@ -98,11 +113,31 @@ impl FittedModel<'_> {
         residuals + bases
     }
 
-    /// Estimates of the fit; none where it failed.
+    /// Estimates of the fit, with an unknown mass as ratios to it; none where it failed.
     pub(super) fn estimates(&self) -> Estimates {
+        let all = self.all_estimates().into_iter();
+        let stated = all.filter_map(|(name, mut estimate)| {
+            if self.model.has_unknown_mass && estimate.status == EstimateStatus::OnlyAsRatio {
+                estimate.status = EstimateStatus::Estimated;
+            }
+            Some((self.stated_name(&name)?, estimate))
+        });
+        Estimates(stated.collect())
+    }
+
+    /// Name under which an estimate is stated: with an unknown mass that of the ratio to it, and `None` for the mass itself.
+    pub(super) fn stated_name(&self, name: &str) -> Option<String> {
+        match self.model.has_unknown_mass && !is_ratio(name) {
+            true => ratios::name(name),
+            false => Some(name.to_owned()),
+        }
+    }
+
+    /// Estimates of the fit with the names of the core.
+    pub(super) fn all_estimates(&self) -> Vec<(String, Estimate)> {
         let status = self.fit.outcome.status;
         if matches!(status, Status::Failed | Status::Infeasible) {
-            return Estimates::default();
+            return Vec::new();
         }
         let problem = &self.model.problem;
         let mut found = estimates(problem, self.fit, self.run_assessment.means().as_ref());
@@ -112,7 +147,7 @@ impl FittedModel<'_> {
         {
             self.unit(function).clone_into(&mut estimate.unit);
         }
-        Estimates(found)
+        found
     }
 }
 
@@ -259,6 +294,9 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
                 "a {quantity} of {} {unit} is implausible: check the units of time and displacement",
                 significant(*value, 2)
             )
+        }
+        VerdictReason::DoubtfulUnits => {
+            "a unit may be wrong: the warnings about the data state what shows it".to_owned()
         }
         VerdictReason::EquationResidual { share } => format!(
             "the residual of the equation of motion is {} of its largest force",

@@ -79,7 +79,6 @@ impl Table {
                 file: Arc::clone(file),
                 set,
                 numbers: members.iter().map(|(number, _)| *number).collect(),
-                calibrations: Vec::new(),
             }),
             headers: Vec::new(),
             units: Vec::new(),
@@ -322,29 +321,5 @@ impl Table {
             .expected("real numbers")
             .hint_if(found.hint.clone()),
         )
-    }
-
-    /// Multiplies the samples of a column by the value of its full scale, `factor`, in this unit.
-    pub fn calibrate(&mut self, index: usize, factor: f64, unit: &str) {
-        let width = self.width();
-        if let (Some(column), Some(stated)) =
-            (self.columns.get_mut(index), self.units.get_mut(index))
-        {
-            column.samples.iter_mut().for_each(|x| *x *= factor);
-            unit.clone_into(stated);
-        }
-        if let Origin::Channels(origin) = &mut self.origin {
-            origin.calibrations.resize(width, None);
-            if let Some(place) = origin.calibrations.get_mut(index) {
-                let text = format!("{factor} {unit}");
-                *place = Some(text.strip_prefix("1 ").unwrap_or(&text).to_owned());
-            }
-        }
-    }
-
-    /// Factor and unit of a calibrated column, as the key `units` states them.
-    pub fn calibration(&self, index: usize) -> Option<&str> {
-        let calibrations = &self.channel_origin()?.calibrations;
-        calibrations.get(index)?.as_deref()
     }
 }

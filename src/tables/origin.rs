@@ -43,8 +43,6 @@ pub(super) struct ChannelOrigin {
     pub set: usize,
     /// Number of each column in the file, from 1; 0 for times made from a sampling rate or interval.
     pub numbers: Vec<usize>,
-    /// Factor and unit of the samples, where they were calibrated.
-    pub calibrations: Vec<Option<String>>,
 }
 
 impl ChannelOrigin {

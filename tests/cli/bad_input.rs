@@ -17,7 +17,10 @@ fn refused(bench: &Workbench, arguments: &[&str]) -> String {
 fn message(bench: &Workbench) -> String {
     let message = refused(bench, &["fit", "model.yaml", "--out", "out"]);
     assert_eq!(
-        refused(bench, &["check", "model.yaml", "--out", "out"]),
+        refused(
+            bench,
+            &["check", "model.yaml", "--gradient", "--out", "out"]
+        ),
         message
     );
     message
@@ -256,12 +259,13 @@ fn meaning() {
        |                ^^^^^^^^
       expected: `bootstrap` beside it
     ");
-    assert_snapshot!(changed("basis: nodal, start: 2.0", "basis: nodal"), @"
-    error: model.yaml:10:14: functions.mass: this function has neither a start nor a fixed value
+    assert_snapshot!(changed("fit:", "  cubic_stiffness: {basis: nodal}\nfit:"), @"
+    error: model.yaml:13:20: functions.cubic_stiffness: this function has neither a start nor a fixed value
        |
-    10 |   mass:      {basis: nodal}
-       |              ^^^^^^^^^^^^^^
+    13 |   cubic_stiffness: {basis: nodal}
+       |                    ^^^^^^^^^^^^^^
       expected: `start` for a function to be fitted, `fixed` for a known one
+      hint: mass, damping and stiffness of a fit start from the record
     ");
     assert_snapshot!(changed("basis: nodal, start: 2.0", "start: 2.0"), @"
     error: model.yaml:10:14: functions.mass: a function to be fitted needs a basis
@@ -389,13 +393,16 @@ fn a_grid_that_does_not_fit_into_memory_is_refused() {
     ");
     // A simulation needs less memory per node.
     let bench = Workbench::with_small_model();
-    let with = |command: &str| refused(&bench, &[command, "model.yaml", "--nodes", "100000000000"]);
-    assert_snapshot!(with("simulate"), @"
+    let with = |command: &[&str]| {
+        let nodes = ["model.yaml", "--nodes", "100000000000"];
+        refused(&bench, &[command, &nodes].concat())
+    };
+    assert_snapshot!(with(&["simulate"]), @"
     error: --nodes: the grid does not fit into memory
       found: 100000000000 nodes, which may need 50.0 TB: 500 bytes each
       expected: at most [nodes] nodes within [bytes]
     ");
-    assert_snapshot!(with("check"), @"
+    assert_snapshot!(with(&["check", "--gradient"]), @"
     error: --nodes: the grid does not fit into memory
       found: 100000000000 nodes, which may need 378 TB: 3780 bytes each
       expected: at most [nodes] nodes within [bytes]
@@ -579,13 +586,9 @@ fn model_files() {
       hint: did you mean `model.yaml`?
     ");
     assert_snapshot!(refused(&bench, &["simulate", "samples.csv"]), @"
-    error: samples.csv:1:1: wrong type of value
-      |
-    1 | t_s,y_m
-      | ^^^^^^^
-      found: text `t_s,y_m 0,1 0.1,0.9851037084132392 0.2,0…`
-      expected: a map with the keys format, experiments, functions, fit, …
-      hint: for a record, `kmcfit init samples.csv` writes a model file
+    error: samples.csv: a record in place of a model file
+      expected: a model file (YAML)
+      hint: `kmcfit init samples.csv` writes a model file for the record
     ");
     bench.write("empty.yaml", "");
     assert_snapshot!(refused(&bench, &["check", "empty.yaml"]), @"
@@ -671,7 +674,12 @@ fn simulate_arguments() {
 #[test]
 fn check_arguments() {
     let bench = Workbench::with_small_model();
-    let with = |more: &[&str]| refused(&bench, &[&["check", "model.yaml"], more].concat());
+    let with = |more: &[&str]| {
+        refused(
+            &bench,
+            &[&["check", "model.yaml", "--gradient"], more].concat(),
+        )
+    };
     assert_snapshot!(with(&["--nodes", "1"]), @"
     error: --nodes: invalid number of nodes
       found: 1

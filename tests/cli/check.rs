@@ -1,13 +1,20 @@
 //! `kmcfit check`: validation, and gradients against finite differences.
 
 use crate::workbench::{MODEL, Workbench, column};
+use insta::assert_snapshot;
 
 /// On coarse grids the error of the continuous gradient has a floor, which is not a failure: the exit code depends on the
 /// discrete gradient.
 #[test]
 fn discrete_gradient_passes_where_the_continuous_one_has_a_floor() {
     let bench = Workbench::with_shipped_models();
-    let check = ["check", "models/paper.yaml", "--nodes", "1000,2000"];
+    let check = [
+        "check",
+        "models/paper.yaml",
+        "--gradient",
+        "--nodes",
+        "1000,2000",
+    ];
     let stdout = bench.run_to(0, &[&check[..], &["--out", "checked"]].concat());
     assert!(stdout.ends_with(
         "results in checked\nthe discrete gradient is exact: smallest relative error below 1e-6\n"
@@ -24,16 +31,19 @@ fn discrete_gradient_passes_where_the_continuous_one_has_a_floor() {
 }
 
 #[test]
-fn without_gradient_it_only_reads() {
+fn the_overview_writes_nothing() {
     let bench = Workbench::with_small_model();
     let before = bench.contents();
-    let stdout = bench.run_to(0, &["check", "model.yaml", "--no-gradient"]);
-    assert_eq!(
-        stdout,
-        "free decay: 21 samples of the displacement in m (UTF-8; separated by commas; decimal point; \
-         column names in line 1)\nSmall: 21 nodes over 2 s (midpoint), 43 parameters, lbfgs\n\
-         the model and its data are valid\n"
-    );
+    let stdout = bench.run_to(0, &["check", "model.yaml"]);
+    assert_snapshot!(stdout, @"
+    free decay: 21 samples of the displacement in m (UTF-8; separated by commas; decimal point; column names in line 1)
+    free decay: one every 0.1 s (10 Hz) from 0 to 2 s; dominant frequency 0.6103 Hz, 1.2 periods; standard deviation 0.438 m
+    Small: 21 nodes over 2 s (midpoint), 43 parameters, lbfgs
+    start values: mass 2 kg, damping 1 N s/m, stiffness 1 N/m; natural frequency 0.1125 Hz, damping ratio 0.3536
+    no force is measured: (m, c, k) are determined only up to a common constant factor; fix a function, constrain a value or mean, or add a record with a measured force
+    undetermined: scale of (m, c, k)
+    Check      at the start values the samples determine 20 of 43 parameter combinations
+    ");
     assert_eq!(bench.contents(), before);
 }
 
@@ -45,7 +55,7 @@ fn a_model_with_fixed_functions_has_no_gradient() {
         "model.yaml",
         &model.replace("basis: constant, start", "fixed"),
     );
-    let (code, stdout, stderr) = bench.run(&["check", "model.yaml"]);
+    let (code, stdout, stderr) = bench.run(&["check", "model.yaml", "--gradient"]);
     assert_eq!(code, 0);
     assert!(stdout.contains("0 parameters"), "{stdout}");
     assert_eq!(
@@ -64,7 +74,7 @@ fn steps_follow_the_size_of_the_cost() {
     for value in ["1e-4", "0.1", "1e4"] {
         let spoilt = model.replace("    initial:", &sigma(value));
         bench.write("models/sigma.yaml", &spoilt);
-        let stdout = bench.run_to(0, &["check", "models/sigma.yaml"]);
+        let stdout = bench.run_to(0, &["check", "models/sigma.yaml", "--gradient"]);
         assert!(stdout.contains("exact"), "{value}: {stdout}");
     }
 }

@@ -94,7 +94,7 @@ fn starters_can_be_fitted() {
         let (data, model) = (format!("data/{data}"), format!("{data}.yaml"));
         bench.run_to(0, &["init", &data, "--out", &model]);
         assert!(bench.read(&model).contains(&format!("data: {data}\n")));
-        let (code, _, stderr) = bench.run(&["check", &model, "--no-gradient"]);
+        let (code, _, stderr) = bench.run(&["check", &model]);
         assert_eq!(code, 0, "{model}: {stderr}");
         assert!(!stderr.contains("warning"), "{model}: {stderr}");
         if fits > 0.0 {
@@ -202,13 +202,9 @@ fn invalid_arguments_have_found_expected_and_hint() {
       expected: one of: bash, elvish, fish, powershell, zsh
 
     $ kmcfit fit samples.csv
-    error: samples.csv:1:1: wrong type of value
-      |
-    1 | t_s,y_m
-      | ^^^^^^^
-      found: text `t_s,y_m 0,1 0.1,0.9851037084132392 0.2,0…`
-      expected: a map with the keys format, experiments, functions, fit, …
-      hint: for a record, `kmcfit init samples.csv` writes a model file
+    error: samples.csv: a record in place of a model file
+      expected: a model file (YAML)
+      hint: `kmcfit init samples.csv` writes a model file for the record
 
     $ kmcfit init .
     error: .: this is a folder
@@ -232,7 +228,7 @@ fn invalid_numbers_have_messages() {
       found: `often`
       expected: a number
     ");
-    let (code, _, said) = bench.run(&["check", "model.yaml", "--nodes", "100,many"]);
+    let (code, _, said) = bench.run(&["check", "model.yaml", "--gradient", "--nodes", "100,many"]);
     assert_eq!(code, 2);
     assert_snapshot!(said, @"
     error: --nodes: not a number
@@ -252,9 +248,10 @@ fn init_prints_the_properties_of_the_record() {
       column `Time [ms]`: time, ms
       column `Weg_mm`: displacement, mm
       dominant frequency 159.6 Hz: 3 periods in the record
+      the mass is unknown: the results are ratios to it; `--mass KG` states it
       schema for editors: run 1/kmcfit.schema.json
     Model run 1/my data.yaml; review it, then run
-      kmcfit check 'run 1/my data.yaml' --no-gradient
+      kmcfit check 'run 1/my data.yaml'
       kmcfit fit 'run 1/my data.yaml'
     ");
     assert_snapshot!(bench.read("run 1/my data.yaml"), @r#"
@@ -272,9 +269,9 @@ fn init_prints_the_properties_of_the_record() {
         initial: estimate                             # or {displacement: …, velocity: …} in m and m/s
     grid: {nodes: auto}                               # chosen from the spectrum of the record
     functions:
-      mass:      {fixed: 1.0}                         # kg; ASSUMED, enter your own: without a measured force only k/m and c/m are identifiable
-      damping:   {basis: constant, start: 40.11}      # N s/m; start value: 2 % of critical damping
-      stiffness: {basis: constant, start: 1006000}    # N/m; the record is too short to show a variation
+      mass:      {fixed: unknown}                     # or its value in kg; without it and without a measured force the results are ratios to the mass
+      damping:   {basis: constant}                    # 1/s, ratio to the mass; starts from the decay or the frequency response
+      stiffness: {basis: constant}                    # 1/s^2, ratio to the mass; the record is too short to show a variation
     # truth: {data: truth.csv}                        # the true functions, where they are known
     fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1.0e-8}}
     "#);
@@ -376,7 +373,6 @@ fn check_and_simulate_take_values_too() {
     let check = [
         "check",
         "models/paper-lbfgs.yaml",
-        "--no-gradient",
         "--set",
         "grid.nodes=1000",
     ];
@@ -511,7 +507,7 @@ fn the_demo_needs_nothing() {
     }
     let model = "runs/demo/models/physical.yaml";
     assert!(stdout.contains(&format!("kmcfit fit {model}")), "{stdout}");
-    bench.run_to(0, &["check", model, "--no-gradient"]);
+    bench.run_to(0, &["check", model]);
 }
 
 /// Every command, by the program's own help.
@@ -534,7 +530,7 @@ fn completions_know_all_commands() {
     for command in commands(&bench) {
         assert!(script.contains(&format!("kmcfit,{command})")), "{command}");
     }
-    for option in ["--set", "--no-gradient", "--sample-rate"] {
+    for option in ["--set", "--sample-rate"] {
         assert!(script.contains(option), "{option}");
     }
     for shell in ["zsh", "fish", "powershell", "elvish"] {

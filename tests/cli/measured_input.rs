@@ -85,7 +85,7 @@ fn warned(changes: &[(&str, &str)]) -> String {
         model = model.replacen(from, to, 1);
     }
     bench.write("model.yaml", &model);
-    let (code, stdout, stderr) = bench.run(&["check", "model.yaml", "--no-gradient"]);
+    let (code, stdout, stderr) = bench.run(&["check", "model.yaml"]);
     assert_eq!(code, 0, "{stdout}\n{stderr}");
     stderr
 }

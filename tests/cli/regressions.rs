@@ -91,7 +91,7 @@ fn a_start_that_fits_exactly_is_converged_and_has_nothing_to_check() {
     bench.write("exact.yaml", &MODEL.replace("samples.csv", "exact.csv"));
     bench.run_to(0, &["fit", "exact.yaml"]);
     assert_eq!(status(&bench, "runs/exact"), "converged");
-    let stdout = bench.run_to(0, &["check", "exact.yaml"]);
+    let stdout = bench.run_to(0, &["check", "exact.yaml", "--gradient"]);
     assert!(
         stdout.contains("the gradient is zero at the start values"),
         "{stdout}"

@@ -289,7 +289,7 @@ fn nodes_are_not_chosen_for_noise() {
     let bench = Workbench::empty();
     bench.write("record.csv", &ring_down(300, 1e-2));
     bench.run_to(0, &["init", "record.csv"]);
-    let (code, _, notes) = bench.run(&["check", "record.yaml", "--no-gradient"]);
+    let (code, _, notes) = bench.run(&["check", "record.yaml"]);
     assert_eq!(code, 0, "{notes}");
     let nodes = notes.split_once("grid: ").expect("a remark").1;
     let nodes: f64 = (nodes.split_once(' ').expect("words").0)
@@ -369,7 +369,7 @@ fn two_modes_of_a_forced_record_are_reported() {
     let columns = "    columns: {displacement: y_m, force: F_N}\n    force: {interpolation: hold}\n    \
                    sigma: {displacement: estimate}\n";
     bench.write("model.yaml", &starter("{nodes: auto}", columns));
-    let (_, _, notes) = bench.run(&["check", "model.yaml", "--no-gradient"]);
+    let (_, _, notes) = bench.run(&["check", "model.yaml"]);
     assert!(
         notes.contains("two modes vibrate in the displacement, at 1 and 2.6"),
         "{notes}"
@@ -558,7 +558,7 @@ fn saturated_samples_are_reported() {
     bench.write("record.csv", &record);
     let check = || {
         bench.write("model.yaml", &starter("{nodes: 401}", ""));
-        bench.run(&["check", "model.yaml", "--no-gradient"]).2
+        bench.run(&["check", "model.yaml"]).2
     };
     assert!(!check().contains("equal its extreme value"));
     bench.write("record.csv", &record.lines().map(cut).collect::<String>());
@@ -599,13 +599,13 @@ fn rest_at_the_beginning_is_excluded() {
         assert!(said.contains(&moves), "{said}");
         let window = format!("window: {{min: {begins}}}");
         assert!(bench.read("record.yaml").contains(&window));
-        let (code, _, told) = bench.run(&["check", "record.yaml", "--no-gradient"]);
+        let (code, _, told) = bench.run(&["check", "record.yaml"]);
         assert!(code == 0 && !told.contains("warning"), "{told}");
         let whole = bench
             .read("record.yaml")
             .replace(&window, "window: {min: 0}");
         bench.write("whole.yaml", &whole);
-        let (_, _, told) = bench.run(&["check", "whole.yaml", "--no-gradient"]);
+        let (_, _, told) = bench.run(&["check", "whole.yaml"]);
         let hint =
             format!("the displacement is at rest before {begins} s; a free decay must begin");
         assert!(told.contains(&hint) && told.contains(&window), "{told}");
@@ -623,7 +623,7 @@ fn rest_at_the_beginning_is_excluded() {
         assert!(late.contains(&window), "{late}");
         let zero = late.replace(&window, "time_zero: 1700006000");
         bench.write("late.yaml", &zero);
-        let (code, _, told) = bench.run(&["check", "late.yaml", "--no-gradient"]);
+        let (code, _, told) = bench.run(&["check", "late.yaml"]);
         assert!(code == 0 && told.contains(&window), "{told}");
     }
 }
@@ -647,7 +647,7 @@ fn a_robust_fit_is_assessed_without_outliers() {
     assert!(robust.contains(loss));
     let squares = robust.replace(loss, "");
     bench.write("squares.yaml", &squares);
-    let (_, _, told) = bench.run(&["check", "squares.yaml", "--no-gradient"]);
+    let (_, _, told) = bench.run(&["check", "squares.yaml"]);
     let lie =
         "5 outliers in the displacement, the first -9999 mm at 0.85 s; delete them (empty fields)";
     assert!(told.contains(lie), "{told}");
@@ -676,13 +676,15 @@ fn a_robust_fit_is_assessed_without_outliers() {
             .replace("sigma: {displacement: estimate}", "")
             .replace("knots: auto", "knots: 11"),
     );
-    let (_, _, told) = bench.run(&["check", "bare.yaml", "--no-gradient"]);
+    let (_, _, told) = bench.run(&["check", "bare.yaml"]);
     assert!(
         told.contains("(`loss: {displacement: huber}`, with `sigma`)"),
         "{told}"
     );
     // A model that cannot match the samples.
-    let wrong = ["--set", "functions.stiffness={fixed: 9.0}"];
+    let wrong =
+        "functions={mass: {fixed: 1.0}, damping: {basis: constant}, stiffness: {fixed: 9.0}}";
+    let wrong = ["--set", wrong];
     let summary = bench.run_to(0, &[fit.as_slice(), &wrong].concat());
     assert!(!summary.contains("is identified"), "{summary}");
     assert!(
@@ -719,7 +721,7 @@ fn a_reversed_sensor_is_reported() {
         let sigma = kinds.map(|kind| format!("{kind}: 0.02")).join(", ");
         let lines = format!("    columns: {{{columns}}}\n    sigma: {{{sigma}}}\n{more}");
         bench.write("model.yaml", &starter("{nodes: 401}", &lines));
-        let (code, _, said) = bench.run(&["check", "model.yaml", "--no-gradient"]);
+        let (code, _, said) = bench.run(&["check", "model.yaml"]);
         assert_eq!(code, 0, "{said}");
         said.contains("opposite signs")
     };

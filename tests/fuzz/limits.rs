@@ -180,7 +180,7 @@ fn the_program_s_own_pipe() {
         .collect();
     Command::new(env!("CARGO_BIN_EXE_kmcfit"))
         .current_dir(folder.path())
-        .args(["check", "m.yaml", "--no-gradient"])
+        .args(["check", "m.yaml"])
         .write_stdin(format!("t_s,y_m\n{rows}"))
         .timeout(Duration::from_secs(60))
         .assert()

@@ -41,7 +41,7 @@ const CASES: [Case; 9] = [
     ),
     case(&["resume", "killed"], &["killed"], &[], 3),
     case(
-        &["check", "model.yaml", "--out", "checked"],
+        &["check", "model.yaml", "--gradient", "--out", "checked"],
         &["checked"],
         &[],
         1,

@@ -119,7 +119,7 @@ fn the_results_of_another_command_are_refused() {
         &["compare", "model.yaml", "--out", "run"][..],
         &["compare", "run", "--out", "run"],
         &["predict", "run", "--initial", "1,0", "--out", "run"],
-        &["check", "model.yaml", "--out", "run"],
+        &["check", "model.yaml", "--gradient", "--out", "run"],
         &["study", "model.yaml", "--out", "run"],
         &["demo", "--out", "run"],
     ] {
@@ -142,7 +142,7 @@ fn unfinished_work_of_another_command_is_refused() {
     for arguments in [
         &["study", "model.yaml", "--out", "killed"][..],
         &["compare", "model.yaml", "--out", "killed"],
-        &["check", "model.yaml", "--out", "killed"],
+        &["check", "model.yaml", "--gradient", "--out", "killed"],
     ] {
         let stderr = refused(&bench, arguments, "killed/fit.journal");
         assert!(stderr.contains("unfinished work"), "{stderr}");

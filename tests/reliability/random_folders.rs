@@ -16,7 +16,7 @@ const OUT: &str = "out";
 const COMMANDS: [&[&str]; 10] = [
     &["fit", "model.yaml", "--out", OUT],
     &["fit", "model.yaml", "--out", OUT, "--no-report"],
-    &["check", "model.yaml", "--out", OUT],
+    &["check", "model.yaml", "--gradient", "--out", OUT],
     &["predict", "done", "--initial", "1,0", "--out", OUT],
     &["compare", "model.yaml", "done", "--out", OUT],
     &["compare", "done", "done", "--out", OUT],
@@ -66,7 +66,10 @@ fn templates() -> Workbench {
     let other = MODEL.replace("iterations: 5", "iterations: 3");
     bench.write("other.yaml", &other);
     bench.run_to(0, &["fit", "other.yaml", "--out", "kinds/fit"]);
-    bench.run_to(0, &["check", "other.yaml", "--out", "kinds/check"]);
+    bench.run_to(
+        0,
+        &["check", "other.yaml", "--gradient", "--out", "kinds/check"],
+    );
     bench.run_to(
         0,
         &[

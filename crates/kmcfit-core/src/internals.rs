@@ -48,9 +48,9 @@ pub mod identifiability {
         Band, BandSettings, BandSide, Bands, CandidateChannel, CandidateExperiment, Classification,
         ClassificationKind, Condition, CovarianceKind, EquationRows, FunctionClassification, Gain,
         MeanOverRecord, Means, RankFinding, RankFindingKind, Ranked, RelativeChange,
-        ResolvedDirection, ScaleFreedom, ScalingAmbiguity, Sensitivity, SingularSpectrum, anchors,
-        classify_functions, is_negligible, is_unhindered, rank_experiments, residual_spread,
-        structural_rank,
+        ResolvedDirection, ScaleFreedom, ScaleSource, ScalingAmbiguity, Sensitivity,
+        SingularSpectrum, anchors, classify_functions, is_negligible, is_unhindered,
+        rank_experiments, residual_spread, scale_source, structural_rank,
     };
     pub use crate::spans::span_words;
 }
@@ -83,8 +83,8 @@ pub mod record {
 pub mod signal {
     pub use crate::signal::{
         ExcitationShape, Interpolation, SecondOrder, Signal, Spectrum, SweepLaw, band_pass,
-        clipped, decimate, decimation_filter, even_spacing, high_pass, low_pass, median,
-        median_spacing, onset, two_forced_modes, two_modes,
+        clipped, decimate, decimation_filter, driven_oscillator, even_spacing, high_pass, low_pass,
+        median, median_spacing, onset, two_forced_modes, two_modes,
     };
 }
 pub mod simd {

@@ -15,6 +15,8 @@ use kmcfit_core::internals::builder::{
 };
 use kmcfit_core::internals::constraints::TimeHistory;
 use kmcfit_core::internals::functions::{self, CoefficientKind};
+use kmcfit_core::internals::identifiability::{ScaleSource, scale_source};
+use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::system::{Grid, NodalCoefficients};
 
 /// Default lower limit of a mass, as a share of its smallest start value: a fit can otherwise end with a mass of nearly zero, whose
@@ -63,6 +65,38 @@ pub(super) fn all(file: &ModelFile) -> Vec<Given<'_>> {
     shared(file).into_iter().chain(own).collect()
 }
 
+/// Start values from the records, for functions without `start`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RecordStarts {
+    /// kg.
+    pub mass: f64,
+    /// N s/m.
+    pub damping: f64,
+    /// N/m.
+    pub stiffness: f64,
+}
+
+impl RecordStarts {
+    /// Start value of a function; `None` for terms beside mass, damping and stiffness.
+    fn of_kind(&self, kind: CoefficientKind) -> Option<f64> {
+        match kind {
+            CoefficientKind::Mass => Some(self.mass),
+            CoefficientKind::Damping => Some(self.damping),
+            CoefficientKind::Stiffness => Some(self.stiffness),
+            _ => None,
+        }
+    }
+}
+
+/// What a function takes that its keys leave out.
+#[derive(Clone, Copy)]
+pub(super) struct Defaults<'a> {
+    /// True for a lower bound of the mass.
+    pub is_limited: bool,
+    /// Start values from the records; `None` without records.
+    pub starts: Option<&'a RecordStarts>,
+}
+
 /// The specification of the function at `key`; if the fit is limited, an estimated mass without `min` has a lower bound of
 /// [`LEAST_MASS`] times its smallest start value.
 pub(super) fn specification(
@@ -70,7 +104,7 @@ pub(super) fn specification(
     grid: &Grid,
     key: &str,
     (kind, given): Given<'_>,
-    is_limited: bool,
+    defaults: Defaults<'_>,
 ) -> Result<CoefficientSpec, InputError> {
     let is_own = !key.starts_with("functions.");
     check_basis_keys(file, key, given)?;
@@ -97,10 +131,16 @@ pub(super) fn specification(
         }
         (Some(fixed), None, None) => known(file, grid, &format!("{key}.fixed"), fixed)?,
         (None, None, None) if is_own && is_known_part_alone(given) => CoefficientSpec::shared(),
-        (None, None, _) => {
-            return Err(file
-                .error_at(key, "this function has neither a start nor a fixed value")
-                .expected("`start` for a function to be fitted, `fixed` for a known one"));
+        (None, None, basis_name) => {
+            let start = defaults.starts.and_then(|starts| starts.of_kind(kind));
+            let Some((basis_name, start)) = basis_name.zip(start) else {
+                return Err(file
+                    .error_at(key, "this function has neither a start nor a fixed value")
+                    .expected("`start` for a function to be fitted, `fixed` for a known one")
+                    .hint("mass, damping and stiffness of a fit start from the record"));
+            };
+            let basis = basis(file, key, given, basis_name)?;
+            CoefficientSpec::estimated(basis, builder::Start::Constant(start))
         }
         (None, Some(_), None) => {
             return Err(file
@@ -114,7 +154,7 @@ pub(super) fn specification(
         }
     };
     spec = spec.bounds(bound("min", &given.min)?, bound("max", &given.max)?);
-    if given.min.is_none() && is_limited && kind == CoefficientKind::Mass {
+    if given.min.is_none() && defaults.is_limited && kind == CoefficientKind::Mass {
         spec = spec.min_of_start(LEAST_MASS);
     }
     for (place, given) in given.penalty.iter().flat_map(|list| list.iter()) {
@@ -152,6 +192,14 @@ fn known(
 ) -> Result<CoefficientSpec, InputError> {
     let map = match given {
         KnownValue::Number(value) => return Ok(CoefficientSpec::fixed(value.0)),
+        KnownValue::Unknown if key == UNKNOWN_MASS => return Ok(CoefficientSpec::fixed(1.0)),
+        KnownValue::Unknown => {
+            return Err(file
+                .error_at(key, "only the mass can be unknown")
+                .found("`unknown`")
+                .expected("a value, or `basis` for a function to be fitted")
+                .hint("all coefficients are ratios to an unknown mass: `functions: {mass: {fixed: unknown}}`"));
+        }
         KnownValue::Map(map) => map,
     };
     let KnownValueMap {
@@ -190,6 +238,41 @@ fn known(
                 .found(found)
                 .expected("{value: 4.5, sigma: 0.02}, or {data: file.csv, column: name}"))
         }
+    }
+}
+
+/// Key of a mass that is `unknown`.
+const UNKNOWN_MASS: &str = "functions.mass.fixed";
+
+/// True if the model states that the mass is unknown.
+pub(super) fn has_unknown_mass(file: &ModelFile) -> bool {
+    file.spec.functions.mass.fixed == Some(KnownValue::Unknown)
+}
+
+/// Error for an unknown mass where a force or another known value determines the scale of the coefficients.
+pub(super) fn check_unknown_mass(file: &ModelFile, problem: &Problem) -> Result<(), InputError> {
+    if !has_unknown_mass(file) {
+        return Ok(());
+    }
+    let refused = |found: String| {
+        Err(file
+            .error_at(
+                UNKNOWN_MASS,
+                "the mass is not unknown: the model determines it",
+            )
+            .found(found)
+            .expected("`mass: {basis: constant}`, or the known mass in kg"))
+    };
+    match scale_source(problem) {
+        ScaleSource::Force => refused("a force".to_owned()),
+        ScaleSource::KnownValue => {
+            refused("a known value with its standard deviation, or a known part".to_owned())
+        }
+        ScaleSource::Fixed(fixed) => match fixed.iter().find(|name| *name != "mass") {
+            Some(other) => refused(format!("the fixed {}", other.replace('_', " "))),
+            None => Ok(()),
+        },
+        ScaleSource::Model => Ok(()),
     }
 }
 

@@ -8,9 +8,9 @@ mod functions;
 mod grid;
 mod on_grid;
 mod refinement;
+mod starts;
 mod study;
 
-#[cfg(test)]
 pub(crate) use experiments::DataWarning;
 pub use experiments::{ChannelNote, HoldOut};
 pub use kmcfit_core::internals::builder::WeightSearch;
@@ -63,6 +63,10 @@ pub struct Model {
     pub warnings: Vec<Finding>,
     /// Automatic choices, such as the number of nodes.
     pub automatic: Vec<Finding>,
+    /// Units that neither the model nor a file states.
+    pub assumed_units: Vec<Finding>,
+    /// True if the model states that the mass is unknown: it is 1, and the other coefficients are ratios to it.
+    pub has_unknown_mass: bool,
     /// True if a fit reduces the width of Coulomb friction.
     pub reduces_width: bool,
     /// The automatic grid of a fit, which may be refined; `None` for a stated number of nodes.
@@ -137,10 +141,15 @@ fn builder(
 ) -> Result<(Builder, Vec<Vec<ChannelNote>>), InputError> {
     let is_limited =
         mode == BuildMode::Fit && matches!(solver, Solver::GaussNewton | Solver::ProjectedGradient);
+    let starts = starts::of_records(file, grid, &records);
+    let defaults = functions::Defaults {
+        is_limited,
+        starts: starts.as_ref(),
+    };
     let shared = functions::shared(file).into_iter();
     let shared = shared.map(|given| {
         let key = format!("functions.{}", given.0.name());
-        let spec = functions::specification(file, grid, &key, given, is_limited)?;
+        let spec = functions::specification(file, grid, &key, given, defaults)?;
         let width = automatic_width.filter(|_| given.0 == CoefficientKind::CoulombFriction);
         let spec = match width {
             Some(width) => spec.width(width),
@@ -157,7 +166,7 @@ fn builder(
     let mut notes = Vec::new();
     for (i, record) in records.into_iter().enumerate() {
         let (record, of_record) =
-            experiments::specification(file, mode, grid, i, record, is_limited)?;
+            experiments::specification(file, mode, grid, i, record, defaults)?;
         builder = builder.record(record);
         notes.push(of_record);
     }
@@ -236,6 +245,7 @@ fn build_on(file: &ModelFile, mode: BuildMode, least: usize) -> Result<Model, In
     let (builder, notes) = builder(file, mode, &grid, solver, records, automatic_width)?;
     let about = |error| input_error(file, error);
     let mut built = builder.lower().map_err(about)?;
+    functions::check_unknown_mass(file, &built.problem)?;
     let searches =
         built.weight_search.is_some() || built.problem.penalties.iter().any(|p| p.rule.is_some());
     let settings = fit::build(file, &built.problem, solver, searches)?;
@@ -246,6 +256,15 @@ fn build_on(file: &ModelFile, mode: BuildMode, least: usize) -> Result<Model, In
     // A simulation uses the functions as given.
     if !matches!(mode, BuildMode::Simulate { .. }) {
         built.move_start().map_err(about)?;
+    }
+    let is_unit = |warning: &Finding| warning.kind == DataWarning::UNIT_ASSUMED;
+    let (units, mut warnings): (Vec<_>, Vec<_>) = warnings.into_iter().partition(is_unit);
+    // Each channel reads the column of times.
+    let mut assumed_units = Vec::new();
+    for unit in units {
+        if !assumed_units.contains(&unit) {
+            assumed_units.push(unit);
+        }
     }
     warnings.extend(built.notices.iter().map(Finding::stated));
     let validation = |i: &usize| experiments::is_held_out(&spec.experiments[*i]);
@@ -287,6 +306,8 @@ fn build_on(file: &ModelFile, mode: BuildMode, least: usize) -> Result<Model, In
         predictions: spec.predict.iter().flatten().map(state).collect(),
         warnings,
         automatic,
+        assumed_units,
+        has_unknown_mass: functions::has_unknown_mass(file),
         reduces_width: automatic_width.is_some() && solver != Solver::EquationError,
         grid: AutomaticGrid::of(file, mode, solver, choice.finer),
         source,

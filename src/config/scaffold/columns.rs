@@ -1,108 +1,17 @@
 //! Assignment of the columns of a table to time, channels, force and base motion, from units, names and values.
 
 use super::quoted;
+use super::roles::{Role, UsedColumn, is_foreign, known};
+use super::statements::{ColumnStatements, Statements};
 use crate::error::InputError;
 use crate::tables::{Table, increasing_at};
-use crate::units::{Quantity, Unit};
+use crate::units::Unit;
 use kmcfit_core::internals::diagnostics::standard_deviation;
 
-/// Role of a column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
-    Time,
-    Displacement,
-    Velocity,
-    Acceleration,
-    Force,
-    BaseAcceleration,
-    BaseDisplacement,
-}
-
-/// Prefixes of column names, in lower case, by role.
-const NAMES: [(Role, &[&str]); 5] = [
-    (Role::Time, &["time", "zeit", "uhrzeit", "t"]),
-    (
-        Role::Displacement,
-        &[
-            "disp", "pos", "defl", "angle", "roll", "pitch", "y", "x", "z", "u", "s",
-        ],
-    ),
-    (Role::Velocity, &["vel", "v"]),
-    (Role::Acceleration, &["acc", "a"]),
-    (Role::Force, &["force", "load", "torque", "f"]),
-];
-/// Words in a name that denote the base.
-const BASE: [&str; 5] = ["base", "table", "ground", "floor", "support"];
-/// Names that match only as whole words, not as prefixes (`roller` is not `roll`).
-const WHOLE: [&str; 2] = ["roll", "pitch"];
-/// Unit suffixes, in lower case, of quantities without a role.
-const FOREIGN: [&str; 18] = [
-    "hz", "khz", "rpm", "degc", "°c", "celsius", "kelvin", "%", "percent", "pa", "kpa", "mpa",
-    "bar", "ohm", "ma", "db", "kg", "volt",
-];
 /// Ratio of standard deviations beyond which a later sensor replaces an earlier one of the same role.
 const MUCH: f64 = 3.0;
-/// Longest name that is compared as a single letter with a number or unit: `y1`.
-const LONGEST_LETTER: usize = 2;
-
 /// Remedy for a column of times that cannot be used.
 const OTHER_TIMES: &str = "correct the times in the file; `--sample-rate HZ` replaces them if the samples are equally spaced";
-
-impl Role {
-    /// Its key in the model file.
-    pub fn key(self) -> &'static str {
-        match self {
-            Role::Time => "time",
-            Role::Displacement => "displacement",
-            Role::Velocity => "velocity",
-            Role::Acceleration => "acceleration",
-            Role::Force => "force",
-            Role::BaseAcceleration => "base_acceleration",
-            Role::BaseDisplacement => "base_displacement",
-        }
-    }
-
-    fn kind(self) -> Quantity {
-        match self {
-            Role::Time => Quantity::Time,
-            Role::Displacement | Role::BaseDisplacement => Quantity::Displacement,
-            Role::Velocity => Quantity::Velocity,
-            Role::Acceleration | Role::BaseAcceleration => Quantity::Acceleration,
-            Role::Force => Quantity::Force,
-        }
-    }
-
-    fn of_base(self) -> Option<Self> {
-        match self {
-            Role::Displacement => Some(Role::BaseDisplacement),
-            Role::Acceleration => Some(Role::BaseAcceleration),
-            _ => None,
-        }
-    }
-
-    /// True for a measured response.
-    pub fn is_channel(self) -> bool {
-        matches!(
-            self,
-            Role::Displacement | Role::Velocity | Role::Acceleration
-        )
-    }
-}
-
-/// A column that is used.
-#[derive(Debug, Clone, Copy)]
-pub struct UsedColumn {
-    pub index: usize,
-    pub role: Role,
-    /// The unit.
-    pub unit: Unit,
-    /// True if the model file must state the unit, because no row of units or name does so in a recognised form.
-    state_unit: bool,
-    /// True if the role follows from the position of the column alone.
-    guessed: bool,
-    /// True if the file states the unit.
-    has_unit: bool,
-}
 
 /// Columns of a table by role, and unused columns.
 #[derive(Debug)]
@@ -112,31 +21,39 @@ pub struct ColumnAssignment {
 }
 
 impl ColumnAssignment {
-    pub fn of(table: &Table, sample_rate: Option<f64>) -> Result<Self, InputError> {
-        let mut columns = Self::known(table, sample_rate)?;
+    /// The columns of a table with the statements of the options, and for each unit among these whether the table has its column.
+    pub fn of(table: &Table, statements: &Statements) -> Result<(Self, Vec<bool>), InputError> {
+        let mut stated = ColumnStatements::of(table, statements)?;
+        let mut columns = Self::known(table, statements.sample_rate, &stated)?;
         if columns.channels().next().is_none() {
-            columns.guess(table)?;
+            columns.guess(table, stated.response())?;
         }
+        stated.state_quantities(&mut columns.used);
         columns.check_units(table)?;
-        Ok(columns)
+        Ok((columns, stated.is_used))
     }
 
     /// The columns with recognised names or units and the column of times; none of them need be a channel.
     pub fn without_guess(table: &Table, sample_rate: Option<f64>) -> Result<Self, InputError> {
-        let columns = Self::known(table, sample_rate)?;
+        let columns = Self::known(table, sample_rate, &ColumnStatements::default())?;
         columns.check_units(table)?;
         Ok(columns)
     }
 
     fn check_units(&self, table: &Table) -> Result<(), InputError> {
-        for column in &self.used {
+        for column in self.used.iter().filter(|column| !column.state_unit) {
             let correct = |error: InputError| error.hint("correct one of them in the file");
             table.check_stated_unit(column.index).map_err(correct)?;
         }
         Ok(())
     }
 
-    fn known(table: &Table, sample_rate: Option<f64>) -> Result<Self, InputError> {
+    fn known(
+        table: &Table,
+        sample_rate: Option<f64>,
+        stated: &ColumnStatements,
+    ) -> Result<Self, InputError> {
+        let known = |table: &Table, index: usize| stated.recognise(table, index);
         let mut numeric = Vec::new();
         for i in 0..table.width() {
             match table.samples(i) {
@@ -158,7 +75,7 @@ impl ColumnAssignment {
             unused: Vec::new(),
         };
         if sample_rate.is_none() {
-            columns.used.push(time(table, &numeric)?);
+            columns.used.push(time(table, &numeric, &known)?);
         }
         for index in numeric {
             if columns.used.iter().any(|c| c.index == index) {
@@ -182,13 +99,17 @@ impl ColumnAssignment {
         let size = |c: &UsedColumn| -> Result<f64, InputError> {
             let samples = table.samples(c.index)?.iter().copied();
             let samples: Vec<f64> = samples.filter(|x| x.is_finite()).collect();
-            Ok(c.unit.factor() * standard_deviation(&samples))
+            Ok(c.factor() * standard_deviation(&samples))
         };
         let there = &self.used[place];
         let alike = column.has_unit == there.has_unit
             && column.unit.is_angular() == there.unit.is_angular();
         let moves_more = size(&column)? > MUCH * size(there)?;
-        let left = match column.role.is_channel() && alike && moves_more {
+        let is_better = match column.is_stated == there.is_stated {
+            true => column.role.is_channel() && alike && moves_more,
+            false => column.is_stated,
+        };
+        let left = match is_better {
             true => std::mem::replace(&mut self.used[place], column),
             false => column,
         };
@@ -197,8 +118,8 @@ impl ColumnAssignment {
         Ok(())
     }
 
-    /// Assigns the first column without a recognised name or foreign unit to the displacement.
-    fn guess(&mut self, table: &Table) -> Result<(), InputError> {
+    /// Assigns the first column without a recognised name or foreign unit to the response `role`, by default the displacement.
+    fn guess(&mut self, table: &Table, role: Option<Role>) -> Result<(), InputError> {
         let is_empty = |i: &usize| match table.samples(*i) {
             Ok(samples) => samples.iter().all(|x| x.is_nan()),
             Err(_) => false,
@@ -224,13 +145,10 @@ impl ColumnAssignment {
             ))
             .expected("a column of samples in addition to the times"));
         };
+        let index = self.unused.remove(place);
         self.used.push(UsedColumn {
-            index: self.unused.remove(place),
-            role: Role::Displacement,
-            unit: Unit::si(Quantity::Displacement),
-            state_unit: false,
-            guessed: true,
-            has_unit: false,
+            guessed: role.is_none(),
+            ..UsedColumn::guessed(index, role.unwrap_or(Role::Displacement))
         });
         Ok(())
     }
@@ -261,31 +179,20 @@ impl ColumnAssignment {
         format!("{{{}}}", pairs.collect::<Vec<_>>().join(", "))
     }
 
-    /// The units that the model file states, as a YAML map: those that the file does not state in a recognised form, and those
-    /// of calibrated columns.
-    pub fn units(&self, table: &Table) -> Option<String> {
-        let unit = |c: &UsedColumn| match table.calibration(c.index) {
-            Some(calibration) => Some(calibration.to_owned()),
-            None => (c.state_unit || !c.has_unit).then(|| c.unit.symbol().to_owned()),
-        };
-        let pair = |c: &UsedColumn| Some(format!("{}: {}", c.role.key(), quoted(&unit(c)?)));
-        let pairs: Vec<String> = self.used.iter().filter_map(pair).collect();
-        (!pairs.is_empty()).then(|| format!("{{{}}}", pairs.join(", ")))
+    /// Units as a YAML map: those that the model file states, because an option or the name of the column alone does.
+    pub fn units(&self) -> Option<String> {
+        Self::map_of(self.used.iter().filter(|c| c.state_unit))
     }
 
-    /// The comment on these units.
-    pub fn units_comment(&self) -> String {
-        let assumed: Vec<&str> = (self.used.iter())
-            .filter(|c| !c.has_unit)
-            .map(|c| c.role.key())
-            .collect();
-        match assumed.is_empty() {
-            true => "converted to SI".to_owned(),
-            false => format!(
-                "ASSUMED, the file does not state a known unit: {}",
-                assumed.join(", ")
-            ),
-        }
+    /// The units that are assumed, as a YAML map.
+    pub fn assumed_units(&self) -> Option<String> {
+        Self::map_of(self.used.iter().filter(|c| c.has_assumed_unit()))
+    }
+
+    fn map_of<'a>(columns: impl Iterator<Item = &'a UsedColumn>) -> Option<String> {
+        let pairs = columns.map(|c| format!("{}: {}", c.role.key(), quoted(&c.unit_in_words())));
+        let pairs: Vec<String> = pairs.collect();
+        (!pairs.is_empty()).then(|| format!("{{{}}}", pairs.join(", ")))
     }
 
     /// One sentence for each column: its role and unit.
@@ -313,7 +220,7 @@ impl ColumnAssignment {
             format!(
                 "column `{}`: {role}, {}{guess}{gaps}",
                 table.label(c.index),
-                c.unit.symbol()
+                c.unit_in_words()
             )
         };
         let mut words: Vec<String> = self.used.iter().map(said).collect();
@@ -337,13 +244,17 @@ pub fn rate(table: &Table) -> Option<(usize, f64)> {
     (0..table.width()).find_map(|i| {
         let column = known(table, i).filter(|c| c.role == Role::Time)?;
         let times = increasing_at(table, i).ok()?;
-        let duration = column.unit.factor() * (times.last()? - times.first()?);
+        let duration = column.factor() * (times.last()? - times.first()?);
         Some((i, (times.len() - 1) as f64 / duration))
     })
 }
 
 /// The column of times: by unit, by name, or the first that increases.
-fn time(table: &Table, numeric: &[usize]) -> Result<UsedColumn, InputError> {
+fn time(
+    table: &Table,
+    numeric: &[usize],
+    known: &dyn Fn(&Table, usize) -> Option<UsedColumn>,
+) -> Result<UsedColumn, InputError> {
     let increases = |i: &&usize| increasing_at(table, **i).is_ok();
     let is_time = |i: &&usize| known(table, **i).is_some_and(|c| c.role == Role::Time);
     if let Some(index) = numeric.iter().find(is_time)
@@ -357,94 +268,11 @@ fn time(table: &Table, numeric: &[usize]) -> Result<UsedColumn, InputError> {
         Some(index) => Ok(known(table, *index)
             .filter(|c| c.role == Role::Time)
             .unwrap_or(UsedColumn {
-                index: *index,
-                role: Role::Time,
-                unit: Unit::si(Quantity::Time),
-                state_unit: false,
                 guessed: true,
-                has_unit: false,
+                ..UsedColumn::guessed(*index, Role::Time)
             })),
         None => Err(InputError::file(table.path(), "no column of times")
             .found("no column whose numbers increase from row to row")
             .expected("a column of times, or `--sample-rate HZ`")),
     }
-}
-
-/// Role and unit of a column from its name and stated unit.
-fn known(table: &Table, index: usize) -> Option<UsedColumn> {
-    let (label, is_base) = without_base(table.quantity_name(index));
-    let by_name = role_of(&label.to_lowercase());
-    let stated = table.stated_unit(index);
-    let roles = [
-        Role::Time,
-        Role::Acceleration,
-        Role::Velocity,
-        Role::Displacement,
-        Role::Force,
-    ];
-    let unit_of = |role: Role| {
-        let explicit = stated.explicit(role.kind()).map(|u| (u, false));
-        explicit.or_else(|| stated.suffix(role.kind()).map(|u| (u, true)))
-    };
-    let by_unit = roles.into_iter().find(|role| unit_of(*role).is_some());
-    if by_unit.is_none() && is_foreign(&label) {
-        return None;
-    }
-    // A role by name takes precedence if its unit agrees, because some units fit several quantities.
-    let role = by_name
-        .filter(|r| unit_of(*r).is_some())
-        .or(by_unit)
-        .or(by_name)?;
-    let found = unit_of(role);
-    let (unit, in_name) = found.unwrap_or((Unit::si(role.kind()), false));
-    Some(UsedColumn {
-        index,
-        role: role.of_base().filter(|_| is_base).unwrap_or(role),
-        unit,
-        state_unit: in_name && unit.factor() != 1.0,
-        guessed: false,
-        has_unit: found.is_some(),
-    })
-}
-
-/// A label without a word for the base, and true if it had one: `table_acc` is an acceleration of the base.
-fn without_base(label: &str) -> (String, bool) {
-    // ASCII lower case keeps the byte length.
-    let small = label.to_ascii_lowercase();
-    let found = BASE
-        .iter()
-        .find_map(|word| Some((small.find(word)?, word.len())));
-    let Some((at, length)) = found else {
-        return (label.to_owned(), false);
-    };
-    let rest = [&label[..at], &label[at + length..]].concat();
-    let is_separator = |c: char| matches!(c, '_' | ' ' | '-' | '.');
-    (rest.trim_start_matches(is_separator).to_owned(), true)
-}
-
-/// True for a name that ends with a unit of [`FOREIGN`].
-fn is_foreign(label: &str) -> bool {
-    let small = label.to_lowercase();
-    let mut words = small.split(['_', ' ', '[', ']', '(', ')', '/']);
-    words.next();
-    words
-        .rfind(|word| !word.is_empty())
-        .is_some_and(|unit| FOREIGN.contains(&unit))
-}
-
-/// Role of a column by its name in lower case.
-fn role_of(name: &str) -> Option<Role> {
-    let bare = name
-        .split(['_', ' ', '[', '(', '/'])
-        .next()
-        .unwrap_or_default();
-    let means = |begin: &str| match begin.len() {
-        1 => bare.starts_with(begin) && bare.len() <= LONGEST_LETTER,
-        _ if WHOLE.contains(&begin) => bare.trim_end_matches(|c: char| c.is_ascii_digit()) == begin,
-        _ => bare.starts_with(begin),
-    };
-    let named = NAMES
-        .iter()
-        .find(|(_, begins)| begins.iter().any(|b| means(b)));
-    named.map(|(role, _)| *role)
 }

@@ -1,26 +1,25 @@
 //! A commented model file for a table of samples, as `kmcfit init` writes it.
 //!
-//! Columns are assigned by units, then by names; the start value of the stiffness follows from the dominant frequency.
-//! Quantities that the table does not determine (the mass in a free decay) get a placeholder and a comment.
+//! Columns are assigned by options, then by units, then by names. Where nothing determines the mass, the model states that it is unknown.
 
-mod calibration;
 mod columns;
+mod functions;
 mod record_summary;
+mod roles;
+mod statements;
 
 use crate::error::InputError;
+use crate::magnitudes::{Magnitude, implausible};
 use crate::memory;
 use crate::number_format::significant;
 use crate::tables::{Table, TableFormat};
 use crate::text_io::{listed, quote};
 pub(super) use columns::ColumnAssignment;
-pub use columns::{Role, rate, recognised};
+pub use columns::{rate, recognised};
 use record_summary::RecordSummary;
-use std::path::Path;
-
-/// Start value of the damping ratio: that of a lightly damped structure.
-const DAMPING_RATIO: f64 = 0.02;
-/// Periods of the response below which the stiffness is constant: fewer do not show how it varies.
-const FEWEST_PERIODS: f64 = 4.0;
+pub use roles::Role;
+pub use statements::Statements;
+use std::path::{Path, PathBuf};
 
 /// Relative difference below which two sampling rates are equal.
 const SAME_RATE: f64 = 0.01;
@@ -29,59 +28,149 @@ const SAME_RATE: f64 = 0.01;
 /// million rows of two columns.
 const PER_ROW: u64 = 200;
 
+/// A file of a record: its path, and its name in the model file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Source {
+    /// Path.
+    pub path: PathBuf,
+    /// Name in the model file.
+    pub name: String,
+}
+
 /// A model file and the findings that it is based on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scaffold {
     /// The text of the model file.
     pub text: String,
-    /// Findings on the table, one sentence each.
-    pub found: Vec<String>,
+    /// Findings on each table, one sentence each.
+    pub found: Vec<Vec<String>>,
+    /// True if nothing determines the mass.
+    pub has_unknown_mass: bool,
 }
 
-/// A model file for the table at `csv`, under the name `data`. `sample_rate` is the sampling rate in Hz of a table
-/// without a column of times; `units` has the value and unit of the full scale of each channel of a file without units,
-/// separated by commas.
+/// A question that no file answers.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Question {
+    /// Unit of a column, which is assumed.
+    Unit {
+        /// Path of the file.
+        file: PathBuf,
+        /// Column.
+        column: String,
+        /// Quantity that it is taken for.
+        role: Role,
+        /// The assumed unit.
+        assumed: &'static str,
+    },
+    /// Mass, or another coefficient that gives the scale.
+    Scale,
+}
+
+/// A record with its columns.
+struct FileRecord<'a> {
+    source: &'a Source,
+    table: Table,
+    columns: ColumnAssignment,
+    summary: RecordSummary,
+}
+
+/// A model file for tables, one experiment each, with the statements of the options.
 ///
 /// # Errors
-/// When the table cannot be read, has no times or no measured response, or a column cannot be converted to samples.
-pub fn scaffold(
-    csv: &Path,
-    data: &str,
-    sample_rate: Option<f64>,
-    units: Option<&str>,
-) -> Result<Scaffold, InputError> {
-    let (table, columns) = record(csv, sample_rate, units)?;
-    memory::check_file(csv, table.rows() as u64 * PER_ROW)?;
-    let record = RecordSummary::of(&table, &columns, sample_rate)?;
-    let mut found = vec![format!(
-        "{} samples over {} s, {}",
-        record.samples,
-        short(record.duration),
-        record.spacing_in_words()
-    )];
-    if let Some(begins) = record.begins {
-        found.insert(
-            0,
-            format!("at rest before {begins} s: excluded by `window`"),
-        );
+/// When a table cannot be read, has no times or no measured response, or a column cannot be converted to samples; when a statement
+/// concerns no column.
+pub fn scaffold(sources: &[Source], statements: &Statements) -> Result<Scaffold, InputError> {
+    let records = read(sources, statements)?;
+    let found = records
+        .iter()
+        .map(|record| findings(record, statements.sample_rate));
+    Ok(Scaffold {
+        found: found.collect(),
+        has_unknown_mass: functions::is_unknown(&records, statements),
+        text: text(&records, statements),
+    })
+}
+
+/// The questions that the tables and the statements leave.
+///
+/// # Errors
+/// As [`scaffold`].
+pub fn questions(sources: &[Source], statements: &Statements) -> Result<Vec<Question>, InputError> {
+    let records = read(sources, statements)?;
+    let units = records.iter().flat_map(|record| {
+        let assumed = record.columns.used.iter().filter(|c| c.has_assumed_unit());
+        assumed.map(|column| Question::Unit {
+            file: record.table.path().to_path_buf(),
+            column: record.table.label(column.index),
+            role: column.role,
+            assumed: column.unit.symbol(),
+        })
+    });
+    let scale = functions::is_unknown(&records, statements).then_some(Question::Scale);
+    Ok(units.chain(scale).collect())
+}
+
+fn read<'a>(
+    sources: &'a [Source],
+    statements: &Statements,
+) -> Result<Vec<FileRecord<'a>>, InputError> {
+    let mut is_used: Vec<bool> = Vec::new();
+    let mut records = Vec::new();
+    for source in sources {
+        let (table, columns, used) = record(&source.path, statements)?;
+        memory::check_file(&source.path, table.rows() as u64 * PER_ROW)?;
+        is_used = match is_used.is_empty() {
+            true => used,
+            false => is_used.iter().zip(used).map(|(a, b)| *a || b).collect(),
+        };
+        let summary = RecordSummary::of(&table, &columns, statements.sample_rate)?;
+        records.push(FileRecord {
+            source,
+            table,
+            columns,
+            summary,
+        });
     }
-    found.extend(columns.in_words(&table));
+    let tables: Vec<&Table> = records.iter().map(|record| &record.table).collect();
+    statements.check_used(&is_used, &tables)?;
+    Ok(records)
+}
+
+/// Findings on a table, one sentence each.
+fn findings(record: &FileRecord, sample_rate: Option<f64>) -> Vec<String> {
+    let FileRecord {
+        table,
+        columns,
+        summary,
+        ..
+    } = record;
+    let mut found = Vec::new();
+    if let Some(begins) = summary.begins {
+        found.push(format!("at rest before {begins} s: excluded by `window`"));
+    }
+    found.push(format!(
+        "{} samples over {} s, {}",
+        summary.samples,
+        short(summary.duration),
+        summary.spacing_in_words()
+    ));
+    found.extend(columns.in_words(table));
     let others: Vec<String> = table.channels_of_other_times().map(quote).collect();
     if !others.is_empty() {
         let others = listed(others.iter().map(String::as_str));
         found.push(format!("not used, of another length or rate: {others}"));
     }
-    if let Some((count, first)) = record.outliers {
+    if let Some((count, first)) = summary.outliers {
         let outliers = match count {
             1 => "1 outlier".to_owned(),
             _ => format!("{count} outliers"),
         };
         found.push(format!(
             "{outliers} (first: {}): if these stand for missing samples, use empty fields; the model has a robust loss",
-            significant(first / record.channel.1, 4)
+            significant(first / summary.channel.1, 4)
         ));
     }
-    if let (Some(given), Some((index, rate))) = (sample_rate, columns::rate(&table))
+    if let (Some(given), Some((index, rate))) = (sample_rate, columns::rate(table))
         && (rate / given - 1.0).abs() > SAME_RATE
     {
         found.push(format!(
@@ -90,84 +179,108 @@ pub fn scaffold(
             significant(rate, 4)
         ));
     }
-    found.push(match record.frequency {
+    found.push(match summary.frequency {
         Some(frequency) => format!(
             "dominant frequency {} Hz: {} in the record",
             short(frequency),
-            match record.periods().round() {
+            match summary.periods().round() {
                 1.0 => "1 period".to_owned(),
                 periods => format!("{periods} periods"),
             }
         ),
         None => "no dominant frequency was found".into(),
     });
-    Ok(Scaffold {
-        text: text(&table, data, &columns, &record, sample_rate),
-        found,
-    })
+    found.extend(implausible_units(record));
+    found
+}
+
+/// Magnitudes outside the range of mechanical vibrations.
+fn implausible_units(record: &FileRecord) -> Option<String> {
+    let columns = &record.columns;
+    let channels = columns
+        .used
+        .iter()
+        .filter(|c| c.role.is_channel() && !c.unit.is_arbitrary());
+    let magnitudes = channels.filter_map(|column| {
+        let samples = record.table.samples(column.index).ok()?;
+        let values: Vec<f64> = samples.iter().map(|x| x * column.factor()).collect();
+        Magnitude::of(column.role.kind(), column.unit, &values)
+    });
+    let magnitudes: Vec<Magnitude> = magnitudes.collect();
+    let time = columns.find(Role::Time).map(|column| column.unit);
+    let found = implausible(record.summary.frequencies?, time, &magnitudes)?;
+    let reading = found
+        .reading
+        .map(|reading| format!(": {reading}"))
+        .unwrap_or_default();
+    Some(format!(
+        "{} is implausible{reading}; state the units by `--units`",
+        found.magnitudes
+    ))
 }
 
 /// The table of a file with its columns; of several sets of channels the only one with times and a measured response.
 fn record(
-    csv: &Path,
-    sample_rate: Option<f64>,
-    units: Option<&str>,
-) -> Result<(Table, ColumnAssignment), InputError> {
-    let mut tables = Table::read_all(csv, &TableFormat::default())?;
-    if let Some(units) = units {
-        for table in &mut tables {
-            calibration::apply(table, units)?;
-        }
-    }
+    path: &Path,
+    statements: &Statements,
+) -> Result<(Table, ColumnAssignment, Vec<bool>), InputError> {
+    let mut tables = Table::read_all(path, &TableFormat::default())?;
     let has_samples = tables.iter().any(|table| table.rows() > 1);
     tables.retain(|table| !has_samples || table.rows() > 1);
     if let [table] = tables.as_slice() {
-        let columns = ColumnAssignment::of(table, sample_rate)?;
-        return Ok((tables.remove(0), columns));
+        let (columns, is_used) = ColumnAssignment::of(table, statements)?;
+        return Ok((tables.remove(0), columns, is_used));
     }
     let mut found = Vec::new();
     for (i, table) in tables.iter().enumerate() {
-        let columns = ColumnAssignment::without_guess(table, sample_rate);
-        let columns = columns
-            .ok()
-            .filter(|columns| columns.channels().next().is_some());
-        found.extend(columns.map(|columns| (i, columns)));
+        let columns = ColumnAssignment::without_guess(table, statements.sample_rate);
+        let is_record = |columns: &ColumnAssignment| columns.channels().next().is_some();
+        if columns.is_ok_and(|columns| is_record(&columns)) {
+            found.push(i);
+        }
     }
-    match (found.pop(), found.is_empty()) {
-        (Some((i, columns)), true) => Ok((tables.remove(i), columns)),
-        _ => Err(Table::several(&tables)),
-    }
+    let [only] = found.as_slice() else {
+        return Err(Table::several(&tables));
+    };
+    let table = tables.remove(*only);
+    let (columns, is_used) = ColumnAssignment::of(&table, statements)?;
+    Ok((table, columns, is_used))
 }
 
-fn text(
-    table: &Table,
-    data: &str,
-    columns: &ColumnAssignment,
-    record: &RecordSummary,
-    sample_rate: Option<f64>,
-) -> String {
-    let name = Path::new(data)
-        .file_stem()
-        .unwrap_or_default()
-        .to_string_lossy();
+fn text(records: &[FileRecord], statements: &Statements) -> String {
+    let title = records
+        .first()
+        .map_or(String::new(), |record| stem(record.source));
     let mut text = format!(
         "# yaml-language-server: $schema=kmcfit.schema.json\n\
          # Model file written by `kmcfit init`. Check it with `kmcfit check`, fit it with `kmcfit fit`;\n\
          # `kmcfit explain KEY` explains a key.\n\
          format: 1\n\
          title: {}\n\
-         experiments:\n  \
-           - name: record 1\n    \
-             data: {}\n",
-        quoted(&name),
-        quoted(data)
+         experiments:\n",
+        quoted(&title),
     );
-    for (key, value, comment) in keys(table, columns, record, sample_rate) {
-        if let Some(value) = value {
-            text += &commented(&format!("{key}: {value}"), &comment);
+    for (i, record) in records.iter().enumerate() {
+        let name = match records {
+            [_] => "record 1".to_owned(),
+            _ => format!("record {}: {}", i + 1, stem(record.source)),
+        };
+        text += &format!(
+            "  - name: {}\n    data: {}\n",
+            quoted(&name),
+            quoted(&record.source.name)
+        );
+        for (key, value, comment) in keys(record, statements.sample_rate) {
+            if let Some(value) = value {
+                text += &commented(&format!("{key}: {value}"), &comment);
+            }
         }
     }
-    text + &functions(columns, record)
+    text += &commented(
+        "grid: {nodes: auto}",
+        "chosen from the spectrum of the record",
+    );
+    text + &functions::functions(records, statements)
         + &commented(
             "# truth: {data: truth.csv}",
             "the true functions, where they are known",
@@ -178,11 +291,20 @@ fn text(
         )
 }
 
-/// The keys of the record and the grid, each with its value and a comment.
+/// Name of a file without its extension.
+fn stem(source: &Source) -> String {
+    let stem = Path::new(&source.name).file_stem().unwrap_or_default();
+    stem.to_string_lossy().into_owned()
+}
+
+/// The keys of a record, each with its value and a comment.
 fn keys(
-    table: &Table,
-    columns: &ColumnAssignment,
-    record: &RecordSummary,
+    FileRecord {
+        table,
+        columns,
+        summary: record,
+        ..
+    }: &FileRecord,
     sample_rate: Option<f64>,
 ) -> Vec<(&'static str, Option<String>, String)> {
     let sigmas: Vec<String> = (columns.channels())
@@ -200,7 +322,12 @@ fn keys(
             "by name or by number from 1",
         ),
         ("    sample_rate", sample_rate.map(|r| r.to_string()), "Hz"),
-        ("    units", columns.units(table), &columns.units_comment()),
+        ("    units", columns.units(), "converted to SI"),
+        (
+            "    # units",
+            columns.assumed_units(),
+            "ASSUMED, the file states none: enter others under `units`",
+        ),
         (
             "    window",
             record.begins.map(|begins| format!("{{min: {begins}}}")),
@@ -231,11 +358,6 @@ fn keys(
             "    initial",
             Some("estimate".into()),
             "or {displacement: …, velocity: …} in m and m/s",
-        ),
-        (
-            "grid",
-            Some("{nodes: auto}".into()),
-            "chosen from the spectrum of the record",
         ),
     ];
     let owned = keys.map(|(key, value, comment)| (key, value, comment.to_owned()));
@@ -269,47 +391,6 @@ fn sensors(
         }
     }
     sensors.into_iter().unzip()
-}
-
-/// The coefficient functions, with start values that give the dominant frequency.
-fn functions(columns: &ColumnAssignment, record: &RecordSummary) -> String {
-    let omega = std::f64::consts::TAU * record.frequency.unwrap_or(1.0);
-    let driven = columns.has(Role::Force);
-    let mass = match driven {
-        true => record.mass(omega).unwrap_or(1.0),
-        false => 1.0,
-    };
-    let mut text = String::from("functions:\n");
-    text += &match driven {
-        true => commented(
-            &format!("  mass:      {{basis: constant, start: {}}}", short(mass)),
-            "kg; identifiable, because the force is measured",
-        ),
-        false => commented(
-            "  mass:      {fixed: 1.0}",
-            "kg; ASSUMED, enter your own: without a measured force only k/m and c/m are identifiable",
-        ),
-    };
-    let damping = 2.0 * DAMPING_RATIO * mass * omega;
-    text += &commented(
-        &format!(
-            "  damping:   {{basis: constant, start: {}}}",
-            short(damping)
-        ),
-        "N s/m; start value: 2 % of critical damping",
-    );
-    let stiffness = short(mass * omega * omega);
-    text += &match record.periods() >= FEWEST_PERIODS {
-        true => commented(
-            &format!("  stiffness: {{basis: b-spline, knots: auto, start: {stiffness}}}"),
-            "N/m; varies smoothly; for a constant write {basis: constant, start: …}",
-        ),
-        false => commented(
-            &format!("  stiffness: {{basis: constant, start: {stiffness}}}"),
-            "N/m; the record is too short to show a variation",
-        ),
-    };
-    text
 }
 
 /// A line followed by a comment, aligned where the line is short enough.

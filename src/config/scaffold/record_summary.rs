@@ -1,23 +1,19 @@
 //! Summary of a record: sampling, onset, dominant frequency, outliers, offset and drift, and the size of the
 //! excitation.
 
-use super::columns::{ColumnAssignment, Role, UsedColumn};
+use super::columns::ColumnAssignment;
+use super::roles::{Role, UsedColumn};
+use crate::config::dominant::{Oscillation, remove_outliers, values_of};
 use crate::error::InputError;
 use crate::tables::{Table, increasing_at};
-use kmcfit_core::internals::diagnostics::{
-    detrended, offset_and_drift, outlier_indices, standard_deviation,
-};
-use kmcfit_core::internals::signal::{Spectrum, onset};
+use kmcfit_core::internals::diagnostics::standard_deviation;
+use kmcfit_core::internals::signal::{median, onset};
 use kmcfit_core::internals::system::round_time;
 
 /// Fewest samples for a model.
 const FEWEST: usize = 8;
 /// Relative difference below which spacings are equal up to rounded times.
 const REGULAR: f64 = 0.05;
-/// Fewest periods for a test of drift, and the share of the variance that a straight line must explain; for an
-/// oscillation without drift of that many periods it explains a few per cent.
-const DRIFT_PERIODS: f64 = 4.0;
-const DRIFT: f64 = 0.1;
 /// An excitation that changes at less than this share of its samples is piecewise constant.
 const MOST_JUMPS: f64 = 0.1;
 
@@ -39,15 +35,12 @@ pub struct RecordSummary {
     pub begins: Option<f64>,
     /// Dominant frequency, Hz.
     pub frequency: Option<f64>,
+    /// Dominant frequency and that which halves the energy, Hz.
+    pub frequencies: Option<[f64; 2]>,
     /// True if the mean of the samples exceeds their deviations from it.
     pub is_off_centre: bool,
     /// True if the samples drift along a straight line.
     pub drifts: bool,
-    /// Root-mean-square force, N, and root-mean-square response with the power of omega that converts it to an
-    /// acceleration.
-    force: Option<f64>,
-    response: f64,
-    power: i32,
     /// Interpolation of force and base motion between samples.
     pub between: &'static str,
 }
@@ -60,21 +53,13 @@ impl RecordSummary {
     ) -> Result<Self, InputError> {
         let times = times(table, columns, sample_rate)?;
         let channel = |role: Role| columns.find(role);
-        let order = [
-            (Role::Displacement, 2),
-            (Role::Velocity, 1),
-            (Role::Acceleration, 0),
-        ];
-        let mut measured = order
-            .into_iter()
-            .filter_map(|(r, p)| Some((channel(r)?, p)));
-        let Some((column, power)) = measured.next() else {
+        let order = [Role::Displacement, Role::Velocity, Role::Acceleration];
+        let Some(column) = order.into_iter().find_map(channel) else {
             return Err(InputError::file(table.path(), "no column of a response"));
         };
         let mut pairs = moving(table, &times, in_si(table, column)?)?;
         let spacings: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
         let spacing = median(&spacings);
-        let force = channel(Role::Force).map(|c| in_si(table, c)).transpose()?;
         let drives = [Role::Force, Role::BaseAcceleration, Role::BaseDisplacement];
         let input = drives.into_iter().find_map(channel);
         let input = input.map(|c| in_si(table, c)).transpose()?;
@@ -87,41 +72,28 @@ impl RecordSummary {
             None => onset(&values, spacing),
         };
         let pairs = &pairs[begins.unwrap_or(0)..];
-        // The line is a drift only if the samples oscillate about it.
         let duration = times[times.len() - 1] - begins.map_or(times[0], |_| pairs[0].0);
-        let beside_line = beside_line(pairs).and_then(|pairs| frequency(&pairs, spacing));
-        let beside_line = beside_line.filter(|f| f * duration >= DRIFT_PERIODS);
+        let oscillation = Oscillation::of(pairs, spacing, duration);
         Ok(Self {
             between: between(&input.unwrap_or_default()),
             samples: pairs.len(),
             missing,
-            channel: (column.role, column.unit.factor()),
+            channel: (column.role, column.factor()),
             outliers,
             begins: begins.map(|_| round_time(pairs[0].0, spacing)),
             duration,
             spacing,
             is_regular: (spacings.iter()).all(|s| (s - spacing).abs() <= REGULAR * spacing),
-            frequency: beside_line.or_else(|| frequency(pairs, spacing)),
+            frequency: oscillation.frequency,
+            frequencies: oscillation.frequencies(),
             is_off_centre: off_centre(pairs),
-            drifts: beside_line.is_some(),
-            force: force.map(|mut force| {
-                force.retain(|x| x.is_finite());
-                standard_deviation(&force)
-            }),
-            response: standard_deviation(&values_of(pairs)),
-            power,
+            drifts: oscillation.drifts,
         })
     }
 
     /// Number of periods of the dominant frequency in the record.
     pub fn periods(&self) -> f64 {
         self.frequency.unwrap_or(0.0) * self.duration
-    }
-
-    /// Mass for which the inertia force equals the measured force, kg.
-    pub fn mass(&self, omega: f64) -> Option<f64> {
-        let mass = self.force? / (self.response * omega.powi(self.power));
-        (mass.is_finite() && mass > 0.0).then_some(mass)
     }
 
     pub fn spacing_in_words(&self) -> String {
@@ -155,29 +127,6 @@ fn moving(table: &Table, times: &[f64], values: Vec<f64>) -> Result<Vec<(f64, f6
     }
 }
 
-/// Removes outliers; returns their number and the first one.
-fn remove_outliers(pairs: &mut Vec<(f64, f64)>) -> Option<(usize, f64)> {
-    let values: Vec<f64> = pairs.iter().map(|(_, value)| *value).collect();
-    let level = median(&values);
-    let away: Vec<f64> = values.iter().map(|value| value - level).collect();
-    let far = outlier_indices(&away);
-    let first = values[*far.first()?];
-    let mut place = 0..;
-    pairs.retain(|_| place.next().is_some_and(|i| far.binary_search(&i).is_err()));
-    Some((far.len(), first))
-}
-
-/// Samples minus their straight line, if it explains a large part of them.
-fn beside_line(pairs: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
-    let (times, values): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
-    let [mean, line] = offset_and_drift(&times, &values);
-    if line <= DRIFT * (1.0 - mean) {
-        return None;
-    }
-    let left = detrended(&times, &values);
-    Some(times.into_iter().zip(left).collect())
-}
-
 /// Interpolation that predicts every second sample of an excitation best from the others.
 fn between(input: &[f64]) -> &'static str {
     let steps: Vec<bool> = input.windows(2).map(|pair| pair[0] != pair[1]).collect();
@@ -209,7 +158,7 @@ fn times(
     match columns.find(Role::Time) {
         Some(column) => {
             let times = increasing_at(table, column.index)?;
-            let times = times.iter().map(|t| t * column.unit.factor());
+            let times = times.iter().map(|t| t * column.factor());
             Ok(times.collect())
         }
         None => {
@@ -220,39 +169,9 @@ fn times(
 }
 
 fn in_si(table: &Table, column: &UsedColumn) -> Result<Vec<f64>, InputError> {
-    let factor = column.unit.factor();
+    let factor = column.factor();
     let samples = table.samples(column.index)?;
     Ok(samples.iter().map(|x| x * factor).collect())
-}
-
-/// Dominant frequency of the samples, interpolated linearly where they are not equally spaced, Hz.
-fn frequency(pairs: &[(f64, f64)], spacing: f64) -> Option<f64> {
-    let (first, last) = (pairs.first()?.0, pairs.last()?.0);
-    // Bounds the memory for records with long gaps.
-    let count = (((last - first) / spacing).round() as usize + 1).min(4 * pairs.len());
-    let step = (last - first) / (count - 1) as f64;
-    let mut next = 1;
-    let at = |i: usize| {
-        let t = first + step * i as f64;
-        while next + 1 < pairs.len() && pairs[next].0 < t {
-            next += 1;
-        }
-        let ((t0, y0), (t1, y1)) = (pairs[next - 1], pairs[next]);
-        y0 + (y1 - y0) * ((t - t0) / (t1 - t0)).clamp(0.0, 1.0)
-    };
-    let values: Vec<f64> = (0..count).map(at).collect();
-    let frequency = Spectrum::of(&values, step)?.dominant();
-    (frequency.is_finite() && frequency > 0.0).then_some(frequency)
-}
-
-fn values_of(pairs: &[(f64, f64)]) -> Vec<f64> {
-    pairs.iter().map(|(_, value)| *value).collect()
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted[sorted.len() / 2]
 }
 
 fn off_centre(pairs: &[(f64, f64)]) -> bool {

@@ -89,14 +89,17 @@ keys! {
             example "2",
             needs "`basis: polynomial`";
         /// Start values of the search: one number, one value per node, cell or knot, polynomial coefficients, or a column of
-        /// a file.
+        /// a file. A mass, damping or stiffness without them starts from the record: from the frequency response to a measured force,
+        /// else from the dominant frequency, the decay and the known mass or stiffness.
         start: Option<StartSpec>,
             example "2.0",
             unit "that of the function",
+            default "for mass, damping and stiffness from the record",
             range "greater than 0 for a mass",
             needs "`basis`";
         /// Fixed values, in place of `basis`; with a standard deviation, `{value: 4.5, sigma: 0.02}`, one that enters all confidence
-        /// intervals.
+        /// intervals. `unknown` for a mass that nothing determines: all other coefficients are then ratios to it (stiffness in 1/s^2,
+        /// damping in 1/s), and so are the results.
         fixed: Option<KnownValue>,
             example "1.0",
             unit "that of the function",

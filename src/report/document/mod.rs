@@ -145,6 +145,9 @@ pub struct ModelSummary {
     pub gradient: String,
     /// Number of free parameters.
     pub parameters: usize,
+    /// True if the mass is unknown: it is 1, and all other functions are ratios to it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub mass_unknown: bool,
     /// The force terms, by the names of their functions.
     #[serde(default = "linear_terms")]
     pub terms: Vec<String>,

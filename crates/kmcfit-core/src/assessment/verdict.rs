@@ -177,6 +177,8 @@ pub enum VerdictReason {
     },
     /// The natural frequency or the response is outside the range of mechanical systems.
     ImplausibleUnits(Implausible),
+    /// The data show that a unit may be wrong: magnitudes, the ratio of two channels, or the mass that a force implies.
+    DoubtfulUnits,
     /// A classical estimate and that of the fit differ by more than their intervals.
     ClassicalDisagrees(ClassicalEstimate),
     /// An error of a record explains the residuals.

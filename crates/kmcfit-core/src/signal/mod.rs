@@ -24,7 +24,7 @@ mod spline;
 pub use clipping::clipped;
 pub use decimate::{decimate, decimation_filter};
 pub use filter::{SecondOrder, band_pass, high_pass, low_pass, zero_phase, zero_phase_transpose};
-pub use frequency_response::{Mobility, two_forced_modes};
+pub use frequency_response::{Mobility, driven_oscillator, two_forced_modes};
 pub use interpolate::{Interpolation, Signal};
 pub use modes::two_modes;
 pub use onset::onset;

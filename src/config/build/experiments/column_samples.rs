@@ -23,6 +23,8 @@ pub struct ColumnSamples {
     pub values: Vec<f64>,
     /// Unit of the values in the file.
     pub unit: Unit,
+    /// Unit of the column of times; `None` for a sampling rate.
+    pub time_unit: Option<Unit>,
     /// Values of a second column of the same file at the same times, SI.
     pub beside: Option<Vec<f64>>,
     /// Rows outside the window.
@@ -119,6 +121,7 @@ pub fn read(
         beside: beside.map(|b| inside.iter().map(|&r| factor * b[r]).collect()),
         outside: times.values.len() - inside.len(),
         unit: unit.unit,
+        time_unit: times.unit,
         label,
         format: table.format_in_words(),
     })
@@ -214,6 +217,7 @@ fn about_format(file: &ModelFile, experiment: &str, error: InputError) -> InputE
 struct Times {
     values: Vec<f64>,
     label: String,
+    unit: Option<Unit>,
 }
 
 /// The times of all rows, in s.
@@ -249,7 +253,11 @@ fn times(
         }
         let values = (0..table.rows()).map(|i| i as f64 / rate.0).collect();
         let label = String::new();
-        return Ok(Times { values, label });
+        return Ok(Times {
+            values,
+            label,
+            unit: None,
+        });
     }
     let default = ColumnId::Name(TIME_COLUMN.to_owned());
     let id = own_column.or(shared_column).unwrap_or(&default);
@@ -278,6 +286,7 @@ fn times(
     Ok(Times {
         values: values.iter().map(|t| t * unit.factor()).collect(),
         label: table.label(index),
+        unit: Some(unit.unit),
     })
 }
 

@@ -1,21 +1,25 @@
 //! Data checks of a record.
 
+use super::channel::quantity;
 use super::warning::DataWarning;
 use super::{RawChannel, RawRecord, is_equation_error};
 use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
+use crate::config::dominant::Oscillation;
 use crate::config::spec::{ExperimentSpec, InitialSpec};
+use crate::config::values::KnownValue;
 use crate::config::values::NumberOrEstimate;
 use crate::finding::Finding;
+use crate::magnitudes::{Magnitude, implausible, mains_hum};
 use kmcfit_core::internals::diagnostics::{detrended, outlier_indices, standard_deviation};
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::signal::{
-    Interpolation, Signal, Spectrum, clipped, onset, two_forced_modes, two_modes,
+    Interpolation, Signal, Spectrum, clipped, driven_oscillator, onset, two_forced_modes, two_modes,
 };
 use kmcfit_core::internals::system::round_time;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
-/// Ratios between channels, or between a sample and the given state, that suggest a wrong unit.
+/// Factors between units that a ratio between channels, or between a sample and the given state, suggests.
 const SUSPICIOUS: [(f64, &str); 8] = [
     (1e3, "the factor 1000 between m and mm"),
     (1e-3, "the factor 1/1000 between mm and m"),
@@ -25,6 +29,17 @@ const SUSPICIOUS: [(f64, &str); 8] = [
     (1e-2, "the factor 1/100 between cm and m"),
     (9.80665, "the factor 9.81 between g and m/s^2"),
     (1.0 / 9.80665, "the factor 1/9.81 between m/s^2 and g"),
+];
+/// Factors of times in minutes, of displacements and their derivatives of translations, and of angles in degrees.
+const MINUTES: [(f64, &str); 4] = [
+    (60.0, "the factor 60 between min and s"),
+    (1.0 / 60.0, "the factor 1/60 between s and min"),
+    (3600.0, "the factor 60² between min and s"),
+    (1.0 / 3600.0, "the factor 1/60² between s and min"),
+];
+const DEGREES: [(f64, &str); 2] = [
+    (180.0 / PI, "the factor 57.3 between rad and deg"),
+    (PI / 180.0, "the factor 1/57.3 between deg and rad"),
 ];
 /// Largest quotient of a ratio and such a factor: channels of one response agree within some ten per cent only, because
 /// the response has more than one frequency.
@@ -39,6 +54,8 @@ const FEWEST_IN_A_PERIOD: f64 = 4.0;
 /// Warnings about the record of experiment `i`.
 pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord) -> Vec<Finding> {
     let mut warnings = unit_factors(spec, record);
+    warnings.extend(magnitudes(record));
+    warnings.extend(implied_mass(file, record));
     warnings.extend(opposite_signs(spec, record));
     warnings.extend(record.channels.iter().filter_map(saturation));
     warnings.extend(record.channels.iter().filter_map(|c| outliers(spec, c)));
@@ -56,8 +73,7 @@ pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord)
 fn unit_factors(spec: &ExperimentSpec, record: &RawRecord) -> Vec<DataWarning> {
     let mut found = Vec::new();
     let mut add = |ratio: f64, quantity: String| {
-        let near = |f: f64| ratio / f < NEAR && f / ratio < NEAR;
-        if let Some((_, factor)) = SUSPICIOUS.iter().find(|(f, _)| near(*f)) {
+        if let Some(factor) = factor_near(ratio, record) {
             found.push(DataWarning::SuspiciousFactor {
                 quantity,
                 ratio,
@@ -95,6 +111,77 @@ fn unit_factors(spec: &ExperimentSpec, record: &RawRecord) -> Vec<DataWarning> {
         }
     }
     found
+}
+
+/// The factor between two units that is nearest to a ratio, if one is near.
+fn factor_near(ratio: f64, record: &RawRecord) -> Option<&'static str> {
+    let is_angular = record.channels.iter().any(|c| c.unit.is_angular());
+    let others = match is_angular {
+        true => &DEGREES[..],
+        false => &MINUTES[..],
+    };
+    let distance = |factor: f64| (ratio / factor).ln().abs();
+    let near =
+        (SUSPICIOUS.iter().chain(others)).filter(|(factor, _)| distance(*factor) < NEAR.ln());
+    near.min_by(|a, b| distance(a.0).total_cmp(&distance(b.0)))
+        .map(|(_, words)| *words)
+}
+
+/// Magnitudes outside the range of mechanical vibrations, and mains hum at a frequency that it has in another unit of time.
+fn magnitudes(record: &RawRecord) -> Vec<DataWarning> {
+    let Some(first) = record.channels.first() else {
+        return Vec::new();
+    };
+    let all = record.channels.iter().filter(|c| !c.unit.is_arbitrary());
+    let all: Vec<Magnitude> = all
+        .filter_map(|c| Magnitude::of(quantity(c.kind), c.unit, &c.values))
+        .collect();
+    let pairs = first
+        .times
+        .iter()
+        .copied()
+        .zip(first.values.iter().copied());
+    let pairs: Vec<(f64, f64)> = pairs.collect();
+    let duration = first.span[1] - first.span[0];
+    let oscillation = Oscillation::of(&pairs, first.median_spacing, duration);
+    let frequencies = oscillation.frequencies();
+    let found = frequencies.and_then(|both| implausible(both, first.time_unit, &all));
+    if let Some(found) = found {
+        return vec![DataWarning::ImplausibleMagnitudes {
+            magnitudes: found.magnitudes,
+            reading: found.reading,
+        }];
+    }
+    let hum = first
+        .time_unit
+        .and_then(|unit| mains_hum(&first.values, first.median_spacing, unit));
+    let hum = hum.map(|(frequency, unit)| DataWarning::MainsHum {
+        channel: first.kind.name(),
+        frequency,
+        unit: unit.symbol().into(),
+    });
+    hum.into_iter().collect()
+}
+
+/// The mass that the measured force and the first channel imply, where it differs from the stated one by the factor between two units.
+fn implied_mass(file: &ModelFile, record: &RawRecord) -> Option<DataWarning> {
+    let stated = match file.spec.functions.mass.fixed.as_ref()? {
+        KnownValue::Number(number) => number.0,
+        KnownValue::Map(map) => map.value?.0,
+        KnownValue::Unknown => return None,
+    };
+    let force = record.force()?;
+    let channel = record.channels.first()?;
+    let spacing = channel.spacing?;
+    let force: Vec<f64> = channel.times.iter().map(|t| force.value(*t)).collect();
+    let [implied, ..] = driven_oscillator(&force, &channel.values, spacing, channel.kind as i32)?;
+    let ratio = implied / stated;
+    Some(DataWarning::SuspiciousMass {
+        channel: channel.kind.name(),
+        implied,
+        ratio,
+        factor: factor_near(ratio, record)?,
+    })
 }
 
 /// Pairs of channels of one response with opposite signs.

@@ -24,10 +24,10 @@ use excitation::RawExcitation;
 use kmcfit_core::internals::builder::{self, ChannelSpec, ScalarSpec, listed};
 use kmcfit_core::internals::functions::{Prior, ScalarParameter};
 use kmcfit_core::internals::record::{ChannelKind, Experiment, InputErrorKind, Weighting};
+use kmcfit_core::internals::signal::Signal;
 use kmcfit_core::internals::system::{Grid, InputQuantity};
 
 pub(super) use excitation::shape;
-#[cfg(test)]
 pub(crate) use warning::DataWarning;
 
 /// Data of one experiment before it is placed on the grid, at the times of its samples.
@@ -37,6 +37,16 @@ pub(super) struct RawRecord {
 }
 
 impl RawRecord {
+    /// Samples of the force, if it alone acts.
+    pub fn force(&self) -> Option<&Signal> {
+        self.excitation.force()
+    }
+
+    /// True for a free response.
+    pub fn is_free(&self) -> bool {
+        self.excitation.is_empty()
+    }
+
     /// First time of its rows, missing samples included, s.
     pub fn start(&self) -> f64 {
         let first = self.channels.iter().map(|c| c.span[0]);
@@ -146,14 +156,14 @@ fn read_one(
     Ok(record)
 }
 
-/// The specification of experiment `i` with its data, and the notes on its channels; with default limits if the fit `is_limited`.
+/// The specification of experiment `i` with its data, and the notes on its channels.
 pub(super) fn specification(
     file: &ModelFile,
     mode: BuildMode,
     grid: &Grid,
     i: usize,
     record: Option<RawRecord>,
-    is_limited: bool,
+    defaults: functions::Defaults<'_>,
 ) -> Result<(builder::Record, Vec<ChannelNote>), InputError> {
     let spec = &file.spec.experiments[i];
     let estimate = ScalarOr::Scalar(NumberOrEstimate::Estimate);
@@ -167,7 +177,7 @@ pub(super) fn specification(
     }
     for given in functions::own(file, i) {
         let key = format!("experiments[{i}].functions.{}", given.0.name());
-        let own = functions::specification(file, grid, &key, given, is_limited)?;
+        let own = functions::specification(file, grid, &key, given, defaults)?;
         found = found.coefficient(given.0, own);
     }
     if let Some((quantity, error)) = input_sigma(file, i)? {

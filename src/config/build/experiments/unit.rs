@@ -91,17 +91,23 @@ impl QuantityColumn<'_> {
             warnings.push(warning.at(&columns_key));
             return Ok(si);
         }
-        if let Some(looks) = suffix.filter(|unit| differs(unit, si)) {
-            let warning = DataWarning::UnitOfNameUnused {
+        let warning = match suffix {
+            // A name like `phi_rad` or `acc_V` has the symbol of the unit for reports.
+            Some(unit) if !differs(&unit, si) => return Ok(unit),
+            Some(unit) => DataWarning::UnitOfNameUnused {
                 column: label,
                 name: name.to_owned(),
                 used: si.symbol().into(),
-                stated: looks.symbol().into(),
-            };
-            warnings.push(warning.at(&columns_key));
-        }
-        // A name like `phi_rad` or `acc_V` has the symbol of the unit for reports.
-        Ok(suffix.filter(|unit| !differs(unit, si)).unwrap_or(si))
+                stated: unit.symbol().into(),
+            },
+            None => DataWarning::UnitAssumed {
+                column: label,
+                quantity: name.to_owned(),
+                unit: si.symbol().into(),
+            },
+        };
+        warnings.push(warning.at(&columns_key));
+        Ok(si)
     }
 
     /// Warns if the table states another unit for this column of standard deviations than `used`, the unit of the

@@ -33,6 +33,13 @@ pub(crate) enum DataWarning {
         quantity: &'static str,
         used: String,
     },
+    /// Neither the model nor the file states the unit of a column. A statement beside a result, and no warning.
+    #[error("{} in {unit} (column `{column}`)", quantity.replace('_', " "))]
+    UnitAssumed {
+        column: String,
+        quantity: String,
+        unit: String,
+    },
     /// The name of a column ends in a unit that is not used.
     #[error(
         "column `{column}`: {used} is assumed, although its name ends in {stated}; add `units: {{{name}: {stated}}}` if it is \
@@ -61,6 +68,36 @@ pub(crate) enum DataWarning {
     #[error("{quantity} is {} times its expected value, {factor}; check `units`", significant(*ratio, 4))]
     SuspiciousFactor {
         quantity: String,
+        ratio: f64,
+        factor: &'static str,
+    },
+    /// The magnitudes of a record are outside the range of mechanical vibrations.
+    #[error("{magnitudes} is implausible{}; check `units`",
+        reading.as_ref().map(|reading| format!(": {reading}")).unwrap_or_default()
+    )]
+    ImplausibleMagnitudes {
+        magnitudes: String,
+        reading: Option<String>,
+    },
+    /// A narrow line that is mains hum in another unit of time.
+    #[error(
+        "the {channel} has a narrow line at {} Hz: mains hum, if the times are in {unit}; check `units: {{time: {unit}}}`",
+        significant(*frequency, 3)
+    )]
+    MainsHum {
+        channel: &'static str,
+        frequency: f64,
+        unit: String,
+    },
+    /// The force and the response imply another mass than the stated one, by the factor between two units.
+    #[error(
+        "the force and the {channel} imply a mass of {} kg, {} times the stated one, {factor}; check `units` and the mass",
+        significant(*implied, 3),
+        significant(*ratio, 3)
+    )]
+    SuspiciousMass {
+        channel: &'static str,
+        implied: f64,
         ratio: f64,
         factor: &'static str,
     },
@@ -122,6 +159,16 @@ pub(crate) enum DataWarning {
 }
 
 impl DataWarning {
+    /// Kind of [`DataWarning::UnitAssumed`].
+    pub const UNIT_ASSUMED: &str = "unit_assumed";
+    /// Kinds of the warnings that show a wrong unit.
+    pub const DOUBTFUL_UNITS: [&str; 4] = [
+        "implausible_magnitudes",
+        "mains_hum",
+        "suspicious_factor",
+        "suspicious_mass",
+    ];
+
     /// The warning as a finding about a key or an experiment of the model file.
     pub fn at(&self, place: &str) -> Finding {
         Finding::of(self, format!("{place}: {self}")).with("place", place)

@@ -50,6 +50,8 @@ pub struct RawChannel {
     /// Correlation of the noise.
     pub noise: NoiseModel,
     pub unit: Unit,
+    /// Unit of the column of times; `None` for a sampling rate.
+    pub time_unit: Option<Unit>,
     ignored: Vec<(usize, String)>,
     format: String,
 }
@@ -100,6 +102,15 @@ fn spec_of(spec: &ExperimentSpec, kind: ChannelKind) -> Spec<'_> {
         loss: pick!(spec.loss),
         noise: pick!(spec.noise),
         sensor: pick!(spec.sensors),
+    }
+}
+
+/// The measured quantity of a channel.
+pub fn quantity(kind: ChannelKind) -> Quantity {
+    match kind {
+        ChannelKind::Displacement => Quantity::Displacement,
+        ChannelKind::Velocity => Quantity::Velocity,
+        ChannelKind::Acceleration => Quantity::Acceleration,
     }
 }
 
@@ -203,11 +214,7 @@ fn read_one(
     let wanted = ColumnRequest {
         experiment: i,
         name: kind.name(),
-        kind: match kind {
-            ChannelKind::Displacement => Quantity::Displacement,
-            ChannelKind::Velocity => Quantity::Velocity,
-            ChannelKind::Acceleration => Quantity::Acceleration,
-        },
+        kind: quantity(kind),
         column,
         unit: of_kind.unit,
         beside: sigma_column,
@@ -254,6 +261,7 @@ fn read_one(
         loss,
         noise: noise_model(of_kind),
         unit: source.unit,
+        time_unit: source.time_unit,
         ignored,
         format: source.format,
     })
