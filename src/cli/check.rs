@@ -119,6 +119,9 @@ fn describe(model: &Model) -> String {
             }
         }
     }
+    for fact in &model.data {
+        text += &format!("{fact}\n");
+    }
     text + &format!(
         "{}: {} nodes over {} s ({}), {} parameters, {}\n",
         model.title,

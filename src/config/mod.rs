@@ -26,7 +26,7 @@ pub mod values;
 mod yaml_errors;
 
 #[cfg(test)]
-pub(crate) use build::DataWarning;
+pub(crate) use build::{DataAction, DataFact, DataWarning, GapPlace};
 pub use build::{
     AutomaticGrid, BuildMode, Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation,
     StudyPlan, StudyTarget, WeightSearch, build,

@@ -5,6 +5,7 @@ mod bad_input;
 mod check;
 mod command_line;
 mod compare;
+mod corruptions;
 mod data_files;
 mod durable;
 mod ending;

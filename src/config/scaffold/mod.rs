@@ -71,6 +71,11 @@ pub fn scaffold(
         let others = listed(others.iter().map(String::as_str));
         found.push(format!("not used, of another length or rate: {others}"));
     }
+    if let Some(lines) = &record.repeated {
+        found.push(format!(
+            "times are repeated in {lines}: the model uses the first row of each time (`duplicates: first`)"
+        ));
+    }
     if let Some((count, first)) = record.outliers {
         let outliers = match count {
             1 => "1 outlier".to_owned(),
@@ -192,6 +197,8 @@ fn keys(
     let between = format!("{{interpolation: {}}}", record.between);
     let or = "between samples: or hold, linear, cubic";
     let (sensors, why) = sensors(columns, record);
+    let repeated = record.repeated.as_deref().unwrap_or_default();
+    let repeated = format!("times are repeated in {repeated}; or `mean`");
     let robust = format!("{{{}: huber}}", record.channel.0.key());
     let keys = [
         (
@@ -201,6 +208,11 @@ fn keys(
         ),
         ("    sample_rate", sample_rate.map(|r| r.to_string()), "Hz"),
         ("    units", columns.units(table), &columns.units_comment()),
+        (
+            "    duplicates",
+            record.repeated.as_ref().map(|_| "first".to_owned()),
+            &repeated,
+        ),
         (
             "    window",
             record.begins.map(|begins| format!("{{min: {begins}}}")),

@@ -43,7 +43,7 @@ pub use rivals::AmplitudeRival;
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
 pub use verdict::{
-    Implausible, VerdictAssumption, VerdictLevel, VerdictReason, verdict_assumptions,
+    Implausible, SampleFault, VerdictAssumption, VerdictLevel, VerdictReason, verdict_assumptions,
     verdict_level, verdict_reasons,
 };
 
