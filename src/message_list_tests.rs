@@ -7,8 +7,8 @@ use crate::report::suggestions::{Suggestion, Suspect};
 use crate::report::{assumption, reason_in_words};
 use kmcfit_core::internals::assessment::{
     AmplitudeRival, ClassicalEstimate, ClassicalMethod, CoarseBasis, FitWarning, FunctionInGap,
-    GapAssessment, GapStatus, Implausible, NoIntervals, RecordError, ResidualPattern, Unidentified,
-    SampleFault, VerdictAssumption, VerdictReason,
+    GapAssessment, GapStatus, Implausible, NoIntervals, RecordError, ResidualPattern, SampleFault,
+    Unidentified, VerdictAssumption, VerdictReason,
 };
 use kmcfit_core::internals::builder::BuildNotice;
 use kmcfit_core::internals::diagnostics::{UntestedReason, Whiteness, WhitenessResult};
@@ -62,11 +62,7 @@ fn messages() {
         all.iter().map(|w| shown(w)),
     );
     let all = data_facts();
-    section(
-        &mut list,
-        "Facts about data",
-        all.iter().map(|f| shown(f)),
-    );
+    section(&mut list, "Facts about data", all.iter().map(|f| shown(f)));
     let all = notices();
     section(
         &mut list,
@@ -529,7 +525,11 @@ fn data_warnings() -> Vec<DataWarning> {
 fn data_facts() -> Vec<DataFact> {
     let channel = || "acceleration".to_owned();
     let unit = || "g".to_owned();
-    let gap = GapPlace { from: 1.25, to: 1.37, samples: 11 };
+    let gap = GapPlace {
+        from: 1.25,
+        to: 1.37,
+        samples: 11,
+    };
     samples![
         DataFact::RepeatedTimes { .. } => DataFact::RepeatedTimes {
             count: 1, lines: vec![14], action: DataAction::Merged,
@@ -819,6 +819,9 @@ fn record_errors() -> Vec<RecordError> {
     let experiment = || "shaker".to_owned();
     samples![
         RecordError::Delay { .. } => RecordError::Delay { experiment: experiment(), delay: 0.0125, samples: 2.5 },
+        RecordError::InputPulses { .. } => RecordError::InputPulses {
+            experiment: experiment(), count: 2, time: 4.25, error: -3.5,
+        },
         RecordError::Delay { .. } => RecordError::Delay { experiment: experiment(), delay: -0.0125, samples: -2.5 },
         RecordError::ClockDifference { .. } => RecordError::ClockDifference { experiment: experiment(), percent: 0.998 },
         RecordError::ClockDifference { .. } => RecordError::ClockDifference { experiment: experiment(), percent: -0.998 },

@@ -25,12 +25,12 @@ mod syntax;
 pub mod values;
 mod yaml_errors;
 
-#[cfg(test)]
-pub(crate) use build::{DataAction, DataFact, DataWarning, GapPlace};
 pub use build::{
     AutomaticGrid, BuildMode, Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation,
     StudyPlan, StudyTarget, WeightSearch, build,
 };
+#[cfg(test)]
+pub(crate) use build::{DataAction, DataFact, DataWarning, GapPlace};
 pub use model_file::ModelFile;
 pub use new_record::{MeasuredChannel, NewRecord};
 pub use overrides::Override;

@@ -9,8 +9,8 @@ use super::text::and_list;
 use crate::finding::Finding;
 use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::{
-    Implausible, SampleFault, VerdictAssumption, VerdictLevel, VerdictReason, estimates, verdict_assumptions,
-    verdict_level, verdict_reasons,
+    Implausible, SampleFault, VerdictAssumption, VerdictLevel, VerdictReason, estimates,
+    verdict_assumptions, verdict_level, verdict_reasons,
 };
 use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::solvers::{EquationBalance, Status};
@@ -93,7 +93,11 @@ impl FittedModel<'_> {
         self.model.data.iter().filter_map(move |fact| {
             let text = |name: &str| Some(fact.quantities.get(name)?.as_str()?.to_owned());
             let is_input = fact.kind == "quantisation" && text("action")? == "used";
-            let share = fact.quantities.get("share")?.as_f64().filter(|_| is_input)?;
+            let share = fact
+                .quantities
+                .get("share")?
+                .as_f64()
+                .filter(|_| is_input)?;
             let (experiment, channel) = (text("experiment")?, text("channel")?);
             let is_input = !problem.channels().any(|c| c.kind().name() == channel);
             let error_is_stated = (problem.experiments.iter())
@@ -181,7 +185,7 @@ impl FittedModel<'_> {
 }
 
 /// Quantisation error of an input, relative to the residuals, above which it is not small.
-const COARSE: f64 = 0.5;
+const COARSE: f64 = 0.25;
 
 /// Smallest share of the largest force that is a large residual of the equation of motion.
 const LARGE_RESIDUAL: f64 = 0.3;
@@ -281,7 +285,9 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
             fault,
         } => match fault {
             SampleFault::Dropouts => {
-                format!("the {channel} of {experiment} is held at a constant value in part (dropouts)")
+                format!(
+                    "the {channel} of {experiment} is held at a constant value in part (dropouts)"
+                )
             }
             SampleFault::Spikes => format!("the {channel} of {experiment} has spikes"),
             SampleFault::CoarseInput => format!(

@@ -175,7 +175,10 @@ mod tests {
             assert_eq!((found.excess(), found.lines(&table, 9)), (3, vec![4, 5, 7]));
             let times = found.merged(table.values(0).unwrap(), duplicates);
             assert_eq!(*times, [0.0, 1.0, 2.0, 3.0]);
-            assert_eq!(*found.merged(table.values(1).unwrap(), duplicates), [1.0, 3.0, 5.0, 7.0]);
+            assert_eq!(
+                *found.merged(table.values(1).unwrap(), duplicates),
+                [1.0, 3.0, 5.0, 7.0]
+            );
         }
     }
 
@@ -183,10 +186,17 @@ mod tests {
     fn other_rows_need_a_setting() {
         let table = table("0,1,2\n1,3,4\n1,5,\n2,5,6\n");
         let error = repeated_times(&table, 0, Duplicates::Error).unwrap_err();
-        assert!(error.hint.unwrap().ends_with("1 row repeats a time: line 4"));
+        assert!(
+            error
+                .hint
+                .unwrap()
+                .ends_with("1 row repeats a time: line 4")
+        );
         let column = |duplicates, index: usize| {
             let found = repeated_times(&table, 0, duplicates).unwrap();
-            found.merged(table.samples(index).unwrap(), duplicates).into_owned()
+            found
+                .merged(table.samples(index).unwrap(), duplicates)
+                .into_owned()
         };
         assert_eq!(column(Duplicates::First, 1), [1.0, 3.0, 5.0]);
         assert_eq!(column(Duplicates::Mean, 1), [1.0, 4.0, 5.0]);
@@ -196,7 +206,13 @@ mod tests {
     #[test]
     fn a_clock_that_restarts_and_rounded_times_have_their_hints() {
         let restarted = repeated_times(&table("0,1,2\n1,3,4\n0,5,6\n"), 0, Duplicates::Mean);
-        assert!(restarted.unwrap_err().hint.unwrap().contains("from line 4 to a file of their own"));
+        assert!(
+            restarted
+                .unwrap_err()
+                .hint
+                .unwrap()
+                .contains("from line 4 to a file of their own")
+        );
         let rounded = table("0,1,2\n0,3,4\n0,5,6\n1,5,6\n");
         let error = repeated_times(&rounded, 0, Duplicates::Error).unwrap_err();
         assert!(error.hint.unwrap().contains("`sample_rate`"));

@@ -9,6 +9,7 @@ mod corruptions;
 mod data_files;
 mod durable;
 mod ending;
+mod faulty_records;
 mod formats;
 mod known_parts;
 mod measured_input;

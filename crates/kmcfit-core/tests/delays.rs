@@ -142,7 +142,10 @@ fn derivatives_in_delays_agree_with_differences() {
             // Rounding of J over the step: 1e-16/1e-5, and the cubic of the difference.
             let slope = (up.cost - down.cost) / (2.0 * step);
             let own = gradient.euclidean[j];
-            assert!((slope / own - 1.0).abs() < 1e-5, "{late:?} {j}: {own} {slope}");
+            assert!(
+                (slope / own - 1.0).abs() < 1e-5,
+                "{late:?} {j}: {own} {slope}"
+            );
         }
         for (own, other) in jacobian.column_iter().zip(by_differences.column_iter()) {
             let size = other.amax();
@@ -195,7 +198,9 @@ fn delays_are_named_without_the_parameter() {
     for (seed, delay) in [0.3, 1.0, 2.5, 5.0].into_iter().enumerate() {
         let case = Case::new(seed as u64, Late::Force, -delay, 0.02);
         let (problem, fit) = case.fitted(None);
-        let warnings = FitAssessment::of(&problem, &fit, true).plausibility.warnings;
+        let warnings = FitAssessment::of(&problem, &fit, true)
+            .plausibility
+            .warnings;
         let named = warnings.iter().find_map(|w| match w {
             FitWarning::RecordError(RecordError::Delay { samples, .. }) => Some(*samples),
             _ => None,

@@ -10,9 +10,9 @@ mod on_grid;
 mod refinement;
 mod study;
 
+pub use experiments::{ChannelNote, DelayLimits, HoldOut};
 #[cfg(test)]
 pub(crate) use experiments::{DataAction, DataFact, DataWarning, GapPlace};
-pub use experiments::{ChannelNote, DelayLimits, HoldOut};
 pub use kmcfit_core::internals::builder::WeightSearch;
 pub use refinement::AutomaticGrid;
 pub use study::{Candidate, Equivalent, StudyPlan, StudyTarget};

@@ -154,7 +154,7 @@ fn is_white(channel: &Channel, predicted: &[f64]) -> bool {
 }
 
 /// The measured input of an experiment, where there is one.
-fn measured(experiment: &Experiment) -> Option<(InputQuantity, &Signal)> {
+pub(super) fn measured(experiment: &Experiment) -> Option<(InputQuantity, &Signal)> {
     match (&experiment.input.force, &experiment.input.base) {
         (Some(Waveform::Samples(signal)), None) => Some((InputQuantity::Force, signal)),
         (None, Some(BaseMotion::Acceleration(signal))) => {

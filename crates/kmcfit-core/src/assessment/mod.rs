@@ -10,6 +10,7 @@ mod friction_width;
 mod function;
 mod gaps;
 mod input_disturbance;
+mod input_pulses;
 mod plausibility;
 mod record_error;
 mod record_errors;
@@ -50,6 +51,7 @@ pub use verdict::{
 use classical::classical_estimate;
 use friction_width::width_warning;
 use gaps::gap_assessments;
+use input_pulses::input_pulses;
 use record_errors::large_error;
 use rivals::amplitude_rival;
 use score_tests::missing;
@@ -214,10 +216,14 @@ fn causes(
         is_system.then(found).flatten()
     };
     let large = || large_error(problem, theta, evaluation).map(FitWarning::RecordError);
+    let pulses = || {
+        let found = || input_pulses(problem, theta, evaluation).map(FitWarning::RecordError);
+        is_system.then(found).flatten()
+    };
     match (width.flatten(), tests) {
         (Some(width), _) => vec![width],
         (None, false) => Vec::new(),
-        (None, true) => match small().or_else(large) {
+        (None, true) => match small().or_else(large).or_else(pulses) {
             Some(cause) => vec![cause],
             None => second_modes(problem, evaluation),
         },

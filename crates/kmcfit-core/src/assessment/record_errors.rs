@@ -303,8 +303,7 @@ fn late_by_refits(problem: &Problem, e: usize, period: f64) -> Option<(Clock, Re
         let refit = Refit::of(with_clock(problem, e, clock)?, &problem.start())?;
         Some((clock, refit))
     });
-    let (clock, refit) =
-        fits.min_by(|a, b| a.1.worst_misfit().total_cmp(&b.1.worst_misfit()))?;
+    let (clock, refit) = fits.min_by(|a, b| a.1.worst_misfit().total_cmp(&b.1.worst_misfit()))?;
     let start = &refit.fit.best.parameters;
     on_best_clock(problem, start, RecordParameter::Delay(e), clock)
 }

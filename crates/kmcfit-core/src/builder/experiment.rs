@@ -340,7 +340,12 @@ impl ExperimentBuilder<'_> {
             offset: value("offset", offset, unit, [0.0, mean, deviation])?,
             // Scale of the drift: the standard deviation of the samples per 1 s.
             drift: value("drift", drift, &per_second, [0.0, 0.0, deviation])?,
-            delay: value("delay", delay, "s", [0.0, 0.0, median_spacing(&channel.times)])?,
+            delay: value(
+                "delay",
+                delay,
+                "s",
+                [0.0, 0.0, median_spacing(&channel.times)],
+            )?,
             input_delay: ScalarValue::Known(0.0),
         };
         if sensor.gain == ScalarValue::Known(0.0) {

@@ -22,9 +22,11 @@ const MOVES: f64 = 0.02;
 /// [`clipped`], or for samples without quantisation, or with one finer than a thousandth of their range, at least three times as many samples
 /// as at each of the next levels. Constant levels of a step or a square wave are none; `step` is the quantisation step, 0 where unknown.
 pub fn cut_off(values: &[f64], step: f64) -> Vec<f64> {
-    let ends = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |r, y| {
-        [r[0].min(*y), r[1].max(*y)]
-    });
+    let ends = values
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |r, y| {
+            [r[0].min(*y), r[1].max(*y)]
+        });
     let range = ends[1] - ends[0];
     let mut levels: Vec<f64> = Vec::new();
     if let Some((_, level)) = clipped(values) {
@@ -33,7 +35,9 @@ pub fn cut_off(values: &[f64], step: f64) -> Vec<f64> {
         levels.extend(clipped(&others).map(|(_, level)| level));
     }
     let is_fine = step < 1e-3 * range;
-    let fine = ends.into_iter().filter(|level| is_fine && is_cut_finely(values, *level, step));
+    let fine = ends
+        .into_iter()
+        .filter(|level| is_fine && is_cut_finely(values, *level, step));
     for level in fine {
         if !levels.contains(&level) {
             levels.push(level);
@@ -50,7 +54,9 @@ fn is_cut_finely(values: &[f64], level: f64, step: f64) -> bool {
     let mut counts = near.chunk_by(|a, b| a == b).map(<[f64]>::len);
     let here = counts.next().unwrap_or(0);
     let next = counts.take(LEVELS).max().unwrap_or(0);
-    let changes = values.windows(2).filter(|w| (w[0] == level) != (w[1] == level));
+    let changes = values
+        .windows(2)
+        .filter(|w| (w[0] == level) != (w[1] == level));
     let largest = changes.map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
     here >= FEW && here >= FEW * next && largest > CHANGE * step
 }
@@ -125,9 +131,16 @@ mod tests {
                 assert!(cut_off(&clean, step).is_empty(), "{per_period} {round}");
             }
         }
-        let noisy: Vec<f64> = (0..400).map(|i| (0.31 * f64::from(i)).sin() * (1.0 + 0.1 * (0.017 * f64::from(i * i % 97)).cos())).collect();
+        let noisy: Vec<f64> = (0..400)
+            .map(|i| {
+                (0.31 * f64::from(i)).sin() * (1.0 + 0.1 * (0.017 * f64::from(i * i % 97)).cos())
+            })
+            .collect();
         let largest = noisy.iter().fold(0.0f64, |m, y| m.max(*y));
-        let cut: Vec<f64> = noisy.iter().map(|y| y.clamp(-0.97 * largest, 0.93 * largest)).collect();
+        let cut: Vec<f64> = noisy
+            .iter()
+            .map(|y| y.clamp(-0.97 * largest, 0.93 * largest))
+            .collect();
         assert!(cut_off(&noisy, 0.0).is_empty());
         assert!(cut_off(&cut, 0.0).contains(&(0.93 * largest)));
     }

@@ -20,6 +20,8 @@ const AT_REST: f64 = 0.02;
 const SPIKE: f64 = 8.0;
 /// The same distance in deviations of the samples around, which are few: their deviation is uncertain by a fifth.
 const SPIKE_BESIDE: f64 = 5.5;
+/// Distances of the neighbours of a single wrong sample relative to its own: -2/3 up to the noise.
+const SINGLE: std::ops::RangeInclusive<f64> = -0.93..=-0.4;
 /// Samples on either side of a spike of which the deviations are compared.
 const BESIDE: usize = 20;
 /// Ratio of the median absolute value to the standard deviation of Gaussian noise.
@@ -43,9 +45,11 @@ pub fn dropouts(values: &[f64], step: f64) -> Vec<Range<usize>> {
     if held as f64 > MOST_HELD * values.len() as f64 {
         return Vec::new();
     }
-    let range = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |r, y| {
-        [r[0].min(*y), r[1].max(*y)]
-    });
+    let range = values
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |r, y| {
+            [r[0].min(*y), r[1].max(*y)]
+        });
     let least = AT_REST * (range[1] - range[0]);
     let is_rest = |level: f64| {
         let all = values.iter().filter(|y| **y == level).count();
@@ -117,11 +121,12 @@ pub fn spikes(times: &[f64], values: &[f64]) -> Vec<usize> {
         }
         let around = i.saturating_sub(BESIDE)..(i + BESIDE + 1).min(distances.len());
         let beside = [i.checked_sub(1), Some(i + 1)].map(|i| i.and_then(|i| distances.get(i)));
-        let beside: Vec<f64> = beside.into_iter().flatten().map(|d| d / own).collect();
-        let share = beside.iter().sum::<f64>() / beside.len().max(1) as f64;
-        own.abs() > SPIKE_BESIDE * deviation(&distances[around])
-            && beside.iter().all(|d| d.abs() < 1.0)
-            && (-0.9..=-0.45).contains(&share)
+        // Both have -2/3 of its distance, up to the noise.
+        let is_single = beside
+            .into_iter()
+            .flatten()
+            .all(|d| SINGLE.contains(&(d / own)));
+        own.abs() > SPIKE_BESIDE * deviation(&distances[around]) && is_single
     };
     let found = (0..distances.len()).filter(is_spike);
     found.map(|i| i + 2).collect()

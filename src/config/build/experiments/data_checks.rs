@@ -36,27 +36,12 @@ const OPPOSITE: f64 = 0.7;
 const FEWEST_PERIODS: f64 = 3.0;
 const FEWEST_IN_A_PERIOD: f64 = 4.0;
 
-/// Warnings about the record of experiment `i`, beside those that are `stated`: spikes are no outliers as well.
-pub fn of(
-    file: &ModelFile,
-    i: usize,
-    spec: &ExperimentSpec,
-    record: &RawRecord,
-    stated: &[Finding],
-) -> Vec<Finding> {
+/// Warnings about the record of experiment `i`.
+pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord) -> Vec<Finding> {
     let name = file.experiment_name(i);
-    let has_spikes = |c: &RawChannel| {
-        let is_of = |w: &Finding, key: &str, value: &str| {
-            w.quantities.get(key).and_then(|v| v.as_str()) == Some(value)
-        };
-        stated.iter().any(|w| {
-            w.kind == "spikes" && is_of(w, "experiment", &name) && is_of(w, "channel", c.kind.name())
-        })
-    };
-    let outlying = |c: &RawChannel| outliers(spec, c).filter(|_| !has_spikes(c));
     let mut warnings = unit_factors(spec, record);
     warnings.extend(opposite_signs(spec, record));
-    warnings.extend(record.channels.iter().filter_map(outlying));
+    warnings.extend(record.channels.iter().filter_map(|c| outliers(spec, c)));
     // The equation error simulates no response from an initial state.
     if !is_equation_error(file) {
         warnings.extend(rest_before_motion(spec, record));

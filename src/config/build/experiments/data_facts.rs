@@ -163,7 +163,10 @@ fn gaps_in_words(places: &[GapPlace], count: usize) -> String {
     let each = places.iter().take(IN_WORDS).map(|gap| {
         let (from, to) = (time(gap.from), time(gap.to));
         let length = significant(gap.to - gap.from, 3);
-        format!("{from} to {to} s ({length} s, {})", counted(gap.samples, "sample"))
+        format!(
+            "{from} to {to} s ({length} s, {})",
+            counted(gap.samples, "sample")
+        )
     });
     listed(each.collect(), count)
 }
@@ -175,7 +178,10 @@ fn spans_in_words(places: &[[f64; 2]]) -> String {
 }
 
 fn times_in_words(places: &[f64], count: usize) -> String {
-    listed(places.iter().take(IN_WORDS).map(|t| time(*t)).collect(), count)
+    listed(
+        places.iter().take(IN_WORDS).map(|t| time(*t)).collect(),
+        count,
+    )
 }
 
 fn listed(each: Vec<String>, count: usize) -> String {

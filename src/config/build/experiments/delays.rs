@@ -117,7 +117,11 @@ fn delay(
             let around = start.unwrap_or(0.0);
             let least = spec.min.map_or(around - usual, |d| d.0);
             let most = spec.max.map_or(around + usual, |d| d.0);
-            let middle = if (least..=most).contains(&0.0) { 0.0 } else { 0.5 * (least + most) };
+            let middle = if (least..=most).contains(&0.0) {
+                0.0
+            } else {
+                0.5 * (least + most)
+            };
             (start.unwrap_or(middle), [least, most])
         }
     };
@@ -139,14 +143,14 @@ pub fn check_input(file: &ModelFile, i: usize, record: &RawRecord) -> Result<(),
         return Ok(());
     };
     let columns = spec.columns.as_ref();
-    let is_read = columns.is_some_and(|c| match name {
+    let has_column = columns.is_some_and(|c| match name {
         "force" => c.force.is_some(),
         "base_acceleration" => c.base_acceleration.is_some(),
         _ => c.base_displacement.is_some(),
     });
     let key = format!("experiments[{i}].sensors.{name}");
     let in_words = name.replace('_', " ");
-    if !is_read {
+    if !has_column {
         return Err(file
             .error_at(
                 &key,
@@ -242,7 +246,11 @@ impl super::RawChannel {
 }
 
 /// Limits of the estimated delays of a model, by the names of their parameters.
-pub fn limits(file: &ModelFile, i: usize, record: &RawRecord) -> Result<Vec<DelayLimits>, InputError> {
+pub fn limits(
+    file: &ModelFile,
+    i: usize,
+    record: &RawRecord,
+) -> Result<Vec<DelayLimits>, InputError> {
     let name = file.experiment_name(i);
     let of = |delay: Delay, channel: &str| match delay {
         Delay::Known(_) => None,

@@ -56,14 +56,20 @@ impl Column<'_> {
         let mut excluded = Vec::new();
         for Faulty { fault, samples } in self.faulty(&times, &values, step) {
             let excludes = self.excludes(fault);
-            let action = if excludes { DataAction::Excluded } else { DataAction::Used };
+            let action = if excludes {
+                DataAction::Excluded
+            } else {
+                DataAction::Used
+            };
             let first = samples.first().copied().unwrap_or_default();
             let level = values[first] / source.unit.factor();
             let unit = source.unit.symbol().to_owned();
             let fact = self.fact(fault, &samples, &times, action, level, unit);
             notes.state(&self.experiment_name(), &fact);
             if excludes {
-                samples.iter().for_each(|i| source.values[present[*i]] = f64::NAN);
+                samples
+                    .iter()
+                    .for_each(|i| source.values[present[*i]] = f64::NAN);
                 excluded.push((samples.len(), fault.reason().to_owned()));
             } else {
                 let is_robust = self.is_robust && fault == FaultName::Spikes;
@@ -100,7 +106,9 @@ impl Column<'_> {
     fn gaps(&self, times: &[f64], notes: &mut RecordNotes) {
         let spacings: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
         let usual = median(&spacings);
-        let regular = spacings.iter().filter(|s| (*s - usual).abs() <= 0.1 * usual);
+        let regular = spacings
+            .iter()
+            .filter(|s| (*s - usual).abs() <= 0.1 * usual);
         if (regular.count() as f64) < REGULAR * spacings.len() as f64 {
             return;
         }
@@ -163,7 +171,8 @@ impl Column<'_> {
             (FaultName::Saturation, cut),
         ];
         let all = all.into_iter().filter(|(_, samples)| !samples.is_empty());
-        all.map(|(fault, samples)| Faulty { fault, samples }).collect()
+        all.map(|(fault, samples)| Faulty { fault, samples })
+            .collect()
     }
 
     fn fact(
@@ -267,8 +276,10 @@ fn is_sustained(values: &[f64], spikes: &[usize]) -> bool {
 /// Quantisation step of the samples that is worth stating, SI.
 pub fn coarse_step(values: &[f64]) -> Option<f64> {
     let present: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
-    let range = present.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |r, y| {
-        [r[0].min(*y), r[1].max(*y)]
-    });
+    let range = present
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |r, y| {
+            [r[0].min(*y), r[1].max(*y)]
+        });
     quantisation(&present).filter(|step| *step > FINE * (range[1] - range[0]))
 }

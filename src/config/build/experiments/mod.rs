@@ -19,6 +19,7 @@ use crate::config::spec::{
 };
 use crate::config::values::{Estimate, NumberOrEstimate};
 use crate::error::InputError;
+use crate::finding::Finding;
 use crate::tables::resample;
 use crate::units::Unit;
 pub(super) use channel::RawChannel;
@@ -153,7 +154,13 @@ fn read_one(
         channels,
         excitation: excitation::read(file, i, spec, notes)?,
     };
-    let checks = data_checks::of(file, i, spec, &record, &notes.warnings);
+    let checks = data_checks::of(file, i, spec, &record);
+    // Outliers are spikes as well.
+    notes.warnings.retain(|spikes| {
+        let is_of = |w: &Finding, key: &str| w.quantities.get(key) == spikes.quantities.get(key);
+        let mut outliers = checks.iter().filter(|w| w.kind == "outliers");
+        spikes.kind != "spikes" || !outliers.any(|w| is_of(w, "experiment") && is_of(w, "channel"))
+    });
     notes.warnings.extend(checks);
     delays::apply(file, i, &mut record, notes)?;
     Ok(record)

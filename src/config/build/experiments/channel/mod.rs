@@ -220,7 +220,8 @@ fn read_one(
     let mut ignored = Vec::new();
     let loss = loss(file, &key, of_kind)?;
     let missing = source.values.iter().filter(|v| v.is_nan()).count();
-    let step = coarse_step(&source.values).filter(|_| spec.band.is_none() && spec.decimate.is_none());
+    let step =
+        coarse_step(&source.values).filter(|_| spec.band.is_none() && spec.decimate.is_none());
     let column = Column {
         file,
         experiment: i,

@@ -61,7 +61,8 @@ pub(super) fn with_quantisation(
     step: f64,
 ) -> (Option<Weighting>, DataAction) {
     let error = step / 12.0f64.sqrt();
-    let is_large = |sigma: &f64| error > NEGLIGIBLE * sigma;
+    // An invalid sigma stays, for its message.
+    let is_large = |sigma: &f64| *sigma > 0.0 && error > NEGLIGIBLE * sigma;
     match weighting {
         Some(Weighting::Sigma(sigma)) if is_large(&sigma) => (
             Some(Weighting::Sigma(sigma.hypot(error))),
