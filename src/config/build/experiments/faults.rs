@@ -120,7 +120,7 @@ impl Column<'_> {
         let places = all.iter().take(MOST_PLACES).map(|i| GapPlace {
             from: self.in_file(times, *i),
             to: self.in_file(times, i + 1),
-            samples: (spacings[*i] / usual - 0.5).round().max(1.0) as usize,
+            samples: (spacings[*i] / usual - 1.0).round().max(1.0) as usize,
         });
         let places: Vec<GapPlace> = places.collect();
         let longest = places
@@ -155,7 +155,9 @@ impl Column<'_> {
             // A force that ends stays at a constant value.
             rows.retain(|row| row.end < values.len());
         }
-        let limits = cut_off(values, step);
+        let mut limits = cut_off(values, step);
+        // A sine has its peak value once in a period.
+        limits.retain(|level| values.windows(2).any(|pair| pair == [*level; 2]));
         let cut = (0..values.len()).filter(|i| limits.contains(&values[*i]));
         let cut: Vec<usize> = cut.collect();
         rows.retain(|row| cut.binary_search(&row.start).is_err());
