@@ -1,14 +1,14 @@
 //! The list of all messages: every error that a test asserts, and every variant of warnings, findings, suggestions and
 //! outcomes. `tests/snapshots/kmcfit__message_list_tests__messages.snap` is this list; it is read as a whole when a message changes.
 
-use crate::config::DataWarning;
+use crate::config::{DataAction, DataFact, DataWarning, GapPlace};
 use crate::report::findings;
 use crate::report::suggestions::{Suggestion, Suspect};
 use crate::report::{assumption, reason_in_words};
 use kmcfit_core::internals::assessment::{
     AmplitudeRival, ClassicalEstimate, ClassicalMethod, CoarseBasis, FitWarning, FunctionInGap,
-    GapAssessment, GapStatus, Implausible, NoIntervals, RecordError, ResidualPattern, Unidentified,
-    VerdictAssumption, VerdictReason,
+    GapAssessment, GapStatus, Implausible, NoIntervals, RecordError, ResidualPattern, SampleFault,
+    Unidentified, VerdictAssumption, VerdictReason,
 };
 use kmcfit_core::internals::builder::BuildNotice;
 use kmcfit_core::internals::diagnostics::{UntestedReason, Whiteness, WhitenessResult};
@@ -61,6 +61,8 @@ fn messages() {
         "Warnings about data",
         all.iter().map(|w| shown(w)),
     );
+    let all = data_facts();
+    section(&mut list, "Facts about data", all.iter().map(|f| shown(f)));
     let all = notices();
     section(
         &mut list,
@@ -511,7 +513,73 @@ fn data_warnings() -> Vec<DataWarning> {
             channel: "displacement", samples: 5, first_value: -9999.0, first_time: 4.5, unit: text("mm"), has_sigma: false,
         },
         DataWarning::Saturation { .. } => DataWarning::Saturation {
-            channel: "acceleration", samples: 12, level: 49.03, unit: text("m/s^2"),
+            channel: text("acceleration"), samples: 12, level: 49.03, unit: text("m/s^2"), is_input: false,
+        },
+        DataWarning::Saturation { .. } => DataWarning::Saturation {
+            channel: text("force"), samples: 12, level: 50.0, unit: text("N"), is_input: true,
+        },
+        DataWarning::Dropouts { .. } => DataWarning::Dropouts {
+            channel: text("acceleration"), samples: 24, first: [1.25, 1.37], is_input: false,
+        },
+        DataWarning::Dropouts { .. } => DataWarning::Dropouts {
+            channel: text("force"), samples: 24, first: [1.25, 1.37], is_input: true,
+        },
+        DataWarning::Spikes { .. } => DataWarning::Spikes {
+            channel: text("acceleration"), samples: 1, first: 1.25, is_input: false,
+        },
+        DataWarning::Spikes { .. } => DataWarning::Spikes {
+            channel: text("force"), samples: 3, first: 1.25, is_input: true,
+        },
+        DataWarning::InputGaps { .. } => DataWarning::InputGaps {
+            channel: text("force"), count: 1, longest: [1.25, 1.37],
+        },
+        DataWarning::InputGaps { .. } => DataWarning::InputGaps {
+            channel: text("base acceleration"), count: 2, longest: [1.25, 1.37],
+        },
+    ]
+}
+
+fn data_facts() -> Vec<DataFact> {
+    let channel = || "acceleration".to_owned();
+    let unit = || "g".to_owned();
+    let gap = GapPlace {
+        from: 1.25,
+        to: 1.37,
+        samples: 11,
+    };
+    samples![
+        DataFact::RepeatedTimes { .. } => DataFact::RepeatedTimes {
+            count: 1, lines: vec![14], action: DataAction::Merged,
+        },
+        DataFact::RepeatedTimes { .. } => DataFact::RepeatedTimes {
+            count: 12, lines: (14..26).collect(), action: DataAction::First,
+        },
+        DataFact::RepeatedTimes { .. } => DataFact::RepeatedTimes {
+            count: 2, lines: vec![14, 20], action: DataAction::Mean,
+        },
+        DataFact::Gaps { .. } => DataFact::Gaps {
+            channel: channel(), count: 1, places: vec![gap], action: DataAction::Missing,
+        },
+        DataFact::Gaps { .. } => DataFact::Gaps {
+            channel: "force".into(), count: 4, places: vec![gap; 4], action: DataAction::Interpolated,
+        },
+        DataFact::Dropouts { .. } => DataFact::Dropouts {
+            channel: channel(), count: 24, places: vec![[1.25, 1.37]], action: DataAction::Excluded,
+        },
+        DataFact::Spikes { .. } => DataFact::Spikes {
+            channel: channel(), count: 2, places: vec![1.25, 1.37], action: DataAction::Used,
+        },
+        DataFact::Saturation { .. } => DataFact::Saturation {
+            channel: channel(), count: 12, level: 5.0, unit: unit(), action: DataAction::Excluded,
+        },
+        DataFact::Quantisation { .. } => DataFact::Quantisation {
+            channel: channel(), step: 0.01, unit: unit(), share: 0.02, action: DataAction::AddedToSigma,
+        },
+        DataFact::Quantisation { .. } => DataFact::Quantisation {
+            channel: channel(), step: 0.01, unit: unit(), share: 0.02, action: DataAction::LeastSigma,
+        },
+        DataFact::Delay { .. } => DataFact::Delay {
+            channel: channel(), seconds: -0.0125, action: DataAction::Shifted,
         },
     ]
 }
@@ -771,6 +839,9 @@ fn record_errors() -> Vec<RecordError> {
     let experiment = || "shaker".to_owned();
     samples![
         RecordError::Delay { .. } => RecordError::Delay { experiment: experiment(), delay: 0.0125, samples: 2.5 },
+        RecordError::InputPulses { .. } => RecordError::InputPulses {
+            experiment: experiment(), count: 2, time: 4.25, error: -3.5,
+        },
         RecordError::Delay { .. } => RecordError::Delay { experiment: experiment(), delay: -0.0125, samples: -2.5 },
         RecordError::ClockDifference { .. } => RecordError::ClockDifference { experiment: experiment(), percent: 0.998 },
         RecordError::ClockDifference { .. } => RecordError::ClockDifference { experiment: experiment(), percent: -0.998 },
@@ -808,6 +879,21 @@ fn verdict_reasons() -> Vec<VerdictReason> {
         VerdictReason::FrictionWidth { .. } => VerdictReason::FrictionWidth { estimate: "damping".into() },
         VerdictReason::SecondMode { .. } => VerdictReason::SecondMode { frequencies: [3.98, 17.21] },
         VerdictReason::Saturation { .. } => VerdictReason::Saturation { channel: "acceleration".into() },
+        VerdictReason::FaultySamples { .. } => VerdictReason::FaultySamples {
+            experiment: experiment(), channel: "acceleration".into(), fault: SampleFault::Dropouts,
+        },
+        VerdictReason::FaultySamples { .. } => VerdictReason::FaultySamples {
+            experiment: experiment(), channel: "acceleration".into(), fault: SampleFault::Spikes,
+        },
+        VerdictReason::FaultySamples { .. } => VerdictReason::FaultySamples {
+            experiment: experiment(), channel: "force".into(), fault: SampleFault::InputGaps,
+        },
+        VerdictReason::FaultySamples { .. } => VerdictReason::FaultySamples {
+            experiment: experiment(), channel: "force".into(), fault: SampleFault::CoarseInput,
+        },
+        VerdictReason::DelayAtLimit { .. } => VerdictReason::DelayAtLimit {
+            parameter: "delay of the force of shaker".into(),
+        },
         VerdictReason::DisturbedInput { .. } => VerdictReason::DisturbedInput {
             experiment: experiment(), input: InputQuantity::Force,
         },
@@ -995,8 +1081,15 @@ fn suggestions() -> Vec<Suggestion> {
         Suggestion::ReverseInput { .. } => Suggestion::ReverseInput {
             experiment: "shaker".into(), channels: vec![channel(), "acceleration".into()],
         },
-        Suggestion::ShiftTimes { .. } => Suggestion::ShiftTimes { experiment: "shaker".into(), delay: 0.0125 },
-        Suggestion::ShiftTimes { .. } => Suggestion::ShiftTimes { experiment: "shaker".into(), delay: -0.0125 },
+        Suggestion::EstimateDelay { .. } => Suggestion::EstimateDelay {
+            experiment: "shaker".into(), channel: "force".into(), delay: -0.0125, held: None,
+        },
+        Suggestion::EstimateDelay { .. } => Suggestion::EstimateDelay {
+            experiment: "shaker".into(), channel: channel(), delay: 0.0025, held: Some(true),
+        },
+        Suggestion::EstimateDelay { .. } => Suggestion::EstimateDelay {
+            experiment: "shaker".into(), channel: channel(), delay: -0.0025, held: Some(false),
+        },
         Suggestion::ScaleTimes { .. } => Suggestion::ScaleTimes { experiment: "shaker".into(), percent: -0.85 },
         Suggestion::NarrowFriction => Suggestion::NarrowFriction,
         Suggestion::FinerBasis { .. } => Suggestion::FinerBasis { function: "stiffness".into(), without_sigma: false },

@@ -31,6 +31,8 @@ pub use build::{
     AutomaticGrid, BuildMode, Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation,
     StudyPlan, StudyTarget, WeightSearch, build,
 };
+#[cfg(test)]
+pub(crate) use build::{DataAction, DataFact, GapPlace};
 pub use model_file::ModelFile;
 pub use new_record::{MeasuredChannel, NewRecord};
 pub use overrides::Override;

@@ -311,6 +311,20 @@ pub fn record_error(error: &RecordError) -> String {
             significant(percent.abs(), 3),
             if *percent > 0.0 { "short" } else { "long" }
         ),
+        RecordError::InputPulses {
+            experiment,
+            count,
+            time,
+            error,
+        } => format!(
+            "the force of {experiment} has errors at {}, as by spikes, cut peaks or unmeasured impacts, the largest of about {} N near {} s",
+            match count {
+                1 => "1 sample".to_owned(),
+                _ => format!("{count} samples"),
+            },
+            significant(*error, 2),
+            significant(*time, 6)
+        ),
         RecordError::InputSign { experiment } => {
             format!("the input of {experiment} has the wrong sign")
         }

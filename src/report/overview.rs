@@ -2,7 +2,6 @@
 
 use super::findings;
 use super::model_assumptions::assumed_units;
-use super::text::and_list;
 use crate::config::{ChannelNote, Model};
 use crate::finding::Finding;
 use crate::number_format::significant;
@@ -14,12 +13,8 @@ use kmcfit_core::internals::record::{Channel, Experiment};
 use kmcfit_core::internals::signal::{Spectrum, median_spacing};
 use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 
-/// Distance of samples, in median distances, from which on it is a gap.
-const GAP: f64 = 1.5;
 /// Largest deviation of distances from multiples of the median one, relative to it, of regular samples with gaps: rounded times have some.
 const REGULAR: f64 = 0.05;
-/// Most gaps that are listed.
-const MOST_GAPS: usize = 3;
 
 /// The overview as text, one statement a line.
 pub fn overview(model: &Model) -> String {
@@ -31,6 +26,7 @@ pub fn overview(model: &Model) -> String {
             lines.extend(of_channel(experiment, channel, note));
         }
     }
+    lines.extend(Finding::texts(&model.data));
     lines.extend(assumed_units(model).map(|units| format!("units: {}", units.text)));
     let grid = &model.problem.system.grid;
     lines.push(format!(
@@ -103,28 +99,7 @@ fn of_channel(experiment: &Experiment, channel: &Channel, note: &ChannelNote) ->
         frequency.unwrap_or_default(),
         significant(size, 3)
     ));
-    lines.extend(gaps(times, spacing).map(|gaps| format!("{name}: {gaps}")));
     lines
-}
-
-/// The longest gaps with their places.
-fn gaps(times: &[f64], spacing: f64) -> Option<String> {
-    let pairs = times
-        .windows(2)
-        .filter(|pair| pair[1] - pair[0] > GAP * spacing);
-    let mut all: Vec<[f64; 2]> = pairs.map(|pair| [pair[0], pair[1]]).collect();
-    let count = all.len();
-    all.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
-    all.truncate(MOST_GAPS);
-    let words = |[from, to]: &[f64; 2]| {
-        let [from, to] = [from, to].map(|time| significant(*time, 5));
-        format!("{from} to {to} s")
-    };
-    let longest: Vec<String> = all.iter().map(words).collect();
-    (count > 0).then(|| match count {
-        1 => format!("1 gap, {}", and_list(&longest)),
-        _ => format!("{count} gaps, the longest {}", and_list(&longest)),
-    })
 }
 
 /// Means of the functions at the start values, with natural frequency and damping ratio.

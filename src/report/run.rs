@@ -182,6 +182,7 @@ impl FittedModel<'_> {
                 .unwrap_or_default(),
             step_check: self.run_assessment.step_check().cloned(),
             equation: self.run_assessment.balance.clone(),
+            data: model.data.clone(),
             automatic: model.automatic.clone(),
             predictions: self.predictions.to_vec(),
             warnings: model.warnings.clone(),

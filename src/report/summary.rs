@@ -55,7 +55,7 @@ fn write_answer(text: &mut String, document: &ResultDocument) -> std::fmt::Resul
         ("Units", assumed(document, UNITS_ASSUMED)),
         ("Fit", fit(document)),
         ("Truth", truth(document).into_iter().collect()),
-        ("Data", Finding::texts(&document.warnings)),
+        ("Data", data_lines(document)),
         ("Next", Finding::texts(&document.advice)),
     ];
     for (heading, sentences) in lists {
@@ -72,6 +72,22 @@ fn assumed(document: &ResultDocument, kind: &str) -> Vec<String> {
     let all = document.verdict.iter().flat_map(|v| &v.assumptions);
     let of_kind = all.filter(|assumption| assumption.kind == kind);
     of_kind.map(|assumption| assumption.text.clone()).collect()
+}
+
+/// What was done with the data, in one line, and the warnings about them.
+fn data_lines(document: &ResultDocument) -> Vec<String> {
+    let is_done = |fact: &&Finding| {
+        let action = fact.quantities.get("action").and_then(|a| a.as_str());
+        action != Some("used") && fact.kind != "quantisation"
+    };
+    let mut done = document.data.iter().filter(is_done);
+    let more = done.clone().count().saturating_sub(1);
+    let line = done.next().map(|first| match more {
+        0 => first.text.clone(),
+        _ => format!("{}; {more} more in result.json", first.text),
+    });
+    let warnings = Finding::texts(&document.warnings);
+    line.into_iter().chain(warnings).collect()
 }
 
 /// Largest errors against the true system, where it is known.

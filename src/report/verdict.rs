@@ -12,10 +12,12 @@ use crate::config::DataWarning;
 use crate::finding::Finding;
 use crate::number_format::{significant, times_in_words};
 use kmcfit_core::internals::assessment::{
-    Estimate, EstimateStatus, Implausible, VerdictAssumption, VerdictLevel, VerdictReason,
-    estimates, verdict_assumptions, verdict_level, verdict_reasons,
+    Estimate, EstimateStatus, Implausible, SampleFault, VerdictAssumption, VerdictLevel,
+    VerdictReason, estimates, verdict_assumptions, verdict_level, verdict_reasons,
 };
+use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::solvers::{EquationBalance, Status};
+use std::collections::BTreeMap;
 
 impl FittedModel<'_> {
     /// Verdict on the fit: reasons from its assessment, the data and the validation records.
@@ -41,6 +43,20 @@ impl FittedModel<'_> {
         if !reasons.iter().any(has_mode) {
             reasons.extend(self.model.warnings.iter().find_map(two_modes));
         }
+        let faults: BTreeMap<String, VerdictReason> = (self.model.warnings.iter())
+            .filter_map(faulty_samples)
+            .map(|reason| (format!("{reason:?}"), reason))
+            .collect();
+        let is_stated = |reason: &VerdictReason| match reason {
+            VerdictReason::Saturation { channel } => reasons.iter().any(
+                |r| matches!(r, VerdictReason::Saturation { channel: other } if other == channel),
+            ),
+            _ => false,
+        };
+        let faults: Vec<VerdictReason> = faults.into_values().filter(|r| !is_stated(r)).collect();
+        reasons.extend(faults);
+        reasons.extend(self.coarse_inputs());
+        reasons.extend(self.delays_at_limits());
         let poor = self.run_assessment.validation.iter();
         let poor = poor.filter_map(ValidationRecord::poor);
         reasons.extend(poor.map(|(name, fit_percent)| VerdictReason::NotPredicted {
@@ -73,6 +89,58 @@ impl FittedModel<'_> {
                 false => String::new(),
             },
         }
+    }
+
+    /// Inputs whose quantisation error, relative to the input, is not small beside the residuals, relative to the samples: intervals do not
+    /// contain it.
+    fn coarse_inputs(&self) -> impl Iterator<Item = VerdictReason> {
+        let problem = &self.model.problem;
+        let noise = move |name: &str| {
+            let of_record = problem.experiments.iter().position(|e| e.name == name)?;
+            let predictions = &self.fit.best.evaluation.predictions[of_record];
+            let channels = problem.experiments[of_record].channels.iter();
+            let shares = channels.zip(predictions).map(|(channel, predicted)| {
+                let residuals: Vec<f64> = channel.residuals(predicted).collect();
+                standard_deviation(&residuals) / standard_deviation(channel.observed())
+            });
+            shares.reduce(f64::min)
+        };
+        self.model.data.iter().filter_map(move |fact| {
+            let text = |name: &str| Some(fact.quantities.get(name)?.as_str()?.to_owned());
+            let is_input = fact.kind == "quantisation" && text("action")? == "used";
+            let share = fact
+                .quantities
+                .get("share")?
+                .as_f64()
+                .filter(|_| is_input)?;
+            let (experiment, channel) = (text("experiment")?, text("channel")?);
+            let is_input = !problem.channels().any(|c| c.kind().name() == channel);
+            let error_is_stated = (problem.experiments.iter())
+                .any(|e| e.name == experiment && e.input_error.is_some());
+            let is_coarse = is_input && !error_is_stated && share > COARSE * noise(&experiment)?;
+            is_coarse.then_some(VerdictReason::FaultySamples {
+                experiment,
+                channel,
+                fault: SampleFault::CoarseInput,
+            })
+        })
+    }
+
+    /// Estimated delays beyond their limits, where samples at the ends of the record are compared with its first or last node.
+    fn delays_at_limits(&self) -> impl Iterator<Item = VerdictReason> {
+        let values = &self.fit.best.evaluation.scalars;
+        let scalars = self.model.problem.functions.scalars().iter().zip(values);
+        let limit = |name: &str| {
+            let mut limits = self.model.delay_limits.iter();
+            limits.find(|l| l.parameter == name).map(|l| l.range)
+        };
+        scalars.filter_map(move |(scalar, value)| {
+            let [least, most] = limit(&scalar.name)?;
+            let is_outside = !(least..=most).contains(value);
+            is_outside.then(|| VerdictReason::DelayAtLimit {
+                parameter: scalar.name.clone(),
+            })
+        })
     }
 
     /// A quantity outside the range of mechanical systems, where the fit identifies a system.
@@ -151,6 +219,9 @@ impl FittedModel<'_> {
     }
 }
 
+/// Quantisation error of an input, relative to the residuals, above which it is not small.
+const COARSE: f64 = 0.25;
+
 /// Smallest share of the largest force that is a large residual of the equation of motion.
 const LARGE_RESIDUAL: f64 = 0.3;
 
@@ -177,6 +248,26 @@ fn two_modes(warning: &Finding) -> Option<VerdictReason> {
     let frequencies: Vec<f64> = frequencies.iter().filter_map(|f| f.as_f64()).collect();
     Some(VerdictReason::SecondMode {
         frequencies: frequencies.try_into().ok()?,
+    })
+}
+
+/// Faulty samples from a warning about the data.
+fn faulty_samples(warning: &Finding) -> Option<VerdictReason> {
+    let text = |name: &str| Some(warning.quantities.get(name)?.as_str()?.to_owned());
+    let fault = match warning.kind.as_str() {
+        "saturation" => {
+            let channel = text("channel")?;
+            return Some(VerdictReason::Saturation { channel });
+        }
+        "dropouts" => SampleFault::Dropouts,
+        "spikes" | "outliers" => SampleFault::Spikes,
+        "input_gaps" => SampleFault::InputGaps,
+        _ => return None,
+    };
+    Some(VerdictReason::FaultySamples {
+        experiment: text("experiment")?,
+        channel: text("channel")?,
+        fault,
     })
 }
 
@@ -222,6 +313,27 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
         VerdictReason::ClassicalDisagrees(estimate) => super::findings::classical(estimate),
         VerdictReason::Saturation { channel } => {
             format!("the {channel} saturates: many samples equal the largest one")
+        }
+        VerdictReason::FaultySamples {
+            experiment,
+            channel,
+            fault,
+        } => match fault {
+            SampleFault::Dropouts => {
+                format!(
+                    "the {channel} of {experiment} is held at a constant value in part (dropouts)"
+                )
+            }
+            SampleFault::Spikes => format!("the {channel} of {experiment} has spikes"),
+            SampleFault::CoarseInput => format!(
+                "the quantisation error of the {channel} of {experiment} is not small beside the residuals"
+            ),
+            SampleFault::InputGaps => {
+                format!("the {channel} of {experiment} has gaps, across which it is interpolated")
+            }
+        },
+        VerdictReason::DelayAtLimit { parameter } => {
+            format!("the {parameter} is beyond its limits")
         }
         VerdictReason::DisturbedInput { experiment, .. } => format!(
             "a disturbance enters through the equation of motion of {experiment}: force sensor, unmeasured drive or missing term"

@@ -121,7 +121,7 @@ fn in_place(table: &Table, column: &str, times: &[f64], step: f64) -> Result<f64
     }
 }
 
-fn not_increasing(table: &Table, column: &str, times: &[f64], row: usize) -> InputError {
+pub(super) fn not_increasing(table: &Table, column: &str, times: &[f64], row: usize) -> InputError {
     let (before, here) = (times[row - 1], times[row]);
     let problem = match before == here {
         true => "two rows with the same time",

@@ -84,7 +84,7 @@ fn keys() {
     4 |   - colour: red
       |     ^^^^^^
       found: `colour`
-      expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, decimate, band, sigma, loss, noise, sensors, force, base, initial, functions, validation
+      expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, duplicates, exclude, decimate, band, sigma, loss, noise, sensors, force, base, initial, functions, validation
     ");
     assert_snapshot!(changed("    initial: {displacement: 1.0, velocity: 0.0}\n", ""), @"
     error: model.yaml:4:5: experiments[0]: the key `initial` is missing
@@ -524,6 +524,7 @@ fn rows() {
        | ^^^
       found: 1.4 after 1.5 in line 17
       expected: a time greater than 1.5
+      hint: if the clock restarted there, write the rows from line 18 to a file of their own: a second experiment
     ");
     assert_snapshot!(with_row(17, "1.5,0.1"), @"
     error: samples.csv:18: column `t_s`: two rows with the same time
@@ -532,6 +533,7 @@ fn rows() {
        | ^^^
       found: 1.5 after 1.5 in line 17
       expected: a time greater than 1.5
+      hint: `duplicates: first` keeps the first row of each time, `duplicates: mean` the mean; 1 row repeats a time: line 18
     ");
 }
 

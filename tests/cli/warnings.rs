@@ -396,17 +396,17 @@ fn a_displacement_with_an_offset_gets_an_estimated_offset() {
 fn a_starter_shows_where_times_do_not_increase() {
     let bench = Workbench::empty();
     let rows: String = (0..20)
-        .map(|i| format!("{},{}\n", i - i / 12, i % 4))
+        .map(|i| format!("{},{}\n", i - 2 * (i / 12), i % 4))
         .collect();
     bench.write("record.csv", &format!("time_s,y_m\n{rows}"));
     let (code, _, stderr) = bench.run(&["init", "record.csv"]);
     assert_eq!(code, 2);
     assert_snapshot!(stderr, @"
-    error: record.csv:14: column `time_s`: two rows with the same time
+    error: record.csv:14: column `time_s`: the times do not increase
        |
-    14 | 11,0
+    14 | 10,0
        | ^^
-      found: 11 after 11 in line 13
+      found: 10 after 11 in line 13
       expected: a time greater than 11
       hint: correct the times in the file; `--sample-rate HZ` replaces them if the samples are equally spaced
     ");
@@ -562,7 +562,7 @@ fn saturated_samples_are_reported() {
     };
     assert!(!check().contains("equal its extreme value"));
     bench.write("record.csv", &record.lines().map(cut).collect::<String>());
-    assert_snapshot!(check(), @"warning: experiments[0] (experiment 1): 66 samples of the displacement equal its extreme value 0.5 m; if the sensor saturates there, delete them (empty fields)");
+    assert_snapshot!(check(), @"warning: experiments[0] (experiment 1): 66 samples of the displacement equal its extreme value 0.5 m; if the sensor saturates there, leave them out: `exclude: [saturation]`");
 }
 
 /// `samples` at every 0.05 s, as a table.

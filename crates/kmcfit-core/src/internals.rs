@@ -7,8 +7,8 @@ pub mod assessment {
         Draw, EXACT, EquationErrorIntervals, Estimate, EstimateErrors, EstimateStatus,
         FitAssessment, FitStatistics, FitWarning, FunctionInGap, FunctionSummary, GapAssessment,
         GapStatus, Implausible, LargeCovariance, MOST_WITH_COVARIANCE, NoDraws, NoIntervals, POOR,
-        Plausibility, RECOVERY_TOLERANCE, RecordError, ResidualPattern, Roughness, StepCheck,
-        TruthErrors, Unidentified, VerdictAssumption, VerdictLevel, VerdictReason,
+        Plausibility, RECOVERY_TOLERANCE, RecordError, ResidualPattern, Roughness, SampleFault,
+        StepCheck, TruthErrors, Unidentified, VerdictAssumption, VerdictLevel, VerdictReason,
         constant_probability, diagnostics, draws, estimates, function_summaries, is_same_truth,
         outliers, pattern, standard_error, verdict_assumptions, verdict_level, verdict_reasons,
     };
@@ -83,8 +83,9 @@ pub mod record {
 pub mod signal {
     pub use crate::signal::{
         ExcitationShape, Interpolation, SecondOrder, Signal, Spectrum, SweepLaw, band_pass,
-        clipped, decimate, decimation_filter, driven_oscillator, even_spacing, high_pass, low_pass,
-        median, median_spacing, onset, two_forced_modes, two_modes,
+        clipped, cut_off, decimate, decimation_filter, driven_oscillator, dropouts, even_spacing,
+        high_pass, low_pass, median, median_spacing, onset, quantisation, spikes, two_forced_modes,
+        two_modes,
     };
 }
 pub mod simd {

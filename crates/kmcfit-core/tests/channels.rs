@@ -238,6 +238,7 @@ impl Case {
                     gain: ScalarValue::Estimated(first),
                     offset: ScalarValue::Estimated(first + 1),
                     drift: ScalarValue::Estimated(first + 2),
+                    ..Sensor::default()
                 });
             experiment = experiment.with_channel(channel);
         }

@@ -179,6 +179,7 @@ impl ChannelSpec {
             gain: value(0),
             offset: value(1),
             drift: value(2),
+            ..Sensor::default()
         });
         if !self.around.is_empty() {
             channel = channel.with_inputs_at_samples(self.around.clone());

@@ -81,6 +81,7 @@ fn problem(units: Units) -> Problem {
         gain: ScalarValue::Known(units.length),
         offset: ScalarValue::Estimated(0),
         drift: ScalarValue::Estimated(1),
+        ..Sensor::default()
     };
     let channel = channel.with_sensor(sensor);
     problem = problem

@@ -316,6 +316,8 @@ impl Case {
                         (1.0 + 0.01 * percent, 0.0, 1.0)
                     }
                     RecordError::InputSign { .. } => (1.0, 0.0, -1.0),
+                    // A spike of the force: no remedy of the response.
+                    RecordError::InputPulses { .. } => (1.0, 0.0, 1.0),
                     RecordError::ChannelFactor {
                         channel, factor, ..
                     } => (1.0, 0.0, if channel == kind.name() { *factor } else { 1.0 }),

@@ -12,7 +12,9 @@ mod starts;
 mod study;
 
 pub(crate) use experiments::DataWarning;
-pub use experiments::{ChannelNote, HoldOut};
+pub use experiments::{ChannelNote, DelayLimits, HoldOut};
+#[cfg(test)]
+pub(crate) use experiments::{DataAction, DataFact, GapPlace};
 pub use kmcfit_core::internals::builder::WeightSearch;
 pub use refinement::AutomaticGrid;
 pub use study::{Candidate, Equivalent, StudyPlan, StudyTarget};
@@ -61,6 +63,10 @@ pub struct Model {
     pub memory: u64,
     /// Warnings about data and specification.
     pub warnings: Vec<Finding>,
+    /// What was found in the data and done with it.
+    pub data: Vec<Finding>,
+    /// Limits of the estimated delays.
+    pub delay_limits: Vec<DelayLimits>,
     /// Automatic choices, such as the number of nodes.
     pub automatic: Vec<Finding>,
     /// Units that neither the model nor a file states.
@@ -233,11 +239,13 @@ fn build_on(file: &ModelFile, mode: BuildMode, least: usize) -> Result<Model, In
     let clock = Instant::now();
     let mut reading = Duration::ZERO;
     let spec = &file.spec;
-    let mut warnings = Vec::new();
+    let mut record_notes = experiments::RecordNotes::default();
     let mut automatic = Vec::new();
     let records = timed(&mut reading, || {
-        experiments::read(file, mode, &mut warnings)
+        experiments::read(file, mode, &mut record_notes)
     })?;
+    let experiments::RecordNotes { warnings, data } = record_notes;
+    let delay_limits = experiments::delay_limits(file, &records)?;
     let choice = grid::build(file, mode, &records, least, &mut automatic)?;
     let grid = choice.grid;
     let solver = fit::solver(file)?;
@@ -305,6 +313,8 @@ fn build_on(file: &ModelFile, mode: BuildMode, least: usize) -> Result<Model, In
             .collect(),
         predictions: spec.predict.iter().flatten().map(state).collect(),
         warnings,
+        data,
+        delay_limits,
         automatic,
         assumed_units,
         has_unknown_mass: functions::has_unknown_mass(file),

@@ -4,7 +4,7 @@ use super::quoted;
 use super::roles::{Role, UsedColumn, is_foreign, known};
 use super::statements::{ColumnStatements, Statements};
 use crate::error::InputError;
-use crate::tables::{Table, increasing_at};
+use crate::tables::{Duplicates, Table, increasing_at, repeated_times};
 use crate::units::Unit;
 use kmcfit_core::internals::diagnostics::standard_deviation;
 
@@ -243,7 +243,8 @@ pub fn recognised(table: &Table, index: usize) -> Option<(Role, Unit, bool)> {
 pub fn rate(table: &Table) -> Option<(usize, f64)> {
     (0..table.width()).find_map(|i| {
         let column = known(table, i).filter(|c| c.role == Role::Time)?;
-        let times = increasing_at(table, i).ok()?;
+        let repeated = repeated_times(table, i, Duplicates::First).ok()?;
+        let times = repeated.merged(table.values(i).ok()?, Duplicates::First);
         let duration = column.factor() * (times.last()? - times.first()?);
         Some((i, (times.len() - 1) as f64 / duration))
     })
@@ -255,10 +256,22 @@ fn time(
     numeric: &[usize],
     known: &dyn Fn(&Table, usize) -> Option<UsedColumn>,
 ) -> Result<UsedColumn, InputError> {
-    let increases = |i: &&usize| increasing_at(table, **i).is_ok();
     let is_time = |i: &&usize| known(table, **i).is_some_and(|c| c.role == Role::Time);
+    // A column that is named as one of times may repeat some.
+    let repeats = |i: &usize| {
+        let found = repeated_times(table, *i, Duplicates::First)?;
+        // Most of them are those of rounded times.
+        match 2 * found.excess() > table.rows() {
+            true => repeated_times(table, *i, Duplicates::Error).map(|_| ()),
+            false => Ok(()),
+        }
+    };
+    let increases = |i: &&usize| match is_time(i) {
+        true => repeats(i).is_ok(),
+        false => increasing_at(table, **i).is_ok(),
+    };
     if let Some(index) = numeric.iter().find(is_time)
-        && let Err(error) = increasing_at(table, *index)
+        && let Err(error) = repeats(index)
         && !numeric.iter().filter(increases).any(|i| is_time(&i))
     {
         return Err(error.hint(OTHER_TIMES));

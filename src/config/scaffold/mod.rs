@@ -160,6 +160,11 @@ fn findings(record: &FileRecord, sample_rate: Option<f64>) -> Vec<String> {
         let others = listed(others.iter().map(String::as_str));
         found.push(format!("not used, of another length or rate: {others}"));
     }
+    if let Some(lines) = &summary.repeated {
+        found.push(format!(
+            "times are repeated in {lines}: the model uses the first row of each time (`duplicates: first`)"
+        ));
+    }
     if let Some((count, first)) = summary.outliers {
         let outliers = match count {
             1 => "1 outlier".to_owned(),
@@ -314,6 +319,8 @@ fn keys(
     let between = format!("{{interpolation: {}}}", record.between);
     let or = "between samples: or hold, linear, cubic";
     let (sensors, why) = sensors(columns, record);
+    let repeated = record.repeated.as_deref().unwrap_or_default();
+    let repeated = format!("times are repeated in {repeated}; or `mean`");
     let robust = format!("{{{}: huber}}", record.channel.0.key());
     let keys = [
         (
@@ -327,6 +334,11 @@ fn keys(
             "    # units",
             columns.assumed_units(),
             "ASSUMED, the file states none: enter others under `units`",
+        ),
+        (
+            "    duplicates",
+            record.repeated.as_ref().map(|_| "first".to_owned()),
+            &repeated,
         ),
         (
             "    window",

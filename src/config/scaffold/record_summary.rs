@@ -5,11 +5,13 @@ use super::columns::ColumnAssignment;
 use super::roles::{Role, UsedColumn};
 use crate::config::dominant::{Oscillation, remove_outliers, values_of};
 use crate::error::InputError;
-use crate::tables::{Table, increasing_at};
+use crate::tables::{Duplicates, RepeatedTimes, Table, lines_in_words, repeated_times};
 use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::signal::{median, onset};
 use kmcfit_core::internals::system::round_time;
 
+/// Most lines in a comment.
+const LISTED: usize = 10;
 /// Fewest samples for a model.
 const FEWEST: usize = 8;
 /// Relative difference below which spacings are equal up to rounded times.
@@ -22,6 +24,8 @@ const MOST_JUMPS: f64 = 0.1;
 pub struct RecordSummary {
     pub samples: usize,
     pub missing: usize,
+    /// Lines that repeat a time with other values, in words.
+    pub repeated: Option<String>,
     /// s.
     pub duration: f64,
     /// Median sampling interval, s.
@@ -51,7 +55,8 @@ impl RecordSummary {
         columns: &ColumnAssignment,
         sample_rate: Option<f64>,
     ) -> Result<Self, InputError> {
-        let times = times(table, columns, sample_rate)?;
+        let (times, repeated) = times(table, columns, sample_rate)?;
+        let in_si = |table, column| in_si(table, column, &repeated);
         let channel = |role: Role| columns.find(role);
         let order = [Role::Displacement, Role::Velocity, Role::Acceleration];
         let Some(column) = order.into_iter().find_map(channel) else {
@@ -78,6 +83,10 @@ impl RecordSummary {
             between: between(&input.unwrap_or_default()),
             samples: pairs.len(),
             missing,
+            repeated: (!repeated.are_equal).then(|| {
+                let lines = repeated.lines(table, LISTED);
+                lines_in_words(&lines, repeated.excess())
+            }),
             channel: (column.role, column.factor()),
             outliers,
             begins: begins.map(|_| round_time(pairs[0].0, spacing)),
@@ -154,23 +163,33 @@ fn times(
     table: &Table,
     columns: &ColumnAssignment,
     sample_rate: Option<f64>,
-) -> Result<Vec<f64>, InputError> {
+) -> Result<(Vec<f64>, RepeatedTimes), InputError> {
     match columns.find(Role::Time) {
         Some(column) => {
-            let times = increasing_at(table, column.index)?;
+            let repeated = repeated_times(table, column.index, Duplicates::First)?;
+            let times = repeated.merged(table.values(column.index)?, Duplicates::First);
             let times = times.iter().map(|t| t * column.factor());
-            Ok(times.collect())
+            Ok((times.collect(), repeated))
         }
         None => {
             let rate = sample_rate.unwrap_or(1.0);
-            Ok((0..table.rows()).map(|i| i as f64 / rate).collect())
+            let times = (0..table.rows()).map(|i| i as f64 / rate).collect();
+            let none = RepeatedTimes {
+                groups: Vec::new(),
+                are_equal: true,
+            };
+            Ok((times, none))
         }
     }
 }
 
-fn in_si(table: &Table, column: &UsedColumn) -> Result<Vec<f64>, InputError> {
+fn in_si(
+    table: &Table,
+    column: &UsedColumn,
+    repeated: &RepeatedTimes,
+) -> Result<Vec<f64>, InputError> {
     let factor = column.factor();
-    let samples = table.samples(column.index)?;
+    let samples = repeated.merged(table.samples(column.index)?, Duplicates::First);
     Ok(samples.iter().map(|x| x * factor).collect())
 }
 

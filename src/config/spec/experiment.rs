@@ -4,7 +4,7 @@ use super::noise::{InputSigmaSpec, NoisesSpec};
 use crate::config::map::keys;
 
 use super::{OwnFunctionsSpec, RangeSpec};
-use crate::config::alternatives::ScalarOr;
+use crate::config::alternatives::{OneOrList, ScalarOr};
 use crate::config::choice::choice;
 use crate::config::values::{ColumnId, Count, Estimate, Number, NumberOrEstimate};
 use crate::config::values::{Sigma, Text};
@@ -50,6 +50,16 @@ keys! {
             unit "s",
             default "0",
             needs "`data`";
+        /// Rows that repeat a time with other values; equal rows are merged.
+        duplicates: Option<DuplicatesName>,
+            example "first",
+            default "error",
+            needs "a column of times";
+        /// Faulty samples that are left out of the fit, as missing samples.
+        exclude: Option<OneOrList<FaultName>>,
+            example "[dropouts, spikes]",
+            default "none",
+            needs "`data`";
         /// Decimation factor; a low-pass filter is applied before.
         decimate: Option<Count>,
             example "4",
@@ -75,8 +85,8 @@ keys! {
             example "{displacement: white}",
             default "auto",
             needs "`sigma`";
-        /// Sensor model: sample = gain * response + offset + drift * time.
-        sensors: Option<SensorsSpec>, example "{acceleration: {offset: estimate}}", default "gain 1, offset 0";
+        /// Sensor model: sample = gain * response(t - delay) + offset + drift * time.
+        sensors: Option<SensorsSpec>, example "{acceleration: {offset: estimate}}", default "gain 1, offset 0, delay 0";
         /// Force on the mass: interpolation of the column `force`, or a waveform in its place.
         force: Option<ForceSpec>, example "{interpolation: cubic}", default "none, or the column `force`";
         /// Interpolation of the base motion.
@@ -95,6 +105,41 @@ keys! {
             example "true",
             default "false",
             needs "another experiment without it; no `functions` of its own";
+    }
+}
+
+choice! {
+    /// Treatment of rows that repeat a time.
+    pub type DuplicatesName = crate::tables::Duplicates {
+        /// An error, unless the rows are equal.
+        Error = "error",
+        /// The first row of each time.
+        First = "first",
+        /// The mean of the rows of each time.
+        Mean = "mean",
+    }
+}
+
+choice! {
+    /// Faulty samples of a response.
+    pub enum FaultName {
+        /// Five or more samples held at one value while the response moves.
+        Dropouts = "dropouts",
+        /// Single samples far from their neighbours.
+        Spikes = "spikes",
+        /// Samples at an end of the range of the sensor.
+        Saturation = "saturation",
+    }
+}
+
+impl FaultName {
+    /// Reason for samples that are not used.
+    pub fn reason(self) -> &'static str {
+        match self {
+            Self::Dropouts => "dropouts",
+            Self::Spikes => "spikes",
+            Self::Saturation => "saturated",
+        }
     }
 }
 
@@ -277,7 +322,7 @@ choice! {
 }
 
 keys! {
-    /// Sensor of each channel: sample = gain * response + offset + drift * time.
+    /// Sensor of each channel: sample = gain * response(t - delay) + offset + drift * time; delay of the force or of the base motion.
     pub struct SensorsSpec (Default) = "sensors", expecting "a map such as {acceleration: {offset: estimate}}" {
         /// Sensor of the displacement.
         displacement: Option<SensorSpec>, example "{drift: estimate}";
@@ -285,6 +330,35 @@ keys! {
         velocity: Option<SensorSpec>, example "{gain: estimate}";
         /// Sensor of the acceleration.
         acceleration: Option<SensorSpec>, example "{offset: estimate}";
+        /// Sensor of the force.
+        force: Option<InputSensorSpec>, example "{delay: estimate}", needs "`columns.force`, no motion of the base";
+        /// Sensor of the acceleration of the base.
+        base_acceleration: Option<InputSensorSpec>, example "{delay: 0.002}", needs "`columns.base_acceleration`, no force";
+        /// Sensor of the displacement of the base.
+        base_displacement: Option<InputSensorSpec>, example "{delay: 0.002}", needs "`columns.base_displacement`, no force";
+    }
+}
+
+keys! {
+    /// Sensor of an input.
+    pub struct InputSensorSpec = "input-sensor", expecting "a map such as {delay: estimate}" {
+        /// Delay of its samples against the response: positive where they are late. Coefficients are then functions of the time of the input.
+        delay: Option<DelayValue>, example "estimate", unit "s", default "0";
+    }
+}
+
+/// A delay: a number, `estimate`, or an estimate with limits.
+pub type DelayValue = ScalarOr<NumberOrEstimate, DelaySpec>;
+
+keys! {
+    /// An estimated delay. Samples that a delay within the limits moves out of the record are left out.
+    pub struct DelaySpec = "delay", expecting "a map such as {start: 0.0, min: -0.01, max: 0.01}" {
+        /// Start value of the search.
+        start: Option<Number>, example "0.0", unit "s", default "0, or the middle of the limits";
+        /// Smallest delay.
+        min: Option<Number>, example "-0.01", unit "s", default "10 samples before the start";
+        /// Largest delay.
+        max: Option<Number>, example "0.01", unit "s", default "10 samples after the start";
     }
 }
 
@@ -300,6 +374,8 @@ keys! {
         offset: Option<EstimateValue>, example "estimate", unit "SI unit of the channel", default "0";
         /// Drift: rate of change of the offset.
         drift: Option<EstimateValue>, example "estimate", unit "SI unit of the channel per s", default "0";
+        /// Delay of the samples against the input or the other channels: positive where they are late.
+        delay: Option<DelayValue>, example "estimate", unit "s", default "0", needs "an input, or another channel";
         /// True for a sensor that measures absolute motion, false for motion relative to the base.
         absolute: Option<bool>,
             example "true",

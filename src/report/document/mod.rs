@@ -103,6 +103,9 @@ pub struct ResultDocument {
     /// Predicted free responses from other initial states.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub predictions: Vec<Prediction>,
+    /// What was found in the data and done with it: repeated times, gaps, faulty samples, quantisation and stated delays.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub data: Vec<Finding>,
     /// Automatic choices, such as the number of nodes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub automatic: Vec<Finding>,

@@ -23,6 +23,7 @@ pub(super) fn overview(document: &ResultDocument) -> String {
     let lists = [
         ("Equation of motion", equation.collect()),
         ("Identifiability", Finding::texts(&known.findings)),
+        ("Data", Finding::texts(&document.data)),
         ("Warnings", warnings),
         ("Suggestions", Finding::texts(&document.advice)),
         ("Automatic choices", Finding::texts(&document.automatic)),

@@ -127,12 +127,17 @@ pub enum Suggestion {
         /// Kinds of its channels.
         channels: Vec<String>,
     },
-    /// Correction of the times of the response for a delay.
-    ShiftTimes {
+    /// Estimation of a delay.
+    EstimateDelay {
         /// Name of the experiment.
         experiment: String,
-        /// The delay, s.
+        /// The channel or input whose samples are late: its only channel, or its input.
+        channel: String,
+        /// Its delay, s.
         delay: f64,
+        /// True for a response that lags by half a sample, as under an input that is held between its samples; false for one that leads by
+        /// half a sample; `None` for other delays.
+        held: Option<bool>,
     },
     /// Correction of the times of the response for a clock at another rate.
     ScaleTimes {
@@ -228,6 +233,9 @@ fn typed(document: &ResultDocument) -> Vec<Suggestion> {
     steps
 }
 
+/// Delays, in samples, like that of an input held between its samples.
+const HALF_SAMPLE: std::ops::RangeInclusive<f64> = 0.4..=0.6;
+
 /// Correction of an error of a record.
 fn about_records(document: &ResultDocument) -> Option<Suggestion> {
     document
@@ -250,10 +258,25 @@ fn about_records(document: &ResultDocument) -> Option<Suggestion> {
                         .collect(),
                     experiment: experiment?,
                 },
-                "delay" => Suggestion::ShiftTimes {
-                    experiment: experiment?,
-                    delay: number("delay")?,
-                },
+                "delay" => {
+                    let (experiment, delay, samples) =
+                        (experiment?, number("delay")?, number("samples")?);
+                    let of_record = document.experiments.iter().find(|e| e.name == experiment)?;
+                    let (channel, delay) = match of_record.channels.as_slice() {
+                        [only] => (only.kind.clone(), delay),
+                        _ if of_record.driven_by.iter().any(|d| d == "force") => {
+                            ("force".to_owned(), -delay)
+                        }
+                        _ => ("base_acceleration".to_owned(), -delay),
+                    };
+                    let is_half = HALF_SAMPLE.contains(&samples.abs());
+                    Suggestion::EstimateDelay {
+                        experiment,
+                        channel,
+                        delay,
+                        held: is_half.then_some(samples > 0.0),
+                    }
+                }
                 "clock_difference" => Suggestion::ScaleTimes {
                     experiment: experiment?,
                     percent: number("percent")?,

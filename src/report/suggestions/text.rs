@@ -120,13 +120,30 @@ impl fmt::Display for Suggestion {
                     each.join(", ")
                 )
             }
-            Suggestion::ShiftTimes { experiment, delay } => write!(
-                f,
-                "align input and response of {experiment} in the file: {} {} s {} the times of the response",
-                if *delay > 0.0 { "subtract" } else { "add" },
-                significant(delay.abs(), 3),
-                if *delay > 0.0 { "from" } else { "to" }
-            ),
+            Suggestion::EstimateDelay {
+                experiment,
+                channel,
+                delay,
+                held,
+            } => {
+                let estimate = format!("`sensors: {{{channel}: {{delay: estimate}}}}`");
+                match held {
+                    Some(true) => write!(
+                        f,
+                        "half a sample is the lag under an input of {experiment} that is held between its samples (`interpolation: hold`); for another delay: {estimate}"
+                    ),
+                    Some(false) => write!(
+                        f,
+                        "half a sample is the lead under an input of {experiment} that is not held between its samples (`interpolation: linear`); for another delay: {estimate}"
+                    ),
+                    None => write!(
+                        f,
+                        "estimate the delay of the {} of {experiment}: {estimate}, about {} s",
+                        channel.replace('_', " "),
+                        significant(*delay, 3)
+                    ),
+                }
+            }
             Suggestion::ScaleTimes {
                 experiment,
                 percent,

@@ -98,7 +98,8 @@ pub(super) fn classical_estimate(
 
 fn of_experiment(experiment: &Experiment, predicted: &[f64]) -> Option<ClassicalEstimate> {
     let channel = experiment.channels.first()?;
-    let is_plain = channel.base().is_empty() && channel.filter().is_empty();
+    let is_plain =
+        channel.base().is_empty() && channel.filter().is_empty() && !channel.sensor().is_delayed();
     let spacing = even_spacing(channel.times()).filter(|_| is_plain)?;
     match (experiment.is_free(), &experiment.input.force) {
         (true, _) => {

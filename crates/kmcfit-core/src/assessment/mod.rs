@@ -11,6 +11,7 @@ mod function;
 mod gaps;
 mod input_correlation;
 mod input_disturbance;
+mod input_pulses;
 mod large_covariance;
 mod plausibility;
 mod record_error;
@@ -46,13 +47,14 @@ pub use rivals::AmplitudeRival;
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
 pub use verdict::{
-    Implausible, VerdictAssumption, VerdictLevel, VerdictReason, verdict_assumptions,
+    Implausible, SampleFault, VerdictAssumption, VerdictLevel, VerdictReason, verdict_assumptions,
     verdict_level, verdict_reasons,
 };
 
 use classical::classical_estimate;
 use friction_width::width_warning;
 use gaps::gap_assessments;
+use input_pulses::input_pulses;
 use record_errors::large_error;
 use rivals::amplitude_rival;
 use score_tests::missing;
@@ -230,10 +232,14 @@ fn causes(
         is_system.then(found).flatten()
     };
     let large = || large_error(problem, theta, evaluation).map(FitWarning::RecordError);
+    let pulses = || {
+        let found = || input_pulses(problem, theta, evaluation).map(FitWarning::RecordError);
+        is_system.then(found).flatten()
+    };
     match (width.flatten(), tests) {
         (Some(width), _) => vec![width],
         (None, false) => Vec::new(),
-        (None, true) => match small().or_else(large) {
+        (None, true) => match small().or_else(large).or_else(pulses) {
             Some(cause) => vec![cause],
             None => second_modes(problem, evaluation),
         },

@@ -22,6 +22,17 @@ pub enum RecordError {
         /// Excess of the time in the system over that on the clock of the response, per cent.
         percent: f64,
     },
+    /// Errors of few samples of the force, or unmeasured impacts, explain the residuals.
+    InputPulses {
+        /// Name of the experiment.
+        experiment: String,
+        /// Number of samples.
+        count: usize,
+        /// Time of the largest error, s.
+        time: f64,
+        /// The largest error, N: what the force lacks.
+        error: f64,
+    },
     /// The input acts against its sign.
     InputSign {
         /// Name of the experiment.

@@ -249,7 +249,7 @@ fn large_clock(
     let channel = experiment
         .channels
         .first()
-        .filter(|_| !experiment.is_free())?;
+        .filter(|c| !experiment.is_free() && !c.sensor().is_delayed())?;
     let spectrum = Spectrum::of(channel.observed(), median_spacing(channel.times()))?;
     let period = 1.0 / spectrum.dominant();
     let duration = problem.system.grid.time(experiment.nodes - 1) - problem.system.grid.start();
@@ -283,10 +283,29 @@ fn large_clock(
     {
         return Some(difference(problem, e, clock));
     }
-    let (clock, refit) = on_best_clock(problem, theta, RecordParameter::Delay(e), late?)?;
-    refit
-        .explains(problem, evaluation)
-        .then(|| delay(problem, e, clock))
+    let explains = |found: &(Clock, Refit)| found.1.explains(problem, evaluation);
+    let late =
+        late.and_then(|clock| on_best_clock(problem, theta, RecordParameter::Delay(e), clock));
+    let late = late.filter(explains);
+    let late = late.or_else(|| late_by_refits(problem, e, period).filter(explains));
+    late.map(|(clock, _)| delay(problem, e, clock))
+}
+
+/// The delay up to half a period with the best fit from the start, refined: a poor fit may have parameters that correlate best with another
+/// one.
+fn late_by_refits(problem: &Problem, e: usize, period: f64) -> Option<(Clock, Refit)> {
+    let eighths = (-4..=4).filter(|i| *i != 0).map(f64::from);
+    let clocks = eighths.map(|i| Clock {
+        delay: 0.125 * period * i,
+        rate: 0.0,
+    });
+    let fits = clocks.filter_map(|clock| {
+        let refit = Refit::of(with_clock(problem, e, clock)?, &problem.start())?;
+        Some((clock, refit))
+    });
+    let (clock, refit) = fits.min_by(|a, b| a.1.worst_misfit().total_cmp(&b.1.worst_misfit()))?;
+    let start = &refit.fit.best.parameters;
+    on_best_clock(problem, start, RecordParameter::Delay(e), clock)
 }
 
 /// The clock other than that of the record, up to `most` in steps, with the largest correlation of samples and predictions.

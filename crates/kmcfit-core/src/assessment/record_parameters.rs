@@ -43,7 +43,8 @@ pub(super) enum RecordParameter {
 pub(super) fn parameters(problem: &Problem) -> Vec<RecordParameter> {
     let mut found = Vec::new();
     for (e, experiment) in problem.experiments.iter().enumerate() {
-        if !experiment.is_free() {
+        let is_estimated = |c: &Channel| c.sensor().is_delayed();
+        if !experiment.is_free() && !experiment.channels.iter().any(is_estimated) {
             found.extend([RecordParameter::Delay(e), RecordParameter::Rate(e)]);
         }
         if !experiment.is_free() || experiment.channels.len() > 1 {

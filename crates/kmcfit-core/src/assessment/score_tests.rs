@@ -58,7 +58,7 @@ pub(super) fn missing(
     (is_few && is_long && applies(problem, theta, evaluation)).then_some(())?;
     (worst_fit(problem, evaluation) > UNRELATED).then_some(())?;
     let kinds = candidates(problem, evaluation);
-    let (extended, at) = extended(problem, theta, &kinds)?;
+    let (extended, at) = extended(problem, theta, constants(problem, &kinds))?;
     let evaluation = extended.evaluate(&at).ok()?;
     let jacobian = weighted_jacobian(&extended, &evaluation);
     let residuals = weighted_residuals(&extended, &evaluation);
@@ -125,7 +125,7 @@ fn refit(problem: &Problem, theta: &[f64], missing: &MissingTerm) -> Option<Refi
     let kinds = candidates(problem, &evaluation);
     let kind = kinds.into_iter().find(|(kind, _)| *kind == missing.term)?;
     let from = |theta: &[f64]| {
-        let (mut extended, mut start) = extended(problem, theta, &[kind])?;
+        let (mut extended, mut start) = extended(problem, theta, constants(problem, &[kind]))?;
         without_correlation(&mut extended.parts_mut().experiments);
         start[problem.functions.scalar_range().start] = missing.value;
         Refit::of(extended, &start)
@@ -158,19 +158,29 @@ fn candidates(problem: &Problem, evaluation: &Evaluation) -> Vec<(CoefficientKin
     kinds.filter(|_| width > 0.0 && width.is_finite()).collect()
 }
 
-/// The problem with constants for the terms of `kinds`, without penalties and constraints, and its parameters.
-fn extended(
+/// Constants for the terms of `kinds`.
+fn constants(
+    problem: &Problem,
+    kinds: &[(CoefficientKind, Term)],
+) -> Vec<(CoefficientFunction, Term)> {
+    let nodes = problem.functions.nodes();
+    let each = kinds.iter();
+    each.map(|(kind, term)| (CoefficientFunction::constant(*kind, 0.0, nodes), *term))
+        .collect()
+}
+
+/// The problem with further coefficients, at zero, and their terms, without penalties and constraints, and its parameters.
+pub(super) fn extended(
     problem: &Problem,
     theta: &[f64],
-    kinds: &[(CoefficientKind, Term)],
+    further: Vec<(CoefficientFunction, Term)>,
 ) -> Option<(Problem, Vec<f64>)> {
     let functions = &problem.functions;
     let (nodes, step) = (functions.nodes(), problem.system.grid.step());
     let mut list: Vec<CoefficientFunction> = functions.iter().cloned().collect();
     let first = list.len();
-    let new = kinds
-        .iter()
-        .map(|(kind, _)| CoefficientFunction::constant(*kind, 0.0, nodes));
+    let (new, terms): (Vec<CoefficientFunction>, Vec<Term>) = further.into_iter().unzip();
+    let zeros = vec![0.0; new.iter().map(CoefficientFunction::parameters).sum()];
     list.extend(new);
     let set = |set: &CoefficientSet| {
         let all = set.iter().copied().chain(first..list.len());
@@ -182,10 +192,7 @@ fn extended(
         .with_scalars(functions.scalars().to_vec());
     let extended = problem.clone().with(|parts| {
         parts.functions = longer;
-        parts
-            .system
-            .terms
-            .extend(kinds.iter().map(|(_, term)| *term));
+        parts.system.terms.extend(terms);
         parts.penalties.clear();
         parts.variations.clear();
         parts.constraints = Default::default();
@@ -193,7 +200,6 @@ fn extended(
         parts.jumps.clear();
     });
     let scalars = functions.scalar_range().start;
-    let zeros = vec![0.0; kinds.len()];
     Some((
         extended.ok()?,
         [&theta[..scalars], &zeros, &theta[scalars..]].concat(),

@@ -47,7 +47,8 @@ impl Span {
         }
     }
 
-    fn orthogonal(&self, vector: &DVector<f64>) -> DVector<f64> {
+    /// Part of a vector orthogonal to the derivatives of the model.
+    pub(super) fn orthogonal(&self, vector: &DVector<f64>) -> DVector<f64> {
         vector - &self.basis * self.basis.tr_mul(vector)
     }
 

@@ -94,6 +94,20 @@ pub enum VerdictReason {
         /// Name of the channel.
         channel: String,
     },
+    /// Faulty samples that are used.
+    FaultySamples {
+        /// Name of the experiment.
+        experiment: String,
+        /// Name of the channel.
+        channel: String,
+        /// The fault.
+        fault: SampleFault,
+    },
+    /// An estimated delay beyond its limits.
+    DelayAtLimit {
+        /// Name of the parameter.
+        parameter: String,
+    },
     /// The residuals are those of errors of a measured input, or of a missing term.
     DisturbedInput {
         /// Name of the experiment.
@@ -184,6 +198,20 @@ pub enum VerdictReason {
     /// An error of a record explains the residuals.
     #[serde(untagged)]
     RecordError(RecordError),
+}
+
+/// A fault of samples, found before the fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SampleFault {
+    /// Samples held at a constant value.
+    Dropouts,
+    /// Single samples far from their neighbours.
+    Spikes,
+    /// Gaps in the samples of an input.
+    InputGaps,
+    /// An input with quantisation steps that are not small beside the residuals.
+    CoarseInput,
 }
 
 /// A quantity outside the range of mechanical systems, which points to a wrong unit.

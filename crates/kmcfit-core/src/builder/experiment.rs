@@ -89,11 +89,80 @@ impl ExperimentBuilder<'_> {
             true => &[][..],
             false => &record.channels,
         };
+        let input_delay = match compared {
+            [] => ScalarValue::Known(0.0),
+            _ => self.input_delay(&experiment.input, scalars)?,
+        };
         for channel in compared {
-            let channel = self.channel(channel, &experiment, scalars)?;
+            let channel = self.channel(channel, &experiment, input_delay, scalars)?;
             experiment.channels.push(channel);
         }
+        self.check_delays(&experiment, scalars)?;
         Ok(experiment)
+    }
+
+    /// Returns the delay of the input, s.
+    fn input_delay(
+        &self,
+        input: &Input,
+        scalars: &mut Vec<ScalarParameter>,
+    ) -> Result<ScalarValue, BuildError> {
+        let Some(spec) = self.record.input_delay else {
+            return Ok(ScalarValue::Known(0.0));
+        };
+        let name = match (&input.force, &input.base) {
+            (Some(_), None) => "force",
+            (None, Some(_)) => "base motion",
+            _ => {
+                let problem = "the delay of an input needs one input";
+                return Err(BuildError::new(format!("{}.sensors", self.key), problem)
+                    .found(match input.force {
+                        Some(_) => "a force and a motion of the base",
+                        None => "no input",
+                    })
+                    .expected("one input, or delays of the channels"));
+            }
+        };
+        let scalar = PendingScalar {
+            key: format!("{}.sensors.{}.delay", self.key, name.replace(' ', "_")),
+            name: format!("delay of the {name} of {}", self.record.name),
+            unit: "s",
+            start: 0.0,
+            scale: self.spacing(),
+        };
+        scalar.value(spec, scalars)
+    }
+
+    /// Smallest median spacing of the samples, s.
+    fn spacing(&self) -> f64 {
+        let each = self.record.channels.iter();
+        let each = each.map(|c| median_spacing(&c.times));
+        each.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Error for delays of all channels and the input: only their differences affect the samples.
+    fn check_delays(
+        &self,
+        experiment: &Experiment,
+        scalars: &[ScalarParameter],
+    ) -> Result<(), BuildError> {
+        let open = |value: ScalarValue| value.index().is_some_and(|i| scalars[i].prior.is_none());
+        let channels = &experiment.channels;
+        let of_input = channels.first().map(|c| open(c.sensor().input_delay));
+        let of_input = of_input.filter(|_| !experiment.is_free());
+        let is_open = channels.iter().all(|c| open(c.sensor().delay)) && of_input.unwrap_or(true);
+        match is_open && !channels.is_empty() {
+            false => Ok(()),
+            true => Err(BuildError::new(
+                format!("{}.sensors", self.key),
+                "the delays of all channels cannot be estimated: only their differences are identifiable",
+            )
+            .found(match of_input {
+                Some(_) => "estimated delays of the input and of every channel",
+                None => "estimated delays of every channel of a record without an input",
+            })
+            .expected("one channel or an input without a delay")),
+        }
     }
 
     /// Returns the initial state, and the scalar parameters of its estimated components.
@@ -145,6 +214,7 @@ impl ExperimentBuilder<'_> {
         &self,
         spec: &ChannelSpec,
         experiment: &Experiment,
+        input_delay: ScalarValue,
         scalars: &mut Vec<ScalarParameter>,
     ) -> Result<Channel, BuildError> {
         let (grid, times) = (self.grid, &spec.times);
@@ -154,7 +224,10 @@ impl ExperimentBuilder<'_> {
             (None, Some(spacing)) => Weighting::Integral { spacing },
             (None, None) => integral_over(times),
         };
-        let sensor = self.sensor(spec, scalars)?;
+        let sensor = Sensor {
+            input_delay,
+            ..self.sensor(spec, scalars)?
+        };
         let values = spec.values.clone();
         let nodes = experiment.nodes;
         let channel = Channel::new(spec.kind, times.clone(), values, weighting, grid, nodes);
@@ -170,7 +243,8 @@ impl ExperimentBuilder<'_> {
         let mut channel = channel
             .with_loss(spec.loss)
             .with_noise_model(spec.noise)
-            .with_sensor(sensor);
+            .with_sensor(sensor)
+            .with_resolution(spec.resolution);
         let input = &experiment.input;
         if spec.kind == ChannelKind::Acceleration && experiment.excitation.is_some() {
             let input_at = |t: &f64| InputSample {
@@ -180,12 +254,23 @@ impl ExperimentBuilder<'_> {
             channel = channel.with_inputs_at_samples(times.iter().map(input_at).collect());
         }
         if let Some(base) = self.base_motion(spec, input)? {
+            if sensor.is_delayed() && spec.kind != ChannelKind::Acceleration {
+                return Err(self.delay_of_absolute_motion(spec.kind));
+            }
             channel = channel.with_base(base);
         }
         if !spec.filter.is_empty() {
             channel = channel.with_filter(spec.filter.clone());
         }
         Ok(channel)
+    }
+
+    fn delay_of_absolute_motion(&self, kind: ChannelKind) -> BuildError {
+        let (key, kind) = (&self.key, kind.name());
+        let problem = format!("the delay of an absolute {kind} cannot be estimated");
+        BuildError::new(format!("{key}.sensors.{kind}"), problem)
+            .found("`absolute: true` and an estimated delay")
+            .expected("a delay in s, or a sensor of relative motion")
     }
 
     /// Returns the base motion (in the unit of the channel, one value per sample) to be added to the relative response; `None` for
@@ -228,6 +313,7 @@ impl ExperimentBuilder<'_> {
             gain,
             offset,
             drift,
+            delay,
             ..
         } = channel.sensor;
         let (kind, values) = (channel.kind.name(), &channel.values);
@@ -254,6 +340,13 @@ impl ExperimentBuilder<'_> {
             offset: value("offset", offset, unit, [0.0, mean, deviation])?,
             // Scale of the drift: the standard deviation of the samples per 1 s.
             drift: value("drift", drift, &per_second, [0.0, 0.0, deviation])?,
+            delay: value(
+                "delay",
+                delay,
+                "s",
+                [0.0, 0.0, median_spacing(&channel.times)],
+            )?,
+            input_delay: ScalarValue::Known(0.0),
         };
         if sensor.gain == ScalarValue::Known(0.0) {
             let problem = "the gain of a sensor must not be 0";
@@ -261,7 +354,7 @@ impl ExperimentBuilder<'_> {
                 .found("0")
                 .expected("another number, or `estimate`"));
         }
-        if self.is_equation_error && sensor.indices().iter().any(Option::is_some) {
+        if self.is_equation_error && sensor.is_estimated() {
             let problem = "the method `equation-error` needs sensors with known parameters";
             return Err(BuildError::new(key, problem)
                 .found("`estimate`")

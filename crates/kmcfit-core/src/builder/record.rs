@@ -38,7 +38,7 @@ impl ScalarSpec {
     }
 }
 
-/// Specification of a sensor: `sample = gain * response + offset + drift * time`; by default gain 1, offset and drift 0.
+/// Specification of a sensor: `sample = gain * response(t - delay) + offset + drift * time`; by default gain 1, the others 0.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SensorSpec {
     /// Gain; 1 by default.
@@ -47,6 +47,9 @@ pub struct SensorSpec {
     pub offset: Option<ScalarSpec>,
     /// Change of the offset, in the SI unit of the channel per s.
     pub drift: Option<ScalarSpec>,
+    /// Delay of the samples relative to the recorded input or to the other channels, s; positive for late samples. The response must
+    /// cover the time of a sample less its delay: samples that it does not cover are compared with its first or last node.
+    pub delay: Option<ScalarSpec>,
     /// True for a sensor of absolute motion, false for one of motion relative to the base; by default absolute for accelerometers,
     /// relative for others.
     pub absolute: Option<bool>,
@@ -67,8 +70,10 @@ pub struct ChannelSpec {
     pub loss: Loss,
     /// Correlation of the noise; used with a sigma.
     pub noise: NoiseModel,
-    /// Gain, offset and drift.
+    /// Gain, offset, drift and delay.
     pub sensor: SensorSpec,
+    /// Quantisation step of the samples, in the SI unit of the kind; 0 where unknown.
+    pub resolution: f64,
     /// Sections of a filter applied to samples and response.
     pub filter: Vec<SecondOrder>,
     /// First and last time of the record, s, missing samples included.
@@ -89,6 +94,7 @@ impl ChannelSpec {
             loss: Loss::Squares,
             noise: NoiseModel::default(),
             sensor: SensorSpec::default(),
+            resolution: 0.0,
             filter: Vec::new(),
             span: [end(times.first()), end(times.last())],
             angular: false,
@@ -191,6 +197,7 @@ pub struct Record {
     force: Option<[Vec<f64>; 2]>,
     base: Option<[Vec<f64>; 2]>,
     interpolation: Interpolation,
+    pub(super) input_delay: Option<ScalarSpec>,
 }
 
 impl Record {
@@ -207,7 +214,16 @@ impl Record {
             force: None,
             base: None,
             interpolation: Interpolation::Linear,
+            input_delay: None,
         }
+    }
+
+    /// Sets the delay of the recorded force or base motion relative to the response, s: positive for an input recorded late. Times of
+    /// the coefficients are then those of the input.
+    #[must_use]
+    pub fn input_delay(mut self, delay: ScalarSpec) -> Self {
+        self.input_delay = Some(delay);
+        self
     }
 
     /// Sets a known initial state: displacement (m) and velocity (m/s) at the first time of all records, which share a time axis.

@@ -118,7 +118,7 @@ impl Kernel for AddTranspose<'_, '_> {
         } = self;
         let [gain, ..] = channel.sensor().values(view.scalars);
         let sensor = channel.sensor();
-        let seeks = sensor.indices().iter().any(Option::is_some);
+        let seeks = sensor.is_estimated();
         let factor = Eight::splat(arithmetic, gain);
         let mut observed = Accelerations::NOTHING;
         let mut sums = [[0.0; LANES]; FUNCTIONS];
@@ -152,7 +152,8 @@ impl Kernel for AddTranspose<'_, '_> {
             if seeks {
                 for (l, slope) in slopes.iter().enumerate() {
                     let i = from + l;
-                    let factors = [observed.value[l] + channel.base_at(i), 1.0, channel.age(i)];
+                    let value = observed.value[l] + channel.base_at(i);
+                    let factors = channel.sensor_factors(view, i, value);
                     sensor.add_gradient(factors, *slope, scalars);
                 }
             }

@@ -7,31 +7,102 @@ use crate::signal::{zero_phase, zero_phase_transpose};
 use crate::simd;
 use crate::simulate::reference::{Observation, observe};
 use crate::simulate::{CoefficientGradient, Trajectory};
-use crate::system::TimePoint;
+use crate::system::{InputSample, TimePoint};
+
+/// Share of a step by which a sample is moved for its derivative in time.
+const FRACTION: f64 = 1e-4;
 
 impl Channel {
+    /// Position of sample `i` on the grid, that of `t_i - delay`; the first or last node where that is before or after the response.
+    pub(crate) fn place(&self, view: SimulatedRecord, i: usize) -> TimePoint {
+        match self.sensor().is_delayed() {
+            false => self.places()[i],
+            true => self.delayed_place(view, i).0,
+        }
+    }
+
+    /// [`Channel::place`] of a delayed sample, and true if it lies within the response.
+    fn delayed_place(&self, view: SimulatedRecord, i: usize) -> (TimePoint, bool) {
+        let (grid, nodes) = (&view.system.grid, view.response.nodes());
+        let end = grid.time(nodes - 1);
+        let time = self.times()[i] - self.sensor().total_delay(view.scalars);
+        let inside = (grid.start()..=end).contains(&time);
+        let place = TimePoint::of(grid, time.clamp(grid.start(), end));
+        let place = place.unwrap_or(self.places()[i]);
+        let place = match place.as_node() {
+            Some(node) => TimePoint::node(node, nodes),
+            None => place,
+        };
+        (place, inside)
+    }
+
     /// Observation at sample `i` with its derivatives, before gain, offset and drift.
     pub fn sensed(&self, view: SimulatedRecord, i: usize) -> Observation {
+        self.sensed_at(view, i, self.place(view, i))
+    }
+
+    fn sensed_at(&self, view: SimulatedRecord, i: usize, place: TimePoint) -> Observation {
+        let is_delayed = self.sensor().is_delayed();
+        let input = match (is_delayed, view.excitation) {
+            (false, excitation) => self.input_at_sample(excitation, i),
+            (true, Some(excitation)) => excitation.input_at(place),
+            (true, None) => InputSample::default(),
+        };
         let mut sensed = observe(
             view.system,
             self.kind(),
             view.nodal,
             view.excitation,
             view.response,
-            self.places()[i],
-            self.input_at_sample(view.excitation, i),
+            place,
+            input,
         );
         if let Some(base) = self.base().get(i) {
-            sensed.value += base;
+            let moves = is_delayed && self.kind() == ChannelKind::Acceleration;
+            sensed.value += if moves { input.base } else { *base };
         }
         sensed
+    }
+
+    /// Time derivative of [`Channel::sensed`] at sample `i`, in its unit per s; zero outside the response.
+    ///
+    /// Central difference of the interpolation within the step, a polynomial for displacement and velocity: its error is of the order
+    /// `FRACTION^2` of the third derivative.
+    fn sensed_rate(&self, view: SimulatedRecord, i: usize) -> f64 {
+        let (place, inside) = self.delayed_place(view, i);
+        if !inside {
+            return 0.0;
+        }
+        let at = |by: f64| {
+            let fraction = place.fraction + by;
+            let moved = TimePoint { fraction, ..place };
+            self.sensed_at(view, i, moved).value
+        };
+        (at(FRACTION) - at(-FRACTION)) / (2.0 * FRACTION * view.system.grid.step())
+    }
+
+    /// Derivatives of sample `i` in the parameters of its sensor, in the order of [`Sensor::indices`]; `value` is that of
+    /// [`Channel::sensed`].
+    pub(crate) fn sensor_factors(
+        &self,
+        view: SimulatedRecord,
+        i: usize,
+        value: f64,
+    ) -> [f64; Sensor::PARAMETERS] {
+        let [gain, ..] = self.sensor().values(view.scalars);
+        let [.., delay, input_delay] = self.sensor().indices();
+        let rate = match delay.or(input_delay) {
+            Some(_) => gain * self.sensed_rate(view, i),
+            None => 0.0,
+        };
+        [value, 1.0, self.age(i), -rate, rate]
     }
 
     /// Value of [`Channel::sensed`].
     fn observed_value(&self, view: SimulatedRecord, i: usize) -> f64 {
         match (
             self.kind(),
-            self.places()[i].as_node(),
+            self.place(view, i).as_node(),
             self.base().is_empty(),
         ) {
             (ChannelKind::Displacement, Some(node), true) => view.response.displacement[node],
@@ -73,15 +144,11 @@ impl Channel {
     /// Directional derivative of [`Channel::predict`].
     pub fn predict_tangent(&self, view: SimulatedRecord, along: RecordTangent) -> Vec<f64> {
         let [gain, ..] = self.sensor().values(view.scalars);
-        let [by_gain, by_offset, by_drift] = self.sensor().changes(along.scalars);
         let model = |i: usize| {
             let sensed = self.sensed(view, i);
-            let TimePoint { step, .. } = self.places()[i];
-            let mut change = gain * answer(&sensed, step, along);
-            if by_gain != 0.0 {
-                change += by_gain * sensed.value;
-            }
-            change + by_offset + by_drift * self.age(i)
+            let TimePoint { step, .. } = self.place(view, i);
+            let factors = self.sensor_factors(view, i, sensed.value);
+            gain * answer(&sensed, step, along) + self.sensor().change(factors, along.scalars)
         };
         let out: Vec<f64> = (0..self.len()).map(model).collect();
         match self.filter().is_empty() {
@@ -124,17 +191,16 @@ impl Channel {
             });
         }
         let [gain, ..] = self.sensor().values(view.scalars);
-        let indices = self.sensor().indices();
-        let simple = self.kind() == ChannelKind::Displacement && indices == [None; 3];
+        let simple = self.kind() == ChannelKind::Displacement && !self.sensor().is_estimated();
         for (i, slope) in slopes.iter().enumerate() {
-            let place = self.places()[i];
+            let place = self.place(view, i);
             if let (true, Some(node)) = (simple, place.as_node()) {
                 source.displacement[node] += gain * slope;
                 continue;
             }
             let sensed = self.sensed(view, i);
             spread(&sensed, place.step, gain * slope, source, direct);
-            let factors = [sensed.value, 1.0, self.age(i)];
+            let factors = self.sensor_factors(view, i, sensed.value);
             self.sensor().add_gradient(factors, *slope, scalars);
         }
     }
@@ -143,7 +209,9 @@ impl Channel {
     pub fn sees_functions(&self) -> bool {
         match self.kind() {
             ChannelKind::Displacement => false,
-            ChannelKind::Velocity => self.places().iter().any(|p| p.as_node().is_none()),
+            ChannelKind::Velocity => {
+                self.sensor().is_delayed() || self.places().iter().any(|p| p.as_node().is_none())
+            }
             ChannelKind::Acceleration => true,
         }
     }

@@ -7,8 +7,8 @@ use crate::system::{Excitation, Grid, InputQuantity, InputSample, TimePoint};
 /// The samples of one sensor.
 ///
 /// The model of sample `i` is `gain * (h_i + b_i) + offset + drift * (t_i - t_0)`. Here `h_i` is displacement, velocity or
-/// acceleration of the response ([`observe`](crate::simulate::reference::observe())), `b_i` the same of the base for a sensor of
-/// absolute motion, and `t_0` the time of the first sample. A filter, if any, is applied to model and samples.
+/// acceleration of the response ([`observe`](crate::simulate::reference::observe())) at `t_i - delay`, `b_i` the same of the base for a
+/// sensor of absolute motion, and `t_0` the time of the first sample. A filter, if any, is applied to model and samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
     kind: ChannelKind,
@@ -27,6 +27,8 @@ pub struct Channel {
     /// Added to the response; empty if zero.
     base: Vec<f64>,
     filter: Vec<SecondOrder>,
+    /// Quantisation step of the samples, in the SI unit of the kind; 0 where unknown.
+    resolution: f64,
     /// True if sample `i` lies on node `i`.
     on_every_node: bool,
 }
@@ -68,6 +70,7 @@ impl Channel {
             inputs_at_samples: None,
             base: Vec::new(),
             filter: Vec::new(),
+            resolution: 0.0,
         })
     }
 
@@ -103,11 +106,24 @@ impl Channel {
         self
     }
 
-    /// Sets gain, offset and drift.
+    /// Sets gain, offset, drift and delay.
     #[must_use]
     pub fn with_sensor(mut self, sensor: Sensor) -> Self {
         self.sensor = sensor;
+        self.on_every_node &= !sensor.is_delayed();
         self
+    }
+
+    /// Sets the quantisation step `q` of the samples (SI unit of the kind): an estimated sigma is then at least `q / sqrt(12)`.
+    #[must_use]
+    pub fn with_resolution(mut self, resolution: f64) -> Self {
+        self.resolution = resolution;
+        self
+    }
+
+    /// Quantisation step of the samples, in the SI unit of the kind; 0 where unknown.
+    pub fn resolution(&self) -> f64 {
+        self.resolution
     }
 
     /// Sets force (N) and base acceleration (m/s^2) at the samples, on which accelerations depend; otherwise both are linear over
@@ -251,6 +267,7 @@ impl Channel {
                 .map(|parts| parts.each_ref().map(|p| short(p))),
             base: short(&self.base),
             filter: self.filter.clone(),
+            resolution: self.resolution,
             on_every_node: self.on_every_node,
         };
         part.filter_samples();
@@ -280,7 +297,7 @@ impl Channel {
         )?;
         Some(Self {
             places: unfiltered.places,
-            on_every_node: unfiltered.on_every_node,
+            on_every_node: unfiltered.on_every_node && !self.sensor.is_delayed(),
             ..self.clone()
         })
     }
@@ -295,7 +312,7 @@ impl Channel {
         &self.times
     }
 
-    /// Positions of the samples on the grid.
+    /// Positions of the times of the samples on the grid, without a delay.
     pub fn places(&self) -> &[TimePoint] {
         &self.places
     }
@@ -325,7 +342,7 @@ impl Channel {
         self.loss
     }
 
-    /// Gain, offset and drift.
+    /// Gain, offset, drift and delay.
     pub fn sensor(&self) -> Sensor {
         self.sensor
     }
@@ -374,7 +391,9 @@ impl Channel {
     /// True if all samples are displacements at nodes.
     pub(crate) fn is_displacement_at_nodes(&self) -> bool {
         let all = || self.places.iter().all(|p| p.as_node().is_some());
-        self.kind == ChannelKind::Displacement && (self.on_every_node || all())
+        self.kind == ChannelKind::Displacement
+            && !self.sensor.is_delayed()
+            && (self.on_every_node || all())
     }
 
     /// True if sample `i` lies on node `i`.

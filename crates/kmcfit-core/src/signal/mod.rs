@@ -11,6 +11,7 @@
 
 mod clipping;
 mod decimate;
+mod faults;
 mod filter;
 mod frequency_response;
 mod interpolate;
@@ -21,8 +22,9 @@ mod spacing;
 mod spectrum;
 mod spline;
 
-pub use clipping::clipped;
+pub use clipping::{clipped, cut_off};
 pub use decimate::{decimate, decimation_filter};
+pub use faults::{dropouts, quantisation, spikes};
 pub use filter::{SecondOrder, band_pass, high_pass, low_pass, zero_phase, zero_phase_transpose};
 pub use frequency_response::{Mobility, driven_oscillator, two_forced_modes};
 pub use interpolate::{Interpolation, Signal};

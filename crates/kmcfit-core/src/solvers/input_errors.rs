@@ -169,7 +169,7 @@ pub(crate) fn input_error_effect(
     let is_acceleration = channel.kind() == ChannelKind::Acceleration;
     let rows: Vec<InputRow> = (0..channel.len())
         .map(|j| {
-            let place = channel.places()[j];
+            let place = channel.place(view, j);
             let (i, x) = (place.step, place.fraction);
             let by_input = match error.quantity {
                 _ if !is_acceleration => 0.0,

@@ -300,6 +300,8 @@ pub(super) fn update(
             let sigma = spread(channel, predicted) / (1.0 - share).sqrt();
             // Samples that are fitted exactly still need a scale.
             let sigma = sigma.max(f64::EPSILON * rms(channel.observed()));
+            // The variance of the quantisation error is part of that of a sample.
+            let sigma = sigma.max(channel.resolution() / 12.0f64.sqrt());
             if sigma > 0.0 {
                 largest = largest.max((sigma / before).ln().abs());
                 *channel = channel

@@ -1,5 +1,6 @@
 //! Reading of a column of a file: times, and values in SI units within the time window.
 
+use super::data_facts::{DataAction, DataFact, MOST_PLACES, RecordNotes};
 use super::unit::QuantityColumn;
 use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
@@ -7,9 +8,10 @@ use crate::config::build::asked_for;
 use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, SourceSpec};
 use crate::config::values::{ColumnId, Text};
 use crate::error::InputError;
-use crate::finding::Finding;
 use crate::number_format::significant;
-use crate::tables::{ColumnName, SAMPLE_RATES, Table, TableFormat, increasing_at};
+use crate::tables::{
+    ColumnName, Duplicates, RepeatedTimes, SAMPLE_RATES, Table, TableFormat, repeated_times,
+};
 use crate::units::{Quantity, Unit};
 
 /// Default name of the column of times.
@@ -63,7 +65,7 @@ pub fn read(
     file: &ModelFile,
     spec: &ExperimentSpec,
     wanted: &ColumnRequest,
-    warnings: &mut Vec<Finding>,
+    notes: &mut RecordNotes,
 ) -> Result<ColumnSamples, InputError> {
     let experiment = format!("experiments[{}]", wanted.experiment);
     let column_key = format!("{experiment}.columns.{}", wanted.name);
@@ -86,16 +88,16 @@ pub fn read(
         table: &table,
         index,
     };
-    let unit = column(index).unit(warnings)?;
+    let unit = column(index).unit(&mut notes.warnings)?;
     let factor = unit.factor();
-    let times = times(file, spec, &experiment, own, &table, warnings)?;
+    let times = times(file, spec, &experiment, own, &table, notes)?;
     let values = table.samples(index).map_err(asked_for(file, &column_key))?;
     let beside = match wanted.beside {
         Some((name, key)) => {
             let found = table
                 .find(&ColumnName::from(name))
                 .map_err(asked_for(file, key))?;
-            column(found).same_as(unit.unit, key, warnings);
+            column(found).same_as(unit.unit, key, &mut notes.warnings);
             Some(table.samples(found).map_err(asked_for(file, key))?)
         }
         None => None,
@@ -113,7 +115,11 @@ pub fn read(
             .found(format!("`{label}`"))
             .expected("two columns"));
     }
+    repeats(file, spec, wanted.experiment, &table, &times, notes);
     let inside = inside(file, &experiment, spec, &times.values)?;
+    let duplicates = spec.duplicates.unwrap_or_default();
+    let values = times.repeated.merged(values, duplicates);
+    let beside = beside.map(|b| times.repeated.merged(b, duplicates));
     let zero = spec.time_zero.map_or(0.0, |t| t.0);
     Ok(ColumnSamples {
         times: inside.iter().map(|&r| times.values[r] - zero).collect(),
@@ -125,6 +131,31 @@ pub fn read(
         label,
         format: table.format_in_words(),
     })
+}
+
+/// States the rows that repeat a time.
+fn repeats(
+    file: &ModelFile,
+    spec: &ExperimentSpec,
+    experiment: usize,
+    table: &Table,
+    times: &Times,
+    notes: &mut RecordNotes,
+) {
+    let repeated = &times.repeated;
+    if repeated.groups.is_empty() {
+        return;
+    }
+    let fact = DataFact::RepeatedTimes {
+        count: repeated.excess(),
+        lines: repeated.lines(table, MOST_PLACES),
+        action: match spec.duplicates.unwrap_or_default() {
+            _ if repeated.are_equal => DataAction::Merged,
+            Duplicates::Mean => DataAction::Mean,
+            Duplicates::First | Duplicates::Error => DataAction::First,
+        },
+    };
+    notes.state(&file.experiment_name(experiment), &fact);
 }
 
 /// The table of a column: of its own file, or of that of the experiment.
@@ -215,19 +246,22 @@ fn about_format(file: &ModelFile, experiment: &str, error: InputError) -> InputE
 }
 
 struct Times {
+    /// Each time once.
     values: Vec<f64>,
     label: String,
     unit: Option<Unit>,
+    /// Rows that repeat a time.
+    repeated: RepeatedTimes,
 }
 
-/// The times of all rows, in s.
+/// The times of the rows, in s.
 fn times(
     file: &ModelFile,
     spec: &ExperimentSpec,
     experiment: &str,
     own: Option<&SourceSpec>,
     table: &Table,
-    warnings: &mut Vec<Finding>,
+    notes: &mut RecordNotes,
 ) -> Result<Times, InputError> {
     let own_rate = own.and_then(|s| s.sample_rate);
     let own_column = own.and_then(|s| s.time.as_ref());
@@ -257,6 +291,10 @@ fn times(
             values,
             label,
             unit: None,
+            repeated: RepeatedTimes {
+                groups: Vec::new(),
+                are_equal: true,
+            },
         });
     }
     let default = ColumnId::Name(TIME_COLUMN.to_owned());
@@ -281,12 +319,16 @@ fn times(
         table,
         index,
     };
-    let unit = column.unit(warnings)?;
-    let values = increasing_at(table, index).map_err(asked_for(file, &key))?;
+    let unit = column.unit(&mut notes.warnings)?;
+    let duplicates = spec.duplicates.unwrap_or_default();
+    let repeated = repeated_times(table, index, duplicates).map_err(asked_for(file, &key))?;
+    let values = table.values(index).map_err(asked_for(file, &key))?;
+    let values = repeated.merged(values, Duplicates::First);
     Ok(Times {
         values: values.iter().map(|t| t * unit.factor()).collect(),
         label: table.label(index),
         unit: Some(unit.unit),
+        repeated,
     })
 }
 

@@ -14,7 +14,7 @@ use crate::magnitudes::{Magnitude, implausible, mains_hum};
 use kmcfit_core::internals::diagnostics::{detrended, outlier_indices, standard_deviation};
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::signal::{
-    Interpolation, Signal, Spectrum, clipped, driven_oscillator, onset, two_forced_modes, two_modes,
+    Interpolation, Signal, Spectrum, driven_oscillator, onset, two_forced_modes, two_modes,
 };
 use kmcfit_core::internals::system::round_time;
 use std::f64::consts::{PI, TAU};
@@ -53,20 +53,21 @@ const FEWEST_IN_A_PERIOD: f64 = 4.0;
 
 /// Warnings about the record of experiment `i`.
 pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord) -> Vec<Finding> {
+    let name = file.experiment_name(i);
     let mut warnings = unit_factors(spec, record);
     warnings.extend(magnitudes(record));
     warnings.extend(implied_mass(file, record));
     warnings.extend(opposite_signs(spec, record));
-    warnings.extend(record.channels.iter().filter_map(saturation));
     warnings.extend(record.channels.iter().filter_map(|c| outliers(spec, c)));
     // The equation error simulates no response from an initial state.
     if !is_equation_error(file) {
         warnings.extend(rest_before_motion(spec, record));
     }
     warnings.extend(modes(spec, record));
-    let name = file.experiment_name(i);
     let place = format!("experiments[{i}] ({name})");
-    warnings.iter().map(|warning| warning.at(&place)).collect()
+    let each = warnings.iter();
+    each.map(|warning| warning.at(&place).with("experiment", &name))
+        .collect()
 }
 
 /// Channels of one response, or a sample and the given state, that disagree by a [`SUSPICIOUS`] factor.
@@ -312,16 +313,5 @@ fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<DataWarning> 
         first_time: in_file(spec, channel, first),
         unit: channel.unit.symbol().into(),
         has_sigma: channel.weighting.is_some(),
-    })
-}
-
-/// Many samples at one extreme value: saturation of the sensor.
-fn saturation(channel: &RawChannel) -> Option<DataWarning> {
-    let (samples, level) = clipped(&channel.values)?;
-    Some(DataWarning::Saturation {
-        channel: channel.kind.name(),
-        samples,
-        level: level / channel.unit.factor(),
-        unit: channel.unit.symbol().into(),
     })
 }

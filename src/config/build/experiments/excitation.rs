@@ -1,12 +1,14 @@
 //! Excitation of an experiment: force and base motion.
 
 use super::column_samples::{self, ColumnRequest};
+use super::data_facts::{DataAction, DataFact, RecordNotes};
+use super::faults::{Column, coarse_step};
 use crate::config::ModelFile;
 use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec};
 use crate::config::values::Number;
 use crate::error::InputError;
-use crate::finding::Finding;
 use crate::units::Quantity;
+use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
 
@@ -25,6 +27,11 @@ impl RawExcitation {
     /// Force and motion of the base.
     pub fn into_input(self) -> Input {
         self.input
+    }
+
+    /// True for a force and a motion of the base.
+    pub fn has_two_inputs(&self) -> bool {
+        self.input.force.is_some() && self.input.base.is_some()
     }
 
     /// Samples of the force, if it alone acts.
@@ -64,7 +71,7 @@ pub fn read(
     file: &ModelFile,
     i: usize,
     spec: &ExperimentSpec,
-    warnings: &mut Vec<Finding>,
+    notes: &mut RecordNotes,
 ) -> Result<RawExcitation, InputError> {
     let key = format!("experiments[{i}]");
     let columns = spec.columns.as_ref();
@@ -91,11 +98,11 @@ pub fn read(
             };
             let meant = interpolation.unwrap_or_default();
             Some(Waveform::Samples(signal(
-                file, spec, &wanted, meant, warnings,
+                file, spec, &wanted, meant, notes,
             )?))
         }
     };
-    let base = base(file, i, spec, warnings)?;
+    let base = base(file, i, spec, notes)?;
     let input = Input { force, base };
     Ok(RawExcitation { input })
 }
@@ -104,7 +111,7 @@ fn base(
     file: &ModelFile,
     i: usize,
     spec: &ExperimentSpec,
-    warnings: &mut Vec<Finding>,
+    notes: &mut RecordNotes,
 ) -> Result<Option<BaseMotion>, InputError> {
     let key = format!("experiments[{i}]");
     let columns = spec.columns.as_ref();
@@ -143,7 +150,7 @@ fn base(
         let unit = units.and_then(|u| u.base_acceleration.as_ref());
         let wanted = wanted("base_acceleration", unit, kind);
         let meant = interpolation.unwrap_or_default();
-        return signal(file, spec, &wanted, meant, warnings)
+        return signal(file, spec, &wanted, meant, notes)
             .map(|signal| Some(BaseMotion::Acceleration(signal)));
     }
     if let Some(given) = interpolation.filter(|i| *i != Interpolation::Cubic) {
@@ -161,7 +168,7 @@ fn base(
     }
     let unit = units.and_then(|u| u.base_displacement.as_ref());
     let wanted = wanted("base_displacement", unit, kind);
-    let signal = signal(file, spec, &wanted, Interpolation::Cubic, warnings)?;
+    let signal = signal(file, spec, &wanted, Interpolation::Cubic, notes)?;
     Ok(Some(BaseMotion::Displacement(signal)))
 }
 
@@ -171,14 +178,14 @@ fn signal(
     spec: &ExperimentSpec,
     wanted: &ColumnRequest,
     interpolation: Interpolation,
-    warnings: &mut Vec<Finding>,
+    notes: &mut RecordNotes,
 ) -> Result<Signal, InputError> {
     // Interpolation needs samples of the excitation slightly beyond the window of the response.
     let unbounded = ExperimentSpec {
         window: None,
         ..spec.clone()
     };
-    let source = column_samples::read(file, &unbounded, wanted, warnings)?;
+    let mut source = column_samples::read(file, &unbounded, wanted, notes)?;
     let key = format!("experiments[{}].columns.{}", wanted.experiment, wanted.name);
     let missing = source.values.iter().filter(|v| v.is_nan()).count();
     if missing > 0 {
@@ -191,6 +198,25 @@ fn signal(
                 source.times[first]
             ))
             .expected("a value in every row: it acts at all times"));
+    }
+    let column = Column {
+        file,
+        experiment: wanted.experiment,
+        spec,
+        name: &wanted.name.replace('_', " "),
+        is_input: true,
+        is_robust: false,
+    };
+    column.check(&mut source, notes);
+    if let Some(step) = coarse_step(&source.values) {
+        let fact = DataFact::Quantisation {
+            channel: column.name.to_owned(),
+            step: step / source.unit.factor(),
+            unit: source.unit.symbol().to_owned(),
+            share: step / (12.0f64.sqrt() * standard_deviation(&source.values)),
+            action: DataAction::Used,
+        };
+        notes.state(&file.experiment_name(wanted.experiment), &fact);
     }
     let samples = source.times.len();
     Signal::new(source.times, source.values, interpolation).ok_or_else(|| {

@@ -3,7 +3,10 @@
 mod channel;
 mod column_samples;
 mod data_checks;
+mod data_facts;
+mod delays;
 mod excitation;
+mod faults;
 mod unit;
 mod warning;
 
@@ -20,6 +23,10 @@ use crate::finding::Finding;
 use crate::tables::resample;
 use crate::units::Unit;
 pub(super) use channel::RawChannel;
+pub(super) use data_facts::RecordNotes;
+#[cfg(test)]
+pub(crate) use data_facts::{DataAction, DataFact, GapPlace};
+pub use delays::DelayLimits;
 use excitation::RawExcitation;
 use kmcfit_core::internals::builder::{self, ChannelSpec, ScalarSpec, listed};
 use kmcfit_core::internals::functions::{Prior, ScalarParameter};
@@ -57,6 +64,11 @@ impl RawRecord {
     pub fn end(&self) -> f64 {
         let last = self.channels.iter().map(|c| c.span[1]);
         last.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// True for a force and a motion of the base.
+    fn has_two_inputs(&self) -> bool {
+        self.excitation.has_two_inputs()
     }
 
     /// Sampling interval of force or base motion, if equally spaced, s.
@@ -110,7 +122,7 @@ pub(super) fn is_held_out(spec: &ExperimentSpec) -> bool {
 pub(super) fn read(
     file: &ModelFile,
     mode: BuildMode,
-    warnings: &mut Vec<Finding>,
+    notes: &mut RecordNotes,
 ) -> Result<Vec<Option<RawRecord>>, InputError> {
     let specs = &file.spec.experiments;
     if specs.iter().all(is_held_out) {
@@ -125,7 +137,7 @@ pub(super) fn read(
         let all_have_data = specs.iter().all(|e| e.data.is_some());
         if has_duration || !all_have_data {
             let records = specs.iter().enumerate().map(|(i, spec)| {
-                let excitation = excitation::read(file, i, spec, warnings)?;
+                let excitation = excitation::read(file, i, spec, notes)?;
                 let channels = Vec::new();
                 Ok((!excitation.is_empty()).then_some(RawRecord {
                     channels,
@@ -137,7 +149,7 @@ pub(super) fn read(
     }
     let records = specs.iter().enumerate();
     records
-        .map(|(i, spec)| read_one(file, i, spec, warnings).map(Some))
+        .map(|(i, spec)| read_one(file, i, spec, notes).map(Some))
         .collect()
 }
 
@@ -145,14 +157,22 @@ fn read_one(
     file: &ModelFile,
     i: usize,
     spec: &ExperimentSpec,
-    warnings: &mut Vec<Finding>,
+    notes: &mut RecordNotes,
 ) -> Result<RawRecord, InputError> {
-    let channels = channel::read(file, i, spec, warnings)?;
-    let record = RawRecord {
+    let channels = channel::read(file, i, spec, notes)?;
+    let mut record = RawRecord {
         channels,
-        excitation: excitation::read(file, i, spec, warnings)?,
+        excitation: excitation::read(file, i, spec, notes)?,
     };
-    warnings.extend(data_checks::of(file, i, spec, &record));
+    let checks = data_checks::of(file, i, spec, &record);
+    // Outliers are spikes as well.
+    notes.warnings.retain(|spikes| {
+        let is_of = |w: &Finding, key: &str| w.quantities.get(key) == spikes.quantities.get(key);
+        let mut outliers = checks.iter().filter(|w| w.kind == "outliers");
+        spikes.kind != "spikes" || !outliers.any(|w| is_of(w, "experiment") && is_of(w, "channel"))
+    });
+    notes.warnings.extend(checks);
+    delays::apply(file, i, &mut record, notes)?;
     Ok(record)
 }
 
@@ -189,13 +209,17 @@ pub(super) fn specification(
     }
     let mut notes = Vec::new();
     if let Some(mut record) = record {
+        if let Some(delay) = delays::of_input(file, i, record.spacing())?.parameter() {
+            found = found.input_delay(delay);
+        }
         found = found.input(record.excitation.into_input());
         if let (BuildMode::Check { .. }, [only]) = (mode, record.channels.as_mut_slice()) {
             sample_per_node(only, grid);
         }
         for raw in record.channels {
             notes.push(raw.note());
-            found = found.channel(channel(spec, raw));
+            let delay = delays::of_channel(file, i, raw.kind, raw.median_spacing)?;
+            found = found.channel(channel(spec, raw, delay.parameter()));
         }
     }
     Ok((found, notes))
@@ -238,11 +262,12 @@ fn scalar(given: &EstimateValue) -> ScalarSpec {
     }
 }
 
-fn channel(spec: &ExperimentSpec, raw: RawChannel) -> ChannelSpec {
+fn channel(spec: &ExperimentSpec, raw: RawChannel, delay: Option<ScalarSpec>) -> ChannelSpec {
     let sensor = |given: &SensorSpec| builder::SensorSpec {
         gain: given.gain.as_ref().map(scalar),
         offset: given.offset.as_ref().map(scalar),
         drift: given.drift.as_ref().map(scalar),
+        delay,
         absolute: given.absolute,
     };
     let given = channel::sensor_of(spec, raw.kind);
@@ -252,6 +277,7 @@ fn channel(spec: &ExperimentSpec, raw: RawChannel) -> ChannelSpec {
         weighting: raw.weighting,
         loss: raw.loss,
         noise: raw.noise,
+        resolution: raw.resolution,
         filter: raw.filter,
         span: raw.span,
         angular: raw.unit.is_angular(),
@@ -272,6 +298,20 @@ fn sample_per_node(raw: &mut RawChannel, grid: &Grid) {
         raw.decimated = false;
         raw.weighting = None;
     }
+}
+
+/// Limits of the estimated delays of all records.
+pub(super) fn delay_limits(
+    file: &ModelFile,
+    records: &[Option<RawRecord>],
+) -> Result<Vec<DelayLimits>, InputError> {
+    let mut found = Vec::new();
+    for (i, record) in records.iter().enumerate() {
+        if let Some(record) = record {
+            found.extend(delays::limits(file, i, record)?);
+        }
+    }
+    Ok(found)
 }
 
 /// Names of channels, separated by commas.

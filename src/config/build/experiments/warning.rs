@@ -147,14 +147,71 @@ pub(crate) enum DataWarning {
     },
     /// Many samples at the end of the range.
     #[error(
-        "{samples} samples of the {channel} equal its extreme value {level} {unit}; if the sensor saturates there, delete \
-         them (empty fields)"
+        "{samples} samples of the {channel} equal its extreme value {} {unit}; if the sensor saturates there, {}",
+        significant(*level, 4),
+        if *is_input {
+            "keep a part without them by `window`"
+        } else {
+            "leave them out: `exclude: [saturation]`"
+        }
     )]
     Saturation {
-        channel: &'static str,
+        channel: String,
         samples: usize,
         level: f64,
         unit: String,
+        #[serde(skip)]
+        is_input: bool,
+    },
+    /// Samples held at a constant value.
+    #[error(
+        "{samples} samples of the {channel} are held at a constant value, from {} to {} s at first, as by a dropout; {}",
+        significant(first[0], 6),
+        significant(first[1], 6),
+        if *is_input {
+            "keep a part without them by `window`"
+        } else {
+            "leave them out: `exclude: [dropouts]`"
+        }
+    )]
+    Dropouts {
+        channel: String,
+        samples: usize,
+        first: [f64; 2],
+        #[serde(skip)]
+        is_input: bool,
+    },
+    /// Single samples far from their neighbours.
+    #[error(
+        "{} of the {channel} {} far from the neighbours, the first at {} s; {}",
+        if *samples == 1 { "1 sample".to_owned() } else { format!("{samples} samples") },
+        if *samples == 1 { "is" } else { "are" },
+        significant(*first, 6),
+        if *is_input {
+            "correct the file, or keep a part without spikes by `window`"
+        } else {
+            "leave spikes out: `exclude: [spikes]`"
+        }
+    )]
+    Spikes {
+        channel: String,
+        samples: usize,
+        first: f64,
+        #[serde(skip)]
+        is_input: bool,
+    },
+    /// Gaps in the samples of an input.
+    #[error(
+        "the {channel} has {}, across which it is interpolated, the longest from {} to {} s; keep a part without them by \
+         `window`",
+        if *count == 1 { "a gap".to_owned() } else { format!("{count} gaps") },
+        significant(longest[0], 6),
+        significant(longest[1], 6)
+    )]
+    InputGaps {
+        channel: String,
+        count: usize,
+        longest: [f64; 2],
     },
 }
 

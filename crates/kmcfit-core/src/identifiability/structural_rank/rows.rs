@@ -24,7 +24,7 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
             if !superposes(problem, experiment, channel) {
                 // A sample of the known initial state does not depend on the parameters.
                 let known = experiment.initial_parameters == [None; 2]
-                    && channel.sensor().indices() == [None; 3]
+                    && !channel.sensor().is_estimated()
                     && channel.filter().is_empty();
                 let acts = |p: &&TimePoint| last_acting(problem, channel.kind(), **p).is_some();
                 others += match known {
@@ -85,7 +85,7 @@ fn superposes(
 ) -> bool {
     problem.system.terms.iter().all(|t| t.is_linear())
         && experiment.initial_parameters == [None; 2]
-        && channel.sensor().indices() == [None; 3]
+        && !channel.sensor().is_estimated()
         && channel.filter().is_empty()
 }
 

@@ -91,7 +91,7 @@ impl Problem {
         let is_plain = |channel: &Channel| {
             channel.filter().is_empty()
                 && channel.correlation().is_none()
-                && channel.sensor().indices().iter().all(Option::is_none)
+                && !channel.sensor().is_estimated()
         };
         self.channels().all(is_plain)
     }
@@ -172,7 +172,11 @@ fn sweep(
     };
     let mut readers = Vec::with_capacity(experiment.channels.len());
     for channel in &experiment.channels {
-        let first = channel.places().partition_point(|p| p.step < steps.start);
+        let is_before = |i: &usize| channel.place(view, *i).step < steps.start;
+        let first = match steps.start {
+            0 => 0,
+            _ => (0..channel.len()).take_while(is_before).count(),
+        };
         let mut block = RowBlock::new(places);
         block.restart(row + first);
         readers.push((JacobianRows::new(channel, view, first), block));
@@ -220,16 +224,15 @@ fn sweep(
 fn add_sensor(channel: &Channel, view: SimulatedRecord, row: usize, jacobian: &mut DMatrix<f64>) {
     let parameters = jacobian.ncols();
     let scalars = parameters - view.scalars.len();
-    for (role, index) in channel.sensor().indices().into_iter().enumerate() {
-        let Some(index) = index else {
-            continue;
-        };
+    let sensor = channel.sensor();
+    if sensor.is_estimated() {
         for i in 0..channel.len() {
-            jacobian[(row + i, scalars + index)] += match role {
-                0 => channel.sensed(view, i).value,
-                1 => 1.0,
-                _ => channel.age(i),
-            };
+            let factors = channel.sensor_factors(view, i, channel.sensed(view, i).value);
+            for (index, factor) in sensor.indices().into_iter().zip(factors) {
+                if let Some(index) = index {
+                    jacobian[(row + i, scalars + index)] += factor;
+                }
+            }
         }
     }
     if !channel.filter().is_empty() {

@@ -109,8 +109,8 @@ impl<'a> JacobianRows<'a> {
             }
         } else {
             batch.count = 0;
-            let places = &self.channel.places()[self.next..];
-            for (l, place) in places.iter().take(most).enumerate() {
+            for l in 0..most {
+                let place = self.channel.place(self.view, self.next + l);
                 if place.step >= steps.end {
                     break;
                 }

@@ -156,10 +156,10 @@ impl UnknownColumns<'_> {
     ) {
         let [gain, ..] = channel.sensor().values(view.scalars);
         // A displacement at a node by a known sensor is the state itself.
-        let known = channel.sensor().indices().iter().all(Option::is_none);
+        let known = !channel.sensor().is_estimated();
         let plain = known && channel.kind() == ChannelKind::Displacement;
         let row = |i: usize, entries: &mut Vec<(usize, f64)>| {
-            let place = channel.places()[i];
+            let place = channel.place(view, i);
             if let Some(node) = plain.then(|| place.as_node()).flatten() {
                 entries.extend(self.state(node, 0).map(|index| (index, gain)));
                 return;
@@ -173,7 +173,7 @@ impl UnknownColumns<'_> {
             }
             let slope = |f: usize, side: usize| gain * sensed.functions[side][f];
             self.add_function_slopes(place.step, &slope, entries);
-            let factors = [sensed.value, 1.0, channel.age(i)];
+            let factors = channel.sensor_factors(view, i, sensed.value);
             for (index, factor) in channel.sensor().indices().into_iter().zip(factors) {
                 entries.extend(index.map(|index| (self.scalar(index), factor)));
             }

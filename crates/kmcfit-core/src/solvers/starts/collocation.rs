@@ -105,7 +105,7 @@ fn response_of_samples(
     theta: &[f64],
     first: &[Trajectory],
 ) -> Option<Vec<Trajectory>> {
-    let perfect = |c: &Channel| c.sensor().indices().iter().all(Option::is_none);
+    let perfect = |c: &Channel| !c.sensor().is_estimated();
     if !problem.channels().all(perfect) {
         return first_states(problem, theta);
     }

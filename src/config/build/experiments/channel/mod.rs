@@ -4,6 +4,8 @@ mod noise;
 mod sampling;
 
 use super::column_samples::{self, ColumnRequest};
+use super::data_facts::{DataFact, RecordNotes};
+use super::faults::{Column, coarse_step};
 use super::warning::DataWarning;
 use super::{ChannelNote, names};
 use crate::config::ModelFile;
@@ -13,14 +15,14 @@ use crate::config::spec::{
 };
 use crate::config::values::{ColumnId, Sigma, Text};
 use crate::error::InputError;
-use crate::finding::Finding;
 use crate::number_format::significant;
 use crate::units::{Quantity, Unit};
+use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::record::{ChannelKind, Loss, NoiseModel, Weighting};
 use kmcfit_core::internals::signal::SecondOrder;
 use kmcfit_core::internals::signal::{even_spacing, median_spacing};
 use kmcfit_core::internals::system::Grid;
-use noise::{loss, noise_model, weighting};
+use noise::{loss, noise_model, weighting, with_quantisation};
 use sampling::{band, decimate, nearly_equal};
 
 /// Default name of the column of the displacement, for files without `columns`.
@@ -52,7 +54,9 @@ pub struct RawChannel {
     pub unit: Unit,
     /// Unit of the column of times; `None` for a sampling rate.
     pub time_unit: Option<Unit>,
-    ignored: Vec<(usize, String)>,
+    /// Quantisation step, SI; 0 where none is stated.
+    pub resolution: f64,
+    pub(super) ignored: Vec<(usize, String)>,
     format: String,
 }
 
@@ -124,7 +128,7 @@ pub fn read(
     file: &ModelFile,
     i: usize,
     spec: &ExperimentSpec,
-    warnings: &mut Vec<Finding>,
+    notes: &mut RecordNotes,
 ) -> Result<Vec<RawChannel>, InputError> {
     let named: Vec<ChannelKind> = (ChannelKind::ALL.into_iter())
         .filter(|kind| spec_of(spec, *kind).column.is_some())
@@ -138,7 +142,7 @@ pub fn read(
         let of_kind = spec_of(spec, kind);
         let usual = named.is_empty() && kind == ChannelKind::Displacement;
         match of_kind.column.or(usual.then_some(&default)) {
-            Some(column) => channels.push(read_one(file, i, spec, &of_kind, column, warnings)?),
+            Some(column) => channels.push(read_one(file, i, spec, &of_kind, column, notes)?),
             None => without_column(file, i, &of_kind, &named)?,
         }
     }
@@ -202,7 +206,7 @@ fn read_one(
     spec: &ExperimentSpec,
     of_kind: &Spec,
     column: &ColumnRef,
-    warnings: &mut Vec<Finding>,
+    notes: &mut RecordNotes,
 ) -> Result<RawChannel, InputError> {
     let kind = of_kind.kind;
     let key = format!("experiments[{i}]");
@@ -219,8 +223,21 @@ fn read_one(
         unit: of_kind.unit,
         beside: sigma_column,
     };
-    let mut source = column_samples::read(file, spec, &wanted, warnings)?;
+    let mut source = column_samples::read(file, spec, &wanted, notes)?;
     let mut ignored = Vec::new();
+    let loss = loss(file, &key, of_kind)?;
+    let missing = source.values.iter().filter(|v| v.is_nan()).count();
+    let step =
+        coarse_step(&source.values).filter(|_| spec.band.is_none() && spec.decimate.is_none());
+    let column = Column {
+        file,
+        experiment: i,
+        spec,
+        name: kind.name(),
+        is_input: false,
+        is_robust: loss != Loss::Squares,
+    };
+    let excluded = column.check(&mut source, notes);
     if source.outside > 0 {
         ignored.push((source.outside, "outside the window".to_owned()));
     }
@@ -234,20 +251,31 @@ fn read_one(
         kind,
         &source,
     )?;
-    let missing = source.values.len() - present.len();
     if missing > 0 {
         ignored.push((missing, "missing".to_owned()));
     }
+    ignored.extend(excluded);
+    let missing = source.values.len() - present.len();
     let pick = |column: &[f64]| -> Vec<f64> { present.iter().map(|&r| column[r]).collect() };
     let (times, values) = (pick(&source.times), pick(&source.values));
     let sigmas = source.beside.as_deref().map(pick);
     let spacing = even_spacing(&times);
     if spacing.is_none() && missing == 0 && nearly_equal(&times) {
-        warnings.push(DataWarning::NearlyEqualTimes.at(&key));
+        notes.warnings.push(DataWarning::NearlyEqualTimes.at(&key));
     }
     let filter = band(file, &key, spec, spacing, missing)?;
     let weighting = weighting(file, &sigma_key, of_kind.sigma, sigmas, &values)?;
-    let loss = loss(file, &key, of_kind)?;
+    let (weighting, action) = with_quantisation(weighting, step.unwrap_or(0.0));
+    if let Some(step) = step {
+        let fact = DataFact::Quantisation {
+            channel: kind.name().to_owned(),
+            step: step / source.unit.factor(),
+            unit: source.unit.symbol().to_owned(),
+            share: step / (12.0f64.sqrt() * standard_deviation(&values)),
+            action,
+        };
+        notes.state(&file.experiment_name(i), &fact);
+    }
     Ok(RawChannel {
         kind,
         span,
@@ -262,6 +290,7 @@ fn read_one(
         noise: noise_model(of_kind),
         unit: source.unit,
         time_unit: source.time_unit,
+        resolution: step.unwrap_or(0.0),
         ignored,
         format: source.format,
     })

@@ -1,5 +1,6 @@
 //! Standard deviation of the samples, loss of the residuals, and correlation of the noise.
 
+use super::super::data_facts::DataAction;
 use super::Spec;
 use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
@@ -48,6 +49,34 @@ pub(super) fn weighting(
             }
         }
         (Some(Sigma::Column(_)), None) => Ok(None),
+    }
+}
+
+/// Share of sigma below which the standard deviation of a quantisation error is negligible: half a per cent of sigma.
+const NEGLIGIBLE: f64 = 0.1;
+
+/// The weighting with the variance `step^2/12` of a quantisation error added to stated variances, and what was done.
+pub(super) fn with_quantisation(
+    weighting: Option<Weighting>,
+    step: f64,
+) -> (Option<Weighting>, DataAction) {
+    let error = step / 12.0f64.sqrt();
+    // An invalid sigma stays, for its message.
+    let is_large = |sigma: &f64| *sigma > 0.0 && error > NEGLIGIBLE * sigma;
+    match weighting {
+        Some(Weighting::Sigma(sigma)) if is_large(&sigma) => (
+            Some(Weighting::Sigma(sigma.hypot(error))),
+            DataAction::AddedToSigma,
+        ),
+        Some(Weighting::Sigmas(sigmas)) if sigmas.iter().any(is_large) => {
+            let sigmas = sigmas.iter().map(|sigma| sigma.hypot(error));
+            (
+                Some(Weighting::Sigmas(sigmas.collect())),
+                DataAction::AddedToSigma,
+            )
+        }
+        Some(Weighting::Estimated { .. }) => (weighting, DataAction::LeastSigma),
+        _ => (weighting, DataAction::Used),
     }
 }
 

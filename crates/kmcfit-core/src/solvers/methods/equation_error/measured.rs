@@ -82,7 +82,7 @@ impl Measured {
         experiment: &Experiment,
         scalars: &[f64],
     ) -> Result<Self, MissingMeasurement> {
-        let estimated = |c: &Channel| c.sensor().indices().iter().any(Option::is_some);
+        let estimated = |c: &Channel| c.sensor().is_estimated();
         if experiment.channels.iter().any(estimated) {
             return Err(MissingMeasurement::KnownSensors);
         }

@@ -1,0 +1,141 @@
+//! Errors of single samples of a measured force: a spike, a cut peak, a lost sample, or an unmeasured impact.
+//!
+//! An error `p_j` of sample `j` of the force adds the response to a triangular pulse, with the derivatives `G_j` of the weighted and whitened
+//! residuals. Orthogonally to the derivatives of the model, the pulse with the largest score
+//!
+//! ```text
+//! t_j = -z_j^T e / (|z_j| s),    s^2 = e^T e / (n - q - k)
+//! ```
+//!
+//! is removed from the residuals `e` until no score is significant (orthogonal matching pursuit, Pati et al. 1993). Few pulses that leave no
+//! significant one explain the residuals; a missing term or a varying coefficient leaves many.
+
+use super::input_correlation::measured;
+use super::record_error::RecordError;
+use super::refinement::applies;
+use super::score_tests::extended;
+use super::span::{Span, weighted_residuals};
+use crate::functions::{CoefficientFunction, CoefficientKind};
+use crate::objective::Evaluation;
+use crate::problem::{FEW_PARAMETERS, Problem};
+use crate::signal::Signal;
+use crate::solvers::weighted_jacobian;
+use crate::system::{Grid, InputQuantity, Term};
+use nalgebra::{DMatrix, DVector};
+
+/// Smallest score of a first pulse: the largest of 10,000 standard normal numbers exceeds it with a probability of 0.0004.
+const SIGNIFICANT: f64 = 5.5;
+/// Score of a pulse above which the residuals are not yet explained.
+const REMAINS: f64 = 4.5;
+/// Largest number of pulses that explain residuals.
+const MOST: usize = 8;
+/// Largest number of derivatives, 8 bytes each.
+const MOST_DERIVATIVES: usize = 4_000_000;
+/// Part of the derivatives of a pulse outside the span of the others below which it is no candidate.
+const APART: f64 = 1e-3;
+
+/// The errors of few samples of the force that explain the residuals of a problem with one record; `None` where there are none, for a long
+/// record, and with a static force or a stated error of the input.
+pub(super) fn input_pulses(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+) -> Option<RecordError> {
+    let [experiment] = problem.experiments.as_slice() else {
+        return None;
+    };
+    let (quantity, signal) = measured(experiment)?;
+    let is_force = quantity == InputQuantity::Force && experiment.input_error.is_none();
+    let mut kinds = problem.functions.iter().map(|f| f.quantity);
+    let has_static_force = kinds.any(|kind| kind == CoefficientKind::Offset);
+    let nodes = problem.functions.nodes();
+    let count = problem.sample_count();
+    let is_short = nodes.saturating_mul(count) <= MOST_DERIVATIVES;
+    let is_few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
+    (is_force && !has_static_force && is_short && is_few).then_some(())?;
+    applies(problem, theta, evaluation).then_some(())?;
+    let pulses = CoefficientFunction::nodal(CoefficientKind::Offset, vec![0.0; nodes]);
+    let (extended, at) = extended(problem, theta, vec![(pulses, Term::Offset)])?;
+    let evaluation = extended.evaluate(&at).ok()?;
+    let jacobian = weighted_jacobian(&extended, &evaluation);
+    let first = problem.functions.scalar_range().start;
+    let own: Vec<usize> = (0..first).chain(first + nodes..jacobian.ncols()).collect();
+    let model = Span::of(&jacobian.select_columns(&own));
+    // A static force acts against positive displacements.
+    let by_sample = -jacobian.columns(first, nodes) * hats(&problem.system.grid, nodes, signal);
+    let residuals = model.orthogonal(&weighted_residuals(&extended, &evaluation));
+    let found = pursuit(&model, by_sample, residuals, own.len())?;
+    let (sample, error) = found
+        .iter()
+        .copied()
+        .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+    Some(RecordError::InputPulses {
+        experiment: experiment.name.clone(),
+        count: found.len(),
+        time: *signal.times().get(sample)?,
+        error,
+    })
+}
+
+/// Values at the nodes of a signal that is 1 at one of its samples and 0 at the others, in one column for each sample.
+fn hats(grid: &Grid, nodes: usize, signal: &Signal) -> DMatrix<f64> {
+    let times = signal.times();
+    let mut hats = DMatrix::zeros(nodes, times.len());
+    for node in 0..nodes {
+        let t = grid.time(node);
+        let right = times.partition_point(|time| *time <= t);
+        match (right.checked_sub(1), times.get(right)) {
+            (Some(left), Some(next)) => {
+                let share = (t - times[left]) / (next - times[left]);
+                hats[(node, left)] = 1.0 - share;
+                hats[(node, right)] = share;
+            }
+            (Some(last), None) => hats[(node, last)] = 1.0,
+            (None, _) => {}
+        }
+    }
+    hats
+}
+
+/// Indices and sizes of the columns that explain the residuals; `None` where none is significant, or more than [`MOST`] are.
+fn pursuit(
+    model: &Span,
+    mut columns: DMatrix<f64>,
+    mut residuals: DVector<f64>,
+    parameters: usize,
+) -> Option<Vec<(usize, f64)>> {
+    let sizes: Vec<f64> = columns.column_iter().map(|c| c.norm()).collect();
+    for mut column in columns.column_iter_mut() {
+        let apart = model.orthogonal(&column.clone_owned());
+        column.copy_from(&apart);
+    }
+    let mut found = Vec::new();
+    for threshold in std::iter::once(SIGNIFICANT).chain([REMAINS; MOST]) {
+        let left = residuals.len().checked_sub(parameters + found.len() + 1)?;
+        let deviation = (residuals.norm_squared() / left.max(1) as f64).sqrt();
+        let products = columns.tr_mul(&residuals);
+        let scores = columns.column_iter().enumerate().map(|(j, column)| {
+            let norm = column.norm();
+            let is_apart = norm > APART * sizes[j];
+            (
+                j,
+                if is_apart {
+                    products[j] / (norm * deviation)
+                } else {
+                    0.0
+                },
+            )
+        });
+        let (best, score) = scores.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+        if score.abs() < threshold || !score.is_finite() {
+            return (!found.is_empty()).then_some(found);
+        }
+        let column = columns.column(best).clone_owned();
+        let square = column.norm_squared();
+        found.push((best, -products[best] / square));
+        residuals -= &column * (products[best] / square);
+        let shares = columns.tr_mul(&column) / square;
+        columns -= &column * shares.transpose();
+    }
+    None
+}

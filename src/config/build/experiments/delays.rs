@@ -1,0 +1,274 @@
+//! Delays of channels and inputs: stated ones shift the times, estimated ones leave out the samples that they may move out of the record.
+
+use super::RawRecord;
+use super::data_facts::{DataAction, DataFact, RecordNotes};
+use crate::config::ModelFile;
+use crate::config::alternatives::ScalarOr;
+use crate::config::spec::{DelayValue, ExperimentSpec, InputSensorSpec};
+use crate::config::values::NumberOrEstimate;
+use crate::error::InputError;
+use crate::number_format::significant;
+use kmcfit_core::internals::builder::ScalarSpec;
+use kmcfit_core::internals::record::{ChannelKind, Weighting};
+use kmcfit_core::internals::system::Grid;
+
+/// Default limit of an estimated delay, in samples.
+const LIMIT: f64 = 10.0;
+
+/// Limits of an estimated delay.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DelayLimits {
+    /// Name of the parameter.
+    pub parameter: String,
+    /// Smallest and largest delay, s.
+    pub range: [f64; 2],
+}
+
+/// A delay, s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Delay {
+    /// Stated.
+    Known(f64),
+    /// Estimated within limits.
+    Estimated { start: f64, range: [f64; 2] },
+}
+
+impl Delay {
+    fn known(self) -> f64 {
+        match self {
+            Self::Known(delay) => delay,
+            Self::Estimated { .. } => 0.0,
+        }
+    }
+
+    /// Limits of the estimated part.
+    fn range(self) -> [f64; 2] {
+        match self {
+            Self::Known(_) => [0.0; 2],
+            Self::Estimated { range, .. } => range,
+        }
+    }
+
+    /// The parameter of the core; `None` for a stated delay, which is in the times.
+    pub fn parameter(self) -> Option<ScalarSpec> {
+        match self {
+            Self::Known(_) => None,
+            Self::Estimated { start, .. } => Some(ScalarSpec::Estimated {
+                start: Some(start),
+                prior: None,
+            }),
+        }
+    }
+}
+
+/// The delay of a channel of experiment `i`, with samples `spacing` (s) apart.
+pub fn of_channel(
+    file: &ModelFile,
+    i: usize,
+    kind: ChannelKind,
+    spacing: f64,
+) -> Result<Delay, InputError> {
+    let spec = &file.spec.experiments[i];
+    let given = super::channel::sensor_of(spec, kind).and_then(|sensor| sensor.delay.as_ref());
+    let key = format!("experiments[{i}].sensors.{}.delay", kind.name());
+    delay(file, &key, given, spacing)
+}
+
+/// The delay of the input of experiment `i`.
+pub fn of_input(file: &ModelFile, i: usize, spacing: f64) -> Result<Delay, InputError> {
+    let spec = &file.spec.experiments[i];
+    match input_sensor(spec) {
+        None => Ok(Delay::Known(0.0)),
+        Some((name, sensor)) => {
+            let key = format!("experiments[{i}].sensors.{name}.delay");
+            delay(file, &key, sensor.delay.as_ref(), spacing)
+        }
+    }
+}
+
+/// The sensor of the input that the model names.
+fn input_sensor(spec: &ExperimentSpec) -> Option<(&'static str, &InputSensorSpec)> {
+    let sensors = spec.sensors.as_ref()?;
+    let named = [
+        ("force", sensors.force.as_ref()),
+        ("base_acceleration", sensors.base_acceleration.as_ref()),
+        ("base_displacement", sensors.base_displacement.as_ref()),
+    ];
+    named
+        .into_iter()
+        .find_map(|(name, sensor)| Some((name, sensor?)))
+}
+
+fn delay(
+    file: &ModelFile,
+    key: &str,
+    given: Option<&DelayValue>,
+    spacing: f64,
+) -> Result<Delay, InputError> {
+    let usual = LIMIT * spacing;
+    let (start, range) = match given {
+        None => return Ok(Delay::Known(0.0)),
+        Some(ScalarOr::Scalar(NumberOrEstimate::Number(delay))) => {
+            return Ok(Delay::Known(delay.0));
+        }
+        Some(ScalarOr::Scalar(NumberOrEstimate::Estimate)) => (0.0, [-usual, usual]),
+        Some(ScalarOr::Map(spec)) => {
+            let start = spec.start.map(|s| s.0);
+            let around = start.unwrap_or(0.0);
+            let least = spec.min.map_or(around - usual, |d| d.0);
+            let most = spec.max.map_or(around + usual, |d| d.0);
+            let middle = if (least..=most).contains(&0.0) {
+                0.0
+            } else {
+                0.5 * (least + most)
+            };
+            (start.unwrap_or(middle), [least, most])
+        }
+    };
+    let [least, most] = range;
+    let is_inside = least < most && (least..=most).contains(&start);
+    match is_inside {
+        true => Ok(Delay::Estimated { start, range }),
+        false => Err(file
+            .error_at(key, "the limits of the delay do not hold its start")
+            .found(format!("min {least} s, start {start} s, max {most} s"))
+            .expected("`min` less than `max`, with `start` between them")),
+    }
+}
+
+/// Refuses a sensor of an input that the experiment does not measure.
+pub fn check_input(file: &ModelFile, i: usize, record: &RawRecord) -> Result<(), InputError> {
+    let spec = &file.spec.experiments[i];
+    let Some((name, _)) = input_sensor(spec) else {
+        return Ok(());
+    };
+    let columns = spec.columns.as_ref();
+    let has_column = columns.is_some_and(|c| match name {
+        "force" => c.force.is_some(),
+        "base_acceleration" => c.base_acceleration.is_some(),
+        _ => c.base_displacement.is_some(),
+    });
+    let key = format!("experiments[{i}].sensors.{name}");
+    let in_words = name.replace('_', " ");
+    if !has_column {
+        return Err(file
+            .error_at(
+                &key,
+                format!("the {in_words} has no column, so it is not read"),
+            )
+            .found(format!("a sensor of the {in_words}"))
+            .expected(format!("`columns: {{{name}: …}}`, or leave the key out")));
+    }
+    if record.has_two_inputs() {
+        return Err(file
+            .error_at(&key, "the delay of an input needs one input")
+            .found("a force and a motion of the base")
+            .expected("one input, or delays of the channels"));
+    }
+    Ok(())
+}
+
+/// Applies stated delays to the times of the channels, and leaves out samples that a delay moves out of the record.
+pub fn apply(
+    file: &ModelFile,
+    i: usize,
+    record: &mut RawRecord,
+    notes: &mut RecordNotes,
+) -> Result<(), InputError> {
+    check_input(file, i, record)?;
+    let (start, end) = (record.start(), record.end());
+    let input = of_input(file, i, record.spacing())?;
+    let spec = &file.spec.experiments[i];
+    if let (Delay::Known(seconds), Some((name, _))) = (input, input_sensor(spec))
+        && seconds != 0.0
+    {
+        state(file, i, &name.replace('_', " "), seconds, notes);
+    }
+    for channel in &mut record.channels {
+        let own = of_channel(file, i, channel.kind, channel.median_spacing)?;
+        if own.known() != 0.0 {
+            state(file, i, channel.kind.name(), own.known(), notes);
+        }
+        let shift = own.known() - input.known();
+        let least = shift + own.range()[0] - input.range()[1];
+        let most = shift + own.range()[1] - input.range()[0];
+        if shift == 0.0 && least == most {
+            continue;
+        }
+        let near = 1e-6 * channel.median_spacing;
+        let stays = |t: &f64| *t >= start + most - near && *t <= end + least + near;
+        let kept: Vec<usize> = (0..channel.times.len())
+            .filter(|i| stays(&channel.times[*i]))
+            .collect();
+        if kept.len() < Grid::FEWEST_NODES {
+            let key = format!("experiments[{i}].sensors");
+            return Err(file
+                .error_at(&key, "the delays leave too few samples")
+                .found(format!(
+                    "{} of {} samples of the {} within the record for delays from {} to {} s",
+                    kept.len(),
+                    channel.times.len(),
+                    channel.kind.name(),
+                    significant(least, 4),
+                    significant(most, 4)
+                ))
+                .expected("closer limits: `delay: {min: …, max: …}`"));
+        }
+        channel.keep(&kept, shift);
+    }
+    Ok(())
+}
+
+fn state(file: &ModelFile, i: usize, channel: &str, seconds: f64, notes: &mut RecordNotes) {
+    let fact = DataFact::Delay {
+        channel: channel.to_owned(),
+        seconds,
+        action: DataAction::Shifted,
+    };
+    notes.state(&file.experiment_name(i), &fact);
+}
+
+impl super::RawChannel {
+    /// Keeps some samples, and subtracts `shift` (s) from their times.
+    fn keep(&mut self, kept: &[usize], shift: f64) {
+        let dropped = self.times.len() - kept.len();
+        let pick = |list: &[f64]| -> Vec<f64> { kept.iter().map(|i| list[*i]).collect() };
+        self.times = kept.iter().map(|i| self.times[*i] - shift).collect();
+        self.values = pick(&self.values);
+        if let Some(Weighting::Sigmas(sigmas)) = &mut self.weighting {
+            *sigmas = pick(sigmas);
+        }
+        if dropped > 0 {
+            let reason = "within the delay of an end of the record";
+            self.ignored.push((dropped, reason.to_owned()));
+        }
+    }
+}
+
+/// Limits of the estimated delays of a model, by the names of their parameters.
+pub fn limits(
+    file: &ModelFile,
+    i: usize,
+    record: &RawRecord,
+) -> Result<Vec<DelayLimits>, InputError> {
+    let name = file.experiment_name(i);
+    let of = |delay: Delay, channel: &str| match delay {
+        Delay::Known(_) => None,
+        Delay::Estimated { range, .. } => Some(DelayLimits {
+            parameter: format!("delay of the {channel} of {name}"),
+            range,
+        }),
+    };
+    let spec = &file.spec.experiments[i];
+    let input = match input_sensor(spec) {
+        Some(("force", _)) => "force",
+        _ => "base motion",
+    };
+    let mut found = Vec::new();
+    found.extend(of(of_input(file, i, record.spacing())?, input));
+    for channel in &record.channels {
+        let delay = of_channel(file, i, channel.kind, channel.median_spacing)?;
+        found.extend(of(delay, channel.kind.name()));
+    }
+    Ok(found)
+}
