@@ -1,7 +1,7 @@
 //! Oscillation of a channel: dominant frequency, drift and decay, from its samples alone.
 
 use kmcfit_core::internals::diagnostics::{detrended, offset_and_drift, outlier_indices};
-use kmcfit_core::internals::signal::{Spectrum, median};
+use kmcfit_core::internals::signal::{Spectrum, median, spikes};
 use std::f64::consts::TAU;
 
 /// Fewest periods for a test of drift, and the share of the variance that a straight line must explain; for an
@@ -77,7 +77,11 @@ pub(super) fn remove_outliers(pairs: &mut Vec<(f64, f64)>) -> Option<(usize, f64
     let values = values_of(pairs);
     let level = median(&values);
     let away: Vec<f64> = values.iter().map(|value| value - level).collect();
-    let far = outlier_indices(&away);
+    let mut far = outlier_indices(&away);
+    if far.is_empty() {
+        let times: Vec<f64> = pairs.iter().map(|(time, _)| *time).collect();
+        far = spikes(&times, &values);
+    }
     let first = values[*far.first()?];
     let mut place = 0..;
     pairs.retain(|_| place.next().is_some_and(|i| far.binary_search(&i).is_err()));

@@ -1,7 +1,7 @@
 //! Functions and identifiability of a fit, for its result document.
 
 use super::assumptions::assumptions;
-use super::document::IdentifiabilitySummary;
+use super::document::{FindingLevel, FitFinding, IdentifiabilitySummary};
 use super::findings;
 use super::fit_assessment::ValidationRecord;
 use super::run::FittedModel;
@@ -16,10 +16,28 @@ use kmcfit_core::internals::identifiability::{
 use kmcfit_core::internals::problem::Jumps;
 use std::collections::BTreeMap;
 
+/// Findings in the order of their addition.
+#[derive(Default)]
+struct Findings(Vec<FitFinding>);
+
+impl Findings {
+    fn add(&mut self, is_warning: bool, finding: Finding) {
+        let level = match is_warning {
+            true => FindingLevel::Warning,
+            false => FindingLevel::Note,
+        };
+        self.0.push(FitFinding { level, finding });
+    }
+
+    fn warn(&mut self, finding: Finding) {
+        self.add(true, finding);
+    }
+}
+
 impl FittedModel<'_> {
     /// Findings and warnings on identifiability: the structural rank, the classification of the functions and the
     /// plausibility of the fit. A fit of the equation error simulates no response and has the classification alone.
-    pub(super) fn identifiability(&self) -> IdentifiabilitySummary {
+    pub(super) fn identifiability(&self) -> (IdentifiabilitySummary, Vec<FitFinding>) {
         let problem = &self.model.problem;
         let mut summary = IdentifiabilitySummary {
             parameters: problem.parameters(),
@@ -31,16 +49,18 @@ impl FittedModel<'_> {
             ..IdentifiabilitySummary::default()
         };
         let Some(assessment) = &self.run_assessment.assessment else {
-            self.add_equation_error(&mut summary);
-            return summary;
+            let mut found = Findings::default();
+            self.add_equation_error(&mut found);
+            return (summary, found.0);
         };
+        let mut found = Findings::default();
         let count = structural_rank(problem);
         summary.rank_bound = count.rank_bound;
         let plausibility = &assessment.plausibility;
         if let Some(reason) = &plausibility.unidentified {
             summary.unidentified = true;
-            summary.warnings.push(findings::unidentified(reason));
-            return summary;
+            found.warn(findings::unidentified(reason));
+            return (summary, found.0);
         }
         let classifications = &assessment.classifications;
         // Constraints and penalties may determine what the records do not.
@@ -49,23 +69,17 @@ impl FittedModel<'_> {
         if count.rank_bound < count.parameters && !all_identified {
             let finding = Finding::new("rank_bound", count.headline());
             let finding = finding.with("rank_bound", count.rank_bound);
-            summary
-                .warnings
-                .push(finding.with("parameters", count.parameters));
+            found.warn(finding.with("parameters", count.parameters));
         }
-        let mut add = |is_warning: bool, finding: Finding| match is_warning {
-            true => summary.warnings.push(finding),
-            false => summary.findings.push(finding),
-        };
         for finding in &count.findings {
-            add(finding.is_warning(), findings::rank(finding));
+            found.add(finding.is_warning(), findings::rank(finding));
         }
         for jumps in &problem.jumps {
-            add(false, self.jumps(jumps));
+            found.add(false, self.jumps(jumps));
         }
         for classification in classifications {
             if classification.verdict != Classification::Fixed {
-                add(
+                found.add(
                     classification.is_open(),
                     findings::classification(classification),
                 );
@@ -80,12 +94,12 @@ impl FittedModel<'_> {
             is_damping && negative.is_some()
         };
         let warnings = plausibility.warnings.iter().filter(|w| !is_replaced(w));
-        summary.warnings.extend(warnings.map(findings::warning));
-        summary.warnings.extend(negative.clone());
+        warnings.for_each(|warning| found.warn(findings::warning(warning)));
+        negative.clone().into_iter().for_each(|n| found.warn(n));
         let poor = self.run_assessment.validation.iter();
         let poor = poor.filter_map(ValidationRecord::poor);
-        summary.warnings.extend(poor.map(findings::not_predicted));
-        summary
+        poor.for_each(|record| found.warn(findings::not_predicted(record)));
+        (summary, found.0)
     }
 
     /// The jumps found in a function, with the levels between them.
@@ -110,25 +124,21 @@ impl FittedModel<'_> {
     }
 
     /// Adds the classification of a fit of the equation error, and the bias of its estimates.
-    fn add_equation_error(&self, summary: &mut IdentifiabilitySummary) {
+    fn add_equation_error(&self, found: &mut Findings) {
         let Some(equation) = &self.run_assessment.equation else {
             return;
         };
-        summary
-            .warnings
-            .push(findings::equation_error(equation.as_ref().err()));
+        found.warn(findings::equation_error(equation.as_ref().err()));
         let missing = self.run_assessment.missing_terms.iter();
         let missing = missing.map(|term| findings::warning(&FitWarning::MissingTerm(*term)));
-        summary.warnings.extend(missing);
+        missing.for_each(|warning| found.warn(warning));
         let Ok(intervals) = equation else {
             return;
         };
-        summary.findings.push(findings::kernel_covariance());
+        found.add(false, findings::kernel_covariance());
         let judged = intervals.classifications.iter();
         let judged = judged.filter(|c| c.verdict != Classification::Fixed);
-        summary
-            .warnings
-            .extend(judged.map(findings::classification));
+        judged.for_each(|judged| found.warn(findings::classification(judged)));
     }
 
     /// Warning where the whole confidence interval of a constant damping is negative.

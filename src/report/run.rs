@@ -117,6 +117,7 @@ impl FittedModel<'_> {
     /// The result document.
     pub fn document(&self) -> ResultDocument {
         let (model, fit) = (self.model, self.fit);
+        let (identifiability, findings) = self.identifiability();
         let mut document = ResultDocument {
             format: FORMAT,
             title: model.title.clone(),
@@ -152,7 +153,8 @@ impl FittedModel<'_> {
             timings: TimingsSummary::new(fit, &OverheadTimings::default(), fit.elapsed),
             functions: self.function_summaries(),
             constraints: self.constraint_summary(),
-            identifiability: self.identifiability(),
+            identifiability,
+            findings,
             weights: self.weight_summary(),
             penalties: self.penalty_summaries(),
             attempts: self.fit.attempts.iter().map(attempt_summary).collect(),

@@ -122,13 +122,12 @@ fn write_details(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
         count(others as usize, &format!("{what} solve")),
         document.seconds
     )?;
-    let known = &document.identifiability;
     let assumed = document.verdict.iter().flat_map(|v| v.assumptions.clone());
     let assumed: Vec<Finding> = assumed.collect();
     for (heading, findings) in [
-        ("Assumptions", &assumed),
-        ("Identifiability", &known.findings),
-        ("Warnings", &known.warnings),
+        ("Assumptions", assumed.iter().collect()),
+        ("Identifiability", document.notes().collect::<Vec<_>>()),
+        ("Warnings", document.fit_warnings().collect()),
     ] {
         for (i, finding) in findings.iter().enumerate() {
             let heading = if i == 0 { heading } else { "" };

@@ -213,7 +213,7 @@ mod tests {
                 .unwrap()
                 .contains("from line 4 to a file of their own")
         );
-        let rounded = table("0,1,2\n0,3,4\n0,5,6\n1,5,6\n");
+        let rounded = table("0,1,2\n0,3,4\n0,5,6\n0,7,6\n1,5,6\n");
         let error = repeated_times(&rounded, 0, Duplicates::Error).unwrap_err();
         assert!(error.hint.unwrap().contains("`sample_rate`"));
     }

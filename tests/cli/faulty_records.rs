@@ -21,7 +21,7 @@ fn document(bench: &Workbench, run: &str) -> Value {
 /// The message about a model with a key.
 fn refused(key: &str) -> String {
     let bench = bench(&Good::new(0).rows(0.0, 0.0), key);
-    let (code, stdout, stderr) = bench.run(&["check", "model.yaml", "--no-gradient"]);
+    let (code, stdout, stderr) = bench.run(&["check", "model.yaml"]);
     assert_eq!(code, 2, "{key}\n{stdout}{stderr}");
     stderr
 }
@@ -44,6 +44,22 @@ fn invalid_keys_of_faulty_records() {
     ));
 }
 
+/// A delay beside a force and a motion of the base could be that of either.
+#[test]
+fn a_delay_of_one_of_two_inputs_is_refused() {
+    let bench = bench(
+        &Good::new(0).rows(0.0, 0.0),
+        "sensors: {force: {delay: estimate}}",
+    );
+    let model = bench.read("model.yaml");
+    let both = model.replace("force: F_N", "force: F_N, base_acceleration: F_N");
+    assert_ne!(both, model);
+    bench.write("model.yaml", &both);
+    let (code, _, stderr) = bench.run(&["check", "model.yaml"]);
+    assert_eq!(code, 2);
+    assert_snapshot!(stderr);
+}
+
 /// A free record with one channel has nothing that its delay is a delay against.
 #[test]
 fn a_delay_needs_another_clock() {
@@ -53,7 +69,7 @@ fn a_delay_needs_another_clock() {
         "    sensors: {displacement: {delay: {min: -0.1, max: 0.1}}}\n    initial:",
     );
     bench.write("model.yaml", &model);
-    let (code, _, stderr) = bench.run(&["check", "model.yaml", "--no-gradient"]);
+    let (code, _, stderr) = bench.run(&["check", "model.yaml"]);
     assert_eq!(code, 2);
     assert_snapshot!(stderr);
 }
@@ -77,7 +93,7 @@ fn repeated_times_are_merged_by_a_setting() {
     );
     let model = bench.read("samples.yaml");
     assert!(model.contains("    duplicates: first"), "{model}");
-    let shown = bench.run_to(0, &["check", "samples.yaml", "--no-gradient"]);
+    let shown = bench.run_to(0, &["check", "samples.yaml"]);
     assert!(
         shown.contains("2 rows repeat a time (lines 7, 10): the first row of each time is used"),
         "{shown}"
@@ -87,7 +103,7 @@ fn repeated_times_are_merged_by_a_setting() {
         "samples.yaml",
         &model.replace("duplicates: first", "duplicates: error"),
     );
-    let (code, _, stderr) = bench.run(&["check", "samples.yaml", "--no-gradient"]);
+    let (code, _, stderr) = bench.run(&["check", "samples.yaml"]);
     assert_eq!(code, 2);
     assert_snapshot!(stderr);
 }
@@ -113,7 +129,7 @@ fn excluded_samples_are_stated_everywhere() {
     };
     assert_eq!(kinds(&before, "warnings"), ["dropouts", "spikes"]);
     let bench = bench(&rows, "exclude: [dropouts, spikes]");
-    let shown = bench.run_to(0, &["check", "model.yaml", "--no-gradient"]);
+    let shown = bench.run_to(0, &["check", "model.yaml"]);
     for line in [
         "377 samples of the displacement in m",
         "21 samples of the displacement not used: dropouts",
@@ -176,7 +192,7 @@ fn estimated_delays_serve_all_analyses() {
         "model.yaml",
         &MODEL.replace("#key", "sensors: {force: {delay: -0.075}}"),
     );
-    let shown = bench.run_to(0, &["check", "model.yaml", "--no-gradient"]);
+    let shown = bench.run_to(0, &["check", "model.yaml"]);
     assert!(
         shown.contains("times of the force shifted by its delay of -0.075 s"),
         "{shown}"

@@ -779,7 +779,8 @@ fn samples_that_are_no_numbers() {
     record: 192 samples of the displacement in m (MATLAB file (version 4))
     record: 1 samples of the displacement not used: missing
     record: one every 0.01562 s (64 Hz) from 0 to 3 s; dominant frequency 0.8666 Hz, 2.6 periods; standard deviation 0.224 m
-    record: 1 gap, 0.14062 to 0.17188 s
+    record: 1 gap in the displacement, 0.141 to 0.172 s (0.031 s, 1 sample): treated as missing samples
+    record: displacement quantised in steps of 0.000977 m: an estimated sigma is at least step/sqrt(12)
     units: displacement in m, force in N and time in s: assumed, the file does not state it; `units` in the model file does
     model: 193 nodes over 3 s (rk4), 3 parameters, gauss-newton
     start values: mass 1.5 kg, damping 1 N s/m, stiffness 80 N/m; natural frequency 1.162 Hz, damping ratio 0.04564

@@ -385,9 +385,7 @@ functions:
 ";
     let result = fitted(&bench, model);
     assert_eq!(result["weights"]["rule"], "bic");
-    let findings = result["identifiability"]["findings"]
-        .as_array()
-        .expect("a list");
+    let findings = result["findings"].as_array().expect("a list");
     let jumps = findings
         .iter()
         .find(|f| f["kind"] == "jumps")
@@ -424,7 +422,7 @@ fn intervals_of_the_equation_error() {
         assert_eq!(found["verdict"], "conditional");
         assert!(number(&found["standard_error"]) > 0.0);
     }
-    let warnings = result["identifiability"]["warnings"].as_array();
+    let warnings = result["findings"].as_array();
     let conditional = warnings.expect("a list").iter();
     let conditional = conditional.filter(|w| w["condition"] == "negligible-noise");
     assert_eq!(conditional.count(), 6);

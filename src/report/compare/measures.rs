@@ -129,7 +129,7 @@ impl Measures {
             roughness: Roughness::of(coefficients, run.finished.system.grid.step()),
             predictions: document.predictions.clone(),
             assumptions: document.identifiability.assumptions.clone(),
-            identifiability: document.identifiability.warnings.clone(),
+            identifiability: document.fit_warnings().cloned().collect(),
             warnings: document.warnings.clone(),
         }
     }

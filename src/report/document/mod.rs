@@ -41,6 +41,10 @@ pub struct ResultDocument {
     /// Verdict on the fit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<Verdict>,
+    /// What the samples, constraints and penalties determine, and warnings: parameters and functions that are not identifiable, and limits of the
+    /// confidence intervals.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub findings: Vec<FitFinding>,
     /// Estimates of the natural frequency, the damping ratio, the functions and ratios; none for a fit that failed.
     #[serde(default, skip_serializing_if = "Estimates::is_empty")]
     pub estimates: Estimates,
@@ -277,6 +281,23 @@ impl ResultDocument {
         self.model.cost_kind != CostKind::EquationError
     }
 
+    /// Findings that are no warnings.
+    pub(super) fn notes(&self) -> impl Iterator<Item = &Finding> {
+        let notes = self.findings.iter().filter(|f| !f.level.is_warning());
+        notes.map(|f| &f.finding)
+    }
+
+    /// Warnings on identifiability and the confidence intervals.
+    pub(super) fn fit_warnings(&self) -> impl Iterator<Item = &Finding> {
+        let warnings = self.findings.iter().filter(|f| f.level.is_warning());
+        warnings.map(|f| &f.finding)
+    }
+
+    /// The first warning of this kind.
+    pub(super) fn fit_warning(&self, kind: &str) -> Option<&Finding> {
+        self.fit_warnings().find(|warning| warning.kind == kind)
+    }
+
     /// True if a previous fit estimated the standard deviation of a channel, which changes the cost of the last one.
     pub(super) fn estimates_sigma(&self) -> bool {
         self.channels().any(|c| c.sigma_estimated)
@@ -319,6 +340,33 @@ pub struct ExperimentSummary {
     pub channels: Vec<ChannelSummary>,
 }
 
+/// Level of a finding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FindingLevel {
+    /// What is determined.
+    Note,
+    /// What is not determined, or a limit of the intervals.
+    Warning,
+}
+
+impl FindingLevel {
+    /// True for a warning.
+    pub fn is_warning(self) -> bool {
+        self == Self::Warning
+    }
+}
+
+/// A finding of a fit with its level.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FitFinding {
+    /// Level.
+    pub level: FindingLevel,
+    /// Kind, quantities and text.
+    #[serde(flatten)]
+    pub finding: Finding,
+}
+
 /// Identifiability: the structural rank, and findings and warnings on functions and ratios. Confidence intervals are
 /// computed for models of at most 64 parameters; `kmcfit study` covers the others.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -327,15 +375,9 @@ pub struct IdentifiabilitySummary {
     pub rank_bound: usize,
     /// Number of parameters.
     pub parameters: usize,
-    /// Parameters and functions that records, constraints and penalties determine.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub findings: Vec<Finding>,
-    /// True if the optimum identifies no system; the first warning has the reason.
+    /// True if the optimum identifies no system; the first warning of the findings has the reason.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub unidentified: bool,
-    /// Parameters and functions that are not identifiable, and limits of the confidence intervals.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub warnings: Vec<Finding>,
     /// Assumptions of the model beside the records: fixed functions, bases, constraints, penalties.
     pub assumptions: Vec<String>,
     /// Kind of the covariance of the intervals: `penalised`, `bayesian` or `kernel`; absent for the inverse of the information of

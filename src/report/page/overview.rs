@@ -15,14 +15,13 @@ use kmcfit_core::internals::solvers::Status;
 
 /// Everything above the contents.
 pub(super) fn overview(document: &ResultDocument) -> String {
-    let known = &document.identifiability;
-    let mut warnings = Finding::texts(&known.warnings);
+    let mut warnings = texts(document.fit_warnings());
     warnings.extend(Finding::texts(&document.warnings));
     let equation = document.equation.iter();
     let equation = equation.map(|b| equation_residual(b, document.is_rotation()));
     let lists = [
         ("Equation of motion", equation.collect()),
-        ("Identifiability", Finding::texts(&known.findings)),
+        ("Identifiability", texts(document.notes())),
         ("Data", Finding::texts(&document.data)),
         ("Warnings", warnings),
         ("Suggestions", Finding::texts(&document.advice)),
@@ -32,6 +31,11 @@ pub(super) fn overview(document: &ResultDocument) -> String {
     let lists =
         lists.map(|(heading, sentences)| format!("<h3>{heading}</h3>\n{}", list(sentences)));
     verdict(document) + &answers(document) + &facts(document) + &lists.collect::<String>()
+}
+
+/// The sentences of findings.
+fn texts<'a>(findings: impl Iterator<Item = &'a Finding>) -> Vec<String> {
+    findings.map(|finding| finding.text.clone()).collect()
 }
 
 /// Verdict as a coloured word, and its reasons.

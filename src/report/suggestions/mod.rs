@@ -205,8 +205,7 @@ fn typed(document: &ResultDocument) -> Vec<Suggestion> {
     steps.extend(of_record);
     steps.extend(about_means(document));
     steps.extend(about_terms(document));
-    let warnings = &document.identifiability.warnings;
-    let has_rival = warnings.iter().any(|w| w.kind == "time_or_amplitude");
+    let has_rival = document.fit_warning("time_or_amplitude").is_some();
     steps.extend(has_rival.then_some(Suggestion::SecondAmplitude));
     steps.extend(about_inputs(document));
     steps.extend(about_friction(document));
@@ -221,7 +220,8 @@ fn typed(document: &ResultDocument) -> Vec<Suggestion> {
     let known = &document.identifiability;
     if document.is_simulated() && document.model.parameters > 0 {
         // Constraints may determine what the records do not.
-        let is_open = known.rank_bound < known.parameters && !known.warnings.is_empty();
+        let is_open =
+            known.rank_bound < known.parameters && document.fit_warnings().next().is_some();
         let is_smooth = document.cost.regularisation > 0.0;
         steps.extend(is_open.then(|| Suggestion::StudyUnidentifiable {
             parameters: known.parameters,
@@ -238,58 +238,53 @@ const HALF_SAMPLE: std::ops::RangeInclusive<f64> = 0.4..=0.6;
 
 /// Correction of an error of a record.
 fn about_records(document: &ResultDocument) -> Option<Suggestion> {
-    document
-        .identifiability
-        .warnings
-        .iter()
-        .find_map(|warning| {
-            let text = |key: &str| Some(warning.quantities.get(key)?.as_str()?.to_owned());
-            let number = |key: &str| warning.quantities.get(key)?.as_f64();
-            let experiment = text("experiment");
-            Some(match warning.kind.as_str() {
-                "channel_factor" => Suggestion::ScaleChannel {
-                    channel: text("channel")?,
-                    factor: number("factor")?,
-                },
-                "input_sign" => Suggestion::ReverseInput {
-                    channels: (document.experiments.iter())
-                        .filter(|e| Some(&e.name) == experiment.as_ref())
-                        .flat_map(|e| e.channels.iter().map(|c| c.kind.clone()))
-                        .collect(),
-                    experiment: experiment?,
-                },
-                "delay" => {
-                    let (experiment, delay, samples) =
-                        (experiment?, number("delay")?, number("samples")?);
-                    let of_record = document.experiments.iter().find(|e| e.name == experiment)?;
-                    let (channel, delay) = match of_record.channels.as_slice() {
-                        [only] => (only.kind.clone(), delay),
-                        _ if of_record.driven_by.iter().any(|d| d == "force") => {
-                            ("force".to_owned(), -delay)
-                        }
-                        _ => ("base_acceleration".to_owned(), -delay),
-                    };
-                    let is_half = HALF_SAMPLE.contains(&samples.abs());
-                    Suggestion::EstimateDelay {
-                        experiment,
-                        channel,
-                        delay,
-                        held: is_half.then_some(samples > 0.0),
+    document.fit_warnings().find_map(|warning| {
+        let text = |key: &str| Some(warning.quantities.get(key)?.as_str()?.to_owned());
+        let number = |key: &str| warning.quantities.get(key)?.as_f64();
+        let experiment = text("experiment");
+        Some(match warning.kind.as_str() {
+            "channel_factor" => Suggestion::ScaleChannel {
+                channel: text("channel")?,
+                factor: number("factor")?,
+            },
+            "input_sign" => Suggestion::ReverseInput {
+                channels: (document.experiments.iter())
+                    .filter(|e| Some(&e.name) == experiment.as_ref())
+                    .flat_map(|e| e.channels.iter().map(|c| c.kind.clone()))
+                    .collect(),
+                experiment: experiment?,
+            },
+            "delay" => {
+                let (experiment, delay, samples) =
+                    (experiment?, number("delay")?, number("samples")?);
+                let of_record = document.experiments.iter().find(|e| e.name == experiment)?;
+                let (channel, delay) = match of_record.channels.as_slice() {
+                    [only] => (only.kind.clone(), delay),
+                    _ if of_record.driven_by.iter().any(|d| d == "force") => {
+                        ("force".to_owned(), -delay)
                     }
+                    _ => ("base_acceleration".to_owned(), -delay),
+                };
+                let is_half = HALF_SAMPLE.contains(&samples.abs());
+                Suggestion::EstimateDelay {
+                    experiment,
+                    channel,
+                    delay,
+                    held: is_half.then_some(samples > 0.0),
                 }
-                "clock_difference" => Suggestion::ScaleTimes {
-                    experiment: experiment?,
-                    percent: number("percent")?,
-                },
-                _ => return None,
-            })
+            }
+            "clock_difference" => Suggestion::ScaleTimes {
+                experiment: experiment?,
+                percent: number("percent")?,
+            },
+            _ => return None,
         })
+    })
 }
 
 /// The first function whose basis is too coarse.
 fn about_bases(document: &ResultDocument) -> Option<Suggestion> {
-    let warnings = &document.identifiability.warnings;
-    let coarse = warnings.iter().find(|w| w.kind == "coarse_basis")?;
+    let coarse = document.fit_warning("coarse_basis")?;
     let function = coarse.quantities.get("function")?.as_str()?;
     Some(Suggestion::FinerBasis {
         function: function.to_owned(),
@@ -300,8 +295,9 @@ fn about_bases(document: &ResultDocument) -> Option<Suggestion> {
 /// The sensor with the most significant mean of its residuals, unless the mean is their dominant pattern
 /// ([`about_residuals`]).
 fn about_means(document: &ResultDocument) -> Option<Suggestion> {
-    let warnings = document.identifiability.warnings.iter();
-    let means = warnings.filter(|w| w.kind == "residual_mean");
+    let means = document
+        .fit_warnings()
+        .filter(|w| w.kind == "residual_mean");
     let t = |w: &Finding| w.quantities.get("t").and_then(serde_json::Value::as_f64);
     let size = |w: &Finding| t(w).unwrap_or_default().abs();
     let worst = means.max_by(|a, b| size(a).total_cmp(&size(b)))?;
@@ -320,8 +316,7 @@ fn about_means(document: &ResultDocument) -> Option<Suggestion> {
 
 /// The most significant missing term of an equation of motion.
 fn about_terms(document: &ResultDocument) -> Option<Suggestion> {
-    let warnings = &document.identifiability.warnings;
-    let missing = warnings.iter().find(|w| w.kind == "missing_term")?;
+    let missing = document.fit_warning("missing_term")?;
     let term = missing.quantities.get("term")?;
     Some(Suggestion::AddTerm {
         term: CoefficientKind::deserialize(term).ok()?,
@@ -331,15 +326,13 @@ fn about_terms(document: &ResultDocument) -> Option<Suggestion> {
 
 /// A smaller width of Coulomb friction, unless an automatic one is the smallest that the grid permits.
 fn about_friction(document: &ResultDocument) -> Option<Suggestion> {
-    let warnings = &document.identifiability.warnings;
-    let depends = warnings.iter().any(|w| w.kind == "friction_width");
+    let depends = document.fit_warning("friction_width").is_some();
     let is_limited = document.warnings.iter().any(|w| w.kind == "width_limited");
     (depends && !is_limited).then_some(Suggestion::NarrowFriction)
 }
 
 fn about_inputs(document: &ResultDocument) -> Option<Suggestion> {
-    let warnings = &document.identifiability.warnings;
-    let disturbed = warnings.iter().find(|w| w.kind == "disturbed_input")?;
+    let disturbed = document.fit_warning("disturbed_input")?;
     Some(Suggestion::StateInputSigma {
         input: disturbed.quantities.get("input")?.as_str()?.to_owned(),
         sigma: disturbed.quantities.get("sigma")?.as_f64()?,
