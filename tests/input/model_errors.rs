@@ -439,7 +439,7 @@ fn wrong_kinds() {
     assert_snapshot!(changed("fixed: 1", "fixed: [1, 1]"), @"
     m.yaml:18:39: functions.stiffness.fixed: not a number
       found: a list
-      expected: a finite number, {value: 4.5, sigma: 0.02}, or a column: {data: file.csv, column: name}
+      expected: a finite number, {value: 4.5, sigma: 0.02}, a column: {data: file.csv, column: name}, or for a mass `unknown`
     ");
     assert_snapshot!(changed("data: start.csv", "data:"), @"
     m.yaml:17:17: the file is not valid YAML: a space or a value is missing behind this `:`
@@ -697,7 +697,7 @@ fn repeated_aliases_are_limited() {
     assert_snapshot!(message(&bomb), @"
     m.yaml:2:8: experiments[0]: unknown key
       found: `b`
-      expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, decimate, band, sigma, loss, noise, sensors, force, base, initial, functions, validation
+      expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, duplicates, exclude, decimate, band, sigma, loss, noise, sensors, force, base, initial, functions, validation
     ");
 }
 
