@@ -924,11 +924,40 @@ fn parquet() {
         let found = fitted(&bench, &format!("data: {file}\n    {keys}"));
         assert_eq!(found, expected, "{file}");
     }
-    assert_snapshot!(bench.run_to(0, &["check", "paged.parquet"]), @"");
+    assert_snapshot!(bench.run_to(0, &["check", "paged.parquet"]), @"
+    paged.parquet: Parquet file
+      column  name          quantity      unit         samples          rate
+      1       time          time          s (assumed)  193              64 Hz
+      2       displacement  displacement  m (assumed)  193              64 Hz
+      3       force         force         N (assumed)  193              64 Hz
+      4       missing       -             -            193, 39 missing  64 Hz
+      5       counts        -             -            193              64 Hz
+    not usable: `at`, dates or times of day
+      save seconds, in Python `t = (t - t.iloc[0]).dt.total_seconds()`
+    not usable: `note`, texts
+    `kmcfit init paged.parquet` writes a model file
+    ");
     let parquet =
         |from: &[u8], to: &[u8]| changed("record.parquet", "a.parquet", replace(from, to));
-    assert_snapshot!(parquet(b"schema", b"schemas"), @"");
-    assert_snapshot!(changed("record.parquet", "a.parquet", |bytes| bytes.truncate(2000)), @"");
-    assert_snapshot!(changed("record.parquet", "a.parquet", |bytes| bytes[40] ^= 0xff), @"");
-    assert_snapshot!(changed("record.parquet", "a.parquet", |bytes| bytes[6] ^= 0x10), @"");
+    assert_snapshot!(parquet(b"schema", b"schemas"), @"
+    error: a.parquet: the Parquet file has no samples that can be used
+      found: no variable or channel
+      expected: arrays or channels of real numbers
+    ");
+    assert_snapshot!(changed("record.parquet", "a.parquet", |bytes| bytes.truncate(2000)), @"
+    error: a.parquet: the file is truncated in the metadata
+      found: no `PAR1` at the end of the file
+      hint: copy or export the file again
+    ");
+    assert_snapshot!(changed("record.parquet", "a.parquet", |bytes| bytes[40] ^= 0xff), @"
+    error: a.parquet: the file is damaged: the column `time`
+      found: data that cannot be decompressed
+      hint: export or copy the file again
+    ");
+    assert_snapshot!(changed("record.parquet", "a.parquet", |bytes| bytes[6] ^= 0x10), @"
+    error: a.parquet: the file is truncated in the column `time`
+      found: 1002 bytes from byte 44 on
+      expected: 1716 bytes
+      hint: copy or export the file again
+    ");
 }
