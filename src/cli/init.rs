@@ -139,8 +139,9 @@ fn statements(arguments: &Arguments) -> Result<Statements, InputError> {
 fn sources(folder: &Path, files: &[PathBuf]) -> Result<Vec<Source>, InputError> {
     let source = |(i, file): (usize, &PathBuf)| {
         if file.is_dir() {
-            return Err(InputError::file(file, "this is a folder")
-                .expected("a record: a text table, or a file of NumPy, MATLAB, HDF5, TDMS, WAV or UFF"));
+            return Err(InputError::file(file, "this is a folder").expected(
+                "a record: a text table, or a file of NumPy, MATLAB, HDF5, TDMS, WAV or UFF",
+            ));
         }
         if files.iter().take(i).any(|earlier| earlier == file) {
             return Err(InputError::file(file, "the file is given twice")
