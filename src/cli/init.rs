@@ -21,7 +21,7 @@ const SCHEMA: &str = "kmcfit.schema.json";
     after_help = "Examples:\n  kmcfit init record.csv --sample-rate 250\n  kmcfit init hit_1.csv hit_2.csv --mass 4.5 --units time=ms,displacement=mm\n  kmcfit init record.wav --units \"50 g,200 N\""
 )]
 pub struct Arguments {
-    /// Records (CSV or another text table, NumPy, MATLAB, TDMS, WAV, UFF), one experiment each.
+    /// Records (CSV or another text table, NumPy, MATLAB, HDF5, TDMS, WAV, UFF), one experiment each.
     #[arg(required = true)]
     data: Vec<PathBuf>,
     /// Model file [default: beside the first record, with its name].
@@ -139,8 +139,9 @@ fn statements(arguments: &Arguments) -> Result<Statements, InputError> {
 fn sources(folder: &Path, files: &[PathBuf]) -> Result<Vec<Source>, InputError> {
     let source = |(i, file): (usize, &PathBuf)| {
         if file.is_dir() {
-            return Err(InputError::file(file, "this is a folder")
-                .expected("a record: a text table, or a file of NumPy, MATLAB, TDMS, WAV or UFF"));
+            return Err(InputError::file(file, "this is a folder").expected(
+                "a record: a text table, or a file of NumPy, MATLAB, HDF5, TDMS, WAV or UFF",
+            ));
         }
         if files.iter().take(i).any(|earlier| earlier == file) {
             return Err(InputError::file(file, "the file is given twice")

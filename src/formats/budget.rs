@@ -156,10 +156,24 @@ impl<'a> Budget<'a> {
         Ok(inflated)
     }
 
+    /// A buffer of `length` zeros for decompressed data of `what`.
+    ///
+    /// # Errors
+    /// When the file expands to more than it may, or the buffer does not fit into memory.
+    pub fn buffer(&mut self, length: usize, what: &str) -> Result<Vec<u8>, InputError> {
+        let error = || self.too_much(format!("{what}, which expands to {length} bytes"));
+        let left = self.inflated.checked_sub(length as u64).ok_or_else(error)?;
+        memory::check_file(self.path, length as u64)?;
+        let mut buffer = Vec::new();
+        buffer.try_reserve_exact(length).map_err(|_| error())?;
+        buffer.resize(length, 0);
+        self.inflated = left;
+        Ok(buffer)
+    }
+
     /// The error for damaged data of `what`.
     pub fn damaged(&self, what: &str) -> InputError {
-        InputError::file(self.path, format!("the file is damaged: {what}"))
-            .hint("export or copy the file again")
+        damaged(self.path, what)
     }
 
     fn too_much(&self, found: String) -> InputError {
@@ -171,4 +185,10 @@ impl<'a> Budget<'a> {
                 self.length
             ))
     }
+}
+
+/// The error for damaged data of `what`.
+pub(super) fn damaged(path: &Path, what: &str) -> InputError {
+    InputError::file(path, format!("the file is damaged: {what}"))
+        .hint("export or copy the file again")
 }

@@ -76,8 +76,11 @@ impl<'a> Bytes<'a> {
         self.at += count.min(self.left());
     }
 
-    /// Unsigned integer of 1, 2, 4 or 8 bytes.
-    fn integer(&mut self, size: u64, what: &str) -> Result<u64, InputError> {
+    /// Unsigned integer of up to 8 bytes.
+    ///
+    /// # Errors
+    /// When fewer bytes are left.
+    pub fn uint(&mut self, size: u64, what: &str) -> Result<u64, InputError> {
         let order = self.order;
         let bytes = self.take(size, what)?;
         let join = |sum: u64, byte: &u8| (sum << 8) | u64::from(*byte);
@@ -88,15 +91,15 @@ impl<'a> Bytes<'a> {
     }
 
     pub fn u16(&mut self, what: &str) -> Result<u16, InputError> {
-        Ok(self.integer(2, what)? as u16)
+        Ok(self.uint(2, what)? as u16)
     }
 
     pub fn u32(&mut self, what: &str) -> Result<u32, InputError> {
-        Ok(self.integer(4, what)? as u32)
+        Ok(self.uint(4, what)? as u32)
     }
 
     pub fn u64(&mut self, what: &str) -> Result<u64, InputError> {
-        self.integer(8, what)
+        self.uint(8, what)
     }
 
     /// A number of any type.

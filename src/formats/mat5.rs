@@ -5,12 +5,11 @@
 
 use std::path::Path;
 
-use super::Channels;
 use super::array::Array;
 use super::budget::{Budget, Stream};
 use super::bytes::Bytes;
-use super::mat_class;
 use super::number::{ByteOrder, NumberType};
+use super::{Channels, mat_class, refused};
 use crate::error::InputError;
 use crate::text_io::quote;
 
@@ -256,11 +255,7 @@ impl Reader<'_, '_> {
     /// The next element, an array at `path`.
     fn inner(&mut self, bytes: &mut Bytes, path: &str, depth: usize) -> Result<(), InputError> {
         if depth == DEEPEST {
-            return Err(
-                InputError::file(self.path, "structs and cells are nested too deeply")
-                    .found(quote(path))
-                    .expected(format!("at most {DEEPEST} levels")),
-            );
+            return Err(refused::nested(self.path, path, DEEPEST));
         }
         let (kind, mut data) = element(bytes, &format!("the variable {}", quote(path)))?;
         match kind {
@@ -286,11 +281,8 @@ impl Reader<'_, '_> {
         let name = inner.map_or(own, str::to_owned);
         self.budget.name(&name)?;
         let hint = mat_class::export(self.path, &name, &class);
-        self.channels.refuse(
-            &name,
-            format!("an object of the class {}", quote(&class)),
-            Some(&hint),
-        );
+        let content = mat_class::object(&class);
+        self.channels.refuse(&name, content, Some(&hint));
         Ok(())
     }
 }

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use crate::text_io::quote;
+
 /// Name for the file in a line of MATLAB.
 fn file_name(path: &Path) -> String {
     let name = path.file_name().map(|name| name.to_string_lossy());
@@ -32,13 +34,23 @@ pub(super) fn save_as_version_7(path: &Path) -> String {
     format!("in MATLAB: `load('{name}'); save('{name}', '-v7')`")
 }
 
+/// Classes of version 5 without plain numbers.
+pub(super) const CHAR: u32 = 4;
+pub(super) const SPARSE: u32 = 5;
+pub(super) const FUNCTION: u32 = 16;
+
+/// Content of an object of a class.
+pub(super) fn object(class: &str) -> String {
+    format!("an object of the class {}", quote(class))
+}
+
 /// Content and remedy of arrays of the classes of version 5 without plain numbers.
 pub(super) fn old(class: u32) -> (&'static str, Option<&'static str>) {
     match class {
         3 => ("an object", Some("save its numbers as a struct")),
-        4 => ("text", None),
-        5 => ("a sparse matrix", Some("save it as `full(x)`")),
-        16 => ("a function", None),
+        CHAR => ("text", None),
+        SPARSE => ("a sparse matrix", Some("save it as `full(x)`")),
+        FUNCTION => ("a function", None),
         _ => ("data of an unknown class", None),
     }
 }

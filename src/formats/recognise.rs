@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use super::{mat4, mat5, npy, tdms, uff};
+use super::{hdf5, mat4, mat5, npy, tdms, uff};
 use crate::error::InputError;
 
 /// Format of a binary file.
@@ -21,15 +21,15 @@ pub enum Format {
     Mat4,
     /// MATLAB, versions 5 to 7.
     Mat5,
-    /// MATLAB, version 7.3; refused.
+    /// MATLAB, version 7.3.
     Mat73,
     /// LabVIEW.
     Tdms,
     /// Index file of LabVIEW; refused.
     TdmsIndex,
-    /// HDF5; refused.
+    /// HDF5.
     Hdf5,
-    /// Apache Parquet; refused.
+    /// Apache Parquet; refused without the feature `parquet`.
     Parquet,
     /// Compressed by gzip; refused.
     Gzip,
@@ -61,7 +61,7 @@ impl fmt::Display for Format {
 }
 
 /// Extensions of binary files, in lower case, and the formats that they stand for.
-const EXTENSIONS: [(&str, &[Format]); 8] = [
+const EXTENSIONS: [(&str, &[Format]); 10] = [
     ("npy", &[Format::Npy]),
     ("npz", &[Format::Npz]),
     ("wav", &[Format::Wav]),
@@ -71,13 +71,16 @@ const EXTENSIONS: [(&str, &[Format]); 8] = [
         "mat",
         &[Format::Mat5, Format::Mat4, Format::Mat73, Format::Hdf5],
     ),
+    ("h5", &[Format::Hdf5, Format::Mat73]),
+    ("hdf5", &[Format::Hdf5, Format::Mat73]),
     ("tdms", &[Format::Tdms]),
     ("parquet", &[Format::Parquet]),
 ];
 
 /// Extensions of text tables and of binary files, in lower case.
-pub const DATA_EXTENSIONS: [&str; 13] = [
-    "csv", "tsv", "txt", "dat", "asc", "npy", "npz", "wav", "uff", "unv", "mat", "tdms", "parquet",
+pub const DATA_EXTENSIONS: [&str; 15] = [
+    "csv", "tsv", "txt", "dat", "asc", "npy", "npz", "wav", "uff", "unv", "mat", "h5", "hdf5",
+    "tdms", "parquet",
 ];
 
 fn extension(path: &Path) -> Option<String> {
@@ -140,7 +143,7 @@ fn by_content(bytes: &[u8]) -> Option<Format> {
         (b"TDSh", Format::TdmsIndex),
         (b"MATLAB 7.3 MAT-file", Format::Mat73),
         (b"MATLAB 5.0 MAT-file", Format::Mat5),
-        (b"\x89HDF\r\n\x1a\n", Format::Hdf5),
+        (hdf5::SIGNATURE, Format::Hdf5),
         (b"PAR1", Format::Parquet),
         (b"\x1f\x8b\x08", Format::Gzip),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", Format::Workbook),

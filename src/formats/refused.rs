@@ -2,31 +2,36 @@
 
 use std::path::Path;
 
-use super::{Format, Unusable, mat_class};
+use super::{Format, Unusable};
 use crate::error::InputError;
 use crate::text_io::quote;
 
 /// Content that is expected of a data file.
-const EXPECTED: &str =
-    "a text table, or a file of NumPy, MATLAB (version 4 to 7), LabVIEW (TDMS), WAV or UFF";
+const EXPECTED: &str = "a text table, or a file of NumPy, MATLAB, HDF5, LabVIEW (TDMS), WAV or UFF";
 
 /// The error for a format that is refused as a whole.
 pub(super) fn whole(path: &Path, format: Format) -> InputError {
     let hint = match format {
-        Format::Mat73 | Format::Hdf5 => mat_class::save_as_version_7(path),
         Format::Parquet => {
-            "in Python: `pandas.read_parquet(file).to_csv('record.csv', index=False)`".into()
+            "compile kmcfit with `--features parquet`, or in Python: `pandas.read_parquet(file).to_csv('record.csv', index=False)`"
         }
-        Format::TdmsIndex => "read the file with the ending .tdms beside it".into(),
-        Format::Gzip => "decompress it: `gunzip FILE`".into(),
+        Format::TdmsIndex => "read the file with the ending .tdms beside it",
+        Format::Gzip => "decompress it: `gunzip FILE`",
         Format::Pickle => {
-            "a pickle can run code: save the numbers with `numpy.savez(file, t=t, y=y)`".into()
+            "a pickle can run code: save the numbers with `numpy.savez(file, t=t, y=y)`"
         }
-        _ => "save the sheet as CSV".into(),
+        _ => "save the sheet as CSV",
     };
     InputError::file(path, format!("this is a {format}, which is not read"))
         .expected(EXPECTED)
         .hint(hint)
+}
+
+/// The error for members of a file that are nested too deeply.
+pub(super) fn nested(path: &Path, name: &str, deepest: usize) -> InputError {
+    InputError::file(path, "groups, structs or cells are nested too deeply")
+        .found(quote(name))
+        .expected(format!("at most {deepest} levels"))
 }
 
 /// The error for a file without a usable channel.

@@ -208,7 +208,7 @@ fn invalid_arguments_have_found_expected_and_hint() {
 
     $ kmcfit init .
     error: .: this is a folder
-      expected: a record: a text table, or a file of NumPy, MATLAB, TDMS, WAV or UFF
+      expected: a record: a text table, or a file of NumPy, MATLAB, HDF5, TDMS, WAV or UFF
 
     $ kmcfit explain functions.penalty
     error: explain: unknown key

@@ -19,9 +19,6 @@ const STEPS: usize = 40;
 const NOISE: f64 = 0.02;
 /// Good records; more would not finish in half a minute.
 const RECORDS: u64 = 6;
-/// Known failures: one sample of the force cut by a tenth of its peak, which no other sample equals, shifts the estimates by 2.2 half-widths
-/// and leaves white residuals.
-const SILENT: [usize; 1] = [27];
 /// Movement of an estimate, in standard errors, below which a corruption need not be named.
 const NEGLIGIBLE: f64 = 0.1;
 
@@ -425,8 +422,7 @@ fn no_corruption_gives_a_silent_wrong_answer() {
         };
         let is_negligible = moved.is_some_and(|m| m[0] < NEGLIGIBLE);
         let title = format!("{kind:?} {} {case}", strength + 1);
-        let is_known = SILENT.contains(&case);
-        if (outcome == "WRONG" || !(named || is_negligible)) && !is_known {
+        if outcome == "WRONG" || !(named || is_negligible) {
             silent.push(title.clone());
         }
         let repaired = kind
@@ -458,4 +454,23 @@ fn no_corruption_gives_a_silent_wrong_answer() {
     }
     assert!(silent.is_empty(), "silent or wrong: {silent:#?}");
     assert!(unrepaired.is_empty(), "not repaired: {unrepaired:#?}");
+}
+
+/// The two largest samples of a force are expected to err by less than 3.5 standard errors in a good record; the probability of one that does
+/// not is 0.01 for 20 records. `KMCFIT_ROUNDS` multiplies them.
+#[test]
+fn a_good_record_has_no_error_of_the_force() {
+    let bench = Workbench::empty();
+    let rounds: u64 = std::env::var("KMCFIT_ROUNDS").map_or(1, |n| n.parse().expect("a number"));
+    let named = |seed: &u64| {
+        let good = Good::new(100 + seed);
+        match fitted(&bench, &table(&good.rows(0.0, 0.0)), None) {
+            Answer::Fit { words, .. } => words.contains("errors at"),
+            Answer::Refused(message) => panic!("{message}"),
+        }
+    };
+    let count = (0..20 * rounds).filter(named).count() as u64;
+    println!("{count} of {} good records", 20 * rounds);
+    // One in 2000 by chance.
+    assert!(count <= rounds / 50, "{count}");
 }

@@ -1,6 +1,6 @@
 //! Binary files of data loggers: one record in every format gives the same result; lists, model files and messages.
 //!
-//! The files of `tests/formats/` were written by SciPy, pyuff, soundfile, npTDMS and pandas: see `make.py` there.
+//! The files of `tests/formats/` were written by SciPy, h5py, pyuff, soundfile, npTDMS and pandas: see `make.py` there.
 
 use crate::workbench::{Workbench, repository};
 use insta::assert_snapshot;
@@ -91,6 +91,9 @@ fn every_format_gives_the_same_bits() {
         ("v4.mat", columns("record.", indices)),
         ("v5.mat", columns("test.", names)),
         ("v7.mat", columns("bench.runs.2.", names)),
+        ("v73.mat", columns("bench.runs.2.", names)),
+        ("record.h5", "columns: {time: test.time, displacement: test.record.1, force: test.record.2}\n    units: {force: N}".into()),
+        ("latest.h5", format!("{}\n    units: {{force: 0.0009765625 N}}", columns("test.", names))),
         ("record.tdms", "columns: {displacement: Test 1.displacement, force: Test 1.force}".into()),
         ("record.tdms", "columns: {time: time, displacement: 1, force: 2}".into()),
         ("record.uff", "columns: {displacement: displacement_12+Z, force: force_7+Z}".into()),
@@ -136,6 +139,47 @@ fn lists_of_channels() {
     not usable: `bench.spectrum`, complex numbers
       save the real samples in time, for instance `real(x)`
     `kmcfit init v7.mat` writes a model file
+    ");
+    assert_snapshot!(list("v73.mat"), @"
+    v73.mat: MATLAB file (version 7.3)
+      column  name                       quantity      unit         samples  rate
+      1       bench.runs.2.displacement  displacement  m (assumed)  193      64 Hz
+      2       bench.runs.2.force         force         N (assumed)  193      64 Hz
+      3       bench.runs.2.time          time          s (assumed)  193      64 Hz
+      4       fs                         -             -            1        -
+    not usable: `bench.runs.1`, text
+    not usable: `bench.runs.2.operator`, text
+    not usable: `bench.spectrum`, complex numbers
+      save the real samples in time, for instance `real(x)`
+    not usable: `empty`, an empty array
+    not usable: `log`, an object of the class `table`
+      in MATLAB: `S = table2struct(log, 'ToScalar', true); save('v73.mat', 'S', '-v7')`
+    `kmcfit init v73.mat` writes a model file
+    ");
+    assert_snapshot!(list("record.h5"), @"
+    record.h5: HDF5 file
+      column  name           quantity      unit         samples  rate
+      1       test.record.1  displacement  m            193      64 Hz
+      2       test.record.2  displacement  m            193      64 Hz
+      3       test.time      time          s (assumed)  193      64 Hz
+    not usable: `test.cube`, an array with 3 dimensions
+      save arrays with two dimensions, for instance `squeeze(x)`
+    not usable: `test.lzf`, data compressed by LZF
+    not usable: `test.never`, an array of which a part was never written
+    not usable: `test.note`, texts
+    `kmcfit init record.h5` writes a model file
+    ");
+    assert_snapshot!(list("latest.h5"), @"
+    latest.h5: HDF5 file
+      column  name               quantity      unit         samples  rate
+      1       test.time          time          s (assumed)  193      64 Hz
+      2       test.displacement  displacement  m (assumed)  193      64 Hz
+      3       test.force         force         N            193      64 Hz
+    not usable: `test.chunks`, data with a newer index of their chunks
+      in Python: write it with `h5py.File(file, 'w', libver='earliest')`
+    not usable: `dense`, a group with a dense index of its members
+      in Python: write it with `h5py.File(file, 'w', libver='earliest')`
+    `kmcfit init latest.h5` writes a model file
     ");
     assert_snapshot!(list("record.npz"), @"
     record.npz: NumPy archive
@@ -204,6 +248,7 @@ fn model_files() {
     };
     assert_snapshot!(init(&["v5.mat"]), @"columns: {time: test.time, displacement: test.displacement, force: test.force}");
     assert_snapshot!(init(&["v7.mat"]), @"columns: {time: bench.runs.2.time, displacement: bench.runs.2.displacement, force: bench.runs.2.force}");
+    assert_snapshot!(init(&["v73.mat"]), @"columns: {time: bench.runs.2.time, displacement: bench.runs.2.displacement, force: bench.runs.2.force}");
     assert_snapshot!(init(&["record.npy"]), @"columns: {time: record.time, displacement: record.displacement, force: record.force}");
     assert_snapshot!(init(&["record.tdms"]), @"columns: {time: time, displacement: Test 1.displacement, force: Test 1.force}");
     assert_snapshot!(init(&["binary.uff"]), @r#"columns: {time: time, displacement: "displacement_12+Z", force: "force_7+Z"}"#);
@@ -231,10 +276,10 @@ fn refused(bench: &Workbench, arguments: &[&str]) -> String {
 #[test]
 fn refused_files() {
     let bench = bench();
-    assert_snapshot!(refused(&bench, &["check", "v73.mat"]), @"
-    error: v73.mat: this is a MATLAB file (version 7.3), which is not read
-      expected: a text table, or a file of NumPy, MATLAB (version 4 to 7), LabVIEW (TDMS), WAV or UFF
-      hint: in MATLAB: `load('v73.mat'); save('v73.mat', '-v7')`
+    assert_snapshot!(refused(&bench, &["check", "circle.h5"]), @"
+    error: circle.h5: groups, structs or cells are nested too deeply
+      found: `a.b.b.b.b.b.b.b.b.b.b.b.b.b.b.b.b.b.b.b.…`
+      expected: at most 32 levels
     ");
     assert_snapshot!(refused(&bench, &["init", "objects.npy"]), @"
     error: objects.npy: the NumPy array has no samples that can be used
@@ -248,16 +293,16 @@ fn refused_files() {
       expected: arrays or channels of real numbers
       hint: kmcfit reads records in time: export the time histories
     ");
-    with_bytes(&bench, "a.parquet", b"PAR1....PAR1");
-    assert_snapshot!(refused(&bench, &["check", "a.parquet"]), @"
-    error: a.parquet: this is a Parquet file, which is not read
-      expected: a text table, or a file of NumPy, MATLAB (version 4 to 7), LabVIEW (TDMS), WAV or UFF
-      hint: in Python: `pandas.read_parquet(file).to_csv('record.csv', index=False)`
+    #[cfg(not(feature = "parquet"))]
+    assert_snapshot!(refused(&bench, &["check", "record.parquet"]), @"
+    error: record.parquet: this is a Parquet file, which is not read
+      expected: a text table, or a file of NumPy, MATLAB, HDF5, LabVIEW (TDMS), WAV or UFF
+      hint: compile kmcfit with `--features parquet`, or in Python: `pandas.read_parquet(file).to_csv('record.csv', index=False)`
     ");
     with_bytes(&bench, "a.csv", b"\x1f\x8b\x08\0");
     assert_snapshot!(refused(&bench, &["check", "a.csv"]), @"
     error: a.csv: this is a file compressed by gzip, which is not read
-      expected: a text table, or a file of NumPy, MATLAB (version 4 to 7), LabVIEW (TDMS), WAV or UFF
+      expected: a text table, or a file of NumPy, MATLAB, HDF5, LabVIEW (TDMS), WAV or UFF
       hint: decompress it: `gunzip FILE`
     ");
     with_bytes(&bench, "a.npy", b"t,y\n0,1\n");
@@ -277,7 +322,7 @@ fn refused_files() {
     fs::copy(bench.path("book.xlsx"), bench.path("book.npz")).expect("room");
     assert_snapshot!(refused(&bench, &["check", "book.npz"]), @"
     error: book.npz: this is a workbook of a spreadsheet, which is not read
-      expected: a text table, or a file of NumPy, MATLAB (version 4 to 7), LabVIEW (TDMS), WAV or UFF
+      expected: a text table, or a file of NumPy, MATLAB, HDF5, LabVIEW (TDMS), WAV or UFF
       hint: save the sheet as CSV
     ");
 }
@@ -298,6 +343,78 @@ fn replace<'a>(from: &'a [u8], to: &'a [u8]) -> impl Fn(&mut Vec<u8>) + 'a {
         let at = at.expect("the bytes to be replaced");
         bytes.splice(at..at + from.len(), to.iter().copied());
     }
+}
+
+/// Damaged files of HDF5: the superblock, B-trees, leaves, a chunk, and addresses.
+#[test]
+fn damaged_hdf5() {
+    let hdf5 = |from: &[u8], to: &[u8]| changed("v73.mat", "a.mat", replace(from, to));
+    assert_snapshot!(hdf5(b"\x89HDF", b"\x88HDF"), @"
+    error: a.mat: the file is damaged: the superblock
+      found: no signature of HDF5
+      expected: one at byte 0, 512, 1024, ...
+      hint: export or copy the file again
+    ");
+    assert_snapshot!(hdf5(b"\n\x1a\n\0", b"\n\x1a\n\x07"), @"
+    error: a.mat: the file is damaged: the superblock
+      found: version 7, addresses of 0 and lengths of 0 bytes
+      expected: version 0 to 3, and 2, 4 or 8 bytes
+      hint: export or copy the file again
+    ");
+    assert_snapshot!(hdf5(b"TREE", b"TREX"), @"
+    error: a.mat: the file is damaged: the members of a group
+      found: other bytes at address 136
+      expected: `TREE`
+      hint: export or copy the file again
+    ");
+    assert_snapshot!(hdf5(b"TREE\0\0", b"TREE\0\x03"), @"
+    error: a.mat: the file is damaged: the members of a group
+      found: other bytes at address 1504
+      expected: `TREE`
+      hint: export or copy the file again
+    ");
+    assert_snapshot!(hdf5(b"TREE\x01\0", b"TREE\x01\x01"), @"
+    error: a.mat: the file is damaged: the variable `bench.runs.2.time`
+      found: other bytes at address 6944
+      expected: `TREE`
+      hint: export or copy the file again
+    ");
+    assert_snapshot!(hdf5(b"SNOD", b"SNOX"), @"
+    error: a.mat: the file is damaged: the members of a group
+      found: other bytes at address 1504
+      expected: `SNOD`
+      hint: export or copy the file again
+    ");
+    assert_snapshot!(hdf5(b"\x78\x5e", b"\x78\x5d"), @"
+    error: a.mat: the file is damaged: the variable `bench.runs.2.time`
+      found: data that cannot be decompressed
+      hint: export or copy the file again
+    ");
+    assert_snapshot!(changed("v73.mat", "a.mat", |bytes| bytes.truncate(bytes.len() / 2)), @"
+    error: a.mat: the file is truncated in its data
+      found: 9284 bytes
+      expected: 19080 bytes, as the file states
+      hint: copy or export the file again
+    ");
+    assert_snapshot!(changed("v73.mat", "a.mat", |bytes| bytes.truncate(600)), @"
+    error: a.mat: the file is truncated in its data
+      found: 88 bytes
+      expected: 19080 bytes, as the file states
+      hint: copy or export the file again
+    ");
+    // The addresses of members.
+    let outside = |bytes: &mut Vec<u8>| {
+        for at in 0..bytes.len() - 24 {
+            if bytes[at..].starts_with(b"SNOD") {
+                bytes[at + 16..at + 24].copy_from_slice(&[0xfe; 8]);
+            }
+        }
+    };
+    assert_snapshot!(changed("v73.mat", "a.mat", outside), @"
+    error: a.mat: the file is damaged: the header of an object
+      found: address 18374403900871474942 in a file of 19080 bytes
+      hint: export or copy the file again
+    ");
 }
 
 #[test]
@@ -461,7 +578,7 @@ fn damaged_files_of_matlab() {
         bytes.extend(nested);
     };
     assert_snapshot!(changed("v5.mat", "deep.mat", deep), @"
-    error: deep.mat: structs and cells are nested too deeply
+    error: deep.mat: groups, structs or cells are nested too deeply
       found: `c.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.1.…`
       expected: at most 32 levels
     ");
@@ -793,5 +910,54 @@ fn samples_that_are_no_numbers() {
     error: v4.mat: sample 11 of `record.2`: not a finite number
       found: `inf`
       expected: a finite number, or NaN for a missing sample
+    ");
+}
+
+/// Columns of Parquet in both versions of pages, with each compression that is read, give the bits of the text table.
+#[cfg(feature = "parquet")]
+#[test]
+fn parquet() {
+    let bench = bench();
+    let keys = "columns: {time: time, displacement: displacement, force: force}";
+    let expected = fitted(&bench, &format!("data: record.csv\n    {keys}"));
+    for file in ["record.parquet", "paged.parquet", "plain.parquet"] {
+        let found = fitted(&bench, &format!("data: {file}\n    {keys}"));
+        assert_eq!(found, expected, "{file}");
+    }
+    assert_snapshot!(bench.run_to(0, &["check", "paged.parquet"]), @"
+    paged.parquet: Parquet file
+      column  name          quantity      unit         samples          rate
+      1       time          time          s (assumed)  193              64 Hz
+      2       displacement  displacement  m (assumed)  193              64 Hz
+      3       force         force         N (assumed)  193              64 Hz
+      4       missing       -             -            193, 39 missing  64 Hz
+      5       counts        -             -            193              64 Hz
+    not usable: `at`, dates or times of day
+      save seconds, in Python `t = (t - t.iloc[0]).dt.total_seconds()`
+    not usable: `note`, texts
+    `kmcfit init paged.parquet` writes a model file
+    ");
+    let parquet =
+        |from: &[u8], to: &[u8]| changed("record.parquet", "a.parquet", replace(from, to));
+    assert_snapshot!(parquet(b"schema", b"schemas"), @"
+    error: a.parquet: the Parquet file has no samples that can be used
+      found: no variable or channel
+      expected: arrays or channels of real numbers
+    ");
+    assert_snapshot!(changed("record.parquet", "a.parquet", |bytes| bytes.truncate(2000)), @"
+    error: a.parquet: the file is truncated in the metadata
+      found: no `PAR1` at the end of the file
+      hint: copy or export the file again
+    ");
+    assert_snapshot!(changed("record.parquet", "a.parquet", |bytes| bytes[40] ^= 0xff), @"
+    error: a.parquet: the file is damaged: the column `time`
+      found: data that cannot be decompressed
+      hint: export or copy the file again
+    ");
+    assert_snapshot!(changed("record.parquet", "a.parquet", |bytes| bytes[6] ^= 0x10), @"
+    error: a.parquet: the file is truncated in the column `time`
+      found: 1002 bytes from byte 44 on
+      expected: 1716 bytes
+      hint: copy or export the file again
     ");
 }

@@ -2,8 +2,8 @@
 """Writes the files of this folder: one record in each format, and files that are refused. Files with a shorter record are
 written into tests/fuzz/corpus/channels.
 
-Needs numpy, scipy, pyuff, soundfile, npTDMS, pandas and h5py. Versions of the last run: numpy 2.4.6, scipy 1.17.1,
-pyuff 2.5.8, soundfile 0.14.0, npTDMS 1.13.0, pandas 3.1.1, h5py 3.16.0.
+Needs numpy, scipy, pyuff, soundfile, npTDMS, pandas, pyarrow and h5py. Versions of the last run: numpy 2.4.6, scipy 1.17.1,
+pyuff 2.5.8, soundfile 0.14.0, npTDMS 1.13.0, pandas 3.1.1, h5py 3.16.0, pyarrow 26.0.1.
 
 The record is held exactly by every format: 64 samples per second, and values k/1024 with integers k of 16 bits, which
 have at most 12 significant digits. It is the displacement of an oscillator with m = 2 kg, c = 1.6 N s/m and k = 90 N/m under a
@@ -76,13 +76,77 @@ def of_matlab():
     scipy.io.savemat(FOLDER / "v7.mat", parts, do_compression=True, oned_as="row")
     table = numpy.stack([t, displacement, force], axis=1)
     scipy.io.savemat(FOLDER / "v4.mat", {"record": table}, format="4")
-    # A file of version 7.3 as MATLAB writes it: HDF5 after a block with the text of the header.
-    with h5py.File(FOLDER / "v73.mat", "w", userblock_size=512, libver="earliest") as file:
-        file["force"] = force[:4]
+    of_matlab_73()
+
+
+def of_matlab_73():
+    """As MATLAB writes version 7.3: HDF5 after a block with the text of the header, arrays with their dimensions reversed, in chunks
+    with deflate where they are long, cells as references to `#refs#`."""
+    path = FOLDER / "v73.mat"
+    with h5py.File(path, "w", userblock_size=512, libver="earliest") as file:
+        def array(name, values, matlab, **options):
+            data = file.create_dataset(name, data=numpy.asarray(values), **options)
+            data.attrs["MATLAB_class"] = numpy.bytes_(matlab)
+            return data
+
+        def text(name, content):
+            array(name, [[ord(c)] for c in content], "char", dtype="u2").attrs["MATLAB_int_decode"] = numpy.int32(2)
+
+        file.create_group("bench").attrs["MATLAB_class"] = numpy.bytes_("struct")
+        file.create_group("#refs#/test").attrs["MATLAB_class"] = numpy.bytes_("struct")
+        long = {"chunks": (1, 50 if COUNT > 50 else 3), "compression": 3}
+        array("#refs#/test/time", t[None, :], "double", **long)
+        array("#refs#/test/displacement", displacement[None, :], "double", shuffle=True, **long)
+        array("#refs#/test/force", force[None, :].astype("f4"), "single", chunks=(1, COUNT // 2), fletcher32=True)
+        text("#refs#/test/operator", "N. N.")
+        text("#refs#/a", "first run")
+        references = [[file["#refs#/a"].ref], [file["#refs#/test"].ref]]
+        array("bench/runs", references, "cell", dtype=h5py.ref_dtype)
+        spectrum = numpy.array([[(1.0, 2.0), (3.0, -1.0)]], dtype=[("real", "f8"), ("imag", "f8")])
+        array("bench/spectrum", spectrum, "double")
+        array("fs", [[64.0]], "double")
+        array("empty", numpy.array([0, 0], dtype="u8"), "double").attrs["MATLAB_empty"] = numpy.uint8(1)
+        array("log", [[0xDD000000, 2, 1, 1, 1, 1]], "table", dtype="u4").attrs["MATLAB_object_decode"] = numpy.int32(3)
     header = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Thu Nov 26 12:00:00 2026 HDF5 schema 1.00 ."
-    content = bytearray((FOLDER / "v73.mat").read_bytes())
+    content = bytearray(path.read_bytes())
     content[:128] = header.ljust(116) + bytes(8) + b"\x00\x02IM"
-    (FOLDER / "v73.mat").write_bytes(content)
+    path.write_bytes(content)
+
+
+def of_hdf5():
+    # Superblock 0 with symbol tables, numbers of the other byte order and in two dimensions; superblock 2 with links in the headers.
+    with h5py.File(FOLDER / "record.h5", "w", libver="earliest") as file:
+        test = file.create_group("test")
+        test.create_dataset("time", data=t.astype(">f8"))
+        table = numpy.stack([displacement, force], axis=1).astype("f4")
+        test.create_dataset("record", data=table, chunks=(COUNT // 3, 2), shuffle=True, compression="gzip")
+        test["record"].attrs["units"] = numpy.bytes_("m")
+        test.create_dataset("note", data="free text")
+        test.create_dataset("lzf", data=displacement, chunks=(COUNT,), compression="lzf")
+        test.create_dataset("never", shape=(COUNT,), dtype="f8")
+        test.create_dataset("cube", data=numpy.zeros((2, 2, 2)))
+        test["again"] = h5py.SoftLink("/test/time")
+    with h5py.File(FOLDER / "circle.h5", "w", libver="earliest") as file:
+        file["a/b"] = file.require_group("a")
+    with h5py.File(FOLDER / "latest.h5", "w", libver="latest") as file:
+        file["test/time"], file["test/displacement"] = t, displacement
+        file["test/force"] = counts["force"].astype(">i2")
+        file["test/force"].attrs["unit"] = numpy.bytes_("N")
+        file.create_dataset("test/chunks", data=force, chunks=(COUNT // 3,))
+        for i in range(10):
+            file[f"dense/{i}"] = i
+
+
+def of_parquet():
+    frame = pandas.DataFrame({"time": t, "displacement": displacement, "force": force.astype("f4")})
+    frame.to_parquet(FOLDER / "record.parquet")
+    frame["missing"] = [None if i % 5 == 2 else i for i in range(COUNT)]
+    frame["counts"] = counts["force"]
+    frame["at"] = pandas.Timestamp("2026-11-26") + pandas.to_timedelta(t, unit="s")
+    frame["note"] = "free text"
+    options = {"row_group_size": COUNT // 3, "data_page_size": 200}
+    frame.to_parquet(FOLDER / "paged.parquet", compression="gzip", data_page_version="2.0", **options)
+    frame[["time", "displacement", "force"]].to_parquet(FOLDER / "plain.parquet", compression=None, use_dictionary=False, **options)
 
 
 def of_sound():
@@ -150,5 +214,5 @@ if __name__ == "__main__":
     for folder, count in FOLDERS.items():
         folder.mkdir(exist_ok=True)
         make(folder, count)
-        for part in (*([text] if folder == HERE else []), of_numpy, of_spreadsheets, of_matlab, of_sound, of_labview, of_universal):
+        for part in (*([text] if folder == HERE else []), of_numpy, of_spreadsheets, of_matlab, of_hdf5, of_parquet, of_sound, of_labview, of_universal):
             part()

@@ -14,7 +14,7 @@ keys! {
     pub struct ExperimentSpec = "experiment", expecting "a map such as {name: free decay, data: file.csv, initial: {displacement: 3.3, velocity: 1.0}}" {
         /// Name for reports.
         name: Option<Text>, example "free decay", default "experiment 1, experiment 2, …";
-        /// Data file, relative to the model file: a text table, or a file of NumPy, MATLAB, TDMS, WAV or UFF; a simulation needs none.
+        /// Data file, relative to the model file: a text table, or a file of NumPy, MATLAB, HDF5, TDMS, WAV or UFF; a simulation needs none.
         data: Option<Text>, example "record.csv";
         /// Format of a text table, where automatic detection fails.
         format: Option<FileFormatSpec>,

@@ -25,6 +25,9 @@ use nalgebra::{DMatrix, DVector};
 
 /// Smallest score of a first pulse: the largest of 10,000 standard normal numbers exceeds it with a probability of 0.0004.
 const SIGNIFICANT: f64 = 5.5;
+/// Smallest score of a first pulse that restores a cut peak, at the largest or smallest value: one of two standard normal numbers exceeds
+/// it with a probability of 0.0005.
+const CUT: f64 = 3.5;
 /// Score of a pulse above which the residuals are not yet explained.
 const REMAINS: f64 = 4.5;
 /// Largest number of pulses that explain residuals.
@@ -64,7 +67,13 @@ pub(super) fn input_pulses(
     // A static force acts against positive displacements.
     let by_sample = -jacobian.columns(first, nodes) * hats(&problem.system.grid, nodes, signal);
     let residuals = model.orthogonal(&weighted_residuals(&extended, &evaluation));
-    let found = pursuit(&model, by_sample, residuals, own.len())?;
+    let found = pursuit(
+        &model,
+        by_sample,
+        residuals,
+        own.len(),
+        &peaks(signal.values()),
+    )?;
     let (sample, error) = found
         .iter()
         .copied()
@@ -75,6 +84,18 @@ pub(super) fn input_pulses(
         time: *signal.times().get(sample)?,
         error,
     })
+}
+
+/// Samples at the largest positive value, with the sign 1, and at the smallest negative one, with the sign -1.
+fn peaks(values: &[f64]) -> Vec<(usize, f64)> {
+    let largest = values.iter().fold(0.0f64, |most, f| most.max(*f));
+    let smallest = values.iter().fold(0.0f64, |least, f| least.min(*f));
+    let signs = values.iter().map(|f| match *f {
+        f if f == largest => 1.0,
+        f if f == smallest => -1.0,
+        _ => 0.0,
+    });
+    signs.enumerate().filter(|(_, sign)| *sign != 0.0).collect()
 }
 
 /// Values at the nodes of a signal that is 1 at one of its samples and 0 at the others, in one column for each sample.
@@ -97,12 +118,14 @@ fn hats(grid: &Grid, nodes: usize, signal: &Signal) -> DMatrix<f64> {
     hats
 }
 
-/// Indices and sizes of the columns that explain the residuals; `None` where none is significant, or more than [`MOST`] are.
+/// Indices and sizes of the columns that explain the residuals; `None` where none is significant, or more than [`MOST`] are. The first one may be
+/// that of a cut peak.
 fn pursuit(
     model: &Span,
     mut columns: DMatrix<f64>,
     mut residuals: DVector<f64>,
     parameters: usize,
+    peaks: &[(usize, f64)],
 ) -> Option<Vec<(usize, f64)>> {
     let sizes: Vec<f64> = columns.column_iter().map(|c| c.norm()).collect();
     for mut column in columns.column_iter_mut() {
@@ -117,18 +140,23 @@ fn pursuit(
         let scores = columns.column_iter().enumerate().map(|(j, column)| {
             let norm = column.norm();
             let is_apart = norm > APART * sizes[j];
-            (
-                j,
-                if is_apart {
-                    products[j] / (norm * deviation)
-                } else {
-                    0.0
-                },
-            )
+            match is_apart {
+                true => products[j] / (norm * deviation),
+                false => 0.0,
+            }
         });
-        let (best, score) = scores.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-        if score.abs() < threshold || !score.is_finite() {
-            return (!found.is_empty()).then_some(found);
+        let scores: Vec<f64> = scores.collect();
+        let largest = scores.iter().copied().enumerate();
+        let (mut best, score) = largest.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+        score.is_finite().then_some(())?;
+        if score.abs() < threshold {
+            // The pulse, against the score, restores a cut peak.
+            let cut = peaks.iter().map(|(j, sign)| (*j, -sign * scores[*j]));
+            let cut = cut.max_by(|a, b| a.1.total_cmp(&b.1));
+            match cut.filter(|(_, score)| found.is_empty() && *score >= CUT) {
+                Some((peak, _)) => best = peak,
+                None => return (!found.is_empty()).then_some(found),
+            }
         }
         let column = columns.column(best).clone_owned();
         let square = column.norm_squared();
