@@ -1,6 +1,6 @@
 //! The answer of a fit as a table: estimates with their confidence intervals, units and status.
 
-use super::document::ResultDocument;
+use super::document::{ResultDocument, Verdict};
 use super::ratios;
 use crate::number_format::{resolved, significant};
 use kmcfit_core::internals::assessment::{Estimate, EstimateStatus};
@@ -57,6 +57,9 @@ fn row(document: &ResultDocument, name: &str, estimate: &Estimate) -> AnswerRow 
     if is_negligible(document, name) {
         value = "0".to_owned();
         interval.clear();
+        range.clear();
+    } else if value == "0" {
+        // Less than the interval resolves.
         range.clear();
     } else if function.is_some_and(|f| f.at_bound) {
         status += ", at its bound";
@@ -120,6 +123,7 @@ fn is_negligible(document: &ResultDocument, name: &str) -> bool {
 fn status(document: &ResultDocument, estimate: &Estimate) -> String {
     match estimate.status {
         EstimateStatus::Estimated if !estimate.value.is_finite() => "not defined".to_owned(),
+        _ if is_not_unique(document, estimate) => "not unique".to_owned(),
         EstimateStatus::Estimated => "estimated".to_owned(),
         EstimateStatus::Fixed => match others_scale(document) {
             true => "fixed; the others scale with it".to_owned(),
@@ -127,9 +131,20 @@ fn status(document: &ResultDocument, estimate: &Estimate) -> String {
         },
         EstimateStatus::OnlyAsRatio => match fixed_name(document) {
             Some(name) => format!("scales with the fixed {name}"),
-            None => "only as ratio".to_owned(),
+            None => "only as ratio; the model sets the scale".to_owned(),
         },
     }
+}
+
+/// True for an estimate without an interval where more parameters are estimated than the samples determine and no penalty determines the
+/// others: other values explain the samples equally well.
+fn is_not_unique(document: &ResultDocument, estimate: &Estimate) -> bool {
+    let is_deficient =
+        |verdict: &Verdict| verdict.reasons.iter().any(|r| r.kind == "rank_deficient");
+    let is_estimated = estimate.status != EstimateStatus::Fixed && estimate.ci95.is_none();
+    is_estimated
+        && document.cost.regularisation == 0.0
+        && document.verdict.as_ref().is_some_and(is_deficient)
 }
 
 fn others_scale(document: &ResultDocument) -> bool {

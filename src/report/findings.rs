@@ -270,15 +270,16 @@ pub fn warning(warning: &FitWarning) -> Finding {
 pub fn classical(estimate: &ClassicalEstimate) -> String {
     let [names, of_damping] = match estimate.method {
         ClassicalMethod::LogarithmicDecrement => ["extremes of the decay", "logarithmic decrement"],
-        ClassicalMethod::FrequencyResponse => ["FRF peak", "half-power damping"],
+        ClassicalMethod::FrequencyResponse => ["FRF peak", "half-power width"],
     };
     let number = |value: f64, [low, high]: [f64; 2]| {
         let [value, ..] = resolved([value, low, high], 0.5 * (high - low));
         value
     };
     let damping = estimate.damping_ratio.zip(estimate.damping_interval);
-    let damping =
-        damping.map(|(value, interval)| format!(", {of_damping} {}", number(value, interval)));
+    let damping = damping.map(|(value, interval)| {
+        format!(", damping ratio {} ({of_damping})", number(value, interval))
+    });
     format!(
         "{names} {} Hz{}: {}",
         number(estimate.frequency, estimate.frequency_interval),

@@ -70,6 +70,11 @@ impl FittedModel<'_> {
             VerdictReason::Failed { status } | VerdictReason::NotConverged { status } => {
                 Finding::of(reason, format!("{}: {}", status.name(), outcome.reason))
             }
+            VerdictReason::RankDeficient { .. } if !problem.penalties.is_empty() => {
+                let mut finding = reason_in_words(reason);
+                finding.text += " from the samples; penalties and constraints determine the others";
+                finding
+            }
             _ => reason_in_words(reason),
         };
         let level = verdict_level(&reasons);
