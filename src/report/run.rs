@@ -400,10 +400,14 @@ fn attempt_summary(attempt: &Attempt) -> AttemptSummary {
 
 /// The files that a fit of a model writes.
 pub fn fit_claim(model: &Model) -> Claim {
-    const FIGURES: [&str; 8] = [
+    const FIGURES: [&str; 12] = [
         "observation",
         "channel",
         "residuals",
+        "residual_tests",
+        "spectra",
+        "frequency_response",
+        "input",
         "convergence",
         "motion",
         "functions",

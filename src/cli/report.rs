@@ -1,0 +1,56 @@
+//! `kmcfit report`: draws the page and the figures of a finished run again.
+
+use super::{CommandError, OK, print, unwritable};
+use crate::report::{FittedModel, Run, RunAssessment, fit_claim, rebuilt_fit};
+use crate::results::{Manifest, OutputFolder, RequestedFiles};
+use std::io;
+use std::path::PathBuf;
+
+/// Write the page and the figures of a finished run again, without a fit.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  kmcfit report runs/model")]
+pub struct Arguments {
+    /// Folder of a finished run.
+    run: PathBuf,
+}
+
+pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
+    let run = Run::open(&arguments.run)?;
+    let (model, mut fit) = rebuilt_fit(&run)?;
+    fit.history.clone_from(&run.history);
+    let run_assessment = RunAssessment::of(&model, &fit);
+    let fitted = FittedModel {
+        model: &model,
+        fit: &fit,
+        predictions: &run.document.predictions,
+        weights: None,
+        run_assessment: &run_assessment,
+        requested: RequestedFiles::figures(),
+    };
+    let inputs = [model.file.clone()];
+    let folder = OutputFolder::prepare(&run.folder, fit_claim(&model).inputs(inputs))?;
+    let manifest = Manifest::read(&run.folder)?;
+    let kept = manifest.into_iter().flat_map(|manifest| manifest.files);
+    let kept: Vec<String> = kept.map(|(name, _)| name).collect();
+    write(&folder, &kept, &fitted, &run).map_err(|error| unwritable(folder.path(), &error))?;
+    print(&format!(
+        "report and figures in {}\n",
+        folder.path().display()
+    ));
+    Ok(OK)
+}
+
+/// Replaces the page and the figures; the other files of the run stay as they are.
+fn write(
+    folder: &OutputFolder,
+    kept: &[String],
+    fitted: &FittedModel,
+    run: &Run,
+) -> io::Result<()> {
+    let mut stage = folder.stage()?;
+    for name in kept.iter().filter(|name| !FittedModel::is_drawn(name)) {
+        stage.write(name, std::fs::read(run.folder.join(name))?)?;
+    }
+    fitted.write_drawings(&mut stage, &run.document)?;
+    stage.commit()
+}
