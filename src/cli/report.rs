@@ -27,8 +27,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         run_assessment: &run_assessment,
         requested: RequestedFiles::figures(),
     };
-    let inputs = [model.file.clone()];
-    let folder = OutputFolder::prepare(&run.folder, fit_claim(&model).inputs(inputs))?;
+    let folder = OutputFolder::prepare(&run.folder, fit_claim(&model))?;
     let manifest = Manifest::read(&run.folder)?;
     let kept = manifest.into_iter().flat_map(|manifest| manifest.files);
     let kept: Vec<String> = kept.map(|(name, _)| name).collect();
@@ -40,17 +39,27 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     Ok(OK)
 }
 
-/// Replaces the page and the figures; the other files of the run stay as they are.
+/// Starts of the names of figures that need the search: iterates, and the path of penalty weights.
+const OF_THE_SEARCH: [&str; 2] = ["figures/motion", "figures/weights"];
+
+/// Replaces the page and the figures; the other files of the run, and its figures of the search, stay as they are.
 fn write(
     folder: &OutputFolder,
     kept: &[String],
     fitted: &FittedModel,
     run: &Run,
 ) -> io::Result<()> {
+    let is_of_search = |name: &str| OF_THE_SEARCH.iter().any(|start| name.starts_with(start));
+    let mut drawn = fitted.drawings(&run.document);
+    drawn.retain(|(name, _)| !(is_of_search(name) && kept.contains(name)));
     let mut stage = folder.stage()?;
-    for name in kept.iter().filter(|name| !FittedModel::is_drawn(name)) {
-        stage.write(name, std::fs::read(run.folder.join(name))?)?;
+    for name in kept {
+        if !drawn.iter().any(|(own, _)| own == name) {
+            stage.write(name, std::fs::read(run.folder.join(name))?)?;
+        }
     }
-    fitted.write_drawings(&mut stage, &run.document)?;
+    for (name, text) in drawn {
+        stage.write(&name, text)?;
+    }
     stage.commit()
 }

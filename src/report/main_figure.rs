@@ -12,10 +12,7 @@ const ROUNDING: f64 = 1e-9;
 impl FittedModel<'_> {
     /// The figure of the first screen; `None` without a varying coefficient and without samples.
     pub(super) fn main_figure(&self, document: &ResultDocument) -> Option<Figure> {
-        let record = self
-            .channels()
-            .first()
-            .map(|(e, c)| self.channel_view(*e, *c));
+        let first = self.channels().first().copied();
         let functions = self.named_functions().into_iter();
         let panels = functions.zip(self.functions_figure().panels);
         let panels = panels.filter(|((function, _), _)| {
@@ -27,10 +24,11 @@ impl FittedModel<'_> {
         let scored = panels.filter_map(|(_, panel)| Some((variation(&panel)?, panel)));
         let most = scored.max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, mut panel)) = most else {
-            let [figure, _] = record?.figures();
+            let (experiment, channel) = first?;
+            let [figure, _] = self.channel_view(experiment, channel).figures();
             return Some(Figure {
                 name: "main".into(),
-                ..figure
+                ..self.titled(figure, experiment, channel)
             });
         };
         panel.marks.retain(|mark| mark.label != "start");
@@ -40,8 +38,8 @@ impl FittedModel<'_> {
             title,
             "The coefficient that varies most relative to its interval; below, the record.",
         );
-        let below = record.map(|view| {
-            let mut figure = view.observation();
+        let below = first.map(|(experiment, channel)| {
+            let mut figure = self.channel_view(experiment, channel).observation();
             for mark in figure.panels.iter_mut().flat_map(|panel| &mut panel.marks) {
                 mark.style.colour = Colour::Grey;
             }

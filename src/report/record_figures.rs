@@ -7,6 +7,8 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Diameter of the dots of a quantile plot, pixels.
 const DOT: f64 = 2.5;
+/// Coherence below which a measured frequency response is noise and does not widen its axis.
+const COHERENT: f64 = 0.5;
 /// Order of the derivative with which [`Mobility`] is the ratio of the response to the input itself.
 const PLAIN: i32 = 1;
 
@@ -137,7 +139,7 @@ pub(super) fn spectrum(pair: &SeriesPair) -> Option<Figure> {
     // A model without noise falls far below the samples.
     let y = within(
         Axis::log("power spectral density", density_unit(unit)),
-        measured.density().get(1..)?,
+        measured.density().iter().skip(1).copied(),
     );
     let panel = Panel::new(over(&frequencies), y).marks(marks.into_iter().flatten());
     Some(
@@ -154,8 +156,15 @@ pub(super) fn spectrum(pair: &SeriesPair) -> Option<Figure> {
 fn density_unit(unit: &str) -> String {
     match unit {
         "" => "1/Hz".to_owned(),
-        unit if unit.chars().all(char::is_alphabetic) => format!("{unit}²/Hz"),
-        unit => format!("({unit})²/Hz"),
+        unit => format!("{}²/Hz", factor(unit)),
+    }
+}
+
+/// A unit as a factor: in parentheses where it has more than letters.
+fn factor(unit: &str) -> String {
+    match unit.chars().all(char::is_alphabetic) {
+        true => unit.to_owned(),
+        false => format!("({unit})"),
     }
 }
 
@@ -182,10 +191,18 @@ pub(super) fn frequency_response(pair: &SeriesPair, input: &InputSeries) -> Opti
         .map(|k| k as f64 * measured.resolution)
         .collect();
     let (measured_size, model_size) = (size(&measured), size(&model));
-    let y = within(
-        Axis::log("frequency response", format!("({unit})/({})", input.unit)),
-        &measured_size,
-    );
+    let unit = format!("{}/{}", factor(unit), factor(input.unit));
+    let is_coherent = |k: &usize| {
+        measured
+            .coherence
+            .get(k + 1)
+            .is_some_and(|c| *c >= COHERENT)
+    };
+    let coherent = (0..measured_size.len()).filter(is_coherent);
+    let drawn = coherent
+        .map(|k| measured_size[k])
+        .chain(model_size.iter().copied());
+    let y = within(Axis::log("frequency response", unit), drawn);
     let grey = Style::new(Colour::Grey).width(2.0);
     let response = Panel::new(over(&frequencies), y).marks([
         Mark::line("measured", &frequencies, &measured_size, grey),
@@ -232,8 +249,8 @@ fn over(frequencies: &[f64]) -> Axis {
 }
 
 /// The axis limited to the positive values of a curve and a little more.
-fn within(axis: Axis, values: &[f64]) -> Axis {
-    let positive = values.iter().copied().filter(|v| *v > 0.0 && v.is_finite());
+fn within(axis: Axis, values: impl Iterator<Item = f64>) -> Axis {
+    let positive = values.filter(|v| *v > 0.0 && v.is_finite());
     let (low, high) = positive.fold((f64::INFINITY, 0.0_f64), |(low, high), v| {
         (low.min(v), high.max(v))
     });

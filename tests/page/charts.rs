@@ -149,10 +149,10 @@ fn keys_zoom_and_read() {
     browser.key("Escape");
     assert_eq!(range(&mut browser, "functions"), [0.0, 20.0]);
     // A chart with a separate logarithmic axis.
-    browser.evaluate(&format!("{}.focus()", plot("convergence")));
-    let whole = range(&mut browser, "convergence");
+    browser.evaluate(&format!("{}.focus()", plot("spectra")));
+    let whole = range(&mut browser, "spectra");
     browser.key("+");
-    assert_ne!(range(&mut browser, "convergence"), whole);
+    assert_ne!(range(&mut browser, "spectra"), whole);
     assert_eq!(range(&mut browser, "functions"), [0.0, 20.0]);
     assert_eq!(browser.complaints(), [""; 0]);
 }

@@ -205,15 +205,18 @@ fn charts_are_saved_as_drawings_and_numbers() {
     assert_eq!(rows[0], "panel,curve,abscissa,x,y,upper");
     let stored: Value =
         serde_json::from_str(&pages().read("runs/hostile/result.json")).expect("JSON");
-    let lags = stored["experiments"][0]["channels"][0]["autocorrelation"]
-        .as_array()
-        .expect("numbers");
-    let stems: Vec<f64> = rows
-        .iter()
-        .filter(|row| row.starts_with("\"autocorrelation\",\"residuals\""))
+    let channel = &stored["experiments"][0]["channels"][0];
+    let lags = channel["autocorrelation"].as_array().expect("numbers");
+    let name = match channel["noise"].is_null() {
+        true => "residuals",
+        false => "innovations",
+    };
+    let start = format!("\"autocorrelation\",\"{name}\",\"lag (s)\",");
+    let stems = rows.iter().filter_map(|row| row.strip_prefix(&start));
+    let stems: Vec<f64> = stems
         .map(|row| {
             row.split(',')
-                .nth(4)
+                .nth(1)
                 .and_then(|y| y.parse().ok())
                 .expect("a number")
         })

@@ -93,7 +93,6 @@ fn a_report_is_complete() {
         "figure-residuals",
         "figure-functions",
         "figure-ratios",
-        "figure-convergence",
         "figure-motion",
     ] {
         assert_eq!(ids.iter().filter(|other| **other == id).count(), 1, "{id}");

@@ -3,6 +3,7 @@
 use super::figures;
 use super::overview::state;
 use super::table::{list, table};
+use crate::config::DataFile;
 use crate::finding::Finding;
 use crate::number_format::significant;
 use crate::report::FittedModel;
@@ -11,6 +12,7 @@ use crate::report::document::{ResultDocument, level_in_words};
 use crate::report::summary::count;
 use crate::report::text::{escape, prose};
 use kmcfit_core::internals::assessment::VerdictLevel;
+use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Seconds of a day.
@@ -35,10 +37,10 @@ fn source(run: &FittedModel, document: &ResultDocument) -> String {
     let mut parts = Vec::new();
     parts.extend(match files.as_slice() {
         [] => None,
-        [only] => Some(only.name.clone()),
+        [only] => Some(name(only)),
         [first, rest @ ..] => Some(format!(
             "{} and {}",
-            first.name,
+            name(first),
             count(rest.len(), "further file")
         )),
     });
@@ -46,6 +48,14 @@ fn source(run: &FittedModel, document: &ResultDocument) -> String {
     parts.push(format!("{} s", significant(document.model.duration, 4)));
     parts.extend(files.iter().filter_map(|f| f.modified).max().and_then(date));
     parts.join(", ")
+}
+
+/// Name of a file without its folder.
+fn name(file: &DataFile) -> String {
+    let name = Path::new(&file.name).file_name();
+    name.map_or(file.name.clone(), |name| {
+        name.to_string_lossy().into_owned()
+    })
 }
 
 /// The day of a time as `2026-03-02`, in universal time; `None` before 1970.

@@ -94,7 +94,19 @@ fn fit_and_residuals(run: &FittedModel, document: &ResultDocument) -> String {
 
 /// Table of all coefficients, and figures of those that vary.
 fn coefficients(run: &FittedModel, document: &ResultDocument) -> String {
-    let varying = [run.functions_figure(), run.ratios_figure()].map(Figure::varying);
+    let mut ratios = run.ratios_figure();
+    // Ratios to a damping of zero to machine precision are rounding errors.
+    if document
+        .functions
+        .get("damping")
+        .is_some_and(|f| f.negligible)
+    {
+        let of_damping = ["c/m", "damping ratio ζ"];
+        ratios
+            .panels
+            .retain(|panel| !of_damping.contains(&panel.y.label.as_str()));
+    }
+    let varying = [run.functions_figure(), ratios].map(Figure::varying);
     let varying: Vec<Figure> = varying.into_iter().flatten().collect();
     overview::functions(document) + &figures_without(START, &varying)
 }
