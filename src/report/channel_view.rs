@@ -99,7 +99,7 @@ impl ChannelView<'_> {
             measured: &measured,
             model: &model,
         };
-        // The response to one input cannot be told from that to another.
+        // With several inputs the ratio to one of them is no frequency response.
         let response = match inputs {
             [input] => frequency_response(&pair, input),
             _ => None,
