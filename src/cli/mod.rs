@@ -15,6 +15,7 @@ mod output;
 mod overrides;
 mod predict;
 mod progress;
+mod report;
 mod resume;
 mod schema;
 mod shell;
@@ -54,6 +55,7 @@ enum Command {
     Predict(predict::Arguments),
     Compare(compare::Arguments),
     Verify(verify::Arguments),
+    Report(report::Arguments),
     Study(study::Arguments),
     Resume(resume::Arguments),
     Init(init::Arguments),
@@ -127,6 +129,7 @@ pub fn main() -> ExitCode {
         Command::Predict(arguments) => predict::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
+        Command::Report(arguments) => report::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::Resume(arguments) => resume::run(&arguments),
         Command::Init(arguments) => init::run(&arguments),

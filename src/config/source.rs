@@ -3,6 +3,7 @@
 use super::ModelFile;
 use crate::digest::digest_of_file;
 use std::path::Path;
+use std::time::SystemTime;
 
 /// Text, overrides and data files of a model.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -22,6 +23,8 @@ pub struct DataFile {
     pub name: String,
     /// Size in bytes and SHA-256 in hexadecimal digits; `None` for a file that can no longer be read.
     pub content: Option<(u64, String)>,
+    /// Time of its last change, where the file system has it.
+    pub modified: Option<SystemTime>,
 }
 
 impl ModelSource {
@@ -29,6 +32,9 @@ impl ModelSource {
     pub fn of(file: &ModelFile) -> Self {
         let data = file.data_names().into_iter().map(|name| DataFile {
             content: content(&file.resolve(&name)),
+            modified: (file.resolve(&name).metadata())
+                .and_then(|m| m.modified())
+                .ok(),
             name,
         });
         Self {

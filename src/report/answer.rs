@@ -29,6 +29,17 @@ pub struct AnswerRow {
     pub status: String,
 }
 
+impl AnswerRow {
+    /// How it was obtained, and the range over the record.
+    pub fn status_and_range(&self) -> String {
+        match (self.range.as_str(), self.estimate.as_str()) {
+            ("", _) => self.status.clone(),
+            (range, "") => format!("{} ({range})", self.status),
+            (range, _) => format!("{} (mean; {range} over the record)", self.status),
+        }
+    }
+}
+
 /// The rows of the answer: natural frequency and damping ratio, then the coefficients; with ratios only the ratios to the mass before what the
 /// model assumes.
 pub fn answer(document: &ResultDocument) -> Vec<AnswerRow> {
@@ -210,17 +221,12 @@ pub fn answer_table(document: &ResultDocument) -> String {
     };
     let mut text = line(["", "estimate", "95 % CI", "unit", "status"]);
     for row in &rows {
-        let status = match (row.range.as_str(), row.estimate.as_str()) {
-            ("", _) => row.status.clone(),
-            (range, "") => format!("{} ({range})", row.status),
-            (range, _) => format!("{} (mean; {range} over the record)", row.status),
-        };
         text += &line([
             &row.quantity,
             &row.estimate,
             &row.interval,
             &row.unit,
-            &status,
+            &row.status_and_range(),
         ]);
     }
     text

@@ -3,10 +3,12 @@
 use super::chart::Figure;
 use super::csv::CsvTable;
 use super::figures;
+use super::record_figures::{self, InputSeries, SeriesPair, frequency_response, spectrum};
 use crate::config::ChannelNote;
 use kmcfit_core::internals::assessment::diagnostics;
 use kmcfit_core::internals::diagnostics::Whiteness;
 use kmcfit_core::internals::record::Channel;
+use kmcfit_core::internals::signal::even_spacing;
 
 /// A channel, its prediction, and its notes for reports.
 #[derive(Debug, Clone, Copy)]
@@ -64,11 +66,45 @@ impl ChannelView<'_> {
         let diagnostics = diagnostics(self.channel, self.predicted);
         [
             figures::channel(label, times, &self.observed(), &self.model()),
-            Figure {
-                description: whiteness(self.channel, &diagnostics.whiteness),
-                ..figures::residuals(label, times, &self.residuals(), &diagnostics)
-            },
+            figures::residuals(
+                label,
+                times,
+                &self.residuals(),
+                &whiteness(self.channel, &diagnostics.whiteness),
+            ),
         ]
+    }
+
+    /// Figure of the tests of the residuals, or of the innovations of correlated noise; `None` for fewer than three.
+    pub fn residual_tests(&self) -> Option<Figure> {
+        let name = match self.channel.correlation() {
+            None => "residuals",
+            Some(_) => "innovations",
+        };
+        let residuals = self.channel.innovations(self.predicted);
+        let diagnostics = diagnostics(self.channel, self.predicted);
+        record_figures::residual_tests(name, &residuals, &diagnostics)
+    }
+
+    /// Figures of the spectra, and of the frequency response to an only input at the samples; none for samples at unequal times.
+    pub fn spectra(&self, inputs: &[InputSeries]) -> Vec<Figure> {
+        let Some(spacing) = even_spacing(self.channel.times()) else {
+            return Vec::new();
+        };
+        let (label, unit) = (self.label(), self.unit());
+        let (measured, model) = (self.observed(), self.model());
+        let pair = SeriesPair {
+            label: (&label, unit),
+            spacing,
+            measured: &measured,
+            model: &model,
+        };
+        // With several inputs the ratio to one of them is no frequency response.
+        let response = match inputs {
+            [input] => frequency_response(&pair, input),
+            _ => None,
+        };
+        spectrum(&pair).into_iter().chain(response).collect()
     }
 
     /// Table of samples and prediction, in the unit of the file.

@@ -1,7 +1,6 @@
 //! The standard figures of a fit, from plain slices.
 
 use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
-use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
@@ -58,35 +57,16 @@ pub fn channel((label, unit): (&str, &str), t: &[f64], observed: &[f64], model: 
     .panel(Panel::of_time(label, unit).marks([samples, Mark::line("model", t, model, line)]))
 }
 
-/// The residuals of a channel against time, and their autocorrelation with the band that contains 95 % of the lags for
-/// white noise.
+/// The residuals of a channel against time; `description` says what their test of whiteness gave.
 pub fn residuals(
     (label, unit): (&str, &str),
     t: &[f64],
     residuals: &[f64],
-    diagnostics: &ResidualDiagnostics,
+    description: &str,
 ) -> Figure {
-    let lags = 0..diagnostics.autocorrelation.len();
-    let lags: Vec<f64> = lags.map(|lag| lag as f64 * diagnostics.step).collect();
-    let band = Style::new(Colour::Grey).dash(Dash::Dashed);
-    let blue = Style::new(Colour::Blue);
-    let (x, y) = (
-        Axis::linear("lag", "s"),
-        Axis::linear("autocorrelation", ""),
-    );
-    Figure::new("residuals", "Residuals", diagnostics.whiteness.to_string()).panels([
-        Panel::of_time(format!("model - {label}"), unit).mark(Mark::points(
-            "",
-            t,
-            residuals,
-            dots(Colour::Blue, t.len()),
-        )),
-        Panel::new(x, y).marks([
-            Mark::horizontal("95 % of white noise", diagnostics.band, band),
-            Mark::horizontal("", -diagnostics.band, band),
-            Mark::line("residuals", &lags, &diagnostics.autocorrelation, blue),
-        ]),
-    ])
+    let dots = Mark::points("", t, residuals, dots(Colour::Blue, t.len()));
+    Figure::new("residuals", "Residuals", description)
+        .panel(Panel::of_time(format!("{label}, measured - model"), unit).mark(dots))
 }
 
 /// Cost J/J₀ and squared gradient norm G²/G₀² against the iteration, both relative to the start;

@@ -3,7 +3,9 @@
 use super::FittedModel;
 use super::chart::Figure;
 use super::figures::{self, FunctionCurve};
+use super::record_figures::{self, InputSeries};
 use kmcfit_core::internals::functions::{CoefficientFunction, Ratios};
+use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::solvers::IterationRecord;
 
 impl FittedModel<'_> {
@@ -21,6 +23,9 @@ impl FittedModel<'_> {
             list.iter_mut().for_each(|figure| figure.name += &suffix);
             figures.extend(list);
         }
+        figures.extend(self.each_channel(Self::channel_spectra));
+        figures.extend(self.each_channel(Self::channel_tests));
+        figures.extend(self.input_figures());
         figures.extend(self.validation_figures());
         figures
     }
@@ -58,6 +63,77 @@ impl FittedModel<'_> {
                 experiments[experiment].channels[channel].kind().name()
             ),
         }
+    }
+
+    /// Figures of all channels with their titles.
+    pub(super) fn each_channel(&self, of: fn(&Self, usize, usize) -> Vec<Figure>) -> Vec<Figure> {
+        let channels = self.channels().into_iter();
+        let figures = channels.flat_map(|(e, c)| {
+            let titled = move |figure| self.titled(figure, e, c);
+            of(self, e, c).into_iter().map(titled)
+        });
+        figures.collect()
+    }
+
+    /// Spectra of a channel, and its frequency response where one input acts.
+    pub(super) fn channel_spectra(&self, experiment: usize, channel: usize) -> Vec<Figure> {
+        let view = self.channel_view(experiment, channel);
+        view.spectra(&self.inputs(experiment, view.channel.times()))
+    }
+
+    /// Tests of the residuals of a channel.
+    pub(super) fn channel_tests(&self, experiment: usize, channel: usize) -> Vec<Figure> {
+        let tests = self.channel_view(experiment, channel).residual_tests();
+        tests.into_iter().collect()
+    }
+
+    /// Samples and residuals of a channel against time.
+    pub(super) fn channel_fit(&self, experiment: usize, channel: usize) -> Vec<Figure> {
+        self.channel_view(experiment, channel).figures().into()
+    }
+
+    /// Force and motion of the base at some times, in SI units.
+    fn inputs(&self, experiment: usize, times: &[f64]) -> Vec<InputSeries> {
+        let input = &self.model.problem.experiments[experiment].input;
+        let units = match self.is_rotation() {
+            true => ["N m", "rad", "rad/s²"],
+            false => ["N", "m", "m/s²"],
+        };
+        let force = |t: &f64| input.force_at(*t);
+        let force = input.force.as_ref().map(|_| InputSeries {
+            label: "force",
+            unit: units[0],
+            samples: times.iter().map(force).collect(),
+        });
+        let motion = |label, kind, unit| {
+            let samples = times.iter().map(|t| input.base_motion_at(kind, *t));
+            let samples = samples.collect::<Option<Vec<f64>>>()?;
+            Some(InputSeries {
+                label,
+                unit,
+                samples,
+            })
+        };
+        let base = input.base.as_ref().and_then(|_| {
+            motion("base displacement", ChannelKind::Displacement, units[1])
+                .or_else(|| motion("base acceleration", ChannelKind::Acceleration, units[2]))
+        });
+        force.into_iter().chain(base).collect()
+    }
+
+    /// The inputs of each driven experiment at the samples of its first channel.
+    pub(super) fn input_figures(&self) -> Vec<Figure> {
+        let channels = self
+            .channels()
+            .into_iter()
+            .filter(|(_, channel)| *channel == 0);
+        let figures = channels.filter_map(|(e, c)| {
+            let times = self.channel_view(e, c).channel.times();
+            let inputs = self.inputs(e, times);
+            let figure = record_figures::input(times, &inputs);
+            (!inputs.is_empty()).then(|| self.titled(figure, e, c))
+        });
+        figures.collect()
     }
 
     /// The figures of one channel: samples, samples with the response, residuals.

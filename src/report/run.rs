@@ -27,6 +27,8 @@ use kmcfit_core::internals::system::{Excitation, Term};
 use std::io;
 use std::time::Duration;
 
+/// The page.
+const PAGE: &str = "report.html";
 /// Draws from the distribution of the estimates.
 pub const DRAWS: &str = "draws.csv";
 /// Covariance of more than 64 parameters.
@@ -98,15 +100,20 @@ impl FittedModel<'_> {
             write(&name, table.to_csv().as_bytes())?;
         }
         if self.requested.figures {
-            for figure in self.figures() {
-                write(
-                    &format!("figures/{}.svg", figure.name),
-                    render(&figure).as_bytes(),
-                )?;
+            for (name, text) in self.drawings(document) {
+                write(&name, text.as_bytes())?;
             }
-            write("report.html", self.page(document).as_bytes())?;
         }
         Ok(writing)
+    }
+
+    /// Figures and page of `document`, each with the name of its file.
+    pub fn drawings(&self, document: &ResultDocument) -> Vec<(String, String)> {
+        let figures = self.figures().into_iter();
+        let figures = figures.map(|f| (format!("figures/{}.svg", f.name), render(&f)));
+        figures
+            .chain([(PAGE.to_owned(), self.page(document))])
+            .collect()
     }
 
     /// The HTML page of the run: one file without external resources.
@@ -402,10 +409,14 @@ fn attempt_summary(attempt: &Attempt) -> AttemptSummary {
 
 /// The files that a fit of a model writes.
 pub fn fit_claim(model: &Model) -> Claim {
-    const FIGURES: [&str; 8] = [
+    const FIGURES: [&str; 12] = [
         "observation",
         "channel",
         "residuals",
+        "residual_tests",
+        "spectra",
+        "frequency_response",
+        "input",
         "convergence",
         "motion",
         "functions",
@@ -424,7 +435,7 @@ pub fn fit_claim(model: &Model) -> Claim {
             "functions.csv",
             "trajectory.csv",
             DRAWS,
-            "report.html",
+            PAGE,
         ])
         .family("channels", "csv", samples.chain(["validation".to_owned()]))
         .family("figures", "svg", FIGURES)

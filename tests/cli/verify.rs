@@ -265,7 +265,7 @@ fn mistakes() {
         refused(&["verify", "run"])
     };
     assert_snapshot!(edited(&|p| p["functions"][0]["has_jumps"] = true.into()), @"
-    error: run: this kind of fit cannot be verified
+    error: run: this kind of fit cannot be rebuilt
       found: a coefficient with jumps found by `bic`
       expected: a fit that its parameters and the noise of its channels describe
       hint: fit the model again into another folder and compare the result documents
@@ -335,4 +335,61 @@ functions:
     let (code, _, error) = bench.run(&["verify", "runs/many"]);
     assert_eq!(code, 2);
     assert!(error.contains("the matrix is damaged"), "{error}");
+}
+
+/// `report` draws the same figures and page as the fit, apart from those of the search, and leaves the other files as they are; the run
+/// still holds.
+#[test]
+fn a_report_is_drawn_again() {
+    let bench = Workbench::with_shipped_models();
+    bench.run_to(0, &["fit", "models/duffing.yaml"]);
+    let kept = ["result.json", "functions.csv", "parameters.json"];
+    let before = kept.map(|name| bench.read(&format!("runs/duffing/{name}")));
+    let drawn = ["functions", "residual_tests", "spectra", "convergence"];
+    let read = |name: &str| bench.read(&format!("runs/duffing/figures/{name}.svg"));
+    let figures = drawn.map(read);
+    let page = bench.read("runs/duffing/report.html");
+    let said = bench.run_to(0, &["report", "runs/duffing"]);
+    assert_eq!(said, "report and figures in runs/duffing\n");
+    assert_eq!(
+        kept.map(|name| bench.read(&format!("runs/duffing/{name}"))),
+        before
+    );
+    for (name, figure) in drawn.iter().zip(&figures) {
+        assert!(read(name) == *figure, "{name} differs");
+    }
+    // The first screen and the sections before the solver are those of the fit.
+    let upper = |page: &str| {
+        page.split("<section id=\"solver\">")
+            .next()
+            .map(str::to_owned)
+    };
+    assert!(upper(&bench.read("runs/duffing/report.html")) == upper(&page));
+    bench.run_to(0, &["verify", "runs/duffing"]);
+    // Without its page a run gets one.
+    bench.run_to(
+        0,
+        &[
+            "fit",
+            "models/duffing.yaml",
+            "--no-report",
+            "--out",
+            "plain",
+        ],
+    );
+    bench.run_to(0, &["report", "plain"]);
+    assert!(upper(&bench.read("plain/report.html")) == upper(&page));
+}
+
+#[test]
+fn a_report_needs_a_finished_run() {
+    let bench = Workbench::with_shipped_models();
+    let before = bench.contents();
+    let (code, stdout, stderr) = bench.run(&["report", "models"]);
+    assert_eq!((code, stdout.as_str()), (2, ""));
+    assert_snapshot!(stderr, @r"
+    error: models/result.json: no such file
+      expected: the result of a finished run
+    ");
+    assert_eq!(bench.contents(), before);
 }

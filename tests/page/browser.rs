@@ -139,9 +139,13 @@ impl Browser {
         }
     }
 
-    /// Opens a file and waits until it is shown and its charts are drawn.
+    /// Opens a file, unfolds its parts, and waits until it is shown and its charts are drawn.
     pub fn open(&mut self, file: &Path) {
         self.load(file);
+        self.evaluate(
+            "document.querySelectorAll('details').forEach(part => { part.open = true; })",
+        );
+        self.settle();
         self.settle();
     }
 

@@ -4,4 +4,5 @@ mod browser;
 mod charts;
 mod contrast;
 mod pages;
+mod screen;
 mod structure;

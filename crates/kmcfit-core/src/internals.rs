@@ -82,10 +82,10 @@ pub mod record {
 }
 pub mod signal {
     pub use crate::signal::{
-        ExcitationShape, Interpolation, SecondOrder, Signal, Spectrum, SweepLaw, band_pass,
-        clipped, cut_off, decimate, decimation_filter, driven_oscillator, dropouts, even_spacing,
-        high_pass, low_pass, median, median_spacing, onset, quantisation, spikes, two_forced_modes,
-        two_modes,
+        ExcitationShape, Interpolation, Mobility, SecondOrder, Signal, Spectrum, SweepLaw,
+        band_pass, clipped, cut_off, decimate, decimation_filter, driven_oscillator, dropouts,
+        even_spacing, high_pass, low_pass, median, median_spacing, onset, quantisation, spikes,
+        two_forced_modes, two_modes,
     };
 }
 pub mod simd {

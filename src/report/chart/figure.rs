@@ -3,8 +3,11 @@
 //! Values that cannot be drawn (not finite, or not positive on a logarithmic axis) leave gaps. If `x` and `y` differ in
 //! length, the excess values are ignored.
 
-use super::plot_mark::Mark;
+use super::plot_mark::{Mark, MarkKind};
 use serde::{Serialize, Serializer};
+
+/// Ranges below this share of the largest value are rounding errors.
+const ROUNDING: f64 = 1e-9;
 
 /// One figure: a grid of panels with a common legend above them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -53,6 +56,12 @@ impl Figure {
         self.panels([panel])
     }
 
+    /// The figure without the panels of constants; `None` where no panel is left.
+    pub(in crate::report) fn varying(mut self) -> Option<Self> {
+        self.panels.retain(|panel| !panel.is_constant());
+        (!self.panels.is_empty()).then_some(self)
+    }
+
     /// Adds panels.
     #[must_use]
     pub fn panels(mut self, panels: impl IntoIterator<Item = Panel>) -> Self {
@@ -83,6 +92,16 @@ impl Panel {
             y,
             marks: Vec::new(),
         }
+    }
+
+    /// True if each curve has one value only.
+    fn is_constant(&self) -> bool {
+        let is_level = |mark: &Mark| {
+            let [low, high] = mark.range();
+            high - low <= ROUNDING * low.abs().max(high.abs())
+        };
+        let mut curves = self.marks.iter().filter(|mark| mark.kind == MarkKind::Line);
+        curves.all(is_level)
     }
 
     /// Sets the heading.

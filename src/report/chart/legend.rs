@@ -82,7 +82,7 @@ fn sample(mark: &Mark, (x, y): Point) -> Vec<Primitive> {
     };
     let stroke = Stroke::of(&mark.style);
     match mark.kind {
-        MarkKind::Line | MarkKind::Across | MarkKind::Upright => {
+        MarkKind::Line | MarkKind::Stems | MarkKind::Across | MarkKind::Upright => {
             vec![Primitive::Path(line, stroke)]
         }
         MarkKind::Points => {

@@ -130,6 +130,7 @@ impl Placed<'_> {
                 dots.for_each(|dot| self.dot(dot, &mark.style, shapes));
             }
             MarkKind::Line | MarkKind::Points => self.line(mark, shapes),
+            MarkKind::Stems => self.stems(mark, shapes),
             MarkKind::Band => self.band(mark, shapes),
             MarkKind::Span => {}
             MarkKind::Across => {
@@ -151,6 +152,24 @@ impl Placed<'_> {
             }
             for piece in curve::clip(&curve::thin(&run), &self.frame) {
                 shapes.push(Primitive::Path(piece, Stroke::of(style)));
+            }
+        }
+    }
+
+    fn stems(&self, Mark { x, y, style, .. }: &Mark, shapes: &mut Vec<Primitive>) {
+        for (foot, head) in x
+            .iter()
+            .zip(y)
+            .map(|(x, y)| (self.pixel(*x, 0.0), self.pixel(*x, *y)))
+        {
+            if (foot.0 + foot.1 + head.1).is_finite() {
+                let pieces = curve::clip(&[foot, head], &self.frame);
+                let stroke = Stroke::of(style);
+                shapes.extend(
+                    pieces
+                        .into_iter()
+                        .map(|piece| Primitive::Path(piece, stroke)),
+                );
             }
         }
     }

@@ -123,6 +123,8 @@ pub enum MarkKind {
     Line,
     /// A dot at each point.
     Points,
+    /// A line from zero to each point.
+    Stems,
     /// The area between two curves over the same x.
     Band,
     /// A shaded interval of x over the full height.
@@ -167,6 +169,14 @@ impl Mark {
         }
     }
 
+    /// Smallest and largest finite y; the first is infinite without any.
+    pub(in crate::report) fn range(&self) -> [f64; 2] {
+        let finite = self.y.iter().filter(|y| y.is_finite());
+        finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], y| {
+            [low.min(*y), high.max(*y)]
+        })
+    }
+
     /// A curve.
     pub fn line(label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
         Self::new(MarkKind::Line, label, x, y, style)
@@ -175,6 +185,11 @@ impl Mark {
     /// Dots.
     pub fn points(label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
         Self::new(MarkKind::Points, label, x, y, style.dash(Dash::Solid))
+    }
+
+    /// Lines from zero to the points.
+    pub fn stems(label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
+        Self::new(MarkKind::Stems, label, x, y, style)
     }
 
     /// The area between `low` and `high`.

@@ -1,11 +1,13 @@
-//! The page of a fit, `report.html`: results first, then figures, constraints, identifiability, settings and the commands
-//! that reproduce the run.
+//! The page of a fit, `report.html`: first screen, contents, and the sections from the fit to the work of the solver.
 
+use super::first_screen::first_screen;
 use super::table::{list, paragraph};
 use super::{figures, figures_without, help, overview, page as shell, reproducibility, settings};
+use crate::finding::Finding;
 use crate::report::FittedModel;
 use crate::report::chart::Figure;
 use crate::report::document::ResultDocument;
+use crate::report::equation::equation_residual;
 use crate::report::figures::weight_path;
 use crate::report::summary::{
     prediction_table, write_attempts, write_constraints, write_nuisance_parameters,
@@ -22,36 +24,38 @@ type Section = (&'static str, &'static str, String);
 /// The page of a run.
 pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> String {
     let sections: Vec<Section> = [
-        ("fit", "Data and fit", data_and_fit(run, document)),
+        ("fit", "Fit and residuals", fit_and_residuals(run, document)),
+        ("functions", "Coefficients", coefficients(run, document)),
+        ("input", "Input", figures(&run.input_figures())),
         (
-            "functions",
-            "Coefficient functions",
-            overview::functions(document) + &figures_without(START, &[run.functions_figure()]),
+            "spectra",
+            "Spectra",
+            figures(&run.each_channel(FittedModel::channel_spectra)),
         ),
         (
-            "ratios",
-            "Ratios, frequency and damping ratio",
-            figures(&[run.ratios_figure()]),
+            "tests",
+            "Residual tests",
+            figures(&run.each_channel(FittedModel::channel_tests)),
         ),
-        ("convergence", "Convergence", convergence(run, document)),
-        ("constraints", "Constraints", constraints(run, document)),
         (
             "identifiability",
             "Identifiability",
             identifiability(run, document),
         ),
+        ("constraints", "Constraints", constraints(run, document)),
         (
             "predictions",
             "Predicted free responses",
             predictions(document),
         ),
+        ("data", "Data", data(document)),
         ("settings", "Settings", settings::settings(run, document)),
         (
             "repeat",
             "Reproduce",
             reproducibility::reproducibility(run, document),
         ),
-        ("cite", "How to cite", reproducibility::cite()),
+        ("solver", "Solver", solver(run, document)),
     ]
     .into_iter()
     .filter(|(_, _, body)| !body.is_empty())
@@ -66,8 +70,8 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
         )
     });
     let body = format!(
-        "{}<nav aria-label=\"Contents\">\n{}</nav>\n{}{}",
-        overview::overview(document),
+        "{}<div class=\"sections\">\n<nav aria-label=\"Contents\">\n{}</nav>\n<div>\n{}{}</div>\n</div>\n",
+        first_screen(run, document),
         links.collect::<String>(),
         help(),
         parts.collect::<String>()
@@ -75,23 +79,57 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
     shell(&document.title, &body)
 }
 
-/// Records, fits and residuals.
-fn data_and_fit(run: &FittedModel, document: &ResultDocument) -> String {
-    let mut drawn = Vec::new();
-    for (experiment, channel) in run.channels() {
-        let pair = run.channel_view(experiment, channel).figures();
-        drawn.extend(pair.map(|figure| run.titled(figure, experiment, channel)));
-    }
+/// Fit of each channel, key figures, and figures of records and residuals.
+fn fit_and_residuals(run: &FittedModel, document: &ResultDocument) -> String {
+    let mut drawn = run.each_channel(FittedModel::channel_fit);
     drawn.extend(run.validation_figures());
+    let equation = document.equation.iter();
+    let equation = equation.map(|b| equation_residual(b, document.is_rotation()));
     overview::records(document)
+        + &overview::facts(document)
+        + &list(&equation.collect::<Vec<_>>())
         + &list(&lines(|text| write_statistics(text, document)))
         + &figures(&drawn)
 }
 
-/// Convergence of the search.
-fn convergence(run: &FittedModel, document: &ResultDocument) -> String {
+/// Table of all coefficients, and figures of those that vary.
+fn coefficients(run: &FittedModel, document: &ResultDocument) -> String {
+    let mut ratios = run.ratios_figure();
+    // Ratios to a damping of zero to machine precision are rounding errors.
+    if document
+        .functions
+        .get("damping")
+        .is_some_and(|f| f.negligible)
+    {
+        let of_damping = ["c/m", "damping ratio ζ"];
+        ratios
+            .panels
+            .retain(|panel| !of_damping.contains(&panel.y.label.as_str()));
+    }
+    let varying = [run.functions_figure(), ratios].map(Figure::varying);
+    let varying: Vec<Figure> = varying.into_iter().flatten().collect();
+    overview::functions(document) + &figures_without(START, &varying)
+}
+
+/// Findings in the data and what was done with them, warnings, and automatic choices.
+fn data(document: &ResultDocument) -> String {
+    let lists = [
+        ("Findings", &document.data),
+        ("Warnings", &document.warnings),
+        ("Automatic choices", &document.automatic),
+    ];
+    let lists = lists.iter().filter(|(_, findings)| !findings.is_empty());
+    let lists = lists.map(|(heading, findings)| {
+        format!("<h3>{heading}</h3>\n{}", list(&Finding::texts(findings)))
+    });
+    lists.collect()
+}
+
+/// End, work and convergence of the search, folded.
+fn solver(run: &FittedModel, document: &ResultDocument) -> String {
     let mut drawn: Vec<Figure> = run.weights.map(weight_path).into_iter().collect();
-    if !run.fit.history.is_empty() {
+    // One iteration is no curve.
+    if run.fit.history.len() > 1 {
         drawn.push(run.convergence());
     }
     for (i, experiment) in run.model.problem.experiments.iter().enumerate() {
@@ -103,7 +141,11 @@ fn convergence(run: &FittedModel, document: &ResultDocument) -> String {
         drawn.push(run.titled(response, i, 0));
     }
     let work = overview::state(document) + &paragraph(&overview::work(document));
-    work + &list(&lines(|text| write_attempts(text, document))) + &figures(&drawn)
+    let attempts = list(&lines(|text| write_attempts(text, document)));
+    format!(
+        "<details>\n<summary>End of the search, work and convergence</summary>\n{work}{attempts}{}</details>\n",
+        figures(&drawn)
+    )
 }
 
 fn constraints(run: &FittedModel, document: &ResultDocument) -> String {
@@ -126,10 +168,13 @@ fn constraints(run: &FittedModel, document: &ResultDocument) -> String {
     paragraph(&hold) + &active + &list(&said)
 }
 
-/// Assumptions, nuisance parameters, notes on the bands, and the command of a study.
+/// Findings, assumptions, nuisance parameters, notes on the bands, and the command of a study.
 fn identifiability(run: &FittedModel, document: &ResultDocument) -> String {
     let known = &document.identifiability;
-    let mut text = match known.assumptions.as_slice() {
+    let notes: Vec<String> = document.notes().map(|f| f.text.clone()).collect();
+    let warnings: Vec<String> = document.fit_warnings().map(|f| f.text.clone()).collect();
+    let mut text = list(&notes) + &list(&warnings);
+    text += &match known.assumptions.as_slice() {
         [] => String::new(),
         list => paragraph(&format!("Assumptions: {}.", list.join("; "))),
     };

@@ -2,8 +2,9 @@
 //! well-formed XML. Without scripts each figure is an SVG drawing, with them an interactive chart.
 //!
 //! A content security policy permits only the style sheet and script of the page, by their SHA-256 digests, so that no
-//! text of a model can run as a script.
+//! text of a model can run as a script; and images within the page, by which a drawing becomes a PNG file.
 
+mod first_screen;
 mod fit;
 mod overview;
 mod reproducibility;
@@ -22,10 +23,11 @@ use sha2::{Digest, Sha256};
 const STYLE: &str = include_str!("page.css");
 
 /// In order of dependence.
-const SCRIPTS: [&str; 6] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("script/scale.js"),
     include_str!("script/draw.js"),
     include_str!("script/interaction.js"),
+    include_str!("script/download.js"),
     include_str!("script/chart.js"),
     include_str!("script/panel.js"),
     include_str!("script/start.js"),
@@ -36,6 +38,9 @@ const KEYS: &str = "Hover over a chart to show values; drag to zoom. Click, then
      Shift to zoom the vertical axis. Keys: arrows, Home and End move the cursor; hold Shift for larger steps; + and - zoom; Escape or a \
      double click resets the view. The legend entries show and hide curves.";
 
+/// The same in one line.
+const HELP: &str = "Charts: hover for values, drag to zoom, double click to reset; arrow keys, + and - do the same.";
+
 /// A page from its title and its body, which must be escaped.
 pub(super) fn page(title: &str, body: &str) -> String {
     let title = escape(title);
@@ -45,13 +50,13 @@ pub(super) fn page(title: &str, body: &str) -> String {
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; \
          base-uri 'none'; form-action 'none'; style-src '{style_hash}'; \
-         script-src '{script_hash}'\"/>\n\
+         script-src '{script_hash}'; img-src data:\"/>\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n\
          <meta name=\"color-scheme\" content=\"light dark\"/>\n\
          <title>{title}</title>\n<style>{style}</style>\n</head>\n<body>\n<main>\n\
-         <h1>{title}</h1>\n{body}</main>\n\
+         <h1>{title}</h1>\n{body}\
          <p id=\"chart-keys\" class=\"visually-hidden\">{}</p>\n\
-         <div id=\"chart-cursor\" class=\"visually-hidden\" aria-live=\"polite\"></div>\n\
+         <div id=\"chart-cursor\" class=\"visually-hidden\" aria-live=\"polite\"></div>\n</main>\n\
          <script>{script}</script>\n</body>\n</html>\n",
         escape(KEYS)
     )
@@ -92,9 +97,9 @@ fn figure(figure: &Figure, off: &[&str]) -> String {
     )
 }
 
-/// Instructions for the charts, shown only with scripts.
+/// Instructions for the charts in one line, shown only with scripts.
 pub(super) fn help() -> String {
-    format!("<p class=\"soft screen\">{}</p>\n", escape(KEYS))
+    format!("<p class=\"soft screen\">{}</p>\n", escape(HELP))
 }
 
 /// Figures one below the other.

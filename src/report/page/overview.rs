@@ -1,80 +1,13 @@
-//! First part of the page of a fit: verdict, answer, main figures, identifiability, warnings, suggestions; and the
-//! tables of records and work.
+//! Status, key figures, and the tables of coefficients, records and work.
 
 use super::table::{list, number, table};
-use crate::finding::Finding;
-use crate::report::answer::{AnswerRow, answer};
-use crate::report::document::{ChannelSummary, ResultDocument, level_in_words};
-use crate::report::equation::equation_residual;
+use crate::report::document::{ChannelSummary, ResultDocument};
 use crate::report::suggestions;
 use crate::report::summary::{count, iterations};
 use crate::report::text::{escape, prose};
-use kmcfit_core::internals::assessment::{FunctionSummary, VerdictLevel};
+use kmcfit_core::internals::assessment::FunctionSummary;
 use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::solvers::Status;
-
-/// Everything above the contents.
-pub(super) fn overview(document: &ResultDocument) -> String {
-    let mut warnings = texts(document.fit_warnings());
-    warnings.extend(Finding::texts(&document.warnings));
-    let equation = document.equation.iter();
-    let equation = equation.map(|b| equation_residual(b, document.is_rotation()));
-    let lists = [
-        ("Equation of motion", equation.collect()),
-        ("Identifiability", texts(document.notes())),
-        ("Data", Finding::texts(&document.data)),
-        ("Warnings", warnings),
-        ("Suggestions", Finding::texts(&document.advice)),
-        ("Automatic choices", Finding::texts(&document.automatic)),
-    ];
-    let lists = lists.iter().filter(|(_, sentences)| !sentences.is_empty());
-    let lists =
-        lists.map(|(heading, sentences)| format!("<h3>{heading}</h3>\n{}", list(sentences)));
-    verdict(document) + &answers(document) + &facts(document) + &lists.collect::<String>()
-}
-
-/// The sentences of findings.
-fn texts<'a>(findings: impl Iterator<Item = &'a Finding>) -> Vec<String> {
-    findings.map(|finding| finding.text.clone()).collect()
-}
-
-/// Verdict as a coloured word, and its reasons.
-fn verdict(document: &ResultDocument) -> String {
-    let Some(verdict) = &document.verdict else {
-        return state(document);
-    };
-    let colour = match verdict.level {
-        VerdictLevel::Adequate => "good",
-        VerdictLevel::Check => "warn",
-        VerdictLevel::Inadequate => "bad",
-    };
-    let reasons = match verdict.reasons.as_slice() {
-        [] => vec![verdict.passed.clone()],
-        reasons => Finding::texts(reasons),
-    };
-    format!(
-        "<p><span class=\"state {colour}\">{}</span> {}</p>\n",
-        level_in_words(verdict.level),
-        prose(&reasons.join("; "))
-    )
-}
-
-/// Table of the answer.
-fn answers(document: &ResultDocument) -> String {
-    let row = |row: AnswerRow| {
-        vec![
-            row.quantity,
-            row.estimate,
-            row.interval,
-            row.range,
-            row.unit,
-            row.status,
-        ]
-    };
-    let rows: Vec<Vec<String>> = answer(document).into_iter().map(row).collect();
-    let headings = ["quantity", "mean", "95 % CI", "range", "unit", "status"];
-    table(&headings, &rows)
-}
 
 /// Status of the solver as a coloured word, and the reason.
 pub(super) fn state(document: &ResultDocument) -> String {
@@ -92,7 +25,7 @@ pub(super) fn state(document: &ResultDocument) -> String {
 }
 
 /// Main figures: cost ratio, fit, chi-square, samples, parameters, rank bound.
-fn facts(document: &ResultDocument) -> String {
+pub(super) fn facts(document: &ResultDocument) -> String {
     let samples: usize = document.experiments.iter().map(|e| e.samples).sum();
     let mut facts = Vec::new();
     if document.has_ratio() {
@@ -166,7 +99,7 @@ pub(super) fn functions(document: &ResultDocument) -> String {
         cells
     };
     let rows: Vec<Vec<String>> = functions.iter().map(row).collect();
-    table(&headings, &rows)
+    table("Coefficients", &headings, &rows)
 }
 
 /// A classification as an entry of the table.
@@ -209,7 +142,7 @@ pub(super) fn records(document: &ResultDocument) -> String {
         "sigma",
         "samples",
     ];
-    table(&headings, &rows) + &list(&notes)
+    table("Fit of each channel", &headings, &rows) + &list(&notes)
 }
 
 fn record(name: &str, channel: &ChannelSummary) -> Vec<String> {

@@ -28,6 +28,8 @@ pub(super) fn reproducibility(run: &FittedModel, document: &ResultDocument) -> S
         + &data(source)
         + "<h3>The model file</h3>\n"
         + &block(source.text.trim_end())
+        + "<h3 id=\"cite\">How to cite</h3>\n"
+        + &cite()
 }
 
 /// A command of the program on the model of the run.
@@ -48,11 +50,11 @@ fn data(source: &ModelSource) -> String {
         vec![file.name.clone(), size, digest]
     };
     let rows: Vec<Vec<String>> = source.data.iter().map(row).collect();
-    table(&["data file", "bytes", "SHA-256"], &rows)
+    table("Data files", &["data file", "bytes", "SHA-256"], &rows)
 }
 
 /// The program, and the paper whose problem it solves.
-pub(super) fn cite() -> String {
+fn cite() -> String {
     let program = format!(
         "kmcfit, version {}: {}.",
         env!("CARGO_PKG_VERSION"),

@@ -2,29 +2,32 @@
 
 use crate::report::text::{decade, escape, prose};
 
-/// A table with a heading for each column; the first cell of a row is its heading.
-pub(super) fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
+/// A table named `name` with a heading for each column; the first cell of a row is its heading. On narrow screens each row is a list of
+/// its values with their headings, so that no column is hidden; the roles keep it a table for screen readers.
+pub(super) fn table(name: &str, headings: &[&str], rows: &[Vec<String>]) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    let heading = |h: &&str| match *h {
-        "" => "<td></td>".to_string(),
-        text => format!("<th scope=\"col\">{}</th>", escape(text)),
-    };
+    let heading = |h: &&str| format!("<th scope=\"col\" role=\"columnheader\">{}</th>", escape(h));
     let head: String = headings.iter().map(heading).collect();
-    let body: String = rows.iter().map(|cells| row(cells)).collect();
+    let body: String = rows.iter().map(|cells| row(headings, cells)).collect();
     format!(
-        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"table\">\n<table>\n\
-         <thead>\n<tr>{head}</tr>\n</thead>\n<tbody>\n{body}</tbody>\n</table>\n</div>\n"
+        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{}\">\n<table class=\"stack\" role=\"table\">\n\
+         <thead role=\"rowgroup\">\n<tr role=\"row\">{head}</tr>\n</thead>\n<tbody role=\"rowgroup\">\n{body}</tbody>\n</table>\n</div>\n",
+        escape(name)
     )
 }
 
-fn row(cells: &[String]) -> String {
-    let mut text = String::from("<tr>");
+fn row(headings: &[&str], cells: &[String]) -> String {
+    let mut text = String::from("<tr role=\"row\">");
     for (i, cell) in cells.iter().enumerate() {
+        let heading = escape(headings.get(i).copied().unwrap_or_default());
         text += &match i {
-            0 => format!("<th scope=\"row\">{}</th>", escape(cell)),
-            _ => format!("<td>{}</td>", escape(cell)),
+            0 => format!("<th scope=\"row\" role=\"rowheader\">{}</th>", escape(cell)),
+            _ => format!(
+                "<td role=\"cell\" data-heading=\"{heading}\">{}</td>",
+                escape(cell)
+            ),
         };
     }
     text + "</tr>\n"
@@ -93,11 +96,11 @@ mod tests {
     #[test]
     fn texts_are_escaped() {
         let bad = "<b>&";
-        let all = table(&[bad], &[vec![bad.into(), bad.into()]])
+        let all = table(bad, &[bad], &[vec![bad.into(), bad.into()]])
             + &pairs(&[(bad, bad.into())])
             + &list(&[bad.into()])
             + &paragraph(bad);
-        assert_eq!(all.matches("&lt;b&gt;&amp;").count(), 7);
+        assert_eq!(all.matches("&lt;b&gt;&amp;").count(), 8);
         assert!(!all.contains("<b>"));
     }
 }

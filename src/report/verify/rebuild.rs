@@ -32,10 +32,8 @@ pub(super) struct Rebuilt {
 pub(super) fn rebuilt(run: &Run, parameters: &ParametersDocument) -> Result<Rebuilt, InputError> {
     let document = &run.document;
     let overrides = Override::parse_all(&document.model.overrides)?;
-    let file =
-        ModelFile::read_with_overrides(&document.model.file, &overrides).map_err(|error| {
-            error.hint("run `kmcfit verify` in the folder in which the run was made")
-        })?;
+    let file = ModelFile::read_with_overrides(&document.model.file, &overrides)
+        .map_err(|error| error.hint("run this command in the folder in which the run was made"))?;
     let model = build(&file, BuildMode::Fit)?;
     let mut model = on_grid(run, model)?;
     if let Some(width) = document.model.friction_width {
@@ -125,7 +123,7 @@ fn differs(run: &Run, expected: &str, found: &str) -> InputError {
 }
 
 fn uncovered(run: &Run, found: &str) -> InputError {
-    InputError::file(&run.folder, "this kind of fit cannot be verified")
+    InputError::file(&run.folder, "this kind of fit cannot be rebuilt")
         .found(found)
         .expected("a fit that its parameters and the noise of its channels describe")
         .hint("fit the model again into another folder and compare the result documents")

@@ -177,16 +177,17 @@ pub fn driven_oscillator(
 pub struct Mobility {
     /// Frequency spacing, Hz.
     pub resolution: f64,
-    /// Squared mobility.
+    /// Squared mobility; NaN at frequency zero.
     pub squares: Vec<f64>,
-    coherence: Vec<f64>,
+    /// Coherence of response and force, 0 to 1; NaN at frequency zero.
+    pub coherence: Vec<f64>,
     /// Density of the force relative to its median.
     drive: Vec<f64>,
 }
 
 impl Mobility {
-    /// Mobility of the response to a force; `derivatives` is the order of the derivative of the displacement that the response is. `None` for too
-    /// few samples.
+    /// Mobility of the response to a force; `derivatives` is the order of the derivative of the displacement that the response is; 1 gives the
+    /// squared ratio of the response to the input itself. `None` for too few samples.
     pub fn of(force: &[f64], response: &[f64], spacing: f64, derivatives: i32) -> Option<Self> {
         let CrossSpectra { resolution, sums } = CrossSpectra::of(force, response, spacing)?;
         let drive: Vec<f64> = sums.iter().map(|(xx, ..)| *xx).collect();

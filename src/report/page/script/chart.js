@@ -59,8 +59,9 @@ class Chart {
     const bar = element("div", { class: "bar" }, this.live);
     this.keys = element("div", { class: "keys", role: "group", "aria-label": `Curves of ${this.title}` }, bar);
     const tools = element("div", { class: "tools", role: "group", "aria-label": `Zoom of ${this.title}` }, bar);
-    const button = (text, name, act) => {
-      const made = element("button", { type: "button", "aria-label": name, title: name }, tools);
+    const files = element("div", { class: "tools", role: "group", "aria-label": `Downloads of ${this.title}` }, bar);
+    const button = (text, name, act, group = tools) => {
+      const made = element("button", { type: "button", "aria-label": name, title: name }, group);
       made.textContent = text;
       made.addEventListener("click", act);
       return made;
@@ -71,7 +72,11 @@ class Chart {
     });
     button("+", "Zoom in", each(0.5));
     button("−", "Zoom out", each(2));
-    this.whole = button("Reset", "Show everything again", () => this.reset());
+    this.whole = button("Reset", "Reset: show everything again", () => this.reset());
+    const file = this.figure.id.replace("figure-", "");
+    button("SVG", "SVG: download the drawing", () => saveSvg(this.figure, file), files);
+    button("PNG", "PNG: download the drawing", () => savePng(this.figure, file), files);
+    button("CSV", "CSV: download the numbers", () => saveCsv(this.panels, file), files);
   }
 
   xAxes() {

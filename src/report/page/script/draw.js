@@ -56,6 +56,14 @@ const dotPath = (mark, view) => {
   return path;
 };
 
+/** Lines from zero to the points. */
+const stemPath = (mark, view) => {
+  let path = "";
+  const foot = fixed(view.near(view.py(0)));
+  walk(mark, mark.y, view, (px, py) => { path += `M${fixed(px)} ${foot}V${fixed(view.near(py))}`; }, () => {});
+  return path;
+};
+
 /** The areas between two curves, one for each stretch without a gap. */
 const bandPath = (mark, view) => {
   let [path, low, high] = ["", [], []];
@@ -80,6 +88,7 @@ const pathOf = (mark, view) => {
   switch (mark.kind) {
     case "line": return linePath(mark, mark.y, view);
     case "points": return dotPath(mark, view);
+    case "stems": return stemPath(mark, view);
     case "band": return bandPath(mark, view);
     case "across": return `M${left} ${fixed(view.near(view.py(mark.y[0])))}h${width}`;
     case "upright": return `M${fixed(view.px(mark.x[0]))} ${top}v${height}`;
@@ -129,7 +138,7 @@ const valueAt = (mark, ys, view, x) => {
   if (!mark.rising || !mark.x.length) return null;
   const i = indexBefore(mark.x, x);
   const next = mark.x[i + 1];
-  if (mark.kind === "points") {
+  if (mark.kind === "points" || mark.kind === "stems") {
     const near = next !== undefined && (0 > i || next - x <= x - mark.x[i]) ? i + 1 : i;
     return { x: mark.x[near], y: ys[near] };
   }

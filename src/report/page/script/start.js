@@ -22,4 +22,6 @@ const begin = () => {
 };
 
 begin();
+// Paper shows what is folded.
+addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((part) => { part.open = true; }));
 document.documentElement.classList.add("scripted");

@@ -1,0 +1,164 @@
+//! First screen of the page of a fit: data file and date, verdict with its reasons, answer, main figure, advice.
+
+use super::figures;
+use super::overview::state;
+use super::table::{list, table};
+use crate::config::DataFile;
+use crate::finding::Finding;
+use crate::number_format::significant;
+use crate::report::FittedModel;
+use crate::report::answer::{AnswerRow, answer};
+use crate::report::document::{ResultDocument, level_in_words};
+use crate::report::summary::count;
+use crate::report::text::{escape, prose};
+use kmcfit_core::internals::assessment::VerdictLevel;
+use std::path::Path;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Seconds of a day.
+const DAY: u64 = 86_400;
+
+/// Everything above the contents.
+pub(super) fn first_screen(run: &FittedModel, document: &ResultDocument) -> String {
+    let main: String = figures(&run.main_figure(document).into_iter().collect::<Vec<_>>());
+    format!(
+        "<p class=\"soft\">{}</p>\n{}<div class=\"first\">\n<div>\n{}{}</div>\n<div>\n{main}</div>\n</div>\n",
+        escape(&source(run, document)),
+        verdict(document),
+        answers(document),
+        advice(document)
+    )
+}
+
+/// Data file, number of samples, duration, and date of the file.
+fn source(run: &FittedModel, document: &ResultDocument) -> String {
+    let samples: usize = document.experiments.iter().map(|e| e.samples).sum();
+    let files = &run.model.source.data;
+    let mut parts = Vec::new();
+    parts.extend(match files.as_slice() {
+        [] => None,
+        [only] => Some(name(only)),
+        [first, rest @ ..] => Some(format!(
+            "{} and {}",
+            name(first),
+            count(rest.len(), "further file")
+        )),
+    });
+    parts.push(count(samples, "sample"));
+    parts.push(format!("{} s", significant(document.model.duration, 4)));
+    parts.extend(files.iter().filter_map(|f| f.modified).max().and_then(date));
+    parts.join(", ")
+}
+
+/// Name of a file without its folder.
+fn name(file: &DataFile) -> String {
+    let name = Path::new(&file.name).file_name();
+    name.map_or(file.name.clone(), |name| {
+        name.to_string_lossy().into_owned()
+    })
+}
+
+/// The day of a time as `2026-03-02`, in universal time; `None` before 1970.
+fn date(time: SystemTime) -> Option<String> {
+    let days = time.duration_since(UNIX_EPOCH).ok()?.as_secs() / DAY;
+    let is_leap = |year: u64| {
+        year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400))
+    };
+    let (mut year, mut day) = (1970, days);
+    while day >= 365 + u64::from(is_leap(year)) {
+        day -= 365 + u64::from(is_leap(year));
+        year += 1;
+    }
+    let mut month = 1;
+    for length in [
+        31,
+        28 + u64::from(is_leap(year)),
+        31,
+        30,
+        31,
+        30,
+        31,
+        31,
+        30,
+        31,
+        30,
+    ] {
+        if day < length {
+            break;
+        }
+        day -= length;
+        month += 1;
+    }
+    Some(format!("{year}-{month:02}-{:02}", day + 1))
+}
+
+/// Verdict as a coloured word, and its reasons.
+fn verdict(document: &ResultDocument) -> String {
+    let Some(verdict) = &document.verdict else {
+        return state(document);
+    };
+    let colour = match verdict.level {
+        VerdictLevel::Adequate => "good",
+        VerdictLevel::Check => "warn",
+        VerdictLevel::Inadequate => "bad",
+    };
+    let reasons = match verdict.reasons.as_slice() {
+        [] => vec![verdict.passed.clone()],
+        reasons => Finding::texts(reasons),
+    };
+    format!(
+        "<p class=\"verdict-line\"><span class=\"state {colour}\">{}</span> {}</p>\n",
+        level_in_words(verdict.level),
+        prose(&reasons.join("; "))
+    )
+}
+
+/// Table of the answer.
+fn answers(document: &ResultDocument) -> String {
+    let row = |row: AnswerRow| {
+        let status = row.status_and_range();
+        let estimate = match row.estimate.as_str() {
+            "" => String::new(),
+            estimate => format!("{estimate} {}", row.unit).trim_end().to_owned(),
+        };
+        vec![row.quantity, estimate, row.interval, status]
+    };
+    let rows: Vec<Vec<String>> = answer(document).into_iter().map(row).collect();
+    table(
+        "Answer",
+        &["quantity", "estimate", "95 % CI", "status"],
+        &rows,
+    )
+}
+
+/// The recommendations, the most urgent first.
+fn advice(document: &ResultDocument) -> String {
+    match Finding::texts(&document.advice).as_slice() {
+        [] => String::new(),
+        [only] => format!("<p><strong>Next:</strong> {}</p>\n", prose(only)),
+        several => format!("<p><strong>Next:</strong></p>\n{}", list(several)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    /// Seconds since 1970 of the tool `date -d DAY +%s`.
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        for (seconds, expected) in [
+            (0, "1970-01-01"),
+            (951_782_400, "2000-02-29"),
+            (1_709_251_199, "2024-02-29"),
+            (1_709_251_200, "2024-03-01"),
+            (1_772_409_600, "2026-03-02"),
+            (4_107_542_400, "2100-03-01"),
+        ] {
+            let time = UNIX_EPOCH + Duration::from_secs(seconds);
+            assert_eq!(date(time).as_deref(), Some(expected));
+        }
+        assert_eq!(date(UNIX_EPOCH - Duration::from_secs(1)), None);
+    }
+}
