@@ -534,7 +534,8 @@ fn a_folder_that_cannot_be_written_to() {
     );
 }
 
-/// The system clock, which may be set back, is not used: times are taken from monotonic clocks.
+/// The system clock, which may be set back, is not used: times are taken from monotonic clocks. The page shows the day of the last
+/// change of the data files, with which nothing is computed.
 #[test]
 fn no_system_clock() {
     fn look(folder: &std::path::Path, found: &mut usize) {
@@ -544,6 +545,10 @@ fn no_system_clock() {
                 look(&path, found);
             } else {
                 *found += 1;
+                let shows_day = ["config/source.rs", "page/first_screen.rs"];
+                if shows_day.iter().any(|name| path.ends_with(name)) {
+                    continue;
+                }
                 let text = std::fs::read_to_string(&path).expect("text");
                 let asks = ["SystemTime", ".modified()", ".created()"];
                 assert!(
