@@ -110,7 +110,7 @@ fn with_page(bench: &Workbench, file: &str, look: impl Fn(&Document)) {
         "http:",
         "https:",
         "src=",
-        "href",
+        "href=\"",
         "@import",
         "<script>alert",
     ] {

@@ -142,7 +142,7 @@ fn excluded_samples_are_stated_everywhere() {
     let summary = bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
     assert!(summary.contains("left out"), "{summary}");
     let page = bench.read("run/report.html");
-    assert!(page.contains("<h3>Data</h3>") && page.contains("2 spikes in the displacement"));
+    assert!(page.contains(">Data</h2>") && page.contains("2 spikes in the displacement"));
     let after = document(&bench, "run");
     assert_eq!(after["verdict"]["level"], "adequate");
     assert_eq!(kinds(&after, "data"), ["dropouts", "spikes"]);

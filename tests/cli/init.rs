@@ -301,7 +301,7 @@ fn an_unknown_mass_leaves_ratios() {
 
     Mass   the mass is unknown: all coefficients are ratios to it; `--set functions.mass.fixed=4.5` (kg) states it
     Fit    99.44 % of displacement; residual 5.74e-5 m rms
-           extremes of the decay 2.0015 Hz, logarithmic decrement 0.01003: agree with the estimates
+           extremes of the decay 2.0015 Hz, damping ratio 0.01003 (logarithmic decrement): agree with the estimates
     results in shown
     ");
     bench.write("force.csv", "t_s,f_N\n0,1\n1,2\n2,1\n");
