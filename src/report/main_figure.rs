@@ -19,7 +19,12 @@ impl FittedModel<'_> {
             let summary = document.functions.get(&function.name());
             let verdict = summary.and_then(|summary| summary.verdict);
             let is_fixed = summary.is_some_and(|summary| summary.fixed);
-            !is_fixed && verdict != Some(ClassificationKind::NotIdentified)
+            // A coefficient that does not differ from zero varies by rounding errors.
+            let mut estimates = document.estimates.0.iter();
+            let estimate = estimates.find(|(name, _)| *name == function.name());
+            let interval = estimate.and_then(|(_, estimate)| estimate.ci95);
+            let is_zero = interval.is_some_and(|[low, high]| low <= 0.0 && high >= 0.0);
+            !is_fixed && !is_zero && verdict != Some(ClassificationKind::NotIdentified)
         });
         let scored = panels.filter_map(|(_, panel)| Some((variation(&panel)?, panel)));
         let most = scored.max_by(|a, b| a.0.total_cmp(&b.0));
