@@ -291,13 +291,13 @@ impl StudyRun<'_> {
         let model = Arc::clone(&self.model);
         let plan = &model.study;
         self.document.sensitivity = Some(self.analysis("sensitivity", || study::sensitivity(at))?);
-        let bands = || study::bands(at, plan, model.truth.as_ref());
+        let bands = || study::bands(at, &model);
         self.document.bands = Some(self.analysis("bands", bands)?);
         for (i, target) in plan.profiles.iter().enumerate() {
             let Some(of) = study::linear(at.problem, target) else {
                 continue;
             };
-            let profile = || study::profile_of(at, &of, plan);
+            let profile = || study::profile_of(at, &of, &model);
             let found = self.analysis(&format!("profile {i}"), profile)?;
             let found = self.or_fail(&format!("profile of {}", of.name), found);
             self.document.profiles.extend(found);
@@ -327,7 +327,11 @@ impl StudyRun<'_> {
         }
         if plan.replicates > 0 {
             let found = self.analysis("bootstrap", || study::refits(at, plan, threads))?;
-            self.document.bootstrap = self.or_fail("bootstrap", found).unwrap_or_default();
+            let mut found = self.or_fail("bootstrap", found).unwrap_or_default();
+            for interval in &mut found {
+                interval.unit = model.converted_unit(&interval.unit).to_owned();
+            }
+            self.document.bootstrap = found;
         }
         Ok(())
     }

@@ -18,7 +18,7 @@ use super::tables::{FUNCTION_ROWS, TRAJECTORY_ROWS};
 use super::timings::{OverheadTimings, TimingsSummary};
 use crate::config::{ChannelNote, Model};
 use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, RequestedFiles, Stage};
-use kmcfit_core::internals::functions::{CoefficientFunction, WeightRule};
+use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, WeightRule};
 use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::solvers::{
     ActiveGroup, Attempt, Fit, PathPoint, Solver, Status, WeightPath, active_constraints, timed,
@@ -58,11 +58,22 @@ pub struct FittedModel<'a> {
 impl Model {
     /// SI unit of a function, for a rotation if the channels are angles; per unit of the mass if this is unknown.
     pub(super) fn unit(&self, function: &CoefficientFunction) -> &'static str {
+        self.unit_of(function.quantity)
+    }
+
+    fn unit_of(&self, kind: CoefficientKind) -> &'static str {
         match self.is_rotation() {
-            is_rotation if self.has_unknown_mass => ratios::unit(function.quantity, is_rotation),
-            true => function.quantity.angular_unit(),
-            false => function.quantity.unit(),
+            is_rotation if self.has_unknown_mass => ratios::unit(kind, is_rotation),
+            true => kind.angular_unit(),
+            false => kind.unit(),
         }
+    }
+
+    /// The unit of a result that is in the SI unit `unit` of a coefficient of a translation; others are unchanged.
+    pub(crate) fn converted_unit<'a>(&self, unit: &'a str) -> &'a str {
+        let mut kinds = CoefficientKind::ALL.into_iter();
+        let kind = kinds.find(|kind| kind.unit() == unit);
+        kind.map_or(unit, |kind| self.unit_of(kind))
     }
 
     /// True if the channels are angles.

@@ -313,3 +313,16 @@ fn a_journal_of_another_shape() {
         assert_eq!(bench.read("run/study.json"), study, "{from}");
     }
 }
+
+/// The coefficients of a rotation have the units of a moment per angle.
+#[test]
+fn a_study_of_a_rotation_has_its_units() {
+    let bench = Workbench::with_shipped_models();
+    let text = bench.run_to(0, &["study", "models/roll-decay.yaml"]);
+    for unit in ["kg m^2", "N m s/rad", "N m/rad^3"] {
+        assert!(text.contains(unit), "{unit}\n{text}");
+    }
+    for unit in ["kg (", "N s/m", "N/m^3"] {
+        assert!(!text.contains(unit), "{unit}\n{text}");
+    }
+}

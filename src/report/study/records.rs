@@ -27,7 +27,6 @@ use kmcfit_core::internals::study::profile_likelihood::{Interval, ProfileSetting
 use kmcfit_core::internals::study::{
     Choice, EquivalentSystem, Linear, equivalent_systems, prediction, profile,
 };
-use kmcfit_core::internals::system::NodalCoefficients;
 
 /// Parameter combinations in the figures, from each end of the spectrum.
 const DIRECTIONS: usize = 3;
@@ -92,13 +91,17 @@ pub fn sensitivity(at: Optimum) -> SensitivityRecord {
 }
 
 /// Confidence bands and the classification by them.
-pub fn bands(at: Optimum, plan: &StudyPlan, truth: Option<&NodalCoefficients>) -> BandsRecord {
+pub fn bands(at: Optimum, model: &Model) -> BandsRecord {
+    let (plan, truth) = (&model.study, model.truth.as_ref());
     let (problem, evaluation) = (at.problem, at.evaluation);
     let settings = BandSettings {
         draws: DRAWS,
         seed: plan.seed,
     };
-    let bands = Bands::at(problem, at.theta, evaluation, &settings);
+    let mut bands = Bands::at(problem, at.theta, evaluation, &settings);
+    for band in &mut bands.functions {
+        band.unit = model.converted_unit(&band.unit).to_owned();
+    }
     let factor = normal_half_width(plan.confidence);
     let plausibility = Plausibility::at(problem, evaluation);
     let judged = match plausibility.errors_hold {
@@ -241,12 +244,13 @@ pub fn linear(problem: &Problem, target: &StudyTarget) -> Option<Linear> {
 ///
 /// # Errors
 /// The reason for which there is none.
-pub fn profile_of(at: Optimum, of: &Linear, plan: &StudyPlan) -> Result<ProfileRecord, String> {
+pub fn profile_of(at: Optimum, of: &Linear, model: &Model) -> Result<ProfileRecord, String> {
     let how = ProfileSettings {
-        quantile: chi_square_one(plan.confidence),
+        quantile: chi_square_one(model.study.confidence),
         ..ProfileSettings::default()
     };
-    let found = profile(at.problem, at.theta, of, &how).map_err(|error| error.to_string())?;
+    let mut found = profile(at.problem, at.theta, of, &how).map_err(|error| error.to_string())?;
+    found.unit = model.converted_unit(&found.unit).to_owned();
     let marks = found.marks.iter();
     Ok(ProfileRecord {
         text: found.sentence(),
@@ -450,7 +454,7 @@ pub fn extremes(
         };
         records.push(ExtremesRecord {
             name: found.name,
-            unit: found.unit.to_owned(),
+            unit: model.converted_unit(found.unit).to_owned(),
             times: plan.extremes.clone(),
             low: found.bands.iter().map(|band| band.low.value).collect(),
             high: found.bands.iter().map(|band| band.high.value).collect(),
