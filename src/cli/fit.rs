@@ -290,7 +290,9 @@ pub(super) fn fit_into(
 /// The reason for a run without draws.
 fn no_draws(reason: NoDraws) -> String {
     match reason {
-        NoDraws::NoCovariance => "no draws: the estimates have no covariance",
+        NoDraws::NoCovariance => {
+            "no draws: the estimates have no covariance, or more than 64 parameters"
+        }
         NoDraws::Constraints => "no draws: fewer than one in a thousand satisfies the constraints",
     }
     .to_owned()

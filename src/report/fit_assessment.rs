@@ -14,6 +14,7 @@ use kmcfit_core::internals::solvers::{
     EquationBalance, Fit, MissingTerm, Solver, Status, equation_balance, missing_terms,
     predict_validation,
 };
+use std::ops::Range;
 
 /// Assessment of a fit, computed once for all its documents.
 #[derive(Debug, Clone)]
@@ -53,12 +54,12 @@ impl RunAssessment {
         }
     }
 
-    /// Variances of the parameters of a simulated response, if standard errors are meaningful.
-    pub(super) fn variances(&self) -> Option<Vec<f64>> {
+    /// Variances of the scalars with the indices `range` of a simulated response, if standard errors are meaningful.
+    pub(super) fn scalar_variances(&self, range: Range<usize>) -> Option<Vec<f64>> {
         let assessment = self.assessment.as_ref()?;
         match (&assessment.covariance, &assessment.large_covariance) {
-            (Some(covariance), _) => Some(covariance.diagonal().iter().copied().collect()),
-            (None, large) => large.as_ref().map(|large| large.variances.clone()),
+            (Some(covariance), _) => Some(range.map(|index| covariance[(index, index)]).collect()),
+            (None, large) => large.as_ref().map(|large| large.scalar_variances.clone()),
         }
     }
 

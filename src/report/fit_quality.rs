@@ -73,7 +73,7 @@ fn noise(correlation: &Correlation) -> NoiseSummary {
     }
 }
 
-/// The nuisance parameters of a problem at a point, with standard errors from the covariance if available, and the degrees of freedom of
+/// The nuisance parameters of a problem at a point, with standard errors from their `variances` if available, and the degrees of freedom of
 /// all parameters.
 pub fn scalars(
     problem: &Problem,
@@ -83,16 +83,16 @@ pub fn scalars(
 ) -> Vec<NuisanceParameter> {
     let range = problem.functions.scalar_range();
     let list = problem.functions.scalars().iter().zip(range);
-    list.zip(&evaluation.scalars)
-        .map(|((scalar, index), value)| NuisanceParameter {
-            name: scalar.name.clone(),
-            unit: scalar.unit.clone(),
-            value: *value,
-            standard_error: variances.map(|variances| variances[index].sqrt()),
-            degrees_of_freedom: (degrees.get(index).copied())
-                .filter(|d| variances.is_some() && d.is_finite()),
-        })
-        .collect()
+    let list = list.zip(&evaluation.scalars).enumerate();
+    list.map(|(place, ((scalar, index), value))| NuisanceParameter {
+        name: scalar.name.clone(),
+        unit: scalar.unit.clone(),
+        value: *value,
+        standard_error: variances.map(|variances| variances[place].sqrt()),
+        degrees_of_freedom: (degrees.get(index).copied())
+            .filter(|d| variances.is_some() && d.is_finite()),
+    })
+    .collect()
 }
 
 /// Summary of a validation record.
@@ -108,7 +108,8 @@ pub(super) fn validation(held: &ValidationRecord) -> ValidationSummary {
     match &held.found {
         Ok((problem, evaluation)) => {
             let covariance = problem.covariance(evaluation);
-            let variances = covariance.map(|c| c.diagonal().iter().copied().collect::<Vec<_>>());
+            let range = problem.functions.scalar_range();
+            let variances = covariance.map(|c| range.map(|i| c[(i, i)]).collect::<Vec<f64>>());
             let degrees = problem.degrees_of_freedom(evaluation);
             summary.nuisance_parameters =
                 scalars(problem, evaluation, variances.as_deref(), &degrees);

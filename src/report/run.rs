@@ -185,7 +185,8 @@ impl FittedModel<'_> {
                 .collect(),
             nuisance_parameters: match self.is_simulated() {
                 true => {
-                    let variances = self.run_assessment.variances();
+                    let scalars = model.problem.functions.scalar_range();
+                    let variances = self.run_assessment.scalar_variances(scalars);
                     let degrees = (self.run_assessment.assessment.as_ref())
                         .map_or(&[][..], |a| &a.degrees_of_freedom);
                     fit_quality::scalars(

@@ -3,6 +3,7 @@
 //! Each case is a model or record with one defect. The fit names the advice; the model is changed as it says, and the root-mean-square
 //! residual of a validation record of the same system, without noise and defect, falls.
 
+use crate::oscillator::displacements;
 use crate::workbench::Workbench;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -22,10 +23,6 @@ struct System {
     rate: f64,
     cubic: f64,
     friction: f64,
-    /// Force that is not measured, N.
-    static_force: f64,
-    /// Damping per (m/s)^2.
-    quadratic: f64,
 }
 
 fn white(seed: u64, count: usize) -> Vec<f64> {
@@ -49,32 +46,14 @@ impl System {
     fn acceleration(&self, t: f64, y: f64, v: f64, f: f64) -> f64 {
         let friction = self.friction * (v / 1e-4).clamp(-1.0, 1.0);
         let spring = (800.0 + self.rate * t) * y + self.cubic * y * y * y;
-        (f + self.static_force - (3.0 + self.quadratic * v.abs()) * v - spring - friction) / 2.0
+        (f - 3.0 * v - spring - friction) / 2.0
     }
 
-    /// Displacements at the samples, by the fourth-order method of Runge and Kutta, from rest.
+    /// Displacements at the samples, from rest.
     fn displacement(&self, force: &[f64]) -> Vec<f64> {
-        let h = SPACING / SUBSTEPS as f64;
-        let (mut y, mut v) = (0.0, 0.0);
-        let mut samples = vec![y];
-        for (i, pair) in force.windows(2).enumerate() {
-            for s in 0..SUBSTEPS {
-                let slope = |part: f64, y: f64, v: f64| {
-                    let share = (s as f64 + part) / SUBSTEPS as f64;
-                    let f = pair[0] + share * (pair[1] - pair[0]);
-                    let t = SPACING * (i as f64 + share);
-                    [v, self.acceleration(t, y, v, f)]
-                };
-                let a = slope(0.0, y, v);
-                let b = slope(0.5, y + 0.5 * h * a[0], v + 0.5 * h * a[1]);
-                let c = slope(0.5, y + 0.5 * h * b[0], v + 0.5 * h * b[1]);
-                let d = slope(1.0, y + h * c[0], v + h * c[1]);
-                y += h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0]);
-                v += h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1]);
-            }
-            samples.push(y);
-        }
-        samples
+        let acceleration = |t, y, v, f| self.acceleration(t, y, v, f);
+        let all = displacements(force, SPACING, SUBSTEPS, acceleration);
+        all.into_iter().step_by(SUBSTEPS).collect()
     }
 }
 
@@ -342,8 +321,6 @@ const LINEAR: System = System {
     rate: 0.0,
     cubic: 0.0,
     friction: 0.0,
-    static_force: 0.0,
-    quadratic: 0.0,
 };
 
 #[test]

@@ -4,6 +4,7 @@
 //! The good record: an oscillator of 1 Hz with 3 % damping under a broadband force, 400 samples at 20 Hz with 2 % white noise.
 //! `KMCFIT_ROUNDS` repeats all cases with further seeds; `--nocapture` prints the table of `docs/long/corruptions.md`.
 
+use crate::oscillator::displacements;
 use crate::workbench::Workbench;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -176,30 +177,11 @@ impl Good {
     }
 }
 
-/// Displacement of `2 y'' + 0.75 y' + 79 y = f` from rest, by the method of Runge and Kutta.
+/// Displacement of `2 y'' + 0.75 y' + 79 y = f` from rest, at every step.
 fn response(force: &[f64]) -> Vec<f64> {
     let (m, k) = (2.0, 2.0 * std::f64::consts::TAU.powi(2));
     let c = 2.0 * m * std::f64::consts::TAU * 0.03;
-    let h = SPACING / STEPS as f64;
-    let (mut y, mut v) = (0.0, 0.0);
-    let mut all = vec![y];
-    for pair in force.windows(2) {
-        for s in 0..STEPS {
-            let slope = |part: f64, y: f64, v: f64| {
-                let share = (s as f64 + part) / STEPS as f64;
-                let f = pair[0] + share * (pair[1] - pair[0]);
-                [v, (f - c * v - k * y) / m]
-            };
-            let a = slope(0.0, y, v);
-            let b = slope(0.5, y + 0.5 * h * a[0], v + 0.5 * h * a[1]);
-            let d = slope(0.5, y + 0.5 * h * b[0], v + 0.5 * h * b[1]);
-            let e = slope(1.0, y + h * d[0], v + h * d[1]);
-            y += h / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * d[0] + e[0]);
-            v += h / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * d[1] + e[1]);
-            all.push(y);
-        }
-    }
-    all
+    displacements(force, SPACING, STEPS, |_, y, v, f| (f - c * v - k * y) / m)
 }
 
 pub fn table(rows: &[[f64; 3]]) -> String {

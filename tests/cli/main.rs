@@ -17,6 +17,7 @@ mod known_parts;
 mod measured_input;
 mod models;
 mod new_user;
+mod oscillator;
 mod predict;
 mod reading_back;
 mod regressions;

@@ -631,7 +631,8 @@ fn a_second_mode() {
     });
 }
 
-/// A mode with a tenth of the first one's part: the noise model makes the residuals white, and the force is coherent with them.
+/// A mode with a tenth of the first one's part, which the noise model may describe: it is named, or the force is coherent with the
+/// residuals.
 #[test]
 fn a_weak_second_mode() {
     assert_found(Kind::WeakMode, |reason| {

@@ -1,5 +1,6 @@
 //! Results of a study: `study.json`, `study.html` and figures. The records of finished analyses are kept in a journal.
 
+mod bands;
 mod document;
 mod figures;
 mod fit;
@@ -15,6 +16,7 @@ pub use document::{
     UnidentifiableRecord,
 };
 
+pub use bands::bands;
 pub use records::*;
 
 use super::{json, render};

@@ -18,7 +18,7 @@ use nalgebra::DMatrix;
 
 /// Largest number of parameters with a full covariance.
 pub const MOST_WITH_COVARIANCE: usize = 1000;
-/// Largest number of parameters whose factor is kept.
+/// Largest number of parameters whose variances and factor are kept.
 const MOST_WITH_FACTOR: usize = 10_000;
 /// Relative change of the penalties in the differences of variances.
 const STEP: f64 = 1e-2;
@@ -28,8 +28,10 @@ const STEP: f64 = 1e-2;
 pub struct LargeCovariance {
     /// Kind of the covariance.
     pub kind: CovarianceKind,
-    /// Variance of each parameter.
+    /// Variance of each parameter, up to 10,000 of them; none beyond.
     pub variances: Vec<f64>,
+    /// Variance of each scalar: initial states and sensor parameters.
+    pub scalar_variances: Vec<f64>,
     /// Covariance of the parameters, up to 1000 of them.
     pub covariance: Option<DMatrix<f64>>,
     functions: Vec<MeanOverRecord>,
@@ -66,19 +68,27 @@ impl LargeCovariance {
         }
         let covariance = (problem.parameters() <= MOST_WITH_COVARIANCE)
             .then(|| normal.covariance_of_parameters(&shift));
+        let is_listed = problem.parameters() <= MOST_WITH_FACTOR;
         let variances = match &covariance {
             Some(covariance) => covariance.diagonal().iter().copied().collect(),
-            None => normal.variances(problem, theta, evaluation, &shift)?,
+            None if is_listed => normal.variances(problem, theta, evaluation, &shift)?,
+            None => Vec::new(),
         };
+        let scalars = problem.functions.scalar_range();
+        let scalar_variances: Vec<f64> = scalars
+            .map(|index| normal.variance(index, &shift))
+            .collect();
         let is_known = |variance: &f64| variance.is_finite() && *variance >= 0.0;
-        variances.iter().all(is_known).then(|| Self {
+        let mut all = variances.iter().chain(&scalar_variances);
+        all.all(is_known).then(|| Self {
             kind: normal.kind,
             variances,
+            scalar_variances,
             covariance,
             functions,
             ratios,
             covariance_of_means,
-            factor: (problem.parameters() <= MOST_WITH_FACTOR).then_some(normal.factor),
+            factor: is_listed.then_some(normal.factor),
         })
     }
 
@@ -182,6 +192,13 @@ impl NormalMatrix {
             dot(gradients[i], &products[j]) + shifts[i] * shifts[j]
         });
         0.5 * (&once + once.transpose())
+    }
+
+    /// Variance of the parameter `index`.
+    fn variance(&self, index: usize, shift: &[f64]) -> f64 {
+        let mut unit = vec![0.0; self.parameters];
+        unit[index] = 1.0;
+        self.times(&unit)[index] + shift[index] * shift[index]
     }
 
     fn covariance_of_parameters(&self, shift: &[f64]) -> DMatrix<f64> {

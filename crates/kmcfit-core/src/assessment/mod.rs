@@ -1,5 +1,6 @@
 //! Assessment of a fit: statistics of the residuals, step-size check, plausibility, standard errors and bands.
 
+mod assumptions;
 mod channel;
 mod classical;
 mod constants;
@@ -9,6 +10,7 @@ mod estimates;
 mod friction_width;
 mod function;
 mod gaps;
+mod implausible;
 mod input_correlation;
 mod input_disturbance;
 mod input_pulses;
@@ -30,6 +32,7 @@ mod step_check;
 mod verdict;
 
 pub use crate::objective::{diagnostics, outliers};
+pub use assumptions::{VerdictAssumption, verdict_assumptions};
 pub use channel::{ResidualPattern, pattern};
 pub use classical::{ClassicalEstimate, ClassicalMethod};
 pub use constants::{constant_probability, standard_error};
@@ -38,6 +41,7 @@ pub use equation_error::{EquationErrorIntervals, NoIntervals};
 pub use estimates::{Estimate, EstimateStatus, estimates};
 pub use function::{EstimateErrors, FunctionSummary, function_summaries};
 pub use gaps::{FunctionInGap, GapAssessment, GapStatus};
+pub use implausible::Implausible;
 pub use large_covariance::{LargeCovariance, MOST_WITH_COVARIANCE};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
 pub use record_error::RecordError;
@@ -46,10 +50,7 @@ pub use refinement::{BasisTest, CoarseBasis};
 pub use rivals::AmplitudeRival;
 pub use statistics::{FitStatistics, statistics};
 pub use step_check::{StepCheck, StepCheckOutcome, step_check};
-pub use verdict::{
-    Implausible, SampleFault, VerdictAssumption, VerdictLevel, VerdictReason, verdict_assumptions,
-    verdict_level, verdict_reasons,
-};
+pub use verdict::{SampleFault, VerdictLevel, VerdictReason, verdict_level, verdict_reasons};
 
 use classical::classical_estimate;
 use friction_width::width_warning;
