@@ -321,7 +321,7 @@ fn fitted(bench: &Workbench, text: &str, key: Option<&str>) -> Answer {
         "warnings",
         "advice",
         "verdict",
-        "identifiability",
+        "findings",
         "experiments",
     ] {
         words += &document[part].to_string();
