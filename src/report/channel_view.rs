@@ -5,8 +5,7 @@ use super::csv::CsvTable;
 use super::figures;
 use super::record_figures::{self, InputSeries, SeriesPair, frequency_response, spectrum};
 use crate::config::ChannelNote;
-use kmcfit_core::internals::assessment::diagnostics;
-use kmcfit_core::internals::diagnostics::Whiteness;
+use kmcfit_core::internals::diagnostics::{ResidualDiagnostics, Whiteness};
 use kmcfit_core::internals::record::Channel;
 use kmcfit_core::internals::signal::even_spacing;
 
@@ -16,6 +15,7 @@ pub(super) struct ChannelView<'a> {
     pub channel: &'a Channel,
     pub predicted: &'a [f64],
     pub note: Option<&'a ChannelNote>,
+    pub diagnostics: &'a ResidualDiagnostics,
 }
 
 impl ChannelView<'_> {
@@ -63,14 +63,13 @@ impl ChannelView<'_> {
         let (label, unit) = (self.label(), self.unit());
         let label = (label.as_str(), unit);
         let times = self.channel.times();
-        let diagnostics = diagnostics(self.channel, self.predicted);
         [
             figures::channel(label, times, &self.observed(), &self.model()),
             figures::residuals(
                 label,
                 times,
                 &self.residuals(),
-                &whiteness(self.channel, &diagnostics.whiteness),
+                &whiteness(self.channel, &self.diagnostics.whiteness),
             ),
         ]
     }
@@ -82,8 +81,7 @@ impl ChannelView<'_> {
             Some(_) => "innovations",
         };
         let residuals = self.channel.innovations(self.predicted);
-        let diagnostics = diagnostics(self.channel, self.predicted);
-        record_figures::residual_tests(name, &residuals, &diagnostics)
+        record_figures::residual_tests(name, &residuals, self.diagnostics)
     }
 
     /// Figures of the spectra, and of the frequency response to an only input at the samples; none for samples at unequal times.

@@ -165,7 +165,7 @@ impl<'a> FunctionCurve<'a> {
     }
 
     /// The function against the times `t` in s.
-    fn panel(&self, t: &[f64]) -> Panel {
+    pub fn panel(&self, t: &[f64]) -> Panel {
         let band = |(low, high)| Mark::band("95 % band", t, low, high, Colour::Blue);
         let start = |y| Mark::line("start", t, y, Style::new(Colour::Green).dash(Dash::Dotted));
         let mut panel = Panel::of_time(self.name, self.unit);
@@ -192,13 +192,13 @@ pub(super) fn truth(t: &[f64], y: &[f64]) -> Mark {
 }
 
 /// The coefficient functions against the times `t` in s, one panel each.
-pub fn functions(t: &[f64], curves: &[FunctionCurve]) -> Figure {
+pub fn functions(panels: impl IntoIterator<Item = Panel>) -> Figure {
     Figure::new(
         "functions",
         "Coefficient functions",
         "Estimated coefficients against time, one panel for each.",
     )
-    .panels(curves.iter().map(|curve| curve.panel(t)))
+    .panels(panels)
 }
 
 /// The error of the gradient against the step, a panel for each adjoint and a line for each grid.

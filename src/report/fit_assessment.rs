@@ -6,6 +6,7 @@ use kmcfit_core::internals::assessment::{
     EquationErrorIntervals, EstimateErrors, FitAssessment, LargeCovariance, NoIntervals, POOR,
     StepCheck, diagnostics,
 };
+use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
 use kmcfit_core::internals::identifiability::{Bands, Means};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
@@ -29,6 +30,8 @@ pub struct RunAssessment {
     pub(super) balance: Option<EquationBalance>,
     /// Validation records.
     pub(super) validation: Vec<ValidationRecord>,
+    /// Diagnostics of the residuals of each channel of each experiment.
+    pub(super) diagnostics: Vec<Vec<ResidualDiagnostics>>,
 }
 
 impl RunAssessment {
@@ -51,6 +54,7 @@ impl RunAssessment {
             validation: validation
                 .map(|out| ValidationRecord::of(model, fit, out))
                 .collect(),
+            diagnostics: of_all(&model.problem, &fit.best.evaluation),
         }
     }
 
@@ -98,6 +102,16 @@ impl RunAssessment {
     }
 }
 
+/// Diagnostics of the residuals of each channel of each experiment.
+fn of_all(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<ResidualDiagnostics>> {
+    let experiments = problem.experiments.iter().zip(&evaluation.predictions);
+    let each = experiments.map(|(experiment, predictions)| {
+        let channels = experiment.channels.iter().zip(predictions);
+        channels.map(|(channel, predicted)| diagnostics(channel, predicted))
+    });
+    each.map(Iterator::collect).collect()
+}
+
 /// A validation record and its prediction by the fitted system.
 #[derive(Debug, Clone)]
 pub(super) struct ValidationRecord {
@@ -106,27 +120,31 @@ pub(super) struct ValidationRecord {
     /// The problem of this record alone, with the functions fixed, and its evaluation at the optimum of the record's
     /// own parameters.
     pub found: Result<(Problem, Evaluation), SimulationError>,
+    /// Diagnostics of the residuals of its channels; none without a response.
+    diagnostics: Vec<ResidualDiagnostics>,
 }
 
 impl ValidationRecord {
     fn of(model: &Model, fit: &Fit, out: &HoldOut) -> Self {
+        let found = predict_validation(
+            &model.problem,
+            &fit.best.evaluation,
+            &out.experiment,
+            &out.scalars,
+            &model.settings,
+        );
+        let of_channels = found.as_ref().map(|(problem, evaluation)| of_all(problem, evaluation));
         Self {
             out: out.clone(),
-            found: predict_validation(
-                &model.problem,
-                &fit.best.evaluation,
-                &out.experiment,
-                &out.scalars,
-                &model.settings,
-            ),
+            diagnostics: of_channels.into_iter().flatten().flatten().collect(),
+            found,
         }
     }
 
     /// Its name and the fit of its worst channel, per cent, if the fitted system does not predict it.
     pub fn poor(&self) -> Option<(&str, f64)> {
         let channels = self.channels();
-        let fits = channels.iter();
-        let fits = fits.map(|c| diagnostics(c.channel, c.predicted).fit_percent);
+        let fits = channels.iter().map(|c| c.diagnostics.fit_percent);
         let worst = fits.reduce(f64::min).filter(|worst| *worst < POOR)?;
         Some((&self.out.experiment.name, worst))
     }
@@ -137,12 +155,13 @@ impl ValidationRecord {
             return Vec::new();
         };
         let predictions = evaluation.predictions.iter().flatten();
-        let channels = problem.channels().zip(predictions).enumerate();
-        channels
-            .map(|(i, (channel, predicted))| ChannelView {
+        let channels = problem.channels().zip(predictions).zip(&self.diagnostics);
+        (channels.enumerate())
+            .map(|(i, ((channel, predicted), diagnostics))| ChannelView {
                 channel,
                 predicted,
                 note: self.out.notes.get(i),
+                diagnostics,
             })
             .collect()
     }

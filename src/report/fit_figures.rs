@@ -4,7 +4,7 @@ use super::FittedModel;
 use super::chart::Figure;
 use super::figures::{self, FunctionCurve};
 use super::record_figures::{self, InputSeries};
-use kmcfit_core::internals::functions::{CoefficientFunction, Ratios};
+use super::tables::FUNCTION_ROWS;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::solvers::IterationRecord;
 
@@ -201,31 +201,36 @@ impl FittedModel<'_> {
         figures::response(times, observed, &snapshots)
     }
 
+    /// The functions, at the nodes that their table has.
     pub(super) fn functions_figure(&self) -> Figure {
         let problem = &self.model.problem;
+        let rows = |values: &[f64]| self.rows(values, FUNCTION_ROWS);
         let starts = problem.functions.values(&problem.start());
-        let list = self.named_functions();
-        let name = |f: &CoefficientFunction| format!("{} {}", f.name(), f.quantity.symbol());
-        let names: Vec<String> = list.iter().map(|(f, _)| name(f)).collect();
-        let times = problem.system.grid.times();
+        let times = rows(&problem.system.grid.times());
         let bands = self
             .bands()
             .map_or(Vec::new(), |b| b.curves(&b.functions, &times));
-        let curves: Vec<FunctionCurve> = (list.iter().enumerate())
-            .map(|(i, (function, found))| FunctionCurve {
+        let panels = self.named_functions().into_iter().enumerate();
+        let panels = panels.map(|(i, (function, found))| {
+            let name = format!("{} {}", function.name(), function.quantity.symbol());
+            let (found, start) = (rows(&found), rows(&starts[i]));
+            let truth = self.true_function(i).map(rows);
+            let curve = FunctionCurve {
                 band: bands.get(i).map(|[low, high]| (&low[..], &high[..])),
-                start: Some(&starts[i]),
-                truth: self.true_function(i),
-                ..FunctionCurve::new(&names[i], self.unit(function), found)
-            })
-            .collect();
-        figures::functions(&times, &curves)
+                start: Some(&start),
+                truth: truth.as_deref(),
+                ..FunctionCurve::new(&name, self.unit(function), &found)
+            };
+            curve.panel(&times)
+        });
+        figures::functions(panels)
     }
 
+    /// The ratios, at the nodes that their table has.
     pub(super) fn ratios_figure(&self) -> Figure {
-        let found = Ratios::of(&self.fit.best.evaluation.nodal);
-        let truth = self.model.truth.as_ref().map(Ratios::of);
-        let times = self.model.problem.system.grid.times();
+        let found = self.ratio_rows(&self.fit.best.evaluation.nodal);
+        let truth = self.model.truth.as_ref().map(|truth| self.ratio_rows(truth));
+        let times = self.rows(&self.model.problem.system.grid.times(), FUNCTION_ROWS);
         let bands = self
             .bands()
             .map_or(Vec::new(), |b| b.curves(&b.ratios, &times));

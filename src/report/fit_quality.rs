@@ -5,7 +5,7 @@ use super::document::{
     ChannelSummary, IgnoredSummary, NoiseSummary, NuisanceParameter, ValidationSummary,
 };
 use super::fit_assessment::ValidationRecord;
-use kmcfit_core::internals::assessment::{diagnostics, outliers, pattern};
+use kmcfit_core::internals::assessment::{outliers, pattern};
 use kmcfit_core::internals::noise::{Correlation, CorrelationLaw};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
@@ -15,7 +15,7 @@ use kmcfit_core::internals::record::{Loss, Weighting};
 pub fn channel(view: &ChannelView) -> ChannelSummary {
     let (channel, note, predicted) = (view.channel, view.note, view.predicted);
     let factor = view.factor();
-    let diagnostics = diagnostics(channel, predicted);
+    let diagnostics = view.diagnostics;
     let sigma = match channel.weighting() {
         Weighting::Sigma(sigma) | Weighting::Estimated { sigma } => Some(sigma / factor),
         Weighting::Sigmas(_) | Weighting::Integral { .. } | Weighting::Trapezoid(_) => None,
@@ -45,7 +45,7 @@ pub fn channel(view: &ChannelView) -> ChannelSummary {
         whiteness_p_value: (diagnostics.whiteness.p_value.is_finite())
             .then_some(diagnostics.whiteness.p_value),
         autocorrelation_band: diagnostics.band,
-        autocorrelation: diagnostics.autocorrelation,
+        autocorrelation: diagnostics.autocorrelation.clone(),
     }
 }
 

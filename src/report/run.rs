@@ -24,6 +24,7 @@ use kmcfit_core::internals::solvers::{
     ActiveGroup, Attempt, Fit, PathPoint, Solver, Status, WeightPath, active_constraints, timed,
 };
 use kmcfit_core::internals::system::{Excitation, Term};
+use kmcfit_core::internals::threads::both;
 use std::io;
 use std::time::Duration;
 
@@ -85,13 +86,34 @@ impl Model {
 
 impl FittedModel<'_> {
     /// Writes tables and, if requested, figures and the page of `document`, but not the result document itself. Returns
-    /// the time taken to render and to write them.
+    /// the time taken to write them.
     ///
     /// # Errors
     /// Errors of the file system.
     pub fn write(&self, stage: &mut Stage, document: &ResultDocument) -> io::Result<Duration> {
         let mut writing = Duration::ZERO;
-        let mut write = |name: &str, bytes: &[u8]| timed(&mut writing, || stage.write(name, bytes));
+        if !self.requested.figures {
+            self.write_tables(stage, document, &mut writing)?;
+            return Ok(writing);
+        }
+        let own = || {
+            self.write_tables(stage, document, &mut writing)?;
+            Ok::<_, io::Error>(self.svg_figures())
+        };
+        let (figures, page) = both(own, || self.page(document));
+        for (name, text) in figures?.into_iter().chain([(PAGE.to_owned(), page)]) {
+            timed(&mut writing, || stage.write(&name, text.as_bytes()))?;
+        }
+        Ok(writing)
+    }
+
+    fn write_tables(
+        &self,
+        stage: &mut Stage,
+        document: &ResultDocument,
+        writing: &mut Duration,
+    ) -> io::Result<()> {
+        let mut write = |name: &str, bytes: &[u8]| timed(writing, || stage.write(name, bytes));
         if self.model.problem.parameters() <= MOST_PARAMETERS {
             write(
                 "parameters.json",
@@ -110,21 +132,20 @@ impl FittedModel<'_> {
         for (name, table) in self.samples() {
             write(&name, table.to_csv().as_bytes())?;
         }
-        if self.requested.figures {
-            for (name, text) in self.drawings(document) {
-                write(&name, text.as_bytes())?;
-            }
-        }
-        Ok(writing)
+        Ok(())
     }
 
     /// Figures and page of `document`, each with the name of its file.
     pub fn drawings(&self, document: &ResultDocument) -> Vec<(String, String)> {
+        let (mut all, page) = both(|| self.svg_figures(), || self.page(document));
+        all.push((PAGE.to_owned(), page));
+        all
+    }
+
+    fn svg_figures(&self) -> Vec<(String, String)> {
         let figures = self.figures().into_iter();
         let figures = figures.map(|f| (format!("figures/{}.svg", f.name), render(&f)));
-        figures
-            .chain([(PAGE.to_owned(), self.page(document))])
-            .collect()
+        figures.collect()
     }
 
     /// The HTML page of the run: one file without external resources.
@@ -383,6 +404,7 @@ impl FittedModel<'_> {
             channel: &self.model.problem.experiments[experiment].channels[channel],
             predicted: &self.fit.best.evaluation.predictions[experiment][channel],
             note: self.note(experiment, channel),
+            diagnostics: &self.run_assessment.diagnostics[experiment][channel],
         }
     }
 

@@ -9,6 +9,7 @@ use kmcfit_core::internals::assessment::{NoDraws, draws};
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 use kmcfit_core::internals::solvers::IterationRecord;
+use kmcfit_core::internals::system::NodalCoefficients;
 
 /// Most rows of the functions where a curve through them has the values in between.
 pub(super) const FUNCTION_ROWS: usize = 4000;
@@ -29,9 +30,11 @@ impl FittedModel<'_> {
     }
 
     /// The values of every node with a row in a table of at most so many rows: one in so many steps, and the last one.
-    fn rows(&self, values: &[f64], most: usize) -> Vec<f64> {
+    pub(super) fn rows(&self, values: &[f64], most: usize) -> Vec<f64> {
+        let Some(last) = values.len().checked_sub(1) else {
+            return Vec::new();
+        };
         let steps = self.steps_per_row(most);
-        let last = values.len() - 1;
         let nodes = (0..last).step_by(steps).chain([last]);
         nodes.map(|node| values[node]).collect()
     }
@@ -94,6 +97,18 @@ impl FittedModel<'_> {
             .column("relative_change", column(|r| r.relative_change))
     }
 
+    /// The ratios of nodal coefficients at the nodes that the table of the functions has.
+    pub(super) fn ratio_rows(&self, nodal: &NodalCoefficients) -> Ratios {
+        let all = Ratios::of(nodal);
+        let rows = |values: &[f64]| self.rows(values, FUNCTION_ROWS);
+        Ratios {
+            k_over_m: rows(&all.k_over_m),
+            c_over_m: rows(&all.c_over_m),
+            frequency: rows(&all.frequency),
+            damping_ratio: rows(&all.damping_ratio),
+        }
+    }
+
     pub(super) fn functions_table(&self) -> CsvTable {
         let is_rotation = self.is_rotation();
         let rows = |values: &[f64]| self.rows(values, FUNCTION_ROWS);
@@ -103,12 +118,12 @@ impl FittedModel<'_> {
         for (function, values) in self.named_functions() {
             table = table.column(function_column(function, is_rotation), rows(&values));
         }
-        let ratios = Ratios::of(coefficients);
+        let ratios = self.ratio_rows(coefficients);
         table = table
-            .column("k_over_m_per_s2", rows(&ratios.k_over_m))
-            .column("c_over_m_per_s", rows(&ratios.c_over_m))
-            .column("natural_frequency_Hz", rows(&ratios.frequency))
-            .column("damping_ratio", rows(&ratios.damping_ratio));
+            .column("k_over_m_per_s2", ratios.k_over_m)
+            .column("c_over_m_per_s", ratios.c_over_m)
+            .column("natural_frequency_Hz", ratios.frequency)
+            .column("damping_ratio", ratios.damping_ratio);
         if let Some(bands) = self.bands() {
             for list in [&bands.functions, &bands.ratios] {
                 for (band, [low, high]) in list.iter().zip(bands.curves(list, &times)) {

@@ -138,16 +138,12 @@ impl Table {
     /// that [`find`](Self::find) reports those that it lacks.
     ///
     /// # Errors
-    /// As [`read_all`](Self::read_all).
-    pub fn read_with_columns(
-        path: impl AsRef<Path>,
-        format: &TableFormat,
-        columns: &[ColumnName],
-    ) -> Result<Self, InputError> {
-        let mut best: Option<(usize, Self)> = None;
-        for table in Self::read_all(path.as_ref(), format)? {
+    /// When the file has no table.
+    pub fn with_columns<'a>(tables: &'a [Self], columns: &[ColumnName]) -> Result<&'a Self, InputError> {
+        let mut best: Option<(usize, &Self)> = None;
+        for table in tables {
             let count = columns.iter().filter(|c| table.find(c).is_ok()).count();
-            if best.as_ref().is_none_or(|(most, _)| count > *most) {
+            if best.is_none_or(|(most, _)| count > most) {
                 best = Some((count, table));
             }
         }

@@ -244,7 +244,7 @@ fn build_on(file: &ModelFile, mode: BuildMode, least: usize) -> Result<Model, In
     let records = timed(&mut reading, || {
         experiments::read(file, mode, &mut record_notes)
     })?;
-    let experiments::RecordNotes { warnings, data } = record_notes;
+    let experiments::RecordNotes { warnings, data, .. } = record_notes;
     let delay_limits = experiments::delay_limits(file, &records)?;
     let choice = grid::build(file, mode, &records, least, &mut automatic)?;
     let grid = choice.grid;

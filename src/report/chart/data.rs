@@ -1,8 +1,7 @@
 //! Serialisation of a figure for the script of a page.
 
 use super::figure::Figure;
-use super::plot_mark::{Mark, MarkKind};
-use super::thin::kept;
+use super::thin::thinned;
 use crate::report::text::clean;
 use serde::Serialize;
 
@@ -22,26 +21,13 @@ pub(in crate::report) fn data(figure: &Figure, off: &[&str]) -> Data {
         figure: &'a Figure,
     }
     let mut figure = figure.clone();
-    let mut thinned = false;
     for panel in &mut figure.panels {
-        for mark in &mut panel.marks {
-            if !matches!(
-                mark.kind,
-                MarkKind::Line | MarkKind::Points | MarkKind::Band
-            ) {
-                continue;
-            }
-            let mut ys = vec![(mark.y.as_slice(), panel.y.scale)];
-            ys.extend((mark.kind == MarkKind::Band).then_some((&mark.high[..], panel.y.scale)));
-            let joined = mark.kind != MarkKind::Points;
-            let (points, is_thinned) = kept((&mark.x, panel.x.scale), &ys, joined);
-            thinned |= is_thinned;
-            let Mark { x, y, high, .. } = mark;
-            for values in [x, y, high].into_iter().filter(|values| !values.is_empty()) {
-                *values = points.iter().map(|i| values[*i]).collect();
-            }
-        }
+        let scales = [panel.x.scale, panel.y.scale];
+        let marks = std::mem::take(&mut panel.marks).into_iter();
+        panel.marks = marks.map(|mark| thinned(mark, scales, 0)).collect();
     }
+    let mut marks = figure.panels.iter().flat_map(|panel| &panel.marks);
+    let thinned = marks.any(|mark| mark.is_thinned);
     let figure = &figure;
     // Plain structs with text keys always serialise.
     let json = serde_json::to_string(&Chart { off, figure }).unwrap_or_default();
@@ -62,7 +48,7 @@ fn inert(json: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::chart::{Axis, Colour, Panel, Style};
+    use crate::report::chart::{Axis, Colour, Mark, Panel, Style};
 
     #[test]
     fn any_data_give_numbers() {

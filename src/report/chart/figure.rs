@@ -4,6 +4,7 @@
 //! length, the excess values are ignored.
 
 use super::plot_mark::{Mark, MarkKind};
+use super::thin::{FEW, thinned};
 use serde::{Serialize, Serializer};
 
 /// Ranges below this share of the largest value are rounding errors.
@@ -122,9 +123,11 @@ impl Panel {
         self.marks([mark])
     }
 
-    /// Adds marks; an `Option` adds at most one.
+    /// Adds marks; an `Option` adds at most one. Long ones are thinned for the scales of the axes.
     #[must_use]
     pub fn marks(mut self, marks: impl IntoIterator<Item = Mark>) -> Self {
+        let scales = [self.x.scale, self.y.scale];
+        let marks = marks.into_iter().map(|mark| thinned(mark, scales, FEW));
         self.marks.extend(marks);
         self
     }

@@ -155,6 +155,9 @@ pub struct Mark {
     /// The upper edge of a band.
     #[serde(serialize_with = "rounded")]
     pub high: Vec<f64>,
+    /// True if points were removed that would be visible when zoomed.
+    #[serde(skip)]
+    pub(super) is_thinned: bool,
 }
 
 impl Mark {
@@ -166,6 +169,7 @@ impl Mark {
             x: x.to_vec(),
             y: y.to_vec(),
             high: Vec::new(),
+            is_thinned: false,
         }
     }
 

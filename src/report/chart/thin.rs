@@ -2,18 +2,38 @@
 
 use super::axis::{even, extent};
 use super::figure::Scale;
+use super::plot_mark::{Mark, MarkKind};
 
 /// Longest curve that is not thinned, points.
-const FEW: usize = 4000;
+pub(super) const FEW: usize = 4000;
 /// Columns of a longer curve, in each of which its first, lowest, highest and last point are kept: more than the pixels
 /// of a chart.
 const COLUMNS: f64 = 700.0;
 /// Tolerance, relative to the range of the curve, within which points on a straight line are removed.
 const STRAIGHT: f64 = 1e-6;
 
+/// A curve, points or a band of more than `most` points on the scales of x and y, with the points that show.
+pub(super) fn thinned(mut mark: Mark, [x_scale, y_scale]: [Scale; 2], most: usize) -> Mark {
+    let is_band = mark.kind == MarkKind::Band;
+    let is_curve = is_band || matches!(mark.kind, MarkKind::Line | MarkKind::Points);
+    if !is_curve || mark.x.len() <= most {
+        return mark;
+    }
+    let mut ys = vec![(mark.y.as_slice(), y_scale)];
+    ys.extend(is_band.then_some((&mark.high[..], y_scale)));
+    let is_joined = mark.kind != MarkKind::Points;
+    let (points, is_thinned) = kept((&mark.x, x_scale), &ys, is_joined);
+    let Mark { x, y, high, .. } = &mut mark;
+    for values in [x, y, high].into_iter().filter(|values| !values.is_empty()) {
+        *values = points.iter().map(|i| values[*i]).collect();
+    }
+    mark.is_thinned |= is_thinned;
+    mark
+}
+
 /// Indices of the kept points of curves `ys` over one `x`, and true if removed points would be visible when zoomed.
 /// `joined`: the points are joined by lines.
-pub(super) fn kept(x: (&[f64], Scale), ys: &[(&[f64], Scale)], joined: bool) -> (Vec<usize>, bool) {
+fn kept(x: (&[f64], Scale), ys: &[(&[f64], Scale)], joined: bool) -> (Vec<usize>, bool) {
     let count = (ys.iter().map(|(y, _)| y.len())).fold(x.0.len(), usize::min);
     let all: Vec<usize> = (0..count).collect();
     let thinned = count > FEW;

@@ -11,13 +11,12 @@
 //! the variance of the innovations that is coherent with the input.
 
 use super::FitWarning;
-use crate::identifiability::Factorisation;
-use crate::objective::{Evaluation, diagnostics};
+use crate::objective::{Evaluation, channel_fit_percent};
 use crate::problem::Problem;
 use crate::record::{BaseMotion, Channel, Experiment, Loss, Waveform};
 use crate::signal::Signal;
 use crate::system::InputQuantity;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Number of lags, in samples: two to four periods at usual sampling rates.
@@ -77,20 +76,47 @@ fn coherent_share(channel: &Channel, predicted: &[f64], input: &Signal) -> Optio
         && count > 10 * LAGS
         && channel.weighting().is_sigma()
         && channel.loss() == Loss::Squares
-        && diagnostics(channel, predicted).fit_percent < EXACT;
+        && channel_fit_percent(channel, predicted) < EXACT;
     is_judged.then_some(())?;
     let innovations = DVector::from_vec(channel.majorant(predicted).weighted);
     let innovations = innovations.rows(LAGS, count);
     let at_samples: Vec<f64> = times.iter().map(|t| input.value(*t)).collect();
     let mean = at_samples.iter().sum::<f64>() / at_samples.len() as f64;
-    let regressors = DMatrix::from_fn(count, LAGS, |i, l| at_samples[LAGS + i - l] - mean);
-    let factorisation = Factorisation::of(&regressors).above(RANK);
-    let moments = regressors.tr_mul(&innovations);
-    let explained = factorisation.inverse_root().tr_mul(&moments).norm_squared();
+    let about_mean = at_samples.iter().map(|u| u - mean);
+    let input = DVector::from_iterator(at_samples.len(), about_mean);
+    let lagged = |l: usize| input.rows(LAGS - l, count);
+    let products = products_of_lags(&input, count);
+    (products.iter().all(|x| x.is_finite())).then_some(())?;
+    let normal = SymmetricEigen::new(products);
+    let moments = DVector::from_fn(LAGS, |l, _| lagged(l).dot(&innovations));
+    let along = normal.eigenvectors.tr_mul(&moments);
+    let least = RANK * RANK * normal.eigenvalues.max();
+    let kept = normal.eigenvalues.iter().zip(&along);
+    let kept = kept.filter(|(square, _)| **square > least);
+    let explained: f64 = kept.clone().map(|(square, x)| x * x / square).sum();
     let share = explained / innovations.norm_squared();
-    let law = ChiSquared::new(factorisation.rank as f64).ok()?;
+    let law = ChiSquared::new(kept.count() as f64).ok()?;
     let probability = 1.0 - law.cdf(count as f64 * share);
     (probability < CERTAIN && share > SHARE).then_some(share)
+}
+
+/// `sum_i u_(L+i-l) u_(L+i-m)` of `count` terms at the lags l, m below `L = LAGS`. Entries along a diagonal differ by the terms at the ends.
+fn products_of_lags(input: &DVector<f64>, count: usize) -> DMatrix<f64> {
+    let mut products = DMatrix::zeros(LAGS, LAGS);
+    for m in 0..LAGS {
+        products[(0, m)] = input
+            .rows(LAGS, count)
+            .dot(&input.rows(LAGS - m, count));
+    }
+    for l in 1..LAGS {
+        for m in l..LAGS {
+            let (first, last) = (LAGS, LAGS + count);
+            products[(l, m)] = products[(l - 1, m - 1)] + input[first - l] * input[first - m]
+                - input[last - l] * input[last - m];
+        }
+    }
+    products.fill_lower_triangle_with_upper_triangle();
+    products
 }
 
 #[cfg(test)]
@@ -136,6 +162,16 @@ mod tests {
             FitWarning::CoherentResiduals { share, .. } => Some(share),
             other => panic!("{other:?}"),
         }
+    }
+
+    /// Products of lags are those of the matrix of regressors, to the rounding of 40 differences.
+    #[test]
+    fn products_of_lags_are_those_of_the_regressors() {
+        let input = DVector::from_vec(white(3, 540));
+        let regressors = DMatrix::from_fn(500, LAGS, |i, l| input[LAGS + i - l]);
+        let expected = regressors.tr_mul(&regressors);
+        let found = products_of_lags(&input, 500);
+        assert!((&found - &expected).amax() < 1e-12 * expected.amax());
     }
 
     /// A part of 0.3 times the force has the share `0.09 / 1.09` of the variance, to which chance adds `40 / n`; the standard error is about

@@ -67,6 +67,7 @@ use crate::identifiability::{
 };
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::{Fit, Status};
+use crate::threads::both;
 use nalgebra::DMatrix;
 
 /// Assessment of a fit of a simulated response.
@@ -135,13 +136,16 @@ impl FitAssessment {
                 draws: 0,
                 ..BandSettings::default()
             };
-            let bands = Bands::at(problem, &best.parameters, &best.evaluation, &settings);
             let (theta, evaluation) = (&best.parameters, &best.evaluation);
-            let test = match (tests_bases, assessment.plausibility.is_coloured) {
-                (true, false) => BasisTest::of(problem, theta, evaluation),
-                (true, true) => BasisTest::of_halves(problem, theta, evaluation),
-                (false, _) => BasisTest::default(),
-            };
+            let is_coloured = assessment.plausibility.is_coloured;
+            let (bands, test) = both(
+                || Bands::at(problem, theta, evaluation, &settings),
+                || match (tests_bases, is_coloured) {
+                    (true, false) => BasisTest::of(problem, theta, evaluation),
+                    (true, true) => BasisTest::of_halves(problem, theta, evaluation),
+                    (false, _) => BasisTest::default(),
+                },
+            );
             assessment.classifications = classify_functions(problem, &best.evaluation, &bands);
             condition_on_bases(problem, &mut assessment.classifications, &test.doubtful);
             if assessment.plausibility.is_disturbed {

@@ -12,7 +12,7 @@ use super::statistics::{FitStatistics, statistics};
 use super::step_check::{StepCheckOutcome, step_check};
 use crate::diagnostics::rms;
 use crate::functions::CoefficientKind;
-use crate::objective::{Evaluation, diagnostics};
+use crate::objective::{Evaluation, channel_fit_percent, diagnostics};
 use crate::problem::Problem;
 use crate::record::{Channel, Loss, ScoreCovariance};
 use crate::simulate::SimulationError;
@@ -318,7 +318,7 @@ fn unidentified(
     }
     let predictions = evaluation.predictions.iter().flatten();
     let mut fits = (problem.channels().zip(predictions))
-        .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent)
+        .map(|(channel, predicted)| channel_fit_percent(channel, predicted))
         .peekable();
     let unrelated = fits.peek().is_some() && fits.all(|fit| fit < UNRELATED);
     unrelated.then_some(Unidentified::Unrelated)
@@ -362,7 +362,7 @@ fn coarse(
     let half = step_check.as_ref().ok()?.as_ref()?;
     let predictions = evaluation.predictions.iter().flatten();
     let mut fits = (problem.channels().zip(predictions))
-        .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent);
+        .map(|(channel, predicted)| channel_fit_percent(channel, predicted));
     // Samples simulated with these steps are matched to machine precision.
     let is_exact = fits.all(|fit| fit > EXACT);
     let times = half.change_per_residual;

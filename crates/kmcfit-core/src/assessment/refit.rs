@@ -1,7 +1,7 @@
 //! Refits of a changed problem, and the test whether they explain the residuals.
 
 use super::plausibility::POOR;
-use crate::objective::{Evaluation, diagnostics};
+use crate::objective::{Evaluation, channel_fit_percent, diagnostics};
 use crate::problem::Problem;
 use crate::record::{Experiment, NoiseEstimate};
 use crate::simd::sum::rms;
@@ -49,7 +49,7 @@ impl Refit {
 /// Fit of the worst channel, per cent.
 pub(super) fn worst_fit(problem: &Problem, evaluation: &Evaluation) -> f64 {
     let fits = (problem.predicted(evaluation))
-        .map(|(channel, predicted)| diagnostics(channel, predicted).fit_percent);
+        .map(|(channel, predicted)| channel_fit_percent(channel, predicted));
     fits.fold(100.0, f64::min)
 }
 

@@ -25,6 +25,7 @@ use crate::simd::sum::rms;
 use crate::simulate::Trajectory;
 use crate::solvers::{MissingTerm, TESTED_TERMS, weighted_jacobian};
 use crate::system::Term;
+use crate::threads::{available, map};
 use nalgebra::DVector;
 
 /// Width of the sign of the velocity in the candidate for Coulomb friction, relative to the root mean square of the velocity.
@@ -66,17 +67,17 @@ pub(super) fn missing(
     let is_new = |j: &usize| (first..first + kinds.len()).contains(j);
     let own: Vec<usize> = (0..jacobian.ncols()).filter(|j| !is_new(j)).collect();
     let model = Span::of(&jacobian.select_columns(&own));
-    let terms = kinds.iter().enumerate().map(|(i, (kind, term))| {
-        let column = jacobian.column(first + i).into_owned();
-        (Candidate::Term(*kind, *term), column)
-    });
-    let of_records = record_parameters::parameters(problem).into_iter();
-    let of_records = of_records.filter_map(|parameter| {
-        let column = record_parameters::column(&extended, &evaluation, parameter)?;
-        Some((Candidate::Record(parameter), DVector::from_vec(column)))
-    });
-    let tests = terms.chain(of_records).filter_map(|(candidate, column)| {
-        let (value, t) = model.test(&extended, &column, &residuals, is_modelled)?;
+    let records = record_parameters::parameters(problem);
+    let column = |i: usize| match i.checked_sub(kinds.len()) {
+        None => Some(jacobian.column(first + i).into_owned()),
+        Some(i) => record_parameters::column(&extended, &evaluation, records[i]).map(DVector::from_vec),
+    };
+    let test = |i: usize| model.test(&extended, &column(i)?, &residuals, is_modelled);
+    let tests = map(kinds.len() + records.len(), available(), test);
+    let terms = kinds.iter().map(|(kind, term)| Candidate::Term(*kind, *term));
+    let candidates = terms.chain(records.iter().copied().map(Candidate::Record));
+    let tests = candidates.zip(tests).filter_map(|(candidate, test)| {
+        let (value, t) = test?;
         Some((candidate, value, t))
     });
     let mut tests: Vec<_> = tests.collect();

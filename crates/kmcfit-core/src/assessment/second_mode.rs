@@ -18,6 +18,7 @@ use crate::objective::{Evaluation, diagnostics};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, ChannelKind, Experiment};
 use crate::signal::{Spectrum, even_spacing};
+use crate::threads::{available, map};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
@@ -89,7 +90,8 @@ fn second_mode(problem: &Problem, evaluation: &Evaluation, e: usize) -> Option<[
     let nodal = evaluation.nodal_of(experiment.coefficient_set);
     let frequency = median(&Ratios::of(nodal).frequency);
     let starts = record.starts(frequency, &residuals)?;
-    let found = starts.into_iter().filter_map(|modes| record.search(modes));
+    let found = map(starts.len(), available(), |i| record.search(starts[i]));
+    let found = found.into_iter().flatten();
     let (modes, found) = found.min_by(|a, b| a.1.square.total_cmp(&b.1.square))?;
     let after = found.square / count as f64;
     let n = count as f64;
@@ -195,14 +197,19 @@ impl<'a> Samples<'a> {
                 [logs[2].exp(), logs[3].exp()],
             ]
         };
-        let mut found = self.sum(modes(&logs))?;
+        let mut own = modes(&logs).map(|mode| self.columns(mode));
+        let mut found = self.sum(own.each_ref())?;
         let mut damping = 1e-2;
         for _ in 0..STEPS {
             let mut jacobian = DMatrix::zeros(self.observed.len(), 4);
             for j in 0..4 {
                 let mut moved = logs;
                 moved[j] += SMALL;
-                let there = self.sum(modes(&moved))?;
+                let other = self.columns(modes(&moved)[j / 2]);
+                let there = match j / 2 {
+                    0 => self.sum([&other, &own[1]]),
+                    _ => self.sum([&own[0], &other]),
+                }?;
                 let pairs = there.residuals.iter().zip(&found.residuals);
                 let change = DVector::from_iterator(
                     self.observed.len(),
@@ -219,13 +226,11 @@ impl<'a> Samples<'a> {
             // A factor of 2 at most.
             let moved: [f64; 4] = std::array::from_fn(|j| logs[j] - step[j].clamp(-0.7, 0.7));
             let is_possible = moved[1] < 0.0 && moved[3] < 0.0;
-            match self
-                .sum(modes(&moved))
-                .filter(|s| is_possible && s.square < found.square)
-            {
+            let other = modes(&moved).map(|mode| self.columns(mode));
+            match (self.sum(other.each_ref())).filter(|s| is_possible && s.square < found.square) {
                 Some(next) => {
                     let is_at_rest = next.square > (1.0 - AT_REST) * found.square;
-                    (logs, found) = (moved, next);
+                    (logs, own, found) = (moved, other, next);
                     damping = (0.1 * damping).max(1e-6);
                     if is_at_rest {
                         break;
@@ -240,12 +245,12 @@ impl<'a> Samples<'a> {
         Some((modes(&logs), found))
     }
 
-    fn sum(&self, modes: [Mode; 2]) -> Option<Sum> {
-        let each = modes.map(|mode| self.columns(mode));
+    /// Least squares of the samples by the [columns](Self::columns) of two modes and a constant.
+    fn sum(&self, each: [&Vec<Vec<f64>>; 2]) -> Option<Sum> {
         let columns = each[0].len();
         let count = self.observed.len();
         let constant = vec![1.0; count];
-        let all: Vec<&Vec<f64>> = each.iter().flatten().chain([&constant]).collect();
+        let all: Vec<&Vec<f64>> = each.into_iter().flatten().chain([&constant]).collect();
         let matrix = DMatrix::from_fn(count, all.len(), |i, j| all[j][i]);
         let sizes: Vec<f64> = matrix.column_iter().map(|c| c.norm()).collect();
         let scaled = DMatrix::from_fn(count, all.len(), |i, j| {

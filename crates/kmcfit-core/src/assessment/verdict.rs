@@ -15,6 +15,7 @@ use crate::functions::CoefficientKind;
 use crate::identifiability::{
     Classification, FunctionClassification, ScaleSource, scale_source, structural_rank,
 };
+use crate::objective::channel_fit_percent;
 use crate::problem::Problem;
 use crate::record::Channel;
 use crate::signal::clipped;
@@ -393,7 +394,7 @@ fn open_gap(gap: &GapAssessment) -> Option<[f64; 2]> {
 fn worst_fit(problem: &Problem, fit: &Fit) -> f64 {
     let channels = problem.predicted(&fit.best.evaluation);
     let fits = channels
-        .map(|(channel, predicted)| crate::objective::diagnostics(channel, predicted).fit_percent);
+        .map(|(channel, predicted)| channel_fit_percent(channel, predicted));
     fits.fold(100.0, f64::min)
 }
 

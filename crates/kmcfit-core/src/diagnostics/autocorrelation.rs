@@ -47,8 +47,7 @@ pub fn autocorrelation(values: &[f64], lags: usize) -> Autocorrelation {
     let scale = if largest > 0.0 { largest } else { 1.0 };
     let scaled: Vec<f64> = values.iter().map(|x| x / scale).collect();
     let lags = lags.min(values.len().saturating_sub(1));
-    let (sums, pairs): (Vec<f64>, Vec<usize>) =
-        (0..=lags).map(|lag| sum_of_products(&scaled, lag)).unzip();
+    let (sums, pairs) = sums_of_products(&scaled, lags);
     let count = pairs[0];
     let power = sums[0] / count.max(1) as f64;
     let normalised = |(lag, (sum, n)): (usize, (&f64, &usize))| {
@@ -92,7 +91,33 @@ impl Autocorrelation {
     }
 }
 
-/// Sum `S_k` and the number of its terms.
+/// Number of lags that are summed together: independent sums overlap where one waits for the addition before.
+const LANES: usize = 16;
+
+/// Sums `S_k` and the numbers of their terms, at lags `0..=lags`.
+fn sums_of_products(values: &[f64], lags: usize) -> (Vec<f64>, Vec<usize>) {
+    if values.iter().any(|x| !x.is_finite()) {
+        return (0..=lags).map(|lag| sum_of_products(values, lag)).unzip();
+    }
+    // Products with the zeros after the end leave the sums unchanged.
+    let mut padded = values.to_vec();
+    padded.resize(values.len() + lags + LANES, 0.0);
+    let mut sums = Vec::with_capacity(lags + LANES);
+    for first in (0..=lags).step_by(LANES) {
+        let mut lanes = [0.0; LANES];
+        for (x, later) in values.iter().zip(padded[first..].windows(LANES)) {
+            for (sum, y) in lanes.iter_mut().zip(later) {
+                *sum += x * y;
+            }
+        }
+        sums.extend(lanes);
+    }
+    sums.truncate(lags + 1);
+    let pairs = (0..=lags).map(|lag| values.len().saturating_sub(lag));
+    (sums, pairs.collect())
+}
+
+/// Sum `S_k` over pairs without missing values, and the number of its terms.
 fn sum_of_products(values: &[f64], lag: usize) -> (f64, usize) {
     let later = values.iter().skip(lag);
     let products = values.iter().zip(later).map(|(a, b)| a * b);
@@ -128,6 +153,18 @@ mod tests {
             assert!((r - h).abs() < 1e-15, "{r} is not {h}");
         }
         assert_eq!((found.pairs, found.count), (vec![4, 2, 2], 4));
+    }
+
+    /// Sums of many lags together have the bits of those of each lag alone.
+    #[test]
+    fn lags_together_are_lags_alone() {
+        for (count, lags) in [(1, 0), (2, 1), (17, 16), (300, 50), (60, 59)] {
+            let values = white(4, count);
+            let (sums, pairs) = sums_of_products(&values, lags);
+            let alone: (Vec<f64>, Vec<usize>) =
+                (0..=lags).map(|lag| sum_of_products(&values, lag)).unzip();
+            assert_eq!((sums, pairs), alone, "{count} {lags}");
+        }
     }
 
     #[test]

@@ -110,7 +110,7 @@ fn on_grid(times: &[f64], residuals: &[f64]) -> (Vec<f64>, f64) {
 /// Median distance of neighbours, refined to the mean of the distances near it, so that rounding of the times does not accumulate.
 fn median_spacing(times: &[f64]) -> Option<f64> {
     let mut spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    spacings.sort_by(f64::total_cmp);
+    spacings.sort_unstable_by(f64::total_cmp);
     let median = *spacings.get(spacings.len() / 2)?;
     let near = |s: &&f64| (0.5..1.5).contains(&(**s / median));
     let alike = || spacings.iter().filter(near);

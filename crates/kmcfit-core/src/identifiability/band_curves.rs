@@ -10,23 +10,36 @@ impl Bands {
         if known.is_empty() {
             return Vec::new();
         }
-        let at = |values: &dyn Fn(usize) -> f64, t: f64| {
-            let next = known.partition_point(|k| *k < t).min(known.len() - 1);
+        // The times are increasing: the place of the last one is near that of the next.
+        let mut next = 0;
+        let places = times.iter().map(|t| {
+            next = match next > 0 && known[next - 1] >= *t {
+                true => known.partition_point(|k| k < t),
+                false => next + known[next..].iter().take_while(|k| *k < t).count(),
+            };
+            next = next.min(known.len() - 1);
             let before = next.saturating_sub(1);
             match known[next] - known[before] {
-                run if known[next] > t && run > 0.0 => {
-                    let share = (t - known[before]) / run;
-                    values(before) + share * (values(next) - values(before))
-                }
-                _ => values(next),
+                run if known[next] > *t && run > 0.0 => (next, (t - known[before]) / run),
+                _ => (next, 1.0),
             }
+        });
+        let places: Vec<(usize, f64)> = places.collect();
+        let side = |values: &[f64]| -> Vec<f64> {
+            let at = |(next, share): &(usize, f64)| match *share < 1.0 {
+                true => {
+                    let before = values[next - 1];
+                    before + share * (values[*next] - before)
+                }
+                false => values[*next],
+            };
+            places.iter().map(at).collect()
         };
-        let side = |band: &Band, side: usize| -> Vec<f64> {
-            let value = |i: usize| band.pointwise(i)[side];
-            times.iter().map(|t| at(&value, *t)).collect()
-        };
-        list.iter()
-            .map(|band| [side(band, 0), side(band, 1)])
-            .collect()
+        let curves = list.iter().map(|band| {
+            let ends = (0..known.len()).map(|i| band.pointwise(i));
+            let (low, high): (Vec<f64>, Vec<f64>) = ends.map(|[l, h]| (l, h)).unzip();
+            [side(&low), side(&high)]
+        });
+        curves.collect()
     }
 }

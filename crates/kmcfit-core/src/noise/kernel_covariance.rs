@@ -15,10 +15,15 @@
 //!
 //! Source: Andrews (1991), *Heteroskedasticity and autocorrelation consistent covariance matrix estimation*, Econometrica 59,
 //! Eqs. (2.7), (6.2) and (6.4), with each score scaled to unit variance, so that `S` transforms with the units of the parameters.
-//! The kernel is positive definite, so `S` is a covariance. It is summed by fast Fourier transforms, in `N log N`.
+//! The kernel is positive definite, so `S` is a covariance. It is summed over the
+//! frequencies of a circle of `L >= 2 N` samples, with the discrete transforms `X_a` of the scores and `K` of the kernel (Parseval),
+//!
+//! ```text
+//! sum_(i,j) kappa((i - j)/b) s_ia s_jb = 1/L sum_f K_f conj(X_fa) X_fb
+//! ```
 
-use nalgebra::DMatrix;
-use rustfft::FftPlannerScalar;
+use crate::signal::{forward_transform, of_pair};
+use nalgebra::{DMatrix, DMatrixView};
 use rustfft::num_complex::Complex;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -101,40 +106,78 @@ pub fn kernel_sum(scores: &DMatrix<f64>, records: &[Range<usize>], bandwidth: f6
     let parameters = scores.ncols();
     let mut sum = DMatrix::zeros(parameters, parameters);
     for record in records {
-        let of_record = scores.rows(record.start, record.len()).into_owned();
-        let smoothed = smoothed(&of_record, bandwidth);
-        sum += of_record.tr_mul(&smoothed);
+        let of_record = scores.rows(record.start, record.len());
+        sum += match bandwidth == 0.0 || record.is_empty() {
+            true => of_record.tr_mul(&of_record),
+            false => correlated_sum(&of_record, bandwidth),
+        };
     }
     // Symmetric to the last bit.
     0.5 * (&sum + sum.transpose())
 }
 
-/// `sum_j kappa((i - j)/b) s_j` for all `i`, by a circular convolution of twice the length.
-fn smoothed(scores: &DMatrix<f64>, bandwidth: f64) -> DMatrix<f64> {
-    let count = scores.nrows();
-    if bandwidth == 0.0 || count == 0 {
-        return scores.clone();
-    }
+/// Rows of the transforms that are multiplied at once.
+const ROWS: usize = 4096;
+
+/// The sum over one record, from the transforms of the scores and of the kernel.
+fn correlated_sum(scores: &DMatrixView<f64>, bandwidth: f64) -> DMatrix<f64> {
+    let (count, parameters) = scores.shape();
     let length = (2 * count).next_power_of_two();
-    let mut planner = FftPlannerScalar::new();
-    let [forward, inverse] = [
-        planner.plan_fft_forward(length),
-        planner.plan_fft_inverse(length),
-    ];
-    let lag = |i: usize| i.min(length - i) as f64;
-    let weight = |i: usize| Complex::from(quadratic_spectral(lag(i) / bandwidth) / length as f64);
-    let mut kernel: Vec<Complex<f64>> = (0..length).map(weight).collect();
-    forward.process(&mut kernel);
-    let mut out = scores.clone();
-    for mut column in out.column_iter_mut() {
-        let mut series: Vec<Complex<f64>> = column.iter().map(|s| Complex::from(*s)).collect();
-        series.resize(length, Complex::default());
-        forward.process(&mut series);
-        (series.iter_mut().zip(&kernel)).for_each(|(s, k)| *s *= k);
-        inverse.process(&mut series);
-        (column.iter_mut().zip(&series)).for_each(|(into, s)| *into = s.re);
+    let half = length / 2;
+    // The transforms of two real series are one of their complex sum; of like size, for the precision of both.
+    let sizes: Vec<f64> = (scores.column_iter())
+        .map(|score| Some(score.amax()).filter(|a| *a > 0.0).unwrap_or(1.0))
+        .collect();
+    let series = |place: usize, i: usize| match place {
+        0 => quadratic_spectral(i.min(length - i) as f64 / bandwidth),
+        _ if place > parameters || i >= count => 0.0,
+        _ => scores[(i, place - 1)] / sizes[place - 1],
+    };
+    let transform = forward_transform(length);
+    let mut scratch = vec![Complex::default(); transform.get_inplace_scratch_len()];
+    let mut weights = Vec::new();
+    // Real and imaginary parts at the frequencies up to a half.
+    let mut parts = DMatrix::zeros(2 * (half + 1), parameters);
+    for first in (0..=parameters).step_by(2) {
+        let mut both: Vec<Complex<f64>> = match first {
+            // The kernel is even.
+            0 => {
+                let kernel: Vec<f64> = (0..=half).map(|i| series(0, i)).collect();
+                let at = |i: usize| Complex::new(kernel[i.min(length - i)], series(1, i));
+                (0..length).map(at).collect()
+            }
+            _ => {
+                let at = |i: usize| Complex::new(series(first, i), series(first + 1, i));
+                (0..length).map(at).collect()
+            }
+        };
+        transform.process_with_scratch(&mut both, &mut scratch);
+        for k in 0..=half {
+            let pair = of_pair(&both, k);
+            if first == 0 {
+                let sides = if k == 0 || k == half { 1.0 } else { 2.0 };
+                weights.push(sides * pair[0].re / length as f64);
+            }
+            for (place, value) in (first..).zip(pair) {
+                if (1..=parameters).contains(&place) {
+                    parts[(2 * k, place - 1)] = value.re;
+                    parts[(2 * k + 1, place - 1)] = value.im;
+                }
+            }
+        }
     }
-    out
+    let mut sum = DMatrix::zeros(parameters, parameters);
+    for first in (0..parts.nrows()).step_by(ROWS) {
+        let rows = parts.rows(first, ROWS.min(parts.nrows() - first));
+        let mut weighted = rows.into_owned();
+        for mut column in weighted.column_iter_mut() {
+            (column.iter_mut().enumerate()).for_each(|(i, x)| *x *= weights[(first + i) / 2]);
+        }
+        sum += rows.tr_mul(&weighted);
+    }
+    DMatrix::from_fn(parameters, parameters, |a, b| {
+        sum[(a, b)] * sizes[a] * sizes[b]
+    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Diagnostics of the residuals of a channel, or of the innovations of its correlated noise.
 
-use crate::diagnostics::{ResidualDiagnostics, ResidualRecord, outlier_indices};
+use crate::diagnostics::{ResidualDiagnostics, ResidualRecord, fit_percent, outlier_indices};
 use crate::noise::Correlation;
 use crate::record::{Channel, Loss};
 
@@ -21,6 +21,19 @@ pub fn diagnostics(channel: &Channel, predicted: &[f64]) -> ResidualDiagnostics 
         model: predicted,
         fitted: channel.correlation().map_or(0, Correlation::order),
     })
+}
+
+/// Fit of a channel ([`fit_percent`]), per cent; [`outliers`] count as missing.
+pub fn channel_fit_percent(channel: &Channel, predicted: &[f64]) -> f64 {
+    if channel.loss() == Loss::Squares {
+        return fit_percent(channel.observed(), predicted);
+    }
+    let mut observed = channel.observed().to_vec();
+    let missed: Vec<f64> = channel.residuals(predicted).collect();
+    for i in outliers(channel, &missed) {
+        observed[i] = f64::NAN;
+    }
+    fit_percent(&observed, predicted)
 }
 
 /// Indices of outliers ([`outlier_indices`]) under a robust loss, which are excluded from the statistics of the fit. Empty under least

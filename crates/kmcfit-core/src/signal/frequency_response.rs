@@ -10,9 +10,10 @@
 //! Where noise, leakage, a nonlinear term or a coefficient that varies in time contribute to the response, the coherence is below 1. Peaks
 //! are those of the mobility `|y'/x|`, in which the stiffness does not hide the mode of the higher frequency.
 
+use super::fourier::{forward_transform, of_pair};
 use super::spacing::median;
+use super::spectrum::hann_window;
 use nalgebra::{Matrix3, Vector3};
-use rustfft::FftPlannerScalar;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
 
@@ -83,8 +84,8 @@ impl CrossSpectra {
             return None;
         }
         let half = length / 2;
-        let transform = FftPlannerScalar::new().plan_fft_forward(length);
-        let window = |j: usize| 0.5 - 0.5 * (TAU * j as f64 / length as f64).cos();
+        let transform = forward_transform(length);
+        let window = hann_window(length);
         let mut sums = vec![(0.0, 0.0, Complex::default()); half];
         for s in 0..SEGMENTS {
             let part = s * half..s * half + length;
@@ -92,14 +93,12 @@ impl CrossSpectra {
             let mean = |series: &[f64]| series.iter().sum::<f64>() / length as f64;
             let [mean_x, mean_y] = [x, y].map(mean);
             // Two real series by one complex transform.
-            let pairs = x.iter().zip(y).enumerate();
-            let both = pairs.map(|(j, (x, y))| window(j) * Complex::new(x - mean_x, y - mean_y));
+            let pairs = window.iter().zip(x.iter().zip(y));
+            let both = pairs.map(|(w, (x, y))| *w * Complex::new(x - mean_x, y - mean_y));
             let mut both: Vec<Complex<f64>> = both.collect();
             transform.process(&mut both);
             for (k, (xx, yy, xy)) in sums.iter_mut().enumerate().skip(1) {
-                let (z, mirrored) = (both[k], both[length - k].conj());
-                let x = 0.5 * (z + mirrored);
-                let y = Complex::new(0.0, -0.5) * (z - mirrored);
+                let [x, y] = of_pair(&both, k);
                 *xx += x.norm_sqr();
                 *yy += y.norm_sqr();
                 *xy += x.conj() * y;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use rustfft::FftPlannerScalar;
+use super::fourier::forward_transform;
 use rustfft::num_complex::Complex;
 
 /// Ratio to the mean that one density of white noise in twenty thousand exceeds.
@@ -37,6 +37,12 @@ pub struct Spectrum {
     density: Vec<f64>,
 }
 
+/// The Hann window `w_j = (1 - cos(2π j/n))/2`.
+pub(super) fn hann_window(n: usize) -> Vec<f64> {
+    let weight = |j: usize| 0.5 - 0.5 * (TAU * j as f64 / n as f64).cos();
+    (0..n).map(weight).collect()
+}
+
 impl Spectrum {
     /// Computes the spectrum of values that are `spacing` seconds apart.
     ///
@@ -50,13 +56,11 @@ impl Spectrum {
             return None;
         }
         let mean = values.iter().sum::<f64>() / n as f64;
-        let window = |j: usize| 0.5 - 0.5 * (TAU * j as f64 / n as f64).cos();
-        let windowed = |(j, x): (usize, &f64)| Complex::from(window(j) * (x - mean));
-        let mut buffer: Vec<Complex<f64>> = values.iter().enumerate().map(windowed).collect();
-        FftPlannerScalar::new()
-            .plan_fft_forward(n)
-            .process(&mut buffer);
-        let squares: f64 = (0..n).map(|j| window(j) * window(j)).sum();
+        let window = hann_window(n);
+        let windowed = |(w, x): (&f64, &f64)| Complex::from(w * (x - mean));
+        let mut buffer: Vec<Complex<f64>> = window.iter().zip(values).map(windowed).collect();
+        forward_transform(n).process(&mut buffer);
+        let squares: f64 = window.iter().map(|w| w * w).sum();
         let density = |k: usize| {
             let sides = if k == 0 || 2 * k == n { 1.0 } else { 2.0 };
             sides * spacing * buffer[k].norm_sqr() / squares

@@ -9,7 +9,7 @@
 //! chapters 6, 9 and 13.
 
 use super::functional::Linear;
-use super::parallel::map;
+use crate::threads::map;
 use super::refit::settings;
 use super::simulate::{noise_of, normal, sigmas, stream, with_samples};
 use crate::objective::Evaluation;

@@ -21,7 +21,6 @@ mod forced_prediction;
 mod free_response;
 mod functional;
 pub mod multistart;
-mod parallel;
 pub mod prediction;
 pub mod profile_likelihood;
 mod refit;

@@ -13,6 +13,8 @@ use crate::tables::{
     ColumnName, Duplicates, RepeatedTimes, SAMPLE_RATES, Table, TableFormat, repeated_times,
 };
 use crate::units::{Quantity, Unit};
+use std::path::PathBuf;
+use std::rc::Rc;
 
 /// Default name of the column of times.
 const TIME_COLUMN: &str = "t_s";
@@ -73,7 +75,9 @@ pub fn read(
         ScalarOr::Scalar(id) => (id, None),
         ScalarOr::Map(source) => (&source.column, Some(source)),
     };
-    let table = table(file, spec, wanted, &column_key, (id, own))?;
+    let source = Source::of(file, spec, wanted, &column_key, (id, own))?;
+    let tables = source.tables(notes)?;
+    let table = source.table(&tables)?;
     let column_key = match own {
         Some(_) => format!("{column_key}.column"),
         None => column_key,
@@ -85,12 +89,12 @@ pub fn read(
         name: wanted.name,
         kind: wanted.kind,
         given: wanted.unit,
-        table: &table,
+        table,
         index,
     };
     let unit = column(index).unit(&mut notes.warnings)?;
     let factor = unit.factor();
-    let times = times(file, spec, &experiment, own, &table, notes)?;
+    let times = times(file, spec, &experiment, own, table, notes)?;
     let values = table.samples(index).map_err(asked_for(file, &column_key))?;
     let beside = match wanted.beside {
         Some((name, key)) => {
@@ -115,7 +119,7 @@ pub fn read(
             .found(format!("`{label}`"))
             .expected("two columns"));
     }
-    repeats(file, spec, wanted.experiment, &table, &times, notes);
+    repeats(file, spec, wanted.experiment, table, &times, notes);
     let inside = inside(file, &experiment, spec, &times.values)?;
     let duplicates = spec.duplicates.unwrap_or_default();
     let values = times.repeated.merged(values, duplicates);
@@ -158,29 +162,61 @@ fn repeats(
     notes.state(&file.experiment_name(experiment), &fact);
 }
 
-/// The table of a column: of its own file, or of that of the experiment.
-fn table(
-    file: &ModelFile,
-    spec: &ExperimentSpec,
-    wanted: &ColumnRequest,
-    column_key: &str,
-    (id, own): (&ColumnId, Option<&SourceSpec>),
-) -> Result<Table, InputError> {
-    let experiment = &format!("experiments[{}]", wanted.experiment);
-    let time = own.and_then(|s| s.time.as_ref());
-    let time = time.or_else(|| spec.columns.as_ref()?.time.as_ref());
-    let mut columns = vec![column_name(id)];
-    columns.extend(time.map(column_name));
-    columns.extend(wanted.beside.map(|(name, _)| ColumnName::from(name)));
-    let own = own.and_then(|s| s.data.as_ref());
-    let key = format!("{}.data", own.map_or(&**experiment, |_| column_key));
-    let data = own.or(spec.data.as_ref()).ok_or_else(|| {
-        file.error_at(experiment, "this experiment has no data")
-            .expected("`data`, a CSV file with the samples")
-    })?;
-    Table::read_with_columns(file.resolve(&data.0), &format(spec), &columns)
-        .map_err(|error| about_format(file, experiment, error))
-        .map_err(asked_for(file, &key))
+/// The file of a column: its own, or that of the experiment.
+struct Source<'a> {
+    file: &'a ModelFile,
+    experiment: String,
+    /// Key of the path.
+    key: String,
+    path: PathBuf,
+    format: TableFormat,
+    /// The column, and those that are read with it.
+    columns: Vec<ColumnName>,
+}
+
+impl<'a> Source<'a> {
+    fn of(
+        file: &'a ModelFile,
+        spec: &ExperimentSpec,
+        wanted: &ColumnRequest,
+        column_key: &str,
+        (id, own): (&ColumnId, Option<&SourceSpec>),
+    ) -> Result<Self, InputError> {
+        let experiment = format!("experiments[{}]", wanted.experiment);
+        let time = own.and_then(|s| s.time.as_ref());
+        let time = time.or_else(|| spec.columns.as_ref()?.time.as_ref());
+        let mut columns = vec![column_name(id)];
+        columns.extend(time.map(column_name));
+        columns.extend(wanted.beside.map(|(name, _)| ColumnName::from(name)));
+        let own = own.and_then(|s| s.data.as_ref());
+        let key = format!("{}.data", own.map_or(&*experiment, |_| column_key));
+        let data = own.or(spec.data.as_ref()).ok_or_else(|| {
+            file.error_at(&experiment, "this experiment has no data")
+                .expected("`data`, a CSV file with the samples")
+        })?;
+        Ok(Self {
+            file,
+            key,
+            path: file.resolve(&data.0),
+            format: format(spec),
+            columns,
+            experiment,
+        })
+    }
+
+    fn tables(&self, notes: &mut RecordNotes) -> Result<Rc<[Table]>, InputError> {
+        let tables = notes.tables(&self.path, &self.format);
+        tables.map_err(|error| self.about(error))
+    }
+
+    fn table<'t>(&self, tables: &'t [Table]) -> Result<&'t Table, InputError> {
+        Table::with_columns(tables, &self.columns).map_err(|error| self.about(error))
+    }
+
+    fn about(&self, error: InputError) -> InputError {
+        let error = about_format(self.file, &self.experiment, error);
+        asked_for(self.file, &self.key)(error)
+    }
 }
 
 /// The rows in the window.

@@ -1,9 +1,12 @@
 //! Facts about the data of a record and what was done with them: repeated times, gaps, dropouts, spikes, saturation, quantisation and delays.
 
+use crate::error::InputError;
 use crate::finding::Finding;
 use crate::number_format::significant;
-use crate::tables::lines_in_words;
+use crate::tables::{Table, TableFormat, lines_in_words};
 use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use thiserror::Error;
 
 /// Most places that a fact lists.
@@ -18,9 +21,33 @@ pub struct RecordNotes {
     pub warnings: Vec<Finding>,
     /// What was found in the data and done with it.
     pub data: Vec<Finding>,
+    /// The file that was read last: its channels follow each other.
+    last_file: Option<(PathBuf, TableFormat, Rc<[Table]>)>,
 }
 
 impl RecordNotes {
+    /// The tables of a file, which is read once for columns that follow each other.
+    ///
+    /// # Errors
+    /// As [`Table::read_all`].
+    pub fn tables(&mut self, path: &Path, format: &TableFormat) -> Result<Rc<[Table]>, InputError> {
+        if let Some((last, of, tables)) = &self.last_file
+            && last == path
+            && of == format
+        {
+            return Ok(Rc::clone(tables));
+        }
+        self.close_file();
+        let tables: Rc<[Table]> = Table::read_all(path, format)?.into();
+        self.last_file = Some((path.to_owned(), *format, Rc::clone(&tables)));
+        Ok(tables)
+    }
+
+    /// Frees the tables of the last file.
+    pub fn close_file(&mut self) {
+        self.last_file = None;
+    }
+
     /// Adds a fact, unless another channel of the same file has stated it.
     pub fn state(&mut self, experiment: &str, fact: &DataFact) {
         let text = format!("{experiment}: {fact}");

@@ -164,6 +164,10 @@ fn read_one(
         channels,
         excitation: excitation::read(file, i, spec, notes)?,
     };
+    let next = file.spec.experiments.get(i + 1);
+    if next.is_none_or(|next| next.data != spec.data) {
+        notes.close_file();
+    }
     let checks = data_checks::of(file, i, spec, &record);
     // Outliers are spikes as well.
     notes.warnings.retain(|spikes| {

@@ -22,7 +22,7 @@
 mod linearised;
 mod reduced;
 
-use super::parallel::map;
+use crate::threads::map;
 use super::refit::{nearest, settings, sizes};
 use crate::problem::Problem;
 use crate::simulate::SimulationError;

@@ -27,7 +27,7 @@ mod search;
 pub use envelope::{Envelope, envelopes};
 
 use super::functional::{Linear, Target};
-use super::parallel::map;
+use crate::threads::map;
 use crate::functions::Penalty;
 use crate::problem::Problem;
 use search::Search;

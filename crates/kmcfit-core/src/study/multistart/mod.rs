@@ -14,7 +14,7 @@ pub use cluster::{Cluster, Distance, distance};
 pub use finding::MultistartFinding;
 pub use path::{Paths, between};
 
-use super::parallel::map;
+use crate::threads::map;
 use super::refit::{nearest, sizes};
 use super::simulate::stream;
 use crate::objective::Evaluation;

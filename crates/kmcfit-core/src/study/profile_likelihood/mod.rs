@@ -18,7 +18,7 @@
 mod continuation;
 
 use super::functional::Linear;
-use super::parallel::map;
+use crate::threads::map;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
 use continuation::ProfileSearch;

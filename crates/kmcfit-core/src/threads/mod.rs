@@ -5,6 +5,10 @@
 
 #![allow(clippy::disallowed_methods)]
 
+mod parallel;
+
+pub use parallel::map;
+
 use crate::host;
 use std::cell::Cell;
 use std::io;
@@ -17,9 +21,14 @@ thread_local! {
 
 /// True if a second thread has a processor: there are at least two, and this thread does not share them with others.
 pub fn spare() -> bool {
+    available() > 1
+}
+
+/// Number of threads that have a processor each: 1 for a thread that shares them with others.
+pub fn available() -> usize {
     static THREADS: LazyLock<usize> =
         LazyLock::new(|| std::thread::available_parallelism().map_or(1, usize::from));
-    !SHARES.get() && *THREADS > 1
+    if SHARES.get() { 1 } else { *THREADS }
 }
 
 /// Marks this thread as one that shares the processors.

@@ -1,6 +1,6 @@
 //! Independent jobs on several threads.
 
-use crate::threads::{share, sharing, spawn_scoped};
+use super::{share, sharing, spawn_scoped};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Largest number of threads, which bounds the memory of their stacks.
