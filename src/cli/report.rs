@@ -1,5 +1,6 @@
 //! `kmcfit report`: draws the page and the figures of a finished run again.
 
+use super::progress::Activity;
 use super::{CommandError, OK, print, unwritable};
 use crate::report::document::ResultDocument;
 use crate::report::{FittedModel, Run, RunAssessment, fit_claim, rebuilt_fit};
@@ -16,6 +17,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
+    let activity = Activity::begin(format!("reading {}", arguments.run.display()));
     let run = Run::open(&arguments.run)?;
     let (model, mut fit) = rebuilt_fit(&run)?;
     fit.history.clone_from(&run.history);
@@ -33,12 +35,14 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         estimates: fitted.document().estimates,
         ..run.document.clone()
     };
+    activity.stage("drawing the figures and the page");
     let folder = OutputFolder::prepare(&run.folder, fit_claim(&model))?;
     let manifest = Manifest::read(&run.folder)?;
     let kept = manifest.into_iter().flat_map(|manifest| manifest.files);
     let kept: Vec<String> = kept.map(|(name, _)| name).collect();
     write(&folder, &kept, &fitted.drawings(&document))
         .map_err(|error| unwritable(folder.path(), &error))?;
+    drop(activity);
     print(&format!(
         "report and figures in {}\n",
         folder.path().display()

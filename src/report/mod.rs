@@ -68,7 +68,7 @@ pub use result_table::ResultTable;
 pub use run::{DRAWS, FittedModel, fit_claim, json};
 pub use run_reader::Run;
 pub use summary::{prediction_table, summary};
-pub use terminal::charts;
+pub use terminal::{charts, summary_plot};
 pub use timings::{OverheadTimings, PartSummary, TimingsSummary};
 #[cfg(test)]
 pub(crate) use verdict::{assumption, reason_in_words};

@@ -1,5 +1,6 @@
 //! Independent jobs on several threads.
 
+use crate::host;
 use crate::threads::{share, sharing, spawn_scoped};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -7,12 +8,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 const MOST_THREADS: usize = 256;
 
 /// Computes `work(0), work(1), ...` on up to `threads` threads and returns the results in order. Each job depends on its
-/// index alone, so results do not depend on the number of threads.
+/// index alone, so results do not depend on the number of threads. The progress of the host shows the finished jobs.
 ///
 /// # Panics
 /// If a job does.
 pub fn map<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    let next = AtomicUsize::new(0);
+    let (next, finished) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let turn = || {
         let mut done = Vec::new();
         loop {
@@ -21,6 +22,7 @@ pub fn map<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T + Sy
                 return done;
             }
             done.push((index, work(index)));
+            host::progress(finished.fetch_add(1, Ordering::Relaxed) + 1, count);
         }
     };
     let workers = threads.clamp(1, count.clamp(1, MOST_THREADS));
