@@ -25,6 +25,7 @@ mod results;
 mod sequence;
 mod simulate;
 mod study;
+mod terminal;
 mod uncommon_input;
 mod units;
 mod verify;
