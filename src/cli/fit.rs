@@ -9,7 +9,7 @@ use crate::error::InputError;
 use crate::fitting::fit_model;
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
-    DRAWS, FittedModel, OverheadTimings, RunAssessment, TimingsSummary, charts, fit_claim, json,
+    DRAWS, DisplayUnits, FittedModel, OverheadTimings, RunAssessment, TimingsSummary, charts, fit_claim, json,
     predict, summary, summary_plot,
 };
 use crate::results::{FitJournal, Heading, OutputFolder, RESULT, RequestedFiles};
@@ -299,6 +299,7 @@ pub(super) fn fit_into(
         predictions: &predictions,
         weights: path.as_ref(),
         requested,
+        display: DisplayUnits::default(),
     };
     let mut document = run.document();
     let draws = run.draws();

@@ -1,5 +1,6 @@
 //! Assessment of a fit and of the validation records: statistics, step-size check, bands, predictions.
 
+use super::display_units::DisplayUnits;
 use super::channel_view::ChannelView;
 use crate::config::{HoldOut, Model};
 use kmcfit_core::internals::assessment::{
@@ -131,8 +132,8 @@ impl ValidationRecord {
         Some((&self.out.experiment.name, worst))
     }
 
-    /// Its channels; empty without a response.
-    pub fn channels(&self) -> Vec<ChannelView<'_>> {
+    /// Its channels in units for display; empty without a response.
+    pub fn channels(&self, display: DisplayUnits) -> Vec<ChannelView<'_>> {
         let Ok((problem, evaluation)) = &self.found else {
             return Vec::new();
         };
@@ -143,6 +144,7 @@ impl ValidationRecord {
                 channel,
                 predicted,
                 note: self.out.notes.get(i),
+                display: display.of_channel(channel.kind()),
             })
             .collect()
     }

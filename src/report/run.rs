@@ -1,6 +1,7 @@
 //! Output of a fit: the result document, tables, figures and the page.
 
 use super::channel_view::ChannelView;
+use super::display_units::DisplayUnits;
 use super::cost::{CostKind, cost_definition};
 use super::document::{
     ActiveSummary, AttemptSummary, ChannelSummary, ConstraintSummary, CostSummary, CountsSummary,
@@ -12,7 +13,7 @@ use super::fit_quality;
 use super::npy::npy;
 use super::page::fit_page;
 use super::ratios;
-use super::render;
+use super::{FigureWidth, render_at};
 use super::suggestions::suggestions;
 use super::tables::{FUNCTION_ROWS, TRAJECTORY_ROWS};
 use super::timings::{OverheadTimings, TimingsSummary};
@@ -53,6 +54,8 @@ pub struct FittedModel<'a> {
     pub run_assessment: &'a RunAssessment,
     /// Files that are written on request.
     pub requested: RequestedFiles,
+    /// Units of page and figures.
+    pub display: DisplayUnits,
 }
 
 impl Model {
@@ -111,17 +114,21 @@ impl FittedModel<'_> {
             write(&name, table.to_csv().as_bytes())?;
         }
         if self.requested.figures {
-            for (name, text) in self.drawings(document) {
+            for (name, text) in self.drawings(document, FigureWidth::Double) {
                 write(&name, text.as_bytes())?;
             }
         }
         Ok(writing)
     }
 
-    /// Figures and page of `document`, each with the name of its file.
-    pub fn drawings(&self, document: &ResultDocument) -> Vec<(String, String)> {
+    /// Figures of a width and the page of `document`, each with the name of its file.
+    pub fn drawings(
+        &self,
+        document: &ResultDocument,
+        width: FigureWidth,
+    ) -> Vec<(String, String)> {
         let figures = self.figures().into_iter();
-        let figures = figures.map(|f| (format!("figures/{}.svg", f.name), render(&f)));
+        let figures = figures.map(|f| (format!("figures/{}.svg", f.name), render_at(&f, width)));
         figures
             .chain([(PAGE.to_owned(), self.page(document))])
             .collect()
@@ -181,7 +188,7 @@ impl FittedModel<'_> {
                 .run_assessment
                 .validation
                 .iter()
-                .map(fit_quality::validation)
+                .map(|record| fit_quality::validation(record, self.display))
                 .collect(),
             nuisance_parameters: match self.is_simulated() {
                 true => {
@@ -353,7 +360,10 @@ impl FittedModel<'_> {
                 let channels: Vec<ChannelSummary> = channels
                     .map(|i| fit_quality::channel(&self.channel_view(e, i)))
                     .collect();
-                let factor = self.note(e, 0).map_or(1.0, |note| note.unit.factor());
+                let factor = match channels.is_empty() {
+                    true => 1.0,
+                    false => self.channel_view(e, 0).factor(),
+                };
                 ExperimentSummary {
                     name: experiment.name.clone(),
                     driven_by: driven_by(experiment.excitation.as_ref()),
@@ -383,6 +393,9 @@ impl FittedModel<'_> {
             channel: &self.model.problem.experiments[experiment].channels[channel],
             predicted: &self.fit.best.evaluation.predictions[experiment][channel],
             note: self.note(experiment, channel),
+            display: self.display.of_channel(
+                self.model.problem.experiments[experiment].channels[channel].kind(),
+            ),
         }
     }
 

@@ -21,6 +21,7 @@ mod oscillator;
 mod predict;
 mod reading_back;
 mod regressions;
+mod report;
 mod results;
 mod sequence;
 mod simulate;

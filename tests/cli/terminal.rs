@@ -2,7 +2,6 @@
 #![cfg(target_os = "linux")]
 
 use crate::workbench::Workbench;
-use std::process::Stdio;
 use std::time::Duration;
 
 /// A record whose stiffness falls by a third; the fit determines it at three knots.
@@ -10,11 +9,23 @@ fn bench() -> Workbench {
     let bench = Workbench::with_small_model();
     let model = bench.read("model.yaml");
     let model = model
-        .replace("mass:      {basis: nodal, start: 2.0}", "mass: {fixed: 1.0}")
-        .replace("damping:   {basis: constant, start: 1.0}", "damping: {fixed: 0.1}")
-        .replace("{basis: nodal, start: 1.0}", "{basis: piecewise-linear, knots: 3, start: 90.0}")
+        .replace(
+            "mass:      {basis: nodal, start: 2.0}",
+            "mass: {fixed: 1.0}",
+        )
+        .replace(
+            "damping:   {basis: constant, start: 1.0}",
+            "damping: {fixed: 0.1}",
+        )
+        .replace(
+            "{basis: nodal, start: 1.0}",
+            "{basis: piecewise-linear, knots: 3, start: 90.0}",
+        )
         .replace("{nodes: 21, method: midpoint}", "{nodes: 801, method: rk4}")
-        .replace("    initial:", "    sigma: {displacement: 0.05}\n    initial:")
+        .replace(
+            "    initial:",
+            "    sigma: {displacement: 0.05}\n    initial:",
+        )
         .replace("lbfgs", "gauss-newton")
         .replace("{iterations: 5}", "{iterations: 30, tolerance: 1e-9}");
     bench.write("model.yaml", &model);
@@ -41,7 +52,7 @@ fn on_terminal(bench: &Workbench, arguments: &str, variables: &[(&str, &str)]) -
         .env_remove("NO_COLOR")
         .envs(variables.iter().copied())
         .args(["-qec", &command, "/dev/null"])
-        .stdin(Stdio::null())
+        .write_stdin("")
         .timeout(Duration::from_secs(60))
         .output()
         .expect("script of util-linux");
@@ -60,14 +71,22 @@ fn the_summary_plots_the_varying_coefficient() {
     let estimates = piped.find("\n\nFit ").expect("a line of the fit");
     let (above, below) = piped.split_at(estimates);
     let shown = on_terminal(&bench, FIT, &[]);
-    let begin = shown.find("stiffness k in N/m; shaded: 95 % band").unwrap_or_else(|| panic!("{shown}"));
-    assert!(shown[..begin].trim_end().ends_with(above.trim_end()), "{shown}");
+    let begin = shown
+        .find("stiffness k in N/m; shaded: 95 % band")
+        .unwrap_or_else(|| panic!("{shown}"));
+    assert!(
+        shown[..begin].trim_end().ends_with(above.trim_end()),
+        "{shown}"
+    );
     let end = shown.find("\n\nFit ").expect("a line of the fit");
     assert_eq!(&shown[end..], below);
     let plot: Vec<&str> = shown[begin..end].lines().collect();
     // A title, six rows, and the times.
     assert_eq!(plot.len(), 8, "{shown}");
-    assert!(plot.iter().all(|line| line.chars().count() <= 72), "{shown}");
+    assert!(
+        plot.iter().all(|line| line.chars().count() <= 72),
+        "{shown}"
+    );
     assert!(plot.iter().any(|line| line.contains('░')) && plot[7].trim_end().ends_with("2 s"));
     let has_plot = |arguments: &str, variables: &[(&str, &str)]| {
         on_terminal(&bench, arguments, variables).contains("stiffness k in N/m")

@@ -17,7 +17,7 @@ pub mod svg;
 mod thin;
 
 pub(super) use data::data;
-pub use figure::{Axis, Figure, Panel, Scale};
+pub use figure::{Axis, Figure, FigureWidth, Panel, Scale};
 pub use plot_mark::{Colour, Dash, Mark, Style};
-pub use svg::render;
+pub use svg::{render, render_at};
 pub(super) use svg::sample;

@@ -16,6 +16,7 @@ use super::fit_assessment::RunAssessment;
 use super::npy::read_npy;
 use super::parameters::ParametersDocument;
 use super::result_table::ResultTable;
+use super::display_units::DisplayUnits;
 use super::run::{COVARIANCE, FittedModel};
 use super::run_reader::Run;
 use crate::config::Model;
@@ -108,7 +109,8 @@ impl Verification {
             predictions: &predictions,
             weights: None,
             run_assessment: &assessment,
-            requested: RequestedFiles {
+            requested: RequestedFiles {,
+            display: DisplayUnits::default(),
                 tables: run.document.model.steps_per_row == 1,
                 ..RequestedFiles::default()
             },

@@ -98,7 +98,10 @@ pub fn envelopes(
         }
     }
     // One list of searches, so that the threads have work to the end.
-    let all: Vec<Target> = jobs.iter().flat_map(|(.., targets)| targets.clone()).collect();
+    let all: Vec<Target> = jobs
+        .iter()
+        .flat_map(|(.., targets)| targets.clone())
+        .collect();
     let found = extreme_pairs(problem, &[theta.to_vec()], &all, level, threads);
     let Some(mut found) = found.map(Vec::into_iter) else {
         return Vec::new();
