@@ -125,7 +125,7 @@ impl ValidationRecord {
 
     /// Its name and the fit of its worst channel, per cent, if the fitted system does not predict it.
     pub fn poor(&self) -> Option<(&str, f64)> {
-        let channels = self.channels();
+        let channels = self.channels(DisplayUnits::default());
         let fits = channels.iter();
         let fits = fits.map(|c| diagnostics(c.channel, c.predicted).fit_percent);
         let worst = fits.reduce(f64::min).filter(|worst| *worst < POOR)?;

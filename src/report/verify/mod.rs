@@ -109,8 +109,8 @@ impl Verification {
             predictions: &predictions,
             weights: None,
             run_assessment: &assessment,
-            requested: RequestedFiles {,
             display: DisplayUnits::default(),
+            requested: RequestedFiles {
                 tables: run.document.model.steps_per_row == 1,
                 ..RequestedFiles::default()
             },
