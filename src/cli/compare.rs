@@ -1,7 +1,7 @@
 //! `kmcfit compare`: fits models, reads finished runs, and writes their comparison.
 
-use super::fit::{fit_into, note_discarded, open_journal};
 use super::compared_names::names;
+use super::fit::{fit_into, note_discarded, open_journal};
 use super::progress::{Activity, Progress};
 use super::{
     CommandError, NOT_CONVERGED, OK, Overrides, exit_code, inputs, interrupt, print, say,

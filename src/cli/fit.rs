@@ -9,8 +9,8 @@ use crate::error::InputError;
 use crate::fitting::fit_model;
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
-    DRAWS, DisplayUnits, FittedModel, OverheadTimings, RunAssessment, TimingsSummary, charts, fit_claim, json,
-    predict, summary, summary_plot,
+    DRAWS, DisplayUnits, FittedModel, OverheadTimings, RunAssessment, TimingsSummary, charts,
+    fit_claim, json, predict, summary, summary_plot,
 };
 use crate::results::{FitJournal, Heading, OutputFolder, RESULT, RequestedFiles};
 use console::Term;

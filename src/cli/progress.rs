@@ -140,7 +140,8 @@ impl Progress {
 
     /// Puts the name of the run before the line.
     pub fn named(self, name: &str) -> Self {
-        self.bar.set_prefix(harmless(&format!("{name}  ")).into_owned());
+        self.bar
+            .set_prefix(harmless(&format!("{name}  ")).into_owned());
         self
     }
 

@@ -2,8 +2,8 @@
 
 use super::progress::Activity;
 use super::{CommandError, OK, print, unwritable};
-use crate::report::document::ResultDocument;
 use crate::error::InputError;
+use crate::report::document::ResultDocument;
 use crate::report::{
     DisplayUnits, FigureWidth, FittedModel, Run, RunAssessment, fit_claim, rebuilt_fit,
 };

@@ -367,7 +367,11 @@ impl StudyRun<'_> {
             return Err(StudyError::Interrupted);
         }
         self.begun += 1;
-        let stage = format!("study {}/{}: {name}", self.begun, self.model.study.analyses());
+        let stage = format!(
+            "study {}/{}: {name}",
+            self.begun,
+            self.model.study.analyses()
+        );
         let activity = Activity::begin(stage);
         let found = self.journal.analysis(name, compute, whole)?;
         drop(activity);

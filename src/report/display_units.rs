@@ -40,16 +40,22 @@ impl DisplayUnits {
                     let known = Unit::recognise(quantity, symbol);
                     known.is_some_and(|u| !u.is_arbitrary() && u.is_angular() == is_rotation)
                 });
-                let motion = if is_rotation { "rotation" } else { "translation" };
+                let motion = if is_rotation {
+                    "rotation"
+                } else {
+                    "translation"
+                };
                 let what = format!("not a unit of the {} of a {motion}", quantity.name());
                 return Err(InputError::argument("--units", what)
                     .found(quote(unit.symbol()))
                     .expected(one_of(symbols)));
             }
             if display.units[place].replace(unit).is_some() {
-                return Err(InputError::argument("--units", "the quantity is given twice")
-                    .found(quote(text))
-                    .expected("one unit for each quantity"));
+                return Err(
+                    InputError::argument("--units", "the quantity is given twice")
+                        .found(quote(text))
+                        .expected("one unit for each quantity"),
+                );
             }
         }
         Ok(display)
@@ -101,8 +107,20 @@ mod tests {
 
     #[test]
     fn messages_of_units_for_display() {
-        let messages = ["g", "acceleratoin=g", "force=kn", "force=g", "displacement=deg", "force=V", "force=N,force=kN"]
-            .map(|text| DisplayUnits::parse(text, false).expect_err(text).to_string());
+        let messages = [
+            "g",
+            "acceleratoin=g",
+            "force=kn",
+            "force=g",
+            "displacement=deg",
+            "force=V",
+            "force=N,force=kN",
+        ]
+        .map(|text| {
+            DisplayUnits::parse(text, false)
+                .expect_err(text)
+                .to_string()
+        });
         assert_snapshot!(messages.join("\n"), @"");
     }
 }

@@ -1,7 +1,7 @@
 //! Assessment of a fit and of the validation records: statistics, step-size check, bands, predictions.
 
-use super::display_units::DisplayUnits;
 use super::channel_view::ChannelView;
+use super::display_units::DisplayUnits;
 use crate::config::{HoldOut, Model};
 use kmcfit_core::internals::assessment::{
     EquationErrorIntervals, EstimateErrors, FitAssessment, LargeCovariance, NoIntervals, POOR,

@@ -14,8 +14,7 @@ impl FittedModel<'_> {
         let first = self.channels().first().copied();
         let functions = self.named_functions().into_iter();
         let panels = functions.zip(self.functions_figure().panels);
-        let panels =
-            panels.filter(|((function, _), _)| document.is_determined(&function.name()));
+        let panels = panels.filter(|((function, _), _)| document.is_determined(&function.name()));
         let scored = panels.filter_map(|(_, panel)| Some((variation(&panel)?, panel)));
         let most = scored.max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, mut panel)) = most else {

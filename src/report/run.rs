@@ -1,8 +1,8 @@
 //! Output of a fit: the result document, tables, figures and the page.
 
 use super::channel_view::ChannelView;
-use super::display_units::DisplayUnits;
 use super::cost::{CostKind, cost_definition};
+use super::display_units::DisplayUnits;
 use super::document::{
     ActiveSummary, AttemptSummary, ChannelSummary, ConstraintSummary, CostSummary, CountsSummary,
     ExperimentSummary, FORMAT, GradientSummary, ModelSummary, OutcomeSummary, PathPointSummary,
@@ -13,10 +13,10 @@ use super::fit_quality;
 use super::npy::npy;
 use super::page::fit_page;
 use super::ratios;
-use super::{FigureWidth, render_at};
 use super::suggestions::suggestions;
 use super::tables::{FUNCTION_ROWS, TRAJECTORY_ROWS};
 use super::timings::{OverheadTimings, TimingsSummary};
+use super::{FigureWidth, render_at};
 use crate::config::{ChannelNote, Model};
 use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, RequestedFiles, Stage};
 use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, WeightRule};
@@ -122,11 +122,7 @@ impl FittedModel<'_> {
     }
 
     /// Figures of a width and the page of `document`, each with the name of its file.
-    pub fn drawings(
-        &self,
-        document: &ResultDocument,
-        width: FigureWidth,
-    ) -> Vec<(String, String)> {
+    pub fn drawings(&self, document: &ResultDocument, width: FigureWidth) -> Vec<(String, String)> {
         let figures = self.figures().into_iter();
         let figures = figures.map(|f| (format!("figures/{}.svg", f.name), render_at(&f, width)));
         figures
@@ -393,9 +389,9 @@ impl FittedModel<'_> {
             channel: &self.model.problem.experiments[experiment].channels[channel],
             predicted: &self.fit.best.evaluation.predictions[experiment][channel],
             note: self.note(experiment, channel),
-            display: self.display.of_channel(
-                self.model.problem.experiments[experiment].channels[channel].kind(),
-            ),
+            display: self
+                .display
+                .of_channel(self.model.problem.experiments[experiment].channels[channel].kind()),
         }
     }
 

@@ -101,7 +101,10 @@ impl Curve {
     fn extent(&self) -> [f64; 2] {
         let [low, high] = range(&self.values);
         let room = WIDE_BAND * (high - low);
-        let band = self.band.as_ref().map(|[from, to]| [range(from)[0], range(to)[1]]);
+        let band = self
+            .band
+            .as_ref()
+            .map(|[from, to]| [range(from)[0], range(to)[1]]);
         let [from, to] = band.unwrap_or([low, high]);
         [low.min(from.max(low - room)), high.max(to.min(high + room))]
     }
@@ -242,7 +245,9 @@ impl Chart {
         let [bottom, top] = self.values;
         for column in 0..self.width {
             let t = first + (column as f64 + 0.5) / self.width as f64 * (last - first);
-            let row = times.partition_point(|time| *time < t).min(times.len().saturating_sub(1));
+            let row = times
+                .partition_point(|time| *time < t)
+                .min(times.len().saturating_sub(1));
             let (Some(low), Some(high)) = (low.get(row), high.get(row)) else {
                 continue;
             };

@@ -18,8 +18,8 @@ use crate::report::timings::TimingsSummary;
 use kmcfit_core::internals::assessment::{
     ClassicalEstimate, FitStatistics, FunctionSummary, StepCheck,
 };
-use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::identifiability::CovarianceKind;
 use kmcfit_core::internals::solvers::{EquationBalance, Optimality, Status, number_or_nan};
 pub use kmcfit_core::internals::study::PredictionSummary as Prediction;

@@ -11,12 +11,12 @@ mod text;
 
 pub use difference::Difference;
 
+use super::display_units::DisplayUnits;
 use super::document::{Prediction, ResultDocument};
 use super::fit_assessment::RunAssessment;
 use super::npy::read_npy;
 use super::parameters::ParametersDocument;
 use super::result_table::ResultTable;
-use super::display_units::DisplayUnits;
 use super::run::{COVARIANCE, FittedModel};
 use super::run_reader::Run;
 use crate::config::Model;
