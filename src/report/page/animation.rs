@@ -3,6 +3,7 @@
 use crate::report::FittedModel;
 use crate::report::chart::{Figure, Mark, Panel, Style, data, text_for_script};
 use crate::report::document::ResultDocument;
+use crate::report::text::escape;
 use kmcfit_core::internals::functions::CoefficientFunction;
 use kmcfit_core::internals::record::ChannelKind;
 use serde::Serialize;
@@ -43,13 +44,9 @@ pub(super) fn animation(run: &FittedModel, document: &ResultDocument) -> String 
         .channels
         .iter()
         .position(|c| is_displacement(c.kind()));
-    let name = channel.and_then(|c| {
-        run.channel_fit(0, c)
-            .into_iter()
-            .next()
-            .map(|f| run.titled(f, 0, c).name)
-    });
-    let chart = name.map(|name| format!("figure-{name}"));
+    // The name of the chart in the section above.
+    let titled = |c| run.titled(Figure::new("channel", "", ""), 0, c).name;
+    let chart = channel.map(|c| format!("figure-{}", titled(c)));
     let coefficient = |(function, values): (&CoefficientFunction, Vec<f64>)| {
         let name = function.name();
         let finite = values.iter().copied().filter(|v| v.is_finite());
@@ -91,7 +88,7 @@ pub(super) fn animation(run: &FittedModel, document: &ResultDocument) -> String 
     format!(
         "<details class=\"screen animation\" id=\"animation\">\n<summary>Animation of the fitted system: {}</summary>\n\
          <script type=\"application/json\" class=\"contents\">{}</script>\n{added}</details>\n",
-        crate::report::text::escape(&first.name),
+        escape(&first.name),
         text_for_script(&contents)
     )
 }
