@@ -44,9 +44,9 @@ fn reports_have_other_units_and_widths() {
         bench.run_to(0, &report.collect::<Vec<_>>());
         for name in [
             "observation",
-            "channel",
             "residuals",
             "functions",
+            "ratios",
             "convergence",
             "residual_tests",
             "spectra",
@@ -70,7 +70,7 @@ fn reports_have_other_units_and_widths() {
     assert!(page.contains("displacement y (mm)") && !page.contains("displacement y (m)"));
     assert!(
         bench
-            .read("run/figures/channel.svg")
+            .read("run/figures/observation.svg")
             .contains("displacement y (mm)")
     );
     let result: serde_json::Value = serde_json::from_str(&result).expect("JSON");

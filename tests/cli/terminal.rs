@@ -2,6 +2,8 @@
 #![cfg(target_os = "linux")]
 
 use crate::workbench::Workbench;
+use std::io::{Read, Write};
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 /// A record whose stiffness falls by a third; the fit determines it at three knots.
@@ -97,6 +99,58 @@ fn the_summary_plots_the_varying_coefficient() {
         assert!(!has_plot("resume run", &[variable]), "{variable:?}");
     }
     assert!(!has_plot("resume run --no-plot", &[]));
-    let constant = "--set functions.stiffness.basis=constant --set functions.stiffness.knots=null";
+    let constant = "--set 'functions.stiffness={basis: constant, start: 90.0}'";
     assert!(!has_plot(&format!("{FIT} {constant}"), &[]));
+}
+
+/// After a second a study shows its analysis of all and the finished refits of all with the remaining time; Ctrl-C then keeps the
+/// analyses before.
+#[test]
+fn a_study_shows_its_progress_and_keeps_what_is_done() {
+    let bench = bench();
+    let study = "study: {seed: 1, bootstrap: 100000}\n";
+    bench.write("model.yaml", &(bench.read("model.yaml") + study));
+    let command = format!(
+        "{} study model.yaml --out study",
+        env!("CARGO_BIN_EXE_kmcfit")
+    );
+    let mut child = Command::new("script")
+        .current_dir(bench.path(""))
+        .env("TERM", "xterm")
+        .args(["-qec", &command, "/dev/null"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("script of util-linux");
+    let (mut keys, mut screen) = (
+        child.stdin.take().expect("keys"),
+        child.stdout.take().expect("a screen"),
+    );
+    let mut shown = String::new();
+    let mut buffer = [0; 4096];
+    let mut is_interrupted = false;
+    loop {
+        let count = screen.read(&mut buffer).expect("a screen");
+        if count == 0 {
+            break;
+        }
+        shown += &String::from_utf8_lossy(&buffer[..count]);
+        if !is_interrupted && shown.contains("/100000  ") && shown.contains(" remaining") {
+            keys.write_all(b"\x03").expect("a key");
+            is_interrupted = true;
+        }
+    }
+    let status = child.wait().expect("an end");
+    assert!(
+        is_interrupted && shown.contains("study 5/6: bootstrap"),
+        "{shown}"
+    );
+    assert_eq!(status.code(), Some(130), "{shown}");
+    let study: serde_json::Value =
+        serde_json::from_str(&bench.read("study/study.json")).expect("JSON");
+    assert_eq!(study["status"], "interrupted");
+    assert!(
+        study["sensitivity"].is_object() && study["bands"].is_object(),
+        "{study}"
+    );
 }
