@@ -92,7 +92,9 @@ fn write(folder: &OutputFolder, kept: &[String], drawings: &[(String, String)]) 
     let drawn = || drawings.iter().filter(|(name, _)| !is_kept(name));
     let mut stage = folder.stage()?;
     for name in kept {
-        if !drawn().any(|(own, _)| own == name) {
+        // A figure that is not drawn any more is one in another unit.
+        let is_stale = name.starts_with("figures/") && !is_of_search(name);
+        if !is_stale && !drawn().any(|(own, _)| own == name) {
             stage.write(name, std::fs::read(folder.path().join(name))?)?;
         }
     }
