@@ -1,4 +1,4 @@
-"""Fit of the Duffing record by pyPESTO: five starting points, intervals from profiles."""
+"""Fit of the Duffing record by pyPESTO: ten starting points, intervals from profiles."""
 import logging
 import numpy as np
 import pypesto
@@ -7,8 +7,8 @@ import pypesto.profile as profile
 from system import NAMES, START, response, y
 
 logging.disable(logging.WARNING)
-LOWER = [0.1, -1.0, -10.0, -10.0, -1.0, -2.0, np.log(1e-4)]
-UPPER = [10.0, 2.0, 10.0, 10.0, 1.0, 2.0, np.log(1.0)]
+LOWER = [0.1, 0.0, 0.0, 0.0, -1.0, -2.0, np.log(1e-4)]
+UPPER = [10.0, 2.0, 50.0, 100.0, 1.0, 2.0, np.log(1.0)]
 
 
 def cost(theta):
@@ -23,7 +23,7 @@ problem = pypesto.Problem(
     x_guesses=[[*START, np.log(0.1)]],
     startpoint_method=pypesto.startpoint.UniformStartpoints())
 optimizer = optimize.ScipyOptimizer("L-BFGS-B", options={"maxiter": 200})
-result = optimize.minimize(problem, optimizer, n_starts=5, progress_bar=False)
+result = optimize.minimize(problem, optimizer, n_starts=10, progress_bar=False)
 best = result.optimize_result[0]
 print("costs", *(f"{value:.1f}" for value in result.optimize_result.fval))
 result = profile.parameter_profile(problem, result, optimizer, profile_index=range(4), progress_bar=False)
