@@ -6,6 +6,7 @@ import pypesto.optimize as optimize
 import pypesto.profile as profile
 from system import NAMES, START, response, y
 
+np.random.seed(1)
 logging.disable(logging.WARNING)
 LOWER = [0.1, 0.0, 0.0, 0.0, -1.0, -2.0, np.log(1e-4)]
 UPPER = [10.0, 2.0, 50.0, 100.0, 1.0, 2.0, np.log(1.0)]
@@ -25,7 +26,6 @@ problem = pypesto.Problem(
 optimizer = optimize.ScipyOptimizer("L-BFGS-B", options={"maxiter": 200})
 result = optimize.minimize(problem, optimizer, n_starts=10, progress_bar=False)
 best = result.optimize_result[0]
-print("costs", *(f"{value:.1f}" for value in result.optimize_result.fval))
 result = profile.parameter_profile(problem, result, optimizer, profile_index=range(4), progress_bar=False)
 for i, name in enumerate(NAMES[:4]):
     of = result.profile_result.list[0][i]

@@ -128,7 +128,7 @@ class Motion {
 
   frame(now) {
     if (!this.playing) return;
-    // After a pause of the browser it goes on where it was.
+    // A pause of the browser adds no time.
     const passed = Math.min(now - (this.before ?? now), 100) / 1000;
     this.before = now;
     this.time = Math.min(this.time + passed * Number(this.speed.value), this.to);
