@@ -121,6 +121,31 @@ mod tests {
                 .expect_err(text)
                 .to_string()
         });
-        assert_snapshot!(messages.join("\n"), @"");
+        assert_snapshot!(messages.join("\n"), @"
+        --units: a unit without its quantity
+          found: `g`
+          expected: quantities and units, as in `acceleration=g,force=kN`
+        --units: unknown quantity
+          found: `acceleratoin`
+          expected: one of: displacement, velocity, acceleration, force
+          hint: did you mean `acceleration`?
+        unit of the force: unknown unit
+          found: `kn`
+          expected: one of: N, kN, mN, lbf, N m, mN m, V
+          hint: did you mean `kN`?
+        unit of the force: unknown unit
+          found: `g`
+          expected: one of: N, kN, mN, lbf, N m, mN m, V
+          hint: this is a unit of acceleration
+        --units: not a unit of the displacement of a translation
+          found: `deg`
+          expected: one of: m, mm, cm, µm, in, ft
+        --units: not a unit of the force of a translation
+          found: `V`
+          expected: one of: N, kN, mN, lbf
+        --units: the quantity is given twice
+          found: `force=N,force=kN`
+          expected: one unit for each quantity
+        ");
     }
 }

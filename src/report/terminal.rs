@@ -366,7 +366,16 @@ mod tests {
             values,
             band: Some(band),
         };
-        assert_snapshot!(curve.plot(&times, 60), @"");
+        assert_snapshot!(curve.plot(&times, 60), @"
+        stiffness k in N/m; shaded: 95 % band, mean half-width 3
+                33 │⣀⣀⡀░░
+                   │ ░⠈⠉⠉⠓⠒⠒⠤⠤⢄⣀⣀⡀░
+                   │            ░⠈⠉⠉⠒⠒⠢⠤⠤⢄⣀⣀⡀░
+                   │                      ░░⠉⠉⠑⠒⠒⠢⠤⠤⣀⣀⡀░
+                   │                                ░░⠈⠉⠉⠑⠒⠒⠤⠤⠤⣀⣀⡀░
+                 7 │                                           ░░⠈⠉⠉
+                   0                                            10 s
+        ");
         assert!((curve.variation().expect("it varies") - 20.0 / 6.0).abs() < 1e-12);
         // A wide band does not flatten the line: 1.5 ranges of it on each side.
         curve.band = Some([-1e3, 1e3].map(|end| vec![end; 101]));

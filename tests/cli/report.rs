@@ -75,9 +75,8 @@ fn reports_have_other_units_and_widths() {
     );
     let result: serde_json::Value = serde_json::from_str(&result).expect("JSON");
     let rms = result["experiments"][0]["channels"][0]["rms_residual"].as_f64();
-    let rms = format!("{:.4e}", 1e3 * rms.expect("a number"));
-    let [mantissa, exponent] = [&rms[..5], &rms[rms.len() - 1..]];
-    assert!(page.contains(mantissa), "{mantissa} {exponent}");
+    let rms = format!("{:.3} mm", 1e3 * rms.expect("a number"));
+    assert!(page.contains(&rms), "{rms}");
 
     let before = bench.contents();
     let mistakes = [
@@ -92,5 +91,16 @@ fn reports_have_other_units_and_widths() {
         messages += &stderr;
     }
     assert!(bench.contents() == before, "nothing is written");
-    assert_snapshot!(messages, @"");
+    assert_snapshot!(messages, @"
+    error: --width: invalid width of the figures
+      found: `90`
+      expected: 85 (one column of a journal) or 180 (two), in mm
+    error: --units: unknown quantity
+      found: `acceleratoin`
+      expected: one of: displacement, velocity, acceleration, force
+      hint: did you mean `acceleration`?
+    error: --units: not a unit of the acceleration of a translation
+      found: `rad/s²`
+      expected: one of: m/s², mm/s², g, mg, gal, in/s², ft/s²
+    ");
 }

@@ -108,7 +108,7 @@ fn the_summary_plots_the_varying_coefficient() {
 #[test]
 fn a_study_shows_its_progress_and_keeps_what_is_done() {
     let bench = bench();
-    let study = "study: {seed: 1, bootstrap: 100000}\n";
+    let study = "study: {seed: 1, bootstrap: 4000}\n";
     bench.write("model.yaml", &(bench.read("model.yaml") + study));
     let command = format!(
         "{} study model.yaml --out study",
@@ -135,7 +135,7 @@ fn a_study_shows_its_progress_and_keeps_what_is_done() {
             break;
         }
         shown += &String::from_utf8_lossy(&buffer[..count]);
-        if !is_interrupted && shown.contains("/100000  ") && shown.contains(" remaining") {
+        if !is_interrupted && shown.contains("/4000  ") && shown.contains(" remaining") {
             keys.write_all(b"\x03").expect("a key");
             is_interrupted = true;
         }
