@@ -1,7 +1,8 @@
 //! `kmcfit check`: an overview of a model and its data before a fit, or of a data file; and the check of the gradient.
 
+use super::fit::read;
+use super::progress::Activity;
 use super::{CommandError, OK, Overrides, announce, check_file, check_gradient, print};
-use crate::config::{BuildMode, build};
 use crate::formats::has_data_extension;
 use crate::report::overview;
 use std::path::PathBuf;
@@ -38,11 +39,14 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         return Ok(check_file::run(&arguments.model)?);
     }
     let file = arguments.set.read(&arguments.model)?;
-    let model = build(&file, BuildMode::Fit)?;
+    let model = read(&file)?;
     announce(&model);
     if arguments.gradient && model.problem.functions.parameters() > 0 {
         return check_gradient::run(&file, &model, &arguments.nodes, arguments.out.as_deref());
     }
-    print(&overview(&model));
+    let activity = Activity::begin("computing the sensitivities");
+    let text = overview(&model);
+    drop(activity);
+    print(&text);
     Ok(OK)
 }

@@ -1,5 +1,6 @@
 //! `kmcfit check FILE`: lists the columns, variables or channels of a data file.
 
+use super::progress::Activity;
 use super::{OK, print};
 use crate::config::{rate, recognised};
 use crate::error::InputError;
@@ -13,7 +14,9 @@ use std::path::Path;
 /// # Errors
 /// When it cannot be read.
 pub(super) fn run(path: &Path) -> Result<u8, InputError> {
+    let reading = Activity::begin(format!("reading {}", path.display()));
     let tables = Table::read_all(path, &TableFormat::default())?;
+    drop(reading);
     let mut text = format!("{}: {}\n", path.display(), format_of(&tables));
     let mut rows =
         vec![["column", "name", "quantity", "unit", "samples", "rate"].map(str::to_owned)];

@@ -1,5 +1,6 @@
 //! `kmcfit check --gradient`: compares the gradient of a model with finite differences over step sizes and grids.
 
+use super::progress::Activity;
 use super::{CommandError, NOT_CONVERGED, OK, inputs, print, say, unwritable};
 use crate::config::{BuildMode, Model, ModelFile, build};
 use crate::report::{CsvTable, figures, render};
@@ -48,7 +49,11 @@ pub(super) fn run(
         "nodes", "adjoint", "min error", "at step"
     ));
     for model in &refined {
-        for curve in check(model, &steps)? {
+        let nodes = model.problem.system.grid.nodes();
+        let activity = Activity::begin(format!("checking the gradient on {nodes} nodes"));
+        let checked = check(model, &steps)?;
+        drop(activity);
+        for curve in checked {
             let (step, error) = curve.best();
             print(&format!(
                 "{:>8}  {:<10}  {error:>12.1e}  {step:>9.1e}\n",

@@ -1,7 +1,8 @@
 //! `kmcfit compare`: fits models, reads finished runs, and writes their comparison.
 
+use super::compared_names::names;
 use super::fit::{fit_into, note_discarded, open_journal};
-use super::progress::Progress;
+use super::progress::{Activity, Progress};
 use super::{
     CommandError, NOT_CONVERGED, OK, Overrides, exit_code, inputs, interrupt, print, say,
     unwritable,
@@ -11,7 +12,7 @@ use crate::error::InputError;
 use crate::report::compare::{ComparedRun, Comparison, LeftOut};
 use crate::report::{fit_claim, json};
 use crate::results::{
-    AnalysisJournal, COMPARE_JOURNAL, Claim, FitJournal, Heading, MANIFEST, OutputFolder, RESULT,
+    AnalysisJournal, COMPARE_JOURNAL, Claim, FitJournal, Heading, OutputFolder, RESULT,
     RequestedFiles, STUDY_JOURNAL,
 };
 use kmcfit_core::internals::solvers::Status;
@@ -195,9 +196,11 @@ impl Job<'_> {
             is_resumed,
             ..Compared::default()
         };
-        for ((name, entry), child) in self.entries.into_iter().zip(children) {
+        let all = self.entries.len();
+        for (i, ((name, entry), child)) in self.entries.into_iter().zip(children).enumerate() {
             match (entry, child) {
                 (ComparisonEntry::Model(to_fit), Some(child)) => {
+                    compared.shown = format!("{}/{all} {name}", i + 1);
                     compared.model(&name, *to_fit, &child, &mut journal)?;
                 }
                 (ComparisonEntry::Run(run), _) => compared.runs.push(*run),
@@ -205,11 +208,13 @@ impl Job<'_> {
             }
         }
         let interrupted = compared.interrupted;
+        let comparing = Activity::begin("comparing");
         let mut comparison = Comparison::new(compared.runs, compared.left_out);
         if let Some(sequence) = self.sequence.filter(|_| !interrupted) {
             comparison = comparison.as_sequence(&sequence.title);
         }
         comparison.write(folder).map_err(full)?;
+        drop(comparing);
         journal.finish_if(!interrupted).map_err(full)?;
         match as_json {
             true => print(&json(&comparison.document())),
@@ -283,6 +288,8 @@ struct Compared {
     flag: Arc<AtomicBool>,
     is_resumed: bool,
     interrupted: bool,
+    /// Number and name of the current model, as shown before its progress.
+    shown: String,
 }
 
 impl Compared {
@@ -331,7 +338,7 @@ impl Compared {
             say("warning", format!("{name}: {warning}"));
         }
         model.settings.interrupt = Some(Arc::clone(&self.flag));
-        let progress = Progress::new(&model.settings.stopping).named(name);
+        let progress = Progress::new(&model.settings.stopping).named(&self.shown);
         match fit_into(
             folder,
             &model,
@@ -366,6 +373,7 @@ impl Compared {
 
 fn entry(path: &Path, set: &[Override], name: &str) -> Result<ComparisonEntry, InputError> {
     const EXPECTED: &str = "a model file (YAML), or the folder of a finished run";
+    let _reading = Activity::begin(format!("reading {}", path.display()));
     if path.is_dir() {
         return Ok(ComparisonEntry::Run(Box::new(ComparedRun::read(
             name, path,
@@ -392,50 +400,6 @@ fn entry(path: &Path, set: &[Override], name: &str) -> Result<ComparisonEntry, I
         model,
         heading,
     })))
-}
-
-/// Name of each run: the name of its file or folder, numbered if it is taken. No fitted model gets the name of a compared
-/// run's folder or of a file of the comparison.
-fn names(paths: &[PathBuf], out: &Path) -> Vec<String> {
-    let runs: Vec<PathBuf> = paths
-        .iter()
-        .filter(|path| path.is_dir())
-        .filter_map(|path| path.canonicalize().ok())
-        .collect();
-    let mut taken: Vec<String> = [
-        "figures",
-        "compare.csv",
-        "compare.html",
-        COMPARE_JOURNAL,
-        MANIFEST,
-    ]
-    .map(String::from)
-    .into();
-    let mut names = Vec::new();
-    for path in paths {
-        let stem = stem(path);
-        let numbered = (2..).map(|i| format!("{stem}-{i}"));
-        let mut wanted = std::iter::once(stem.clone()).chain(numbered);
-        let free = |name: &String| {
-            let place = out.join(name).canonicalize();
-            let overwrites = !path.is_dir() && place.is_ok_and(|place| runs.contains(&place));
-            // Some file systems ignore case.
-            !taken.contains(&name.to_lowercase()) && !overwrites
-        };
-        let name = wanted.find(free).unwrap_or(stem.clone());
-        taken.push(name.to_lowercase());
-        names.push(name);
-    }
-    names
-}
-
-fn stem(path: &Path) -> String {
-    let whole = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
-    let name = match path.is_dir() {
-        true => whole.file_name(),
-        false => return super::stem(path),
-    };
-    name.map_or_else(|| "run".into(), |name| name.to_string_lossy().into_owned())
 }
 
 /// Exit code: success if every run converged or completed.

@@ -1,4 +1,4 @@
-//! Services of the process for the numerics: clock, memory limit, thread starts, choice of SIMD arithmetic.
+//! Services of the process for the numerics: clock, memory limit, thread starts, progress, choice of SIMD arithmetic.
 
 use crate::error::InputError;
 use crate::faults::{self, Operation};
@@ -18,6 +18,7 @@ pub fn provide_host() {
         clock: || START.elapsed(),
         has_memory: |bytes| memory::check(bytes).is_ok(),
         may_start_thread: || faults::check(Operation::Spawn),
+        progress: super::progress::show_jobs,
     });
 }
 

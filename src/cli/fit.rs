@@ -1,6 +1,6 @@
 //! `kmcfit fit`: fits a model to its records and writes the run.
 
-use super::progress::Progress;
+use super::progress::{Activity, Progress};
 use super::{
     CommandError, Overrides, announce, exit_code, inputs, interrupt, print, say, stem, unwritable,
 };
@@ -9,8 +9,8 @@ use crate::error::InputError;
 use crate::fitting::fit_model;
 use crate::report::document::{FailureDocument, Prediction, ResultDocument};
 use crate::report::{
-    DRAWS, FittedModel, OverheadTimings, RunAssessment, TimingsSummary, charts, fit_claim, json,
-    predict, summary,
+    DRAWS, DisplayUnits, FittedModel, OverheadTimings, RunAssessment, TimingsSummary, charts,
+    fit_claim, json, predict, summary, summary_plot,
 };
 use crate::results::{FitJournal, Heading, OutputFolder, RESULT, RequestedFiles};
 use console::Term;
@@ -58,12 +58,22 @@ pub struct Arguments {
     /// Exit with 4 for the verdict Check, with 5 for Inadequate.
     #[arg(long)]
     strict: bool,
-    /// Plot record, fit and functions in the terminal.
-    #[arg(long, conflicts_with = "json")]
-    plot: bool,
+    #[command(flatten)]
+    plots: PlotOptions,
     /// Shortest time between checkpoints for `resume` [default: 1 s, longer if they take over 2 % of the time].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     checkpoint: Option<f64>,
+}
+
+/// Options for plots in the terminal.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct PlotOptions {
+    /// Plot record, fit and functions in the terminal.
+    #[arg(long, conflicts_with = "json")]
+    plot: bool,
+    /// Leave out the plot of the coefficient that varies.
+    #[arg(long, conflicts_with_all = ["json", "plot"])]
+    no_plot: bool,
 }
 
 /// Exit codes of the verdicts with `--strict`.
@@ -78,7 +88,7 @@ const PIPED: usize = 80;
 pub(super) struct Printed {
     pub json: bool,
     pub timings: bool,
-    pub plot: bool,
+    pub plots: PlotOptions,
     pub verbose: bool,
     /// True where the verdict determines the exit code.
     pub strict: bool,
@@ -108,7 +118,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let printed = Printed {
         json: arguments.json,
         timings: arguments.timings,
-        plot: arguments.plot,
+        plots: arguments.plots,
         verbose: arguments.verbose,
         strict: arguments.strict,
     };
@@ -136,7 +146,7 @@ fn fit(
     printed: &Printed,
     is_resumed: bool,
 ) -> Result<u8, CommandError> {
-    let mut model = build(file, BuildMode::Fit)?;
+    let mut model = read(file)?;
     model.settings.interrupt = Some(interrupt::flag());
     let folder = OutputFolder::prepare(out, fit_claim(&model).inputs(inputs(file)))?;
     if !is_resumed {
@@ -151,6 +161,12 @@ fn fit(
         interrupt::say_resumable(folder.path(), "fit");
     }
     Ok(code(&document, printed))
+}
+
+/// Reads the data of a model for a fit, with a line of progress.
+pub(super) fn read(file: &ModelFile) -> Result<Model, InputError> {
+    let _reading = Activity::begin(format!("reading the data of {}", file.path.display()));
+    build(file, BuildMode::Fit)
 }
 
 /// Exit code of a fit: that of its end, or with `--strict` of its verdict where the fit ended well.
@@ -202,12 +218,17 @@ pub(super) fn print_results(document: &ResultDocument, folder: &Path, printed: &
     if printed.json {
         return print(&json(document));
     }
-    print(&summary(document, printed.verbose));
-    if printed.plot {
-        let width = Term::stdout()
-            .size_checked()
-            .map_or(PIPED, |(_, columns)| columns.into());
-        match charts(folder, document, width) {
+    let width = || {
+        let size = Term::stdout().size_checked();
+        size.map_or(PIPED, |(_, columns)| columns.into())
+    };
+    // A table that cannot be read is an error of `--plot` only.
+    let is_small = !printed.plots.plot && !printed.plots.no_plot && draws_small_plots();
+    let small = is_small.then(|| summary_plot(folder, document, width()).ok());
+    let small = small.flatten().flatten();
+    print(&summary(document, printed.verbose, small.as_deref()));
+    if printed.plots.plot {
+        match charts(folder, document, width()) {
             Ok(text) => print(&text),
             Err(error) => say("warning", format!("no plot: {error}")),
         }
@@ -216,6 +237,24 @@ pub(super) fn print_results(document: &ResultDocument, folder: &Path, printed: &
         print(&format!("\n{}\n", document.timings.text()));
     }
     print(&format!("results in {}\n", folder.display()));
+}
+
+/// True if standard output is a terminal with colours (no `NO_COLOR`, no `TERM=dumb`) and an encoding in UTF-8.
+fn draws_small_plots() -> bool {
+    let term = Term::stdout();
+    term.is_term() && term.features().colors_supported() && is_utf8(|name| std::env::var(name).ok())
+}
+
+/// True if the locale of characters is in UTF-8: the first of `LC_ALL`, `LC_CTYPE` and `LANG` that is set and not empty. Terminals of
+/// Windows show Unicode without them.
+fn is_utf8(variable: impl Fn(&str) -> Option<String>) -> bool {
+    let mut names = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter();
+    let locale = names.find_map(|name| variable(name).filter(|value| !value.is_empty()));
+    let is_of_utf8 = |locale: String| {
+        let locale = locale.to_ascii_lowercase();
+        locale.contains("utf-8") || locale.contains("utf8")
+    };
+    locale.map_or(cfg!(windows), is_of_utf8)
 }
 
 /// Fits a model and writes all files of the run. An older run in the folder stays unchanged until the new one is complete.
@@ -247,6 +286,7 @@ pub(super) fn fit_into(
         }
     };
     let model = weighted.as_ref().unwrap_or(model);
+    let activity = Activity::begin(progress.named_stage("assessing the fit"));
     let analysis = Instant::now();
     let predictions = predictions(model, &found);
     let run_assessment = RunAssessment::of(model, &found);
@@ -259,11 +299,14 @@ pub(super) fn fit_into(
         predictions: &predictions,
         weights: path.as_ref(),
         requested,
+        display: DisplayUnits::default(),
     };
     let mut document = run.document();
     let draws = run.draws();
     let mut stage = folder.stage().map_err(full)?;
+    activity.stage(progress.named_stage("writing the results"));
     let writing = run.write(&mut stage, &document).map_err(full)?;
+    drop(activity);
     match draws {
         Some(Ok(table)) => stage.write(DRAWS, table.to_csv()).map_err(full)?,
         Some(Err(reason)) => say("warning", no_draws(reason)),
@@ -347,4 +390,25 @@ pub(super) fn predictions(model: &Model, found: &Fit) -> Vec<Prediction> {
         }
     };
     model.predictions.iter().flat_map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `setlocale(3)`: `LC_ALL` precedes `LC_CTYPE`, which precedes `LANG`; empty ones count as unset.
+    #[test]
+    fn the_encoding_is_that_of_the_first_locale_set() {
+        let of = |set: &[(&str, &str)]| {
+            is_utf8(|name| {
+                let found = set.iter().find(|(of, _)| *of == name);
+                found.map(|(_, value)| (*value).to_owned())
+            })
+        };
+        assert!(of(&[("LANG", "de_DE.UTF-8")]) && of(&[("LC_CTYPE", "C.utf8")]));
+        assert!(!of(&[("LC_ALL", "C"), ("LANG", "de_DE.UTF-8")]));
+        assert!(of(&[("LC_ALL", ""), ("LANG", "de_DE.UTF-8")]));
+        assert!(!of(&[("LANG", "de_DE.ISO-8859-1")]));
+        assert_eq!(of(&[]), cfg!(windows));
+    }
 }

@@ -1,5 +1,6 @@
 //! `kmcfit init`: writes a model file for records.
 
+use super::progress::Activity;
 use super::{CommandError, OK, print, schema, unwritable};
 use crate::config::{ModelFile, Question, Source, Statements, questions, scaffold};
 use crate::error::InputError;
@@ -13,6 +14,9 @@ use std::path::{Component, Path, PathBuf};
 
 /// Schema file named by the comment in the first line of a model file.
 const SCHEMA: &str = "kmcfit.schema.json";
+
+/// Stage shown while the records are read.
+const READING: &str = "reading the records";
 
 /// Write a commented model file for records: columns, units, grid and bases are taken from them. On a terminal it asks for what no file
 /// states.
@@ -63,7 +67,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
             .into());
     }
     if std::io::stdin().is_terminal() && std::io::stderr().is_terminal() {
+        let reading = Activity::begin(READING);
         let questions = questions(&sources, &statements)?;
+        drop(reading);
         ask_all(
             &questions,
             &mut statements,
@@ -72,7 +78,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         )
         .map_err(|error| CommandError::Numerical(format!("standard input: {error}")))?;
     }
+    let reading = Activity::begin(READING);
     let scaffold = scaffold(&sources, &statements)?;
+    drop(reading);
     // The written model must be readable.
     ModelFile::parse(&out, scaffold.text.as_str())?;
     let schema = folder.join(SCHEMA);

@@ -5,6 +5,7 @@ mod check;
 mod check_file;
 mod check_gradient;
 mod compare;
+mod compared_names;
 mod demo;
 mod environment;
 mod explain;

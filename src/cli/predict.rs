@@ -1,6 +1,7 @@
 //! `kmcfit predict`: simulates an identified system under another force or motion of the base, or its free response from other initial
 //! states.
 
+use super::progress::Activity;
 use super::{CommandError, OK, print, unwritable};
 use crate::config::NewRecord;
 use crate::error::InputError;
@@ -46,6 +47,9 @@ pub struct Arguments {
     json: bool,
 }
 
+/// Stage shown while responses are computed.
+const PREDICTING: &str = "predicting";
+
 /// The files in the output folder.
 const FILES: [&str; 2] = ["predictions.csv", "figures/predictions.svg"];
 
@@ -55,7 +59,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         .iter()
         .map(|text| state(text))
         .collect::<Result<_, _>>()?;
+    let reading = Activity::begin(format!("reading {}", arguments.run.display()));
     let run = open(&arguments.run)?;
+    drop(reading);
     let files = || arguments.force.iter().chain(&arguments.base).cloned();
     let prepare = || {
         let out = arguments.out.as_deref();
@@ -76,9 +82,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         .into());
     }
     let folder = prepare()?;
+    let predicting = Activity::begin(PREDICTING);
     let responses = predict(&run.system, &run.coefficients, run.truth.as_ref(), &states).map_err(
         |breakdown| CommandError::Numerical(format!("--initial: no response: {breakdown}")),
     )?;
+    drop(predicting);
     if let Some(folder) = folder {
         let unit = if run.document.is_rotation() {
             "rad"
@@ -136,7 +144,9 @@ fn forced(
     }
     let wanted = |kind: &ChannelKind| arguments.channel.iter().any(|name| name == kind.name());
     let kinds: Vec<ChannelKind> = ChannelKind::ALL.into_iter().filter(wanted).collect();
+    let predicting = Activity::begin(PREDICTING);
     let found = ForcedPredictions::of(run, &record, &states, &kinds)?;
+    drop(predicting);
     let folder = prepare()?;
     let predictions = found.map_err(CommandError::Numerical)?;
     if let Some(folder) = folder {

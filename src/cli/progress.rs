@@ -1,9 +1,119 @@
-//! Progress line of a fit, on a terminal only.
+//! Progress lines on standard error, on a terminal only: of a fit by its iterations, of other work by its stage and finished jobs.
 
-use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use crate::escape::harmless;
+use crate::faults::{self, Operation};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use kmcfit_core::internals::solvers::{IterationEvent, Stopping};
 use std::cell::Cell;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Mutex, PoisonError};
+use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
+
+/// Time after which a stage is shown.
+const DELAY: Duration = Duration::from_secs(1);
+/// Time between updates of the elapsed time.
+const TICK: Duration = Duration::from_millis(500);
+
+/// Line of a stage, and of one with jobs.
+const STAGE: &str = "{msg}  {elapsed}";
+const JOBS: &str = "{msg}  {bar:24} {pos}/{len}  {elapsed}, about {eta} remaining";
+
+/// The line that shows the jobs of the numerics.
+static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
+
+/// Progress of work without iterations: its stage, the finished jobs of all, and the elapsed and remaining time. Appears after a second;
+/// hidden if standard error is not a terminal. Dropping it removes the line.
+pub struct Activity {
+    bar: ProgressBar,
+    /// Ends the thread that updates the line.
+    end: Option<Sender<()>>,
+    updates: Option<JoinHandle<()>>,
+}
+
+impl Activity {
+    /// A line for a stage, as `reading shaker.csv`.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "the thread outlives the call, and a refusal leaves out the line"
+    )]
+    pub fn begin(stage: impl AsRef<str>) -> Self {
+        let target = ProgressDrawTarget::stderr();
+        let is_visible = !target.is_hidden();
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
+        bar.set_style(style(STAGE));
+        let mut activity = Self {
+            end: None,
+            updates: None,
+            bar,
+        };
+        activity.stage(stage);
+        if is_visible {
+            *SHOWN.lock().unwrap_or_else(PoisonError::into_inner) = Some(activity.bar.clone());
+            let (end, ended) = channel();
+            let bar = activity.bar.clone();
+            // Without a thread there is no line.
+            let updates = faults::check(Operation::Spawn)
+                .and_then(|()| Builder::new().spawn(move || update(&bar, target, &ended)));
+            activity.end = Some(end);
+            activity.updates = updates.ok();
+        }
+        activity
+    }
+
+    /// Shows the next stage.
+    pub fn stage(&self, stage: impl AsRef<str>) {
+        self.bar.set_style(style(STAGE));
+        self.bar.set_message(harmless(stage.as_ref()).into_owned());
+    }
+}
+
+/// Shows the line after a second and updates it until its end.
+fn update(bar: &ProgressBar, target: ProgressDrawTarget, ended: &Receiver<()>) {
+    let goes_on = |time| ended.recv_timeout(time) == Err(RecvTimeoutError::Timeout);
+    if !goes_on(DELAY) {
+        return;
+    }
+    bar.set_draw_target(target);
+    bar.tick();
+    while goes_on(TICK) {
+        bar.tick();
+    }
+}
+
+impl Drop for Activity {
+    fn drop(&mut self) {
+        SHOWN.lock().unwrap_or_else(PoisonError::into_inner).take();
+        drop(self.end.take());
+        if let Some(updates) = self.updates.take() {
+            // A panic of the display is no failure of the work.
+            let _ = updates.join();
+        }
+        self.bar.finish_and_clear();
+    }
+}
+
+/// Shows the number of finished jobs of all in the line of the current [`Activity`].
+pub fn show_jobs(done: usize, all: usize) {
+    let shown = SHOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(bar) = shown.as_ref() else {
+        return;
+    };
+    let (done, all) = (done as u64, all as u64);
+    // The first job of the next list.
+    if done == 1 || bar.length() != Some(all) {
+        bar.set_style(style(JOBS));
+        bar.set_length(all);
+        bar.set_position(0);
+        bar.reset_eta();
+    }
+    // Threads report out of order.
+    bar.set_position(done.max(bar.position()));
+}
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
 
 /// Progress line: iteration, cost ratio, gradient ratio, constraint violation, start strategy, remaining time.
 pub struct Progress {
@@ -19,10 +129,7 @@ impl Progress {
     /// A line for these stopping tests; hidden if standard error is not a terminal.
     pub fn new(stopping: &Stopping) -> Self {
         let bar = ProgressBar::new(stopping.iterations);
-        let template = "{prefix}{bar:24} {pos}/{len}  {msg}";
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style);
-        }
+        bar.set_style(style("{prefix}{bar:24} {pos}/{len}  {msg}"));
         Self {
             bar,
             limit: stopping.limit,
@@ -33,8 +140,14 @@ impl Progress {
 
     /// Puts the name of the run before the line.
     pub fn named(self, name: &str) -> Self {
-        self.bar.set_prefix(format!("{name}  "));
+        self.bar
+            .set_prefix(harmless(&format!("{name}  ")).into_owned());
         self
+    }
+
+    /// A stage before or after the search, with the name of the run.
+    pub fn named_stage(&self, stage: &str) -> String {
+        format!("{}{stage}", self.bar.prefix())
     }
 
     /// True on a terminal.

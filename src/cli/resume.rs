@@ -1,6 +1,6 @@
 //! `kmcfit resume`: continues an interrupted fit, study or comparison from its journal.
 
-use super::fit::{self, Printed};
+use super::fit::{self, PlotOptions, Printed};
 use super::{CommandError, INTERRUPTED, compare, say, study};
 use crate::error::InputError;
 use crate::report::Run;
@@ -23,9 +23,8 @@ pub struct Arguments {
     /// Exit with 4 for the verdict Check of a fit, with 5 for Inadequate.
     #[arg(long)]
     strict: bool,
-    /// Plot record, fit and functions in the terminal.
-    #[arg(long, conflicts_with = "json")]
-    plot: bool,
+    #[command(flatten)]
+    plots: PlotOptions,
     /// Number of threads of a study; results do not depend on it [default: one per core].
     #[arg(long)]
     threads: Option<usize>,
@@ -48,7 +47,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let printed = Printed {
         json: arguments.json,
         timings: false,
-        plot: arguments.plot,
+        plots: arguments.plots,
         verbose: arguments.verbose,
         strict: arguments.strict,
     };

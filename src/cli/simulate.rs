@@ -1,5 +1,6 @@
 //! `kmcfit simulate`: simulates a model and writes the response, with noise if asked, as a record.
 
+use super::progress::Activity;
 use super::{CommandError, OK, Overrides, inputs, print, say, unwritable};
 use crate::config::{BuildMode, ModelFile, build};
 use crate::digest::{digest, digest_of_file};
@@ -52,7 +53,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let mode = BuildMode::Simulate {
         nodes: arguments.nodes,
     };
+    let reading = Activity::begin(format!("reading the data of {}", file.path.display()));
     let problem = build(&file, mode)?.problem;
+    drop(reading);
     let noise = noise(arguments)?;
     if let Some(out) = &arguments.out {
         check_place(out, &file)?;
@@ -73,6 +76,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     problem
         .functions
         .nodal_into(&start, experiment.coefficient_set, &mut coefficients);
+    let simulating = Activity::begin("simulating");
     let response = problem
         .system
         .forward(
@@ -89,6 +93,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         .column("t_s", problem.system.grid.times())
         .column("y_m", samples)
         .to_csv();
+    drop(simulating);
     let record = Provenance {
         made_by: MADE_BY,
         version: env!("CARGO_PKG_VERSION"),

@@ -1,13 +1,13 @@
 //! `kmcfit study`: runs the analyses of a fit, or compares a sequence of models.
 
 use super::compare::{open_analyses, run_sequence};
-use super::fit::search;
-use super::progress::Progress;
+use super::fit::{read, search};
+use super::progress::{Activity, Progress};
 use super::{
     CommandError, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, say,
     stem, unwritable,
 };
-use crate::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
+use crate::config::{Model, ModelFile, Override, Sequence};
 use crate::error::InputError;
 use crate::report::study::{
     self, AnalysisFailure, Optimum, StudiedFit, StudyDocument, structural_rank,
@@ -23,7 +23,7 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{CheckpointStore, Status};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::io::{self, IsTerminal};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -125,7 +125,7 @@ fn run_in(
     finished: Option<StudiedFit>,
     is_resumed: bool,
 ) -> Result<u8, CommandError> {
-    let mut model = build(file, BuildMode::Fit)?;
+    let mut model = read(file)?;
     can_be_studied(file, &model)?;
     model.check_study_memory()?;
     announce(&model);
@@ -157,6 +157,7 @@ fn run_in(
         journal,
         flag,
         threads,
+        begun: 1,
         document,
     };
     let done = match work.run() {
@@ -269,6 +270,8 @@ struct StudyRun<'a> {
     journal: AnalysisJournal,
     flag: Arc<AtomicBool>,
     threads: usize,
+    /// Number of analyses begun, the fit included.
+    begun: usize,
     document: StudyDocument,
 }
 
@@ -293,13 +296,14 @@ impl StudyRun<'_> {
         self.document.sensitivity = Some(self.analysis("sensitivity", || study::sensitivity(at))?);
         let bands = || study::bands(at, &model);
         self.document.bands = Some(self.analysis("bands", bands)?);
-        for (i, target) in plan.profiles.iter().enumerate() {
+        for target in &plan.profiles {
             let Some(of) = study::linear(at.problem, target) else {
                 continue;
             };
             let profile = || study::profile_of(at, &of, &model);
-            let found = self.analysis(&format!("profile {i}"), profile)?;
-            let found = self.or_fail(&format!("profile of {}", of.name), found);
+            let name = format!("profile of {}", of.name);
+            let found = self.analysis(&name, profile)?;
+            let found = self.or_fail(&name, found);
             self.document.profiles.extend(found);
         }
         if !plan.candidates.is_empty() {
@@ -362,10 +366,15 @@ impl StudyRun<'_> {
         if !whole() {
             return Err(StudyError::Interrupted);
         }
-        if io::stderr().is_terminal() {
-            say("study", name);
-        }
+        self.begun += 1;
+        let stage = format!(
+            "study {}/{}: {name}",
+            self.begun,
+            self.model.study.analyses()
+        );
+        let activity = Activity::begin(stage);
         let found = self.journal.analysis(name, compute, whole)?;
+        drop(activity);
         found.ok_or(StudyError::Interrupted)
     }
 
@@ -384,7 +393,8 @@ impl StudyRun<'_> {
     /// The fit, from the journal or computed.
     fn fit(&mut self) -> Result<(Problem, Vec<f64>, Evaluation), StudyError> {
         let model = Arc::clone(&self.model);
-        let progress = Progress::new(&model.settings.stopping);
+        let shown = format!("study 1/{}: fit", model.study.analyses());
+        let progress = Progress::new(&model.settings.stopping).named(&shown);
         let (folder, heading, is_resumed) = (self.folder, &self.heading, self.is_resumed);
         let flag = Arc::clone(&self.flag);
         let finished = self.finished.take();

@@ -1,6 +1,7 @@
 //! `kmcfit verify`: recomputes the results of a finished run.
 
 use super::fit::predictions;
+use super::progress::Activity;
 use super::{CommandError, NOT_CONVERGED, OK, print};
 use crate::report::{Run, Verification, json};
 use std::path::PathBuf;
@@ -19,8 +20,11 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
+    let activity = Activity::begin(format!("reading {}", arguments.run.display()));
     let run = Run::open(&arguments.run)?;
+    activity.stage("recomputing the results");
     let verification = Verification::of(&run, &predictions)?;
+    drop(activity);
     match arguments.json {
         true => print(&json(&verification)),
         false => print(&verification.text()),

@@ -5,6 +5,7 @@ use super::csv::CsvTable;
 use super::figures;
 use super::record_figures::{self, InputSeries, SeriesPair, frequency_response, spectrum};
 use crate::config::ChannelNote;
+use crate::units::Unit;
 use kmcfit_core::internals::diagnostics::{ResidualDiagnostics, Whiteness};
 use kmcfit_core::internals::record::Channel;
 use kmcfit_core::internals::signal::even_spacing;
@@ -16,18 +17,27 @@ pub(super) struct ChannelView<'a> {
     pub predicted: &'a [f64],
     pub note: Option<&'a ChannelNote>,
     pub diagnostics: &'a ResidualDiagnostics,
+    /// Unit for display; `None` for that of the file.
+    pub display: Option<Unit>,
 }
 
 impl ChannelView<'_> {
-    /// Factor from the unit of the file to SI.
+    /// Unit for display, or of the file. Samples of uncalibrated channels keep theirs.
+    fn shown(&self) -> Option<Unit> {
+        let own = self.note.map(|note| note.unit);
+        let is_arbitrary = own.is_some_and(|unit| unit.is_arbitrary());
+        self.display.filter(|_| !is_arbitrary).or(own)
+    }
+
+    /// Factor from the unit shown to SI.
     pub fn factor(&self) -> f64 {
-        self.note.map_or(1.0, |n| n.unit.factor())
+        self.shown().map_or(1.0, |unit| unit.factor())
     }
 
     /// Unit in which reports give the channel.
-    pub fn unit(&self) -> &str {
-        self.note
-            .map_or(self.channel.kind().unit(), |n| n.unit.symbol())
+    pub fn unit(&self) -> &'static str {
+        self.shown()
+            .map_or(self.channel.kind().unit(), |unit| unit.symbol())
     }
 
     fn scaled(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {

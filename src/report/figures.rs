@@ -332,21 +332,13 @@ mod tests {
     use super::*;
     use crate::report::chart::svg;
 
-    /// A single iteration is drawn as dots, three times as wide as the lines.
+    /// A single iteration is drawn as dots, of three times the width of the lines in radius.
     #[test]
     fn a_single_iteration_shows() {
         let one = svg::render(&convergence(&[1.0], &[1e-3], &[1e-4]));
         let two = svg::render(&convergence(&[1.0, 2.0], &[1e-3, 1e-4], &[1e-4, 1e-6]));
-        for (dot, line) in [("66", "22"), ("27", "9")] {
-            let width = |w: &str| format!("stroke-width=\"{w}\"");
-            assert!(
-                one.contains(&width(dot)) && !one.contains(&width(line)),
-                "{one}"
-            );
-            assert!(
-                two.contains(&width(line)) && !two.contains(&width(dot)),
-                "{two}"
-            );
+        for radius in ["r=\"66\"", "r=\"27\""] {
+            assert!(one.contains(radius) && !two.contains(radius), "{radius}");
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Assessment of a fit and of the validation records: statistics, step-size check, bands, predictions.
 
 use super::channel_view::ChannelView;
+use super::display_units::DisplayUnits;
 use crate::config::{HoldOut, Model};
 use kmcfit_core::internals::assessment::{
     EquationErrorIntervals, EstimateErrors, FitAssessment, LargeCovariance, NoIntervals, POOR,
@@ -133,7 +134,9 @@ impl ValidationRecord {
             &out.scalars,
             &model.settings,
         );
-        let of_channels = found.as_ref().map(|(problem, evaluation)| of_all(problem, evaluation));
+        let of_channels = found
+            .as_ref()
+            .map(|(problem, evaluation)| of_all(problem, evaluation));
         Self {
             out: out.clone(),
             diagnostics: of_channels.into_iter().flatten().flatten().collect(),
@@ -143,14 +146,14 @@ impl ValidationRecord {
 
     /// Its name and the fit of its worst channel, per cent, if the fitted system does not predict it.
     pub fn poor(&self) -> Option<(&str, f64)> {
-        let channels = self.channels();
+        let channels = self.channels(DisplayUnits::default());
         let fits = channels.iter().map(|c| c.diagnostics.fit_percent);
         let worst = fits.reduce(f64::min).filter(|worst| *worst < POOR)?;
         Some((&self.out.experiment.name, worst))
     }
 
-    /// Its channels; empty without a response.
-    pub fn channels(&self) -> Vec<ChannelView<'_>> {
+    /// Its channels in units for display; empty without a response.
+    pub fn channels(&self, display: DisplayUnits) -> Vec<ChannelView<'_>> {
         let Ok((problem, evaluation)) = &self.found else {
             return Vec::new();
         };
@@ -162,6 +165,7 @@ impl ValidationRecord {
                 predicted,
                 note: self.out.notes.get(i),
                 diagnostics,
+                display: display.of_channel(channel.kind()),
             })
             .collect()
     }

@@ -5,6 +5,7 @@ use super::chart::Figure;
 use super::figures::{self, FunctionCurve};
 use super::record_figures::{self, InputSeries};
 use super::tables::FUNCTION_ROWS;
+use crate::units::Unit;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::solvers::IterationRecord;
 
@@ -99,18 +100,22 @@ impl FittedModel<'_> {
             true => ["N m", "rad", "rad/s²"],
             false => ["N", "m", "m/s²"],
         };
-        let force = |t: &f64| input.force_at(*t);
+        let scale = |unit: Option<Unit>| unit.map_or(1.0, |unit| unit.factor());
+        let force_unit = self.display.of_force();
+        let force = |t: &f64| input.force_at(*t) / scale(force_unit);
         let force = input.force.as_ref().map(|_| InputSeries {
             label: "force",
-            unit: units[0],
+            unit: force_unit.map_or(units[0], |unit| unit.symbol()),
             samples: times.iter().map(force).collect(),
         });
         let motion = |label, kind, unit| {
-            let samples = times.iter().map(|t| input.base_motion_at(kind, *t));
+            let shown = self.display.of_channel(kind);
+            let at = |t: &f64| Some(input.base_motion_at(kind, *t)? / scale(shown));
+            let samples = times.iter().map(at);
             let samples = samples.collect::<Option<Vec<f64>>>()?;
             Some(InputSeries {
                 label,
-                unit,
+                unit: shown.map_or(unit, |unit| unit.symbol()),
                 samples,
             })
         };
@@ -154,7 +159,7 @@ impl FittedModel<'_> {
     pub(super) fn validation_figures(&self) -> Vec<Figure> {
         let mut figures = Vec::new();
         for (i, held) in self.run_assessment.validation.iter().enumerate() {
-            for view in held.channels() {
+            for view in held.channels(self.display) {
                 let kind = view.channel.kind().name();
                 for mut figure in view.figures() {
                     figure.name += &format!("-validation-{}-{kind}", i + 1);
@@ -229,7 +234,11 @@ impl FittedModel<'_> {
     /// The ratios, at the nodes that their table has.
     pub(super) fn ratios_figure(&self) -> Figure {
         let found = self.ratio_rows(&self.fit.best.evaluation.nodal);
-        let truth = self.model.truth.as_ref().map(|truth| self.ratio_rows(truth));
+        let truth = self
+            .model
+            .truth
+            .as_ref()
+            .map(|truth| self.ratio_rows(truth));
         let times = self.rows(&self.model.problem.system.grid.times(), FUNCTION_ROWS);
         let bands = self
             .bands()

@@ -1,6 +1,7 @@
 //! Fit quality in the result document: channels, nuisance parameters, validation records.
 
 use super::channel_view::{ChannelView, whiteness};
+use super::display_units::DisplayUnits;
 use super::document::{
     ChannelSummary, IgnoredSummary, NoiseSummary, NuisanceParameter, ValidationSummary,
 };
@@ -96,8 +97,8 @@ pub fn scalars(
 }
 
 /// Summary of a validation record.
-pub(super) fn validation(held: &ValidationRecord) -> ValidationSummary {
-    let channels = held.channels();
+pub(super) fn validation(held: &ValidationRecord, display: DisplayUnits) -> ValidationSummary {
+    let channels = held.channels(display);
     let summaries = channels.iter().map(channel);
     let mut summary = ValidationSummary {
         name: held.out.experiment.name.clone(),

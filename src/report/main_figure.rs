@@ -4,7 +4,6 @@
 use super::FittedModel;
 use super::chart::{Colour, Figure, Panel};
 use super::document::ResultDocument;
-use kmcfit_core::internals::identifiability::ClassificationKind;
 
 /// Variations below this share of the largest value are rounding errors.
 const ROUNDING: f64 = 1e-9;
@@ -15,17 +14,7 @@ impl FittedModel<'_> {
         let first = self.channels().first().copied();
         let functions = self.named_functions().into_iter();
         let panels = functions.zip(self.functions_figure().panels);
-        let panels = panels.filter(|((function, _), _)| {
-            let summary = document.functions.get(&function.name());
-            let verdict = summary.and_then(|summary| summary.verdict);
-            let is_fixed = summary.is_some_and(|summary| summary.fixed);
-            // A coefficient that does not differ from zero varies by rounding errors.
-            let mut estimates = document.estimates.0.iter();
-            let estimate = estimates.find(|(name, _)| *name == function.name());
-            let interval = estimate.and_then(|(_, estimate)| estimate.ci95);
-            let is_zero = interval.is_some_and(|[low, high]| low <= 0.0 && high >= 0.0);
-            !is_fixed && !is_zero && verdict != Some(ClassificationKind::NotIdentified)
-        });
+        let panels = panels.filter(|((function, _), _)| document.is_determined(&function.name()));
         let scored = panels.filter_map(|(_, panel)| Some((variation(&panel)?, panel)));
         let most = scored.max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, mut panel)) = most else {

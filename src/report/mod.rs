@@ -23,6 +23,7 @@ mod columns;
 pub mod compare;
 mod cost;
 mod csv;
+mod display_units;
 pub mod document;
 mod equation;
 pub mod figures;
@@ -55,10 +56,13 @@ mod verdict;
 mod verify;
 
 pub use answer::{AnswerRow, answer};
-pub use chart::{Axis, Colour, Dash, Figure, Mark, Panel, Scale, Style, render};
+pub use chart::{
+    Axis, Colour, Dash, Figure, FigureWidth, Mark, Panel, Scale, Style, render, render_at,
+};
 pub use compare::Comparison;
 pub use cost::{CostKind, cost_definition};
 pub use csv::CsvTable;
+pub use display_units::DisplayUnits;
 pub use fit_assessment::RunAssessment;
 pub use kmcfit_core::internals::study::{PredictedResponse, predict};
 pub use overview::overview;
@@ -68,7 +72,7 @@ pub use result_table::ResultTable;
 pub use run::{DRAWS, FittedModel, fit_claim, json};
 pub use run_reader::Run;
 pub use summary::{prediction_table, summary};
-pub use terminal::charts;
+pub use terminal::{charts, summary_plot};
 pub use timings::{OverheadTimings, PartSummary, TimingsSummary};
 #[cfg(test)]
 pub(crate) use verdict::{assumption, reason_in_words};

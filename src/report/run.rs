@@ -2,6 +2,7 @@
 
 use super::channel_view::ChannelView;
 use super::cost::{CostKind, cost_definition};
+use super::display_units::DisplayUnits;
 use super::document::{
     ActiveSummary, AttemptSummary, ChannelSummary, ConstraintSummary, CostSummary, CountsSummary,
     ExperimentSummary, FORMAT, GradientSummary, ModelSummary, OutcomeSummary, PathPointSummary,
@@ -12,10 +13,10 @@ use super::fit_quality;
 use super::npy::npy;
 use super::page::fit_page;
 use super::ratios;
-use super::render;
 use super::suggestions::suggestions;
 use super::tables::{FUNCTION_ROWS, TRAJECTORY_ROWS};
 use super::timings::{OverheadTimings, TimingsSummary};
+use super::{FigureWidth, render_at};
 use crate::config::{ChannelNote, Model};
 use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, RequestedFiles, Stage};
 use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, WeightRule};
@@ -54,6 +55,8 @@ pub struct FittedModel<'a> {
     pub run_assessment: &'a RunAssessment,
     /// Files that are written on request.
     pub requested: RequestedFiles,
+    /// Units of page and figures.
+    pub display: DisplayUnits,
 }
 
 impl Model {
@@ -98,7 +101,7 @@ impl FittedModel<'_> {
         }
         let own = || {
             self.write_tables(stage, document, &mut writing)?;
-            Ok::<_, io::Error>(self.svg_figures())
+            Ok::<_, io::Error>(self.svg_figures(FigureWidth::Double))
         };
         let (figures, page) = both(own, || self.page(document));
         for (name, text) in figures?.into_iter().chain([(PAGE.to_owned(), page)]) {
@@ -136,15 +139,15 @@ impl FittedModel<'_> {
     }
 
     /// Figures and page of `document`, each with the name of its file.
-    pub fn drawings(&self, document: &ResultDocument) -> Vec<(String, String)> {
-        let (mut all, page) = both(|| self.svg_figures(), || self.page(document));
+    pub fn drawings(&self, document: &ResultDocument, width: FigureWidth) -> Vec<(String, String)> {
+        let (mut all, page) = both(|| self.svg_figures(width), || self.page(document));
         all.push((PAGE.to_owned(), page));
         all
     }
 
-    fn svg_figures(&self) -> Vec<(String, String)> {
+    fn svg_figures(&self, width: FigureWidth) -> Vec<(String, String)> {
         let figures = self.figures().into_iter();
-        let figures = figures.map(|f| (format!("figures/{}.svg", f.name), render(&f)));
+        let figures = figures.map(|f| (format!("figures/{}.svg", f.name), render_at(&f, width)));
         figures.collect()
     }
 
@@ -202,7 +205,7 @@ impl FittedModel<'_> {
                 .run_assessment
                 .validation
                 .iter()
-                .map(fit_quality::validation)
+                .map(|record| fit_quality::validation(record, self.display))
                 .collect(),
             nuisance_parameters: match self.is_simulated() {
                 true => {
@@ -374,7 +377,10 @@ impl FittedModel<'_> {
                 let channels: Vec<ChannelSummary> = channels
                     .map(|i| fit_quality::channel(&self.channel_view(e, i)))
                     .collect();
-                let factor = self.note(e, 0).map_or(1.0, |note| note.unit.factor());
+                let factor = match channels.is_empty() {
+                    true => 1.0,
+                    false => self.channel_view(e, 0).factor(),
+                };
                 ExperimentSummary {
                     name: experiment.name.clone(),
                     driven_by: driven_by(experiment.excitation.as_ref()),
@@ -405,6 +411,9 @@ impl FittedModel<'_> {
             predicted: &self.fit.best.evaluation.predictions[experiment][channel],
             note: self.note(experiment, channel),
             diagnostics: &self.run_assessment.diagnostics[experiment][channel],
+            display: self
+                .display
+                .of_channel(self.model.problem.experiments[experiment].channels[channel].kind()),
         }
     }
 

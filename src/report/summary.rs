@@ -14,11 +14,11 @@ use kmcfit_core::internals::identifiability::ClassificationKind;
 use std::fmt::Write;
 
 /// The summary of a fit: verdict, estimates, fit of the samples, advice; `verbose` adds the solver, each channel, all findings and the
-/// constraints.
-pub fn summary(document: &ResultDocument, verbose: bool) -> String {
+/// constraints. `plot` stands below the estimates.
+pub fn summary(document: &ResultDocument, verbose: bool, plot: Option<&str>) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
-    let _ = write_answer(&mut text, document);
+    let _ = write_answer(&mut text, document, plot);
     if verbose {
         let _ = write_details(&mut text, document);
     }
@@ -30,7 +30,11 @@ pub fn summary(document: &ResultDocument, verbose: bool) -> String {
 }
 
 /// The answer: title, verdict, estimates, fit, warnings about the data, advice.
-fn write_answer(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
+fn write_answer(
+    text: &mut String,
+    document: &ResultDocument,
+    plot: Option<&str>,
+) -> std::fmt::Result {
     let samples = document
         .experiments
         .iter()
@@ -50,6 +54,9 @@ fn write_answer(text: &mut String, document: &ResultDocument) -> std::fmt::Resul
         write!(text, "\n{}", answer_table(document))?;
     }
     writeln!(text)?;
+    if let Some(plot) = plot {
+        writeln!(text, "{plot}")?;
+    }
     let lists = [
         ("Mass", assumed(document, MASS_UNKNOWN)),
         ("Units", assumed(document, UNITS_ASSUMED)),

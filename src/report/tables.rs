@@ -195,7 +195,7 @@ impl FittedModel<'_> {
         });
         let validation = self.run_assessment.validation.iter().enumerate();
         let validation = validation.flat_map(|(i, out)| {
-            out.channels().into_iter().map(move |view| {
+            out.channels(self.display).into_iter().map(move |view| {
                 let kind = view.channel.kind().name();
                 let name = format!("channels/validation-{}-{kind}.csv", i + 1);
                 (name, view.table())

@@ -1,8 +1,10 @@
-//! Text charts for the terminal: samples with the fitted response, and the coefficient functions.
+//! Text charts for the terminal: samples with the fitted response, and the coefficient functions; and the small plot of the summary.
 
+use super::columns::{interval_columns, named_column};
 use super::document::ResultDocument;
 use super::result_table::ResultTable;
 use crate::error::InputError;
+use crate::number_format::significant;
 use kmcfit_core::internals::functions::CoefficientKind;
 use std::path::Path;
 
@@ -13,6 +15,13 @@ const TALL: usize = 10;
 const LOW: usize = 5;
 /// Narrowest and widest chart, in columns.
 const WIDTHS: [usize; 2] = [40, 160];
+/// Rows of the plot of the summary, and its widest width in columns.
+const SMALL: usize = 6;
+const WIDEST_SMALL: usize = 72;
+/// Largest extent of a band beyond the estimate, relative to its range, that the plot of the summary includes.
+const WIDE_BAND: f64 = 1.5;
+/// Variations below this share of the largest value are rounding errors.
+const ROUNDING: f64 = 1e-9;
 
 /// The charts of a finished run in a folder, `width` columns wide.
 ///
@@ -60,12 +69,102 @@ pub fn charts(
     Ok(text)
 }
 
+/// A coefficient over time: name, unit, estimate and 95 % band.
+struct Curve {
+    name: String,
+    unit: String,
+    values: Vec<f64>,
+    band: Option<[Vec<f64>; 2]>,
+}
+
+impl Curve {
+    /// Range of the estimate relative to the mean width of its band, or to its largest value without one; `None` for a constant.
+    fn variation(&self) -> Option<f64> {
+        let [low, high] = range(&self.values);
+        let largest = low.abs().max(high.abs());
+        let is_varying = high - low > ROUNDING * largest;
+        let width = self.half_width().map(|half| 2.0 * half);
+        is_varying.then(|| (high - low) / width.filter(|w| *w > 0.0).unwrap_or(largest))
+    }
+
+    /// Mean half-width of the band.
+    fn half_width(&self) -> Option<f64> {
+        let [low, high] = self.band.as_ref()?;
+        let halves = low.iter().zip(high).map(|(low, high)| 0.5 * (high - low));
+        let (sum, count) = halves
+            .filter(|half| half.is_finite())
+            .fold((0.0, 0), |(sum, count), half| (sum + half, count + 1));
+        (count > 0).then(|| sum / f64::from(count))
+    }
+
+    /// Range of the plot: that of the estimate and its band, of which at most [`WIDE_BAND`] ranges of the estimate beyond it.
+    fn extent(&self) -> [f64; 2] {
+        let [low, high] = range(&self.values);
+        let room = WIDE_BAND * (high - low);
+        let band = self
+            .band
+            .as_ref()
+            .map(|[from, to]| [range(from)[0], range(to)[1]]);
+        let [from, to] = band.unwrap_or([low, high]);
+        [low.min(from.max(low - room)), high.max(to.min(high + room))]
+    }
+
+    fn plot(&self, times: &[f64], width: usize) -> String {
+        let band = self.half_width().map_or(String::new(), |half| {
+            format!(
+                "; shaded: 95 % band, mean half-width {}",
+                significant(half, 2)
+            )
+        });
+        let mut chart = Chart::new(width, SMALL, times);
+        chart.values = self.extent();
+        if let Some([low, high]) = &self.band {
+            chart.shade(times, low, high);
+        }
+        chart.line(times, &self.values);
+        format!("{} in {}{band}\n{}", self.name, self.unit, chart.text())
+    }
+}
+
+/// The plot of the summary: the estimated coefficient that varies most relative to its interval, at most 72 columns wide; `None` if all
+/// are constant.
+///
+/// # Errors
+/// When the table of the coefficients cannot be read.
+pub fn summary_plot(
+    folder: &Path,
+    document: &ResultDocument,
+    width: usize,
+) -> Result<Option<String>, InputError> {
+    let table = ResultTable::read(&folder.join("functions.csv"))?;
+    let times = table.required("t_s")?;
+    let curve = |name: &str| {
+        let unit = &document.functions.get(name)?.unit;
+        let column = named_column(name, document.is_rotation())?;
+        let [low, high] = interval_columns(&column).map(|end| table.column(&end));
+        Some(Curve {
+            name: super::answer::quantity(name),
+            unit: unit.clone(),
+            values: table.column(&column)?,
+            band: low.zip(high).map(|(low, high)| [low, high]),
+        })
+    };
+    let names = document.all_functions();
+    let names = names.filter(|(name, f)| document.is_determined(name) && !f.negligible);
+    let curves = names.filter_map(|(name, _)| curve(name));
+    let scored = curves.filter_map(|curve| Some((curve.variation()?, curve)));
+    let most = scored.max_by(|a, b| a.0.total_cmp(&b.0));
+    let width = width.clamp(WIDTHS[0], WIDEST_SMALL);
+    Ok(most.map(|(_, curve)| curve.plot(&times, width)))
+}
+
 /// A chart in Braille: two dots across and four down in each character.
 struct Chart {
     width: usize,
     height: usize,
     dots: Vec<u8>,
     marks: Vec<bool>,
+    shades: Vec<bool>,
     times: [f64; 2],
     values: [f64; 2],
 }
@@ -78,6 +177,7 @@ impl Chart {
             height,
             dots: vec![0; width * height],
             marks: vec![false; width * height],
+            shades: vec![false; width * height],
             times: range(times),
             values: [0.0, 1.0],
         }
@@ -139,6 +239,26 @@ impl Chart {
         }
     }
 
+    /// Shades the characters whose middle is between two curves at their time.
+    fn shade(&mut self, times: &[f64], low: &[f64], high: &[f64]) {
+        let [first, last] = self.times;
+        let [bottom, top] = self.values;
+        for column in 0..self.width {
+            let t = first + (column as f64 + 0.5) / self.width as f64 * (last - first);
+            let row = times
+                .partition_point(|time| *time < t)
+                .min(times.len().saturating_sub(1));
+            let (Some(low), Some(high)) = (low.get(row), high.get(row)) else {
+                continue;
+            };
+            for line in 0..self.height {
+                let share = 1.0 - (line as f64 + 0.5) / self.height as f64;
+                let y = bottom + share * (top - bottom);
+                self.shades[line * self.width + column] = (*low..=*high).contains(&y);
+            }
+        }
+    }
+
     fn text(&self) -> String {
         let mut text = String::new();
         for row in 0..self.height {
@@ -153,10 +273,11 @@ impl Chart {
                 _ => String::new(),
             };
             let cells = row * self.width..(row + 1) * self.width;
-            let cell = |i: usize| match (self.dots[i], self.marks[i]) {
-                (0, true) => 'o',
-                (0, false) => ' ',
-                (dots, _) => char::from_u32(0x2800 + u32::from(dots)).unwrap_or(' '),
+            let cell = |i: usize| match (self.dots[i], self.marks[i], self.shades[i]) {
+                (0, true, _) => 'o',
+                (0, false, true) => '░',
+                (0, false, false) => ' ',
+                (dots, ..) => char::from_u32(0x2800 + u32::from(dots)).unwrap_or(' '),
             };
             let line: String = cells.map(cell).collect();
             text += &format!("{label:>MARGIN$} │{}\n", line.trim_end());
@@ -231,5 +352,38 @@ mod tests {
         empty.scale(&[&[f64::NAN]]);
         empty.line(&[f64::NAN], &[f64::NAN]);
         assert!(empty.text().lines().count() == 6);
+    }
+
+    /// A falling line with a band of half-width 3 in a range of 20: the band takes a row above and below; a constant has no variation.
+    #[test]
+    fn the_band_of_the_small_plot_is_shaded() {
+        let times: Vec<f64> = (0..101).map(|i| f64::from(i) * 0.1).collect();
+        let values: Vec<f64> = times.iter().map(|t| 30.0 - 2.0 * t).collect();
+        let band = [-3.0, 3.0].map(|half| values.iter().map(|v| v + half).collect());
+        let mut curve = Curve {
+            name: "stiffness k".into(),
+            unit: "N/m".into(),
+            values,
+            band: Some(band),
+        };
+        assert_snapshot!(curve.plot(&times, 60), @"
+        stiffness k in N/m; shaded: 95 % band, mean half-width 3
+                33 │⣀⣀⡀░░
+                   │ ░⠈⠉⠉⠓⠒⠒⠤⠤⢄⣀⣀⡀░
+                   │            ░⠈⠉⠉⠒⠒⠢⠤⠤⢄⣀⣀⡀░
+                   │                      ░░⠉⠉⠑⠒⠒⠢⠤⠤⣀⣀⡀░
+                   │                                ░░⠈⠉⠉⠑⠒⠒⠤⠤⠤⣀⣀⡀░
+                 7 │                                           ░░⠈⠉⠉
+                   0                                            10 s
+        ");
+        assert!((curve.variation().expect("it varies") - 20.0 / 6.0).abs() < 1e-12);
+        // A wide band does not flatten the line: 1.5 ranges of it on each side.
+        curve.band = Some([-1e3, 1e3].map(|end| vec![end; 101]));
+        assert_eq!(curve.extent(), [-20.0, 60.0]);
+        curve.values = vec![2.0; 101];
+        assert_eq!(curve.variation(), None);
+        // Without times there is nothing to draw.
+        curve.values.clear();
+        assert!(curve.plot(&[], 40).lines().count() == SMALL + 2);
     }
 }

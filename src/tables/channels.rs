@@ -139,7 +139,10 @@ impl Table {
     ///
     /// # Errors
     /// When the file has no table.
-    pub fn with_columns<'a>(tables: &'a [Self], columns: &[ColumnName]) -> Result<&'a Self, InputError> {
+    pub fn with_columns<'a>(
+        tables: &'a [Self],
+        columns: &[ColumnName],
+    ) -> Result<&'a Self, InputError> {
         let mut best: Option<(usize, &Self)> = None;
         for table in tables {
             let count = columns.iter().filter(|c| table.find(c).is_ok()).count();

@@ -164,7 +164,7 @@ fn invalid_arguments_have_found_expected_and_hint() {
     $ kmcfit fit model.yaml --jsn
     error: kmcfit fit: unknown argument
       found: `--jsn`
-      expected: one of: --out, --set, --json, --no-report, --tables, --draws, --timings, --verbose, --strict, --plot, --checkpoint
+      expected: one of: --out, --set, --json, --no-report, --tables, --draws, --timings, --verbose, --strict, --plot, --no-plot, --checkpoint
       hint: did you mean `--json`?
 
     $ kmcfit fit model.yaml other.yaml

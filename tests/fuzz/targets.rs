@@ -7,7 +7,7 @@ use kmcfit::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
 use kmcfit::error::InputError;
 use kmcfit::formats::{self, recognise};
 use kmcfit::report::study::StudyDocument;
-use kmcfit::report::{FittedModel, RunAssessment, fit_claim, json, predict};
+use kmcfit::report::{DisplayUnits, FittedModel, RunAssessment, fit_claim, json, predict};
 use kmcfit::results::{
     AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, RESULT,
     STUDY_JOURNAL, with_checksums,
@@ -150,6 +150,7 @@ fn finish(workshop: &Workshop) {
         weights: None,
         run_assessment: &run_assessment,
         requested: heading.requested,
+        display: DisplayUnits::default(),
     };
     let folder = OutputFolder::prepare(&workshop.path("run"), fit_claim(model)).expect("a folder");
     let mut stage = folder.stage().expect("room");

@@ -231,3 +231,78 @@ fn charts_are_saved_as_drawings_and_numbers() {
     assert_eq!(kind, "image/png");
     assert!(size.parse::<f64>().expect("bytes") > 10_000.0, "{size}");
 }
+
+/// The animation is still until it is played; its slider shows the response of `trajectory.csv` at that time, and the mass moves by it.
+#[test]
+fn the_animation_shows_the_response_at_a_time() {
+    let Some(mut browser) = Browser::start() else {
+        return;
+    };
+    browser.open(&pages().path(REPORT));
+    browser.evaluate("document.getElementById('animation').open = true");
+    browser.settle();
+    let part = |what: &str| format!("document.querySelector('#animation {what}')");
+    let button = part("button");
+    let text = format!("{button}.textContent");
+    assert_eq!(browser.text(&text), "Play");
+    for control in ["button", "select", "input"] {
+        let height = browser.number(&format!("{}.getBoundingClientRect().height", part(control)));
+        assert!(height >= 44.0, "{control}: {height}");
+    }
+    let time = format!("Number({}.value)", part("input"));
+    browser.settle();
+    assert_eq!(browser.number(&time), 0.0, "it starts still");
+    let csv = pages().read("runs/plain/trajectory.csv");
+    let mut lines = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let headers = lines.next().expect("a header");
+    let column = headers
+        .iter()
+        .position(|h| h.starts_with("y_") || h.starts_with("displacement"));
+    let column = column.unwrap_or_else(|| panic!("{headers:?}"));
+    let rows: Vec<Vec<f64>> = lines
+        .map(|line| line.iter().map(|x| x.parse().unwrap_or(f64::NAN)).collect())
+        .collect();
+    let last = rows.len() - 1;
+    let ends = [rows[0][0], rows[last][0]];
+    let moved = |browser: &mut Browser, place: usize| {
+        browser.evaluate(&format!(
+            "(() => {{ const s = {}; s.value = {place}; s.dispatchEvent(new Event('input')); }})()",
+            part("input")
+        ));
+        let shown = browser.text("document.querySelectorAll('#animation dd')[1].textContent");
+        let shown = shown.replace('−', "-");
+        let shown: f64 = shown
+            .split(' ')
+            .next()
+            .and_then(|x| x.parse().ok())
+            .expect("a number");
+        let x = browser.number(&format!("Number({}.getAttribute('x'))", part("rect.mass")));
+        let t = ends[0] + place as f64 / 1000.0 * (ends[1] - ends[0]);
+        let after = rows.partition_point(|row| row[0] < t).clamp(1, last);
+        let [a, b] = [&rows[after - 1], &rows[after]];
+        let y = a[column] + (t - a[0]) / (b[0] - a[0]) * (b[column] - a[column]);
+        (shown, y, x)
+    };
+    let places = [0, 130, 500, 990].map(|place| moved(&mut browser, place));
+    let largest = rows.iter().map(|row| row[column].abs()).fold(0.0, f64::max);
+    for (shown, y, x) in places {
+        // Three digits are shown, and the curve is drawn from the samples' times.
+        assert!((shown - y).abs() <= 0.02 * largest, "{shown} {y}");
+        let travel = (x - places[0].2) / (shown - places[0].0);
+        assert!(
+            shown == places[0].0 || (travel * largest / 120.0 - 1.0).abs() < 0.2,
+            "{travel}"
+        );
+    }
+    browser.evaluate(&format!("{button}.click()"));
+    assert_eq!(browser.text(&text), "Pause");
+    let before = browser.text("document.querySelector('#animation dd').textContent");
+    let runs = (0..200).any(|_| {
+        browser.settle();
+        browser.text("document.querySelector('#animation dd').textContent") != before
+    });
+    assert!(runs, "it moves");
+    browser.evaluate(&format!("{button}.click()"));
+    assert_eq!(browser.text(&text), "Play");
+    assert_eq!(browser.complaints(), [""; 0]);
+}

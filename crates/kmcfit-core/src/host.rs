@@ -1,6 +1,7 @@
-//! Services of the host, provided by the application: a clock, the memory limit and the permission to start a thread.
+//! Services of the host, provided by the application: a clock, the memory limit, the permission to start a thread, and a display of
+//! progress.
 //!
-//! Without a host, a fit has no time limit, timings are zero, memory is unlimited, and threads may start.
+//! Without a host, a fit has no time limit, timings are zero, memory is unlimited, threads may start, and no progress is shown.
 
 use std::io;
 use std::sync::OnceLock;
@@ -15,6 +16,9 @@ pub struct Host {
     pub has_memory: fn(u64) -> bool,
     /// Permission to start a thread; an error counts as a refusal by the operating system.
     pub may_start_thread: fn() -> io::Result<()>,
+    /// Display of progress: number of finished jobs and number of all jobs of an analysis. Called from any thread, after each job; not
+    /// necessarily in increasing order.
+    pub progress: fn(usize, usize),
 }
 
 static HOST: OnceLock<Host> = OnceLock::new();
@@ -37,6 +41,13 @@ pub(crate) fn may_start_thread() -> io::Result<()> {
     HOST.get().map_or(Ok(()), |host| (host.may_start_thread)())
 }
 
+/// Shows the number of finished jobs of all.
+pub(crate) fn progress(done: usize, all: usize) {
+    if let Some(host) = HOST.get() {
+        (host.progress)(done, all);
+    }
+}
+
 /// Sets the process clock as host, for tests of timings.
 #[cfg(test)]
 pub(crate) fn provide_clock() {
@@ -46,6 +57,7 @@ pub(crate) fn provide_clock() {
         clock: || START.elapsed(),
         has_memory: |_| true,
         may_start_thread: || Ok(()),
+        progress: |_, _| {},
     });
 }
 

@@ -50,6 +50,21 @@ pub struct StudyPlan {
     pub limit: Option<Duration>,
 }
 
+impl StudyPlan {
+    /// Number of analyses, the fit included.
+    pub fn analyses(&self) -> usize {
+        // Fit, sensitivity, bands, equivalent systems, extremes.
+        let always = 5;
+        let asked = [
+            !self.candidates.is_empty(),
+            self.starts > 0,
+            self.constancy_test,
+            self.replicates > 0,
+        ];
+        always + self.profiles.len() + asked.into_iter().filter(|asked| *asked).count()
+    }
+}
+
 /// Target of a profile.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StudyTarget {

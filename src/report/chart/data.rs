@@ -37,6 +37,12 @@ pub(in crate::report) fn data(figure: &Figure, off: &[&str]) -> Data {
     }
 }
 
+/// Serialises plain data for a script element.
+pub(in crate::report) fn text_for_script<T: Serialize>(contents: &T) -> String {
+    // Plain structs with text keys always serialise.
+    inert(&serde_json::to_string(contents).unwrap_or_default())
+}
+
 /// Escapes the characters of JSON that could end a script or begin markup; they occur only in strings.
 fn inert(json: &str) -> String {
     clean(json)

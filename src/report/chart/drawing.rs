@@ -35,6 +35,10 @@ impl Ink {
     }
 }
 
+/// Thinnest and thickest curve in pixels: 0.5 and 1 pt.
+const THINNEST: f64 = 96.0 / 72.0 / 2.0;
+const THICKEST: f64 = 96.0 / 72.0;
+
 /// Stroke of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stroke {
@@ -52,6 +56,16 @@ impl Stroke {
         }
     }
 
+    /// Of a curve in print: 0.5 to 1 pt wide.
+    pub fn of_curve(style: &Style) -> Self {
+        let stroke = Self::of(style);
+        Self {
+            width: stroke.width.clamp(THINNEST, THICKEST),
+            ..stroke
+        }
+    }
+
+    /// Of dots, whose diameter is the width.
     pub fn of(style: &Style) -> Self {
         Self {
             ink: Ink::of(style.colour),

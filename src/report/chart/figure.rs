@@ -10,6 +10,28 @@ use serde::{Serialize, Serializer};
 /// Ranges below this share of the largest value are rounding errors.
 const ROUNDING: f64 = 1e-9;
 
+/// Width of a figure in print.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FigureWidth {
+    /// One column of a journal, 85 mm; the panels stand below each other.
+    Single,
+    /// Two columns, 180 mm.
+    Double,
+}
+
+impl FigureWidth {
+    /// Both widths.
+    pub const ALL: [Self; 2] = [Self::Single, Self::Double];
+
+    /// Width in mm.
+    pub fn millimetres(self) -> u32 {
+        match self {
+            Self::Single => 85,
+            Self::Double => 180,
+        }
+    }
+}
+
 /// One figure: a grid of panels with a common legend above them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figure {

@@ -2,12 +2,12 @@
 
 use super::axis::{self, Range, Ruler};
 use super::drawing::{Frame, Sheet};
-use super::figure::{Axis, Figure, Panel, Scale};
+use super::figure::{Axis, Figure, FigureWidth, Panel, Scale};
 use super::legend;
 use super::panel::{Placed, SIZE, label_height, label_width};
 
-/// Width of a figure in pixels: 180 mm, two columns of a journal.
-const WIDTH: f64 = 680.0;
+/// Pixels of a millimetre: 96 to the inch.
+const PIXELS: f64 = 96.0 / 25.4;
 /// Blank edge around everything.
 const EDGE: f64 = 8.0;
 /// Margin right of the last column, for a tick label that extends beyond its axis.
@@ -18,19 +18,20 @@ const ROW_GAP: f64 = 7.0;
 /// Least width of the axes.
 const NARROWEST: f64 = 60.0;
 const TITLE: f64 = 1.6 * SIZE;
-/// Height of the axes in pixels: alone, side by side, and in a stack.
+/// Height of the axes in pixels: alone, alone in one column of a journal, side by side, and in a stack.
 const ALONE: f64 = 320.0;
+const ALONE_SINGLE: f64 = 220.0;
 const BESIDE: f64 = 260.0;
 const STACKED: f64 = 165.0;
 
 /// Draws a figure.
-pub(super) fn sheet(figure: &Figure) -> Sheet {
-    let grid = PanelGrid::new(figure);
+pub(super) fn sheet(figure: &Figure, width: FigureWidth) -> Sheet {
+    let grid = PanelGrid::new(figure, width);
     let rulers: Vec<Ruler> = (0..figure.panels.len()).map(|i| grid.y_ruler(i)).collect();
     let columns = grid.columns(&rulers);
     let left = columns.first().map_or(EDGE, |column| column.left);
     let entries = legend::entries(figure);
-    let (mut shapes, height) = legend::draw(&entries, left, EDGE, WIDTH - RIGHT - EDGE - left);
+    let (mut shapes, height) = legend::draw(&entries, left, EDGE, grid.width - RIGHT - EDGE - left);
     let mut top = EDGE + height + if height > 0.0 { 6.0 } else { 0.0 };
     for row in 0..grid.rows() {
         top += grid.title_height(row);
@@ -45,7 +46,7 @@ pub(super) fn sheet(figure: &Figure) -> Sheet {
         .last()
         .map_or(0.0, |column| column.left + column.width);
     Sheet {
-        width: (right + RIGHT + EDGE).max(WIDTH).ceil(),
+        width: (right + RIGHT + EDGE).max(grid.width),
         height: (top + EDGE).ceil(),
         shapes,
     }
@@ -65,12 +66,13 @@ struct PanelColumn {
 struct PanelGrid<'a> {
     panels: &'a [Panel],
     columns: usize,
+    width: f64,
     x: Vec<Option<Range>>,
     y: Vec<Option<Range>>,
 }
 
 impl<'a> PanelGrid<'a> {
-    fn new(figure: &'a Figure) -> Self {
+    fn new(figure: &'a Figure, width: FigureWidth) -> Self {
         let panels = figure.panels.as_slice();
         let extents = |of: &dyn Fn(&'a Panel) -> (Scale, Vec<f64>)| {
             let extent = |panel| {
@@ -81,7 +83,11 @@ impl<'a> PanelGrid<'a> {
         };
         Self {
             panels,
-            columns: figure.columns.clamp(1, panels.len().max(1)),
+            columns: match width {
+                FigureWidth::Single => 1,
+                FigureWidth::Double => figure.columns.clamp(1, panels.len().max(1)),
+            },
+            width: PIXELS * f64::from(width.millimetres()),
             x: extents(&|p| {
                 (
                     p.x.scale,
@@ -106,6 +112,7 @@ impl<'a> PanelGrid<'a> {
 
     fn height(&self) -> f64 {
         match (self.rows(), self.columns) {
+            (1, 1) if self.width < ALONE + ALONE_SINGLE => ALONE_SINGLE,
             (1, 1) => ALONE,
             (1, _) => BESIDE,
             _ => STACKED,
@@ -152,7 +159,7 @@ impl<'a> PanelGrid<'a> {
             *label = label.max(label_width(ruler, self.y_labels(index)));
         }
         let gaps = COLUMN_GAP * (self.columns - 1) as f64;
-        let room = WIDTH - 2.0 * EDGE - RIGHT - gaps - labels.iter().sum::<f64>();
+        let room = self.width - 2.0 * EDGE - RIGHT - gaps - labels.iter().sum::<f64>();
         let width = (room / self.columns as f64).max(NARROWEST);
         let mut left = EDGE;
         let mut columns = Vec::new();

@@ -83,7 +83,7 @@ fn sample(mark: &Mark, (x, y): Point) -> Vec<Primitive> {
     let stroke = Stroke::of(&mark.style);
     match mark.kind {
         MarkKind::Line | MarkKind::Stems | MarkKind::Across | MarkKind::Upright => {
-            vec![Primitive::Path(line, stroke)]
+            vec![Primitive::Path(line, Stroke::of_curve(&mark.style))]
         }
         MarkKind::Points => {
             let dot =

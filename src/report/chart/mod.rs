@@ -16,8 +16,8 @@ pub mod plot_mark;
 pub mod svg;
 mod thin;
 
-pub(super) use data::data;
-pub use figure::{Axis, Figure, Panel, Scale};
+pub(super) use data::{data, text_for_script};
+pub use figure::{Axis, Figure, FigureWidth, Panel, Scale};
 pub use plot_mark::{Colour, Dash, Mark, Style};
-pub use svg::render;
 pub(super) use svg::sample;
+pub use svg::{render, render_at};

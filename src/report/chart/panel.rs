@@ -102,7 +102,7 @@ impl Placed<'_> {
     }
 
     fn grid(&self, shapes: &mut Vec<Primitive>) {
-        let stroke = Stroke::solid(GRID, 0.7);
+        let stroke = Stroke::solid(GRID, 0.67);
         for tick in &self.x.major {
             shapes.push(self.rule_at_x(tick.share, stroke));
         }
@@ -122,7 +122,7 @@ impl Placed<'_> {
     }
 
     fn mark(&self, mark: &Mark, shapes: &mut Vec<Primitive>) {
-        let stroke = Stroke::of(&mark.style);
+        let stroke = Stroke::of_curve(&mark.style);
         let is_inside = |share: &f64| (0.0..=1.0).contains(share);
         match mark.kind {
             MarkKind::Points if mark.x.len().min(mark.y.len()) <= MOST_DOTS => {
@@ -144,14 +144,19 @@ impl Placed<'_> {
         }
     }
 
-    fn line(&self, Mark { x, y, style, .. }: &Mark, shapes: &mut Vec<Primitive>) {
+    fn line(&self, mark: &Mark, shapes: &mut Vec<Primitive>) {
+        let Mark { x, y, style, .. } = mark;
+        let stroke = match mark.kind {
+            MarkKind::Points => Stroke::of(style),
+            _ => Stroke::of_curve(style),
+        };
         for run in curve::runs(self.pixels(x, y)) {
             // A point between two gaps has no line segment and is drawn as a dot.
             if let [alone] = run[..] {
                 self.dot(alone, &style.width(2.0 * style.width), shapes);
             }
             for piece in curve::clip(&curve::thin(&run), &self.frame) {
-                shapes.push(Primitive::Path(piece, Stroke::of(style)));
+                shapes.push(Primitive::Path(piece, stroke));
             }
         }
     }
@@ -164,7 +169,7 @@ impl Placed<'_> {
         {
             if (foot.0 + foot.1 + head.1).is_finite() {
                 let pieces = curve::clip(&[foot, head], &self.frame);
-                let stroke = Stroke::of(style);
+                let stroke = Stroke::of_curve(style);
                 shapes.extend(
                     pieces
                         .into_iter()

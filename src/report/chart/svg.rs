@@ -4,7 +4,7 @@
 //! group that has the style.
 
 use super::drawing::{Anchor, Ink, Point, Primitive, Words};
-use super::figure::Figure;
+use super::figure::{Figure, FigureWidth};
 use super::layout;
 use super::plot_mark::{Dash, Style};
 use crate::report::text::escape;
@@ -12,17 +12,27 @@ use crate::report::text::escape;
 /// Units per pixel.
 const UNITS: f64 = 10.0;
 
-/// The figure as an SVG document: white background, generic sans-serif, no scripts, no links.
+/// Millimetres of a pixel: 96 to the inch.
+const MILLIMETRES: f64 = 25.4 / 96.0;
+
+/// The figure as an SVG document 180 mm wide: white background, generic sans-serif, no scripts, no links.
 ///
 /// The same figure always gives the same bytes. Title and description stand in `<title>` and
 /// `<desc>`; all text is escaped.
 pub fn render(figure: &Figure) -> String {
-    let sheet = layout::sheet(figure);
-    let (width, height) = (sheet.width, sheet.height);
-    let (across, down) = (units(width), units(height));
+    render_at(figure, FigureWidth::Double)
+}
+
+/// [`render`] at a width for print. Fonts and lines have the same size at both: 7 to 9 pt, smaller only where a label is too long, and
+/// 0.5 to 1 pt.
+pub fn render_at(figure: &Figure, width: FigureWidth) -> String {
+    let sheet = layout::sheet(figure, width);
+    let (across, down) = (units(sheet.width), units(sheet.height));
+    let [width, height] =
+        [sheet.width, sheet.height].map(|side| (100.0 * MILLIMETRES * side).round() / 100.0);
     let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" width=\"{width}\" \
-         height=\"{height}\" viewBox=\"0 0 {across} {down}\">\n\
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" width=\"{width}mm\" \
+         height=\"{height}mm\" viewBox=\"0 0 {across} {down}\">\n\
          <title>{}</title>\n<desc>{}</desc>\n\
          <rect width=\"{across}\" height=\"{down}\" fill=\"#FFFFFF\"/>\n",
         escape(&figure.title),

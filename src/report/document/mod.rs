@@ -19,6 +19,7 @@ use kmcfit_core::internals::assessment::{
     ClassicalEstimate, FitStatistics, FunctionSummary, StepCheck,
 };
 use kmcfit_core::internals::functions::CoefficientKind;
+use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::identifiability::CovarianceKind;
 use kmcfit_core::internals::solvers::{EquationBalance, Optimality, Status, number_or_nan};
 pub use kmcfit_core::internals::study::PredictionSummary as Prediction;
@@ -274,6 +275,18 @@ impl ResultDocument {
         let own =
             own.filter(|(name, _)| *name != "mass" && !self.model.terms.iter().any(|t| t == name));
         self.terms().chain(own)
+    }
+
+    /// True for an estimated function that is identified and differs from zero; one that does not varies by rounding errors.
+    pub(super) fn is_determined(&self, name: &str) -> bool {
+        let mut estimates = self.estimates.0.iter();
+        let estimate = estimates.find(|(of, _)| of == name);
+        let interval = estimate.and_then(|(_, estimate)| estimate.ci95);
+        let is_zero = interval.is_some_and(|[low, high]| low <= 0.0 && high >= 0.0);
+        let function = self.functions.get(name);
+        let is_open = function
+            .is_some_and(|f| f.fixed || f.verdict == Some(ClassificationKind::NotIdentified));
+        !is_zero && !is_open
     }
 
     /// True if the fit minimises the misfit of a simulated response; false for the equation error.

@@ -1,5 +1,6 @@
 //! The page of a fit, `report.html`: first screen, contents, and the sections from the fit to the work of the solver.
 
+use super::animation::animation;
 use super::first_screen::first_screen;
 use super::table::{list, paragraph};
 use super::{figures, figures_without, help, overview, page as shell, reproducibility, settings};
@@ -90,6 +91,7 @@ fn fit_and_residuals(run: &FittedModel, document: &ResultDocument) -> String {
         + &list(&equation.collect::<Vec<_>>())
         + &list(&lines(|text| write_statistics(text, document)))
         + &figures(&drawn)
+        + &animation(run, document)
 }
 
 /// Table of all coefficients, and figures of those that vary.

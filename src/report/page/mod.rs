@@ -4,6 +4,7 @@
 //! A content security policy permits only the style sheet and script of the page, by their SHA-256 digests, so that no
 //! text of a model can run as a script; and images within the page, by which a drawing becomes a PNG file.
 
+mod animation;
 mod first_screen;
 mod fit;
 mod overview;
@@ -23,13 +24,14 @@ use sha2::{Digest, Sha256};
 const STYLE: &str = include_str!("page.css");
 
 /// In order of dependence.
-const SCRIPTS: [&str; 7] = [
+const SCRIPTS: [&str; 8] = [
     include_str!("script/scale.js"),
     include_str!("script/draw.js"),
     include_str!("script/interaction.js"),
     include_str!("script/download.js"),
     include_str!("script/chart.js"),
     include_str!("script/panel.js"),
+    include_str!("script/animation.js"),
     include_str!("script/start.js"),
 ];
 

@@ -11,6 +11,7 @@ mod text;
 
 pub use difference::Difference;
 
+use super::display_units::DisplayUnits;
 use super::document::{Prediction, ResultDocument};
 use super::fit_assessment::RunAssessment;
 use super::npy::read_npy;
@@ -108,6 +109,7 @@ impl Verification {
             predictions: &predictions,
             weights: None,
             run_assessment: &assessment,
+            display: DisplayUnits::default(),
             requested: RequestedFiles {
                 tables: run.document.model.steps_per_row == 1,
                 ..RequestedFiles::default()

@@ -104,9 +104,7 @@ fn coherent_share(channel: &Channel, predicted: &[f64], input: &Signal) -> Optio
 fn products_of_lags(input: &DVector<f64>, count: usize) -> DMatrix<f64> {
     let mut products = DMatrix::zeros(LAGS, LAGS);
     for m in 0..LAGS {
-        products[(0, m)] = input
-            .rows(LAGS, count)
-            .dot(&input.rows(LAGS - m, count));
+        products[(0, m)] = input.rows(LAGS, count).dot(&input.rows(LAGS - m, count));
     }
     for l in 1..LAGS {
         for m in l..LAGS {

@@ -70,11 +70,15 @@ pub(super) fn missing(
     let records = record_parameters::parameters(problem);
     let column = |i: usize| match i.checked_sub(kinds.len()) {
         None => Some(jacobian.column(first + i).into_owned()),
-        Some(i) => record_parameters::column(&extended, &evaluation, records[i]).map(DVector::from_vec),
+        Some(i) => {
+            record_parameters::column(&extended, &evaluation, records[i]).map(DVector::from_vec)
+        }
     };
     let test = |i: usize| model.test(&extended, &column(i)?, &residuals, is_modelled);
     let tests = map(kinds.len() + records.len(), available(), test);
-    let terms = kinds.iter().map(|(kind, term)| Candidate::Term(*kind, *term));
+    let terms = kinds
+        .iter()
+        .map(|(kind, term)| Candidate::Term(*kind, *term));
     let candidates = terms.chain(records.iter().copied().map(Candidate::Record));
     let tests = candidates.zip(tests).filter_map(|(candidate, test)| {
         let (value, t) = test?;

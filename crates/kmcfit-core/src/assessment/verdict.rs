@@ -393,8 +393,7 @@ fn open_gap(gap: &GapAssessment) -> Option<[f64; 2]> {
 /// Fit of the worst channel, per cent.
 fn worst_fit(problem: &Problem, fit: &Fit) -> f64 {
     let channels = problem.predicted(&fit.best.evaluation);
-    let fits = channels
-        .map(|(channel, predicted)| channel_fit_percent(channel, predicted));
+    let fits = channels.map(|(channel, predicted)| channel_fit_percent(channel, predicted));
     fits.fold(100.0, f64::min)
 }
 

@@ -9,13 +9,13 @@
 //! chapters 6, 9 and 13.
 
 use super::functional::Linear;
-use crate::threads::map;
 use super::refit::settings;
 use super::simulate::{noise_of, normal, sigmas, stream, with_samples};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
 use crate::solvers::{Status, fit_from};
+use crate::threads::map_with_progress;
 use nalgebra::DMatrix;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -124,7 +124,7 @@ pub fn bootstrap(
         }
     };
     Ok(Bootstrap {
-        replicates: map(count, threads, job),
+        replicates: map_with_progress(count, threads, job),
         optimum: optimum.to_vec(),
         seed,
     })

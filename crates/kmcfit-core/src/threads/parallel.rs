@@ -1,10 +1,28 @@
 //! Independent jobs on several threads.
 
 use super::{share, sharing, spawn_scoped};
+use crate::host;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Largest number of threads, which bounds the memory of their stacks.
 const MOST_THREADS: usize = 256;
+
+/// [`map`], with the number of finished jobs to the progress of the host.
+///
+/// # Panics
+/// If a job does.
+pub fn map_with_progress<T: Send>(
+    count: usize,
+    threads: usize,
+    work: impl Fn(usize) -> T + Sync,
+) -> Vec<T> {
+    let finished = AtomicUsize::new(0);
+    map(count, threads, |index| {
+        let result = work(index);
+        host::progress(finished.fetch_add(1, Ordering::Relaxed) + 1, count);
+        result
+    })
+}
 
 /// Computes `work(0), work(1), ...` on up to `threads` threads and returns the results in order. Each job depends on its
 /// index alone, so results do not depend on the number of threads.

@@ -75,6 +75,7 @@ pub fn provide_clock() {
         clock: || START.elapsed(),
         has_memory: |_| true,
         may_start_thread: || Ok(()),
+        progress: |_, _| {},
     });
 }
 

@@ -15,7 +15,8 @@ const saveSvg = (figure, name) => save(`${name}.svg`, new Blob([drawing(figure)]
 
 const savePng = (figure, name) => {
   const still = figure.querySelector(".still svg");
-  const [width, height] = ["width", "height"].map((side) => DENSITY * Number(still.getAttribute(side)));
+  // The drawing has ten units per pixel.
+  const [width, height] = still.getAttribute("viewBox").split(" ").slice(2).map((side) => (DENSITY * Number(side)) / 10);
   const image = new Image();
   image.addEventListener("load", () => {
     const canvas = element("canvas", { width: Math.round(width), height: Math.round(height) });

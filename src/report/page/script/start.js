@@ -11,6 +11,8 @@ const begin = () => {
     figure.classList.add("ready");
     return chart;
   });
+  const motion = document.getElementById("animation");
+  if (motion) new Motion(motion, charts);
   for (const axis of axes.values()) {
     const full = axis.full ?? [0, 1];
     axis.full = full[1] > full[0] ? full : padded(full, 0);

@@ -22,11 +22,11 @@
 mod linearised;
 mod reduced;
 
-use crate::threads::map;
 use super::refit::{nearest, settings, sizes};
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
 use crate::solvers::fit_from;
+use crate::threads::map_with_progress;
 use linearised::LinearisedModels;
 use reduced::ConstantModel;
 
@@ -154,7 +154,7 @@ pub fn of_function(
     let statistic = ratio(constant.evaluation.cost, there.min(here));
     let evaluation = problem.evaluate(&embedded)?;
     let linear = LinearisedModels::new(problem, &reduced, &embedded, &evaluation);
-    let simulated = map(how.simulations, how.threads, |index| {
+    let simulated = map_with_progress(how.simulations, how.threads, |index| {
         let [constant, varying] = linear.costs(how.seed, index);
         ratio(constant, varying)
     });

@@ -1,7 +1,7 @@
 //! Envelopes of all coefficient functions and of `k/m` and `c/m`: smallest and largest values compatible with the data.
 
 use super::{
-    Extreme, ExtremePair, ExtremeStatus, MisfitLimit, extreme_pairs, ratios_at, values_at,
+    Extreme, ExtremePair, ExtremeStatus, MisfitLimit, Target, extreme_pairs, ratios_at, values_at,
 };
 use crate::diagnostics::chi_square_one;
 use crate::functions::CoefficientKind;
@@ -97,10 +97,19 @@ pub fn envelopes(
             jobs.push((name.to_owned(), unit, ratios_at(problem, over, mass, times)));
         }
     }
-    let starts = [theta.to_vec()];
-    let envelopes = jobs.into_iter().filter_map(|(name, unit, targets)| {
-        let bands = extreme_pairs(problem, &starts, &targets, level, threads)?;
-        Some(Envelope { name, unit, bands })
+    // One list of searches, so that the threads have work to the end.
+    let all: Vec<Target> = jobs
+        .iter()
+        .flat_map(|(.., targets)| targets.clone())
+        .collect();
+    let found = extreme_pairs(problem, &[theta.to_vec()], &all, level, threads);
+    let Some(mut found) = found.map(Vec::into_iter) else {
+        return Vec::new();
+    };
+    let envelopes = jobs.into_iter().map(|(name, unit, targets)| Envelope {
+        name,
+        unit,
+        bands: found.by_ref().take(targets.len()).collect(),
     });
     envelopes.collect()
 }

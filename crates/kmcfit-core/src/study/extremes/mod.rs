@@ -27,9 +27,9 @@ mod search;
 pub use envelope::{Envelope, envelopes};
 
 use super::functional::{Linear, Target};
-use crate::threads::map;
 use crate::functions::Penalty;
 use crate::problem::Problem;
+use crate::threads::map_with_progress;
 use search::Search;
 
 /// Limits of the admissible systems, in addition to the constraints of the problem.
@@ -153,7 +153,7 @@ pub fn extreme_pairs(
             .max_by(|a, b| (side * a.value).total_cmp(&(side * b.value)))
             .expect("the start was within the level")
     };
-    let mut extremes = map(2 * targets.len(), threads, job).into_iter();
+    let mut extremes = map_with_progress(2 * targets.len(), threads, job).into_iter();
     let mut bands = Vec::with_capacity(targets.len());
     while let (Some(low), Some(high)) = (extremes.next(), extremes.next()) {
         bands.push(ExtremePair { low, high });

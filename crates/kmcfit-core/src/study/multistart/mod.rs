@@ -14,12 +14,12 @@ pub use cluster::{Cluster, Distance, distance};
 pub use finding::MultistartFinding;
 pub use path::{Paths, between};
 
-use crate::threads::map;
 use super::refit::{nearest, sizes};
 use super::simulate::stream;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::solvers::{FitSettings, Status, fit, fit_from};
+use crate::threads::map_with_progress;
 use rand::RngExt;
 
 /// Ranges of the starting points.
@@ -160,7 +160,7 @@ fn constants(problem: &Problem, levels: &[f64]) -> Vec<f64> {
 /// Runs all fits; a failed fit is listed with its reason.
 pub fn multistart(problem: &Problem, how: &Multistart) -> Waterfall {
     let starts = starts(problem, how);
-    let runs = map(starts.len(), how.threads, |i| run(problem, how, &starts[i]));
+    let runs = map_with_progress(starts.len(), how.threads, |i| run(problem, how, &starts[i]));
     let mut order: Vec<usize> = (0..runs.len())
         .filter(|i| runs[*i].found.is_some())
         .collect();

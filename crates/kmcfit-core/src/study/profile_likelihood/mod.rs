@@ -18,9 +18,9 @@
 mod continuation;
 
 use super::functional::Linear;
-use crate::threads::map;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
+use crate::threads::map_with_progress;
 use continuation::ProfileSearch;
 
 /// The 95 % quantile of chi-square with one degree of freedom.
@@ -183,7 +183,7 @@ pub fn profiles(
     how: &ProfileSettings,
     threads: usize,
 ) -> Result<Vec<Profile>, SimulationError> {
-    let each = map(of.len(), threads, |i| {
+    let each = map_with_progress(of.len(), threads, |i| {
         profile(problem, optimum, &of[i], how)
     });
     each.into_iter().collect()
