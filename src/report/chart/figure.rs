@@ -95,7 +95,7 @@ impl Panel {
     }
 
     /// True if each curve has one value only.
-    fn is_constant(&self) -> bool {
+    pub(in crate::report) fn is_constant(&self) -> bool {
         let is_level = |mark: &Mark| {
             let [low, high] = mark.range();
             high - low <= ROUNDING * low.abs().max(high.abs())

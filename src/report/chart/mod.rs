@@ -18,6 +18,7 @@ mod thin;
 
 pub(super) use data::data;
 pub use figure::{Axis, Figure, Panel, Scale};
+pub(super) use plot_mark::MarkKind;
 pub use plot_mark::{Colour, Dash, Mark, Style};
 pub use svg::render;
 pub(super) use svg::sample;
