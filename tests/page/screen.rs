@@ -124,11 +124,8 @@ fn on_a_phone(browser: &mut Browser, page: &str) {
         "[...document.querySelectorAll('.scroll')].filter(e => e.scrollWidth > e.clientWidth).map(e => e.getAttribute('aria-label')).join()",
     );
     assert_eq!(hidden, "", "{page}");
-    assert_eq!(
-        browser.number("document.documentElement.scrollWidth"),
-        390.0,
-        "{page}"
-    );
+    let wide = browser.number("document.documentElement.scrollWidth");
+    assert!(wide <= 390.0, "{page}: {wide}");
     assert_eq!(overlaps(browser), "", "{page}");
     browser.evaluate("document.querySelector('main section:last-child').scrollIntoView()");
     browser.settle();
@@ -167,7 +164,7 @@ fn pages_break_no_rule_of_axe() {
         browser.evaluate(&format!("{{{script}; undefined}}"));
         let broken = browser.text(
             "axe.run({runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice']}).then(found =>
-               found.violations.map(v => `${v.id}: ${v.nodes.map(n => n.target.join(' ')).slice(0, 5).join(', ')}`).join('; '))",
+               found.passes.length < 20 ? 'few rules were applied' : found.violations.map(v => `${v.id}: ${v.nodes.map(n => n.target.join(' ')).slice(0, 5).join(', ')}`).join('; '))",
         );
         assert_eq!(broken, "", "{page}");
     }

@@ -47,8 +47,9 @@ fn every_figure_has_its_texts_and_its_numbers() {
         let page = parsed(&html);
         assert!(all(&page, "figure").count() >= 3, "{name}");
         let ids = all(&page, "figure").filter_map(|n| n.attribute("id"));
-        let distinct: BTreeSet<&str> = ids.clone().collect();
-        assert_eq!(distinct.len(), ids.count(), "{name}");
+        let ids: Vec<&str> = ids.collect();
+        let distinct: BTreeSet<&&str> = ids.iter().collect();
+        assert_eq!(distinct.len(), ids.len(), "{name}: {ids:?}");
         for figure in all(&page, "figure") {
             let caption = figure.children().find(|n| n.has_tag_name("figcaption"));
             assert!(!text_of(caption.expect("a caption")).trim().is_empty());

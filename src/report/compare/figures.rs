@@ -46,31 +46,18 @@ pub(super) fn all(comparison: &Comparison) -> Vec<Figure> {
 
 /// The figure of the first screen: the function whose curves differ most; where all are constant, the residuals.
 pub(super) fn main(comparison: &Comparison) -> Option<Figure> {
-    let size = |of: fn(&NodalCoefficients) -> &Vec<f64>| {
-        let runs = comparison.runs.iter();
-        let spans = runs.map(|run| span(of(&run.finished.coefficients), SPIKES));
-        let (low, high) = spans.fold(EMPTY, union);
-        high.abs().max(low.abs())
-    };
-    let (mass, stiffness) = (size(|d| &d.mass), size(|d| &d.coefficients[1]));
     let spread = |panel: &Panel| {
-        let scale = match panel.y.label.as_str() {
-            "mass m" => mass,
-            "stiffness k" => stiffness,
-            // The critical damping.
-            _ => 2.0 * (mass * stiffness).sqrt(),
-        };
         let lines = panel
             .marks
             .iter()
             .filter(|mark| mark.kind == MarkKind::Line);
         let (low, high) = lines.map(|mark| span(&mark.y, SPIKES)).fold(EMPTY, union);
-        (high - low) / scale
+        (high - low) / scale(&comparison.runs, &panel.y.label)
     };
     let panels = functions(comparison).into_iter().flat_map(|f| f.panels);
-    let scored = panels.map(|panel| (spread(&panel), panel));
-    let visible = scored.filter(|(spread, _)| *spread > INVISIBLE);
-    let most = visible.max_by(|a, b| a.0.total_cmp(&b.0));
+    let most = panels
+        .map(|panel| (spread(&panel), panel))
+        .max_by(|a, b| a.0.total_cmp(&b.0));
     let Some((_, panel)) = most else {
         let name = "main".to_owned();
         return residuals(comparison).map(|figure| Figure { name, ..figure });
@@ -78,6 +65,27 @@ pub(super) fn main(comparison: &Comparison) -> Option<Figure> {
     let title = format!("{} of each model", panel.y.label);
     let figure = Figure::new("main", title, "The coefficient whose curves differ most.");
     Some(figure.panel(panel))
+}
+
+/// Largest magnitude of a function or ratio of all runs; of damping and c/m the critical value.
+fn scale(runs: &[ComparedRun], label: &str) -> f64 {
+    let size = |of: &dyn Fn(&NodalCoefficients) -> Vec<f64>| {
+        let spans = runs
+            .iter()
+            .map(|run| span(&of(&run.finished.coefficients), SPIKES));
+        let (low, high) = spans.fold(EMPTY, union);
+        high.abs().max(low.abs())
+    };
+    let mass = || size(&|d| d.mass.clone());
+    let stiffness = || size(&|d| d.coefficients[1].clone());
+    let ratio = || size(&|d| Ratios::of(d).k_over_m);
+    match label {
+        "mass m" => mass(),
+        "stiffness k" => stiffness(),
+        "k/m" => ratio(),
+        "c/m" => 2.0 * ratio().sqrt(),
+        _ => 2.0 * (mass() * stiffness()).sqrt(),
+    }
 }
 
 /// A curve of each system: caption, unit, values.
@@ -148,12 +156,16 @@ fn list(measures: &[Measures], of: impl Fn(&Measures) -> Option<String>) -> Stri
 
 fn overlay(figure: Figure, runs: &[ComparedRun], curves: &[Curve]) -> Figure {
     let truths = truths(runs);
-    figure.panels(curves.iter().map(|(label, unit, of)| {
+    figure.panels(curves.iter().filter_map(|(label, unit, of)| {
         let found: Vec<Vec<f64>> = runs
             .iter()
             .map(|run| of(&run.finished.coefficients))
             .collect();
         let real: Vec<Vec<f64>> = truths.iter().map(|(_, _, truth)| of(truth)).collect();
+        let all = found.iter().chain(&real).map(|f| span(f, 0.0));
+        let (low, high) = all.fold(EMPTY, union);
+        // Curves that are equal to this accuracy would be drawn on an axis of rounding errors.
+        (high - low > INVISIBLE * scale(runs, label)).then_some(())?;
         let mut panel = Panel::of_time(*label, *unit);
         if let Some((low, high)) = without_spikes(&real, &found) {
             panel.y = panel.y.limits(low, high);
@@ -172,7 +184,7 @@ fn overlay(figure: Figure, runs: &[ComparedRun], curves: &[Curve]) -> Figure {
         let bands: Vec<Mark> = bands.collect();
         let found = runs.iter().zip(&found).enumerate();
         let found = found.map(|(i, (run, y))| Mark::line(&run.name, &run.times(), y, style(i)));
-        panel.marks(bands).marks(truths).marks(found)
+        Some(panel.marks(bands).marks(truths).marks(found))
     }))
 }
 

@@ -221,9 +221,12 @@ fn card(run: &Measures, look: Style) -> String {
     text + "</div>\n"
 }
 
-/// The text with a capital first letter.
+/// The text with a capital first letter, unless it begins with a symbol such as `c`.
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
+    if letters.clone().nth(1) == Some(' ') {
+        return text.to_owned();
+    }
     match letters.next() {
         Some(first) => first.to_uppercase().chain(letters).collect(),
         None => String::new(),

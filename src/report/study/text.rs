@@ -222,7 +222,7 @@ fn is_exact(e: &ExtremesRecord) -> bool {
 /// The range between the extremes with its unit, at the time where they differ most.
 pub fn widest_range(e: &ExtremesRecord) -> String {
     let i = widest_index(e);
-    let (Some(low), Some(high)) = (e.low.get(i), e.high.get(i)) else {
+    let (Some(low), Some(high), Some(time)) = (e.low.get(i), e.high.get(i), e.times.get(i)) else {
         return String::new();
     };
     if is_exact(e) {
@@ -232,7 +232,7 @@ pub fn widest_range(e: &ExtremesRecord) -> String {
     let is_constant = |values: &[f64]| values.iter().all(|x| *x == values[0]);
     let at = match is_constant(&e.low) && is_constant(&e.high) {
         true => String::new(),
-        false => format!(" at {} s, where the range is widest", e.times[i]),
+        false => format!(" at {time} s, where the range is widest"),
     };
     format!("{low} to {high} {}{at}", e.unit)
 }
