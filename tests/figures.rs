@@ -123,7 +123,7 @@ fn text_is_escaped_everywhere() {
         .mark(Mark::span(text, 0.2, f64::INFINITY))
         .mark(Mark::horizontal(text, 0.5, Style::nth(1)))
         .mark(Mark::vertical(text, f64::NAN, Style::nth(2)))
-        .mark(Mark::band(text, &t, &t, &t, Colour::Green));
+        .mark(Mark::band(text, &t, &t, &t, Colour::Purple));
     let svg = render(&Figure::new("name", text, text).panel(panel));
     check(&svg);
     let document = roxmltree::Document::parse(&svg).expect("well-formed");

@@ -109,3 +109,35 @@ fn sample(mark: &Mark, (x, y): Point) -> Vec<Primitive> {
         MarkKind::Span => block(SPAN),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::chart::{Colour, Panel, Style};
+
+    /// Dots and a band of a curve have its entry; another colour has its own.
+    #[test]
+    fn equal_labels_of_one_colour_are_one_entry() {
+        let t = [0.0, 1.0];
+        let blue = Style::new(Colour::Blue);
+        let panel = Panel::of_time("k", "N/m")
+            .mark(Mark::band("fit", &t, &t, &t, Colour::Blue).dash(Dash::Dashed))
+            .mark(Mark::line("fit", &t, &t, blue))
+            .mark(Mark::points("fit", &t, &t, blue))
+            .mark(Mark::points("fit", &t, &t, Style::new(Colour::Green)));
+        let figure = Figure::new("", "", "").panel(panel);
+        let kinds: Vec<MarkKind> = entries(&figure).iter().map(|mark| mark.kind).collect();
+        assert_eq!(kinds, [MarkKind::Line, MarkKind::Points]);
+    }
+
+    /// Pointwise and simultaneous bands differ without colours: by edges and tone.
+    #[test]
+    fn a_dashed_band_has_edges() {
+        let t = [0.0, 1.0];
+        let plain = Mark::band("", &t, &t, &t, Colour::Grey);
+        let edged = plain.clone().dash(Dash::Dashed);
+        assert_eq!(sample(&plain, (0.0, 0.0)).len(), 1);
+        assert_eq!(sample(&edged, (0.0, 0.0)).len(), 3);
+        assert!(band_opacity(&edged.style) < band_opacity(&plain.style));
+    }
+}
