@@ -25,6 +25,9 @@ const ORDER: [(Part, &str); 13] = [
     (Part::Fit, "fit"),
 ];
 
+/// Predictions with a chart; those of the others are in `figures/study-predictions.svg`, so that the page stays below 2 MB.
+const MOST_PREDICTIONS: usize = 2;
+
 /// Leading parts of [`ORDER`] whose first findings stand on the first screen.
 const LEADING: usize = 4;
 
@@ -102,7 +105,11 @@ fn section(study: &StudyDocument, part: Part) -> String {
         Part::Bands => return bands(study, &sentences),
         Part::Profiles => figures::profiles_alone(study),
         Part::Extremes => figures::extremes_alone(study),
-        Part::Predictions => figures::predictions_alone(study),
+        Part::Predictions => {
+            let mut charts = figures::predictions_alone(study);
+            charts.truncate(MOST_PREDICTIONS);
+            charts
+        }
         Part::EquivalentSystems => return finding(&sentences, figures::equivalent_systems(study)),
         Part::Multistart => return finding(&sentences, figures::waterfall(study)),
         Part::Sensitivity => {
@@ -126,6 +133,10 @@ fn bands(study: &StudyDocument, sentences: &[String]) -> String {
     let charts = charts.map(|(name, chart)| {
         let own = known.iter().find(|c| c.name == name);
         let own: Vec<String> = own.map(|c| c.text.clone()).into_iter().collect();
+        // Natural frequency and damping ratio have no finding of their own beside those of k/m and c/m.
+        if own.is_empty() && !known.is_empty() {
+            return String::new();
+        }
         others.retain(|sentence| !own.contains(sentence));
         finding(&own, [chart])
     });
