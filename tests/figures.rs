@@ -31,7 +31,7 @@ fn standard(t: &[f64], y: &[f64]) -> Vec<Figure> {
         observation(&[("displacement y", "m", t, y), ("velocity v", "m/s", t, t)]),
         convergence(t, y, t),
         response(t, y, &[(0, t, y), (10, t, t)]),
-        functions(t, &[curve, curve, curve]),
+        functions([curve, curve, curve].map(|c| c.panel(t))),
         gradient_error(&[
             gradient(1000, GradientKind::Discrete),
             gradient(2000, GradientKind::Continuous),
@@ -103,7 +103,7 @@ fn figures_without_content_are_documents_too() {
     check(&render(&Figure::new("", "", "")));
     check(&render(&observation(&[])));
     check(&render(&gradient_error(&[])));
-    check(&render(&functions(&[], &[])));
+    check(&render(&functions([])));
     check(&render(&ratios(&[], &Ratios::default(), None, &[])));
     check(&render(&Figure::new("", "", "").columns(0).panel(
         Panel::new(
@@ -123,7 +123,7 @@ fn text_is_escaped_everywhere() {
         .mark(Mark::span(text, 0.2, f64::INFINITY))
         .mark(Mark::horizontal(text, 0.5, Style::nth(1)))
         .mark(Mark::vertical(text, f64::NAN, Style::nth(2)))
-        .mark(Mark::band(text, &t, &t, &t, Colour::Green));
+        .mark(Mark::band(text, &t, &t, &t, Colour::Purple));
     let svg = render(&Figure::new("name", text, text).panel(panel));
     check(&svg);
     let document = roxmltree::Document::parse(&svg).expect("well-formed");
@@ -164,7 +164,7 @@ fn long_series_make_small_files_and_keep_their_spikes() {
 fn equal_axes_share_their_labels() {
     let (t, y) = wave(50);
     let curve = FunctionCurve::new("mass m", "kg", &y);
-    let svg = render(&functions(&t, &[curve, curve]));
+    let svg = render(&functions([curve, curve].map(|c| c.panel(&t))));
     assert_eq!(svg.matches("time t (s)").count(), 1);
     assert_eq!(svg.matches("mass m (kg)").count(), 2);
     assert_eq!(svg.matches(">\nestimate\n<").count(), 1);

@@ -171,7 +171,7 @@ fn run_in(
         document.status = "complete".into();
     }
     let written = document
-        .write(&folder)
+        .write(&folder, &work.model)
         .and_then(|()| work.journal.finish_if(done));
     written.map_err(|error| unwritable(folder.path(), &error))?;
     match as_json {
@@ -196,7 +196,7 @@ fn finished_fit(run: &Run) -> Option<StudiedFit> {
     let is_at_end = run.document.outcome.status == Status::Converged;
     let (model, fit) = is_at_end.then(|| rebuilt_fit(run).ok()).flatten()?;
     say("note", "starting from the fit of this run");
-    Some(StudiedFit::of(&model.problem, &fit))
+    Some(StudiedFit::of(&model, &fit))
 }
 
 /// Checks that the fit simulates a response and has parameters.
@@ -406,8 +406,7 @@ impl StudyRun<'_> {
             let mut journal = fit_journal(folder, heading, is_resumed);
             let journal = journal.as_mut().map(|j| j as &mut dyn CheckpointStore);
             let (weighted, _, found) = search(&model, &progress, journal)?;
-            let problem = weighted.as_ref().map_or(&model.problem, |m| &m.problem);
-            let fit = StudiedFit::of(problem, &found);
+            let fit = StudiedFit::of(weighted.as_ref().unwrap_or(&model), &found);
             interrupted = Some(fit.clone());
             Ok::<_, String>(fit)
         };

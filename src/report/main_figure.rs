@@ -44,7 +44,7 @@ impl FittedModel<'_> {
 }
 
 /// Range of the estimate of a panel relative to the mean width of its band, or to its largest value without one; `None` for a constant.
-fn variation(panel: &Panel) -> Option<f64> {
+pub(super) fn variation(panel: &Panel) -> Option<f64> {
     let estimate = panel.marks.iter().find(|mark| mark.label == "estimate")?;
     let [low, high] = estimate.range();
     let largest = low.abs().max(high.abs());

@@ -1,25 +1,40 @@
 //! Reasons of the verdict on a fit in words, each a clause of one line.
 
 use super::document::{Estimates, Verdict};
-use super::fit_assessment::ValidationRecord;
+use super::fit_assessment::{RunAssessment, ValidationRecord};
 use super::model_assumptions::{assumed_units, unknown_mass};
 use super::ratios;
 use super::rivals::{rival_in_words, term_in_words};
 use super::run::FittedModel;
 use super::suggestions::percent;
 use super::text::and_list;
-use crate::config::DataWarning;
+use crate::config::{DataWarning, Model};
 use crate::finding::Finding;
 use crate::number_format::{significant, times_in_words};
+use crate::results::RequestedFiles;
 use kmcfit_core::internals::assessment::{
     Estimate, EstimateStatus, Implausible, SampleFault, VerdictAssumption, VerdictLevel,
     VerdictReason, estimates, verdict_assumptions, verdict_level, verdict_reasons,
 };
 use kmcfit_core::internals::diagnostics::standard_deviation;
-use kmcfit_core::internals::solvers::{EquationBalance, Status};
+use kmcfit_core::internals::solvers::{EquationBalance, Fit, Status};
 use std::collections::BTreeMap;
 
 impl FittedModel<'_> {
+    /// Verdict on a fit of a model.
+    pub(super) fn verdict_of(model: &Model, fit: &Fit) -> Verdict {
+        let fitted = FittedModel {
+            display: Default::default(),
+            model,
+            fit,
+            predictions: &[],
+            weights: None,
+            run_assessment: &RunAssessment::of(model, fit),
+            requested: RequestedFiles::default(),
+        };
+        fitted.verdict()
+    }
+
     /// Verdict on the fit: reasons from its assessment, the data and the validation records.
     pub(super) fn verdict(&self) -> Verdict {
         let problem = &self.model.problem;

@@ -110,7 +110,7 @@ fn with_page(bench: &Workbench, file: &str, look: impl Fn(&Document)) {
         "http:",
         "https:",
         "src=",
-        "href=\"",
+        "href=\"/",
         "@import",
         "<script>alert",
     ] {
@@ -437,8 +437,14 @@ fn the_page() {
         for run in &records {
             assert!(text.to_lowercase().contains(&run["verdict"].to_lowercase()));
         }
-        assert_eq!(all("section").count(), 3);
-        assert_eq!(all("figure").count(), 4);
+        assert_eq!(
+            all("div")
+                .filter(|n| n.attribute("class") == Some("run"))
+                .count(),
+            3
+        );
+        // The main figure, and those of the sections.
+        assert_eq!(all("figure").count(), 5);
         for figure in all("figure") {
             assert!(figure.descendants().any(|n| n.has_tag_name("figcaption")));
             let drawings: Vec<Node> = (figure.descendants())
@@ -454,8 +460,16 @@ fn the_page() {
                 assert!(described("title") && described("desc"));
             }
         }
-        let columns = all("th").filter(|n| n.attribute("scope") == Some("col"));
-        assert_eq!(columns.count(), 3);
+        let heads: Vec<String> = all("thead")
+            .map(|head| {
+                head.descendants()
+                    .filter(|n| n.has_tag_name("th"))
+                    .map(text_of)
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            })
+            .collect();
+        assert_eq!(heads[1], "quantity, hostile, twice, free");
     });
 }
 
@@ -658,4 +672,87 @@ fn overrides_apply_to_all_models() {
     ]);
     assert_eq!(code, 2);
     assert_snapshot!(stderr);
+}
+
+/// The page of ranked models leads with the best one, its table has the numbers of the document, and each model's prediction of the validation
+/// record is drawn beside the samples.
+#[test]
+fn ranked_models_and_their_predictions() {
+    let bench = Workbench::empty();
+    let mut samples = String::from("t_s,y_m\n");
+    for i in 0..201 {
+        let t = 0.05 * f64::from(i);
+        // Deterministic noise: tones that no system of the models contains.
+        let noise = 0.01 * ((37.0 * t).sin() + (53.0 * t + 1.0).cos() + (71.0 * t).sin());
+        let y = (-0.1 * t).exp() * (1.99 * t).cos() + noise;
+        samples += &format!("{t},{y}\n");
+    }
+    bench.write("samples.csv", &samples);
+    let record = "data: samples.csv, sigma: {displacement: 0.02}, initial: {displacement: 1.0, velocity: 0.0}";
+    for (name, stiffness) in [
+        ("varying", "{basis: piecewise-linear, knots: 5, start: 4.0}"),
+        ("constant", "{basis: constant, start: 4.0}"),
+    ] {
+        let model = format!(
+            "format: 1
+experiments:
+  - {{name: first, {record}}}
+  - {{name: 'second <b>', validation: true, {record}}}
+functions:
+  mass: {{fixed: 1.0}}
+  damping: {{basis: constant, start: 0.1}}
+  stiffness: {stiffness}
+"
+        );
+        bench.write(&format!("{name}.yaml"), &model);
+    }
+    let (_, stdout, stderr) = bench.run(&["compare", "varying.yaml", "constant.yaml", "--json"]);
+    let document: Value = serde_json::from_str(&stdout).unwrap_or_else(|e| panic!("{e}: {stderr}"));
+    with_page(&bench, "runs/compare/compare.html", |page| {
+        let class = |name: &'static str| {
+            let found = page
+                .descendants()
+                .find(|n| n.attribute("class") == Some(name));
+            found.unwrap_or_else(|| panic!("{name}"))
+        };
+        assert_eq!(text_of(class("state good")), "Best: constant");
+        let table = class("stack");
+        let rows: Vec<Vec<String>> = (table.descendants().filter(|n| n.has_tag_name("tr")))
+            .map(|row| {
+                row.children()
+                    .map(|cell| text_of(cell).trim().to_owned())
+                    .collect()
+            })
+            .collect();
+        let names: Vec<&str> = rows.iter().map(|row| row[0].as_str()).collect();
+        assert_eq!(names, ["model", "constant", "varying"]);
+        let place = rows[0].iter().position(|heading| heading == "BIC - best");
+        let place = place.expect("the column");
+        let stored = document["runs"][0]["bic_difference"]
+            .as_f64()
+            .expect("a number");
+        let shown: f64 = rows[2][place].parse().expect("a number");
+        // One decimal place is shown.
+        assert!((shown - stored).abs() <= 0.051, "{shown} {stored}");
+        let figure = page
+            .descendants()
+            .find(|n| n.attribute("id") == Some("figure-validation"));
+        let script = figure.and_then(|f| f.children().find(|n| n.has_tag_name("script")));
+        let drawn: Value =
+            serde_json::from_str(&text_of(script.expect("the numbers"))).expect("JSON");
+        let panel = &drawn["panels"][0];
+        assert_eq!(panel["title"], "second <b>");
+        let labels: Vec<&str> = (panel["marks"].as_array().expect("marks").iter())
+            .filter_map(|mark| mark["label"].as_str())
+            .collect();
+        assert_eq!(labels, ["measured", "varying", "constant"]);
+        let stored = bench.read("runs/compare/varying/channels/validation-1-displacement.csv");
+        let stored = column(&stored, "predicted");
+        let shown = panel["marks"][1]["y"].as_array().expect("numbers");
+        assert_eq!(shown.len(), stored.len());
+        for (shown, stored) in shown.iter().zip(&stored) {
+            // Charts have six digits.
+            assert!((shown.as_f64().expect("a number") - stored).abs() < 1e-5);
+        }
+    });
 }

@@ -184,7 +184,7 @@ fn a_sequence() {
     assert!(stdout.contains("paper-positive has J/J0"), "{stdout}");
     assert!(
         stdout.contains(
-            "linear-mass is the first run close to the true system, including its scale."
+            "linear-mass is the first run that recovers the true system, including its scale."
         ),
         "{stdout}"
     );

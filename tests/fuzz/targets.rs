@@ -491,7 +491,7 @@ pub fn study_journal(bytes: &[u8]) -> Verdict {
     if PIECES.iter().any(|name| journal.has(name)) {
         let claim = StudyDocument::claim().journals(&[STUDY_JOURNAL]);
         let out = OutputFolder::prepare(&folder, claim).expect("a folder");
-        document.write(&out).expect("room");
+        document.write(&out, &workshop().fits[0].1).expect("room");
     }
     Verdict::Accepted
 }

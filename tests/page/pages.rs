@@ -9,12 +9,16 @@ use tempfile::TempDir;
 /// Text that must not become markup.
 pub const HOSTILE: &str = "<script>alert(1)</script></script>\"'&";
 
+/// Names of a data file and of a model file that must not become markup.
+const HOSTILE_FILE: &str = "<i>&'data.csv";
+pub const HOSTILE_STEM: &str = "<b>&'model";
+
 /// A light system with a force, a known truth, an active constraint, and names that contain markup.
 const MODEL: &str = "format: 1
 title: TITLE
 experiments:
   - name: NAME
-    data: samples.csv
+    data: DATA
     sigma: {displacement: 0.02}
     initial: {displacement: 1.0, velocity: 0.0}
 grid: {nodes: 201}
@@ -26,7 +30,11 @@ truth: {data: truth.csv}
 predict:
   - {displacement: 2.0, velocity: 0.0}
 fit: {stop: {iterations: 30, tolerance: 1e-10}}
-study: {starts: 2}
+study:
+  starts: 2
+  profiles: [{function: damping}]
+  candidates:
+    - {name: CANDIDATE, initial: {displacement: 2.0, velocity: 0.0}}
 ";
 
 const DEVICE: &str = "format: 1
@@ -50,9 +58,12 @@ impl Pages {
             folder: tempfile::tempdir().expect("a temporary folder"),
         };
         let quoted = |text: &str| format!("'{}'", text.replace('\'', "''"));
-        let model = |title: &str| {
+        let model = |title: &str, data: &str| {
             let model = MODEL.replace("TITLE", &quoted(title));
-            model.replace("NAME", &quoted(title))
+            let model = model.replace("DATA", &quoted(data));
+            model
+                .replace("NAME", &quoted(title))
+                .replace("CANDIDATE", &quoted(title))
         };
         let truth: String = (0..201)
             .map(|i| format!("{},1.0,0.1,1.0\n", f64::from(i) * 0.1))
@@ -60,14 +71,37 @@ impl Pages {
         let heads = "t_s,mass_kg,damping_N_s_per_m,stiffness_N_per_m\n";
         pages.write("truth.csv", &(heads.to_string() + &truth));
         pages.write("device.yaml", DEVICE);
-        pages.write("plain.yaml", &model("A plain run"));
-        pages.write("hostile.yaml", &model(HOSTILE));
+        pages.write("plain.yaml", &model("A plain run", "samples.csv"));
+        // Names of files and columns that contain markup.
+        let hostile = model(HOSTILE, HOSTILE_FILE).replace(
+            &format!("data: {}", quoted(HOSTILE_FILE)),
+            &format!(
+                "data: {}\n    columns: {{time: '<t>', displacement: '<y>&'}}",
+                quoted(HOSTILE_FILE)
+            ),
+        );
+        pages.write("hostile.yaml", &hostile);
+        pages.write(&format!("{HOSTILE_STEM}.yaml"), &hostile);
+        let sequence = format!(
+            "format: 1\ntitle: {}\nsequence: [plain.yaml, {}]\n",
+            quoted(HOSTILE),
+            quoted(&format!("{HOSTILE_STEM}.yaml"))
+        );
+        pages.write("sequence.yaml", &sequence);
         let noise = ["--noise", "0.02", "--seed", "5", "--out", "samples.csv"];
         pages.run(&[&["simulate", "device.yaml"][..], &noise].concat());
+        let samples = pages.read("samples.csv");
+        let rows = samples
+            .lines()
+            .filter(|line| !line.starts_with('#'))
+            .skip(1);
+        let rows: String = rows.map(|row| row.to_owned() + "\n").collect();
+        pages.write(HOSTILE_FILE, &("<t>,<y>&\n".to_owned() + &rows));
         pages.run(&["fit", "plain.yaml"]);
         pages.run(&["fit", "hostile.yaml"]);
         pages.run(&["compare", "runs/plain", "runs/hostile"]);
-        pages.run(&["study", "plain.yaml", "--out", "runs/study"]);
+        pages.run(&["study", "hostile.yaml", "--out", "runs/study"]);
+        pages.run(&["study", "sequence.yaml", "--out", "runs/sequence"]);
         pages
     }
 
@@ -94,11 +128,12 @@ impl Pages {
 }
 
 /// The pages of all tests.
-pub const PAGES: [&str; 4] = [
+pub const PAGES: [&str; 5] = [
     "runs/plain/report.html",
     "runs/hostile/report.html",
     "runs/compare/compare.html",
     "runs/study/study.html",
+    "runs/sequence/compare.html",
 ];
 
 pub fn pages() -> &'static Pages {

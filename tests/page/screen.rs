@@ -18,34 +18,31 @@ fn the_first_screen_holds_verdict_answer_and_chart() {
         return;
     };
     resize(&mut browser, [1440, 900]);
-    for page in &PAGES[..2] {
+    for page in PAGES {
         browser.open(&pages().path(page));
+        let table = match page.ends_with("compare.html") {
+            true => "main > .scroll table",
+            false => ".first table",
+        };
         let edge = |browser: &mut Browser, what: &str, side: &str| {
             browser.number(&format!(
                 "document.querySelector('{what}').getBoundingClientRect().{side}"
             ))
         };
-        for part in [
-            ".state",
-            ".first table",
-            "#figure-main .plot",
-            "#figure-main",
-        ] {
+        for part in [".state", table, "#figure-main .plot", "#figure-main"] {
             let [top, bottom] = ["top", "bottom"].map(|side| edge(&mut browser, part, side));
             assert!(
                 top >= 0.0 && bottom > top && bottom <= 900.0,
                 "{page}: {part} {top} {bottom}"
             );
         }
-        let table = edge(&mut browser, ".first table", "right");
-        assert!(
-            table <= edge(&mut browser, "#figure-main", "left"),
-            "{page}"
-        );
-        let wide = "(() => { const box = document.querySelector('.first .scroll'); return box.scrollWidth - box.clientWidth; })()";
+        // Text left, chart right.
+        let text = edge(&mut browser, ".first > :first-child", "right");
+        assert!(text <= edge(&mut browser, "#figure-main", "left"), "{page}");
+        let wide = "(() => { const box = document.querySelector('main .scroll'); return box.scrollWidth - box.clientWidth; })()";
         assert!(
             browser.number(wide) <= 0.0,
-            "{page}: columns of the answer are hidden"
+            "{page}: columns of the table are hidden"
         );
     }
 }
@@ -110,21 +107,67 @@ fn a_phone_has_large_targets_and_whole_tables() {
         return;
     };
     resize(&mut browser, [390, 844]);
-    browser.open(&pages().path(REPORT));
+    for page in PAGES {
+        browser.open(&pages().path(page));
+        on_a_phone(&mut browser, page);
+    }
+}
+
+fn on_a_phone(browser: &mut Browser, page: &str) {
     let small = browser.text(
         "[...document.querySelectorAll('nav a, button, summary')].filter(e => {
            const b = e.getBoundingClientRect(); return b.height < 44 || b.width < 44;
          }).map(e => e.textContent).join('; ')",
     );
-    assert_eq!(small, "");
+    assert_eq!(small, "", "{page}");
     let hidden = browser.text(
         "[...document.querySelectorAll('.scroll')].filter(e => e.scrollWidth > e.clientWidth).map(e => e.getAttribute('aria-label')).join()",
     );
-    assert_eq!(hidden, "");
-    browser.evaluate("document.querySelector('#settings').scrollIntoView()");
+    assert_eq!(hidden, "", "{page}");
+    let wide = browser.number("document.documentElement.scrollWidth");
+    assert!(wide <= 390.0, "{page}: {wide}");
+    assert_eq!(overlaps(browser), "", "{page}");
+    browser.evaluate("document.querySelector('main section:last-child').scrollIntoView()");
     browser.settle();
     let top = browser.number("document.querySelector('nav').getBoundingClientRect().top");
-    assert_eq!(top, 0.0);
+    assert_eq!(top, 0.0, "{page}");
+}
+
+/// Pairs of labels of a chart whose boxes overlap by more than a pixel.
+fn overlaps(browser: &mut Browser) -> String {
+    browser.text(
+        "[...document.querySelectorAll('.chart.ready .plot svg')].flatMap(svg => {
+           const labels = [...svg.querySelectorAll('text')].map(e => [e.textContent, e.getBoundingClientRect()]);
+           return labels.flatMap(([one, a], i) => labels.slice(i + 1)
+             .filter(([, b]) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1
+               && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1)
+             .map(([other]) => `${svg.closest('figure').id}: ${one} and ${other}`));
+         }).join('; ')",
+    )
+}
+
+/// The rules of axe-core for WCAG 2.2 AA and its best practices, where `KMCFIT_AXE` has the path of its script.
+#[test]
+fn pages_break_no_rule_of_axe() {
+    let Some(script) = std::env::var_os("KMCFIT_AXE") else {
+        eprintln!("SKIPPED: KMCFIT_AXE is not set");
+        return;
+    };
+    let script = std::fs::read_to_string(script).expect("the script of axe-core");
+    let Some(mut browser) = Browser::start() else {
+        return;
+    };
+    resize(&mut browser, [1440, 900]);
+    for page in PAGES {
+        browser.open(&pages().path(page));
+        assert_eq!(overlaps(&mut browser), "", "{page}");
+        browser.evaluate(&format!("{{{script}; undefined}}"));
+        let broken = browser.text(
+            "axe.run({runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice']}).then(found =>
+               found.passes.length < 20 ? 'few rules were applied' : found.violations.map(v => `${v.id}: ${v.nodes.map(n => n.target.join(' ')).slice(0, 5).join(', ')}`).join('; '))",
+        );
+        assert_eq!(broken, "", "{page}");
+    }
 }
 
 /// The numbers of the answer are those of `result.json`, to the digits shown.

@@ -1,8 +1,9 @@
 //! Contents of the pages.
 
-use crate::pages::{HOSTILE, PAGES, pages, repository};
+use crate::pages::{HOSTILE, HOSTILE_STEM, PAGES, pages, repository};
 use roxmltree::{Document, Node, ParsingOptions};
 use serde_json::Value;
+use std::collections::BTreeSet;
 
 /// The page parsed as XML, which it also is.
 fn parsed(html: &str) -> Document<'_> {
@@ -45,6 +46,10 @@ fn every_figure_has_its_texts_and_its_numbers() {
         let html = pages().read(name);
         let page = parsed(&html);
         assert!(all(&page, "figure").count() >= 3, "{name}");
+        let ids = all(&page, "figure").filter_map(|n| n.attribute("id"));
+        let ids: Vec<&str> = ids.collect();
+        let distinct: BTreeSet<&&str> = ids.iter().collect();
+        assert_eq!(distinct.len(), ids.len(), "{name}: {ids:?}");
         for figure in all(&page, "figure") {
             let caption = figure.children().find(|n| n.has_tag_name("figcaption"));
             assert!(!text_of(caption.expect("a caption")).trim().is_empty());
@@ -149,6 +154,82 @@ fn a_report_is_complete() {
     }
 }
 
+/// Each finding of a study with a chart stands beside it, what can be acted on first; extremes are curves, and the wider band has dashed edges.
+#[test]
+fn a_study_shows_findings_beside_their_charts() {
+    let html = pages().read("runs/study/study.html");
+    let page = parsed(&html);
+    let study: Value = serde_json::from_str(&pages().read("runs/study/study.json")).expect("JSON");
+    let anchors: Vec<&str> = all(&page, "section")
+        .filter_map(|n| n.attribute("id"))
+        .collect();
+    let place = |anchor: &str| {
+        let place = anchors.iter().position(|other| *other == anchor);
+        place.unwrap_or_else(|| panic!("{anchor} in {anchors:?}"))
+    };
+    assert!(place("starts") < place("candidates"));
+    assert!(place("candidates") < place("bands") && place("bands") < place("sensitivity"));
+    let beside = |id: &str| {
+        let figure = page.descendants().find(|n| n.attribute("id") == Some(id));
+        let figure = figure.unwrap_or_else(|| panic!("{id}"));
+        let finding = figure
+            .ancestors()
+            .find(|n| n.attribute("class") == Some("finding"));
+        let text = finding.and_then(|n| n.descendants().find(|n| n.has_tag_name("li")));
+        (text.map(text_of).unwrap_or_default(), numbers(figure))
+    };
+    let plain = |text: &Value| text.as_str().expect("a sentence").replace('`', "");
+    let (text, _) = beside("figure-profiles-1");
+    assert_eq!(text, plain(&study["profiles"][0]["text"]));
+    // The first function of the extremes is the mass, which varies.
+    let (text, drawn) = beside("figure-extremes-1");
+    assert!(text.starts_with("mass: "), "{text}");
+    let marks = drawn["panels"][0]["marks"].as_array().expect("marks");
+    assert!(marks.iter().all(|mark| mark["kind"] != "band"), "{marks:?}");
+    for (label, key) in [("smallest", "low"), ("largest", "high")] {
+        let mut lines = marks
+            .iter()
+            .filter(|m| m["label"] == label && m["kind"] == "line");
+        let line = lines.next().expect("a curve");
+        let stored = study["extremes"][0][key].as_array().expect("numbers");
+        let shown = line["y"].as_array().expect("numbers");
+        assert_eq!(shown.len(), stored.len());
+        for (shown, stored) in shown.iter().zip(stored) {
+            let (shown, stored) = (
+                shown.as_f64().expect("a number"),
+                stored.as_f64().expect("a number"),
+            );
+            // Charts have six digits.
+            assert!(
+                (shown - stored).abs() <= 1e-5 * stored.abs(),
+                "{shown} {stored}"
+            );
+        }
+    }
+    let (_, drawn) = beside("figure-bands-1");
+    let marks = drawn["panels"][0]["marks"].as_array().expect("marks");
+    let dash = |label: &str| {
+        let mark = marks.iter().find(|m| m["label"] == label);
+        mark.and_then(|m| m["dash"].as_str()).map(str::len)
+    };
+    assert!(dash("simultaneous").is_some_and(|length| length > 0));
+    assert_eq!(dash("pointwise"), Some(0));
+    // At most twelve instants are marked, and constants have no chart.
+    let figures = all(&page, "figure").map(numbers);
+    let panels: Vec<Value> = figures
+        .flat_map(|f| f["panels"].as_array().cloned().unwrap_or_default())
+        .collect();
+    for panel in &panels {
+        for mark in panel["marks"].as_array().expect("marks") {
+            let is_anchor = ["turning points", "zero crossings"]
+                .iter()
+                .any(|label| mark["label"] == *label);
+            assert!(!is_anchor || size(mark) <= 12);
+        }
+        assert!(panel["y"]["label"] != "damping", "{panel}");
+    }
+}
+
 /// No element loads an external resource, also not one from text of the user.
 #[test]
 fn nothing_is_loaded() {
@@ -192,11 +273,18 @@ fn nothing_is_loaded() {
 /// Titles, names and the text of the model are shown literally, as text.
 #[test]
 fn hostile_texts_are_texts() {
-    for name in ["runs/hostile/report.html", "runs/compare/compare.html"] {
+    for name in &PAGES[1..] {
         let html = pages().read(name);
         assert!(!html.contains("<script>alert"), "{name}");
         let page = parsed(&html);
-        assert!(text_of(page.root_element()).contains(HOSTILE), "{name}");
+        let text = text_of(page.root_element());
+        assert!(text.contains(HOSTILE), "{name}");
+        let file = match *name {
+            "runs/sequence/compare.html" => HOSTILE_STEM,
+            "runs/compare/compare.html" => "hostile",
+            _ => "<i>&'data.csv",
+        };
+        assert!(text.contains(file), "{name}: {file}");
         let runs = |n: &Node| n.attribute("type") != Some("application/json");
         assert_eq!(all(&page, "script").filter(runs).count(), 1, "{name}");
         // In HTML a script ends at its first end tag.

@@ -117,14 +117,20 @@ impl Panel {
         }
     }
 
-    /// True if each curve has one value only.
-    fn is_constant(&self) -> bool {
-        let is_level = |mark: &Mark| {
-            let [low, high] = mark.range();
+    /// True if each curve, and each edge of a band, has one value only.
+    pub(in crate::report) fn is_constant(&self) -> bool {
+        let is_level = |values: &[f64]| {
+            let finite = values.iter().filter(|y| y.is_finite());
+            let low = finite.clone().copied().fold(f64::INFINITY, f64::min);
+            let high = finite.copied().fold(f64::NEG_INFINITY, f64::max);
             high - low <= ROUNDING * low.abs().max(high.abs())
         };
-        let mut curves = self.marks.iter().filter(|mark| mark.kind == MarkKind::Line);
-        curves.all(is_level)
+        let mut curves = self.marks.iter().filter(|mark| match mark.kind {
+            MarkKind::Line => true,
+            MarkKind::Band => !mark.y.is_empty(),
+            _ => false,
+        });
+        curves.all(|mark| is_level(&mark.y) && (mark.high.is_empty() || is_level(&mark.high)))
     }
 
     /// Sets the heading.

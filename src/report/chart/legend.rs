@@ -2,8 +2,8 @@
 
 use super::drawing::{Anchor, Frame, Point, Primitive, Stroke, Words};
 use super::figure::Figure;
-use super::panel::{BAND_OPACITY, SIZE, SPAN};
-use super::plot_mark::{Mark, MarkKind};
+use super::panel::{EDGE, SIZE, SPAN, band_opacity};
+use super::plot_mark::{Dash, Mark, MarkKind};
 use crate::report::text;
 
 /// Length of the sample beside a label.
@@ -12,21 +12,23 @@ const SAMPLE_GAP: f64 = 6.0;
 const ENTRY_GAP: f64 = 18.0;
 const ROW: f64 = 18.0;
 
-/// The marks in the legend: labelled marks, equal labels with equal style once.
+/// The marks in the legend: labelled marks, those with equal label and colour once, by their curve if they have one.
 pub(super) fn entries(figure: &Figure) -> Vec<&Mark> {
     let mut entries: Vec<&Mark> = Vec::new();
     let marks = figure.panels.iter().flat_map(|panel| &panel.marks);
     for mark in marks.filter(|mark| !mark.label.is_empty()) {
-        if !entries.iter().any(|entry| alike(entry, mark)) {
-            entries.push(mark);
+        let is_same = |entry: &&mut &Mark| {
+            entry.label == mark.label && entry.style.colour == mark.style.colour
+        };
+        match entries.iter_mut().find(is_same) {
+            None => entries.push(mark),
+            Some(entry) if entry.kind != MarkKind::Line && mark.kind == MarkKind::Line => {
+                *entry = mark;
+            }
+            Some(_) => {}
         }
     }
     entries
-}
-
-/// True for two marks with the same label and the same sample.
-fn alike(one: &Mark, other: &Mark) -> bool {
-    one.label == other.label && sample(one, (0.0, 0.0)) == sample(other, (0.0, 0.0))
 }
 
 /// Draws the legend from `left`, `top` on, within a width; returns the shapes and their height.
@@ -90,7 +92,52 @@ fn sample(mark: &Mark, (x, y): Point) -> Vec<Primitive> {
                 |share| Primitive::Dot((x + share * SAMPLE, y), stroke.width / 2.0, stroke.ink);
             vec![dot(0.2), dot(0.5), dot(0.8)]
         }
-        MarkKind::Band => block(stroke.ink.opacity(BAND_OPACITY)),
+        MarkKind::Band if mark.style.dash != Dash::Solid => {
+            let edge = |dy| {
+                let ends = vec![(x, y + dy), (x + SAMPLE, y + dy)];
+                let stroke = Stroke {
+                    width: EDGE,
+                    ..stroke
+                };
+                Primitive::Path(ends, stroke)
+            };
+            let mut shapes = block(stroke.ink.opacity(band_opacity(&mark.style)));
+            shapes.extend([-0.4 * SIZE, 0.4 * SIZE].map(edge));
+            shapes
+        }
+        MarkKind::Band => block(stroke.ink.opacity(band_opacity(&mark.style))),
         MarkKind::Span => block(SPAN),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::chart::{Colour, Panel, Style};
+
+    /// Dots and a band of a curve have its entry; another colour has its own.
+    #[test]
+    fn equal_labels_of_one_colour_are_one_entry() {
+        let t = [0.0, 1.0];
+        let blue = Style::new(Colour::Blue);
+        let panel = Panel::of_time("k", "N/m")
+            .mark(Mark::band("fit", &t, &t, &t, Colour::Blue).dash(Dash::Dashed))
+            .mark(Mark::line("fit", &t, &t, blue))
+            .mark(Mark::points("fit", &t, &t, blue))
+            .mark(Mark::points("fit", &t, &t, Style::new(Colour::Green)));
+        let figure = Figure::new("", "", "").panel(panel);
+        let kinds: Vec<MarkKind> = entries(&figure).iter().map(|mark| mark.kind).collect();
+        assert_eq!(kinds, [MarkKind::Line, MarkKind::Points]);
+    }
+
+    /// Pointwise and simultaneous bands differ without colours: by edges and tone.
+    #[test]
+    fn a_dashed_band_has_edges() {
+        let t = [0.0, 1.0];
+        let plain = Mark::band("", &t, &t, &t, Colour::Grey);
+        let edged = plain.clone().dash(Dash::Dashed);
+        assert_eq!(sample(&plain, (0.0, 0.0)).len(), 1);
+        assert_eq!(sample(&edged, (0.0, 0.0)).len(), 3);
+        assert!(band_opacity(&edged.style) < band_opacity(&plain.style));
     }
 }

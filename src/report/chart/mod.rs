@@ -18,6 +18,7 @@ mod thin;
 
 pub(super) use data::{data, text_for_script};
 pub use figure::{Axis, Figure, FigureWidth, Panel, Scale};
+pub(super) use plot_mark::MarkKind;
 pub use plot_mark::{Colour, Dash, Mark, Style};
 pub(super) use svg::sample;
 pub use svg::{render, render_at};

@@ -4,7 +4,7 @@ use super::axis::Ruler;
 use super::curve;
 use super::drawing::{Anchor, Frame, Ink, Point, Primitive, Stroke, Words};
 use super::figure::Panel;
-use super::plot_mark::{Mark, MarkKind, Style};
+use super::plot_mark::{Dash, Mark, MarkKind, Style};
 use crate::report::text;
 
 /// Font size of labels and ticks, in pixels.
@@ -20,7 +20,11 @@ const MOST_DOTS: usize = 2000;
 const AXIS: Ink = Ink::solid((51, 51, 51));
 const GRID: Ink = Ink::solid((228, 228, 228));
 pub(super) const SPAN: Ink = Ink::solid((238, 238, 238));
-pub(super) const BAND_OPACITY: f64 = 0.25;
+/// Opacity of a band; that of one with dashed edges is lower, so that bands differ without colours.
+const BAND_OPACITY: f64 = 0.25;
+const EDGED_OPACITY: f64 = 0.1;
+/// Width of the dashed edges of a band, in pixels.
+pub(super) const EDGE: f64 = 1.2;
 
 /// A panel with its frame and rulers.
 pub(super) struct Placed<'a> {
@@ -34,6 +38,14 @@ pub(super) struct Placed<'a> {
     pub y_labels: bool,
     /// Width of the labels left of the frame, common to a column so that its axis labels align.
     pub label_width: f64,
+}
+
+/// Opacity of the area of a band.
+pub(super) fn band_opacity(style: &Style) -> f64 {
+    match style.dash {
+        Dash::Solid => BAND_OPACITY,
+        _ => EDGED_OPACITY,
+    }
 }
 
 /// Height needed below a frame for the labels of the horizontal axis.
@@ -187,7 +199,11 @@ impl Placed<'_> {
     }
 
     fn band(&self, mark: &Mark, shapes: &mut Vec<Primitive>) {
-        let ink = Ink::of(mark.style.colour).opacity(BAND_OPACITY);
+        let ink = Ink::of(mark.style.colour).opacity(band_opacity(&mark.style));
+        let stroke = Stroke {
+            width: EDGE,
+            ..Stroke::of(&mark.style)
+        };
         let low = self.pixels(&mark.x, &mark.y);
         let edges: Vec<_> = low.zip(self.pixels(&mark.x, &mark.high)).collect();
         let drawable = |(low, high): &(Point, Point)| (low.0 + low.1 + high.1).is_finite();
@@ -200,6 +216,14 @@ impl Placed<'_> {
             };
             let outline = edge(|edge| edge.0).chain(edge(|edge| edge.1).rev());
             shapes.push(Primitive::Area(outline.collect(), ink));
+            if mark.style.dash == Dash::Solid {
+                continue;
+            }
+            for of in [|e: &(Point, Point)| e.0, |e: &(Point, Point)| e.1] {
+                let path: Vec<Point> = run.iter().map(of).collect();
+                let pieces = curve::clip(&curve::thin(&path), &self.frame).into_iter();
+                shapes.extend(pieces.map(|piece| Primitive::Path(piece, stroke)));
+            }
         }
     }
 

@@ -79,7 +79,7 @@ impl Serialize for Dash {
 pub struct Style {
     /// Colour.
     pub colour: Colour,
-    /// Dash pattern; points ignore it.
+    /// Dash pattern of a line, and of the edges of a band; a band with solid style has no edges. Points ignore it.
     pub dash: Dash,
     /// Width in pixels, from 0.1 to 20; a figure is 680 pixels (180 mm) wide.
     pub width: f64,
@@ -135,7 +135,7 @@ pub enum MarkKind {
     Upright,
 }
 
-/// A mark in a panel. A mark with a label appears in the legend; equal labels with equal style, in any panel, appear
+/// A mark in a panel. A mark with a label appears in the legend; equal labels with equal colour, in any panel, appear
 /// there once.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mark {
@@ -208,6 +208,13 @@ impl Mark {
             high: high.to_vec(),
             ..Self::new(MarkKind::Band, label, x, low, Style::new(colour))
         }
+    }
+
+    /// Sets the dash pattern.
+    #[must_use]
+    pub fn dash(mut self, dash: Dash) -> Self {
+        self.style.dash = dash;
+        self
     }
 
     /// A shaded interval of x.

@@ -1,9 +1,8 @@
 //! Conclusions on a sequence of runs, computed from their measures: the assumptions that each run adds, its result, and
 //! the first run that recovers the true system.
 
-use super::CLOSE;
 use super::measures::Measures;
-use kmcfit_core::internals::assessment::TruthErrors;
+use super::verdict::Agreement;
 
 /// One sentence for each run, then the sentences on the whole sequence.
 pub fn conclusions(runs: &[Measures]) -> Vec<String> {
@@ -38,64 +37,72 @@ fn outcome(run: &Measures) -> String {
         true => format!("{:.0e} %", 100.0 * share),
         false => format!("{:.2} %", 100.0 * share),
     };
-    let scale = errors.mass_relative >= CLOSE;
-    match (worst < CLOSE, scale, matched) {
-        (true, false, _) => format!(
-            "close to the true system: relative error of k/m and c/m {}, of m {}",
-            percent(worst),
-            percent(errors.mass_relative)
+    let agreement = Agreement::of(errors);
+    let mass = percent(errors.mass_relative);
+    match (agreement, agreement.has_scale(errors), matched) {
+        (Agreement::Recovered, true, _) => format!(
+            "true system recovered: relative error of k/m and c/m {}, of m {mass}",
+            percent(worst)
         ),
-        (true, true, _) => format!(
-            "k/m and c/m close to the true values (error {}), but not the scale: error of m {}",
-            percent(worst),
-            percent(errors.mass_relative)
+        (Agreement::Recovered, false, _) => format!(
+            "k/m and c/m of the true system recovered (error {}), but not the scale: error of m {mass}",
+            percent(worst)
         ),
-        (false, _, true) => format!(
+        (Agreement::Close, true, _) => format!(
+            "close to the true system: relative error of k/m and c/m {}, of m {mass}",
+            percent(worst)
+        ),
+        (Agreement::Close, false, _) => format!(
+            "k/m and c/m close to the true values (error {}), but not the scale: error of m {mass}",
+            percent(worst)
+        ),
+        (Agreement::Different, _, true) => format!(
             "response fitted by another parameter set: error of k/m or c/m {}",
             percent(worst)
         ),
-        (false, _, false) => format!(
+        (Agreement::Different, _, false) => format!(
             "response not fitted, not close to the true system: error of k/m or c/m {}",
             percent(worst)
         ),
     }
 }
 
-/// Largest relative error of k/m and c/m; `None` if the true system is not known.
-fn ratio_error(run: &Measures) -> Option<f64> {
-    run.errors.as_ref().map(TruthErrors::largest_ratio_error)
-}
-
 /// Sentences on the true system: the smallest misfit of a wrong parameter set, and the first run that recovers the system.
-fn on_the_truth(runs: &[Measures]) -> Vec<String> {
+pub(super) fn on_the_truth(runs: &[Measures]) -> Vec<String> {
     let mut sentences = Vec::new();
-    let known: Vec<&Measures> = runs.iter().filter(|r| r.errors.is_some()).collect();
-    let wrong = |r: &&&Measures| ratio_error(r).is_some_and(|d| d >= CLOSE);
-    let best_wrong = known
-        .iter()
-        .filter(wrong)
-        .min_by(|a, b| a.cost_ratio.total_cmp(&b.cost_ratio));
-    if let Some(run) = best_wrong {
+    let known = runs.iter().filter_map(|run| {
+        let errors = run.errors.as_ref()?;
+        let agreement = Agreement::of(errors);
+        Some((run, agreement, agreement.has_scale(errors)))
+    });
+    let known: Vec<(&Measures, Agreement, bool)> = known.collect();
+    let wrong = known.iter().filter(|(_, a, _)| *a == Agreement::Different);
+    let best_wrong = wrong.min_by(|a, b| a.0.cost_ratio.total_cmp(&b.0.cost_ratio));
+    if let Some((run, ..)) = best_wrong {
         sentences.push(format!(
             "A small misfit does not imply the true system: {} has J/J0 = {:.1e} with another parameter set.",
             run.name, run.cost_ratio
         ));
     }
-    let found = known.iter().filter(|r| !wrong(r));
-    let with_scale = |r: &&&&Measures| r.errors.as_ref().is_some_and(|e| e.mass_relative < CLOSE);
-    let found: Vec<&&Measures> = found.collect();
-    match (found.is_empty(), found.iter().find(with_scale)) {
-        (true, _) if !known.is_empty() => {
-            sentences.push("No run is close to the true system.".into());
-        }
-        (false, Some(first)) => sentences.push(format!(
-            "{} is the first run close to the true system, including its scale.",
+    let mut recovered = known.iter().filter(|(_, a, _)| *a == Agreement::Recovered);
+    let is_recovered = recovered.clone().next().is_some();
+    let first = recovered.find(|(.., has_scale)| *has_scale);
+    let close = known.iter().find(|(_, a, _)| *a == Agreement::Close);
+    sentences.extend(match (first, close) {
+        _ if known.is_empty() => None,
+        (Some((first, ..)), _) => Some(format!(
+            "{} is the first run that recovers the true system, including its scale.",
             first.name
         )),
-        (false, None) => sentences.push(
-            "k/m and c/m are close to the true values in at least one run; the scale of m, c and k is not close in any of these.".into(),
+        _ if is_recovered => Some(
+            "k/m and c/m of the true system are recovered in at least one run, the scale of m, c and k in none."
+                .into(),
         ),
-        _ => {}
-    }
+        (None, Some((close, ..))) => Some(format!(
+            "No run recovers the true system; {} is the first that is close to it.",
+            close.name
+        )),
+        (None, None) => Some("No run recovers the true system.".into()),
+    });
     sentences
 }

@@ -2,9 +2,9 @@
 
 use super::Comparison;
 use super::measures::Measures;
-use super::run::ComparedRun;
+use super::run::{ComparedRun, ValidationChannel};
 use super::table::short;
-use crate::report::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
+use crate::report::chart::{Axis, Colour, Dash, Figure, Mark, MarkKind, Panel, Style};
 use crate::report::summary::count;
 use kmcfit_core::internals::assessment::is_same_truth;
 use kmcfit_core::internals::functions::Ratios;
@@ -21,18 +21,71 @@ pub(super) fn style(index: usize) -> Style {
 }
 
 /// The names of the figures.
-pub(super) const NAMES: [&str; 4] = ["functions", "ratios", "residuals", "convergence"];
+pub(super) const NAMES: [&str; 5] = [
+    "functions",
+    "ratios",
+    "validation",
+    "residuals",
+    "convergence",
+];
+
+/// Differences of curves below this share of their scale are not visible.
+const INVISIBLE: f64 = 1e-6;
 
 /// All figures of a comparison.
 pub(super) fn all(comparison: &Comparison) -> Vec<Figure> {
-    let runs = &comparison.runs;
-    let mut figures = vec![
-        functions(runs, &comparison.measures),
-        ratios(runs, &comparison.measures),
+    let figures = [
+        functions(comparison),
+        ratios(comparison),
+        validation(comparison),
+        residuals(comparison),
+        convergence(comparison),
     ];
-    figures.extend(residuals(runs, &comparison.measures));
-    figures.extend(convergence(runs, &comparison.measures));
-    figures
+    figures.into_iter().flatten().collect()
+}
+
+/// The figure of the first screen: the function whose curves differ most; where all are constant, the residuals.
+pub(super) fn main(comparison: &Comparison) -> Option<Figure> {
+    let spread = |panel: &Panel| {
+        let lines = panel
+            .marks
+            .iter()
+            .filter(|mark| mark.kind == MarkKind::Line);
+        let (low, high) = lines.map(|mark| span(&mark.y, SPIKES)).fold(EMPTY, union);
+        (high - low) / scale(&comparison.runs, &panel.y.label)
+    };
+    let panels = functions(comparison).into_iter().flat_map(|f| f.panels);
+    let most = panels
+        .map(|panel| (spread(&panel), panel))
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((_, panel)) = most else {
+        let name = "main".to_owned();
+        return residuals(comparison).map(|figure| Figure { name, ..figure });
+    };
+    let title = format!("{} of each model", panel.y.label);
+    let figure = Figure::new("main", title, "The coefficient whose curves differ most.");
+    Some(figure.panel(panel))
+}
+
+/// Largest magnitude of a function or ratio of all runs; of damping and c/m the critical value.
+fn scale(runs: &[ComparedRun], label: &str) -> f64 {
+    let size = |of: &dyn Fn(&NodalCoefficients) -> Vec<f64>| {
+        let spans = runs
+            .iter()
+            .map(|run| span(&of(&run.finished.coefficients), SPIKES));
+        let (low, high) = spans.fold(EMPTY, union);
+        high.abs().max(low.abs())
+    };
+    let mass = || size(&|d| d.mass.clone());
+    let stiffness = || size(&|d| d.coefficients[1].clone());
+    let ratio = || size(&|d| Ratios::of(d).k_over_m);
+    match label {
+        "mass m" => mass(),
+        "stiffness k" => stiffness(),
+        "k/m" => ratio(),
+        "c/m" => 2.0 * ratio().sqrt(),
+        _ => 2.0 * (mass() * stiffness()).sqrt(),
+    }
 }
 
 /// A curve of each system: caption, unit, values.
@@ -42,7 +95,8 @@ type Curve = (
     fn(&NodalCoefficients) -> Vec<f64>,
 );
 
-fn functions(runs: &[ComparedRun], measures: &[Measures]) -> Figure {
+/// Mass, damping and stiffness of each run; `None` where all are constant.
+pub(super) fn functions(Comparison { runs, measures, .. }: &Comparison) -> Option<Figure> {
     let curves: [Curve; 3] = [
         ("mass m", "kg", |d| d.mass.clone()),
         ("damping c", "N s/m", |d| d.coefficients[0].clone()),
@@ -57,15 +111,15 @@ fn functions(runs: &[ComparedRun], measures: &[Measures]) -> Figure {
         "functions",
         "Mass, damping and stiffness",
         format!(
-            "Three panels, one above the other: mass, damping and stiffness of each run against \
-             time{}",
+            "Coefficients of each run against time{}",
             over_the_truth(&errors)
         ),
     );
-    overlay(figure, runs, &curves)
+    overlay(figure, runs, &curves).varying()
 }
 
-fn ratios(runs: &[ComparedRun], measures: &[Measures]) -> Figure {
+/// Ratios of each run; `None` where all are constant.
+pub(super) fn ratios(Comparison { runs, measures, .. }: &Comparison) -> Option<Figure> {
     let curves: [Curve; 2] = [
         ("k/m", "s⁻²", |d| Ratios::of(d).k_over_m),
         ("c/m", "s⁻¹", |d| Ratios::of(d).c_over_m),
@@ -79,12 +133,11 @@ fn ratios(runs: &[ComparedRun], measures: &[Measures]) -> Figure {
         "ratios",
         "Ratios k/m and c/m, identifiable without a force",
         format!(
-            "Two panels, one above the other: stiffness over mass and damping over mass of each \
-             run against time{}",
+            "Stiffness over mass and damping over mass of each run against time{}",
             over_the_truth(&errors)
         ),
     );
-    overlay(figure, runs, &curves)
+    overlay(figure, runs, &curves).varying()
 }
 
 fn over_the_truth(errors: &str) -> String {
@@ -103,12 +156,16 @@ fn list(measures: &[Measures], of: impl Fn(&Measures) -> Option<String>) -> Stri
 
 fn overlay(figure: Figure, runs: &[ComparedRun], curves: &[Curve]) -> Figure {
     let truths = truths(runs);
-    figure.panels(curves.iter().map(|(label, unit, of)| {
+    figure.panels(curves.iter().filter_map(|(label, unit, of)| {
         let found: Vec<Vec<f64>> = runs
             .iter()
             .map(|run| of(&run.finished.coefficients))
             .collect();
         let real: Vec<Vec<f64>> = truths.iter().map(|(_, _, truth)| of(truth)).collect();
+        let all = found.iter().chain(&real).map(|f| span(f, 0.0));
+        let (low, high) = all.fold(EMPTY, union);
+        // Curves that are equal to this accuracy would be drawn on an axis of rounding errors.
+        (high - low > INVISIBLE * scale(runs, label)).then_some(())?;
         let mut panel = Panel::of_time(*label, *unit);
         if let Some((low, high)) = without_spikes(&real, &found) {
             panel.y = panel.y.limits(low, high);
@@ -119,14 +176,15 @@ fn overlay(figure: Figure, runs: &[ComparedRun], curves: &[Curve]) -> Figure {
         let truths = truths.map(|((label, run, _), y)| Mark::line(label, &run.times(), y, thick));
         let bands = runs.iter().enumerate().filter_map(|(i, run)| {
             let [low, high] = run.finished.band(band_name(label))?;
-            let caption = format!("{} 95 %", run.name);
             let is_finite = low.iter().chain(&high).all(|x| x.is_finite());
-            is_finite.then(|| Mark::band(caption, &run.times(), &low, &high, Colour::nth(i)))
+            let style = style(i);
+            let band = || Mark::band(&run.name, &run.times(), &low, &high, style.colour);
+            is_finite.then(|| band().dash(style.dash))
         });
         let bands: Vec<Mark> = bands.collect();
         let found = runs.iter().zip(&found).enumerate();
         let found = found.map(|(i, (run, y))| Mark::line(&run.name, &run.times(), y, style(i)));
-        panel.marks(bands).marks(truths).marks(found)
+        Some(panel.marks(bands).marks(truths).marks(found))
     }))
 }
 
@@ -143,13 +201,18 @@ const ROOM: f64 = 3.0;
 /// Relative variation below which a curve is treated as constant.
 const FLAT: f64 = 0.1;
 
+/// The range of no values.
+const EMPTY: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
+
+fn union(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
+    (a.0.min(b.0), a.1.max(b.1))
+}
+
 /// Range of the axis that excludes the spikes of some runs but includes all of `real`; `None` if no spikes need to be
 /// cut off.
 fn without_spikes(real: &[Vec<f64>], found: &[Vec<f64>]) -> Option<(f64, f64)> {
-    let empty = (f64::INFINITY, f64::NEG_INFINITY);
-    let union = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
-    let spans = |skip: f64| found.iter().map(move |f| span(f, skip)).fold(empty, union);
-    let truth = real.iter().map(|f| span(f, 0.0)).fold(empty, union);
+    let spans = |skip: f64| found.iter().map(move |f| span(f, skip)).fold(EMPTY, union);
+    let truth = real.iter().map(|f| span(f, 0.0)).fold(EMPTY, union);
     let (all, most) = (union(truth, spans(0.0)), union(truth, spans(SPIKES)));
     let room = most.1 - most.0;
     // For constant values their magnitude is the reference.
@@ -167,7 +230,7 @@ fn span(f: &[f64], skip: f64) -> (f64, f64) {
     let kept = &sorted[skipped..sorted.len() - skipped];
     match (kept.first(), kept.last()) {
         (Some(low), Some(high)) => (*low, *high),
-        _ => (f64::INFINITY, f64::NEG_INFINITY),
+        _ => EMPTY,
     }
 }
 
@@ -215,8 +278,44 @@ fn truths(runs: &[ComparedRun]) -> Vec<(String, &ComparedRun, &NodalCoefficients
         .collect()
 }
 
+/// Samples of the validation records with the prediction of each run, one panel for each channel.
+pub(super) fn validation(Comparison { runs, .. }: &Comparison) -> Option<Figure> {
+    let mut channels: Vec<&ValidationChannel> = Vec::new();
+    for channel in runs.iter().flat_map(|run| &run.validation) {
+        if !channels.iter().any(|other| is_same_channel(other, channel)) {
+            channels.push(channel);
+        }
+    }
+    let panels: Vec<Panel> = channels
+        .iter()
+        .map(|channel| {
+            let dots = Style::new(Colour::Black).width(2.4);
+            let measured = Mark::points("measured", &channel.times, &channel.measured, dots);
+            let predicted = runs.iter().enumerate().flat_map(|(i, run)| {
+                let own = run.validation.iter();
+                let own = own.filter(|other| is_same_channel(other, channel));
+                own.map(move |c| Mark::line(&run.name, &c.times, &c.predicted, style(i)))
+            });
+            Panel::of_time(&channel.kind, &channel.unit)
+                .title(&channel.record)
+                .mark(measured)
+                .marks(predicted)
+        })
+        .collect();
+    let figure = Figure::new(
+        "validation",
+        "Validation records",
+        "Samples that were not fitted, and the prediction of each model.",
+    );
+    (!panels.is_empty()).then(|| figure.panels(panels))
+}
+
+fn is_same_channel(one: &ValidationChannel, other: &ValidationChannel) -> bool {
+    (&one.record, &one.kind, &one.unit) == (&other.record, &other.kind, &other.unit)
+}
+
 /// The residuals of the records, one panel for each name of an experiment.
-fn residuals(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
+pub(super) fn residuals(Comparison { runs, measures, .. }: &Comparison) -> Option<Figure> {
     let mut names: Vec<&str> = Vec::new();
     for response in runs.iter().flat_map(|run| &run.responses) {
         if !names.contains(&response.experiment.as_str()) {
@@ -244,7 +343,7 @@ fn residuals(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
 }
 
 /// `J/J0` against the iteration, both logarithmic, so that iteration 0 is not shown.
-fn convergence(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
+pub(super) fn convergence(Comparison { runs, measures, .. }: &Comparison) -> Option<Figure> {
     let ends = list(measures, |m| {
         Some(format!(
             "{:.1e} after {}",
@@ -261,6 +360,7 @@ fn convergence(runs: &[ComparedRun], measures: &[Measures]) -> Option<Figure> {
         "Convergence of J/J₀",
         format!("Cost over its first value against the iteration, both logarithmic. {ends}."),
     );
-    let some = runs.iter().any(|run| !run.iterations.is_empty());
+    // One iteration is no curve.
+    let some = runs.iter().any(|run| run.iterations.len() > 1);
     some.then(|| figure.panel(panel))
 }

@@ -2,11 +2,11 @@
 
 use super::likelihood::Likelihood;
 use super::run::ComparedRun;
-use super::verdict::{ResponseFit, verdict};
+use super::verdict::{Agreement, ResponseFit, verdict};
 use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::document::Prediction;
-use kmcfit_core::internals::assessment::{Estimate, RECOVERY_TOLERANCE, Roughness, TruthErrors};
+use kmcfit_core::internals::assessment::{Estimate, Roughness, TruthErrors, VerdictLevel};
 use kmcfit_core::internals::solvers::Status;
 use serde::Serialize;
 
@@ -23,6 +23,9 @@ pub struct Measures {
     pub reason: String,
     /// Summary in one line.
     pub verdict: String,
+    /// Level of the verdict on the fit.
+    #[serde(skip)]
+    pub level: Option<VerdictLevel>,
     /// True if the response is fitted.
     #[serde(skip)]
     pub is_matched: bool,
@@ -94,8 +97,10 @@ impl Measures {
             status: document.outcome.status,
             reason: document.outcome.reason.clone(),
             verdict: verdict(&response, errors.as_ref()),
+            level: document.verdict.as_ref().map(|verdict| verdict.level),
             is_matched: response.is_matched(),
-            is_true_system: errors.as_ref().map(|e| e.within(RECOVERY_TOLERANCE)),
+            is_true_system: (errors.as_ref())
+                .map(|errors| Agreement::of(errors) == Agreement::Recovered),
             method: document.model.method.clone(),
             nodes: document.model.nodes,
             parameters: document.model.parameters,

@@ -1,12 +1,13 @@
 //! The comparison as a page.
 
-use super::conclusions::conclusions;
+use super::conclusions::{conclusions, on_the_truth};
 use super::figures::{self, style};
 use super::measures::Measures;
 use super::selection;
-use super::table::{QuantityRow, known_rows};
+use super::table::{Cell, known_rows};
+use super::verdict::Agreement;
 use super::{CLOSE, Comparison, MATCHED};
-use crate::report::chart::{Style, sample};
+use crate::report::chart::{Figure, Style, sample};
 use crate::report::page as shell;
 use crate::report::text::{escape, prose};
 use kmcfit_core::internals::assessment::RECOVERY_TOLERANCE;
@@ -18,65 +19,170 @@ pub(super) fn page(comparison: &Comparison) -> String {
         (None, 1) => "One run".to_string(),
         (None, count) => format!("Comparison of {count} runs"),
     };
-    let mut body = format!("<p>{}</p>\n", prose(&lead(comparison)));
-    if comparison.sequence.is_some() {
-        body += "<h2>Conclusions</h2>\n";
-        body += &shell::list(&conclusions(&comparison.measures));
-    }
-    body += "<h2>Summary of each run</h2>\n";
-    for (i, run) in comparison.measures.iter().enumerate() {
-        body += &card(run, style(i));
-    }
-    if let Some(warning) = comparison.warning() {
-        body += &format!("<p class=\"soft\">warning: {}</p>\n", prose(&warning));
-    }
-    for left_out in &comparison.left_out {
-        body += &format!(
-            "<section class=\"run\">\n<h3>{}</h3>\n<p class=\"verdict\">no result: {}</p>\n</section>\n",
-            escape(&left_out.name),
-            prose(&left_out.reason)
-        );
-    }
-    let sentences = selection::sentences(comparison);
-    if !sentences.is_empty() {
-        body += "<h2>Model selection</h2>\n";
-        body += &shell::list(&sentences);
-    }
-    body += "<h2>Table</h2>\n";
-    body += &table(&comparison.measures);
-    body += &format!("<p class=\"soft\">{}</p>\n", prose(&notes()));
-    body += "<h2>Figures</h2>\n";
-    body += &shell::help();
-    body += &shell::figures(&figures::all(comparison));
-    body += &format!(
-        "<p class=\"soft\">Made by kmcfit {}.</p>\n",
+    let conclusions = match comparison.sequence {
+        Some(_) => shell::list(&conclusions(&comparison.measures)),
+        None => String::new(),
+    };
+    let drawn = |figures: &[Option<Figure>]| {
+        let figures = figures.iter().flatten().cloned();
+        shell::figures(&figures.collect::<Vec<_>>())
+    };
+    let curves = [figures::functions(comparison), figures::ratios(comparison)];
+    let notes = format!(
+        "<p class=\"soft\">{} Made by kmcfit {}.</p>\n",
+        prose(&notes()),
         env!("CARGO_PKG_VERSION")
     );
-    shell::page(&title, &body)
+    let sections: Vec<shell::Section> = vec![
+        ("conclusions", "Conclusions", conclusions),
+        ("functions", "Coefficients and ratios", drawn(&curves)),
+        (
+            "validation",
+            "Predictions of validation records",
+            drawn(&[figures::validation(comparison)]),
+        ),
+        (
+            "residuals",
+            "Residuals",
+            drawn(&[figures::residuals(comparison)]),
+        ),
+        ("runs", "Summary of each run", runs(comparison)),
+        (
+            "quantities",
+            "All quantities",
+            all_quantities(&comparison.measures) + &notes,
+        ),
+        (
+            "search",
+            "Search",
+            drawn(&[figures::convergence(comparison)]),
+        ),
+    ];
+    shell::sectioned(&title, &first_screen(comparison), sections)
 }
 
-/// First sentence: the number of runs that recover the true system.
-fn lead(comparison: &Comparison) -> String {
-    let runs = &comparison.measures;
-    let known = runs.iter().filter(|m| m.is_true_system.is_some()).count();
-    let reached = runs
+/// Records, conclusion, table of models with its meaning in words, and main figure.
+fn first_screen(comparison: &Comparison) -> String {
+    let is_sequence = comparison.sequence.is_some();
+    let mut sentences = match is_sequence {
+        true => on_the_truth(&comparison.measures),
+        false => Vec::new(),
+    };
+    sentences.extend(selection::sentences(comparison));
+    let above = records(comparison) + &state(comparison, &mut sentences);
+    let models = selection::model_table(&comparison.measures, is_sequence);
+    let symbols = models.runs.iter().map(|i| sample(&style(*i)));
+    let table = shell::marked_table(
+        "Models",
+        &models.headings,
+        &symbols.collect::<Vec<_>>(),
+        &models.rows,
+    );
+    let text = shell::list(&sentences) + &left_out(comparison);
+    shell::screen(&(above + &table), &text, figures::main(comparison))
+}
+
+/// Number of samples and duration of the common records; empty where the runs have different ones.
+fn records(comparison: &Comparison) -> String {
+    let first = comparison.runs.first();
+    let Some(run) = first.filter(|_| comparison.warning().is_none()) else {
+        return String::new();
+    };
+    let document = &run.finished.document;
+    let samples = document.experiments.iter().map(|e| e.samples).sum();
+    shell::source_line(&[], samples, document.model.duration)
+}
+
+/// The conclusion: the best model where models are ranked, else the agreement with the true system. The sentence of the best model moves from
+/// `sentences` to it; the other follows them.
+fn state(comparison: &Comparison, sentences: &mut Vec<String>) -> String {
+    let is_sequence = comparison.sequence.is_some();
+    let lead = lead(comparison);
+    let best = selection::best(comparison).filter(|_| !is_sequence);
+    match comparison.warning() {
+        // The records of a sequence may differ on purpose.
+        Some(warning) if is_sequence && lead.is_some() => sentences.push(warning),
+        Some(warning) => {
+            sentences.extend(lead);
+            return shell::state_line("warn", "Not ranked", &warning);
+        }
+        None => {}
+    }
+    match (best, lead) {
+        (Some(best), lead) => {
+            sentences.retain(|sentence| *sentence != best.sentence);
+            sentences.extend(lead);
+            let (colour, word) = match best.is_favoured {
+                true => ("good", format!("Best: {}", best.name)),
+                false => ("warn", "No clear best".to_owned()),
+            };
+            shell::state_line(colour, &word, &best.sentence)
+        }
+        (None, Some(lead)) => {
+            let (known, reached, _) = agreement(&comparison.measures);
+            let (colour, word) = match reached {
+                0 => ("bad", "Not recovered"),
+                _ if reached == known => ("good", "Recovered"),
+                _ => ("warn", "Recovered in part"),
+            };
+            shell::state_line(colour, word, &lead)
+        }
+        (None, None) => {
+            let reason = "fewer than two runs have a likelihood of the same samples";
+            shell::state_line("warn", "Not ranked", reason)
+        }
+    }
+}
+
+/// The summaries of the runs.
+fn runs(comparison: &Comparison) -> String {
+    let runs = comparison.measures.iter().enumerate();
+    runs.map(|(i, run)| card(run, style(i))).collect()
+}
+
+/// The runs without a result.
+fn left_out(comparison: &Comparison) -> String {
+    let runs = comparison.left_out.iter();
+    let runs = runs.map(|run| format!("{}: no result: {}", run.name, run.reason));
+    shell::list(&runs.collect::<Vec<_>>())
+}
+
+/// Numbers of runs with a known true system, of those that recover it, and of those that are close to it.
+fn agreement(runs: &[Measures]) -> (usize, usize, usize) {
+    let known = runs
         .iter()
-        .filter(|m| m.is_true_system == Some(true))
-        .count();
-    match (known, reached) {
-        (0, _) => "The true system is not known for any run.".into(),
-        (1, 0) => "The run with a known true system does not recover it.".into(),
-        (1, _) => "The run with a known true system recovers it.".into(),
-        (_, 0) => format!("None of the {known} runs with a known true system recovers it."),
-        _ if known == reached => format!("All {known} runs with a known true system recover it."),
+        .filter_map(|m| m.errors.as_ref().map(Agreement::of));
+    let known: Vec<Agreement> = known.collect();
+    let count = |which| known.iter().filter(|a| **a == which).count();
+    (
+        known.len(),
+        count(Agreement::Recovered),
+        count(Agreement::Close),
+    )
+}
+
+/// The number of runs that recover the true system; `None` where it is not known for any.
+fn lead(comparison: &Comparison) -> Option<String> {
+    let (known, reached, close) = agreement(&comparison.measures);
+    let lead = match (known, reached) {
+        (0, _) => return None,
+        (1, 0) => "The run with a known true system does not recover it".into(),
+        (1, _) => "The run with a known true system recovers it".into(),
+        (_, 0) => format!("None of the {known} runs with a known true system recovers it"),
+        _ if known == reached => format!("All {known} runs with a known true system recover it"),
         _ => format!(
-            "{reached} of the {known} runs with a known true system recover{} it.",
+            "{reached} of the {known} runs with a known true system recover{} it",
             match reached {
                 1 => "s",
                 _ => "",
             }
         ),
-    }
+    };
+    Some(match close {
+        0 => format!("{lead}."),
+        1 => format!("{lead}; one is close to it in k/m and c/m."),
+        _ => format!("{lead}; {close} are close to it in k/m and c/m."),
+    })
 }
 
 fn notes() -> String {
@@ -93,7 +199,7 @@ fn notes() -> String {
 
 fn card(run: &Measures, look: Style) -> String {
     let mut text = format!(
-        "<section class=\"run\">\n<h3>{} {}</h3>\n<p>{}</p>\n<p class=\"verdict\">{}</p>\n\
+        "<div class=\"run\">\n<h3>{} {}</h3>\n<p>{}</p>\n<p class=\"verdict\">{}</p>\n\
          <p class=\"soft\">{}: {}</p>\n",
         sample(&look),
         escape(&run.name),
@@ -112,46 +218,45 @@ fn card(run: &Measures, look: Style) -> String {
     for warning in &run.warnings {
         text += &format!("<p class=\"soft\">warning: {}</p>\n", prose(&warning.text));
     }
-    text + "</section>\n"
+    text + "</div>\n"
 }
 
-/// The text with a capital first letter.
+/// The text with a capital first letter, unless it begins with a symbol such as `c`.
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
+    if letters.clone().nth(1) == Some(' ') {
+        return text.to_owned();
+    }
     match letters.next() {
         Some(first) => first.to_uppercase().chain(letters).collect(),
         None => String::new(),
     }
 }
 
-fn table(runs: &[Measures]) -> String {
-    let mut text =
-        String::from("<div class=\"scroll\" tabindex=\"0\">\n<table>\n<thead>\n<tr><td></td>");
-    for (i, run) in runs.iter().enumerate() {
-        let (sample, name) = (sample(&style(i)), escape(&run.name));
-        text += &format!("<th scope=\"col\">{sample} {name}</th>");
-    }
-    text += "</tr>\n</thead>\n<tbody>\n";
-    known_rows(runs)
-        .iter()
-        .for_each(|row| text += &table_row(row));
-    text + "</tbody>\n</table>\n</div>\n"
-}
-
-fn table_row(row: &QuantityRow) -> String {
-    let part = if row.label.starts_with(' ') {
-        " class=\"part\""
-    } else {
-        ""
-    };
-    let label = escape(row.label.trim_start()).replace("= -", "= −");
-    let cells = row.cells.iter().map(|cell| {
-        let text = escape(&cell.short()).replace('-', "−");
-        match cell {
-            super::table::Cell::Text(text) => format!("<td>{}</td>", escape(text)),
-            _ => format!("<td>{text}</td>"),
-        }
+/// Table of all quantities, one row for each.
+fn all_quantities(runs: &[Measures]) -> String {
+    let rows = known_rows(runs);
+    // The rows of a group continue its label.
+    let mut group = String::new();
+    let rows = rows.iter().map(|row| {
+        let label = match row.label.strip_prefix("  ") {
+            Some(part) => format!("{group} {part}"),
+            None => {
+                let words = row.label.split(" of ").next().unwrap_or_default();
+                group = words.split(" (").next().unwrap_or_default().to_owned();
+                row.label.clone()
+            }
+        };
+        let cells = row.cells.iter().map(|cell| match cell {
+            Cell::Text(text) => text.clone(),
+            _ => cell.short().replace('-', "−"),
+        });
+        std::iter::once(label.replace("= -", "= −"))
+            .chain(cells)
+            .collect()
     });
-    let cells: String = cells.collect();
-    format!("<tr><th scope=\"row\"{part}>{label}</th>{cells}</tr>\n")
+    let rows: Vec<Vec<String>> = rows.collect();
+    let names = runs.iter().map(|run| run.name.as_str());
+    let headings: Vec<&str> = std::iter::once("quantity").chain(names).collect();
+    shell::table("All quantities", &headings, &rows)
 }

@@ -19,6 +19,25 @@ pub struct ComparedRun {
     pub cost_ratio: Vec<f64>,
     /// Fitted responses.
     pub responses: Vec<MatchedResponse>,
+    /// Channels of the validation records.
+    pub(super) validation: Vec<ValidationChannel>,
+}
+
+/// A channel of a validation record with its prediction, in the unit of its file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ValidationChannel {
+    /// Name of the record.
+    pub record: String,
+    /// Kind of the channel.
+    pub kind: String,
+    /// Unit.
+    pub unit: String,
+    /// Times of the samples, s.
+    pub times: Vec<f64>,
+    /// Samples.
+    pub measured: Vec<f64>,
+    /// Predictions.
+    pub predicted: Vec<f64>,
 }
 
 /// A measured response and its residuals.
@@ -53,6 +72,7 @@ impl ComparedRun {
                 .map(|r| r.iteration as f64)
                 .collect(),
             cost_ratio: finished.history.iter().map(|r| r.cost_ratio).collect(),
+            validation: validation(&finished),
             responses: responses(&finished.trajectory, names),
             finished,
         })
@@ -76,6 +96,26 @@ impl ComparedRun {
     pub fn times(&self) -> Vec<f64> {
         self.finished.system.grid.times()
     }
+}
+
+/// Channels of the validation records from their tables; none without such a table.
+fn validation(run: &Run) -> Vec<ValidationChannel> {
+    let records = run.document.validation.iter().enumerate();
+    let channels =
+        records.flat_map(|(i, record)| record.channels.iter().map(move |c| (i, record, c)));
+    let read = channels.filter_map(|(i, record, channel)| {
+        let name = format!("channels/validation-{}-{}.csv", i + 1, channel.kind);
+        let table = ResultTable::read(&run.folder.join(name)).ok()?;
+        Some(ValidationChannel {
+            record: record.name.clone(),
+            kind: channel.kind.clone(),
+            unit: channel.unit.clone(),
+            times: table.column("t_s")?,
+            measured: table.column("measured")?,
+            predicted: table.column("predicted")?,
+        })
+    });
+    read.collect()
 }
 
 /// The responses that have samples: `y_m` and `observed_y_m`, or with the number of the experiment

@@ -3,13 +3,18 @@
 use super::Comparison;
 use super::likelihood::LikelihoodRatio;
 use super::measures::Measures;
+use super::verdict::percent;
 use crate::number_format::significant;
+use crate::report::document::level_in_words;
 use kmcfit_core::internals::assessment::Estimate;
 
 /// Differences of BIC beyond which evidence is very strong, strong and positive (Kass and Raftery 1995).
 const VERY_STRONG: f64 = 10.0;
 const STRONG: f64 = 6.0;
 const POSITIVE: f64 = 2.0;
+
+/// Width of an interval, relative to the estimate, below which it is not printed: samples without noise.
+const EXACT: f64 = 2e-7;
 
 /// Headers of the table.
 const HEADERS: [&str; 9] = [
@@ -83,6 +88,9 @@ fn interval(estimate: Option<&Estimate>) -> String {
     };
     match estimate.ci95 {
         None => significant(estimate.value, 4),
+        Some([low, high]) if (high - low).abs() <= EXACT * estimate.value.abs() => {
+            significant(estimate.value, 7)
+        }
         Some([low, high]) => {
             let width = (high - low).abs();
             let digits = (estimate.value.abs() / width)
@@ -96,31 +104,117 @@ fn interval(estimate: Option<&Estimate>) -> String {
     }
 }
 
+/// Headings of the page that the table of the terminal lacks.
+const VERDICT: &str = "verdict";
+const ERRORS: [&str; 3] = ["error of k/m", "error of c/m", "error of m"];
+
+/// Relative error below which the table says so.
+const LEAST_ERROR: f64 = 1e-4;
+
+/// The table of models on the page.
+pub(super) struct ModelTable {
+    /// Headings of the columns.
+    pub headings: Vec<&'static str>,
+    /// Index of the run of each row.
+    pub runs: Vec<usize>,
+    /// The rows.
+    pub rows: Vec<Vec<String>>,
+}
+
+/// The table of models: the best first where they are ranked, else in the given order; columns without a value are omitted.
+pub(super) fn model_table(measures: &[Measures], keeps_order: bool) -> ModelTable {
+    let mut runs: Vec<usize> = (0..measures.len()).collect();
+    let difference = |i: &usize| measures[*i].bic_difference.unwrap_or(f64::INFINITY);
+    if !keeps_order {
+        runs.sort_by(|a, b| difference(a).total_cmp(&difference(b)));
+    }
+    let [name, others @ ..] = HEADERS;
+    let headings: Vec<&str> = [name, VERDICT]
+        .into_iter()
+        .chain(others)
+        .chain(ERRORS)
+        .collect();
+    let all: Vec<Vec<String>> = runs.iter().map(|i| page_row(&measures[*i])).collect();
+    let is_known = |j: &usize| *j == 0 || all.iter().any(|row| row[*j] != "–");
+    let kept: Vec<usize> = (0..headings.len()).filter(is_known).collect();
+    ModelTable {
+        headings: kept.iter().map(|j| headings[*j]).collect(),
+        rows: all
+            .iter()
+            .map(|row| kept.iter().map(|j| row[*j].clone()).collect())
+            .collect(),
+        runs,
+    }
+}
+
+/// A row of the table of models with all its columns.
+fn page_row(m: &Measures) -> Vec<String> {
+    let level = m.level.map_or("–", level_in_words).to_owned();
+    let errors = m.errors.as_ref().map_or([f64::NAN; 3], |e| {
+        [e.k_over_m_relative, e.c_over_m_relative, e.mass_relative]
+    });
+    let errors = errors.map(|error| match error.is_nan() {
+        true => "–".to_owned(),
+        false if error < LEAST_ERROR => "< 0.01 %".to_owned(),
+        false => percent(error),
+    });
+    let [name, others @ ..] = row(m);
+    let others = others.map(|cell| cell.replace('-', "−"));
+    [name, level]
+        .into_iter()
+        .chain(others)
+        .chain(errors)
+        .collect()
+}
+
 /// Sentences on the best model and on nested ones.
 pub(super) fn sentences(comparison: &Comparison) -> Vec<String> {
-    let mut sentences = Vec::new();
+    let tests = comparison.likelihood_ratios.iter().map(ratio);
+    best(comparison)
+        .into_iter()
+        .map(|best| best.sentence)
+        .chain(tests)
+        .collect()
+}
+
+/// The best model.
+pub(super) struct BestModel<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// True if the data favour it.
+    pub is_favoured: bool,
+    /// The difference to the next in words.
+    pub sentence: String,
+}
+
+/// The model with the smallest BIC; `None` where fewer than two are ranked.
+pub(super) fn best(comparison: &Comparison) -> Option<BestModel<'_>> {
     let mut known: Vec<(&str, f64)> = (comparison.measures.iter())
         .filter_map(|m| Some((m.name.as_str(), m.bic_difference?)))
         .collect();
     known.sort_by(|a, b| a.1.total_cmp(&b.1));
-    if let [(best, _), (second, difference), ..] = known.as_slice() {
-        let size = significant(*difference, 2);
-        sentences.push(match *difference {
-            d if d >= POSITIVE => format!(
-                "The data favour `{best}` over `{second}` {} (difference of BIC {size}).",
-                match d {
-                    d if d >= VERY_STRONG => "decisively",
-                    d if d >= STRONG => "strongly",
-                    _ => "weakly",
-                }
-            ),
-            _ => format!(
-                "The data do not distinguish `{best}` and `{second}` (difference of BIC {size})."
-            ),
-        });
-    }
-    sentences.extend(comparison.likelihood_ratios.iter().map(ratio));
-    sentences
+    let [(best, _), (second, difference), ..] = known.as_slice() else {
+        return None;
+    };
+    let size = significant(*difference, 2);
+    let sentence = match *difference {
+        d if d >= POSITIVE => format!(
+            "The data favour `{best}` over `{second}` {} (difference of BIC {size}).",
+            match d {
+                d if d >= VERY_STRONG => "decisively",
+                d if d >= STRONG => "strongly",
+                _ => "weakly",
+            }
+        ),
+        _ => format!(
+            "The data do not distinguish `{best}` and `{second}` (difference of BIC {size})."
+        ),
+    };
+    Some(BestModel {
+        name: best,
+        is_favoured: *difference >= POSITIVE,
+        sentence,
+    })
 }
 
 fn ratio(test: &LikelihoodRatio) -> String {

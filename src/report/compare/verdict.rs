@@ -9,6 +9,36 @@ use std::fmt;
 /// Smallest fit, per cent, of a response that counts as fitted, if sigma was estimated.
 const FITTED: f64 = 90.0;
 
+/// Agreement of a fitted system with the true one, by the errors of k/m and c/m: the same thresholds for verdicts, conclusions and headline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Agreement {
+    /// Below [`RECOVERY_TOLERANCE`].
+    Recovered,
+    /// Below [`CLOSE`].
+    Close,
+    /// Above.
+    Different,
+}
+
+impl Agreement {
+    pub fn of(errors: &TruthErrors) -> Self {
+        match errors {
+            e if e.within(RECOVERY_TOLERANCE) => Self::Recovered,
+            e if e.within(CLOSE) => Self::Close,
+            _ => Self::Different,
+        }
+    }
+
+    /// True if the error of the mass, the scale, is below the same threshold.
+    pub fn has_scale(self, errors: &TruthErrors) -> bool {
+        errors.mass_relative
+            < match self {
+                Self::Recovered => RECOVERY_TOLERANCE,
+                Self::Close | Self::Different => CLOSE,
+            }
+    }
+}
+
 /// Fit of the measured response.
 pub(super) enum ResponseFit {
     /// Fit of the worst channel, per cent. Sigma was estimated, so chi-square carries no information.
@@ -99,7 +129,8 @@ pub(super) fn verdict(response: &ResponseFit, errors: Option<&TruthErrors>) -> S
     let Some(errors) = errors else {
         return format!("{response}; true system not known");
     };
-    if errors.within(RECOVERY_TOLERANCE) {
+    let agreement = Agreement::of(errors);
+    if agreement == Agreement::Recovered {
         let mut text = match errors.relative_to_critical {
             true => format!(
                 "true system recovered: k/m within {} of its largest value, c/m within {} of critical damping",
@@ -111,7 +142,7 @@ pub(super) fn verdict(response: &ResponseFit, errors: Option<&TruthErrors>) -> S
                 size(errors.largest_ratio_error())
             ),
         };
-        if errors.mass_relative >= RECOVERY_TOLERANCE {
+        if !agreement.has_scale(errors) {
             let off = percent(errors.mass_relative);
             text += &format!("; m, c and k are scaled by a common factor (error of m {off})");
         }
@@ -121,8 +152,8 @@ pub(super) fn verdict(response: &ResponseFit, errors: Option<&TruthErrors>) -> S
         };
     }
     let off = distances(errors);
-    match (matched, errors.within(CLOSE)) {
-        (_, true) if errors.mass_relative >= CLOSE => format!(
+    match (matched, agreement == Agreement::Close) {
+        (_, true) if !agreement.has_scale(errors) => format!(
             "close to the true system in k/m and c/m: {off}; m, c and k are scaled by a common factor (error of m \
              {}); {response}",
             percent(errors.mass_relative)
@@ -175,7 +206,7 @@ fn size(x: f64) -> String {
 }
 
 /// A ratio as a percentage with two or three digits.
-fn percent(share: f64) -> String {
+pub(super) fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     match percent {
         _ if !percent.is_finite() => "unbounded".into(),

@@ -8,7 +8,8 @@ use crate::finding::Finding;
 use crate::number_format::significant;
 use crate::report::FittedModel;
 use crate::report::answer::{AnswerRow, answer};
-use crate::report::document::{ResultDocument, level_in_words};
+use crate::report::chart::Figure;
+use crate::report::document::{ResultDocument, Verdict, level_in_words};
 use crate::report::summary::count;
 use crate::report::text::{escape, prose};
 use kmcfit_core::internals::assessment::VerdictLevel;
@@ -20,22 +21,26 @@ const DAY: u64 = 86_400;
 
 /// Everything above the contents.
 pub(super) fn first_screen(run: &FittedModel, document: &ResultDocument) -> String {
-    let main: String = figures(&run.main_figure(document).into_iter().collect::<Vec<_>>());
-    format!(
-        "<p class=\"soft\">{}</p>\n{}<div class=\"first\">\n<div>\n{}{}</div>\n<div>\n{main}</div>\n</div>\n",
-        escape(&source(run, document)),
-        verdict(document),
-        answers(document),
-        advice(document)
-    )
+    let samples = document.experiments.iter().map(|e| e.samples).sum();
+    let source = source_line(&run.model.source.data, samples, document.model.duration);
+    let state = match &document.verdict {
+        Some(verdict) => verdict_line(verdict),
+        None => state(document),
+    };
+    let answer = answers(document) + &advice(document);
+    screen(&(source + &state), &answer, run.main_figure(document))
 }
 
-/// Data file, number of samples, duration, and date of the file.
-fn source(run: &FittedModel, document: &ResultDocument) -> String {
-    let samples: usize = document.experiments.iter().map(|e| e.samples).sum();
-    let files = &run.model.source.data;
+/// What stands above the contents: lines over the whole width, and below them a text beside the main figure.
+pub(in crate::report) fn screen(above: &str, text: &str, main: Option<Figure>) -> String {
+    let main = figures(&main.into_iter().collect::<Vec<_>>());
+    format!("{above}<div class=\"first\">\n<div>\n{text}</div>\n<div>\n{main}</div>\n</div>\n")
+}
+
+/// Data files, number of samples, duration (s), and date of the last change of a file.
+pub(in crate::report) fn source_line(files: &[DataFile], samples: usize, duration: f64) -> String {
     let mut parts = Vec::new();
-    parts.extend(match files.as_slice() {
+    parts.extend(match files {
         [] => None,
         [only] => Some(name(only)),
         [first, rest @ ..] => Some(format!(
@@ -45,9 +50,9 @@ fn source(run: &FittedModel, document: &ResultDocument) -> String {
         )),
     });
     parts.push(count(samples, "sample"));
-    parts.push(format!("{} s", significant(document.model.duration, 4)));
+    parts.push(format!("{} s", significant(duration, 4)));
     parts.extend(files.iter().filter_map(|f| f.modified).max().and_then(date));
-    parts.join(", ")
+    format!("<p class=\"soft\">{}</p>\n", escape(&parts.join(", ")))
 }
 
 /// Name of a file without its folder.
@@ -93,10 +98,7 @@ fn date(time: SystemTime) -> Option<String> {
 }
 
 /// Verdict as a coloured word, and its reasons.
-fn verdict(document: &ResultDocument) -> String {
-    let Some(verdict) = &document.verdict else {
-        return state(document);
-    };
+pub(in crate::report) fn verdict_line(verdict: &Verdict) -> String {
     let colour = match verdict.level {
         VerdictLevel::Adequate => "good",
         VerdictLevel::Check => "warn",
@@ -106,10 +108,15 @@ fn verdict(document: &ResultDocument) -> String {
         [] => vec![verdict.passed.clone()],
         reasons => Finding::texts(reasons),
     };
+    state_line(colour, level_in_words(verdict.level), &reasons.join("; "))
+}
+
+/// A word in one of the colours `good`, `warn` and `bad`, and a sentence.
+pub(in crate::report) fn state_line(colour: &str, word: &str, sentence: &str) -> String {
     format!(
         "<p class=\"verdict-line\"><span class=\"state {colour}\">{}</span> {}</p>\n",
-        level_in_words(verdict.level),
-        prose(&reasons.join("; "))
+        escape(word),
+        prose(sentence)
     )
 }
 

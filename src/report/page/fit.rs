@@ -3,7 +3,7 @@
 use super::animation::animation;
 use super::first_screen::first_screen;
 use super::table::{list, paragraph};
-use super::{figures, figures_without, help, overview, page as shell, reproducibility, settings};
+use super::{Section, figures, figures_without, overview, reproducibility, sectioned, settings};
 use crate::finding::Finding;
 use crate::report::FittedModel;
 use crate::report::chart::Figure;
@@ -19,12 +19,9 @@ use crate::report::text::escape;
 /// Curves that are hidden at first: the start may be far from the estimate.
 const START: &[&str] = &["start"];
 
-/// A section of the page: anchor, heading, body.
-type Section = (&'static str, &'static str, String);
-
 /// The page of a run.
 pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> String {
-    let sections: Vec<Section> = [
+    let sections: Vec<Section> = vec![
         ("fit", "Fit and residuals", fit_and_residuals(run, document)),
         ("functions", "Coefficients", coefficients(run, document)),
         ("input", "Input", figures(&run.input_figures())),
@@ -57,27 +54,8 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
             reproducibility::reproducibility(run, document),
         ),
         ("solver", "Solver", solver(run, document)),
-    ]
-    .into_iter()
-    .filter(|(_, _, body)| !body.is_empty())
-    .collect();
-    let links = sections
-        .iter()
-        .map(|(anchor, heading, _)| format!("<a href=\"#{anchor}\">{}</a>\n", escape(heading)));
-    let parts = sections.iter().map(|(anchor, heading, body)| {
-        format!(
-            "<section id=\"{anchor}\">\n<h2>{}</h2>\n{body}</section>\n",
-            escape(heading)
-        )
-    });
-    let body = format!(
-        "{}<div class=\"sections\">\n<nav aria-label=\"Contents\">\n{}</nav>\n<div>\n{}{}</div>\n</div>\n",
-        first_screen(run, document),
-        links.collect::<String>(),
-        help(),
-        parts.collect::<String>()
-    );
-    shell(&document.title, &body)
+    ];
+    sectioned(&document.title, &first_screen(run, document), sections)
 }
 
 /// Fit of each channel, key figures, and figures of records and residuals.

@@ -12,9 +12,10 @@ mod reproducibility;
 mod settings;
 mod table;
 
+pub(super) use first_screen::{screen, source_line, state_line, verdict_line};
 pub(super) use fit::page as fit_page;
 pub(crate) use reproducibility::quoted as shell_quoted;
-pub(super) use table::list;
+pub(super) use table::{list, marked_table, paragraph, table};
 
 use super::chart::{Figure, data, render};
 use super::text::escape;
@@ -44,7 +45,7 @@ const KEYS: &str = "Hover over a chart to show values; drag to zoom. Click, then
 const HELP: &str = "Charts: hover for values, drag to zoom, double click to reset; arrow keys, + and - do the same.";
 
 /// A page from its title and its body, which must be escaped.
-pub(super) fn page(title: &str, body: &str) -> String {
+fn page(title: &str, body: &str) -> String {
     let title = escape(title);
     let (style, script) = (format!("\n{STYLE}"), script());
     let (style_hash, script_hash) = (hash(&style), hash(&script));
@@ -62,6 +63,30 @@ pub(super) fn page(title: &str, body: &str) -> String {
          <script>{script}</script>\n</body>\n</html>\n",
         escape(KEYS)
     )
+}
+
+/// A section of a page: anchor, heading, body.
+pub(super) type Section = (&'static str, &'static str, String);
+
+/// A page with a first screen and, beside contents that stay in sight, its sections; those without a body are omitted.
+pub(super) fn sectioned(title: &str, first: &str, mut sections: Vec<Section>) -> String {
+    sections.retain(|(_, _, body)| !body.is_empty());
+    let links = sections
+        .iter()
+        .map(|(anchor, heading, _)| format!("<a href=\"#{anchor}\">{}</a>\n", escape(heading)));
+    let parts = sections.iter().map(|(anchor, heading, body)| {
+        format!(
+            "<section id=\"{anchor}\">\n<h2>{}</h2>\n{body}</section>\n",
+            escape(heading)
+        )
+    });
+    let body = format!(
+        "{first}<div class=\"sections\">\n<nav aria-label=\"Contents\">\n{}</nav>\n<div>\n{}{}</div>\n</div>\n",
+        links.collect::<String>(),
+        help(),
+        parts.collect::<String>()
+    );
+    page(title, &body)
 }
 
 /// The script of every page. The marks around it are comments in HTML and delimit character data in XML.
@@ -100,7 +125,7 @@ fn figure(figure: &Figure, off: &[&str]) -> String {
 }
 
 /// Instructions for the charts in one line, shown only with scripts.
-pub(super) fn help() -> String {
+fn help() -> String {
     format!("<p class=\"soft screen\">{}</p>\n", escape(HELP))
 }
 

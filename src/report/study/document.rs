@@ -1,6 +1,7 @@
 //! The document of a study, `study.json`, and the records of its analyses, which the journal keeps as well.
 
 use crate::finding::Finding;
+use crate::report::document::Verdict;
 use kmcfit_core::internals::solvers::Status;
 use serde::{Deserialize, Serialize};
 
@@ -71,6 +72,9 @@ pub struct StudiedFit {
     pub reason: String,
     /// Cost J.
     pub cost: f64,
+    /// Verdict on the fit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
     /// Part of J from the samples.
     pub misfit: f64,
     /// Number of nodes.

@@ -1,13 +1,16 @@
 //! The record of the fit that is studied, and the problem as it was fitted.
 
 use super::StudiedFit;
+use crate::config::Model;
+use crate::report::FittedModel;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, Weighting};
 use kmcfit_core::internals::solvers::Fit;
 
 impl StudiedFit {
-    /// The record of a fit.
-    pub fn of(problem: &Problem, fit: &Fit) -> Self {
+    /// The record of a fit of a model.
+    pub fn of(model: &Model, fit: &Fit) -> Self {
+        let problem = &model.problem;
         let sigma = |c: &Channel| match c.weighting() {
             Weighting::Estimated { sigma } => Some(*sigma),
             _ => None,
@@ -15,6 +18,7 @@ impl StudiedFit {
         Self {
             status: fit.outcome.status,
             reason: fit.outcome.reason.to_string(),
+            verdict: Some(FittedModel::verdict_of(model, fit)),
             cost: fit.best.evaluation.cost,
             misfit: fit.best.evaluation.misfit,
             nodes: problem.system.grid.nodes(),

@@ -19,8 +19,11 @@ pub use document::{
 pub use bands::bands;
 pub use records::*;
 
+use super::page::source_line;
 use super::{json, render};
+use crate::config::Model;
 use crate::results::{Claim, OutputFolder};
+use kmcfit_core::internals::record::Channel;
 use std::io;
 
 impl StudyDocument {
@@ -36,16 +39,19 @@ impl StudyDocument {
             .family("figures", "svg", figures::NAMES)
     }
 
-    /// Writes `study.json`, `study.html` and `figures/*.svg`.
+    /// Writes `study.json`, `study.html` and `figures/*.svg` of the study of a model.
     ///
     /// # Errors
     /// An error of the file system.
-    pub fn write(&self, folder: &OutputFolder) -> io::Result<()> {
+    pub fn write(&self, folder: &OutputFolder, model: &Model) -> io::Result<()> {
         let mut stage = folder.stage()?;
         for figure in figures::all(self) {
             stage.write(&format!("figures/{}.svg", figure.name), render(&figure))?;
         }
-        stage.write("study.html", page::page(self))?;
+        let samples = model.problem.channels().map(Channel::len).sum();
+        let duration = model.problem.system.grid.duration();
+        let source = source_line(&model.source.data, samples, duration);
+        stage.write("study.html", page::page(self, &source))?;
         stage.write("study.json", json(self))?;
         stage.commit()
     }

@@ -1,26 +1,157 @@
-//! The page of a study, `study.html`.
+//! The page of a study, `study.html`: first screen, then each finding beside its chart.
 
 use super::StudyDocument;
 use super::figures;
-use super::text::sections;
+use super::text::{Part, widest_range};
+use crate::report::chart::Figure;
 use crate::report::page as shell;
-use crate::report::text::escape;
+use crate::report::text::{escape, prose};
 
-/// The page: one HTML file without external resources.
-pub fn page(study: &StudyDocument) -> String {
-    let mut body = String::new();
-    for (heading, sentences) in sections(study) {
-        body += &format!("<h2>{}</h2>\n{}", escape(heading), shell::list(&sentences));
-    }
-    body += "<h2>Figures</h2>\n";
-    body += &shell::help();
-    body += &shell::figures(&figures::all(study));
-    body += &format!(
-        "<p class=\"soft\">Made by kmcfit {}; seed {}, confidence {}; the study is {}.</p>\n",
-        escape(&study.version),
-        study.seed,
-        study.confidence,
-        escape(&study.status)
+/// The parts in order of what the user can do about them: mend the study or the fit, change the model, measure again; then what the records
+/// determine, and the basis of these findings.
+const ORDER: [(Part, &str); 13] = [
+    (Part::Failures, "failures"),
+    (Part::Multistart, "starts"),
+    (Part::Constancy, "constancy"),
+    (Part::Candidates, "candidates"),
+    (Part::Bands, "bands"),
+    (Part::Profiles, "profiles"),
+    (Part::Bootstrap, "bootstrap"),
+    (Part::Extremes, "extremes"),
+    (Part::Predictions, "predictions"),
+    (Part::EquivalentSystems, "equivalent-systems"),
+    (Part::Sensitivity, "sensitivity"),
+    (Part::StructuralRank, "structural-rank"),
+    (Part::Fit, "fit"),
+];
+
+/// Predictions with a chart; those of the others are in `figures/study-predictions.svg`, so that the page stays below 2 MB.
+const MOST_PREDICTIONS: usize = 2;
+
+/// Leading parts of [`ORDER`] whose first findings stand on the first screen.
+const LEADING: usize = 4;
+
+/// The page: one HTML file without external resources. `source` is the line on its data.
+pub fn page(study: &StudyDocument, source: &str) -> String {
+    let mut sections: Vec<shell::Section> = ORDER
+        .iter()
+        .map(|(part, anchor)| (*anchor, part.heading(), section(study, *part)))
+        .collect();
+    let made = format!(
+        "Made by kmcfit {}; seed {}, confidence {}; the study is {}.",
+        study.version, study.seed, study.confidence, study.status
     );
-    shell::page(&format!("Study of identifiability: {}", study.title), &body)
+    sections.push(("made", "Settings", shell::paragraph(&made)));
+    let title = format!("Study of identifiability: {}", study.title);
+    shell::sectioned(&title, &first_screen(study, source), sections)
+}
+
+fn first_screen(study: &StudyDocument, source: &str) -> String {
+    let fit = study.fit.as_ref();
+    let state = fit.map_or(String::new(), |fit| match &fit.verdict {
+        Some(verdict) => shell::verdict_line(verdict),
+        None => shell::state_line("warn", fit.status.name(), &fit.reason),
+    });
+    let state = match study.status.as_str() {
+        "complete" => state,
+        status => state + &shell::paragraph(&format!("The study is {status}.")),
+    };
+    let text = quantities(study) + &leading(study);
+    shell::screen(&(source.to_owned() + &state), &text, figures::main(study))
+}
+
+/// Table of the functions and ratios: extremes and classification of each.
+fn quantities(study: &StudyDocument) -> String {
+    let known = study.bands.iter().flat_map(|bands| &bands.classification);
+    let rows = known.map(|c| {
+        let extremes = study.extremes.iter().find(|e| e.name == c.name);
+        let text = c.text.strip_prefix(&format!("{}: ", c.name));
+        vec![
+            c.name.clone(),
+            text.unwrap_or(&c.text).to_owned(),
+            extremes.map_or(String::new(), widest_range),
+        ]
+    });
+    let headings = [
+        "quantity",
+        "determined by the records",
+        "data-consistent extremes",
+    ];
+    let table = shell::table("Quantities", &headings, &rows.collect::<Vec<_>>());
+    format!("<div class=\"words\">\n{table}</div>\n")
+}
+
+/// The first finding of each leading part, with a link to its section.
+fn leading(study: &StudyDocument) -> String {
+    let items = ORDER[..LEADING].iter().filter_map(|(part, anchor)| {
+        let sentences = part.sentences(study);
+        let first = prose(sentences.first()?);
+        let heading = escape(part.heading());
+        Some(format!(
+            "<li><a href=\"#{anchor}\">{heading}</a>: {first}</li>\n"
+        ))
+    });
+    let items: String = items.collect();
+    match items.is_empty() {
+        true => items,
+        false => format!("<ul>\n{items}</ul>\n"),
+    }
+}
+
+/// Findings of a part, each beside its charts.
+fn section(study: &StudyDocument, part: Part) -> String {
+    let sentences = part.sentences(study);
+    let charts: Vec<Option<Figure>> = match part {
+        Part::Bands => return bands(study, &sentences),
+        Part::Profiles => figures::profiles_alone(study),
+        Part::Extremes => figures::extremes_alone(study),
+        Part::Predictions => {
+            let mut charts = figures::predictions_alone(study);
+            charts.truncate(MOST_PREDICTIONS);
+            charts
+        }
+        Part::EquivalentSystems => return finding(&sentences, figures::equivalent_systems(study)),
+        Part::Multistart => return finding(&sentences, figures::waterfall(study)),
+        Part::Sensitivity => {
+            let spectrum = figures::spectrum(study).into_iter();
+            return finding(&sentences, spectrum.chain(figures::directions(study)));
+        }
+        _ => Vec::new(),
+    };
+    let own = sentences.iter().zip(charts);
+    let own = own.map(|(sentence, chart)| finding(std::slice::from_ref(sentence), chart));
+    let own: Vec<String> = own.collect();
+    own.concat() + &shell::list(&sentences[own.len()..])
+}
+
+/// The bands of functions and ratios that vary, each beside its classification; before them the other sentences.
+fn bands(study: &StudyDocument, sentences: &[String]) -> String {
+    let mut others = sentences.to_vec();
+    let known = study.bands.iter().flat_map(|bands| &bands.classification);
+    let known: Vec<_> = known.collect();
+    let charts = figures::bands_alone(study).into_iter();
+    let charts = charts.map(|(name, chart)| {
+        let own = known.iter().find(|c| c.name == name);
+        let own: Vec<String> = own.map(|c| c.text.clone()).into_iter().collect();
+        // Natural frequency and damping ratio have no finding of their own beside those of k/m and c/m.
+        if own.is_empty() && !known.is_empty() {
+            return String::new();
+        }
+        others.retain(|sentence| !own.contains(sentence));
+        finding(&own, [chart])
+    });
+    let charts: String = charts.collect();
+    shell::list(&others) + &charts
+}
+
+/// Sentences beside their charts; sentences alone without any, and charts alone.
+fn finding(sentences: &[String], charts: impl IntoIterator<Item = Figure>) -> String {
+    let charts: Vec<Figure> = charts.into_iter().collect();
+    let (text, charts) = (shell::list(sentences), shell::figures(&charts));
+    match charts.is_empty() {
+        true => text,
+        false => {
+            format!("<div class=\"finding\">\n<div>\n{text}</div>\n<div>\n{charts}</div>\n</div>\n")
+        }
+    }
 }

@@ -14,29 +14,66 @@ const MOST_LISTED: usize = 6;
 /// Width of a range below which its ends are equal to machine precision, relative to the larger one.
 const NEGLIGIBLE: f64 = 1e-12;
 
-/// The study as text: a heading for each analysis and its sentences.
-pub fn text(study: &StudyDocument) -> String {
-    let mut text = format!("{}\n", study.title);
-    for (heading, sentences) in sections(study) {
-        text += &format!("\n{heading}\n");
-        for sentence in sentences {
-            text += &format!("  {sentence}\n");
-        }
-    }
-    text
+/// A part of a study: one analysis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    StructuralRank,
+    Fit,
+    Sensitivity,
+    Bands,
+    Profiles,
+    Extremes,
+    EquivalentSystems,
+    Multistart,
+    Constancy,
+    Bootstrap,
+    Candidates,
+    Predictions,
+    Failures,
 }
 
-/// Headings and their sentences; analyses that were not run are omitted.
-pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
-    let multistart = study.multistart.iter();
-    let sections = [
-        (
-            "Structural rank (before the fit)",
-            Finding::texts(&study.structural_rank),
-        ),
-        (
-            "Fit",
-            lines(study.fit.as_slice(), |fit| {
+impl Part {
+    /// All parts in the order of the analyses.
+    const ALL: [Self; 13] = [
+        Self::StructuralRank,
+        Self::Fit,
+        Self::Sensitivity,
+        Self::Bands,
+        Self::Profiles,
+        Self::Extremes,
+        Self::EquivalentSystems,
+        Self::Multistart,
+        Self::Constancy,
+        Self::Bootstrap,
+        Self::Candidates,
+        Self::Predictions,
+        Self::Failures,
+    ];
+
+    /// Its heading.
+    pub fn heading(self) -> &'static str {
+        match self {
+            Self::StructuralRank => "Structural rank (before the fit)",
+            Self::Fit => "Fit",
+            Self::Sensitivity => "Sensitivity",
+            Self::Bands => "Identifiability of functions and ratios, within the model",
+            Self::Profiles => "Likelihood profiles",
+            Self::Extremes => "Data-consistent extremes, within the model",
+            Self::EquivalentSystems => "Equivalent systems, in a wider model",
+            Self::Multistart => "Fits from random starting points",
+            Self::Constancy => "Constancy test",
+            Self::Bootstrap => "Bootstrap intervals",
+            Self::Candidates => "Candidate experiments",
+            Self::Predictions => "Predicted responses",
+            Self::Failures => "Failed analyses",
+        }
+    }
+
+    /// Its sentences; none for an analysis that was not run.
+    pub fn sentences(self, study: &StudyDocument) -> Vec<String> {
+        match self {
+            Self::StructuralRank => Finding::texts(&study.structural_rank),
+            Self::Fit => lines(study.fit.as_slice(), |fit| {
                 let penalty = fit.cost - fit.misfit;
                 let parts = match penalty > 1e-6 * fit.cost {
                     true => format!(" (misfit {:.6e}, penalties {penalty:.2e})", fit.misfit),
@@ -45,51 +82,37 @@ pub fn sections(study: &StudyDocument) -> Vec<(&'static str, Vec<String>)> {
                 let (status, reason) = (fit.status.name(), &fit.reason);
                 format!("{status}: {reason}; J = {:.6e}{parts}", fit.cost)
             }),
-        ),
-        (
-            "Sensitivity",
-            study.sensitivity.iter().flat_map(sensitivity).collect(),
-        ),
-        (
-            "Identifiability of functions and ratios, within the model",
-            study.bands.iter().flat_map(bands).collect(),
-        ),
-        (
-            "Likelihood profiles",
-            lines(&study.profiles, |p| p.text.clone()),
-        ),
-        (
-            "Data-consistent extremes, within the model",
-            extremes(study),
-        ),
-        (
-            "Equivalent systems, in a wider model",
-            equivalent_systems(study),
-        ),
-        (
-            "Fits from random starting points",
-            multistart
+            Self::Sensitivity => study.sensitivity.iter().flat_map(sensitivity).collect(),
+            Self::Bands => study.bands.iter().flat_map(bands).collect(),
+            Self::Profiles => lines(&study.profiles, |p| p.text.clone()),
+            Self::Extremes => extremes(study),
+            Self::EquivalentSystems => equivalent_systems(study),
+            Self::Multistart => (study.multistart.iter())
                 .flat_map(|m| Finding::texts(&m.findings))
                 .collect(),
-        ),
-        (
-            "Constancy test",
-            lines(&study.constancy_test, |v| v.text.clone()),
-        ),
-        ("Bootstrap intervals", lines(&study.bootstrap, interval)),
-        (
-            "Candidate experiments",
-            lines(&study.candidates, |c| c.text.clone()),
-        ),
-        ("Predicted responses", lines(&study.predictions, prediction)),
-        (
-            "Failed analyses",
-            lines(&study.failures, |f| format!("{}: {}", f.analysis, f.reason)),
-        ),
-    ];
-    let mut sections = Vec::from(sections);
-    sections.retain(|(_, lines)| !lines.is_empty());
-    sections
+            Self::Constancy => lines(&study.constancy_test, |v| v.text.clone()),
+            Self::Bootstrap => lines(&study.bootstrap, interval),
+            Self::Candidates => lines(&study.candidates, |c| c.text.clone()),
+            Self::Predictions => lines(&study.predictions, prediction),
+            Self::Failures => lines(&study.failures, |f| format!("{}: {}", f.analysis, f.reason)),
+        }
+    }
+}
+
+/// The study as text: a heading for each analysis and its sentences.
+pub fn text(study: &StudyDocument) -> String {
+    let mut text = format!("{}\n", study.title);
+    for part in Part::ALL {
+        let sentences = part.sentences(study);
+        if sentences.is_empty() {
+            continue;
+        }
+        text += &format!("\n{}\n", part.heading());
+        for sentence in sentences {
+            text += &format!("  {sentence}\n");
+        }
+    }
+    text
 }
 
 fn lines<T>(list: &[T], line: impl Fn(&T) -> String) -> Vec<String> {
@@ -168,27 +191,50 @@ fn search(status: ExtremeSearch) -> &'static str {
 
 /// The extremes at the time where they differ most.
 fn widest(e: &ExtremesRecord) -> String {
-    let width = |i: &usize| e.high[*i] - e.low[*i];
-    let widest = (0..e.times.len().min(e.low.len())).max_by(|a, b| width(a).total_cmp(&width(b)));
-    let widest = widest.unwrap_or(0);
-    if width(&widest) <= NEGLIGIBLE * e.high[widest].abs().max(e.low[widest].abs()) {
-        return format!(
-            "{}: {} {} to machine precision: the fit reproduces the samples exactly",
-            e.name,
-            significant(e.high[widest], 6),
-            e.unit
-        );
+    let range = widest_range(e);
+    match is_exact(e) {
+        true => format!(
+            "{}: {range} to machine precision: the fit reproduces the samples exactly",
+            e.name
+        ),
+        false => format!("{}: {range} (misfit limit {:.4e})", e.name, e.misfit_limit),
     }
-    let [low, high] = ends([e.low[widest], e.high[widest]]);
+}
+
+/// Index of the time at which the extremes differ most.
+fn widest_index(e: &ExtremesRecord) -> usize {
+    let width = |i: &usize| e.high[*i] - e.low[*i];
+    let times = 0..e.times.len().min(e.low.len()).min(e.high.len());
+    times
+        .max_by(|a, b| width(a).total_cmp(&width(b)))
+        .unwrap_or(0)
+}
+
+/// True if the extremes are equal to machine precision.
+fn is_exact(e: &ExtremesRecord) -> bool {
+    let i = widest_index(e);
+    let (Some(low), Some(high)) = (e.low.get(i), e.high.get(i)) else {
+        return false;
+    };
+    high - low <= NEGLIGIBLE * high.abs().max(low.abs())
+}
+
+/// The range between the extremes with its unit, at the time where they differ most.
+pub fn widest_range(e: &ExtremesRecord) -> String {
+    let i = widest_index(e);
+    let (Some(low), Some(high), Some(time)) = (e.low.get(i), e.high.get(i), e.times.get(i)) else {
+        return String::new();
+    };
+    if is_exact(e) {
+        return format!("{} {}", significant(*high, 6), e.unit);
+    }
+    let [low, high] = ends([*low, *high]);
     let is_constant = |values: &[f64]| values.iter().all(|x| *x == values[0]);
     let at = match is_constant(&e.low) && is_constant(&e.high) {
         true => String::new(),
-        false => format!(" at {} s, where the range is widest", e.times[widest]),
+        false => format!(" at {time} s, where the range is widest"),
     };
-    format!(
-        "{}: {low} to {high} {}{at} (misfit limit {:.4e})",
-        e.name, e.unit, e.misfit_limit
-    )
+    format!("{low} to {high} {}{at}", e.unit)
 }
 
 /// The ends of an interval with three digits of its half-width.

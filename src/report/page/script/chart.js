@@ -83,12 +83,13 @@ class Chart {
     return [...new Set(this.panels.map((panel) => panel.axis))];
   }
 
-  /** One key for each label with the same look. */
+  /** One key for each label of one colour, with the look of its curve if it has one. */
   legend(off) {
     const seen = new Map();
     for (const mark of this.panels.flatMap((panel) => panel.marks)) {
-      mark.key = [mark.label, mark.kind, mark.colour, mark.dash, mark.width].join("|");
-      if (mark.label && !seen.has(mark.key)) seen.set(mark.key, mark);
+      mark.key = [mark.label, mark.colour].join("|");
+      const first = seen.get(mark.key);
+      if (mark.label && (!first || (first.kind !== "line" && mark.kind === "line"))) seen.set(mark.key, mark);
     }
     for (const [key, mark] of seen) {
       const shown = !off.includes(mark.label);
@@ -97,6 +98,7 @@ class Chart {
       const sample = shape(this.space, "svg", { viewBox: "0 0 28 12", "aria-hidden": "true" }, button);
       const paths = { points: "M5 6h0M14 6h0M23 6h0", band: "M0 1H28V11H0Z", span: "M0 1H28V11H0Z" };
       shape(this.space, "path", { ...looks(mark), d: paths[mark.kind] ?? "M0 6H28" }, sample);
+      if (mark.kind === "band" && mark.dash) shape(this.space, "path", { ...looks({ ...mark, kind: "line", width: 1.2 }), d: "M0 1H28M0 11H28" }, sample);
       element("span", {}, button).textContent = mark.label;
       button.addEventListener("click", () => this.toggle(key, button));
     }

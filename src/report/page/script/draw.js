@@ -101,7 +101,7 @@ const pathOf = (mark, view) => {
 
 const looks = (mark) => {
   switch (mark.kind) {
-    case "band": return { class: `area ${mark.colour}` };
+    case "band": return { class: `area ${mark.colour}${mark.dash ? " edged" : ""}` };
     case "span": return { class: "stretch" };
     case "points": return { class: `dots ${mark.colour}`, "stroke-width": mark.width };
     default: {
@@ -113,7 +113,12 @@ const looks = (mark) => {
 
 const drawMark = (space, mark, view, parent) => {
   const path = pathOf(mark, view);
-  if (path && !path.includes("NaN")) shape(space, "path", { ...looks(mark), d: path }, parent);
+  if (!path || path.includes("NaN")) return;
+  shape(space, "path", { ...looks(mark), d: path }, parent);
+  if (mark.kind !== "band" || !mark.dash) return;
+  // The dashes are those of both edges, not of the ends.
+  const edges = [mark.y, mark.high].map((ys) => linePath(mark, ys, view)).join("");
+  shape(space, "path", { ...looks({ ...mark, kind: "line", width: 1.2 }), d: edges }, parent);
 };
 
 const drawAxes = (space, view, parent) => {

@@ -133,7 +133,9 @@ class Panel {
 
   values(view, x) {
     const found = [];
-    for (const mark of this.marks.filter((mark) => mark.x.length && mark.y.length && this.isShown(mark))) {
+    const curves = new Set(this.marks.filter((mark) => mark.kind === "line" && mark.label).map((mark) => mark.key));
+    const isRepeated = (mark) => mark.kind === "points" && curves.has(mark.key);
+    for (const mark of this.marks.filter((mark) => mark.x.length && mark.y.length && this.isShown(mark) && !isRepeated(mark))) {
       if (mark.kind === "band") {
         const [low, high] = [mark.y, mark.high].map((ys) => valueAt(mark, ys, view, x));
         if (low && high) found.push({ mark, y: NaN, text: `${number(low.y, 5)} to ${number(high.y, 5)} ${this.y.unit}`.trim() });
