@@ -276,7 +276,7 @@ fit: {{stop: {{iterations: 200, tolerance: 1e-8}}}}
 }
 
 /// Every attempt is in the result and in the summary, and the best of them is the fit. The record has 40 periods with three
-/// samples each, and the start values have a wrong period (`crates/kmcfit-core/tests/start_strategy.rs`).
+/// samples each, and the start values have a wrong period (`crates/kmcfit-core/tests/suite/start_strategy.rs`).
 #[test]
 fn every_attempt_is_in_the_result_and_the_summary() {
     let bench = Workbench::empty();

@@ -1,0 +1,54 @@
+//! Tests of the library through its public interface and its modules: one program, so that the tests share the processors.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod rational;
+
+mod activity;
+mod bases;
+mod chain;
+mod channels;
+mod checkpoints;
+mod closed_forms;
+mod constraints;
+mod cost_and_gradient;
+mod delays;
+mod derivatives;
+mod driven;
+mod equation_error;
+mod equation_error_intervals;
+mod equation_error_weak;
+mod experiments;
+mod features;
+mod gaps;
+mod gauss_newton;
+mod identifiability;
+mod infeasible;
+mod input_errors;
+mod input_pulses;
+mod jumps;
+mod known_parts;
+mod large_covariance;
+mod laws;
+mod lbfgs;
+mod long;
+mod missing_terms;
+mod noise_models;
+mod nonlinear;
+mod projected_gradient;
+mod qp;
+mod qp_programs;
+mod reach;
+mod recovery;
+mod residual_means;
+mod rivals;
+mod search;
+mod smooth_functions;
+mod soft;
+mod start_strategy;
+mod statistics;
+mod study;
+mod total_variation_jumps;
+mod verdict;
+mod weights;
+mod wrong_models;
