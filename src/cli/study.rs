@@ -21,6 +21,7 @@ use crate::text_io::quote;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{CheckpointStore, Status};
+use kmcfit_core::internals::study::extremes::is_within_rounding;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::io;
@@ -343,6 +344,12 @@ impl StudyRun<'_> {
     /// Extremes of the functions, and the predictions of the systems that have them.
     fn extremes(&mut self, at: Optimum) -> Result<(), StudyError> {
         let (model, threads) = (Arc::clone(&self.model), self.threads);
+        if model.study.misfit_limit.is_none() && is_within_rounding(at.problem, at.evaluation) {
+            let reason = "the samples are matched to machine precision and a penalty determines every function: without a stated \
+                 `study.misfit_limit` the ranges are rounding errors";
+            self.fail("extremes", reason);
+            return Ok(());
+        }
         let compute = || study::extremes(&model, at, threads);
         let (extremes, predictions) = self.analysis("extremes", compute)?;
         if extremes.is_empty() {

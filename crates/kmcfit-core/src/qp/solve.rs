@@ -120,9 +120,10 @@ impl Subproblem {
         self.solve_within(Self::ITERATIONS)
     }
 
-    /// Solution for a trial step, which is verified by a simulation: the first point of reduced accuracy ([`Kkt::is_reduced`]) ends the attempts.
+    /// Solution for a trial step, which is verified by a simulation: the first point of reduced accuracy ([`Kkt::is_reduced`]) ends the attempts,
+    /// and no proof of infeasibility is sought.
     pub fn solve_for_step(&self) -> Solution {
-        self.solve_until(Self::ITERATIONS, Kkt::is_reduced)
+        self.solve_until(Self::ITERATIONS, Kkt::is_reduced, false)
     }
 
     /// [`Subproblem::solve`] with at most `iterations` iterations per attempt; with zero iterations the program is stalled.
@@ -130,7 +131,7 @@ impl Subproblem {
     /// The status of the interior-point solver is not used: its point is polished on its active set and accepted by its residuals, its proof of
     /// infeasibility is checked. A rejected result is followed by an attempt with other settings.
     pub fn solve_within(&self, iterations: u32) -> Solution {
-        self.solve_until(iterations, Kkt::is_solution)
+        self.solve_until(iterations, Kkt::is_solution, true)
     }
 
     /// A step of a fit on the stages of [`Subproblem::layout`]: a point that satisfies the constraints and brings the cost down
@@ -152,8 +153,13 @@ impl Subproblem {
     /// Largest excess of the cost of a step over the minimum, as a share of the decrease; the next linearisation removes it.
     const STEP_GAP: f64 = 5e-3;
 
-    /// Attempts until the residuals of a point are within limits.
-    fn solve_until(&self, iterations: u32, is_enough: impl Fn(&Kkt) -> bool) -> Solution {
+    /// Attempts until the residuals of a point are within limits; without such a point, with `seeks_proof` a proof of infeasibility.
+    fn solve_until(
+        &self,
+        iterations: u32,
+        is_enough: impl Fn(&Kkt) -> bool,
+        seeks_proof: bool,
+    ) -> Solution {
         if iterations == 0 || !self.is_finite() {
             return self.refused(None, 0);
         }
@@ -217,7 +223,7 @@ impl Subproblem {
         }
         let attempts = ATTEMPTS.len() as u32;
         let normalised = normalised.unwrap_or_else(|| ScaledProgram::new(self));
-        if normalised.sub.has_violations(iterations) {
+        if seeks_proof && normalised.sub.has_violations(iterations) {
             return self.solution(ConicStatus::Infeasible, best, attempts);
         }
         self.refused(best, attempts)

@@ -5,11 +5,13 @@ use super::{
 };
 use crate::diagnostics::chi_square_one;
 use crate::functions::CoefficientKind;
-use crate::objective::Evaluation;
+use crate::objective::{Evaluation, channel_fit_percent};
 use crate::problem::Problem;
 
 /// Largest roughness of a system in an envelope, as a multiple of the optimum's.
 const BUDGET: f64 = 2.0;
+/// Fit, per cent, from which residuals are rounding errors.
+const ROUNDED: f64 = 100.0 - 1e-7;
 /// A misfit above this share of the limit counts as equal to the limit.
 const AT_LEVEL: f64 = 0.999;
 
@@ -49,6 +51,23 @@ impl MisfitLimit {
             .collect();
         level
     }
+}
+
+/// True if the misfit and the roughness of an optimum are rounding errors, so that no limit of the misfit follows from them: samples without
+/// sigma that the response matches to machine precision, and a penalty on every estimated function.
+pub fn is_within_rounding(problem: &Problem, evaluation: &Evaluation) -> bool {
+    let fits = problem.predicted(evaluation);
+    let mut fits = fits.map(|(channel, predicted)| {
+        (
+            channel.weighting().sigma(0).is_some(),
+            channel_fit_percent(channel, predicted),
+        )
+    });
+    let is_exact = fits.all(|(has_sigma, fit)| !has_sigma && fit >= ROUNDED);
+    let functions = &problem.functions;
+    let mut estimated =
+        (0..functions.ranges().len()).filter(|f| functions.get(*f).parameters() > 0);
+    is_exact && estimated.all(|f| problem.penalties.iter().any(|p| p.function == f))
 }
 
 impl Extreme {

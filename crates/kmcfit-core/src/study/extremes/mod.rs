@@ -24,7 +24,7 @@
 mod envelope;
 mod search;
 
-pub use envelope::{Envelope, envelopes};
+pub use envelope::{Envelope, envelopes, is_within_rounding};
 
 use super::functional::{Linear, Target};
 use crate::functions::Penalty;

@@ -20,6 +20,8 @@ const SETTLED: f64 = 1e-9;
 /// Misfit limit of the convex programs as a share of the root of the stated one. A program may violate a cone by
 /// [`Kkt::VIOLATION`]; the margin keeps trial points feasible.
 const AIM: f64 = 1.0 - 2.0 * Kkt::VIOLATION;
+/// Largest number of programs in a row without a solution: a smaller trust region does not help where the solver fails.
+const FAILURES: usize = 4;
 /// Largest number of corrections of one trial.
 const CORRECTIONS: usize = 6;
 /// Shares of the predicted gain above which a step is good and below which it is poor.
@@ -77,7 +79,7 @@ impl Search<'_> {
         let mut here = self.point(start)?;
         let sizes = sizes(self.problem, start);
         let mut radius = FIRST_RADIUS;
-        let (mut ended, mut programs) = (ExtremeStatus::ProgramLimit, 0);
+        let (mut ended, mut programs, mut failures) = (ExtremeStatus::ProgramLimit, 0, 0);
         let size = target_size(target, start, &sizes);
         let reach = self.level.reach * size;
         while programs < self.level.programs {
@@ -88,6 +90,7 @@ impl Search<'_> {
             }
             programs += 1;
             let proposal = self.push(&here, target, side, radius, reach, &sizes);
+            failures = if proposal.is_some() { 0 } else { failures + 1 };
             let gain = proposal.as_ref().map_or(0.0, |p| p.gain);
             if proposal.as_ref().is_some_and(|p| p.is_largest) && gain <= SETTLED * size {
                 ended = ExtremeStatus::Converged;
@@ -108,7 +111,7 @@ impl Search<'_> {
                 }
                 _ => radius *= 0.25,
             }
-            if radius < RADII[0] {
+            if radius < RADII[0] || failures == FAILURES {
                 ended = ExtremeStatus::NoFeasibleStep;
                 break;
             }

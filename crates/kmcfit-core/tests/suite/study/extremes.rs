@@ -6,7 +6,7 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Loss;
 use kmcfit_core::internals::solvers::fit_from;
 use kmcfit_core::internals::study::extremes::{
-    ExtremeStatus, MisfitLimit, extreme, extreme_pairs, ratios_at, values_at,
+    ExtremeStatus, MisfitLimit, extreme, extreme_pairs, is_within_rounding, ratios_at, values_at,
 };
 use kmcfit_core::internals::study::profile_likelihood::QUANTILE_95;
 use kmcfit_core::internals::study::{Linear, ProfileSettings, Target, profile};
@@ -299,4 +299,30 @@ fn the_paper_s_optimum_is_within_its_level_on_its_grid() {
         clock.elapsed().as_secs_f64()
     );
     assert!(found.misfit <= 0.0114 && found.value < q.of(&optimum));
+}
+
+/// Samples that the response matches to machine precision give no limit of the misfit once penalties determine every function.
+#[test]
+fn an_exact_fit_of_penalised_functions_has_no_range() {
+    let n = 100;
+    let mut problem = paper_problem(n, [2.0, 1.0, 1.0]);
+    let truth = paper_system(n);
+    let theta = [
+        truth.mass.clone(),
+        truth.coefficients[0].clone(),
+        truth.coefficients[1].clone(),
+    ];
+    let theta = theta.concat();
+    let exact = problem.evaluate(&theta).unwrap();
+    assert!(!is_within_rounding(&problem, &exact));
+    for f in 0..3 {
+        let rows = Basis::Nodal.roughness(&problem.system.grid, 1);
+        problem.penalize(Penalty::new(f, 1, 1.0, rows)).unwrap();
+    }
+    let exact = problem.evaluate(&theta).unwrap();
+    assert!(is_within_rounding(&problem, &exact));
+    let mut other = theta;
+    other[n / 2] *= 1.001;
+    let off = problem.evaluate(&other).unwrap();
+    assert!(!is_within_rounding(&problem, &off));
 }
