@@ -4,7 +4,7 @@
 //! length, the excess values are ignored.
 
 use super::plot_mark::{Mark, MarkKind};
-use super::thin::{FEW, thinned};
+use super::thin::{Detail, thinned};
 use serde::{Serialize, Serializer};
 
 /// Ranges below this share of the largest value are rounding errors.
@@ -85,6 +85,16 @@ impl Figure {
         (!self.panels.is_empty()).then_some(self)
     }
 
+    /// The figure with its curves thinned to a detail.
+    pub(in crate::report) fn thinned(mut self, detail: Detail) -> Self {
+        for panel in &mut self.panels {
+            let scales = [panel.x.scale, panel.y.scale];
+            let marks = std::mem::take(&mut panel.marks).into_iter();
+            panel.marks = marks.map(|mark| thinned(mark, scales, 0, detail)).collect();
+        }
+        self
+    }
+
     /// Adds panels.
     #[must_use]
     pub fn panels(mut self, panels: impl IntoIterator<Item = Panel>) -> Self {
@@ -155,7 +165,9 @@ impl Panel {
     #[must_use]
     pub fn marks(mut self, marks: impl IntoIterator<Item = Mark>) -> Self {
         let scales = [self.x.scale, self.y.scale];
-        let marks = marks.into_iter().map(|mark| thinned(mark, scales, FEW));
+        let marks = marks
+            .into_iter()
+            .map(|mark| thinned(mark, scales, Detail::FULL.few, Detail::FULL));
         self.marks.extend(marks);
         self
     }
