@@ -40,8 +40,8 @@ fn the_first_screen_holds_verdict_answer_and_chart() {
         let source = browser.text("document.querySelector('main > .soft').textContent");
         let file = match page {
             "runs/hostile/report.html" | "runs/study/study.html" => HOSTILE_FILE,
-            "runs/plain/report.html" => "samples.csv, ",
-            _ => "samples.csv and 1 further file, ",
+            "runs/plain/report.html" => "samples.csv and 1 further file, 201 samples, 20 s, ",
+            _ => "samples.csv and 2 further files, ",
         };
         let date = source.rsplit(", ").next().unwrap_or_default();
         assert!(source.starts_with(file), "{page}: {source}");

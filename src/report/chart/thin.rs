@@ -1,7 +1,6 @@
 //! Thinning of curves, which bounds the size of pages of long records without visible change.
 
-use super::axis::{even, extent};
-use super::figure::Scale;
+use super::axis::{Scale, even, extent};
 use super::plot_mark::{Mark, MarkKind};
 
 /// Detail of the curves of a page.
