@@ -122,11 +122,13 @@ fn figure(figure: &Figure, off: &[&str], detail: Detail) -> String {
     let coarse = (detail != Detail::FULL).then(|| figure.clone().thinned(detail));
     let figure = coarse.as_ref().unwrap_or(figure);
     let drawn = data(figure, off);
+    let is_sentence = figure.description.is_empty() || figure.description.ends_with('.');
+    let end = if is_sentence { "" } else { "." };
     let thinned = match drawn.thinned {
-        true => {
-            " Long series are thinned for display: every peak is kept; all values are in the tables."
-        }
-        false => "",
+        true => format!(
+            "{end} Long series are thinned for display: every peak is kept; all values are in the tables."
+        ),
+        false => String::new(),
     };
     format!(
         "<figure class=\"chart\" id=\"figure-{}\">\n<figcaption><strong>{}</strong> \
@@ -175,14 +177,14 @@ mod tests {
         let mut y: Vec<f64> = t.iter().map(|t| (t * t).sin()).collect();
         y[1234] = 7.25;
         let line = Mark::points("samples", &t, &y, Style::nth(0));
-        let drawn = Figure::new("record", "", "").panel(Panel::of_time("y", "m").mark(line));
+        let drawn = Figure::new("record", "", "noise").panel(Panel::of_time("y", "m").mark(line));
         let drawn = vec![drawn; 30];
         let of = |detail| figures(&drawn, detail);
         assert!(of(Detail::FULL).len() > LARGEST && !of(Detail::FULL).contains("are thinned"));
         let page = within_limit(of);
         assert!(page.len() <= LARGEST, "{}", page.len());
         assert_eq!(page.matches("7.25").count(), 30, "the peak of each");
-        assert_eq!(page.matches("are thinned").count(), 30);
+        assert_eq!(page.matches("noise. Long series are thinned").count(), 30);
         let small = |detail| figures(&drawn[..1], detail);
         assert!(within_limit(small) == small(Detail::FULL));
     }
