@@ -1,4 +1,4 @@
-//! Services of the process for the numerics: clock, memory limit, thread starts, progress, choice of SIMD arithmetic.
+//! Services of the process for the numerics: clock, memory limit, thread starts, progress, interruption, choice of SIMD arithmetic.
 
 use crate::error::InputError;
 use crate::faults::{self, Operation};
@@ -19,6 +19,7 @@ pub fn provide_host() {
         has_memory: |bytes| memory::check(bytes).is_ok(),
         may_start_thread: || faults::check(Operation::Spawn),
         progress: super::progress::show_jobs,
+        is_interrupted: super::interrupt::is_asked,
     });
 }
 

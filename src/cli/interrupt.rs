@@ -51,6 +51,11 @@ fn is_ignored(signal: i32) -> bool {
     mask.unwrap_or(0) >> (signal - 1) & 1 == 1
 }
 
+/// True once a signal has asked the process to end.
+pub fn is_asked() -> bool {
+    RECEIVED.load(Ordering::Relaxed) != 0
+}
+
 /// The exit code of a run that a signal ended.
 pub fn exit_code() -> u8 {
     match RECEIVED.load(Ordering::Relaxed) {

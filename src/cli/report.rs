@@ -103,3 +103,46 @@ fn write(folder: &OutputFolder, kept: &[String], drawings: &[(String, String)]) 
     }
     stage.commit()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::Claim;
+
+    /// Of the figures of an earlier report the one that is not drawn any more is removed; tables and figures of the search stay.
+    #[test]
+    fn figures_that_are_not_drawn_are_removed() {
+        let place = tempfile::tempdir().expect("a folder");
+        let path = place.path().join("run");
+        let write_run = |kept: &[&str], drawn: &[&str]| {
+            let claim = Claim::new("fit").files(["functions.csv"]).family(
+                "figures",
+                "svg",
+                ["motion", "ratios", "spectra"],
+            );
+            let folder = OutputFolder::prepare(&path, claim).expect("a folder");
+            let kept: Vec<String> = kept.iter().map(ToString::to_string).collect();
+            let drawn = drawn
+                .iter()
+                .map(|name| (name.to_string(), name.to_string()));
+            write(&folder, &kept, &drawn.collect::<Vec<_>>()).expect("written");
+        };
+        let first = [
+            "functions.csv",
+            "figures/motion.svg",
+            "figures/ratios.svg",
+            "figures/spectra.svg",
+        ];
+        write_run(&[], &first);
+        write_run(&first, &["figures/ratios.svg"]);
+        let is_there = first.map(|name| path.join(name).exists());
+        assert_eq!(is_there, [true, true, true, false]);
+        let manifest = Manifest::read(&path)
+            .expect("readable")
+            .expect("a manifest");
+        assert_eq!(
+            manifest.files.keys().collect::<Vec<_>>(),
+            ["figures/motion.svg", "figures/ratios.svg", "functions.csv"]
+        );
+    }
+}

@@ -1,6 +1,7 @@
 //! The standard figures of a fit, from plain slices.
 
 use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
+use crate::number_format::significant;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
@@ -12,6 +13,8 @@ const MANY: usize = 400;
 
 /// Largest extent of a band beyond the curves, relative to their range, that the axis includes.
 const WIDE_BAND: f64 = 1.5;
+/// Half-width of a band relative to the range of its curve, below which the line of the curve covers it.
+const NARROW_BAND: f64 = 0.01;
 /// Relative variation below which a curve is treated as constant.
 const FLAT: f64 = 0.1;
 
@@ -164,9 +167,27 @@ impl<'a> FunctionCurve<'a> {
         is_wide.then(|| (limits.0.max(band.0), limits.1.min(band.1)))
     }
 
+    /// Label of the band; with its largest half-width if it is too narrow to be visible beside the curve.
+    fn band_label(&self) -> String {
+        let label = "95 % band";
+        let (Some((low, high)), Some(range)) = (self.band, extent(self.found.iter())) else {
+            return label.into();
+        };
+        let half_widths = high.iter().zip(low).map(|(high, low)| 0.5 * (high - low));
+        let half_width = half_widths.filter(|w| w.is_finite()).fold(0.0, f64::max);
+        let is_visible = half_width >= NARROW_BAND * (range.1 - range.0);
+        if is_visible || half_width == 0.0 {
+            return label.into();
+        }
+        let percent = significant(100.0 * half_width / range.0.abs().max(range.1.abs()), 2);
+        let symbol = self.name.split(' ').next_back().unwrap_or_default();
+        format!("{label}, at most ±{percent} % of max {symbol}")
+    }
+
     /// The function against the times `t` in s.
     pub fn panel(&self, t: &[f64]) -> Panel {
-        let band = |(low, high)| Mark::band("95 % band", t, low, high, Colour::Blue);
+        let label = self.band_label();
+        let band = |(low, high)| Mark::band(label, t, low, high, Colour::Blue);
         let start = |y| Mark::line("start", t, y, Style::new(Colour::Green).dash(Dash::Dotted));
         let mut panel = Panel::of_time(self.name, self.unit);
         if let Some((low, high)) = self.room() {
@@ -331,6 +352,22 @@ pub fn weight_path(path: &WeightPath) -> Figure {
 mod tests {
     use super::*;
     use crate::report::chart::svg;
+
+    /// A band of half-width 0.02 N/m on a stiffness from 4 to 5 N/m is 2 % of that range and visible; one of 0.005 N/m is not.
+    #[test]
+    fn a_narrow_band_has_its_half_width_in_the_legend() {
+        let (t, found) = ([0.0, 1.0], [4.0, 5.0]);
+        let label = |half_width: f64| {
+            let [low, high] = [-1.0, 1.0].map(|sign| found.map(|y| y + sign * half_width));
+            let curve = FunctionCurve {
+                band: Some((&low, &high)),
+                ..FunctionCurve::new("stiffness k", "N/m", &found)
+            };
+            curve.panel(&t).marks[0].label.clone()
+        };
+        assert_eq!(label(0.02), "95 % band");
+        assert_eq!(label(0.005), "95 % band, at most ±0.1 % of max k");
+    }
 
     /// A single iteration is drawn as dots, of three times the width of the lines in radius.
     #[test]

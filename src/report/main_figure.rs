@@ -43,7 +43,8 @@ impl FittedModel<'_> {
     }
 }
 
-/// Range of the estimate of a panel relative to the mean width of its band, or to its largest value without one; `None` for a constant.
+/// Range of the estimate of a panel relative to the mean width of its band, or without one to its largest value; `None` for a constant.
+/// Without a band a curve that reaches zero, as the rounding errors of a damping do, ranks last.
 pub(super) fn variation(panel: &Panel) -> Option<f64> {
     let estimate = panel.marks.iter().find(|mark| mark.label == "estimate")?;
     let [low, high] = estimate.range();
@@ -56,7 +57,11 @@ pub(super) fn variation(panel: &Panel) -> Option<f64> {
         widths.sum::<f64>() / band.y.len().max(1) as f64
     });
     let width = width.filter(|width| *width > 0.0);
-    Some(range / width.unwrap_or(largest))
+    Some(match width {
+        Some(width) => range / width,
+        None if low * high <= 0.0 => 0.0,
+        None => range / largest,
+    })
 }
 
 #[cfg(test)]
@@ -79,5 +84,6 @@ mod tests {
         assert_eq!(variation(&panel(&[10.0, 12.0, 14.0], 1.0)), Some(2.0));
         assert_eq!(variation(&panel(&[10.0, 12.0, 20.0], 0.0)), Some(0.5));
         assert_eq!(variation(&panel(&[10.0, 10.0 + 1e-12, 10.0], 1.0)), None);
+        assert_eq!(variation(&panel(&[-1e-7, 2e-7, 1e-7], 0.0)), Some(0.0));
     }
 }

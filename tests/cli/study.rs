@@ -58,6 +58,15 @@ fn a_study_reports_all_its_analyses() {
     let bench = bench();
     let stdout = bench.run_to(0, &["study", "model.yaml"]);
     assert!(stdout.contains("damping is identified"), "{stdout}");
+    // The order of the page.
+    let headings = [
+        "Constancy test",
+        "Candidate experiments",
+        "Likelihood profiles",
+        "Fit\n",
+    ];
+    let at = headings.map(|heading| stdout.find(&format!("\n{heading}")));
+    assert!(at.is_sorted() && at[0].is_some(), "{at:?} {stdout}");
     let study = document(&bench, "runs/model-study");
     assert_eq!(study["status"], "complete");
     assert_eq!(study["sensitivity"]["rank"], 5);

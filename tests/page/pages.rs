@@ -10,7 +10,7 @@ use tempfile::TempDir;
 pub const HOSTILE: &str = "<script>alert(1)</script></script>\"'&";
 
 /// Names of a data file and of a model file that must not become markup.
-const HOSTILE_FILE: &str = "<i>&'data.csv";
+pub const HOSTILE_FILE: &str = "<i>&'data.csv";
 pub const HOSTILE_STEM: &str = "<b>&'model";
 
 /// A light system with a force, a known truth, an active constraint, and names that contain markup.

@@ -1,7 +1,7 @@
 //! First screen, headings, tables and downloads of the page of a fit in a browser.
 
 use crate::browser::Browser;
-use crate::pages::{PAGES, pages};
+use crate::pages::{HOSTILE_FILE, PAGES, pages};
 use serde_json::{Value, json};
 
 const REPORT: &str = PAGES[0];
@@ -36,6 +36,19 @@ fn the_first_screen_holds_verdict_answer_and_chart() {
                 "{page}: {part} {top} {bottom}"
             );
         }
+        // Data files and the date of the last change.
+        let source = browser.text("document.querySelector('main > .soft').textContent");
+        let file = match page {
+            "runs/hostile/report.html" | "runs/study/study.html" => HOSTILE_FILE,
+            "runs/plain/report.html" => "samples.csv and 1 further file, 201 samples, 20 s, ",
+            _ => "samples.csv and 2 further files, ",
+        };
+        let date = source.rsplit(", ").next().unwrap_or_default();
+        assert!(source.starts_with(file), "{page}: {source}");
+        assert!(
+            date.len() == 10 && date.matches('-').count() == 2,
+            "{source}"
+        );
         // Text left, chart right.
         let text = edge(&mut browser, ".first > :first-child", "right");
         assert!(text <= edge(&mut browser, "#figure-main", "left"), "{page}");

@@ -1,7 +1,7 @@
 //! SIGTERM and kills of long commands.
 
 use crate::tree::whole_run;
-use crate::workbench::Workbench;
+use crate::workbench::{Workbench, sample_table};
 use serde_json::Value;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -90,6 +90,46 @@ fn a_comparison_is_resumed() {
         assert!(bench.path("run/compare.html").exists());
         std::fs::remove_dir_all(bench.path("run")).expect("removed");
     }
+}
+
+/// Ctrl-C within 100,000 refits ends the study; the analyses before them are kept. All refits take
+/// minutes; the end within one shows that they did not start.
+#[test]
+#[cfg(unix)]
+fn refits_do_not_start_after_an_interrupt() {
+    let bench = Workbench::with_small_model();
+    let model = bench.read("model.yaml").replace("nodal", "constant");
+    let model = model.replace("{basis: constant, start: 2.0}", "{fixed: 1.0}");
+    let model = model.replace("nodes: 21", "nodes: 2001");
+    bench.write(
+        "model.yaml",
+        &format!("{model}study: {{bootstrap: 100000}}\n"),
+    );
+    bench.write("samples.csv", &sample_table(2001));
+    let study = ["study", "model.yaml", "--out", "run", "--threads", "2"];
+    let mut child = started(&bench, &study);
+    // Heading, fit, sensitivity, bands and equivalent systems; the refits are next.
+    wait_for_lines(&bench, "run/study.journal", 5);
+    std::thread::sleep(Duration::from_millis(300));
+    signal(&child, "-INT");
+    let begin = Instant::now();
+    let code = loop {
+        if let Some(status) = child.try_wait().expect("its state") {
+            break status.code();
+        }
+        if begin.elapsed() > Duration::from_secs(60) {
+            child.kill().expect("a child");
+            panic!("the refits go on");
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    };
+    assert_eq!(code, Some(130));
+    let study: Value = serde_json::from_str(&bench.read("run/study.json")).expect("JSON");
+    assert_eq!(study["status"], "interrupted");
+    assert!(study["bands"]["bands"].is_array() && study["sensitivity"]["rank"].is_u64());
+    assert_eq!(study["bootstrap"].as_array().map(Vec::len), Some(0));
+    let journal = bench.read("run/study.journal");
+    assert!(!journal.contains("\"bootstrap\"") && journal.lines().count() == 5);
 }
 
 /// A signal that was ignored when the process started stays ignored.

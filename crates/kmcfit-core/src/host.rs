@@ -1,7 +1,8 @@
-//! Services of the host, provided by the application: a clock, the memory limit, the permission to start a thread, and a display of
-//! progress.
+//! Services of the host, provided by the application: a clock, the memory limit, the permission to start a thread, a display of
+//! progress, and a request to end.
 //!
-//! Without a host, a fit has no time limit, timings are zero, memory is unlimited, threads may start, and no progress is shown.
+//! Without a host, a fit has no time limit, timings are zero, memory is unlimited, threads may start, no progress is shown, and no
+//! analysis ends early.
 
 use std::io;
 use std::sync::OnceLock;
@@ -19,6 +20,8 @@ pub struct Host {
     /// Display of progress: number of finished jobs and number of all jobs of an analysis. Called from any thread, after each job; not
     /// necessarily in increasing order.
     pub progress: fn(usize, usize),
+    /// True once the user has asked the process to end: the remaining jobs of an analysis are not started. Never false again.
+    pub is_interrupted: fn() -> bool,
 }
 
 static HOST: OnceLock<Host> = OnceLock::new();
@@ -48,6 +51,11 @@ pub(crate) fn progress(done: usize, all: usize) {
     }
 }
 
+/// True if the host asks to end; always false without a host.
+pub(crate) fn is_interrupted() -> bool {
+    HOST.get().is_some_and(|host| (host.is_interrupted)())
+}
+
 /// Sets the process clock as host, for tests of timings.
 #[cfg(test)]
 pub(crate) fn provide_clock() {
@@ -58,6 +66,7 @@ pub(crate) fn provide_clock() {
         has_memory: |_| true,
         may_start_thread: || Ok(()),
         progress: |_, _| {},
+        is_interrupted: || false,
     });
 }
 

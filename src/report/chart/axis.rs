@@ -1,9 +1,9 @@
-//! Ranges and ticks of an axis.
+//! An axis, its range and ticks.
 //!
 //! Ranges are in the coordinate in which the axis is uniform: the value itself, or its decimal logarithm.
 
-use super::figure::{Axis, Scale};
 use crate::report::text;
+use serde::{Serialize, Serializer};
 
 /// Magnitudes beyond this leave gaps, so that no difference of two values overflows.
 const LARGEST: f64 = 1e300;
@@ -15,6 +15,74 @@ const FLAT: f64 = 1e-9;
 const PAD: f64 = 0.05;
 /// Axes over more decades have no ticks between them.
 const MINOR_DECADES: f64 = 7.0;
+
+/// Scale of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// Length proportional to the value.
+    Linear,
+    /// Length proportional to the logarithm; values at or below zero leave gaps.
+    Log,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
+fn is_log<S: Serializer>(scale: &Scale, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_bool(*scale == Scale::Log)
+}
+
+/// An axis: quantity, unit, scale and range.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Axis {
+    /// Quantity and symbol, as in `time t`.
+    pub label: String,
+    /// Unit, as in `s`; empty for a pure number.
+    pub unit: String,
+    /// Linear or logarithmic.
+    #[serde(rename = "log", serialize_with = "is_log")]
+    pub scale: Scale,
+    /// Lowest and highest value shown, in the unit of the axis; `None` for the range of the data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limits: Option<(f64, f64)>,
+}
+
+impl Axis {
+    /// A linear axis as wide as its data.
+    pub fn linear(label: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self {
+            label: label.into(),
+            unit: unit.into(),
+            scale: Scale::Linear,
+            limits: None,
+        }
+    }
+
+    /// A logarithmic axis over the whole decades that hold its data.
+    pub fn log(label: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self {
+            scale: Scale::Log,
+            ..Self::linear(label, unit)
+        }
+    }
+
+    /// Sets the lowest and the highest value shown; ignores invalid limits (not finite, not increasing, not positive on
+    /// a logarithmic axis).
+    #[must_use]
+    pub fn limits(mut self, low: f64, high: f64) -> Self {
+        let is_range = low.is_finite() && high.is_finite() && low < high;
+        let is_drawable = self.scale == Scale::Linear || low > 0.0;
+        self.limits = (is_range && is_drawable).then_some((low, high));
+        self
+    }
+
+    /// Label and unit as written beside the axis: `time t (s)`.
+    pub fn caption(&self) -> String {
+        match (self.label.as_str(), self.unit.as_str()) {
+            (label, "") => label.to_string(),
+            ("", unit) => unit.to_string(),
+            (label, unit) => format!("{label} ({unit})"),
+        }
+    }
+}
 
 /// Lowest and highest value in the uniform coordinate.
 pub(super) type Range = (f64, f64);

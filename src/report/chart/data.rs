@@ -1,7 +1,7 @@
 //! Serialisation of a figure for the script of a page.
 
 use super::figure::Figure;
-use super::thin::thinned;
+use super::thin::Detail;
 use crate::report::text::clean;
 use serde::Serialize;
 
@@ -20,12 +20,7 @@ pub(in crate::report) fn data(figure: &Figure, off: &[&str]) -> Data {
         #[serde(flatten)]
         figure: &'a Figure,
     }
-    let mut figure = figure.clone();
-    for panel in &mut figure.panels {
-        let scales = [panel.x.scale, panel.y.scale];
-        let marks = std::mem::take(&mut panel.marks).into_iter();
-        panel.marks = marks.map(|mark| thinned(mark, scales, 0)).collect();
-    }
+    let figure = figure.clone().thinned(Detail::FULL);
     let mut marks = figure.panels.iter().flat_map(|panel| &panel.marks);
     let thinned = marks.any(|mark| mark.is_thinned);
     let figure = &figure;

@@ -3,9 +3,10 @@
 //! Values that cannot be drawn (not finite, or not positive on a logarithmic axis) leave gaps. If `x` and `y` differ in
 //! length, the excess values are ignored.
 
+use super::axis::Axis;
 use super::plot_mark::{Mark, MarkKind};
-use super::thin::{FEW, thinned};
-use serde::{Serialize, Serializer};
+use super::thin::{Detail, thinned};
+use serde::Serialize;
 
 /// Ranges below this share of the largest value are rounding errors.
 const ROUNDING: f64 = 1e-9;
@@ -85,6 +86,16 @@ impl Figure {
         (!self.panels.is_empty()).then_some(self)
     }
 
+    /// The figure with its curves thinned to a detail.
+    pub(in crate::report) fn thinned(mut self, detail: Detail) -> Self {
+        for panel in &mut self.panels {
+            let scales = [panel.x.scale, panel.y.scale];
+            let marks = std::mem::take(&mut panel.marks).into_iter();
+            panel.marks = marks.map(|mark| thinned(mark, scales, 0, detail)).collect();
+        }
+        self
+    }
+
     /// Adds panels.
     #[must_use]
     pub fn panels(mut self, panels: impl IntoIterator<Item = Panel>) -> Self {
@@ -155,76 +166,10 @@ impl Panel {
     #[must_use]
     pub fn marks(mut self, marks: impl IntoIterator<Item = Mark>) -> Self {
         let scales = [self.x.scale, self.y.scale];
-        let marks = marks.into_iter().map(|mark| thinned(mark, scales, FEW));
+        let marks = marks
+            .into_iter()
+            .map(|mark| thinned(mark, scales, Detail::FULL.few, Detail::FULL));
         self.marks.extend(marks);
         self
-    }
-}
-
-/// Scale of an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scale {
-    /// Length proportional to the value.
-    Linear,
-    /// Length proportional to the logarithm; values at or below zero leave gaps.
-    Log,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
-fn is_log<S: Serializer>(scale: &Scale, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_bool(*scale == Scale::Log)
-}
-
-/// An axis: quantity, unit, scale and range.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Axis {
-    /// Quantity and symbol, as in `time t`.
-    pub label: String,
-    /// Unit, as in `s`; empty for a pure number.
-    pub unit: String,
-    /// Linear or logarithmic.
-    #[serde(rename = "log", serialize_with = "is_log")]
-    pub scale: Scale,
-    /// Lowest and highest value shown, in the unit of the axis; `None` for the range of the data.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub limits: Option<(f64, f64)>,
-}
-
-impl Axis {
-    /// A linear axis as wide as its data.
-    pub fn linear(label: impl Into<String>, unit: impl Into<String>) -> Self {
-        Self {
-            label: label.into(),
-            unit: unit.into(),
-            scale: Scale::Linear,
-            limits: None,
-        }
-    }
-
-    /// A logarithmic axis over the whole decades that hold its data.
-    pub fn log(label: impl Into<String>, unit: impl Into<String>) -> Self {
-        Self {
-            scale: Scale::Log,
-            ..Self::linear(label, unit)
-        }
-    }
-
-    /// Sets the lowest and the highest value shown; ignores invalid limits (not finite, not increasing, not positive on
-    /// a logarithmic axis).
-    #[must_use]
-    pub fn limits(mut self, low: f64, high: f64) -> Self {
-        let is_range = low.is_finite() && high.is_finite() && low < high;
-        let is_drawable = self.scale == Scale::Linear || low > 0.0;
-        self.limits = (is_range && is_drawable).then_some((low, high));
-        self
-    }
-
-    /// Label and unit as written beside the axis: `time t (s)`.
-    pub fn caption(&self) -> String {
-        match (self.label.as_str(), self.unit.as_str()) {
-            (label, "") => label.to_string(),
-            ("", unit) => unit.to_string(),
-            (label, unit) => format!("{label} ({unit})"),
-        }
     }
 }

@@ -1,8 +1,8 @@
 //! Layout of the panels and the legend of a figure.
 
-use super::axis::{self, Range, Ruler};
+use super::axis::{self, Axis, Range, Ruler, Scale};
 use super::drawing::{Frame, Sheet};
-use super::figure::{Axis, Figure, FigureWidth, Panel, Scale};
+use super::figure::{Figure, FigureWidth, Panel};
 use super::legend;
 use super::panel::{Placed, SIZE, label_height, label_width};
 

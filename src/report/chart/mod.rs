@@ -1,6 +1,6 @@
 //! Charts: the data model of a figure, and its two renderers.
 //!
-//! [`figure`] and [`plot_mark`] describe the contents of a figure. `layout`, `panel`, `legend`, `axis` and `curve` turn it
+//! [`figure`], [`plot_mark`] and `axis` describe the contents of a figure. `layout`, `panel`, `legend`, `axis` and `curve` turn it
 //! into primitives in pixels, which [`svg`] writes; `data` serialises the same description for the script of a page.
 
 mod axis;
@@ -16,9 +16,11 @@ pub mod plot_mark;
 pub mod svg;
 mod thin;
 
+pub use axis::{Axis, Scale};
 pub(super) use data::{data, text_for_script};
-pub use figure::{Axis, Figure, FigureWidth, Panel, Scale};
+pub use figure::{Figure, FigureWidth, Panel};
 pub(super) use plot_mark::MarkKind;
 pub use plot_mark::{Colour, Dash, Mark, Style};
 pub(super) use svg::sample;
 pub use svg::{render, render_at};
+pub(super) use thin::Detail;

@@ -1,19 +1,46 @@
 //! Thinning of curves, which bounds the size of pages of long records without visible change.
 
-use super::axis::{even, extent};
-use super::figure::Scale;
+use super::axis::{Scale, even, extent};
 use super::plot_mark::{Mark, MarkKind};
 
-/// Longest curve that is not thinned, points.
-pub(super) const FEW: usize = 4000;
-/// Columns of a longer curve, in each of which its first, lowest, highest and last point are kept: more than the pixels
-/// of a chart.
-const COLUMNS: f64 = 700.0;
+/// Detail of the curves of a page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::report) struct Detail {
+    /// Longest curve that is not thinned, points.
+    pub(super) few: usize,
+    /// Columns of a longer curve, in each of which its first, lowest, highest and last point are kept.
+    columns: u32,
+}
+
+impl Detail {
+    /// Columns finer than the pixels of a chart.
+    pub const FULL: Self = Self {
+        few: 4000,
+        columns: 700,
+    };
+    /// Fewest columns.
+    const FEWEST: u32 = 16;
+
+    /// Half the columns; `None` where curves would lose their shape.
+    pub fn coarser(self) -> Option<Self> {
+        let columns = self.columns / 2;
+        (columns >= Self::FEWEST).then_some(Self {
+            few: 2 * columns as usize,
+            columns,
+        })
+    }
+}
+
 /// Tolerance, relative to the range of the curve, within which points on a straight line are removed.
 const STRAIGHT: f64 = 1e-6;
 
 /// A curve, points or a band of more than `most` points on the scales of x and y, with the points that show.
-pub(super) fn thinned(mut mark: Mark, [x_scale, y_scale]: [Scale; 2], most: usize) -> Mark {
+pub(super) fn thinned(
+    mut mark: Mark,
+    [x_scale, y_scale]: [Scale; 2],
+    most: usize,
+    detail: Detail,
+) -> Mark {
     let is_band = mark.kind == MarkKind::Band;
     let is_curve = is_band || matches!(mark.kind, MarkKind::Line | MarkKind::Points);
     if !is_curve || mark.x.len() <= most {
@@ -22,7 +49,7 @@ pub(super) fn thinned(mut mark: Mark, [x_scale, y_scale]: [Scale; 2], most: usiz
     let mut ys = vec![(mark.y.as_slice(), y_scale)];
     ys.extend(is_band.then_some((&mark.high[..], y_scale)));
     let is_joined = mark.kind != MarkKind::Points;
-    let (points, is_thinned) = kept((&mark.x, x_scale), &ys, is_joined);
+    let (points, is_thinned) = kept((&mark.x, x_scale), &ys, is_joined, detail);
     let Mark { x, y, high, .. } = &mut mark;
     for values in [x, y, high].into_iter().filter(|values| !values.is_empty()) {
         *values = points.iter().map(|i| values[*i]).collect();
@@ -33,11 +60,19 @@ pub(super) fn thinned(mut mark: Mark, [x_scale, y_scale]: [Scale; 2], most: usiz
 
 /// Indices of the kept points of curves `ys` over one `x`, and true if removed points would be visible when zoomed.
 /// `joined`: the points are joined by lines.
-fn kept(x: (&[f64], Scale), ys: &[(&[f64], Scale)], joined: bool) -> (Vec<usize>, bool) {
+fn kept(
+    x: (&[f64], Scale),
+    ys: &[(&[f64], Scale)],
+    joined: bool,
+    detail: Detail,
+) -> (Vec<usize>, bool) {
     let count = (ys.iter().map(|(y, _)| y.len())).fold(x.0.len(), usize::min);
     let all: Vec<usize> = (0..count).collect();
-    let thinned = count > FEW;
-    let points = if thinned { columns(x, ys, &all) } else { all };
+    let thinned = count > detail.few;
+    let points = match thinned {
+        true => columns(x, ys, &all, f64::from(detail.columns)),
+        false => all,
+    };
     let [(y, scale)] = ys else {
         return (points, thinned);
     };
@@ -53,9 +88,14 @@ fn kept(x: (&[f64], Scale), ys: &[(&[f64], Scale)], joined: bool) -> (Vec<usize>
 }
 
 /// Per column the first and last point, and the lowest and highest of every curve.
-fn columns((x, scale): (&[f64], Scale), ys: &[(&[f64], Scale)], points: &[usize]) -> Vec<usize> {
+fn columns(
+    (x, scale): (&[f64], Scale),
+    ys: &[(&[f64], Scale)],
+    points: &[usize],
+    columns: f64,
+) -> Vec<usize> {
     let (low, high) = extent(scale, x).unwrap_or((0.0, 1.0));
-    let column = |i: usize| (COLUMNS * (even(scale, x[i]) - low) / (high - low)).floor();
+    let column = |i: usize| (columns * (even(scale, x[i]) - low) / (high - low)).floor();
     let alike = |a: &usize, b: &usize| column(*a).total_cmp(&column(*b)).is_eq();
     let mut kept = Vec::new();
     for chunk in points.chunk_by(alike) {
@@ -132,7 +172,7 @@ mod tests {
         let mut y: Vec<f64> = x.iter().map(|x| (0.3 * x).sin()).collect();
         y[40_001] = 9.0;
         y[50_001] = f64::NAN;
-        let (points, thinned) = kept((&x, LINEAR), &[(&y, LINEAR)], true);
+        let (points, thinned) = kept((&x, LINEAR), &[(&y, LINEAR)], true, Detail::FULL);
         assert!(thinned && points.len() <= 4 * 701 + 1, "{}", points.len());
         assert!(
             [0, 40_001, 50_001, 64_999]
@@ -140,7 +180,12 @@ mod tests {
                 .all(|i| points.contains(i))
         );
         assert!(points.is_sorted());
-        let (points, thinned) = kept((&x[..4000], LINEAR), &[(&y[..4000], LINEAR)], true);
+        let (points, thinned) = kept(
+            (&x[..4000], LINEAR),
+            &[(&y[..4000], LINEAR)],
+            true,
+            Detail::FULL,
+        );
         assert!(!thinned && points.len() == 4000);
     }
 
@@ -148,7 +193,7 @@ mod tests {
     fn straight_pieces_are_their_ends() {
         let x: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 0.01).collect();
         let bent: Vec<f64> = x.iter().map(|x| (x - 4.0).abs()).collect();
-        let of = |y: &[f64]| kept((&x, LINEAR), &[(y, LINEAR)], true).0;
+        let of = |y: &[f64]| kept((&x, LINEAR), &[(y, LINEAR)], true, Detail::FULL).0;
         assert_eq!(of(&bent), [0, 400, 1000]);
         assert_eq!(of(&vec![2.0; 1001]), [0, 1000]);
         // Removed points are on the remaining segments.
@@ -171,7 +216,8 @@ mod tests {
             vec![1.0; 9000],
             (0..9000).map(f64::from).collect::<Vec<_>>(),
         );
-        assert_eq!(kept((&x, LINEAR), &[(&y, LINEAR)], false).0, [0, 8999]);
+        let kept = kept((&x, LINEAR), &[(&y, LINEAR)], false, Detail::FULL);
+        assert_eq!(kept.0, [0, 8999]);
     }
 
     #[test]
@@ -179,7 +225,7 @@ mod tests {
         let x: Vec<f64> = (0..100).map(f64::from).collect();
         let mut y = vec![1.0; 100];
         y[50] = f64::NAN;
-        let (points, _) = kept((&x, LINEAR), &[(&y, LINEAR)], true);
+        let (points, _) = kept((&x, LINEAR), &[(&y, LINEAR)], true, Detail::FULL);
         assert_eq!(points, [0, 49, 50, 51, 99]);
     }
 }

@@ -7,12 +7,18 @@ use super::selection;
 use super::table::{Cell, known_rows};
 use super::verdict::Agreement;
 use super::{CLOSE, Comparison, MATCHED};
-use crate::report::chart::{Figure, Style, sample};
+use crate::config::DataFile;
+use crate::report::chart::{Detail, Figure, Style, sample};
 use crate::report::page as shell;
 use crate::report::text::{escape, prose};
 use kmcfit_core::internals::assessment::RECOVERY_TOLERANCE;
+use std::path::Path;
 
 pub(super) fn page(comparison: &Comparison) -> String {
+    shell::within_limit(|detail| page_of(comparison, detail))
+}
+
+fn page_of(comparison: &Comparison, detail: Detail) -> String {
     let count = comparison.measures.len() + comparison.left_out.len();
     let title = match (&comparison.sequence, count) {
         (Some(title), _) => title.clone(),
@@ -25,7 +31,7 @@ pub(super) fn page(comparison: &Comparison) -> String {
     };
     let drawn = |figures: &[Option<Figure>]| {
         let figures = figures.iter().flatten().cloned();
-        shell::figures(&figures.collect::<Vec<_>>())
+        shell::figures(&figures.collect::<Vec<_>>(), detail)
     };
     let curves = [figures::functions(comparison), figures::ratios(comparison)];
     let notes = format!(
@@ -58,11 +64,11 @@ pub(super) fn page(comparison: &Comparison) -> String {
             drawn(&[figures::convergence(comparison)]),
         ),
     ];
-    shell::sectioned(&title, &first_screen(comparison), sections)
+    shell::sectioned(&title, &first_screen(comparison, detail), sections)
 }
 
 /// Records, conclusion, table of models with its meaning in words, and main figure.
-fn first_screen(comparison: &Comparison) -> String {
+fn first_screen(comparison: &Comparison, detail: Detail) -> String {
     let is_sequence = comparison.sequence.is_some();
     let mut sentences = match is_sequence {
         true => on_the_truth(&comparison.measures),
@@ -79,18 +85,29 @@ fn first_screen(comparison: &Comparison) -> String {
         &models.rows,
     );
     let text = shell::list(&sentences) + &left_out(comparison);
-    shell::screen(&(above + &table), &text, figures::main(comparison))
+    shell::screen(&(above + &table), &text, figures::main(comparison), detail)
 }
 
-/// Number of samples and duration of the common records; empty where the runs have different ones.
+/// Data files of all runs, each once, with the date of the last change; number of samples and duration where the runs have common records.
 fn records(comparison: &Comparison) -> String {
+    let mut files: Vec<DataFile> = Vec::new();
+    for file in comparison.runs.iter().flat_map(|run| &run.data) {
+        let is_same = |other: &DataFile| {
+            Path::new(&other.name).file_name() == Path::new(&file.name).file_name()
+                && other.content == file.content
+        };
+        if !files.iter().any(is_same) {
+            files.push(file.clone());
+        }
+    }
     let first = comparison.runs.first();
-    let Some(run) = first.filter(|_| comparison.warning().is_none()) else {
-        return String::new();
-    };
-    let document = &run.finished.document;
-    let samples = document.experiments.iter().map(|e| e.samples).sum();
-    shell::source_line(&[], samples, document.model.duration)
+    let common = first.filter(|_| comparison.warning().is_none());
+    let size = common.map(|run| {
+        let document = &run.finished.document;
+        let samples = document.experiments.iter().map(|e| e.samples).sum();
+        (samples, document.model.duration)
+    });
+    shell::source_line(&files, size)
 }
 
 /// The conclusion: the best model where models are ranked, else the agreement with the true system. The sentence of the best model moves from

@@ -1,5 +1,6 @@
 //! A compared run, read from its folder.
 
+use crate::config::{DataFile, ModelFile, ModelSource, Override};
 use crate::error::InputError;
 use crate::report::{ResultTable, Run};
 use std::path::Path;
@@ -19,6 +20,8 @@ pub struct ComparedRun {
     pub cost_ratio: Vec<f64>,
     /// Fitted responses.
     pub responses: Vec<MatchedResponse>,
+    /// Data files of its model file; none where that file or its text cannot be read any more.
+    pub(super) data: Vec<DataFile>,
     /// Channels of the validation records.
     pub(super) validation: Vec<ValidationChannel>,
 }
@@ -73,6 +76,7 @@ impl ComparedRun {
                 .collect(),
             cost_ratio: finished.history.iter().map(|r| r.cost_ratio).collect(),
             validation: validation(&finished),
+            data: data(&finished),
             responses: responses(&finished.trajectory, names),
             finished,
         })
@@ -96,6 +100,14 @@ impl ComparedRun {
     pub fn times(&self) -> Vec<f64> {
         self.finished.system.grid.times()
     }
+}
+
+/// The data files of the model file of a run.
+fn data(run: &Run) -> Vec<DataFile> {
+    let model = &run.document.model;
+    let overrides = Override::parse_all(&model.overrides);
+    let file = overrides.and_then(|set| ModelFile::read_with_overrides(&model.file, &set));
+    file.map_or_else(|_| Vec::new(), |file| ModelSource::of(&file).data)
 }
 
 /// Channels of the validation records from their tables; none without such a table.

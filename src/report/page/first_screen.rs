@@ -8,7 +8,7 @@ use crate::finding::Finding;
 use crate::number_format::significant;
 use crate::report::FittedModel;
 use crate::report::answer::{AnswerRow, answer};
-use crate::report::chart::Figure;
+use crate::report::chart::{Detail, Figure};
 use crate::report::document::{ResultDocument, Verdict, level_in_words};
 use crate::report::summary::count;
 use crate::report::text::{escape, prose};
@@ -20,25 +20,37 @@ use std::time::{SystemTime, UNIX_EPOCH};
 const DAY: u64 = 86_400;
 
 /// Everything above the contents.
-pub(super) fn first_screen(run: &FittedModel, document: &ResultDocument) -> String {
+pub(super) fn first_screen(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
     let samples = document.experiments.iter().map(|e| e.samples).sum();
-    let source = source_line(&run.model.source.data, samples, document.model.duration);
+    let size = Some((samples, document.model.duration));
+    let source = source_line(&run.model.source.data, size);
     let state = match &document.verdict {
         Some(verdict) => verdict_line(verdict),
         None => state(document),
     };
     let answer = answers(document) + &advice(document);
-    screen(&(source + &state), &answer, run.main_figure(document))
+    screen(
+        &(source + &state),
+        &answer,
+        run.main_figure(document),
+        detail,
+    )
 }
 
 /// What stands above the contents: lines over the whole width, and below them a text beside the main figure.
-pub(in crate::report) fn screen(above: &str, text: &str, main: Option<Figure>) -> String {
-    let main = figures(&main.into_iter().collect::<Vec<_>>());
+pub(in crate::report) fn screen(
+    above: &str,
+    text: &str,
+    main: Option<Figure>,
+    detail: Detail,
+) -> String {
+    let main = figures(&main.into_iter().collect::<Vec<_>>(), detail);
     format!("{above}<div class=\"first\">\n<div>\n{text}</div>\n<div>\n{main}</div>\n</div>\n")
 }
 
-/// Data files, number of samples, duration (s), and date of the last change of a file.
-pub(in crate::report) fn source_line(files: &[DataFile], samples: usize, duration: f64) -> String {
+/// Data files, number of samples and duration (s) where all records of the page have the same, and date of the last change of a file.
+/// Empty without any of them.
+pub(in crate::report) fn source_line(files: &[DataFile], size: Option<(usize, f64)>) -> String {
     let mut parts = Vec::new();
     parts.extend(match files {
         [] => None,
@@ -49,10 +61,15 @@ pub(in crate::report) fn source_line(files: &[DataFile], samples: usize, duratio
             count(rest.len(), "further file")
         )),
     });
-    parts.push(count(samples, "sample"));
-    parts.push(format!("{} s", significant(duration, 4)));
+    if let Some((samples, duration)) = size {
+        parts.push(count(samples, "sample"));
+        parts.push(format!("{} s", significant(duration, 4)));
+    }
     parts.extend(files.iter().filter_map(|f| f.modified).max().and_then(date));
-    format!("<p class=\"soft\">{}</p>\n", escape(&parts.join(", ")))
+    match parts.is_empty() {
+        true => String::new(),
+        false => format!("<p class=\"soft\">{}</p>\n", escape(&parts.join(", "))),
+    }
 }
 
 /// Name of a file without its folder.

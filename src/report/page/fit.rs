@@ -3,10 +3,12 @@
 use super::animation::animation;
 use super::first_screen::first_screen;
 use super::table::{list, paragraph};
-use super::{Section, figures, figures_without, overview, reproducibility, sectioned, settings};
+use super::{
+    Section, figures, figures_without, overview, reproducibility, sectioned, settings, within_limit,
+};
 use crate::finding::Finding;
 use crate::report::FittedModel;
-use crate::report::chart::Figure;
+use crate::report::chart::{Detail, Figure};
 use crate::report::document::ResultDocument;
 use crate::report::equation::equation_residual;
 use crate::report::figures::weight_path;
@@ -21,9 +23,22 @@ const START: &[&str] = &["start"];
 
 /// The page of a run.
 pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> String {
+    within_limit(|detail| page_of(run, document, detail))
+}
+
+fn page_of(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
+    let figures = |drawn: &[Figure]| figures(drawn, detail);
     let sections: Vec<Section> = vec![
-        ("fit", "Fit and residuals", fit_and_residuals(run, document)),
-        ("functions", "Coefficients", coefficients(run, document)),
+        (
+            "fit",
+            "Fit and residuals",
+            fit_and_residuals(run, document, detail),
+        ),
+        (
+            "functions",
+            "Coefficients",
+            coefficients(run, document, detail),
+        ),
         ("input", "Input", figures(&run.input_figures())),
         (
             "spectra",
@@ -53,13 +68,17 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
             "Reproduce",
             reproducibility::reproducibility(run, document),
         ),
-        ("solver", "Solver", solver(run, document)),
+        ("solver", "Solver", solver(run, document, detail)),
     ];
-    sectioned(&document.title, &first_screen(run, document), sections)
+    sectioned(
+        &document.title,
+        &first_screen(run, document, detail),
+        sections,
+    )
 }
 
 /// Fit of each channel, key figures, and figures of records and residuals.
-fn fit_and_residuals(run: &FittedModel, document: &ResultDocument) -> String {
+fn fit_and_residuals(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
     let mut drawn = run.each_channel(FittedModel::channel_fit);
     drawn.extend(run.validation_figures());
     let equation = document.equation.iter();
@@ -68,12 +87,12 @@ fn fit_and_residuals(run: &FittedModel, document: &ResultDocument) -> String {
         + &overview::facts(document)
         + &list(&equation.collect::<Vec<_>>())
         + &list(&lines(|text| write_statistics(text, document)))
-        + &figures(&drawn)
+        + &figures(&drawn, detail)
         + &animation(run, document)
 }
 
 /// Table of all coefficients, and figures of those that vary.
-fn coefficients(run: &FittedModel, document: &ResultDocument) -> String {
+fn coefficients(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
     let mut ratios = run.ratios_figure();
     // Ratios to a damping of zero to machine precision are rounding errors.
     if document
@@ -88,7 +107,7 @@ fn coefficients(run: &FittedModel, document: &ResultDocument) -> String {
     }
     let varying = [run.functions_figure(), ratios].map(Figure::varying);
     let varying: Vec<Figure> = varying.into_iter().flatten().collect();
-    overview::functions(document) + &figures_without(START, &varying)
+    overview::functions(document) + &figures_without(START, &varying, detail)
 }
 
 /// Findings in the data and what was done with them, warnings, and automatic choices.
@@ -106,7 +125,7 @@ fn data(document: &ResultDocument) -> String {
 }
 
 /// End, work and convergence of the search, folded.
-fn solver(run: &FittedModel, document: &ResultDocument) -> String {
+fn solver(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
     let mut drawn: Vec<Figure> = run.weights.map(weight_path).into_iter().collect();
     // One iteration is no curve.
     if run.fit.history.len() > 1 {
@@ -124,7 +143,7 @@ fn solver(run: &FittedModel, document: &ResultDocument) -> String {
     let attempts = list(&lines(|text| write_attempts(text, document)));
     format!(
         "<details>\n<summary>End of the search, work and convergence</summary>\n{work}{attempts}{}</details>\n",
-        figures(&drawn)
+        figures(&drawn, detail)
     )
 }
 

@@ -17,7 +17,7 @@ pub(super) use fit::page as fit_page;
 pub(crate) use reproducibility::quoted as shell_quoted;
 pub(super) use table::{list, marked_table, paragraph, table};
 
-use super::chart::{Figure, data, render};
+use super::chart::{Detail, Figure, data, render};
 use super::text::escape;
 use data_encoding::BASE64;
 use sha2::{Digest, Sha256};
@@ -65,6 +65,21 @@ fn page(title: &str, body: &str) -> String {
     )
 }
 
+/// Largest page, bytes.
+const LARGEST: usize = 1_900_000;
+
+/// A page of at most [`LARGEST`] bytes: the curves of a larger one are thinned further, down to the coarsest detail.
+pub(super) fn within_limit(page: impl Fn(Detail) -> String) -> String {
+    let mut detail = Detail::FULL;
+    loop {
+        let text = page(detail);
+        match detail.coarser().filter(|_| text.len() > LARGEST) {
+            Some(coarser) => detail = coarser,
+            None => return text,
+        }
+    }
+}
+
 /// A section of a page: anchor, heading, body.
 pub(super) type Section = (&'static str, &'static str, String);
 
@@ -103,13 +118,17 @@ fn hash(text: &str) -> String {
 
 /// A figure with its caption: a drawing, and its numbers for the chart. Title and description of the figure are its
 /// text for screen readers.
-fn figure(figure: &Figure, off: &[&str]) -> String {
+fn figure(figure: &Figure, off: &[&str], detail: Detail) -> String {
+    let coarse = (detail != Detail::FULL).then(|| figure.clone().thinned(detail));
+    let figure = coarse.as_ref().unwrap_or(figure);
     let drawn = data(figure, off);
+    let is_sentence = figure.description.is_empty() || figure.description.ends_with('.');
+    let end = if is_sentence { "" } else { "." };
     let thinned = match drawn.thinned {
-        true => {
-            " Long series are thinned for display: every peak is kept; all values are in the tables."
-        }
-        false => "",
+        true => format!(
+            "{end} Long series are thinned for display: every peak is kept; all values are in the tables."
+        ),
+        false => String::new(),
     };
     format!(
         "<figure class=\"chart\" id=\"figure-{}\">\n<figcaption><strong>{}</strong> \
@@ -130,13 +149,13 @@ fn help() -> String {
 }
 
 /// Figures one below the other.
-pub(super) fn figures(figures: &[Figure]) -> String {
-    figures_without(&[], figures)
+pub(super) fn figures(figures: &[Figure], detail: Detail) -> String {
+    figures_without(&[], figures, detail)
 }
 
 /// Figures whose curves with the labels `off` are initially hidden, because their range would flatten the others.
-fn figures_without(off: &[&str], figures: &[Figure]) -> String {
-    figures.iter().map(|f| figure(f, off)).collect()
+fn figures_without(off: &[&str], figures: &[Figure], detail: Detail) -> String {
+    figures.iter().map(|f| figure(f, off, detail)).collect()
 }
 
 /// An SVG drawing for inclusion in HTML, without a name space.
@@ -149,6 +168,26 @@ fn inline(svg: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::chart::{Mark, Panel, Style};
+
+    /// Thirty records of 4000 samples, noise that no straight line replaces, exceed the limit at full detail. Every peak stays.
+    #[test]
+    fn a_large_page_is_thinned_to_the_limit() {
+        let t: Vec<f64> = (0..4000).map(f64::from).collect();
+        let mut y: Vec<f64> = t.iter().map(|t| (t * t).sin()).collect();
+        y[1234] = 7.25;
+        let line = Mark::points("samples", &t, &y, Style::nth(0));
+        let drawn = Figure::new("record", "", "noise").panel(Panel::of_time("y", "m").mark(line));
+        let drawn = vec![drawn; 30];
+        let of = |detail| figures(&drawn, detail);
+        assert!(of(Detail::FULL).len() > LARGEST && !of(Detail::FULL).contains("are thinned"));
+        let page = within_limit(of);
+        assert!(page.len() <= LARGEST, "{}", page.len());
+        assert_eq!(page.matches("7.25").count(), 30, "the peak of each");
+        assert_eq!(page.matches("noise. Long series are thinned").count(), 30);
+        let small = |detail| figures(&drawn[..1], detail);
+        assert!(within_limit(small) == small(Detail::FULL));
+    }
 
     #[test]
     fn the_script_stands_in_any_page() {

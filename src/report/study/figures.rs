@@ -202,7 +202,10 @@ pub fn directions(study: &StudyDocument) -> Vec<Figure> {
             format!("Parameter combinations identified {name}"),
             "Change of each function against time along these combinations.",
         );
-        Some(figure.panels(panels))
+        let figure = figure.panels(panels);
+        // The values of constants stand in the sentences.
+        let varies = !figure.panels.iter().all(Panel::is_constant);
+        varies.then_some(figure)
     };
     let sets = [("best", &spectrum.best[..]), ("worst", &spectrum.worst)];
     sets.into_iter().filter_map(figure).collect()

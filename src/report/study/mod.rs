@@ -50,7 +50,7 @@ impl StudyDocument {
         }
         let samples = model.problem.channels().map(Channel::len).sum();
         let duration = model.problem.system.grid.duration();
-        let source = source_line(&model.source.data, samples, duration);
+        let source = source_line(&model.source.data, Some((samples, duration)));
         stage.write("study.html", page::page(self, &source))?;
         stage.write("study.json", json(self))?;
         stage.commit()

@@ -3,39 +3,28 @@
 use super::StudyDocument;
 use super::figures;
 use super::text::{Part, widest_range};
-use crate::report::chart::Figure;
+use crate::report::chart::{Detail, Figure};
 use crate::report::page as shell;
 use crate::report::text::{escape, prose};
-
-/// The parts in order of what the user can do about them: mend the study or the fit, change the model, measure again; then what the records
-/// determine, and the basis of these findings.
-const ORDER: [(Part, &str); 13] = [
-    (Part::Failures, "failures"),
-    (Part::Multistart, "starts"),
-    (Part::Constancy, "constancy"),
-    (Part::Candidates, "candidates"),
-    (Part::Bands, "bands"),
-    (Part::Profiles, "profiles"),
-    (Part::Bootstrap, "bootstrap"),
-    (Part::Extremes, "extremes"),
-    (Part::Predictions, "predictions"),
-    (Part::EquivalentSystems, "equivalent-systems"),
-    (Part::Sensitivity, "sensitivity"),
-    (Part::StructuralRank, "structural-rank"),
-    (Part::Fit, "fit"),
-];
 
 /// Predictions with a chart; those of the others are in `figures/study-predictions.svg`, so that the page stays below 2 MB.
 const MOST_PREDICTIONS: usize = 2;
 
-/// Leading parts of [`ORDER`] whose first findings stand on the first screen.
+/// Leading parts whose first findings stand on the first screen.
 const LEADING: usize = 4;
 
 /// The page: one HTML file without external resources. `source` is the line on its data.
 pub fn page(study: &StudyDocument, source: &str) -> String {
-    let mut sections: Vec<shell::Section> = ORDER
+    shell::within_limit(|detail| page_of(study, source, detail))
+}
+
+fn page_of(study: &StudyDocument, source: &str, detail: Detail) -> String {
+    let mut sections: Vec<shell::Section> = Part::ALL
         .iter()
-        .map(|(part, anchor)| (*anchor, part.heading(), section(study, *part)))
+        .map(|part| {
+            let body = section(study, *part, detail);
+            (part.anchor(), part.heading(), body)
+        })
         .collect();
     let made = format!(
         "Made by kmcfit {}; seed {}, confidence {}; the study is {}.",
@@ -43,10 +32,10 @@ pub fn page(study: &StudyDocument, source: &str) -> String {
     );
     sections.push(("made", "Settings", shell::paragraph(&made)));
     let title = format!("Study of identifiability: {}", study.title);
-    shell::sectioned(&title, &first_screen(study, source), sections)
+    shell::sectioned(&title, &first_screen(study, source, detail), sections)
 }
 
-fn first_screen(study: &StudyDocument, source: &str) -> String {
+fn first_screen(study: &StudyDocument, source: &str, detail: Detail) -> String {
     let fit = study.fit.as_ref();
     let state = fit.map_or(String::new(), |fit| match &fit.verdict {
         Some(verdict) => shell::verdict_line(verdict),
@@ -57,7 +46,12 @@ fn first_screen(study: &StudyDocument, source: &str) -> String {
         status => state + &shell::paragraph(&format!("The study is {status}.")),
     };
     let text = quantities(study) + &leading(study);
-    shell::screen(&(source.to_owned() + &state), &text, figures::main(study))
+    shell::screen(
+        &(source.to_owned() + &state),
+        &text,
+        figures::main(study),
+        detail,
+    )
 }
 
 /// Table of the functions and ratios: extremes and classification of each.
@@ -83,10 +77,10 @@ fn quantities(study: &StudyDocument) -> String {
 
 /// The first finding of each leading part, with a link to its section.
 fn leading(study: &StudyDocument) -> String {
-    let items = ORDER[..LEADING].iter().filter_map(|(part, anchor)| {
+    let items = Part::ALL[..LEADING].iter().filter_map(|part| {
         let sentences = part.sentences(study);
         let first = prose(sentences.first()?);
-        let heading = escape(part.heading());
+        let (anchor, heading) = (part.anchor(), escape(part.heading()));
         Some(format!(
             "<li><a href=\"#{anchor}\">{heading}</a>: {first}</li>\n"
         ))
@@ -99,10 +93,10 @@ fn leading(study: &StudyDocument) -> String {
 }
 
 /// Findings of a part, each beside its charts.
-fn section(study: &StudyDocument, part: Part) -> String {
+fn section(study: &StudyDocument, part: Part, detail: Detail) -> String {
     let sentences = part.sentences(study);
     let charts: Vec<Option<Figure>> = match part {
-        Part::Bands => return bands(study, &sentences),
+        Part::Bands => return bands(study, &sentences, detail),
         Part::Profiles => figures::profiles_alone(study),
         Part::Extremes => figures::extremes_alone(study),
         Part::Predictions => {
@@ -110,22 +104,28 @@ fn section(study: &StudyDocument, part: Part) -> String {
             charts.truncate(MOST_PREDICTIONS);
             charts
         }
-        Part::EquivalentSystems => return finding(&sentences, figures::equivalent_systems(study)),
-        Part::Multistart => return finding(&sentences, figures::waterfall(study)),
+        Part::EquivalentSystems => {
+            return finding(&sentences, figures::equivalent_systems(study), detail);
+        }
+        Part::Multistart => return finding(&sentences, figures::waterfall(study), detail),
         Part::Sensitivity => {
             let spectrum = figures::spectrum(study).into_iter();
-            return finding(&sentences, spectrum.chain(figures::directions(study)));
+            return finding(
+                &sentences,
+                spectrum.chain(figures::directions(study)),
+                detail,
+            );
         }
         _ => Vec::new(),
     };
     let own = sentences.iter().zip(charts);
-    let own = own.map(|(sentence, chart)| finding(std::slice::from_ref(sentence), chart));
+    let own = own.map(|(sentence, chart)| finding(std::slice::from_ref(sentence), chart, detail));
     let own: Vec<String> = own.collect();
     own.concat() + &shell::list(&sentences[own.len()..])
 }
 
 /// The bands of functions and ratios that vary, each beside its classification; before them the other sentences.
-fn bands(study: &StudyDocument, sentences: &[String]) -> String {
+fn bands(study: &StudyDocument, sentences: &[String], detail: Detail) -> String {
     let mut others = sentences.to_vec();
     let known = study.bands.iter().flat_map(|bands| &bands.classification);
     let known: Vec<_> = known.collect();
@@ -138,16 +138,20 @@ fn bands(study: &StudyDocument, sentences: &[String]) -> String {
             return String::new();
         }
         others.retain(|sentence| !own.contains(sentence));
-        finding(&own, [chart])
+        finding(&own, [chart], detail)
     });
     let charts: String = charts.collect();
     shell::list(&others) + &charts
 }
 
 /// Sentences beside their charts; sentences alone without any, and charts alone.
-fn finding(sentences: &[String], charts: impl IntoIterator<Item = Figure>) -> String {
+fn finding(
+    sentences: &[String],
+    charts: impl IntoIterator<Item = Figure>,
+    detail: Detail,
+) -> String {
     let charts: Vec<Figure> = charts.into_iter().collect();
-    let (text, charts) = (shell::list(sentences), shell::figures(&charts));
+    let (text, charts) = (shell::list(sentences), shell::figures(&charts, detail));
     match charts.is_empty() {
         true => text,
         false => {

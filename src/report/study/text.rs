@@ -33,22 +33,42 @@ pub enum Part {
 }
 
 impl Part {
-    /// All parts in the order of the analyses.
-    const ALL: [Self; 13] = [
-        Self::StructuralRank,
-        Self::Fit,
-        Self::Sensitivity,
-        Self::Bands,
-        Self::Profiles,
-        Self::Extremes,
-        Self::EquivalentSystems,
+    /// All parts in order of what the user can do about them: mend the study or the fit, change the model, measure again; then what the
+    /// records determine, and the basis of these findings.
+    pub const ALL: [Self; 13] = [
+        Self::Failures,
         Self::Multistart,
         Self::Constancy,
-        Self::Bootstrap,
         Self::Candidates,
+        Self::Bands,
+        Self::Profiles,
+        Self::Bootstrap,
+        Self::Extremes,
         Self::Predictions,
-        Self::Failures,
+        Self::EquivalentSystems,
+        Self::Sensitivity,
+        Self::StructuralRank,
+        Self::Fit,
     ];
+
+    /// Anchor of its section on the page.
+    pub fn anchor(self) -> &'static str {
+        match self {
+            Self::StructuralRank => "structural-rank",
+            Self::Fit => "fit",
+            Self::Sensitivity => "sensitivity",
+            Self::Bands => "bands",
+            Self::Profiles => "profiles",
+            Self::Extremes => "extremes",
+            Self::EquivalentSystems => "equivalent-systems",
+            Self::Multistart => "starts",
+            Self::Constancy => "constancy",
+            Self::Bootstrap => "bootstrap",
+            Self::Candidates => "candidates",
+            Self::Predictions => "predictions",
+            Self::Failures => "failures",
+        }
+    }
 
     /// Its heading.
     pub fn heading(self) -> &'static str {
@@ -99,7 +119,7 @@ impl Part {
     }
 }
 
-/// The study as text: a heading for each analysis and its sentences.
+/// The study as text in the order of its page: a heading for each analysis and its sentences.
 pub fn text(study: &StudyDocument) -> String {
     let mut text = format!("{}\n", study.title);
     for part in Part::ALL {

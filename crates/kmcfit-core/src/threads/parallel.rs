@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Largest number of threads, which bounds the memory of their stacks.
 const MOST_THREADS: usize = 256;
 
-/// [`map`], with the number of finished jobs to the progress of the host.
+/// [`map`], with the number of finished jobs to the progress of the host. Once the host asks to end, no further job is started: the
+/// results are those of the first jobs, all of them where there was no such request.
 ///
 /// # Panics
 /// If a job does.
@@ -17,11 +18,12 @@ pub fn map_with_progress<T: Send>(
     work: impl Fn(usize) -> T + Sync,
 ) -> Vec<T> {
     let finished = AtomicUsize::new(0);
-    map(count, threads, |index| {
+    let job = |index| {
         let result = work(index);
         host::progress(finished.fetch_add(1, Ordering::Relaxed) + 1, count);
         result
-    })
+    };
+    map_until(count, threads, job, host::is_interrupted)
 }
 
 /// Computes `work(0), work(1), ...` on up to `threads` threads and returns the results in order. Each job depends on its
@@ -30,16 +32,27 @@ pub fn map_with_progress<T: Send>(
 /// # Panics
 /// If a job does.
 pub fn map<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    map_until(count, threads, work, || false)
+}
+
+/// [`map`] up to the first job that finds `is_ended`: each job with a result is preceded by jobs with results.
+fn map_until<T: Send>(
+    count: usize,
+    threads: usize,
+    work: impl Fn(usize) -> T + Sync,
+    is_ended: impl Fn() -> bool + Sync,
+) -> Vec<T> {
     let next = AtomicUsize::new(0);
     let turn = || {
         let mut done = Vec::new();
-        loop {
+        while !is_ended() {
             let index = next.fetch_add(1, Ordering::Relaxed);
             if index >= count {
-                return done;
+                break;
             }
             done.push((index, work(index)));
         }
+        done
     };
     let workers = threads.clamp(1, count.clamp(1, MOST_THREADS));
     let mut results = std::thread::scope(|scope| {
@@ -64,4 +77,25 @@ pub fn map<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T + Sy
     });
     results.sort_by_key(|(index, _)| *index);
     results.into_iter().map(|(_, result)| result).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicBool;
+
+    /// The request comes within the fifth job: of 1000 jobs those that had begun on the three threads have results, without a gap.
+    #[test]
+    fn no_job_starts_after_the_request_to_end() {
+        let is_ended = AtomicBool::new(false);
+        let job = |index: usize| {
+            is_ended.fetch_or(index >= 4, Ordering::SeqCst);
+            index
+        };
+        let found = map_until(1000, 3, job, || is_ended.load(Ordering::SeqCst));
+        assert!((5..=7).contains(&found.len()), "{}", found.len());
+        assert!(found.iter().copied().eq(0..found.len()));
+        assert!(map_until(1000, 3, job, || true).is_empty());
+        assert_eq!(map(7, 3, |index| index), [0, 1, 2, 3, 4, 5, 6]);
+    }
 }

@@ -76,6 +76,7 @@ pub fn provide_clock() {
         has_memory: |_| true,
         may_start_thread: || Ok(()),
         progress: |_, _| {},
+        is_interrupted: || false,
     });
 }
 
