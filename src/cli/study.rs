@@ -405,9 +405,8 @@ impl StudyRun<'_> {
             }
             let mut journal = fit_journal(folder, heading, is_resumed);
             let journal = journal.as_mut().map(|j| j as &mut dyn CheckpointStore);
-            let (weighted, _, found) = search(&model, &progress, journal)?;
-            let problem = weighted.as_ref().map_or(&model.problem, |m| &m.problem);
-            let fit = StudiedFit::of(problem, &found);
+            let (fitted, _, found) = search(&model, &progress, journal)?;
+            let fit = StudiedFit::of(&fitted.problem, &found);
             interrupted = Some(fit.clone());
             Ok::<_, String>(fit)
         };

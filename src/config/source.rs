@@ -1,7 +1,7 @@
 //! Sources of a model, for reproducible runs: its text, overrides, and data files with digests.
 
 use super::ModelFile;
-use crate::digest::digest_of_file;
+use crate::digest::{digest, digest_of_file};
 use std::path::Path;
 use std::time::SystemTime;
 
@@ -31,7 +31,10 @@ impl ModelSource {
     /// The text of a model file, and the files behind its keys `data`.
     pub fn of(file: &ModelFile) -> Self {
         let data = file.data_names().into_iter().map(|name| DataFile {
-            content: content(&file.resolve(&name)),
+            content: match file.in_memory(&name) {
+                Some(bytes) => Some((bytes.len() as u64, digest(bytes))),
+                None => content(&file.resolve(&name)),
+            },
             modified: (file.resolve(&name).metadata())
                 .and_then(|m| m.modified())
                 .ok(),
