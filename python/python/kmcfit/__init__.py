@@ -11,7 +11,15 @@ from __future__ import annotations
 
 from typing import Any, Dict
 
-from . import _kmcfit
+try:
+    import numpy as _numpy  # noqa: F401
+
+    from . import _kmcfit
+except ImportError as error:
+    if "subinterpreter" in str(error) or "more than once" in str(error):
+        message = "kmcfit cannot be imported in a subinterpreter; use threads or processes"
+        raise ImportError(message) from error
+    raise
 from ._compare import Comparison, compare
 from ._errors import Error, InputError, InternalError, NumericalError
 from ._estimates import Estimate, Estimates

@@ -209,6 +209,8 @@ def _columns(data: Any, given: Dict[str, Any], sample_rate: Optional[float]) -> 
     first = next(iter(columns))
     for name, values in columns.items():
         _check_length(f"Experiment.{name}", values, len(columns[first]), f"`{first}`")
+    for name, values in columns.items():
+        _check_finite(f"Experiment.{name}", values)
     if "time" in columns:
         _check_times(columns["time"])
     return columns
@@ -217,6 +219,13 @@ def _columns(data: Any, given: Dict[str, Any], sample_rate: Optional[float]) -> 
 def _check_length(where: str, values: "np.ndarray", expected: int, of: str) -> None:
     if len(values) != expected:
         raise InputError("unequal lengths", where, f"{len(values)} samples", f"{expected} samples, as {of}")
+
+
+def _check_finite(where: str, values: "np.ndarray") -> None:
+    infinite = np.isinf(values)
+    if infinite.any():
+        first = int(np.argmax(infinite))
+        raise InputError("not a finite number", where, f"{values[first]} at index {first}", "a finite number, or NaN where missing")
 
 
 def _check_times(times: "np.ndarray") -> None:
