@@ -15,10 +15,9 @@ try:
     import numpy as _numpy  # noqa: F401
 
     from . import _kmcfit
-except ImportError as error:
-    if "subinterpreter" in str(error) or "more than once" in str(error):
-        message = "kmcfit cannot be imported in a subinterpreter; use threads or processes"
-        raise ImportError(message) from error
+except ImportError as _error:
+    if "subinterpreter" in str(_error) or "more than once" in str(_error):
+        raise ImportError("kmcfit cannot be imported in a subinterpreter; use threads or processes") from _error
     raise
 from ._compare import Comparison, compare
 from ._errors import Error, InputError, InternalError, NumericalError

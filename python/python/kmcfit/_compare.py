@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 from typing import Any, Dict, List, Mapping
 
 from . import _kmcfit
 from ._errors import InputError
-from ._fit import Fit
+from ._fit import Fit, temporary_folder
 
 
 class Comparison:
@@ -47,7 +46,7 @@ class Comparison:
 
     def to_pandas(self) -> Any:
         """The measures as a DataFrame of pandas, one row for each fit."""
-        import pandas
+        import pandas  # type: ignore[import-untyped,unused-ignore]
 
         return pandas.json_normalize(self.runs).set_index("name")
 
@@ -68,7 +67,7 @@ def compare(fits: Mapping[str, Fit]) -> Comparison:
     """
     if len(fits) < 2:
         raise InputError("too few fits", "compare", f"{len(fits)}", "two or more, as in `compare({'a': fit_a, 'b': fit_b})`")
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         runs = []
         for i, (name, fit) in enumerate(fits.items()):
             run = os.path.join(folder, str(i))

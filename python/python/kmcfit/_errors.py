@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from typing import Iterable, Optional
 
 
@@ -57,6 +56,8 @@ class InternalError(Error, RuntimeError):
 
 def did_you_mean(word: str, words: Iterable[str]) -> Optional[str]:
     """The nearest spelling among `words`, as a remedy."""
+    import difflib
+
     near = difflib.get_close_matches(word, list(words), n=1, cutoff=0.6)
     return f"did you mean `{near[0]}`?" if near else None
 

@@ -70,7 +70,7 @@ class Estimates:
 
     def to_pandas(self) -> Any:
         """The table as a DataFrame of pandas, indexed by the quantity; the interval in `low` and `high`."""
-        import pandas
+        import pandas  # type: ignore[import-untyped,unused-ignore]
 
         rows = [
             (row.quantity, row.value, *(row.ci95 or (None, None)), *(row.range or (None, None)), row.unit, row.status)

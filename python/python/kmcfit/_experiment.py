@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional
 
 import numpy as np
 
-from . import _npz
+from . import _kmcfit, _npz
 from ._arrays import column
 from ._errors import InputError, did_you_mean, unknown_keyword
 from ._functions import lowered, plain
@@ -74,7 +76,8 @@ class Experiment:
 
     Notes
     -----
-    The arrays are copied and never changed. The offset of an accelerometer is estimated unless `sensors` is given.
+    The arrays are copied and never changed. What is not given is chosen from the record as ``kmcfit init`` chooses it: interpolation of the
+    input, offsets of sensors, a robust loss where there are outliers, and a window that leaves out a rest before the motion.
     """
 
     def __init__(
@@ -151,18 +154,36 @@ class Experiment:
         if sigma is not None:
             spec["sigma"] = self._sigma(sigma)
         spec["initial"] = _initial(initial)
-        has_base = any(name in self._columns for name in INPUTS[1:])
+        chosen = self._chosen_by_init(spec["units"])
+        for key in ("window", "duplicates", "loss", "sensors", "force", "base"):
+            if key in chosen and (key != "loss" or "sigma" in spec):
+                spec[key] = chosen[key]
         if self._waveform is not None:
             spec["force"] = self._waveform
         elif interpolation is not None:
+            has_base = any(name in self._columns for name in INPUTS[1:])
             spec["base" if has_base else "force"] = {"interpolation": interpolation}
-        if "acceleration" in self._columns:
-            spec["sensors"] = {"acceleration": {"offset": "estimate"}}
         for key, value in keys.items():
             spec[key] = plain(value)
         if "functions" in keys:
             spec["functions"] = {name: lowered(value) for name, value in keys["functions"].items()}
         return {key: value for key, value in spec.items() if value is not None}
+
+    def _chosen_by_init(self, units: Mapping[str, str]) -> Dict[str, Any]:
+        """The experiment that ``kmcfit init`` writes for these columns; empty where it refuses them."""
+        from ._fit import temporary_folder
+
+        columns = {f"{name} [{units[name]}]": self._columns[name] for name in units}
+        with temporary_folder() as folder:
+            path = Path(folder, "record.npz")
+            path.write_bytes(_npz.archive(columns))
+            try:
+                text = _kmcfit.scaffold([str(path)])
+            except InputError:
+                # The fit refuses them too, or the record is unusual: nothing is chosen.
+                return {}
+        chosen: Dict[str, Any] = json.loads(_kmcfit.parse(text, "model.yaml"))["experiments"][0]
+        return chosen
 
     def _sigma(self, sigma: Any) -> Dict[str, Any]:
         if not isinstance(sigma, dict):

@@ -5,9 +5,7 @@ from __future__ import annotations
 import html
 import json
 import os
-import tempfile
 from pathlib import Path
-from statistics import NormalDist
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
@@ -33,7 +31,6 @@ _CURVES = (
     "natural_frequency",
     "damping_ratio",
 )
-_FLOAT95 = NormalDist().inv_cdf(0.975)
 
 
 class Verdict:
@@ -95,7 +92,7 @@ class Curve:
             raise InputError("no confidence intervals", f"{self.name}.band", expected="a fit with `sigma` and identified parameters")
         if not 0.0 < level < 1.0:
             raise InputError("invalid level", f"{self.name}.band", repr(level), "a number between 0 and 1")
-        factor = 1.0 if level == 0.95 else NormalDist().inv_cdf(0.5 + 0.5 * level) / _FLOAT95
+        factor = 1.0 if level == 0.95 else _quantile(level) / _quantile(0.95)
         ends = [self.values + factor * (end - self.values) if factor != 1.0 else end for end in self._band]
         if t is None:
             return ends[0].copy(), ends[1].copy()
@@ -267,7 +264,7 @@ class Fit:
         state = [float(x) for x in initial]
         if len(state) != 2:
             raise InputError("invalid initial state", "Fit.simulate.initial", repr(initial), "(displacement, velocity)")
-        with tempfile.TemporaryDirectory() as folder:
+        with temporary_folder() as folder:
             run = os.path.join(folder, "run")
             self._write(run)
             paths: Dict[str, Optional[str]] = {"force": None, "base": None}
@@ -318,7 +315,7 @@ class Fit:
 
     def to_pandas(self) -> Any:
         """Curves over time as a DataFrame of pandas, indexed by the time in s."""
-        import pandas
+        import pandas  # type: ignore[import-untyped,unused-ignore]
 
         return pandas.DataFrame(self.functions).set_index("t_s")
 
@@ -342,7 +339,7 @@ class Fit:
             if found is None:
                 raise InputError("no draws in this run", "Fit.draws", expected="a run saved with `draws=…`")
             return _table.columns(found.decode())
-        with tempfile.TemporaryDirectory() as folder:
+        with temporary_folder() as folder:
             self._raw.save(os.path.join(folder, "run"), False, False, number)
             path = Path(folder, "run", "draws.csv")
             if not path.exists():
@@ -383,7 +380,7 @@ class Fit:
     def _run(self) -> Dict[str, bytes]:
         """All files of the run by name."""
         if self._files is None:
-            with tempfile.TemporaryDirectory() as folder:
+            with temporary_folder() as folder:
                 run = os.path.join(folder, "run")
                 self._write(run, report=True)
                 return self._once("run", lambda: read_files(run))
@@ -428,6 +425,20 @@ def read_files(folder: str) -> Dict[str, bytes]:
     """The files of a folder by their relative names."""
     root = Path(folder)
     return {path.relative_to(root).as_posix(): path.read_bytes() for path in sorted(root.rglob("*")) if path.is_file()}
+
+
+def temporary_folder() -> Any:
+    """A folder that its context removes. The module is slow to import, and used for few calls."""
+    from tempfile import TemporaryDirectory
+
+    return TemporaryDirectory()
+
+
+def _quantile(level: float) -> float:
+    """Half width of the central interval of the standard normal distribution with the probability `level`."""
+    from statistics import NormalDist
+
+    return NormalDist().inv_cdf(0.5 + 0.5 * level)
 
 
 def _texts(findings: Any) -> List[str]:

@@ -111,11 +111,11 @@ class Model:
 
         Experiments with their data files are part of the model; paths in a file are relative to its folder.
         """
-        is_text = isinstance(source, str) and "\n" in source
-        path = _PATH if is_text else os.fspath(source)
-        text = source if is_text else _kmcfit.read_text(path)
+        given = os.fspath(source)
+        is_text = "\n" in given
+        path = _PATH if is_text else given
         model = cls.__new__(cls)
-        model._spec = json.loads(_kmcfit.parse(text, path))
+        model._spec = json.loads(_kmcfit.parse(given if is_text else _kmcfit.read_text(path), path))
         model._folder = "" if is_text else str(Path(path).parent)
         return model
 
