@@ -350,7 +350,10 @@ class Fit:
         """Draws from the distribution of the estimates as InferenceData of ArviZ, one chain."""
         import arviz
 
-        return arviz.from_dict({name: values[np.newaxis] for name, values in self.draws(number).items()})
+        posterior = {name: values[np.newaxis] for name, values in self.draws(number).items()}
+        # Since version 1 the groups are named.
+        is_old = int(arviz.__version__.split(".")[0]) < 1
+        return arviz.from_dict(posterior if is_old else {"posterior": posterior})
 
     # Display.
 
