@@ -6,9 +6,6 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-/// Path of a model that has no file.
-pub const IN_MEMORY: &str = "model.yaml";
-
 /// Reason for which a call fails.
 pub enum Failure {
     /// Invalid input.
@@ -54,18 +51,29 @@ impl Failure {
     }
 }
 
-/// Place of an error: in a model without a file the key alone.
+/// Place of an error, with its key.
 fn place(error: &InputError) -> String {
-    let is_in_memory = matches!(&error.place, Location::Line { file, .. } | Location::File(file)
-        if file == Path::new(IN_MEMORY));
     let place = match &error.place {
         Location::Argument(name) => name.trim_start_matches("--").to_owned(),
         place => place.to_string(),
     };
     match &error.key {
-        Some(key) if is_in_memory => key.clone(),
         Some(key) => format!("{place}: {key}"),
         None => place,
+    }
+}
+
+/// An error in a text that was made from arguments: its place is the key, which is an argument, and no line.
+pub fn keyed(error: InputError, path: &Path) -> InputError {
+    let is_of_text =
+        matches!(&error.place, Location::Line { file, .. } | Location::File(file) if file == path);
+    match error.key {
+        Some(key) if is_of_text => InputError {
+            place: Location::Argument(key),
+            key: None,
+            ..error
+        },
+        key => InputError { key, ..error },
     }
 }
 

@@ -1,6 +1,6 @@
 //! Fits.
 
-use crate::errors::{Failure, IN_MEMORY, caught, guarded};
+use crate::errors::{Failure, caught, guarded};
 use crate::source::{Files, Source};
 use kmcfit::config::{Model, ModelFile};
 use kmcfit::fitting::fit_or_no_response;
@@ -17,6 +17,8 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread::{Builder, scope};
 use std::time::{Duration, Instant};
 
+/// Name of the file for a model of arrays in the folder of its run.
+const MODEL: &str = "model.yaml";
 /// Time between two looks for Ctrl-C.
 const POLL: Duration = Duration::from_millis(20);
 /// Stack of the thread of a fit, bytes: that of the program's main thread on Linux.
@@ -68,6 +70,10 @@ pub fn fit(
 }
 
 /// Does `work` on a thread of its own, and sets `flag` at the first exception of a signal handler, which is returned.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "its stack is as large as that of the program's main thread; a refusal is an error"
+)]
 fn watched<T: Send>(
     flag: &AtomicBool,
     work: impl FnOnce() -> Result<T, Failure> + Send,
@@ -126,10 +132,10 @@ impl RawFit {
     /// Writes the run; a model in memory with its files beside the results.
     fn write(&self, folder: &Path, requested: RequestedFiles) -> Result<(), Failure> {
         let in_memory: Vec<(String, Arc<[u8]>)> = self.file.files_in_memory();
-        let placed = match self.is_in_memory() {
+        let placed = match !in_memory.is_empty() {
             true => Some(CompletedFit {
                 model: Model {
-                    file: folder.join(IN_MEMORY),
+                    file: folder.join(MODEL),
                     ..self.done.model.clone()
                 },
                 ..self.done.clone()
@@ -140,7 +146,7 @@ impl RawFit {
         let mut claim = fit_claim(&done.model);
         if placed.is_some() {
             let names = in_memory.iter().map(|(name, _)| name.clone());
-            claim = claim.files(names.chain([IN_MEMORY.to_owned()]));
+            claim = claim.files(names.chain([MODEL.to_owned()]));
         } else {
             let inputs = self.file.data_files().into_iter();
             claim = claim.inputs(inputs.chain([self.file.path.clone()]));
@@ -159,7 +165,7 @@ impl RawFit {
         let mut stage = output.stage().map_err(full)?;
         if placed.is_some() {
             stage
-                .write(IN_MEMORY, self.file.effective_text())
+                .write(MODEL, self.file.effective_text())
                 .map_err(full)?;
             for (name, content) in &in_memory {
                 stage.write(name, content).map_err(full)?;
@@ -171,10 +177,6 @@ impl RawFit {
         }
         stage.write(RESULT, json(&document)).map_err(full)?;
         stage.commit().map_err(full)
-    }
-
-    fn is_in_memory(&self) -> bool {
-        self.file.path == Path::new(IN_MEMORY)
     }
 }
 

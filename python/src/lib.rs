@@ -1,6 +1,10 @@
 //! The extension module `kmcfit._kmcfit`: models, fits and runs for the Python package on top of it.
 
 #![forbid(unsafe_code)]
+#![allow(
+    clippy::result_large_err,
+    reason = "as in the application: an input error ends the call"
+)]
 
 mod errors;
 mod fit;

@@ -1,6 +1,6 @@
 //! Finished runs, data files and model files.
 
-use crate::errors::{Failure, guarded};
+use crate::errors::{Failure, guarded, keyed};
 use crate::source::to_bytes;
 use kmcfit::Run;
 use kmcfit::config::{ModelFile, NewRecord, Source, Statements};
@@ -14,10 +14,14 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::path::PathBuf;
 
-/// Checks the keys and types of a model; returns its maps and lists as JSON.
+/// Checks the keys and types of a model; returns its maps and lists as JSON. Messages name keys, and lines if it was `written` by the user.
 #[pyfunction]
-pub fn parse(py: Python<'_>, text: String, path: PathBuf) -> PyResult<String> {
-    guarded(py, || Ok(ModelFile::parse(&path, text)?.to_json()))
+pub fn parse(py: Python<'_>, text: String, path: PathBuf, written: bool) -> PyResult<String> {
+    guarded(py, || match ModelFile::parse(&path, text) {
+        Ok(file) => Ok(file.to_json()),
+        Err(error) if written => Err(Failure::Input(error)),
+        Err(error) => Err(Failure::Input(keyed(error, &path))),
+    })
 }
 
 /// The text of a model file.

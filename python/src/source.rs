@@ -1,7 +1,8 @@
 //! Models and their files in memory.
 
-use crate::errors::Failure;
+use crate::errors::{Failure, keyed};
 use kmcfit::config::{BuildMode, Model, ModelFile, Override, build};
+use kmcfit::error::InputError;
 use pyo3::pybacked::PyBackedBytes;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -22,13 +23,23 @@ impl Source {
     /// Reads the file and builds its model for a fit.
     pub fn build(self) -> Result<(ModelFile, Model), Failure> {
         let overrides = Override::parse_all(&self.overrides)?;
+        // Lines are those of a file; a text is made from arguments.
+        let path = self.text.as_ref().map(|_| self.path.clone());
+        let built = self.read(&overrides);
+        built.map_err(|error| match &path {
+            Some(path) => Failure::Input(keyed(error, path)),
+            None => Failure::Input(error),
+        })
+    }
+
+    fn read(self, overrides: &[Override]) -> Result<(ModelFile, Model), InputError> {
         let file = match self.text {
             Some(text) => ModelFile::parse(&self.path, text)?,
             None => ModelFile::read(&self.path)?,
         };
         let files = self.files.iter();
         let files = files.map(|(name, content)| (name.clone(), Arc::from(&**content)));
-        let file = file.with_files(files).with_overrides(&overrides)?;
+        let file = file.with_files(files).with_overrides(overrides)?;
         let model = build(&file, BuildMode::Fit)?;
         Ok((file, model))
     }

@@ -22,9 +22,9 @@ def program(*words, cwd=ROOT):
 
 
 def oscillator(mass, damping, stiffness, time, force, initial=(0.0, 0.0)):
-    """Acceleration of a linear oscillator by RK4 with a tenth of the sampling interval, force linear between samples."""
+    """States and acceleration of a linear oscillator under `force(t)`, by RK4 with a tenth of the sampling interval."""
     steps = 10
-    fine = np.interp(np.linspace(0, len(time) - 1, steps * 2 * (len(time) - 1) + 1), np.arange(len(time)), force)
+    fine = force(np.linspace(time[0], time[-1], steps * 2 * (len(time) - 1) + 1))
     h = (time[1] - time[0]) / steps
 
     def rate(y, f):
@@ -43,17 +43,20 @@ def oscillator(mass, damping, stiffness, time, force, initial=(0.0, 0.0)):
         k4 = rate(y + h * k3, c)
         y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
     states = np.array(states)
-    return states, (force - damping * states[:, 1] - stiffness * states[:, 0]) / mass
+    return states, (force(time) - damping * states[:, 1] - stiffness * states[:, 0]) / mass
 
 
 @pytest.fixture(scope="session")
 def record():
     """Time, force and acceleration of m = 2.4 kg, c = 1 N s/m, k = 1500 N/m, with noise of 0.02 m/s^2."""
     time = np.linspace(0.0, 2.0, 401)
-    force = 20.0 * np.sin(2 * np.pi * (2.0 * time + time**2))
+
+    def force(t):
+        return 20.0 * np.sin(2 * np.pi * (2.0 * t + t**2))
+
     _, acceleration = oscillator(2.4, 1.0, 1500.0, time, force)
     noise = np.random.default_rng(1).standard_normal(len(time))
-    return time, force, acceleration + 0.02 * noise
+    return time, force(time), acceleration + 0.02 * noise
 
 
 @pytest.fixture(scope="session")

@@ -182,7 +182,7 @@ class Experiment:
             except InputError:
                 # The fit refuses them too, or the record is unusual: nothing is chosen.
                 return {}
-        chosen: Dict[str, Any] = json.loads(_kmcfit.parse(text, "model.yaml"))["experiments"][0]
+        chosen: Dict[str, Any] = json.loads(_kmcfit.parse(text, "model.yaml", False))["experiments"][0]
         return chosen
 
     def _sigma(self, sigma: Any) -> Dict[str, Any]:

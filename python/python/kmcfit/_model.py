@@ -100,10 +100,10 @@ class Model:
             "study": plain(study),
         }
         self._spec: Dict[str, Any] = {key: value for key, value in spec.items() if value is not None}
-        self._folder = ""
+        self._path = _PATH
         # Keys and types are checked at once; numbers with the records.
         placeholder = {"initial": "estimate"}
-        _kmcfit.parse(_yaml.text({**self._spec, "experiments": [placeholder]}), _PATH)
+        _kmcfit.parse(_yaml.text({**self._spec, "experiments": [placeholder]}), _PATH, False)
 
     @classmethod
     def from_yaml(cls, source: Union[str, "os.PathLike[str]"]) -> "Model":
@@ -115,8 +115,8 @@ class Model:
         is_text = "\n" in given
         path = _PATH if is_text else given
         model = cls.__new__(cls)
-        model._spec = json.loads(_kmcfit.parse(given if is_text else _kmcfit.read_text(path), path))
-        model._folder = "" if is_text else str(Path(path).parent)
+        model._spec = json.loads(_kmcfit.parse(given if is_text else _kmcfit.read_text(path), path, True))
+        model._path = path
         return model
 
     def to_yaml(self, *data: Experiment) -> str:
@@ -177,14 +177,14 @@ class Model:
         return f"<Model {', '.join(self._spec['functions'])}>"
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Model) and (self._spec, self._folder) == (other._spec, other._folder)
+        return isinstance(other, Model) and (self._spec, self._path) == (other._spec, other._path)
 
     __hash__ = None  # type: ignore[assignment]
 
     def _source(self, data: Tuple[Experiment, ...]) -> Tuple[str, str, Dict[str, bytes]]:
         """Text, path and files in memory."""
         text, files = self._with(data)
-        return text, os.path.join(self._folder, _PATH), files
+        return text, os.path.join(os.path.dirname(self._path), _PATH) if files else self._path, files
 
     def _with(self, data: Tuple[Experiment, ...]) -> Tuple[str, Dict[str, bytes]]:
         """The text with the experiments of `data`, and their files."""
