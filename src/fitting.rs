@@ -7,7 +7,7 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::simulate::SimulationError;
 use kmcfit_core::internals::solvers::{
     Fit, GridNotice, Observer, OnNodes, WeightPath, WidthNotice, choose_weight_watched,
-    fit_on_reduced_widths, fit_on_refined_grids, fit_with_noise_watched,
+    fit_on_reduced_widths, fit_on_refined_grids, fit_with_noise_watched, no_response,
 };
 
 /// A fit, and the model as fitted.
@@ -78,6 +78,25 @@ pub fn fit_model(model: &Model, watch: &mut Observer) -> Result<ModelFit, Simula
         model,
         weights: found.further,
         fit: found.fit,
+    })
+}
+
+/// As [`fit_model`]; a fit whose problem has no response from any start has the status infeasible or failed, where its method states one.
+///
+/// # Errors
+/// A [`SimulationError`] if no starting point can be simulated, and the method states no outcome without a response.
+pub fn fit_or_no_response(
+    model: &Model,
+    watch: &mut Observer,
+) -> Result<ModelFit, SimulationError> {
+    fit_model(model, watch).or_else(|breakdown| {
+        let (problem, settings) = (&model.problem, &model.settings);
+        let fit = no_response(problem, &model.given_start, settings, breakdown)?;
+        Ok(ModelFit {
+            model: model.clone(),
+            weights: None,
+            fit,
+        })
     })
 }
 

@@ -6,21 +6,18 @@ use super::{
 };
 use crate::config::{BuildMode, Model, ModelFile, Override, build};
 use crate::error::InputError;
-use crate::fitting::fit_model;
-use crate::report::document::{FailureDocument, Prediction, ResultDocument};
+use crate::fitting::fit_or_no_response;
+use crate::report::document::{FailureDocument, ResultDocument};
 use crate::report::{
     DRAWS, DisplayUnits, FittedModel, OverheadTimings, RunAssessment, TimingsSummary, charts,
-    fit_claim, json, predict, summary, summary_plot,
+    fit_claim, json, model_predictions, summary, summary_plot,
 };
 use crate::results::{FitJournal, Heading, OutputFolder, RESULT, RequestedFiles};
 use console::Term;
 use kmcfit_core::internals::assessment::{NoDraws, VerdictLevel};
-use kmcfit_core::internals::simulate::SimulationError;
 use kmcfit_core::internals::solvers::{
     CheckpointStore, Fit, IterationEvent, IterationRecord, Observer, Status, WeightPath,
-    no_response,
 };
-use kmcfit_core::internals::system::State;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -274,7 +271,7 @@ pub(super) fn fit_into(
             format!("the journal of the fit could not be written: {trouble}"),
         );
     }
-    let (weighted, path, found) = match result {
+    let (model, path, found) = match result {
         Ok(found) => found,
         Err(reason) => {
             let document = FailureDocument::new(&model.title, &reason);
@@ -285,10 +282,10 @@ pub(super) fn fit_into(
             return Err(CommandError::Numerical(reason));
         }
     };
-    let model = weighted.as_ref().unwrap_or(model);
+    let model = &model;
     let activity = Activity::begin(progress.named_stage("assessing the fit"));
     let analysis = Instant::now();
-    let predictions = predictions(model, &found);
+    let predictions = model_predictions(model, &found);
     let run_assessment = RunAssessment::of(model, &found);
     let analysis = analysis.elapsed();
     let report = Instant::now();
@@ -341,12 +338,12 @@ fn no_draws(reason: NoDraws) -> String {
     .to_owned()
 }
 
-/// Runs the fit. Also returns the model as fitted, with the path of weights if a rule chose one; no model without a response.
+/// Runs the fit. Also returns the model as fitted, with the path of weights if a rule chose one.
 pub(super) fn search(
     model: &Model,
     progress: &Progress,
     store: Option<&mut dyn CheckpointStore>,
-) -> Result<(Option<Model>, Option<WeightPath>, Fit), String> {
+) -> Result<(Model, Option<WeightPath>, Fit), String> {
     let (mut ignore, mut show) = (
         |_: &IterationRecord| {},
         |moment: &IterationEvent| progress.show(moment),
@@ -358,38 +355,11 @@ pub(super) fn search(
     if let Some(store) = store {
         watch = watch.with_checkpoints(store);
     }
-    let result = fit_model(model, &mut watch);
+    let result = fit_or_no_response(model, &mut watch);
     progress.clear();
-    let result = result.map(|found| (Some(found.model), found.weights, found.fit));
-    let result = result.or_else(|breakdown| {
-        let (problem, settings) = (&model.problem, &model.settings);
-        let fit = no_response(problem, &model.given_start, settings, breakdown)?;
-        Ok((None, None, fit))
-    });
     result
-        .map_err(|breakdown: SimulationError| format!("the start cannot be evaluated: {breakdown}"))
-}
-
-/// Predictions of the model file; a failed one has its reason.
-pub(super) fn predictions(model: &Model, found: &Fit) -> Vec<Prediction> {
-    let coefficients = &found.best.evaluation.nodal;
-    let system = &model.problem.system;
-    let one = |state: &State| {
-        let responses = predict(system, coefficients, model.truth.as_ref(), &[*state]);
-        match responses {
-            Ok(responses) => responses.into_iter().map(|m| m.summary).collect(),
-            Err(breakdown) => vec![Prediction {
-                displacement: state.displacement,
-                velocity: state.velocity,
-                cost: None,
-                energy: None,
-                largest: None,
-                last: None,
-                failure: Some(breakdown.to_string()),
-            }],
-        }
-    };
-    model.predictions.iter().flat_map(one).collect()
+        .map(|found| (found.model, found.weights, found.fit))
+        .map_err(|breakdown| format!("the start cannot be evaluated: {breakdown}"))
 }
 
 #[cfg(test)]

@@ -27,10 +27,12 @@ mod verify;
 use crate::config::{Model, ModelFile};
 use crate::error::InputError;
 use clap::{CommandFactory, Parser, Subcommand};
-use environment::{check_arithmetic, provide_host};
+use environment::check_arithmetic;
+pub use environment::provide_host;
 use kmcfit_core::internals::solvers::Status;
 use output::{complain, print, say};
 use overrides::Overrides;
+use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -96,32 +98,33 @@ impl From<InputError> for CommandError {
 /// Runs the program on the arguments of the process.
 pub fn main() -> ExitCode {
     crate::memory::restart_with_plain_allocators();
+    ExitCode::from(run(std::env::args_os().collect()))
+}
+
+/// Runs the program on arguments, the first of which is its name; returns its exit code.
+pub fn run(mut words: Vec<OsString>) -> u8 {
     interrupt::ignore_file_size_signal();
-    let mut words: Vec<_> = std::env::args_os().collect();
     // `kmcfit help --help` is `kmcfit help`; clap takes the option for a command.
     if words.len() == 3 && words[1] == "help" && (words[2] == "--help" || words[2] == "-h") {
         words.truncate(2);
     }
-    let arguments = match Arguments::try_parse_from(words) {
+    let arguments = match Arguments::try_parse_from(&words) {
         Ok(arguments) => arguments,
         Err(error) => {
-            let command = std::env::args_os().nth(1);
-            let command = command.as_ref().and_then(|word| word.to_str());
-            return ExitCode::from(
-                match arguments::input_error(&error, &Arguments::command(), command) {
-                    Some(error) => {
-                        complain(&error);
-                        BAD_INPUT
-                    }
-                    None => output::print_usage(&error),
-                },
-            );
+            let command = words.get(1).and_then(|word| word.to_str());
+            return match arguments::input_error(&error, &Arguments::command(), command) {
+                Some(error) => {
+                    complain(&error);
+                    BAD_INPUT
+                }
+                None => output::print_usage(&error),
+            };
         }
     };
     provide_host();
     if let Err(error) = check_arithmetic().and_then(|()| crate::memory::check_base()) {
         complain(&error);
-        return ExitCode::from(BAD_INPUT);
+        return BAD_INPUT;
     }
     let result = match arguments.command {
         Command::Fit(arguments) => fit::run(&arguments),
@@ -151,10 +154,10 @@ pub fn main() -> ExitCode {
             NOT_CONVERGED
         }
     };
-    ExitCode::from(match output::has_failed() {
+    match output::has_failed() {
         true => BAD_INPUT,
         false => code,
-    })
+    }
 }
 
 /// Prints the notes and warnings of a model.

@@ -412,8 +412,8 @@ impl StudyRun<'_> {
             }
             let mut journal = fit_journal(folder, heading, is_resumed);
             let journal = journal.as_mut().map(|j| j as &mut dyn CheckpointStore);
-            let (weighted, _, found) = search(&model, &progress, journal)?;
-            let fit = StudiedFit::of(weighted.as_ref().unwrap_or(&model), &found);
+            let (fitted, _, found) = search(&model, &progress, journal)?;
+            let fit = StudiedFit::of(&fitted, &found);
             interrupted = Some(fit.clone());
             Ok::<_, String>(fit)
         };

@@ -1,9 +1,8 @@
 //! `kmcfit verify`: recomputes the results of a finished run.
 
-use super::fit::predictions;
 use super::progress::Activity;
 use super::{CommandError, NOT_CONVERGED, OK, print};
-use crate::report::{Run, Verification, json};
+use crate::report::{Run, Verification, json, model_predictions};
 use std::path::PathBuf;
 
 /// Recompute the results of a finished run from its model file, data and parameters.
@@ -23,7 +22,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let activity = Activity::begin(format!("reading {}", arguments.run.display()));
     let run = Run::open(&arguments.run)?;
     activity.stage("recomputing the results");
-    let verification = Verification::of(&run, &predictions)?;
+    let verification = Verification::of(&run, &model_predictions)?;
     drop(activity);
     match arguments.json {
         true => print(&json(&verification)),

@@ -1,6 +1,8 @@
 //! A model file: path, text, parsed specification and overrides.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::input_limits::{Checked, LONGEST_MODEL};
 use super::key_positions::{key_path, locate, place};
@@ -9,6 +11,7 @@ use super::spec::ModelSpec;
 use super::yaml_errors;
 use crate::error::InputError;
 use crate::formats::has_data_extension;
+use crate::tables::{Table, TableFormat};
 use crate::text_io::read_text;
 
 /// Expected contents of a model file, for messages.
@@ -30,6 +33,8 @@ pub struct ModelFile {
     pub overrides: Vec<Override>,
     /// Text with the overrides applied; `None` without overrides.
     edited: Option<String>,
+    /// Contents of data files by their names in the model, in place of files.
+    files: BTreeMap<String, Arc<[u8]>>,
 }
 
 impl ModelFile {
@@ -105,6 +110,51 @@ impl ModelFile {
         self.edited.as_deref().unwrap_or(&self.text)
     }
 
+    /// Adds contents of data files by their names in the model: they are read in place of files.
+    #[must_use]
+    pub fn with_files(mut self, files: impl IntoIterator<Item = (String, Arc<[u8]>)>) -> Self {
+        self.files.extend(files);
+        self
+    }
+
+    /// The contents of data files that stand in memory, by their names in the model.
+    pub fn files_in_memory(&self) -> Vec<(String, Arc<[u8]>)> {
+        let files = self.files.iter();
+        files
+            .map(|(name, content)| (name.clone(), Arc::clone(content)))
+            .collect()
+    }
+
+    /// The content of a data file that stands in memory.
+    pub(super) fn in_memory(&self, name: &str) -> Option<&[u8]> {
+        self.files.get(name).map(|content| &**content)
+    }
+
+    /// The tables of a data file, by its name in the model.
+    ///
+    /// # Errors
+    ///
+    /// As [`Table::read_all`].
+    pub(super) fn tables(
+        &self,
+        name: &str,
+        format: &TableFormat,
+    ) -> Result<Vec<Table>, InputError> {
+        match self.in_memory(name) {
+            Some(content) => Table::parse_all(name, content, format),
+            None => Table::read_all(self.resolve(name), format),
+        }
+    }
+
+    /// The model with the overrides applied as JSON: its keys, with the values of all anchors and merges.
+    pub fn to_json(&self) -> String {
+        // The text was parsed before, so neither step fails.
+        let value = Checked::new(&self.path, self.effective_text())
+            .ok()
+            .and_then(|text| text.read::<serde_yaml::Value>().ok());
+        serde_json::to_string(&value).unwrap_or_default()
+    }
+
     /// The overrides as they were written.
     pub fn override_texts(&self) -> Vec<String> {
         self.overrides.iter().map(Override::to_string).collect()
@@ -150,6 +200,7 @@ impl ModelFile {
             spec,
             overrides: Vec::new(),
             edited: None,
+            files: BTreeMap::new(),
         };
         if model.spec.experiments.is_empty() {
             return Err(model

@@ -1,7 +1,7 @@
 //! Sources of a model, for reproducible runs: its text, overrides, and data files with digests.
 
 use super::ModelFile;
-use crate::digest::digest_of_file;
+use crate::digest::{digest, digest_of_file};
 use std::path::Path;
 use std::time::SystemTime;
 
@@ -31,7 +31,10 @@ impl ModelSource {
     /// The text of a model file, and the files behind its keys `data`.
     pub fn of(file: &ModelFile) -> Self {
         let data = file.data_names().into_iter().map(|name| DataFile {
-            content: content(&file.resolve(&name)),
+            content: match file.in_memory(&name) {
+                Some(bytes) => Some((bytes.len() as u64, digest(bytes))),
+                None => content(&file.resolve(&name)),
+            },
             modified: (file.resolve(&name).metadata())
                 .and_then(|m| m.modified())
                 .ok(),
@@ -53,6 +56,8 @@ fn content(path: &Path) -> Option<(u64, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::{BuildMode, Model, build};
+    use std::sync::Arc;
 
     #[test]
     fn every_data_file_is_named_once() {
@@ -77,5 +82,45 @@ fit: {initial: data}
             found,
             expected.map(|(name, content)| (name.to_string(), content))
         );
+    }
+
+    #[test]
+    fn a_file_in_memory_is_that_of_the_disk() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let table = "t_s,y_m\n0,3.3\n1,3.2\n2,3.0\n3,2.6\n4,2.1\n";
+        std::fs::write(folder.path().join("a.csv"), table).expect("a file");
+        let text = "format: 1
+experiments: [{data: a.csv, initial: {displacement: 3.3, velocity: 0}}]
+functions: {mass: {fixed: 1}, damping: {basis: constant, start: 0.1}, stiffness: {fixed: {data: k.csv, column: k}}}
+";
+        let on_disk = ModelFile::parse(folder.path().join("model.yaml"), text).expect("a model");
+        let stiffness = "t_s,k\n0,1\n4,2\n";
+        std::fs::write(folder.path().join("k.csv"), stiffness).expect("a file");
+        let files = [("a.csv", table), ("k.csv", stiffness)];
+        let files = files.map(|(name, text)| (name.to_owned(), Arc::from(text.as_bytes())));
+        let in_memory = ModelFile::parse("model.yaml", text).expect("a model");
+        let in_memory = in_memory.with_files(files);
+        let [disk, memory] =
+            [on_disk, in_memory].map(|file| build(&file, BuildMode::Fit).expect("a model"));
+        assert_eq!(memory.problem.start(), disk.problem.start());
+        let observed = |model: &Model| -> Vec<f64> {
+            let channels = model.problem.channels();
+            channels.flat_map(|c| c.observed().to_vec()).collect()
+        };
+        assert_eq!(observed(&memory), [3.3, 3.2, 3.0, 2.6, 2.1]);
+        assert_eq!(observed(&memory), observed(&disk));
+        let contents = |model: Model| -> Vec<_> {
+            model
+                .source
+                .data
+                .into_iter()
+                .map(|file| file.content)
+                .collect()
+        };
+        assert_eq!(contents(memory), contents(disk));
+        // A name that is neither in memory nor on the disk.
+        let file = ModelFile::parse("model.yaml", text).expect("a model");
+        let error = build(&file, BuildMode::Fit).expect_err("no file");
+        assert!(error.to_string().contains("a.csv"), "{error}");
     }
 }

@@ -21,6 +21,7 @@ mod channel_view;
 pub mod chart;
 mod columns;
 pub mod compare;
+mod completed_fit;
 mod cost;
 mod csv;
 mod display_units;
@@ -60,6 +61,7 @@ pub use chart::{
     Axis, Colour, Dash, Figure, FigureWidth, Mark, Panel, Scale, Style, render, render_at,
 };
 pub use compare::Comparison;
+pub use completed_fit::{CompletedFit, model_predictions};
 pub use cost::{CostKind, cost_definition};
 pub use csv::CsvTable;
 pub use display_units::DisplayUnits;

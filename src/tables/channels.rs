@@ -155,7 +155,7 @@ impl Table {
     }
 
     /// The only table of a file, apart from single numbers beside it.
-    pub(super) fn only(tables: Vec<Self>) -> Result<Self, InputError> {
+    pub(crate) fn only(tables: Vec<Self>) -> Result<Self, InputError> {
         let has_samples = tables.iter().any(|table| table.rows() > 1);
         let mut found = tables;
         found.retain(|table| !has_samples || table.rows() > 1);

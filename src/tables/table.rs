@@ -72,6 +72,21 @@ impl Table {
         Self::from_bytes(path, read_bytes(path, TABLE, LONGEST_TABLE)?, format)
     }
 
+    /// Parses all tables of the content of a file; messages name `path`.
+    ///
+    /// # Errors
+    ///
+    /// As [`read_all`](Self::read_all), apart from the file system.
+    pub fn parse_all(
+        path: impl AsRef<Path>,
+        reader: impl Read,
+        format: &TableFormat,
+    ) -> Result<Vec<Self>, InputError> {
+        let path = path.as_ref();
+        let bytes = read_bytes_from(path, reader, LONGEST_TABLE)?;
+        Self::from_bytes(path, bytes, format)
+    }
+
     /// Parses a table; messages name `path`.
     ///
     /// ```
@@ -100,9 +115,7 @@ impl Table {
         reader: impl Read,
         format: &TableFormat,
     ) -> Result<Self, InputError> {
-        let path = path.as_ref();
-        let bytes = read_bytes_from(path, reader, LONGEST_TABLE)?;
-        Self::only(Self::from_bytes(path, bytes, format)?)
+        Self::only(Self::parse_all(path, reader, format)?)
     }
 
     /// The path, as given.

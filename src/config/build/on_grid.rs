@@ -3,7 +3,7 @@
 use super::asked_for;
 use crate::config::ModelFile;
 use crate::error::InputError;
-use crate::tables::{Table, increasing};
+use crate::tables::{Table, TableFormat, increasing};
 use crate::units::Quantity;
 use kmcfit_core::internals::system::Grid;
 
@@ -27,7 +27,8 @@ pub(super) fn column_on_grid(
     grid: &Grid,
 ) -> Result<Vec<f64>, InputError> {
     let about_data = asked_for(file, wanted.data_key);
-    let table = Table::read(file.resolve(wanted.data)).map_err(&about_data)?;
+    let tables = file.tables(wanted.data, &TableFormat::default());
+    let table = tables.and_then(Table::only).map_err(&about_data)?;
     check_seconds(&table).map_err(&about_data)?;
     let times = increasing(&table, TIME_COLUMN).map_err(&about_data)?;
     let values = table

@@ -13,7 +13,6 @@ use crate::tables::{
     ColumnName, Duplicates, RepeatedTimes, SAMPLE_RATES, Table, TableFormat, repeated_times,
 };
 use crate::units::{Quantity, Unit};
-use std::path::PathBuf;
 use std::rc::Rc;
 
 /// Default name of the column of times.
@@ -168,7 +167,7 @@ struct Source<'a> {
     experiment: String,
     /// Key of the path.
     key: String,
-    path: PathBuf,
+    name: &'a str,
     format: TableFormat,
     /// The column, and those that are read with it.
     columns: Vec<ColumnName>,
@@ -177,10 +176,10 @@ struct Source<'a> {
 impl<'a> Source<'a> {
     fn of(
         file: &'a ModelFile,
-        spec: &ExperimentSpec,
+        spec: &'a ExperimentSpec,
         wanted: &ColumnRequest,
         column_key: &str,
-        (id, own): (&ColumnId, Option<&SourceSpec>),
+        (id, own): (&ColumnId, Option<&'a SourceSpec>),
     ) -> Result<Self, InputError> {
         let experiment = format!("experiments[{}]", wanted.experiment);
         let time = own.and_then(|s| s.time.as_ref());
@@ -197,7 +196,7 @@ impl<'a> Source<'a> {
         Ok(Self {
             file,
             key,
-            path: file.resolve(&data.0),
+            name: &data.0,
             format: format(spec),
             columns,
             experiment,
@@ -205,7 +204,7 @@ impl<'a> Source<'a> {
     }
 
     fn tables(&self, notes: &mut RecordNotes) -> Result<Rc<[Table]>, InputError> {
-        let tables = notes.tables(&self.path, &self.format);
+        let tables = notes.tables(self.file, self.name, &self.format);
         tables.map_err(|error| self.about(error))
     }
 

@@ -1,11 +1,11 @@
 //! Facts about the data of a record and what was done with them: repeated times, gaps, dropouts, spikes, saturation, quantisation and delays.
 
+use crate::config::ModelFile;
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::number_format::significant;
 use crate::tables::{Table, TableFormat, lines_in_words};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use thiserror::Error;
 
@@ -22,24 +22,29 @@ pub struct RecordNotes {
     /// What was found in the data and done with it.
     pub data: Vec<Finding>,
     /// The file that was read last: its channels follow each other.
-    last_file: Option<(PathBuf, TableFormat, Rc<[Table]>)>,
+    last_file: Option<(String, TableFormat, Rc<[Table]>)>,
 }
 
 impl RecordNotes {
-    /// The tables of a file, which is read once for columns that follow each other.
+    /// The tables of a data file, by its name in the model; it is read once for columns that follow each other.
     ///
     /// # Errors
     /// As [`Table::read_all`].
-    pub fn tables(&mut self, path: &Path, format: &TableFormat) -> Result<Rc<[Table]>, InputError> {
+    pub fn tables(
+        &mut self,
+        file: &ModelFile,
+        name: &str,
+        format: &TableFormat,
+    ) -> Result<Rc<[Table]>, InputError> {
         if let Some((last, of, tables)) = &self.last_file
-            && last == path
+            && last == name
             && of == format
         {
             return Ok(Rc::clone(tables));
         }
         self.close_file();
-        let tables: Rc<[Table]> = Table::read_all(path, format)?.into();
-        self.last_file = Some((path.to_owned(), *format, Rc::clone(&tables)));
+        let tables: Rc<[Table]> = file.tables(name, format)?.into();
+        self.last_file = Some((name.to_owned(), *format, Rc::clone(&tables)));
         Ok(tables)
     }
 

@@ -1,0 +1,448 @@
+"""Fits: estimates, curves over time, verdict, and the files of a run."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+from pathlib import Path
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from . import _kmcfit, _npz, _table
+from ._arrays import column
+from ._errors import InputError, did_you_mean
+from ._estimates import Estimates
+
+#: Quantities over time in `functions.csv`.
+_CURVES = (
+    "mass",
+    "damping",
+    "stiffness",
+    "quadratic_stiffness",
+    "cubic_stiffness",
+    "quintic_stiffness",
+    "quadratic_damping",
+    "coulomb_friction",
+    "static_force",
+    "k_over_m",
+    "c_over_m",
+    "natural_frequency",
+    "damping_ratio",
+)
+
+
+class Verdict:
+    """Verdict on a fit.
+
+    Attributes
+    ----------
+    level : {"adequate", "check", "inadequate"}
+    reasons : list of str
+        Reasons, the most important first; none for adequate.
+    assumptions : list of str
+        Assumptions that the records cannot test.
+    """
+
+    def __init__(self, given: Mapping[str, Any]) -> None:
+        self.level: str = given.get("level", "")
+        self.reasons: List[str] = _texts(given.get("reasons"))
+        self.passed: str = given.get("passed", "")
+        self.assumptions: List[str] = _texts(given.get("assumptions"))
+
+    def __str__(self) -> str:
+        return "; ".join([self.level.capitalize(), *(self.reasons or filter(None, [self.passed]))])
+
+    def __repr__(self) -> str:
+        return f"<Verdict {self}>"
+
+
+class Curve:
+    """A quantity over time: values at the nodes, linear in between."""
+
+    def __init__(self, name: str, unit: str, times: "np.ndarray", values: "np.ndarray", band: Optional[Tuple[Any, Any]]) -> None:
+        self.name = name
+        self.unit = unit
+        #: Times of the nodes, s.
+        self.times = times
+        #: Values at the nodes, in `unit`.
+        self.values = values
+        self._band = band
+
+    def __repr__(self) -> str:
+        low, high = np.nanmin(self.values), np.nanmax(self.values)
+        return f"<Curve {self.name}: {low:.6g} to {high:.6g} {self.unit}>"
+
+    def __call__(self, t: Any) -> Any:
+        """Values at the times `t` (s, any shape), in `unit`; NaN outside the record."""
+        return self._at(t, self.values)
+
+    def band(self, t: Any = None, level: float = 0.95) -> Tuple[Any, Any]:
+        """Lower and upper end of the pointwise confidence interval at the times `t` (default: at the nodes).
+
+        The interval of 95 % is that of the run; others are scaled by the quantiles of the normal distribution.
+
+        Raises
+        ------
+        InputError
+            If the run has no intervals for the quantity, or `level` is not between 0 and 1.
+        """
+        if self._band is None:
+            raise InputError("no confidence intervals", f"{self.name}.band", expected="a fit with `sigma` and identified parameters")
+        if not 0.0 < level < 1.0:
+            raise InputError("invalid level", f"{self.name}.band", repr(level), "a number between 0 and 1")
+        factor = 1.0 if level == 0.95 else _quantile(level) / _quantile(0.95)
+        ends = [self.values + factor * (end - self.values) if factor != 1.0 else end for end in self._band]
+        if t is None:
+            return ends[0].copy(), ends[1].copy()
+        return self._at(t, ends[0]), self._at(t, ends[1])
+
+    def _at(self, t: Any, values: "np.ndarray") -> Any:
+        times = np.asarray(t, dtype=np.float64)
+        found = np.interp(times, self.times, values, left=np.nan, right=np.nan)
+        return float(found) if times.ndim == 0 else found
+
+
+class Fit:
+    """A fit of a model: the results of ``kmcfit fit``. Made by `Model.fit`, `fit_model` and `open`.
+
+    Attributes
+    ----------
+    estimates : Estimates
+        Quantity, estimate, 95 % interval, unit, status.
+    verdict : Verdict
+    warnings : list of str
+    result : dict
+        The document ``result.json``.
+    mass, damping, stiffness, k_over_m, natural_frequency, damping_ratio, … : Curve
+        Coefficients and ratios over time.
+    """
+
+    _raw: Optional["_kmcfit.RawFit"]
+    _json: str
+    _files: Optional[Dict[str, bytes]]
+
+    def __init__(self) -> None:
+        raise TypeError("a Fit is made by `Model.fit`, `fit_model` or `open`")
+
+    @classmethod
+    def _of(cls, raw: "_kmcfit.RawFit") -> "Fit":
+        fit = cls.__new__(cls)
+        fit.__dict__.update(_raw=raw, _json=raw.json(), _files=None, _cache={})
+        if fit.status == "interrupted":
+            import warnings
+
+            warnings.warn("the fit was interrupted; the best point so far is returned", RuntimeWarning, stacklevel=4)
+        return fit
+
+    @classmethod
+    def _opened(cls, text: str, files: Dict[str, bytes]) -> "Fit":
+        fit = cls.__new__(cls)
+        fit.__dict__.update(_raw=None, _json=text, _files=files, _cache={})
+        return fit
+
+    # Documents.
+
+    @property
+    def result(self) -> Dict[str, Any]:
+        """The document ``result.json``; see the chapter on results."""
+        return self._once("result", lambda: json.loads(self._json))
+
+    @property
+    def status(self) -> str:
+        """End of the fit: converged, completed, max-iterations, time-limit, stalled, interrupted, infeasible or failed."""
+        return self.result["outcome"]["status"]
+
+    @property
+    def cost(self) -> float:
+        """Cost J at the estimates."""
+        return self.result["cost"]["final"]
+
+    @property
+    def estimates(self) -> Estimates:
+        """Table of estimates."""
+        return self._once("estimates", lambda: Estimates(self.result))
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict on the fit."""
+        return Verdict(self.result.get("verdict") or {})
+
+    @property
+    def warnings(self) -> List[str]:
+        """Warnings about data, model and identifiability."""
+        findings = self.result.get("findings", [])
+        return _texts(self.result.get("warnings")) + _texts([f for f in findings if f.get("level") == "warning"])
+
+    @property
+    def parameters(self) -> Dict[str, float]:
+        """Estimated parameters by name, SI."""
+        document = self._parameters()
+        return dict(zip(document["names"], document["values"]))
+
+    @property
+    def covariance(self) -> Optional["np.ndarray"]:
+        """Covariance of the parameters in their order, or None."""
+        found = self._parameters().get("covariance")
+        return None if found is None else np.array(found)
+
+    @property
+    def functions(self) -> Dict[str, "np.ndarray"]:
+        """Columns of ``functions.csv``: coefficients, ratios and their intervals over time."""
+        return self._once("functions", lambda: _table.columns(self._text("functions.csv")))
+
+    @property
+    def trajectory(self) -> Dict[str, "np.ndarray"]:
+        """Columns of ``trajectory.csv``: the simulated response over time."""
+        return self._once("trajectory", lambda: _table.columns(self._text("trajectory.csv")))
+
+    @property
+    def history(self) -> Dict[str, "np.ndarray"]:
+        """Columns of ``history.csv``: one row per iteration."""
+        return self._once("history", lambda: _table.columns(self._text("history.csv")))
+
+    def curve(self, name: str) -> Curve:
+        """A quantity over time by its name: ``"stiffness"``, ``"k_over_m"``, ``"natural_frequency"``, …"""
+        names = self._curve_names()
+        if name not in names:
+            known = list(names)
+            raise InputError("no such quantity", "Fit.curve", f"`{name}`", "one of: " + ", ".join(known), did_you_mean(name, known))
+        header = names[name]
+        table = self.functions
+        ends = table.get(header + "_lo95"), table.get(header + "_hi95")
+        band = None if ends[0] is None or np.isnan(ends[0]).all() else ends
+        unit = self.estimates[name].unit if any(e.quantity == name for e in self.estimates) else ""
+        return Curve(name, unit, table["t_s"], table[header], band)
+
+    def __getattr__(self, name: str) -> Curve:
+        if name in _CURVES and "_json" in self.__dict__:
+            if name in self._curve_names():
+                return self.curve(name)
+            raise AttributeError(f"the model has no {name}")
+        raise AttributeError(f"'Fit' object has no attribute '{name}'")
+
+    def __dir__(self) -> List[str]:
+        return [*super().__dir__(), *self._curve_names()]
+
+    # Use.
+
+    def simulate(
+        self,
+        *,
+        time: Any = None,
+        force: Any = None,
+        base_acceleration: Any = None,
+        base_displacement: Any = None,
+        initial: Sequence[float] = (0.0, 0.0),
+        channels: Union[str, Sequence[str]] = "displacement",
+    ) -> Dict[str, "np.ndarray"]:
+        """The response of the fitted system to another input, as ``kmcfit predict`` computes it.
+
+        Parameters
+        ----------
+        time : array_like, shape (n,)
+            Times of the input, s.
+        force, base_acceleration, base_displacement : array_like, shape (n,), optional
+            Inputs in SI units; none for a free response over the times of the fit.
+        initial : (displacement, velocity)
+            Initial state, m and m/s.
+        channels : str or sequence of str
+            ``displacement``, ``velocity``, ``acceleration``.
+
+        Returns
+        -------
+        dict of ndarray
+            Columns of ``predictions.csv``: times, and each channel with its interval where the run has one.
+        """
+        inputs = {"force": force, "base_acceleration": base_acceleration, "base_displacement": base_displacement}
+        units = {"force": "N", "base_acceleration": "m/s^2", "base_displacement": "m"}
+        given = {name: column(f"Fit.simulate.{name}", value) for name, value in inputs.items() if value is not None}
+        if given and time is None:
+            raise InputError("no times", "Fit.simulate.time", expected="times of the input, s")
+        wanted = [channels] if isinstance(channels, str) else list(channels)
+        state = [float(x) for x in initial]
+        if len(state) != 2:
+            raise InputError("invalid initial state", "Fit.simulate.initial", repr(initial), "(displacement, velocity)")
+        with temporary_folder() as folder:
+            run = os.path.join(folder, "run")
+            self._write(run)
+            paths: Dict[str, Optional[str]] = {"force": None, "base": None}
+            for name, values in given.items():
+                times = column("Fit.simulate.time", time)
+                if len(times) != len(values):
+                    found = f"{len(values)} samples"
+                    raise InputError("unequal lengths", f"Fit.simulate.{name}", found, f"{len(times)} samples, as `time`")
+                path = os.path.join(folder, name + ".npz")
+                Path(path).write_bytes(_npz.archive({"time [s]": times, f"{name} [{units[name]}]": values}))
+                paths["force" if name == "force" else "base"] = path
+            return _table.columns(_kmcfit.simulate(run, paths["force"], paths["base"], (state[0], state[1]), wanted))
+
+    def save(
+        self, folder: Union[str, "os.PathLike[str]"], *, report: bool = True, tables: bool = False, draws: int = 0
+    ) -> None:
+        """Writes the run into a folder: the files of ``kmcfit fit --out FOLDER``.
+
+        For a model of arrays the folder also has ``model.yaml`` and the records, so that ``kmcfit verify`` can recompute the results.
+
+        Parameters
+        ----------
+        folder : path
+            A new folder, or one with results of kmcfit, which are replaced.
+        report : bool
+            With figures and page.
+        tables : bool
+            A row for every node in the tables over time.
+        draws : int
+            Number of draws from the distribution of the estimates in ``draws.csv``.
+        """
+        if self._raw is not None:
+            self._raw.save(os.fspath(folder), report, tables, draws)
+            return
+        target = Path(folder)
+        if target.exists() and any(target.iterdir()):
+            raise InputError("the folder is not empty", str(target), expected="a new folder")
+        for name, content in (self._files or {}).items():
+            path = target / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+
+    def plot(self, quantities: Optional[Sequence[str]] = None) -> Any:
+        """A figure of matplotlib: the coefficients that vary (or `quantities`) with their 95 % bands."""
+        from ._plot import figure
+
+        return figure({"": self}, list(quantities or self._varying()))
+
+    def to_pandas(self) -> Any:
+        """Curves over time as a DataFrame of pandas, indexed by the time in s."""
+        import pandas  # type: ignore[import-untyped,unused-ignore]
+
+        return pandas.DataFrame(self.functions).set_index("t_s")
+
+    def to_xarray(self) -> Any:
+        """Curves over time as a Dataset of xarray, with units and the ends of the intervals."""
+        import xarray
+
+        data, names = {}, self._curve_names()
+        for name in names:
+            curve = self.curve(name)
+            data[name] = ("time", curve.values, {"units": curve.unit})
+            if curve._band is not None:
+                for end, values in zip(("low95", "high95"), curve._band):
+                    data[f"{name}_{end}"] = ("time", values, {"units": curve.unit})
+        return xarray.Dataset(data, coords={"time": ("time", self.functions["t_s"], {"units": "s"})})
+
+    def draws(self, number: int = 4000) -> Dict[str, "np.ndarray"]:
+        """Draws from the distribution of the estimates: the columns of ``draws.csv``."""
+        if self._raw is None:
+            found = (self._files or {}).get("draws.csv")
+            if found is None:
+                raise InputError("no draws in this run", "Fit.draws", expected="a run saved with `draws=…`")
+            return _table.columns(found.decode())
+        with temporary_folder() as folder:
+            self._raw.save(os.path.join(folder, "run"), False, False, number)
+            path = Path(folder, "run", "draws.csv")
+            if not path.exists():
+                raise InputError("no draws", "Fit.draws", expected="a covariance of at most 64 parameters")
+            return _table.columns(path.read_text())
+
+    def to_arviz(self, number: int = 4000) -> Any:
+        """Draws from the distribution of the estimates as InferenceData of ArviZ, one chain."""
+        import arviz
+
+        posterior = {name: values[np.newaxis] for name, values in self.draws(number).items()}
+        # Since version 1 the groups are named.
+        is_old = int(arviz.__version__.split(".")[0]) < 1
+        return arviz.from_dict(posterior if is_old else {"posterior": posterior})
+
+    # Display.
+
+    def __repr__(self) -> str:
+        title = self.result["title"]
+        return f"<Fit {title!r}: {self.status}>\n{self.verdict}\n{self.estimates!r}"
+
+    def _repr_html_(self) -> str:
+        page = f"<h4>{html.escape(self.result['title'])}: {html.escape(self.status)}</h4><p>{html.escape(str(self.verdict))}</p>"
+        chart = self._run().get("figures/functions.svg", b"").decode()
+        return page + self.estimates._repr_html_() + chart[max(chart.find("<svg"), 0) :]
+
+    def __getstate__(self) -> Dict[str, Any]:
+        return {"json": self._json, "files": self._run()}
+
+    def __setstate__(self, state: Dict[str, Any]) -> None:
+        self.__dict__.update(_raw=None, _json=state["json"], _files=state["files"], _cache={})
+
+    # Parts.
+
+    def _once(self, name: str, make: Any) -> Any:
+        cache = self.__dict__["_cache"]
+        if name not in cache:
+            cache[name] = make()
+        return cache[name]
+
+    def _run(self) -> Dict[str, bytes]:
+        """All files of the run by name."""
+        if self._files is None:
+            with temporary_folder() as folder:
+                run = os.path.join(folder, "run")
+                self._write(run, report=True)
+                return self._once("run", lambda: read_files(run))
+        return self._files
+
+    def _write(self, folder: str, report: bool = False) -> None:
+        if self._raw is None:
+            self.save(folder)
+        else:
+            self._raw.save(folder, report, not report, 0)
+
+    def _text(self, name: str) -> str:
+        if self._files is not None:
+            return self._files[name].decode()
+        return self._once("tables", lambda: dict(self._raw.tables()) if self._raw else {})[name]
+
+    def _parameters(self) -> Dict[str, Any]:
+        return self._once("parameters", lambda: json.loads(self._text("parameters.json")))
+
+    def _curve_names(self) -> Dict[str, str]:
+        """Headers of the values by quantity."""
+        found: Dict[str, str] = {}
+        for header in self.functions:
+            names = [name for name in _CURVES if header == name or header.startswith(name + "_")]
+            if names and not header.endswith(("_lo95", "_hi95")) and " of " not in header:
+                found.setdefault(max(names, key=len), header)
+        return found
+
+    def _varying(self) -> List[str]:
+        names = [name for name in self._curve_names() if name in _CURVES[:9]]
+        varying = [name for name in names if np.nanmax(self.curve(name).values) > np.nanmin(self.curve(name).values)]
+        return varying or names
+
+
+def open_run(folder: Union[str, "os.PathLike[str]"]) -> Fit:
+    """A finished run from the folder that ``kmcfit fit`` or `Fit.save` wrote."""
+    path = os.fspath(folder)
+    return Fit._opened(_kmcfit.open_run(path), read_files(path))
+
+
+def read_files(folder: str) -> Dict[str, bytes]:
+    """The files of a folder by their relative names."""
+    root = Path(folder)
+    return {path.relative_to(root).as_posix(): path.read_bytes() for path in sorted(root.rglob("*")) if path.is_file()}
+
+
+def temporary_folder() -> Any:
+    """A folder that its context removes. The module is slow to import, and used for few calls."""
+    from tempfile import TemporaryDirectory
+
+    return TemporaryDirectory()
+
+
+def _quantile(level: float) -> float:
+    """Half width of the central interval of the standard normal distribution with the probability `level`."""
+    from statistics import NormalDist
+
+    return NormalDist().inv_cdf(0.5 + 0.5 * level)
+
+
+def _texts(findings: Any) -> List[str]:
+    return [finding["text"] for finding in findings or []]

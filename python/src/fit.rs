@@ -1,0 +1,211 @@
+//! Fits.
+
+use crate::errors::{Failure, caught, guarded};
+use crate::source::{Files, Source};
+use kmcfit::config::{Model, ModelFile};
+use kmcfit::fitting::fit_or_no_response;
+use kmcfit::report::document::ResultDocument;
+use kmcfit::report::{CompletedFit, DRAWS, OverheadTimings, TimingsSummary, fit_claim, json};
+use kmcfit::results::{OutputFolder, RESULT, RequestedFiles};
+use kmcfit_core::internals::solvers::{Observer, Status};
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread::{Builder, scope};
+use std::time::{Duration, Instant};
+
+/// Name of the file for a model of arrays in the folder of its run.
+const MODEL: &str = "model.yaml";
+/// Time between two looks for Ctrl-C.
+const POLL: Duration = Duration::from_millis(20);
+/// Stack of the thread of a fit, bytes: that of the program's main thread on Linux.
+const STACK: usize = 8 << 20;
+
+/// A finished fit.
+#[pyclass(frozen, module = "kmcfit._kmcfit")]
+pub struct RawFit {
+    file: ModelFile,
+    done: CompletedFit,
+    document: ResultDocument,
+}
+
+/// Fits a model; Ctrl-C ends the fit at its best point.
+#[pyfunction]
+pub fn fit(
+    py: Python<'_>,
+    text: Option<String>,
+    path: PathBuf,
+    files: Files,
+    overrides: Vec<String>,
+) -> PyResult<RawFit> {
+    let source = Source {
+        text,
+        path,
+        files,
+        overrides,
+    };
+    let flag = Arc::new(AtomicBool::new(false));
+    let interrupt = Arc::clone(&flag);
+    let (result, signal) = py.detach(|| watched(&flag, move || fitted(source, interrupt)));
+    let found = result.map_err(|failure| failure.raise(py));
+    match signal {
+        None => found,
+        Some(raised) => {
+            let is_ended = |found: &RawFit| found.document.outcome.status == Status::Interrupted;
+            match raised.is_instance_of::<PyKeyboardInterrupt>(py) {
+                true => found.and_then(|found| {
+                    if is_ended(&found) {
+                        Ok(found)
+                    } else {
+                        Err(raised)
+                    }
+                }),
+                false => Err(raised),
+            }
+        }
+    }
+}
+
+/// Does `work` on a thread of its own, and sets `flag` at the first exception of a signal handler, which is returned.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "its stack is as large as that of the program's main thread; a refusal is an error"
+)]
+fn watched<T: Send>(
+    flag: &AtomicBool,
+    work: impl FnOnce() -> Result<T, Failure> + Send,
+) -> (Result<T, Failure>, Option<PyErr>) {
+    let mut signal = None;
+    let result = scope(|scope| {
+        let (done, finished) = channel();
+        let worker = Builder::new()
+            .stack_size(STACK)
+            .spawn_scoped(scope, move || {
+                let result = caught(work);
+                // The receiver waits for it.
+                let _ = done.send(());
+                result
+            });
+        let worker = worker.map_err(|error| Failure::Numerical(format!("no thread: {error}")))?;
+        while finished.recv_timeout(POLL) == Err(RecvTimeoutError::Timeout) {
+            if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                flag.store(true, Ordering::Relaxed);
+                signal = Some(raised);
+            }
+        }
+        worker
+            .join()
+            .unwrap_or_else(|payload| Err(Failure::of_panic(&*payload)))
+    });
+    (result, signal)
+}
+
+fn fitted(source: Source, interrupt: Arc<AtomicBool>) -> Result<RawFit, Failure> {
+    let (file, mut model) = source.build()?;
+    model.settings.interrupt = Some(interrupt);
+    let clock = Instant::now();
+    let found = fit_or_no_response(&model, &mut Observer::new(&mut |_| {}));
+    let found = found.map_err(|breakdown| {
+        Failure::Numerical(format!("the start cannot be evaluated: {breakdown}"))
+    })?;
+    let analysis = Instant::now();
+    let done = CompletedFit::of(found);
+    let mut document = done.fitted(RequestedFiles::figures()).document();
+    let overhead = OverheadTimings {
+        io: model.preparation.reading,
+        analysis: analysis.elapsed(),
+        report: Duration::ZERO,
+    };
+    let total = (model.preparation.total + clock.elapsed()).max(overhead.sum() + done.fit.elapsed);
+    document.timings = TimingsSummary::new(&done.fit, &overhead, total);
+    Ok(RawFit {
+        file,
+        done,
+        document,
+    })
+}
+
+impl RawFit {
+    /// Writes the run; a model in memory with its files beside the results.
+    fn write(&self, folder: &Path, requested: RequestedFiles) -> Result<(), Failure> {
+        let in_memory: Vec<(String, Arc<[u8]>)> = self.file.files_in_memory();
+        let placed = match !in_memory.is_empty() {
+            true => Some(CompletedFit {
+                model: Model {
+                    file: folder.join(MODEL),
+                    ..self.done.model.clone()
+                },
+                ..self.done.clone()
+            }),
+            false => None,
+        };
+        let done = placed.as_ref().unwrap_or(&self.done);
+        let mut claim = fit_claim(&done.model);
+        if placed.is_some() {
+            let names = in_memory.iter().map(|(name, _)| name.clone());
+            claim = claim.files(names.chain([MODEL.to_owned()]));
+        } else {
+            let inputs = self.file.data_files().into_iter();
+            claim = claim.inputs(inputs.chain([self.file.path.clone()]));
+        }
+        let output = OutputFolder::prepare(folder, claim)?;
+        let full = |error| {
+            Failure::Input(
+                kmcfit::error::InputError::file(folder, "the results cannot be written")
+                    .found(error)
+                    .expected("a writable folder"),
+            )
+        };
+        let run = done.fitted(requested);
+        let mut document = run.document();
+        document.timings = self.document.timings.clone();
+        let mut stage = output.stage().map_err(full)?;
+        if placed.is_some() {
+            stage
+                .write(MODEL, self.file.effective_text())
+                .map_err(full)?;
+            for (name, content) in &in_memory {
+                stage.write(name, content).map_err(full)?;
+            }
+        }
+        run.write(&mut stage, &document).map_err(full)?;
+        if let Some(Ok(table)) = run.draws() {
+            stage.write(DRAWS, table.to_csv()).map_err(full)?;
+        }
+        stage.write(RESULT, json(&document)).map_err(full)?;
+        stage.commit().map_err(full)
+    }
+}
+
+#[pymethods]
+impl RawFit {
+    /// The result document.
+    fn json(&self, py: Python<'_>) -> PyResult<String> {
+        guarded(py, || Ok(json(&self.document)))
+    }
+
+    /// Tables over time and iterations, and the parameters, by the name of the file; one row for every node.
+    fn tables(&self, py: Python<'_>) -> PyResult<Vec<(String, String)>> {
+        guarded(py, || Ok(self.done.tables(&self.document)))
+    }
+
+    /// Writes the run into a folder.
+    fn save(
+        &self,
+        py: Python<'_>,
+        folder: PathBuf,
+        figures: bool,
+        tables: bool,
+        draws: usize,
+    ) -> PyResult<()> {
+        let requested = RequestedFiles {
+            figures,
+            tables,
+            draws,
+        };
+        guarded(py, || self.write(&folder, requested))
+    }
+}

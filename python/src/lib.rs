@@ -1,0 +1,53 @@
+//! The extension module `kmcfit._kmcfit`: models, fits and runs for the Python package on top of it.
+
+#![forbid(unsafe_code)]
+#![allow(
+    clippy::result_large_err,
+    reason = "as in the application: an input error ends the call"
+)]
+
+mod errors;
+mod fit;
+mod problem;
+mod runs;
+mod source;
+
+use mimalloc::MiMalloc;
+use pyo3::prelude::*;
+
+/// As in the program: the system's allocator returns the pages of arrays with one value per node at once.
+#[global_allocator]
+static ALLOCATOR: MiMalloc = MiMalloc;
+
+#[pymodule]
+mod _kmcfit {
+    use super::*;
+    use std::ffi::OsString;
+
+    #[pymodule_export]
+    use crate::fit::{RawFit, fit};
+    #[pymodule_export]
+    use crate::problem::Problem;
+    #[pymodule_export]
+    use crate::runs::{compare, open_run, parse, read_table, read_text, scaffold, simulate};
+
+    /// Provides the services of the process once.
+    #[pymodule_init]
+    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
+        kmcfit::cli::provide_host();
+        Ok(())
+    }
+
+    /// Runs the program on its arguments; returns its exit code.
+    #[pyfunction]
+    fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+        let words = std::iter::once(OsString::from("kmcfit")).chain(arguments);
+        py.detach(|| kmcfit::cli::run(words.collect()))
+    }
+
+    /// Version of the package.
+    #[pyfunction]
+    fn version() -> &'static str {
+        env!("CARGO_PKG_VERSION")
+    }
+}

@@ -1,0 +1,175 @@
+"""Fits of arrays: estimates, curves, files."""
+
+import json
+import os
+import pickle
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+from conftest import MODELS, oscillator, program
+
+import kmcfit as km
+
+#: Fits of the test of the memory.
+COUNT = int(os.environ.get("KMCFIT_FITS", "30"))
+
+
+def test_estimates_contain_the_true_system(fit):
+    # The record is made with these values; 95 % intervals of one seed, three times as wide: a chance of 1e-8.
+    for name, true in {"damping": 1.0, "stiffness": 1500.0, "natural_frequency": np.sqrt(1500 / 2.4) / (2 * np.pi)}.items():
+        low, high = fit.estimates[name].ci95
+        half = 0.5 * (high - low)
+        assert abs(fit.estimates[name].value - true) < 3 * half, name
+        assert half < 0.01 * true, name
+    assert fit.status == "converged" and fit.verdict.level == "adequate"
+    assert fit.estimates["mass"].status == "fixed"
+    assert fit.estimates[0].quantity == fit.result["estimates"].__iter__().__next__()
+    assert "natural_frequency" in repr(fit.estimates) and "<table>" in fit.estimates._repr_html_()
+    assert "<svg" in fit._repr_html_()
+
+
+def test_curves_are_the_columns_of_the_table(fit):
+    table, stiffness = fit.functions, fit.stiffness
+    assert stiffness.unit == "N/m"
+    assert np.array_equal(stiffness(table["t_s"]), table["stiffness_N_per_m"])
+    low, high = stiffness.band(1.0)
+    assert low < stiffness(1.0) < high
+    assert (low, high) == pytest.approx(fit.estimates["stiffness"].ci95, rel=1e-12)
+    # A normal distribution: 0.6827 within one standard deviation, 1.96 for 95 %.
+    narrow = fit.stiffness.band(1.0, 0.6826894921370859)
+    assert (narrow[1] - narrow[0]) * 1.959963984540054 == pytest.approx(high - low, rel=1e-9)
+    assert np.isnan(stiffness(99.0))
+    with pytest.raises(AttributeError):
+        fit.cubic_stiffness
+    with pytest.raises(km.InputError, match="did you mean `stiffness`"):
+        fit.curve("stifness")
+
+
+def test_simulated_response_is_that_of_another_integrator(fit, record):
+    time = record[0]
+    force = 5.0 * np.cos(9.0 * time)
+    found = fit.simulate(time=time, force=force, initial=(0.01, -0.2), channels="acceleration")
+    values = fit.parameters
+    linear = lambda t: np.interp(t, time, force)  # noqa: E731
+    _, expected = oscillator(2.4, values["damping"], values["stiffness"], time, linear, (0.01, -0.2))
+    at = np.interp(time, found["t_s"], found["acceleration_m_per_s2"])
+    # Both are of order 4, with at least ten steps in 1/20 of a period: errors below 1e-6 of the peak, sampling of the table included.
+    assert np.max(np.abs(at - expected)) < 2e-3 * np.max(np.abs(expected))
+    free = fit.simulate(initial=(0.01, 0.0))
+    assert free["displacement_m"][0] == 0.01
+
+
+def test_a_saved_run_is_verified_opened_and_pickled(fit, data, tmp_path):
+    fit.save(tmp_path / "run", report=False)
+    done = program("verify", tmp_path / "run")
+    assert done.returncode == 0, done.stdout + done.stderr
+    opened = km.open(tmp_path / "run")
+    copy = pickle.loads(pickle.dumps(opened))
+    for other in (opened, copy, pickle.loads(pickle.dumps(fit))):
+        assert other.estimates == fit.estimates and other.parameters == fit.parameters
+        assert np.array_equal(other.covariance, fit.covariance)
+        assert other.stiffness(1.0) == fit.stiffness(1.0)
+    copy.save(tmp_path / "copy")
+    assert km.open(tmp_path / "copy").result == opened.result
+    with pytest.raises(km.InputError, match="not empty"):
+        copy.save(tmp_path / "copy")
+    # The same model as files gives the same bits.
+    km.Model(mass=2.4).save(tmp_path / "model.yaml", data)
+    again = km.fit_model(tmp_path / "model.yaml")
+    assert again.parameters == fit.parameters and again.estimates == fit.estimates
+    with pytest.raises(km.InputError, match="exists already"):
+        km.Model(mass=2.4).save(tmp_path / "model.yaml", data)
+
+
+def test_threads_give_the_same_bits(data, fit):
+    found = []
+    work = lambda: found.append(km.Model(mass=2.4).fit(data).parameters)  # noqa: E731
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == [fit.parameters] * 4
+
+
+def test_ctrl_c_ends_a_fit_at_its_best_point():
+    # The signal comes while the fit runs: 10 million iterations would take hours.
+    code = (
+        "import os, signal, threading, warnings, kmcfit as km\n"
+        "threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
+        "with warnings.catch_warnings(record=True) as caught:\n"
+        "    warnings.simplefilter('always')\n"
+        f"    fit = km.fit_model({str(MODELS / 'paper.yaml')!r}, set={{'fit.stop.iterations': 10_000_000}})\n"
+        "cost = fit.result['cost']\n"
+        "print(fit.status, cost['final'] < cost['initial'], len(fit.history['cost']) > 0, len(caught))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stdout.split() == ["interrupted", "True", "True", "1"], done.stderr
+
+
+def test_memory_stays_flat(data):
+    resource = pytest.importorskip("resource")
+    model = km.Model(mass=2.4)
+
+    def pages():
+        with open("/proc/self/statm") as file:
+            return int(file.read().split()[1]) * resource.getpagesize()
+
+    for _ in range(COUNT // 3):
+        model.fit(data)
+    before = pages()
+    for _ in range(COUNT):
+        model.fit(data)
+    # A fit holds more than 0.3 MB (its curves at 801 nodes, 13 columns with intervals): each kept would be 9 MB after 30.
+    assert pages() - before < 0.1e6 * COUNT + 1e6
+
+
+def test_comparison_prefers_the_constant(data, fit):
+    line = km.Model(mass=2.4, stiffness=km.Polynomial(degree=1, start=[1500.0, 0.0])).fit(data)
+    found = km.compare({"constant": fit, "line": line})
+    assert [run["name"] for run in found.runs] == ["constant", "line"]
+    assert found.runs[0]["bic_difference"] == 0.0 < found.runs[1]["bic_difference"]
+    assert "constant" in repr(found) and found.html.startswith("<!DOCTYPE html>")
+    assert found.result["format"] == 1 and json.dumps(found.result)
+    with pytest.raises(km.InputError, match="too few fits"):
+        km.compare({"constant": fit})
+
+
+def test_extras(fit):
+    pandas = pytest.importorskip("pandas")
+    frame = fit.estimates.to_pandas()
+    assert frame.loc["stiffness", "value"] == fit.estimates["stiffness"].value
+    assert isinstance(fit.to_pandas(), pandas.DataFrame)
+
+
+def test_figures_are_drawn_on_request(fit):
+    assert "matplotlib" not in subprocess.run(
+        [sys.executable, "-c", "import kmcfit, sys; print(*sys.modules)"], capture_output=True, text=True
+    ).stdout
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    figure = fit.plot(["stiffness", "damping"])
+    assert [panel.get_ylabel() for panel in figure.axes] == ["stiffness (N/m)", "damping (N s/m)"]
+    line = figure.axes[0].get_lines()[0]
+    assert np.array_equal(line.get_ydata(), fit.stiffness.values)
+
+
+def test_xarray(fit):
+    pytest.importorskip("xarray")
+    found = fit.to_xarray()
+    assert found["stiffness"].attrs["units"] == "N/m"
+    assert np.array_equal(found["stiffness"].values, fit.stiffness.values)
+
+
+def test_draws_have_the_covariance_of_the_estimates(fit):
+    draws = fit.draws(1000)
+    values = draws["stiffness"] if "stiffness" in draws else draws[next(n for n in draws if n.startswith("stiffness"))]
+    names = list(fit.parameters)
+    sigma = np.sqrt(fit.covariance[names.index("stiffness"), names.index("stiffness")])
+    # The standard error of a standard deviation of 1000 draws is 2.2 %: five of them.
+    assert np.std(values) == pytest.approx(sigma, rel=0.11)
+    pytest.importorskip("arviz")
+    assert "posterior" in fit.to_arviz(100).groups()
