@@ -203,6 +203,11 @@ impl RawFit {
 
 #[pymethods]
 impl RawFit {
+    /// True if Ctrl-C ended the fit.
+    fn is_interrupted(&self) -> bool {
+        self.document.outcome.status == Status::Interrupted
+    }
+
     /// The result document.
     fn json(&self, py: Python<'_>) -> PyResult<String> {
         guarded(py, || Ok(json(&self.document)))
