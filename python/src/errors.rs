@@ -14,6 +14,8 @@ pub enum Failure {
     Numerical(String),
     /// A panic, with its message.
     Panic(String),
+    /// An exception of a function that was called.
+    Raised(PyErr),
 }
 
 impl From<InputError> for Failure {
@@ -46,6 +48,7 @@ impl Failure {
             }
             Self::Numerical(text) => errors.getattr("NumericalError")?.call1((text,)),
             Self::Panic(text) => errors.getattr("InternalError")?.call1((text,)),
+            Self::Raised(error) => Err(error),
         });
         made.map_or_else(|error| error, PyErr::from_value)
     }

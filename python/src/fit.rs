@@ -7,7 +7,7 @@ use kmcfit::fitting::fit_or_no_response;
 use kmcfit::report::document::ResultDocument;
 use kmcfit::report::{CompletedFit, DRAWS, OverheadTimings, TimingsSummary, fit_claim, json};
 use kmcfit::results::{OutputFolder, RESULT, RequestedFiles};
-use kmcfit_core::internals::solvers::{Observer, Status};
+use kmcfit_core::internals::solvers::{IterationRecord, Observer, Status};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ pub struct RawFit {
     document: ResultDocument,
 }
 
-/// Fits a model; Ctrl-C ends the fit at its best point.
+/// Fits a model; Ctrl-C ends the fit at its best point. `progress` is called with number and cost of each iteration.
 #[pyfunction]
 pub fn fit(
     py: Python<'_>,
@@ -40,6 +40,7 @@ pub fn fit(
     path: PathBuf,
     files: Files,
     overrides: Vec<String>,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<RawFit> {
     let source = Source {
         text,
@@ -49,7 +50,8 @@ pub fn fit(
     };
     let flag = Arc::new(AtomicBool::new(false));
     let interrupt = Arc::clone(&flag);
-    let (result, signal) = py.detach(|| watched(&flag, move || fitted(source, interrupt)));
+    let (result, signal) =
+        py.detach(|| watched(&flag, move || fitted(source, interrupt, progress)));
     let found = result.map_err(|failure| failure.raise(py));
     match signal {
         None => found,
@@ -103,11 +105,30 @@ fn watched<T: Send>(
     (result, signal)
 }
 
-fn fitted(source: Source, interrupt: Arc<AtomicBool>) -> Result<RawFit, Failure> {
+fn fitted(
+    source: Source,
+    interrupt: Arc<AtomicBool>,
+    progress: Option<Py<PyAny>>,
+) -> Result<RawFit, Failure> {
     let (file, mut model) = source.build()?;
-    model.settings.interrupt = Some(interrupt);
+    model.settings.interrupt = Some(Arc::clone(&interrupt));
     let clock = Instant::now();
-    let found = fit_or_no_response(&model, &mut Observer::new(&mut |_| {}));
+    let mut raised = None;
+    let mut show = |record: &IterationRecord| {
+        let Some(progress) = progress.as_ref().filter(|_| raised.is_none()) else {
+            return;
+        };
+        let (iteration, cost) = (record.iteration, record.cost);
+        let called = Python::attach(|py| progress.call1(py, (iteration, cost)).map(drop));
+        if let Err(error) = called {
+            interrupt.store(true, Ordering::Relaxed);
+            raised = Some(error);
+        }
+    };
+    let found = fit_or_no_response(&model, &mut Observer::new(&mut show));
+    if let Some(error) = raised {
+        return Err(Failure::Raised(error));
+    }
     let found = found.map_err(|breakdown| {
         Failure::Numerical(format!("the start cannot be evaluated: {breakdown}"))
     })?;
@@ -182,6 +203,11 @@ impl RawFit {
 
 #[pymethods]
 impl RawFit {
+    /// True if Ctrl-C ended the fit.
+    fn is_interrupted(&self) -> bool {
+        self.document.outcome.status == Status::Interrupted
+    }
+
     /// The result document.
     fn json(&self, py: Python<'_>) -> PyResult<String> {
         guarded(py, || Ok(json(&self.document)))

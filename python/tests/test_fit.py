@@ -110,6 +110,19 @@ def test_ctrl_c_ends_a_fit_at_its_best_point():
     assert done.stdout.split() == ["interrupted", "True", "True", "1"], done.stderr
 
 
+def test_progress_is_called_after_each_iteration(data, fit):
+    seen = []
+    found = km.Model(mass=2.4).fit(data, progress=lambda iteration, cost: seen.append((iteration, cost)))
+    assert found.parameters == fit.parameters and len(seen) >= len(fit.history["cost"])
+    assert all(isinstance(iteration, int) and cost > 0.0 for iteration, cost in seen)
+
+    def refuse(iteration, cost):
+        raise KeyError("enough")
+
+    with pytest.raises(KeyError, match="enough"):
+        km.Model(mass=2.4).fit(data, progress=refuse)
+
+
 def test_memory_stays_flat(data):
     resource = pytest.importorskip("resource")
     model = km.Model(mass=2.4)

@@ -120,7 +120,6 @@ class Fit:
     """
 
     _raw: Optional["_kmcfit.RawFit"]
-    _json: str
     _files: Optional[Dict[str, bytes]]
 
     def __init__(self) -> None:
@@ -129,8 +128,8 @@ class Fit:
     @classmethod
     def _of(cls, raw: "_kmcfit.RawFit") -> "Fit":
         fit = cls.__new__(cls)
-        fit.__dict__.update(_raw=raw, _json=raw.json(), _files=None, _cache={})
-        if fit.status == "interrupted":
+        fit.__dict__.update(_raw=raw, _files=None, _cache={})
+        if raw.is_interrupted():
             import warnings
 
             warnings.warn("the fit was interrupted; the best point so far is returned", RuntimeWarning, stacklevel=4)
@@ -139,7 +138,7 @@ class Fit:
     @classmethod
     def _opened(cls, text: str, files: Dict[str, bytes]) -> "Fit":
         fit = cls.__new__(cls)
-        fit.__dict__.update(_raw=None, _json=text, _files=files, _cache={})
+        fit.__dict__.update(_raw=None, _files=files, _cache={"json": text})
         return fit
 
     # Documents.
@@ -147,7 +146,7 @@ class Fit:
     @property
     def result(self) -> Dict[str, Any]:
         """The document ``result.json``; see the chapter on results."""
-        return self._once("result", lambda: json.loads(self._json))
+        return self._once("result", lambda: json.loads(self._document()))
 
     @property
     def status(self) -> str:
@@ -216,7 +215,7 @@ class Fit:
         return Curve(name, unit, table["t_s"], table[header], band)
 
     def __getattr__(self, name: str) -> Curve:
-        if name in _CURVES and "_json" in self.__dict__:
+        if name in _CURVES and "_cache" in self.__dict__:
             if name in self._curve_names():
                 return self.curve(name)
             raise AttributeError(f"the model has no {name}")
@@ -367,10 +366,10 @@ class Fit:
         return page + self.estimates._repr_html_() + chart[max(chart.find("<svg"), 0) :]
 
     def __getstate__(self) -> Dict[str, Any]:
-        return {"json": self._json, "files": self._run()}
+        return {"json": self._document(), "files": self._run()}
 
     def __setstate__(self, state: Dict[str, Any]) -> None:
-        self.__dict__.update(_raw=None, _json=state["json"], _files=state["files"], _cache={})
+        self.__dict__.update(_raw=None, _files=state["files"], _cache={"json": state["json"]})
 
     # Parts.
 
@@ -399,6 +398,10 @@ class Fit:
         if self._files is not None:
             return self._files[name].decode()
         return self._once("tables", lambda: dict(self._raw.tables()) if self._raw else {})[name]
+
+    def _document(self) -> str:
+        """The text of the result document."""
+        return self._once("json", lambda: self._raw.json() if self._raw else "{}")
 
     def _parameters(self) -> Dict[str, Any]:
         return self._once("parameters", lambda: json.loads(self._text("parameters.json")))

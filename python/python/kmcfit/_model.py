@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
+from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, Union
 
 from . import _kmcfit, _yaml
 from ._errors import InputError, unknown_keyword
@@ -31,6 +31,7 @@ _FIT = {"method": "gauss-newton", "stop": {"iterations": 100, "tolerance": 1e-8}
 _PATH = "model.yaml"
 
 Overrides = Mapping[str, Any]
+Progress = Callable[[int, float], object]
 
 
 class Model:
@@ -143,7 +144,12 @@ class Model:
         for file, content in contents.items():
             file.write_bytes(content)
 
-    def fit(self, *data: Experiment, set: Optional[Overrides] = None) -> Fit:  # noqa: A002
+    def fit(
+        self,
+        *data: Experiment,
+        set: Optional[Overrides] = None,  # noqa: A002
+        progress: Optional[Progress] = None,
+    ) -> Fit:
         """Fits the model to records.
 
         The interpreter is free for other threads meanwhile. Ctrl-C ends the fit at the best point so far, with the status
@@ -155,6 +161,8 @@ class Model:
             Records of one system on a common time axis; without any the experiments of the model file.
         set : dict, optional
             Changed keys, e.g. ``{"fit.stop.iterations": 50}``.
+        progress : callable, optional
+            Called with the number and the cost of each iteration, from another thread; its exception ends the fit, and is raised.
 
         Returns
         -------
@@ -167,7 +175,7 @@ class Model:
         NumericalError
             If no starting point has a response.
         """
-        return Fit._of(_kmcfit.fit(*self._source(data), overrides(set)))
+        return Fit._of(_kmcfit.fit(*self._source(data), overrides(set), progress))
 
     def problem(self, *data: Experiment, set: Optional[Overrides] = None) -> Problem:  # noqa: A002
         """The cost and its derivatives as functions of the parameters, for other optimisers; arguments as for `fit`."""
@@ -211,9 +219,13 @@ def overrides(changes: Optional[Overrides]) -> List[str]:
     return [f"{key}={_yaml._flow(plain(value))}" for key, value in (changes or {}).items()]
 
 
-def fit_model(path: Union[str, "os.PathLike[str]"], set: Optional[Overrides] = None) -> Fit:  # noqa: A002
+def fit_model(
+    path: Union[str, "os.PathLike[str]"],
+    set: Optional[Overrides] = None,  # noqa: A002
+    progress: Optional[Progress] = None,
+) -> Fit:
     """Fits the model of a file, as ``kmcfit fit`` does, with the same results. See `Model.fit`."""
-    return Fit._of(_kmcfit.fit(None, os.fspath(path), {}, overrides(set)))
+    return Fit._of(_kmcfit.fit(None, os.fspath(path), {}, overrides(set), progress))
 
 
 def init(*paths: Union[str, "os.PathLike[str]"]) -> Model:
