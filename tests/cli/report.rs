@@ -83,6 +83,8 @@ fn reports_have_other_units_and_widths() {
         ["--width", "90"],
         ["--units", "acceleratoin=g"],
         ["--units", "acceleration=rad/s^2"],
+        ["--units", "g"],
+        ["--units", "force=N,force=kN"],
     ];
     let mut messages = String::new();
     for mistake in mistakes {
@@ -102,5 +104,11 @@ fn reports_have_other_units_and_widths() {
     error: --units: not a unit of the acceleration of a translation
       found: `rad/s²`
       expected: one of: m/s², mm/s², g, mg, gal, in/s², ft/s²
+    error: --units: a unit without its quantity
+      found: `g`
+      expected: quantities and units, as in `acceleration=g,force=kN`
+    error: --units: the quantity is given twice
+      found: `force=N,force=kN`
+      expected: one unit for each quantity
     ");
 }
