@@ -121,7 +121,7 @@ impl Subproblem {
     }
 
     /// Solution for a trial step, which is verified by a simulation: the first point of reduced accuracy ([`Kkt::is_reduced`]) ends the attempts,
-    /// and no proof of infeasibility is sought.
+    /// without a search for a proof of infeasibility.
     pub fn solve_for_step(&self) -> Solution {
         self.solve_until(Self::ITERATIONS, Kkt::is_reduced, false)
     }
