@@ -10,14 +10,8 @@ impl Bands {
         if known.is_empty() {
             return Vec::new();
         }
-        // The times are increasing: the place of the last one is near that of the next.
-        let mut next = 0;
         let places = times.iter().map(|t| {
-            next = match next > 0 && known[next - 1] >= *t {
-                true => known.partition_point(|k| k < t),
-                false => next + known[next..].iter().take_while(|k| *k < t).count(),
-            };
-            next = next.min(known.len() - 1);
+            let next = known.partition_point(|k| k < t).min(known.len() - 1);
             let before = next.saturating_sub(1);
             match known[next] - known[before] {
                 run if known[next] > *t && run > 0.0 => (next, (t - known[before]) / run),

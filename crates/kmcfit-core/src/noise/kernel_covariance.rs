@@ -128,41 +128,42 @@ fn correlated_sum(scores: &DMatrixView<f64>, bandwidth: f64) -> DMatrix<f64> {
     let sizes: Vec<f64> = (scores.column_iter())
         .map(|score| Some(score.amax()).filter(|a| *a > 0.0).unwrap_or(1.0))
         .collect();
-    let series = |place: usize, i: usize| match place {
-        0 => quadratic_spectral(i.min(length - i) as f64 / bandwidth),
-        _ if place > parameters || i >= count => 0.0,
-        _ => scores[(i, place - 1)] / sizes[place - 1],
+    let score = |a: usize, i: usize| match a < parameters && i < count {
+        true => scores[(i, a)] / sizes[a],
+        false => 0.0,
     };
+    // Even: the second half mirrors the first.
+    let kernel: Vec<f64> = (0..=half)
+        .map(|lag| quadratic_spectral(lag as f64 / bandwidth))
+        .collect();
     let transform = forward_transform(length);
     let mut scratch = vec![Complex::default(); transform.get_inplace_scratch_len()];
     let mut weights = Vec::new();
-    // Real and imaginary parts at the frequencies up to a half.
+    // Real and imaginary parts of the scores at the frequencies up to a half.
     let mut parts = DMatrix::zeros(2 * (half + 1), parameters);
-    for first in (0..=parameters).step_by(2) {
-        let mut both: Vec<Complex<f64>> = match first {
-            // The kernel is even.
-            0 => {
-                let kernel: Vec<f64> = (0..=half).map(|i| series(0, i)).collect();
-                let at = |i: usize| Complex::new(kernel[i.min(length - i)], series(1, i));
-                (0..length).map(at).collect()
-            }
-            _ => {
-                let at = |i: usize| Complex::new(series(first, i), series(first + 1, i));
-                (0..length).map(at).collect()
-            }
+    for pair in 0..=parameters / 2 {
+        // The kernel with score 0, then scores 1 and 2, 3 and 4, ...
+        let at = |i: usize| match pair {
+            0 => Complex::new(kernel[i.min(length - i)], score(0, i)),
+            _ => Complex::new(score(2 * pair - 1, i), score(2 * pair, i)),
         };
+        let mut both: Vec<Complex<f64>> = (0..length).map(at).collect();
         transform.process_with_scratch(&mut both, &mut scratch);
         for k in 0..=half {
-            let pair = of_pair(&both, k);
-            if first == 0 {
-                let sides = if k == 0 || k == half { 1.0 } else { 2.0 };
-                weights.push(sides * pair[0].re / length as f64);
-            }
-            for (place, value) in (first..).zip(pair) {
-                if (1..=parameters).contains(&place) {
-                    parts[(2 * k, place - 1)] = value.re;
-                    parts[(2 * k + 1, place - 1)] = value.im;
+            let [first, second] = of_pair(&both, k);
+            let mut set = |a: usize, value: Complex<f64>| {
+                if a < parameters {
+                    parts[(2 * k, a)] = value.re;
+                    parts[(2 * k + 1, a)] = value.im;
                 }
+            };
+            set(2 * pair, second);
+            match pair {
+                0 => {
+                    let sides = if k == 0 || k == half { 1.0 } else { 2.0 };
+                    weights.push(sides * first.re / length as f64);
+                }
+                _ => set(2 * pair - 1, first),
             }
         }
     }
