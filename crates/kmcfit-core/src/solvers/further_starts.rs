@@ -191,8 +191,7 @@ fn has_likelihood(problem: &Problem) -> bool {
 /// In long records the test of whiteness finds much smaller correlations.
 fn oscillates(channel: &Channel, predicted: &[f64]) -> bool {
     misspecification(channel, predicted).is_some_and(|(whiteness, share)| {
-        share > SMALL_RESIDUAL
-            || whiteness.statistic > SMALL_CORRELATION * channel.len() as f64
+        share > SMALL_RESIDUAL || whiteness.statistic > SMALL_CORRELATION * channel.len() as f64
     })
 }
 
