@@ -5,7 +5,7 @@ use super::{CommandError, OK, Overrides, interrupt, print, say, unwritable};
 use crate::config::{ModelFile, Override};
 use crate::error::InputError;
 use crate::fleet::{
-    Collected, FleetFolder, FleetModel, RecordList, RunOptions, Shard, Trend, collect, fleet_page,
+    FleetFolder, FleetModel, RecordList, RunOptions, Shard, Trend, collect, fleet_page,
     fleet_summary, page_folder, run as run_shard,
 };
 use crate::results::{Heading, RequestedFiles, write_whole};
@@ -86,7 +86,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     match (&arguments.command, &arguments.model, &arguments.out) {
         (Some(Command::Collect(arguments)), ..) => {
             let folder = FleetFolder::open(&arguments.folder)?;
-            collected(&folder, arguments.trend.as_deref())?;
+            let list = folder.records()?;
+            let trend = trend_of(arguments.trend.as_deref(), &list)?;
+            collected(&folder, list, &trend)?;
             Ok(OK)
         }
         (Some(Command::Page(arguments)), ..) => page(arguments),
@@ -123,7 +125,7 @@ fn fit(arguments: &Arguments, model: &Path, out: &Path) -> Result<u8, CommandErr
     let reading = Activity::begin("reading the list of records");
     let model = FleetModel::new(arguments.set.read(model)?)?;
     let list = RecordList::read(&arguments.records)?;
-    check_trend(arguments.trend.as_deref(), &list)?;
+    let trend = trend_of(arguments.trend.as_deref(), &list)?;
     let folder = FleetFolder::prepare(out, &model, &list, arguments.warm_start)?;
     drop(reading);
     if !list.uses.is_empty() {
@@ -160,7 +162,7 @@ fn fit(arguments: &Arguments, model: &Path, out: &Path) -> Result<u8, CommandErr
         return Ok(interrupt::exit_code());
     }
     match shard == Shard::ALL {
-        true => collected(&folder, arguments.trend.as_deref())?,
+        true => collected(&folder, list, &trend)?,
         false => print(&format!(
             "{} records of shard {}/{} have their row; `kmcfit fleet collect {}` joins the shards\n",
             done.all,
@@ -172,12 +174,18 @@ fn fit(arguments: &Arguments, model: &Path, out: &Path) -> Result<u8, CommandErr
     Ok(OK)
 }
 
-/// Error where the table has no column of the name.
-fn check_trend(name: Option<&str>, list: &RecordList) -> Result<(), InputError> {
-    let Some(name) = name.filter(|name| !list.columns.iter().any(|column| column == name)) else {
-        return Ok(());
-    };
+/// The column `name`, or without a name the one that suits best.
+fn trend_of(name: Option<&str>, list: &RecordList) -> Result<Trend, InputError> {
+    if let Some(trend) = Trend::of(list, name) {
+        return Ok(trend);
+    }
+    let name = name.unwrap_or_default();
     let known = list.columns.iter().map(String::as_str);
+    if known.clone().any(|column| column == name) {
+        return Err(InputError::argument("--trend", "the column holds neither numbers nor dates")
+            .found(quote(name))
+            .expected("a column of which at least half of the cells are numbers, or dates such as 2026-03-02"));
+    }
     let expected = match list.columns.is_empty() {
         true => "a table of records with further columns".to_owned(),
         false => one_of(known.clone()),
@@ -189,21 +197,15 @@ fn check_trend(name: Option<&str>, list: &RecordList) -> Result<(), InputError> 
 }
 
 /// Joins the shards, writes the page and prints the summary.
-fn collected(folder: &FleetFolder, trend: Option<&str>) -> Result<(), CommandError> {
+fn collected(folder: &FleetFolder, list: RecordList, trend: &Trend) -> Result<(), CommandError> {
     let activity = Activity::begin("collecting the rows");
-    let found: Collected = collect(folder)?;
-    check_trend(trend, &found.list)?;
-    let trend = Trend::of(&found, trend).ok_or_else(|| {
-        InputError::argument("--trend", "the column holds neither numbers nor dates")
-            .found(quote(trend.unwrap_or_default()))
-            .expected("a column of which at least half of the cells are numbers, or dates such as 2026-03-02")
-    })?;
+    let found = collect(folder, list, trend)?;
     let title = format!("{} records fitted", found.list.records.len());
-    let text = fleet_page(&title, folder, &found, &trend);
+    let text = fleet_page(&title, folder, &found, trend);
     let path = folder.path.join("fleet.html");
     write_whole(&path, &text).map_err(|error| unwritable(&folder.path, &error))?;
     drop(activity);
-    print(&fleet_summary(folder, &found));
+    print(&fleet_summary(folder, &found, trend));
     Ok(())
 }
 

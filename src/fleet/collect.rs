@@ -2,11 +2,12 @@
 
 use super::fit::TIME_LIMIT;
 use super::folder::FleetFolder;
-use super::journal::record_of;
+use super::journal::{curve_files, journals, record_of};
 use super::parquet::{Cell, ColumnKind, ParquetWriter};
 use super::records::RecordList;
 use super::row::{Curve, Row};
 use super::statistics::{Distribution, Statistics};
+use super::trend::Trend;
 use crate::error::InputError;
 use crate::results::{complete_lines, write_stream, write_whole};
 use kmcfit_core::internals::assessment::VerdictLevel;
@@ -38,12 +39,15 @@ pub struct Collected {
 /// Most errors that are kept.
 const MOST_ERRORS: usize = 1000;
 
-/// Joins the shards of a fleet: writes its tables and its statistics.
+/// Joins the shards of a fleet on the records `list`: writes its tables and its statistics over the axis `trend`.
 ///
 /// # Errors
 /// If a file cannot be read or written.
-pub fn collect(folder: &FleetFolder) -> Result<Collected, InputError> {
-    let list = folder.records()?;
+pub fn collect(
+    folder: &FleetFolder,
+    list: RecordList,
+    trend: &Trend,
+) -> Result<Collected, InputError> {
     let at = |path: &Path| {
         let path = path.to_path_buf();
         move |error: io::Error| {
@@ -54,12 +58,14 @@ pub fn collect(folder: &FleetFolder) -> Result<Collected, InputError> {
     let mut rows = Lines::default();
     let mut curves = Lines::default();
     let mut gathered = Gathered::new(list.records.len());
-    for (kind, path) in journals(&folder.path).map_err(at(&folder.path))? {
-        match kind {
-            Kind::Rows => rows.read(&path, &positions, &mut |i, line| gathered.add(i, line)),
-            Kind::Curves => curves.read(&path, &positions, &mut |_, _| Ok(true)),
-        }
-        .map_err(at(&path))?;
+    for path in journals(&folder.path)? {
+        rows.read(&path, &positions, &mut |i, line| gathered.add(i, line))
+            .map_err(at(&path))?;
+    }
+    for path in curve_files(&folder.path)? {
+        curves
+            .read(&path, &positions, &mut |_, _| Ok(true))
+            .map_err(at(&path))?;
     }
     drop(positions);
     let names = |i: usize| list.records[i].name.clone();
@@ -67,7 +73,9 @@ pub fn collect(folder: &FleetFolder) -> Result<Collected, InputError> {
     statistics.distributions = gathered
         .estimates
         .into_iter()
-        .filter_map(|estimate| Distribution::of(estimate.name, estimate.unit, estimate.values))
+        .filter_map(|estimate| {
+            Distribution::of(estimate.name, estimate.unit, estimate.values, &trend.values)
+        })
         .collect();
     statistics.outliers = Statistics::find_outliers(&statistics.distributions, &names);
     statistics.records = list.records.len();
@@ -85,31 +93,6 @@ pub fn collect(folder: &FleetFolder) -> Result<Collected, InputError> {
         verdicts: gathered.verdicts,
         errors: gathered.errors,
     })
-}
-
-enum Kind {
-    Rows,
-    Curves,
-}
-
-/// The journals of a folder, in the order of their names.
-fn journals(folder: &Path) -> io::Result<Vec<(Kind, PathBuf)>> {
-    let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder)? {
-        let path = entry?.path();
-        let name = path
-            .file_name()
-            .and_then(|name| name.to_str())
-            .unwrap_or_default();
-        let kind = match name.ends_with(".jsonl") && name.contains("-of-") {
-            true if name.starts_with("rows-") => Kind::Rows,
-            true if name.starts_with("curves-") => Kind::Curves,
-            _ => continue,
-        };
-        found.push((kind, path));
-    }
-    found.sort_by(|a, b| a.1.cmp(&b.1));
-    Ok(found)
 }
 
 /// Places of the lines of records in files.

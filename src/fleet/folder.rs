@@ -1,5 +1,6 @@
 //! The folder of a fleet: which model on which records.
 
+use super::journal::journals;
 use super::model::FleetModel;
 use super::records::{Record, RecordList};
 use crate::config::Override;
@@ -101,6 +102,13 @@ impl FleetFolder {
             return Err(
                 InputError::file(path, "the folder holds a run of another command")
                     .found(MANIFEST)
+                    .expected("a folder of its own for the fleet"),
+            );
+        }
+        if path.is_dir() && !journals(path)?.is_empty() {
+            return Err(
+                InputError::file(path, "the folder holds rows of an unknown fleet")
+                    .found(format!("rows without {IDENTITY}"))
                     .expected("a folder of its own for the fleet"),
             );
         }

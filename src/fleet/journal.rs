@@ -3,8 +3,9 @@
 use super::row::{Curve, Row};
 use super::shard::Shard;
 use crate::error::InputError;
-use crate::results::RowFile;
+use crate::results::{RowFile, complete_lines};
 use serde::Deserialize;
+use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -22,15 +23,56 @@ pub fn curves_path(folder: &Path, shard: Shard) -> PathBuf {
     folder.join(format!("curves-{shard}.jsonl"))
 }
 
+/// The files of rows in a folder, in the order of their names.
+pub fn journals(folder: &Path) -> Result<Vec<PathBuf>, InputError> {
+    files(folder, "rows-").map_err(|error| unreadable(folder, error))
+}
+
+/// The files of curves.
+pub fn curve_files(folder: &Path) -> Result<Vec<PathBuf>, InputError> {
+    files(folder, "curves-").map_err(|error| unreadable(folder, error))
+}
+
+fn files(folder: &Path, start: &str) -> io::Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        let name = path
+            .file_name()
+            .and_then(|name| name.to_str())
+            .unwrap_or_default();
+        if name.starts_with(start) && name.contains("-of-") && name.ends_with(".jsonl") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// Hands the records of the complete lines of a file of rows to `each`.
+pub fn recorded(path: &Path, each: &mut dyn FnMut(&str)) -> Result<(), InputError> {
+    let read = complete_lines(path, |_, line| {
+        each(&record_of(line)?);
+        Ok(())
+    });
+    read.map(drop).map_err(|error| unreadable(path, error))
+}
+
+fn unreadable(path: &Path, error: io::Error) -> InputError {
+    InputError::file(path, "the rows cannot be read or written to")
+        .found(error)
+        .expected("a journal of a fleet that can be written to")
+}
+
 /// The record of a line.
 #[derive(Deserialize)]
-pub struct LineName<'a> {
+struct LineName<'a> {
     #[serde(borrow)]
-    pub record: std::borrow::Cow<'a, str>,
+    record: Cow<'a, str>,
 }
 
 /// The record of a line of a journal.
-pub fn record_of(line: &str) -> io::Result<std::borrow::Cow<'_, str>> {
+pub fn record_of(line: &str) -> io::Result<Cow<'_, str>> {
     let name: LineName = serde_json::from_str(line)?;
     Ok(name.record)
 }
@@ -65,9 +107,7 @@ impl Journal {
                         .expected("one process for each shard")
                         .hint("wait for it, or give each process a shard of its own")
                 }
-                _ => InputError::file(&path, "the rows cannot be read or written to")
-                    .found(error)
-                    .expected("a journal of a fleet that can be written to"),
+                _ => unreadable(&path, error),
             })
         };
         Ok(Self {

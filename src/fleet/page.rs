@@ -4,7 +4,7 @@ use super::collect::Collected;
 use super::figures::{histograms, trend_figure};
 use super::folder::FleetFolder;
 use super::statistics::{Distribution, Statistics};
-use super::summary::{between, counts, shown};
+use super::summary::{cells, counts, headings, shown};
 use super::trend::Trend;
 use crate::number_format::significant;
 use crate::report::chart::Detail;
@@ -72,7 +72,7 @@ fn page_of(
             name: "main".into(),
             ..figure
         });
-    let first = shell::screen(&above, &answers(&shown), main, detail);
+    let first = shell::screen(&above, &answers(&shown, trend), main, detail);
     shell::sectioned(title, &first, sections)
 }
 
@@ -90,30 +90,11 @@ fn state(statistics: &Statistics) -> String {
     shell::state_line(colour, word, &counts(statistics))
 }
 
-fn answers(shown: &[&Distribution]) -> String {
-    let rows: Vec<Vec<String>> = shown
-        .iter()
-        .map(|d| {
-            vec![
-                d.name.replace('_', " "),
-                significant(d.median, 5),
-                between(d.central95),
-                d.unit.clone(),
-                d.outliers.to_string(),
-            ]
-        })
-        .collect();
-    shell::table(
-        "Estimates over all records",
-        &[
-            "Estimate",
-            "Median",
-            "95 % of the records",
-            "Unit",
-            "Outliers",
-        ],
-        &rows,
-    )
+fn answers(shown: &[&Distribution], trend: &Trend) -> String {
+    let rows: Vec<Vec<String>> = shown.iter().map(|d| cells(d).to_vec()).collect();
+    let headings = headings(trend);
+    let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
+    shell::table("Estimates over all records", &headings, &rows)
 }
 
 fn outliers(folder: &FleetFolder, statistics: &Statistics) -> String {
@@ -137,9 +118,9 @@ fn outliers(folder: &FleetFolder, statistics: &Statistics) -> String {
         })
         .collect();
     let meaning = match all {
-        0 => "No estimate lies more than 3.5 standard deviations from its median (modified z-score, Iglewicz and Hoaglin 1993).".to_owned(),
+        0 => "No estimate lies more than 3.5 standard deviations from its trend (modified z-score, Iglewicz and Hoaglin 1993).".to_owned(),
         _ => format!(
-            "{}, whose farthest estimate lies more than 3.5 standard deviations from the median (modified z-score, Iglewicz and Hoaglin \
+            "{}, whose farthest estimate lies more than 3.5 standard deviations from its trend, the median slope of all pairs of records (modified z-score, Iglewicz and Hoaglin \
              1993){}. `kmcfit fleet page {} RECORD` makes the page of a record.",
             count(all, "record"),
             if all > MOST_ROWS { format!("; the first {MOST_ROWS} are listed") } else { String::new() },
@@ -151,7 +132,7 @@ fn outliers(folder: &FleetFolder, statistics: &Statistics) -> String {
         "Estimate",
         "Value",
         "Unit",
-        "Standard deviations from the median",
+        "Standard deviations from the trend",
     ];
     shell::paragraph(&meaning)
         + &shell::table("Records that stand out", &headings, &rows)

@@ -2,7 +2,7 @@
 
 use super::fit::{Limits, fit_record};
 use super::folder::FleetFolder;
-use super::journal::Journal;
+use super::journal::{Journal, journals, recorded};
 use super::model::FleetModel;
 use super::records::{Record, RecordList};
 use super::shard::Shard;
@@ -70,11 +70,16 @@ pub fn run(
     let jobs = Jobs::of(list, options);
     let mut has_row = vec![false; list.records.len()];
     let positions = list.positions();
-    let journal = Journal::open(&folder.path, options.shard, |name| {
+    let mut found = |name: &str| {
         if let Some(i) = positions.get(name) {
             has_row[*i] = true;
         }
-    })?;
+    };
+    // Shards of another number may have fitted some of the records.
+    for path in journals(&folder.path)? {
+        recorded(&path, &mut found)?;
+    }
+    let journal = Journal::open(&folder.path, options.shard, &mut found)?;
     drop(positions);
     let own = jobs.own();
     let all = own.clone().map(<[u32]>::len).sum();

@@ -3,50 +3,24 @@
 use super::collect::Collected;
 use super::folder::FleetFolder;
 use super::statistics::{Distribution, Outlier, Statistics};
+use super::trend::Trend;
 use crate::number_format::significant;
 use crate::report::count;
 use std::fmt::Write;
 
 /// The summary for the terminal.
-pub fn fleet_summary(folder: &FleetFolder, collected: &Collected) -> String {
+pub fn fleet_summary(folder: &FleetFolder, collected: &Collected, trend: &Trend) -> String {
     let statistics = &collected.statistics;
     let mut text = format!("{}\n\n", counts(statistics));
     let shown = shown(statistics);
     if !shown.is_empty() {
-        let mut rows = vec![
-            [
-                "",
-                "median",
-                "middle half",
-                "95 % of records",
-                "unit",
-                "outliers",
-            ]
-            .map(String::from),
-        ];
-        rows.extend(shown.iter().map(|d| {
-            [
-                d.name.replace('_', " "),
-                significant(d.median, 5),
-                between(d.quartiles),
-                between(d.central95),
-                d.unit.clone(),
-                d.outliers.to_string(),
-            ]
-        }));
-        let widths: Vec<usize> = (0..6)
-            .map(|i| {
-                rows.iter()
-                    .map(|row| row[i].chars().count())
-                    .max()
-                    .unwrap_or(0)
-            })
-            .collect();
+        let mut rows = vec![headings(trend)];
+        rows.extend(shown.iter().map(|d| cells(d)));
+        let width = |i: usize| rows.iter().map(|row| row[i].chars().count()).max();
+        let widths: Vec<usize> = (0..COLUMNS).map(|i| width(i).unwrap_or(0)).collect();
         for row in &rows {
-            let cells = row
-                .iter()
-                .zip(&widths)
-                .map(|(cell, width)| format!("{cell:<width$}"));
+            let cells = row.iter().zip(&widths);
+            let cells = cells.map(|(cell, width)| format!("{cell:<width$}"));
             let line = cells.collect::<Vec<_>>().join("  ");
             let _ = writeln!(text, "{}", line.trim_end());
         }
@@ -63,6 +37,36 @@ pub fn fleet_summary(folder: &FleetFolder, collected: &Collected) -> String {
     text
 }
 
+/// Columns of the table of estimates.
+const COLUMNS: usize = 6;
+
+/// Headings of the table of estimates.
+pub(super) fn headings(trend: &Trend) -> [String; COLUMNS] {
+    let change = format!("change per {}", trend.step());
+    [
+        "estimate",
+        "median",
+        "95 % of records",
+        &change,
+        "unit",
+        "outliers",
+    ]
+    .map(String::from)
+}
+
+/// The row of an estimate in it.
+pub(super) fn cells(distribution: &Distribution) -> [String; COLUMNS] {
+    let d = distribution;
+    [
+        d.name.replace('_', " "),
+        significant(d.median, 5),
+        between(d.central95),
+        significant(d.slope, 3),
+        d.unit.clone(),
+        d.outliers.to_string(),
+    ]
+}
+
 fn outlier_in_words(outlier: &Outlier, statistics: &Statistics) -> String {
     let distribution = statistics
         .distributions
@@ -70,7 +74,7 @@ fn outlier_in_words(outlier: &Outlier, statistics: &Statistics) -> String {
         .find(|d| d.name == outlier.estimate);
     let unit = distribution.map_or("", |d| d.unit.as_str());
     format!(
-        "{}: {} {} {unit}, {} standard deviations from the median",
+        "{}: {} {} {unit}, {} standard deviations from the trend",
         outlier.record,
         outlier.estimate.replace('_', " "),
         significant(outlier.value, 5),
@@ -91,7 +95,7 @@ pub(super) fn shown(statistics: &Statistics) -> Vec<&Distribution> {
         .collect()
 }
 
-pub(super) fn between([low, high]: [f64; 2]) -> String {
+fn between([low, high]: [f64; 2]) -> String {
     format!("{} to {}", significant(low, 5), significant(high, 5))
 }
 

@@ -1,6 +1,6 @@
 //! The axis along which the estimates of a fleet are shown.
 
-use super::collect::Collected;
+use super::records::RecordList;
 
 /// Days of a year.
 const YEAR: f64 = 365.25;
@@ -18,8 +18,7 @@ pub struct Trend {
 impl Trend {
     /// The column `wanted`, else the column `date` or the first one of numbers or dates, else the order of the records. `None` where there
     /// is no column of the name wanted.
-    pub fn of(collected: &Collected, wanted: Option<&str>) -> Option<Self> {
-        let list = &collected.list;
+    pub fn of(list: &RecordList, wanted: Option<&str>) -> Option<Self> {
         let column = |index: usize| {
             let cells = list
                 .records
@@ -35,11 +34,19 @@ impl Trend {
         let any = || (0..list.columns.len()).find_map(column);
         first.or_else(any).or_else(|| {
             Some(Self {
-                name: "number of the record".into(),
+                name: "record".into(),
                 unit: String::new(),
                 values: (1..=list.records.len()).map(|i| i as f64).collect(),
             })
         })
+    }
+
+    /// The unit of the axis as a noun: `year`, or the name of the column.
+    pub fn step(&self) -> &str {
+        match self.unit.is_empty() {
+            true => &self.name,
+            false => &self.unit,
+        }
     }
 
     /// A column of which at least half of the cells are numbers, or dates such as 2026-03-02.

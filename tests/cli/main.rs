@@ -11,6 +11,7 @@ mod data_files;
 mod durable;
 mod ending;
 mod faulty_records;
+mod fleet;
 mod formats;
 mod init;
 mod known_parts;

@@ -30,6 +30,7 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{FitSettings, Solver, timed};
 use kmcfit_core::internals::system::{Grid, NodalCoefficients, State};
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Problem, settings and further contents of a model file.
@@ -225,32 +226,76 @@ fn contradicted(file: &ModelFile, contradiction: &Contradiction, problem: &str) 
         .found(listed(rows.iter().map(String::as_str)))
 }
 
+/// The records of a model with what was noted about them.
+#[derive(Debug)]
+struct ReadRecords {
+    records: Vec<Option<experiments::RawRecord>>,
+    warnings: Vec<Finding>,
+    data: Vec<Finding>,
+}
+
+impl ReadRecords {
+    fn of(file: &ModelFile, mode: BuildMode) -> Result<Self, InputError> {
+        let mut notes = experiments::RecordNotes::default();
+        let records = experiments::read(file, mode, &mut notes)?;
+        let experiments::RecordNotes { warnings, data, .. } = notes;
+        Ok(Self {
+            records,
+            warnings,
+            data,
+        })
+    }
+}
+
+/// What is known of a model from another grid.
+struct Known {
+    read: Arc<ReadRecords>,
+    /// States at the first node of the fitted records, from which those are searched that are estimated.
+    states: Vec<State>,
+    source: ModelSource,
+}
+
 /// Builds the model of a file in a mode.
 ///
 /// # Errors
 /// At the first invalid key, with its line.
 pub fn build(file: &ModelFile, mode: BuildMode) -> Result<Model, InputError> {
-    let model = build_on(file, mode, 0)?;
+    let model = build_on(file, mode, 0, None)?;
     Ok(model.on_stable_grid())
 }
 
-/// [`build()`] with at least `least` nodes of an automatic grid.
-fn build_on(file: &ModelFile, mode: BuildMode, least: usize) -> Result<Model, InputError> {
+/// [`build()`] with at least `least` nodes of an automatic grid; what is known from another grid is not read and estimated again.
+fn build_on(
+    file: &ModelFile,
+    mode: BuildMode,
+    least: usize,
+    known: Option<Known>,
+) -> Result<Model, InputError> {
     let clock = Instant::now();
     let mut reading = Duration::ZERO;
     let spec = &file.spec;
-    let mut record_notes = experiments::RecordNotes::default();
     let mut automatic = Vec::new();
-    let records = timed(&mut reading, || {
-        experiments::read(file, mode, &mut record_notes)
-    })?;
-    let experiments::RecordNotes { warnings, data, .. } = record_notes;
-    let delay_limits = experiments::delay_limits(file, &records)?;
-    let choice = grid::build(file, mode, &records, least, &mut automatic)?;
+    let (read, states, source) = match known {
+        Some(known) => (known.read, known.states, Some(known.source)),
+        None => {
+            let read = timed(&mut reading, || ReadRecords::of(file, mode))?;
+            (Arc::new(read), Vec::new(), None)
+        }
+    };
+    let (warnings, data) = (read.warnings.clone(), read.data.clone());
+    let records = &read.records;
+    let delay_limits = experiments::delay_limits(file, records)?;
+    let choice = grid::build(file, mode, records, least, &mut automatic)?;
     let grid = choice.grid;
     let solver = fit::solver(file)?;
-    let automatic_width = friction::automatic_width(file, &records)?;
+    let automatic_width = friction::automatic_width(file, records)?;
+    let automatic_grid = AutomaticGrid::of(file, mode, solver, choice.finer, &read);
+    let records = match Arc::try_unwrap(read) {
+        Ok(read) => read.records,
+        Err(read) => read.records.clone(),
+    };
     let (builder, notes) = builder(file, mode, &grid, solver, records, automatic_width)?;
+    let builder = builder.states(states);
     let about = |error| input_error(file, error);
     let mut built = builder.lower().map_err(about)?;
     functions::check_unknown_mass(file, &built.problem)?;
@@ -287,7 +332,7 @@ fn build_on(file: &ModelFile, mode: BuildMode, least: usize) -> Result<Model, In
     };
     let memory = grid::memory_of(file, mode, grid.nodes()) as u64;
     let study = study::build(file, &built.problem)?;
-    let source = timed(&mut reading, || ModelSource::of(file));
+    let source = source.unwrap_or_else(|| timed(&mut reading, || ModelSource::of(file)));
     Ok(Model {
         file: file.path.clone(),
         study,
@@ -319,7 +364,7 @@ fn build_on(file: &ModelFile, mode: BuildMode, least: usize) -> Result<Model, In
         assumed_units,
         has_unknown_mass: functions::has_unknown_mass(file),
         reduces_width: automatic_width.is_some() && solver != Solver::EquationError,
-        grid: AutomaticGrid::of(file, mode, solver, choice.finer),
+        grid: automatic_grid,
         source,
         preparation: Preparation {
             reading,

@@ -1,7 +1,7 @@
 //! Finer grids of a model whose number of nodes is automatic.
 
 use super::grid::{FinerNodes, stable_nodes};
-use super::{BuildMode, Model, build_on};
+use super::{BuildMode, Known, Model, ReadRecords, build_on};
 use crate::config::ModelFile;
 use kmcfit_core::internals::solvers::Solver;
 use std::sync::Arc;
@@ -11,6 +11,7 @@ use std::sync::Arc;
 pub struct AutomaticGrid {
     file: Arc<ModelFile>,
     finer: FinerNodes,
+    read: Arc<ReadRecords>,
 }
 
 impl AutomaticGrid {
@@ -20,12 +21,14 @@ impl AutomaticGrid {
         mode: BuildMode,
         solver: Solver,
         finer: Option<FinerNodes>,
+        read: &Arc<ReadRecords>,
     ) -> Option<Self> {
         let is_fit = mode == BuildMode::Fit && solver != Solver::EquationError;
         let finer = finer.filter(|_| is_fit)?;
         Some(Self {
             file: Arc::new(file.clone()),
             finer,
+            read: Arc::clone(read),
         })
     }
 
@@ -39,8 +42,16 @@ impl Model {
     /// The model on an automatic grid of at least `least` nodes, with the same settings; `None` if the number of nodes is stated, or
     /// the grid does not fit into memory.
     pub fn on_nodes(&self, least: usize) -> Option<Self> {
-        let AutomaticGrid { file, finer } = self.grid.as_ref()?;
-        let model = build_on(file, BuildMode::Fit, finer.at_least(least)).ok()?;
+        let AutomaticGrid { file, finer, read } = self.grid.as_ref()?;
+        let start = self.problem.start();
+        let scalars = self.problem.scalars(&start);
+        let experiments = self.problem.experiments.iter();
+        let known = Known {
+            read: Arc::clone(read),
+            states: experiments.map(|e| e.initial_state(scalars)).collect(),
+            source: self.source.clone(),
+        };
+        let model = build_on(file, BuildMode::Fit, finer.at_least(least), Some(known)).ok()?;
         Some(Self {
             settings: self.settings.clone(),
             automatic: self.automatic.clone(),

@@ -238,7 +238,10 @@ impl Builder {
         let fitted = self.records.iter().filter(|record| !record.validation);
         let mut start = problem.start();
         let first = problem.functions.scalar_range().start;
-        let states = estimate_states(problem);
+        let states = match self.states.is_empty() {
+            true => estimate_states(problem),
+            false => self.states.iter().copied().map(Some).collect(),
+        };
         for ((record, experiment), state) in fitted.zip(&problem.experiments).zip(states) {
             let Some(state) = state else { continue };
             for (q, value) in [state.displacement, state.velocity].into_iter().enumerate() {

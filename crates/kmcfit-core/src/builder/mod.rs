@@ -57,7 +57,7 @@ use crate::functions::{CoefficientKind, ScalarParameter};
 use crate::problem::Problem;
 use crate::record::Experiment;
 use crate::solvers::Solver;
-use crate::system::{Grid, Method};
+use crate::system::{Grid, Method, State};
 use constraints::{ConstraintSpec, RowKey, move_start};
 
 /// Specification of a problem.
@@ -71,6 +71,8 @@ pub struct Builder {
     solver: Solver,
     is_simulation: bool,
     constraints: Vec<ConstraintSpec>,
+    /// States at the first node, for initial states without a start; estimated from the samples where empty.
+    states: Vec<State>,
 }
 
 /// A problem with its notices, before the projection of its start onto the constraints.
@@ -120,6 +122,7 @@ impl Builder {
             solver: Solver::GaussNewton,
             is_simulation: false,
             constraints: Vec::new(),
+            states: Vec::new(),
         }
     }
 
@@ -202,6 +205,14 @@ impl Builder {
     #[must_use]
     pub fn solver(mut self, solver: Solver) -> Self {
         self.solver = solver;
+        self
+    }
+
+    /// Sets the states at the first node of the fitted records from which initial states without a start begin, in place of estimates from
+    /// the samples.
+    #[must_use]
+    pub fn states(mut self, states: Vec<State>) -> Self {
+        self.states = states;
         self
     }
 

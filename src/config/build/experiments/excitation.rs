@@ -13,7 +13,7 @@ use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
 
 /// Excitation of an experiment, as samples or shapes.
-#[derive(Default)]
+#[derive(Debug, Default, Clone)]
 pub struct RawExcitation {
     input: Input,
 }

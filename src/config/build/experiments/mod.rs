@@ -38,6 +38,7 @@ pub(super) use excitation::shape;
 pub(crate) use warning::DataWarning;
 
 /// Data of one experiment before it is placed on the grid, at the times of its samples.
+#[derive(Debug, Clone)]
 pub(super) struct RawRecord {
     pub channels: Vec<RawChannel>,
     excitation: RawExcitation,

@@ -29,6 +29,7 @@ use sampling::{band, decimate, nearly_equal};
 const DISPLACEMENT_COLUMN: &str = "y_m";
 
 /// A channel before it is placed on the grid.
+#[derive(Debug, Clone)]
 pub struct RawChannel {
     /// Measured quantity.
     pub kind: ChannelKind,
