@@ -1,7 +1,7 @@
 //! Fits.
 
 use crate::errors::{Failure, caught, guarded};
-use crate::source::{Files, Source};
+use crate::source::RawModel;
 use kmcfit::config::{Model, ModelFile};
 use kmcfit::fitting::fit_or_no_response;
 use kmcfit::report::document::ResultDocument;
@@ -27,47 +27,37 @@ const STACK: usize = 8 << 20;
 /// A finished fit.
 #[pyclass(frozen, module = "kmcfit._kmcfit")]
 pub struct RawFit {
-    file: ModelFile,
-    done: CompletedFit,
+    pub file: ModelFile,
+    pub done: CompletedFit,
     document: ResultDocument,
 }
 
 /// Fits a model; Ctrl-C ends the fit at its best point. `progress` is called with number and cost of each iteration.
 #[pyfunction]
-pub fn fit(
-    py: Python<'_>,
-    text: Option<String>,
-    path: PathBuf,
-    files: Files,
-    overrides: Vec<String>,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<RawFit> {
-    let source = Source {
-        text,
-        path,
-        files,
-        overrides,
-    };
+pub fn fit(py: Python<'_>, model: Py<RawModel>, progress: Option<Py<PyAny>>) -> PyResult<RawFit> {
+    let model = model.get();
     let flag = Arc::new(AtomicBool::new(false));
     let interrupt = Arc::clone(&flag);
     let (result, signal) =
-        py.detach(|| watched(&flag, move || fitted(source, interrupt, progress)));
+        py.detach(|| watched(&flag, move || fitted(model, interrupt, progress)));
+    ended(py, result, signal, RawFit::is_interrupted)
+}
+
+/// The result of work that a signal may have ended: Ctrl-C gives a result that `is_interrupted`, another exception is raised.
+pub fn ended<T>(
+    py: Python<'_>,
+    result: Result<T, Failure>,
+    signal: Option<PyErr>,
+    is_interrupted: impl Fn(&T) -> bool,
+) -> PyResult<T> {
     let found = result.map_err(|failure| failure.raise(py));
-    match signal {
-        None => found,
-        Some(raised) => {
-            let is_ended = |found: &RawFit| found.document.outcome.status == Status::Interrupted;
-            match raised.is_instance_of::<PyKeyboardInterrupt>(py) {
-                true => found.and_then(|found| {
-                    if is_ended(&found) {
-                        Ok(found)
-                    } else {
-                        Err(raised)
-                    }
-                }),
-                false => Err(raised),
-            }
-        }
+    let Some(raised) = signal else {
+        return found;
+    };
+    match (raised.is_instance_of::<PyKeyboardInterrupt>(py), found) {
+        (true, Ok(found)) if is_interrupted(&found) => Ok(found),
+        (true, Err(error)) => Err(error),
+        _ => Err(raised),
     }
 }
 
@@ -76,7 +66,7 @@ pub fn fit(
     clippy::disallowed_methods,
     reason = "its stack is as large as that of the program's main thread; a refusal is an error"
 )]
-fn watched<T: Send>(
+pub fn watched<T: Send>(
     flag: &AtomicBool,
     work: impl FnOnce() -> Result<T, Failure> + Send,
 ) -> (Result<T, Failure>, Option<PyErr>) {
@@ -106,11 +96,11 @@ fn watched<T: Send>(
 }
 
 fn fitted(
-    source: Source,
+    source: &RawModel,
     interrupt: Arc<AtomicBool>,
     progress: Option<Py<PyAny>>,
 ) -> Result<RawFit, Failure> {
-    let (file, mut model) = source.build()?;
+    let mut model = source.build()?;
     model.settings.interrupt = Some(Arc::clone(&interrupt));
     let clock = Instant::now();
     let mut raised = None;
@@ -143,7 +133,7 @@ fn fitted(
     let total = (model.preparation.total + clock.elapsed()).max(overhead.sum() + done.fit.elapsed);
     document.timings = TimingsSummary::new(&done.fit, &overhead, total);
     Ok(RawFit {
-        file,
+        file: source.file().clone(),
         done,
         document,
     })
@@ -204,7 +194,7 @@ impl RawFit {
 #[pymethods]
 impl RawFit {
     /// True if Ctrl-C ended the fit.
-    fn is_interrupted(&self) -> bool {
+    pub fn is_interrupted(&self) -> bool {
         self.document.outcome.status == Status::Interrupted
     }
 

@@ -11,6 +11,7 @@ mod fit;
 mod problem;
 mod runs;
 mod source;
+mod study;
 
 use mimalloc::MiMalloc;
 use pyo3::prelude::*;
@@ -28,6 +29,10 @@ mod _kmcfit {
     use crate::fit::{RawFit, fit};
     #[pymodule_export]
     use crate::problem::Problem;
+    #[pymodule_export]
+    use crate::source::RawModel;
+    #[pymodule_export]
+    use crate::study::{study, study_run};
     #[pymodule_export]
     use crate::runs::{compare, open_run, parse, read_table, read_text, scaffold, simulate};
 

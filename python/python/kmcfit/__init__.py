@@ -37,18 +37,22 @@ from ._functions import (
 )
 from ._model import Model, fit_model, init
 from ._problem import Problem
+from ._study import Candidate, Direction, Extremes, Profile, Sensitivity, Study, StudyFinding
 
 __version__: str = _kmcfit.version()
 
 __all__ = [
     "BSpline",
+    "Candidate",
     "Comparison",
     "Constant",
     "Curve",
+    "Direction",
     "Error",
     "Estimate",
     "Estimates",
     "Experiment",
+    "Extremes",
     "Fit",
     "Fixed",
     "Function",
@@ -61,6 +65,10 @@ __all__ = [
     "PiecewiseLinear",
     "Polynomial",
     "Problem",
+    "Profile",
+    "Sensitivity",
+    "Study",
+    "StudyFinding",
     "Verdict",
     "compare",
     "fit_model",

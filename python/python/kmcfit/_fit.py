@@ -10,10 +10,13 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from . import _kmcfit, _npz, _table
+from . import _kmcfit, _npz, _table, _yaml
 from ._arrays import column
-from ._errors import InputError, did_you_mean
+from ._errors import InputError, did_you_mean, unknown_keyword
 from ._estimates import Estimates
+from ._functions import plain
+from ._page import first_screen, read_files, write_files
+from ._study import Study
 
 #: Quantities over time in `functions.csv`.
 _CURVES = (
@@ -298,13 +301,98 @@ class Fit:
         if self._raw is not None:
             self._raw.save(os.fspath(folder), report, tables, draws)
             return
-        target = Path(folder)
-        if target.exists() and any(target.iterdir()):
-            raise InputError("the folder is not empty", str(target), expected="a new folder")
-        for name, content in (self._files or {}).items():
-            path = target / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
+        write_files(folder, self._files or {})
+
+    def study(
+        self,
+        *,
+        confidence: Optional[float] = None,
+        seed: Optional[int] = None,
+        profiles: Optional[Sequence[Mapping[str, Any]]] = None,
+        extremes: Any = None,
+        misfit_limit: Optional[float] = None,
+        starts: Optional[int] = None,
+        spread: Optional[float] = None,
+        merge_tolerance: Optional[float] = None,
+        bootstrap: Optional[int] = None,
+        noise: Optional[str] = None,
+        equivalent_systems: Optional[Sequence[Mapping[str, Any]]] = None,
+        constancy_test: Optional[bool] = None,
+        candidates: Optional[Sequence[Mapping[str, Any]]] = None,
+        threads: Optional[int] = None,
+        **unknown: Any,
+    ) -> Study:
+        """Analyses what the records determine, as ``kmcfit study`` does: identified directions, profiles, extremes, candidates.
+
+        The arguments are the keys of ``study`` in the model file; those that are not given have the values of the model, or its
+        defaults. Ctrl-C ends the study after the analyses finished so far, with the status ``"interrupted"``.
+
+        Parameters
+        ----------
+        confidence : float
+            Confidence level of bands, profiles, extremes and bootstrap intervals; 0.95.
+        seed : int
+            Seed of all random numbers; 1.
+        profiles : list of dict
+            Quantities for a likelihood profile, e.g. ``[{"function": "stiffness", "mean": True}]``.
+        extremes : float or sequence of float
+            Times of the data-consistent extremes, s; five over the record.
+        misfit_limit : float
+            Largest misfit of a system that is consistent with the data; from the confidence level.
+        starts : int
+            Number of fits from random starting points, within a factor `spread` of the start; minima within `merge_tolerance` count as
+            one.
+        bootstrap : int
+            Number of refits of resampled records, with ``noise="parametric"`` or ``"residual"``.
+        equivalent_systems : list of dict
+            Masses of equivalent systems, e.g. ``[{"name": "constant mass", "mass": 1.0}]``.
+        constancy_test : bool
+            Likelihood-ratio test of each function against a constant.
+        candidates : list of dict
+            Candidate experiments, e.g. ``[{"name": "again", "initial": {"displacement": 0.01, "velocity": 0.0}}]``.
+        threads : int
+            Number of threads, one per core if not given; results do not depend on it.
+
+        Returns
+        -------
+        Study
+        """
+        given = {
+            "confidence": confidence,
+            "seed": seed,
+            "profiles": profiles,
+            "extremes": extremes,
+            "misfit_limit": misfit_limit,
+            "starts": starts,
+            "spread": spread,
+            "merge_tolerance": merge_tolerance,
+            "bootstrap": bootstrap,
+            "noise": noise,
+            "equivalent_systems": equivalent_systems,
+            "constancy_test": constancy_test,
+            "candidates": candidates,
+        }
+        for word in unknown:
+            raise unknown_keyword("Fit.study", word, [*given, "threads"])
+        if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
+            raise InputError("invalid number of threads", "Fit.study.threads", repr(threads), "1 or more")
+        changes = [f"study.{key}={_yaml.flow(plain(value))}" for key, value in given.items() if value is not None]
+        with temporary_folder() as folder:
+            out = os.path.join(folder, "study")
+            if self._raw is not None:
+                findings, text, is_interrupted = _kmcfit.study(self._raw, out, changes, threads)
+            else:
+                run = os.path.join(folder, "run")
+                write_files(run, self._files or {})
+                # A run of arrays has its model with it.
+                own = os.path.join(run, "model.yaml")
+                model = own if os.path.exists(own) else self.result["model"]["file"]
+                findings, text, is_interrupted = _kmcfit.study_run(run, model, out, changes, threads)
+            if is_interrupted:
+                import warnings
+
+                warnings.warn("the study was interrupted; it has the analyses finished so far", RuntimeWarning, stacklevel=2)
+            return Study(findings, text, read_files(out))
 
     def plot(self, quantities: Optional[Sequence[str]] = None) -> Any:
         """A figure of matplotlib: the coefficients that vary (or `quantities`) with their 95 % bands."""
@@ -361,9 +449,11 @@ class Fit:
         return f"<Fit {title!r}: {self.status}>\n{self.verdict}\n{self.estimates!r}"
 
     def _repr_html_(self) -> str:
-        page = f"<h4>{html.escape(self.result['title'])}: {html.escape(self.status)}</h4><p>{html.escape(str(self.verdict))}</p>"
-        chart = self._run().get("figures/functions.svg", b"").decode()
-        return page + self.estimates._repr_html_() + chart[max(chart.find("<svg"), 0) :]
+        page = self._run().get("report.html")
+        if page is not None:
+            return first_screen(page.decode())
+        title = f"<h4>{html.escape(self.result['title'])}: {html.escape(self.status)}</h4>"
+        return f"{title}<p>{html.escape(str(self.verdict))}</p>{self.estimates._repr_html_()}"
 
     def __getstate__(self) -> Dict[str, Any]:
         return {"json": self._document(), "files": self._run()}
@@ -425,12 +515,6 @@ def open_run(folder: Union[str, "os.PathLike[str]"]) -> Fit:
     """A finished run from the folder that ``kmcfit fit`` or `Fit.save` wrote."""
     path = os.fspath(folder)
     return Fit._opened(_kmcfit.open_run(path), read_files(path))
-
-
-def read_files(folder: str) -> Dict[str, bytes]:
-    """The files of a folder by their relative names."""
-    root = Path(folder)
-    return {path.relative_to(root).as_posix(): path.read_bytes() for path in sorted(root.rglob("*")) if path.is_file()}
 
 
 def temporary_folder() -> Any:
