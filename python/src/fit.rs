@@ -32,14 +32,22 @@ pub struct RawFit {
     document: ResultDocument,
 }
 
-/// Fits a model; Ctrl-C ends the fit at its best point. `progress` is called with number and cost of each iteration.
+/// Fits a model; Ctrl-C ends the fit at its best point. `progress` is called with number and cost of each iteration. In the main thread
+/// the fit of small records is done in place, which saves the start of a thread.
 #[pyfunction]
-pub fn fit(py: Python<'_>, model: Py<RawModel>, progress: Option<Py<PyAny>>) -> PyResult<RawFit> {
+pub fn fit(
+    py: Python<'_>,
+    model: Py<RawModel>,
+    progress: Option<Py<PyAny>>,
+    is_main_thread: bool,
+) -> PyResult<RawFit> {
     let model = model.get();
     let flag = Arc::new(AtomicBool::new(false));
     let interrupt = Arc::clone(&flag);
-    let (result, signal) =
-        py.detach(|| watched(&flag, move || fitted(model, interrupt, progress)));
+    let (result, signal) = match is_main_thread && model.is_small() {
+        true => polled(py, &flag, |poll| fitted(model, interrupt, progress, poll)),
+        false => py.detach(|| watched(&flag, || fitted(model, interrupt, progress, &mut || ()))),
+    };
     ended(py, result, signal, RawFit::is_interrupted)
 }
 
@@ -73,38 +81,68 @@ pub fn watched<T: Send>(
     let mut signal = None;
     let result = scope(|scope| {
         let (done, finished) = channel();
+        // The result is sent, so that the call does not wait for the end of the thread, which returns its memory.
         let worker = Builder::new()
             .stack_size(STACK)
             .spawn_scoped(scope, move || {
-                let result = caught(work);
-                // The receiver waits for it.
-                let _ = done.send(());
-                result
+                let _ = done.send(caught(work));
             });
-        let worker = worker.map_err(|error| Failure::Numerical(format!("no thread: {error}")))?;
-        while finished.recv_timeout(POLL) == Err(RecvTimeoutError::Timeout) {
-            if let Err(raised) = Python::attach(|py| py.check_signals()) {
-                flag.store(true, Ordering::Relaxed);
-                signal = Some(raised);
+        worker.map_err(|error| Failure::Numerical(format!("no thread: {error}")))?;
+        loop {
+            match finished.recv_timeout(POLL) {
+                Ok(result) => return result,
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(Failure::Panic("the thread of the work ended".into()));
+                }
+                Err(RecvTimeoutError::Timeout) => {
+                    if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                        flag.store(true, Ordering::Relaxed);
+                        signal = Some(raised);
+                    }
+                }
             }
         }
-        worker
-            .join()
-            .unwrap_or_else(|payload| Err(Failure::of_panic(&*payload)))
     });
     (result, signal)
 }
 
+/// Does `work` on this thread, without the interpreter; it calls its argument often, which sets `flag` at the first exception of a signal
+/// handler, which is returned.
+fn polled<T: Send>(
+    py: Python<'_>,
+    flag: &AtomicBool,
+    work: impl FnOnce(&mut dyn FnMut()) -> Result<T, Failure> + Send,
+) -> (Result<T, Failure>, Option<PyErr>) {
+    py.detach(|| {
+        let (mut signal, mut last) = (None, Instant::now());
+        let mut poll = || {
+            if last.elapsed() < POLL {
+                return;
+            }
+            last = Instant::now();
+            if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                flag.store(true, Ordering::Relaxed);
+                signal = Some(raised);
+            }
+        };
+        let result = caught(|| work(&mut poll));
+        (result, signal)
+    })
+}
+
+/// Fits a model; `poll` is called after each iteration.
 fn fitted(
     source: &RawModel,
     interrupt: Arc<AtomicBool>,
     progress: Option<Py<PyAny>>,
+    poll: &mut dyn FnMut(),
 ) -> Result<RawFit, Failure> {
     let mut model = source.build()?;
     model.settings.interrupt = Some(Arc::clone(&interrupt));
     let clock = Instant::now();
     let mut raised = None;
     let mut show = |record: &IterationRecord| {
+        poll();
         let Some(progress) = progress.as_ref().filter(|_| raised.is_none()) else {
             return;
         };

@@ -30,11 +30,11 @@ mod _kmcfit {
     #[pymodule_export]
     use crate::problem::Problem;
     #[pymodule_export]
+    use crate::runs::{compare, open_run, parse, read_table, read_text, scaffold, simulate};
+    #[pymodule_export]
     use crate::source::RawModel;
     #[pymodule_export]
     use crate::study::{study, study_run};
-    #[pymodule_export]
-    use crate::runs::{compare, open_run, parse, read_table, read_text, scaffold, simulate};
 
     /// Provides the services of the process once.
     #[pymodule_init]

@@ -8,6 +8,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+/// Most bytes of small records: three columns of 2700 samples.
+const SMALL: usize = 1 << 16;
+
 /// A model with its overrides and the files that stand in memory, ready to be fitted many times.
 #[pyclass(frozen, module = "kmcfit._kmcfit")]
 pub struct RawModel {
@@ -49,6 +52,13 @@ impl RawModel {
 }
 
 impl RawModel {
+    /// True if all records stand in memory and are small.
+    pub fn is_small(&self) -> bool {
+        let sizes = self.file.files_in_memory();
+        let total: usize = sizes.iter().map(|(_, content)| content.len()).sum();
+        (1..=SMALL).contains(&total)
+    }
+
     /// The model file.
     pub fn file(&self) -> &ModelFile {
         &self.file

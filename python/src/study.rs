@@ -35,12 +35,12 @@ pub fn study(
             false => error,
         };
         let finished = StudiedFit::of(&fit.done.model, &fit.done.fit);
-        studied(file, &overrides, &folder, threads, Some(finished), flag).map_err(
-            |error| match error {
+        studied(file, &overrides, &folder, threads, Some(finished), flag).map_err(|error| {
+            match error {
                 Failure::Input(error) => Failure::Input(located(error)),
                 other => other,
-            },
-        )
+            }
+        })
     })
 }
 
@@ -74,7 +74,11 @@ fn run(
     let own = Arc::clone(&flag);
     let (result, signal) = py.detach(|| watched(&flag, move || work(own)));
     let document = ended(py, result, signal, |document| !document.is_complete())?;
-    Ok((document.findings(), document.text(), !document.is_complete()))
+    Ok((
+        document.findings(),
+        document.text(),
+        !document.is_complete(),
+    ))
 }
 
 fn studied(

@@ -4,7 +4,8 @@ use super::compare::run_sequence;
 use super::fit::read;
 use super::study_run::StudyTask;
 use super::{
-    CommandError, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, say, stem,
+    CommandError, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, say,
+    stem,
 };
 use crate::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
 use crate::error::InputError;

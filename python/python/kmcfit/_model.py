@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import operator
 import os
+import threading
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, Union
 
@@ -179,7 +180,7 @@ class Model:
         NumericalError
             If no starting point has a response.
         """
-        return Fit._of(_kmcfit.fit(self._ready(data, overrides(set)), progress))
+        return Fit._of(_kmcfit.fit(self._ready(data, overrides(set)), progress, _is_main_thread()))
 
     def study(
         self,
@@ -241,6 +242,10 @@ class Model:
         return _yaml.text({**self._spec, "experiments": experiments}), files
 
 
+def _is_main_thread() -> bool:
+    return threading.current_thread() is threading.main_thread()
+
+
 def overrides(changes: Optional[Overrides]) -> List[str]:
     """Changed keys as the texts of ``--set``."""
     return [f"{key}={_yaml.flow(plain(value))}" for key, value in (changes or {}).items()]
@@ -252,7 +257,7 @@ def fit_model(
     progress: Optional[Progress] = None,
 ) -> Fit:
     """Fits the model of a file, as ``kmcfit fit`` does, with the same results. See `Model.fit`."""
-    return Fit._of(_kmcfit.fit(_kmcfit.RawModel(None, os.fspath(path), {}, overrides(set)), progress))
+    return Fit._of(_kmcfit.fit(_kmcfit.RawModel(None, os.fspath(path), {}, overrides(set)), progress, _is_main_thread()))
 
 
 def init(*paths: Union[str, "os.PathLike[str]"]) -> Model:

@@ -148,7 +148,13 @@ impl Problem {
         let mut scalars = vec![0.0; evaluation.scalars.len()];
         for (e, experiment) in self.experiments.iter().enumerate() {
             if experiment.channels.is_empty()
-                || self.add_gradient_of_constants(evaluation, e, slopes, &mut gradient, &mut scalars)
+                || self.add_gradient_of_constants(
+                    evaluation,
+                    e,
+                    slopes,
+                    &mut gradient,
+                    &mut scalars,
+                )
             {
                 continue;
             }
