@@ -20,10 +20,11 @@ except ImportError as _error:
         raise ImportError("kmcfit cannot be imported in a subinterpreter; use threads or processes") from _error
     raise
 from ._compare import Comparison, compare
+from ._curve import Curve
 from ._errors import Error, InputError, InternalError, NumericalError
-from ._estimates import Estimate, Estimates
+from ._estimates import Estimate, Estimates, Verdict
 from ._experiment import Experiment
-from ._fit import Curve, Fit, Verdict
+from ._fit import Fit
 from ._fit import open_run as open  # noqa: A001
 from ._functions import (
     BSpline,
