@@ -31,6 +31,16 @@ def test_estimates_contain_the_true_system(fit):
     assert "<svg" in fit._repr_html_()
 
 
+def test_a_force_determines_an_unknown_mass(data, record):
+    fit = km.Model().fit(data)
+    low, high = fit.estimates["mass"].ci95
+    # Made with 2.4 kg; as above.
+    assert abs(fit.estimates["mass"].value - 2.4) < 1.5 * (high - low) < 0.1
+    assert pickle.loads(pickle.dumps(km.Model())).fit(data).parameters == fit.parameters
+    free = km.Experiment(time=record[0], acceleration=record[2])
+    assert "unknown" in km.Model().to_yaml(free) and "unknown" not in km.Model().to_yaml(data)
+
+
 def test_curves_are_the_columns_of_the_table(fit):
     table, stiffness = fit.functions, fit.stiffness
     assert stiffness.unit == "N/m"

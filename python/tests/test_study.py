@@ -72,7 +72,7 @@ def test_a_study_writes_the_files_of_the_program(study, line, tmp_path):
         study.save(tmp_path / "study")
 
 
-def test_options_are_the_keys_of_the_model_file(line, data):
+def test_options_are_the_keys_of_the_model_file(line, record):
     import inspect
 
     schema = json.loads((ROOT / "docs" / "kmcfit.schema.json").read_text())
@@ -87,6 +87,9 @@ def test_options_are_the_keys_of_the_model_file(line, data):
         line.study(extremes=[99.0])
     assert (caught.value.where, caught.value.found) == ("study.extremes[0]", "99")
     with pytest.raises(km.InputError, match="nothing to study"):
+        time, force, acceleration = record
+        known = dict(sigma=0.02, initial=(0.0, 0.0), sensors={"acceleration": {"offset": 0.0}})
+        data = km.Experiment(time=time, force=force, acceleration=acceleration, **known)
         km.Model(mass=2.4, damping=1.0, stiffness=1500.0).study(data)
 
 
@@ -141,6 +144,6 @@ def test_hostile_names_stay_text(record):
 def test_a_study_of_a_file_is_that_of_the_program(tmp_path):
     """Bits of all analyses, of a model with many parameters that has a verdict of its own."""
     path = MODELS / "linear-mass.yaml"
-    done = program("study", path, "--out", tmp_path / "program")
+    done = program("study", path, "--out", tmp_path / "program", "--set", "study.extremes=[12.5]")
     assert done.returncode == 0, done.stderr
-    assert km.fit_model(path).study().result == json.loads((tmp_path / "program" / "study.json").read_text())
+    assert km.fit_model(path).study(extremes=[12.5]).result == json.loads((tmp_path / "program" / "study.json").read_text())

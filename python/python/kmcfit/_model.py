@@ -43,8 +43,9 @@ class Model:
     Parameters
     ----------
     mass, damping, stiffness : float, Constant, Polynomial, PiecewiseLinear, BSpline, Nodal, Fixed or dict, optional
-        Coefficient functions, kg, N s/m and N/m; a number is a fixed value. Without a mass it is unknown, and the other
-        coefficients are ratios to it. Damping and stiffness are constants by default, estimated from the record.
+        Coefficient functions, kg, N s/m and N/m; a number is a fixed value. Without a mass it is a constant, estimated, for records of
+        which one has a force; for others it is unknown, and the other coefficients are ratios to it. Damping and stiffness are constants by
+        default, estimated from the record.
     quadratic_stiffness, cubic_stiffness, quintic_stiffness, quadratic_damping, coulomb_friction, static_force : optional
         Further coefficient functions.
     constraints : list of dict, optional
@@ -105,6 +106,7 @@ class Model:
         }
         self._spec: Dict[str, Any] = {key: value for key, value in spec.items() if value is not None}
         self._path = _PATH
+        self._chooses_mass = mass is None
         self._last: Optional[Tuple[Tuple[Experiment, ...], List[str], "_kmcfit.RawModel"]] = None
         # Keys and types are checked at once; numbers with the records.
         placeholder = {"initial": "estimate"}
@@ -122,6 +124,7 @@ class Model:
         model = cls.__new__(cls)
         model._spec = json.loads(_kmcfit.parse(given if is_text else _kmcfit.read_text(path), path, True))
         model._path = path
+        model._chooses_mass = False
         model._last = None
         return model
 
@@ -205,7 +208,7 @@ class Model:
     __hash__ = None  # type: ignore[assignment]
 
     def __getstate__(self) -> Dict[str, Any]:
-        return {"_spec": self._spec, "_path": self._path}
+        return {"_spec": self._spec, "_path": self._path, "_chooses_mass": self._chooses_mass}
 
     def __setstate__(self, state: Dict[str, Any]) -> None:
         self.__dict__.update(state, _last=None)
@@ -239,7 +242,11 @@ class Model:
             files[file] = experiment._file(file)
             name = {} if experiment.name is None else {"name": experiment.name}
             experiments.append({**name, "data": file, **experiment._spec})
-        return _yaml.text({**self._spec, "experiments": experiments}), files
+        spec = {**self._spec, "experiments": experiments}
+        if self._chooses_mass and any(experiment.has_force for experiment in data):
+            # A force determines the mass.
+            spec["functions"] = {**spec["functions"], "mass": _FROM_RECORD}
+        return _yaml.text(spec), files
 
 
 def _is_main_thread() -> bool:
