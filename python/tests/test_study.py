@@ -3,6 +3,8 @@
 import json
 import pickle
 import re
+import subprocess
+import sys
 from html.parser import HTMLParser
 
 import numpy as np
@@ -147,3 +149,18 @@ def test_a_study_of_a_file_is_that_of_the_program(tmp_path):
     done = program("study", path, "--out", tmp_path / "program", "--set", "study.extremes=[12.5]")
     assert done.returncode == 0, done.stderr
     assert km.fit_model(path).study(extremes=[12.5]).result == json.loads((tmp_path / "program" / "study.json").read_text())
+
+
+def test_ctrl_c_ends_a_study_after_the_finished_analyses():
+    # 100000 further fits would take minutes.
+    code = (
+        "import os, signal, threading, warnings, kmcfit as km\n"
+        f"fit = km.fit_model({str(MODELS / 'linear-mass.yaml')!r})\n"
+        "threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
+        "with warnings.catch_warnings(record=True) as caught:\n"
+        "    warnings.simplefilter('always')\n"
+        "    study = fit.study(starts=100_000)\n"
+        "print(study.status, study.sensitivity.rank, len(study.result['extremes']), len(caught))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stdout.split() == ["interrupted", "3", "0", "1"], done.stderr
