@@ -312,7 +312,7 @@ pub(super) fn iterations(document: &ResultDocument) -> String {
 }
 
 /// A count with its noun in the singular or plural.
-pub(super) fn count(number: usize, thing: &str) -> String {
+pub(crate) fn count(number: usize, thing: &str) -> String {
     match number {
         1 => format!("1 {thing}"),
         _ => format!("{number} {thing}s"),
