@@ -54,9 +54,12 @@ impl Failure {
     }
 }
 
-/// Place of an error, with its key.
+/// Place of an error, with its key; a changed value by its key alone.
 fn place(error: &InputError) -> String {
     let place = match &error.place {
+        Location::Argument(name) if name.starts_with("--set ") && error.key.is_some() => {
+            return error.key.clone().unwrap_or_default();
+        }
         Location::Argument(name) => name.trim_start_matches("--").to_owned(),
         place => place.to_string(),
     };

@@ -1,7 +1,7 @@
 //! Fits.
 
 use crate::errors::{Failure, caught, guarded};
-use crate::source::{Files, Source};
+use crate::source::RawModel;
 use kmcfit::config::{Model, ModelFile};
 use kmcfit::fitting::fit_or_no_response;
 use kmcfit::report::document::ResultDocument;
@@ -27,47 +27,45 @@ const STACK: usize = 8 << 20;
 /// A finished fit.
 #[pyclass(frozen, module = "kmcfit._kmcfit")]
 pub struct RawFit {
-    file: ModelFile,
-    done: CompletedFit,
+    pub file: ModelFile,
+    pub done: CompletedFit,
     document: ResultDocument,
 }
 
-/// Fits a model; Ctrl-C ends the fit at its best point. `progress` is called with number and cost of each iteration.
+/// Fits a model; Ctrl-C ends the fit at its best point. `progress` is called with number and cost of each iteration. In the main thread
+/// the fit of small records is done in place, which saves the start of a thread.
 #[pyfunction]
 pub fn fit(
     py: Python<'_>,
-    text: Option<String>,
-    path: PathBuf,
-    files: Files,
-    overrides: Vec<String>,
+    model: Py<RawModel>,
     progress: Option<Py<PyAny>>,
+    is_main_thread: bool,
 ) -> PyResult<RawFit> {
-    let source = Source {
-        text,
-        path,
-        files,
-        overrides,
-    };
+    let model = model.get();
     let flag = Arc::new(AtomicBool::new(false));
     let interrupt = Arc::clone(&flag);
-    let (result, signal) =
-        py.detach(|| watched(&flag, move || fitted(source, interrupt, progress)));
+    let (result, signal) = match is_main_thread && model.is_small() {
+        true => polled(py, &flag, |poll| fitted(model, interrupt, progress, poll)),
+        false => py.detach(|| watched(&flag, || fitted(model, interrupt, progress, &mut || ()))),
+    };
+    ended(py, result, signal, RawFit::is_interrupted)
+}
+
+/// The result of work that a signal may have ended: Ctrl-C gives a result that `is_interrupted`, another exception is raised.
+pub fn ended<T>(
+    py: Python<'_>,
+    result: Result<T, Failure>,
+    signal: Option<PyErr>,
+    is_interrupted: impl Fn(&T) -> bool,
+) -> PyResult<T> {
     let found = result.map_err(|failure| failure.raise(py));
-    match signal {
-        None => found,
-        Some(raised) => {
-            let is_ended = |found: &RawFit| found.document.outcome.status == Status::Interrupted;
-            match raised.is_instance_of::<PyKeyboardInterrupt>(py) {
-                true => found.and_then(|found| {
-                    if is_ended(&found) {
-                        Ok(found)
-                    } else {
-                        Err(raised)
-                    }
-                }),
-                false => Err(raised),
-            }
-        }
+    let Some(raised) = signal else {
+        return found;
+    };
+    match (raised.is_instance_of::<PyKeyboardInterrupt>(py), found) {
+        (true, Ok(found)) if is_interrupted(&found) => Ok(found),
+        (true, Err(error)) => Err(error),
+        _ => Err(raised),
     }
 }
 
@@ -76,45 +74,75 @@ pub fn fit(
     clippy::disallowed_methods,
     reason = "its stack is as large as that of the program's main thread; a refusal is an error"
 )]
-fn watched<T: Send>(
+pub fn watched<T: Send>(
     flag: &AtomicBool,
     work: impl FnOnce() -> Result<T, Failure> + Send,
 ) -> (Result<T, Failure>, Option<PyErr>) {
     let mut signal = None;
     let result = scope(|scope| {
         let (done, finished) = channel();
+        // The result is sent, so that the call does not wait for the end of the thread, which returns its memory.
         let worker = Builder::new()
             .stack_size(STACK)
             .spawn_scoped(scope, move || {
-                let result = caught(work);
-                // The receiver waits for it.
-                let _ = done.send(());
-                result
+                let _ = done.send(caught(work));
             });
-        let worker = worker.map_err(|error| Failure::Numerical(format!("no thread: {error}")))?;
-        while finished.recv_timeout(POLL) == Err(RecvTimeoutError::Timeout) {
-            if let Err(raised) = Python::attach(|py| py.check_signals()) {
-                flag.store(true, Ordering::Relaxed);
-                signal = Some(raised);
+        worker.map_err(|error| Failure::Numerical(format!("no thread: {error}")))?;
+        loop {
+            match finished.recv_timeout(POLL) {
+                Ok(result) => return result,
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(Failure::Panic("the thread of the work ended".into()));
+                }
+                Err(RecvTimeoutError::Timeout) => {
+                    if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                        flag.store(true, Ordering::Relaxed);
+                        signal = Some(raised);
+                    }
+                }
             }
         }
-        worker
-            .join()
-            .unwrap_or_else(|payload| Err(Failure::of_panic(&*payload)))
     });
     (result, signal)
 }
 
+/// Does `work` on this thread, without the interpreter; it calls its argument often, which sets `flag` at the first exception of a signal
+/// handler, which is returned.
+fn polled<T: Send>(
+    py: Python<'_>,
+    flag: &AtomicBool,
+    work: impl FnOnce(&mut dyn FnMut()) -> Result<T, Failure> + Send,
+) -> (Result<T, Failure>, Option<PyErr>) {
+    py.detach(|| {
+        let (mut signal, mut last) = (None, Instant::now());
+        let mut poll = || {
+            if last.elapsed() < POLL {
+                return;
+            }
+            last = Instant::now();
+            if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                flag.store(true, Ordering::Relaxed);
+                signal = Some(raised);
+            }
+        };
+        let result = caught(|| work(&mut poll));
+        (result, signal)
+    })
+}
+
+/// Fits a model; `poll` is called after each iteration.
 fn fitted(
-    source: Source,
+    source: &RawModel,
     interrupt: Arc<AtomicBool>,
     progress: Option<Py<PyAny>>,
+    poll: &mut dyn FnMut(),
 ) -> Result<RawFit, Failure> {
-    let (file, mut model) = source.build()?;
+    let mut model = source.build()?;
     model.settings.interrupt = Some(Arc::clone(&interrupt));
     let clock = Instant::now();
     let mut raised = None;
     let mut show = |record: &IterationRecord| {
+        poll();
         let Some(progress) = progress.as_ref().filter(|_| raised.is_none()) else {
             return;
         };
@@ -143,7 +171,7 @@ fn fitted(
     let total = (model.preparation.total + clock.elapsed()).max(overhead.sum() + done.fit.elapsed);
     document.timings = TimingsSummary::new(&done.fit, &overhead, total);
     Ok(RawFit {
-        file,
+        file: source.file().clone(),
         done,
         document,
     })
@@ -204,7 +232,7 @@ impl RawFit {
 #[pymethods]
 impl RawFit {
     /// True if Ctrl-C ended the fit.
-    fn is_interrupted(&self) -> bool {
+    pub fn is_interrupted(&self) -> bool {
         self.document.outcome.status == Status::Interrupted
     }
 

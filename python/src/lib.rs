@@ -11,6 +11,7 @@ mod fit;
 mod problem;
 mod runs;
 mod source;
+mod study;
 
 use mimalloc::MiMalloc;
 use pyo3::prelude::*;
@@ -30,6 +31,10 @@ mod _kmcfit {
     use crate::problem::Problem;
     #[pymodule_export]
     use crate::runs::{compare, open_run, parse, read_table, read_text, scaffold, simulate};
+    #[pymodule_export]
+    use crate::source::RawModel;
+    #[pymodule_export]
+    use crate::study::{study, study_run};
 
     /// Provides the services of the process once.
     #[pymodule_init]

@@ -1,14 +1,13 @@
 //! Cost and derivatives as functions of the parameters.
 
 use crate::errors::{Failure, guarded};
-use crate::source::{Files, Source, from_bytes, to_bytes};
+use crate::source::{RawModel, from_bytes, to_bytes};
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem as Core;
 use kmcfit_core::internals::simulate::SimulationError;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyBytes;
-use std::path::PathBuf;
 
 /// The problem of a model.
 #[pyclass(frozen, module = "kmcfit._kmcfit")]
@@ -40,23 +39,11 @@ impl Problem {
 #[pymethods]
 impl Problem {
     #[new]
-    fn new(
-        py: Python<'_>,
-        text: Option<String>,
-        path: PathBuf,
-        files: Files,
-        overrides: Vec<String>,
-    ) -> PyResult<Self> {
-        let source = Source {
-            text,
-            path,
-            files,
-            overrides,
-        };
+    fn new(py: Python<'_>, model: Py<RawModel>) -> PyResult<Self> {
+        let model = model.get();
         guarded(py, || {
-            let (_, model) = source.build()?;
             Ok(Self {
-                core: model.problem,
+                core: model.build()?.problem,
             })
         })
     }
@@ -155,10 +142,7 @@ impl Problem {
     ) -> PyResult<Bound<'py, PyBytes>> {
         let slopes = from_bytes(&slopes);
         self.at(py, &theta, |core, _, evaluation| {
-            let jacobian = core.predictions_jacobian(evaluation);
-            let columns = jacobian.column_iter();
-            let along = columns.map(|column| column.iter().zip(&slopes).map(|(a, b)| a * b).sum());
-            along.collect()
+            core.predictions_transpose(evaluation, &slopes)
         })
     }
 

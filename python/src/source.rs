@@ -1,47 +1,80 @@
 //! Models and their files in memory.
 
-use crate::errors::{Failure, keyed};
+use crate::errors::{Failure, guarded, keyed};
 use kmcfit::config::{BuildMode, Model, ModelFile, Override, build};
-use kmcfit::error::InputError;
+use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Files in memory by their names in the model.
-pub type Files = BTreeMap<String, PyBackedBytes>;
+/// Most bytes of small records: three columns of 2700 samples.
+const SMALL: usize = 1 << 16;
 
-/// A model with its overrides: a text, or without one the file of the path.
-pub struct Source {
-    pub text: Option<String>,
-    pub path: PathBuf,
-    pub files: Files,
-    pub overrides: Vec<String>,
+/// A model with its overrides and the files that stand in memory, ready to be fitted many times.
+#[pyclass(frozen, module = "kmcfit._kmcfit")]
+pub struct RawModel {
+    file: ModelFile,
+    /// True for a text that was made from arguments: lines of it mean nothing to the user.
+    is_text: bool,
 }
 
-impl Source {
-    /// Reads the file and builds its model for a fit.
-    pub fn build(self) -> Result<(ModelFile, Model), Failure> {
-        let overrides = Override::parse_all(&self.overrides)?;
-        // Lines are those of a file; a text is made from arguments.
-        let path = self.text.as_ref().map(|_| self.path.clone());
-        let built = self.read(&overrides);
-        built.map_err(|error| match &path {
-            Some(path) => Failure::Input(keyed(error, path)),
-            None => Failure::Input(error),
+#[pymethods]
+impl RawModel {
+    /// A model from a text, or without one from the file of the path; `files` are those in memory by their names in the model.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        text: Option<String>,
+        path: PathBuf,
+        files: BTreeMap<String, PyBackedBytes>,
+        overrides: Vec<String>,
+    ) -> PyResult<Self> {
+        let is_text = text.is_some();
+        guarded(py, || {
+            let read = || {
+                let overrides = Override::parse_all(&overrides)?;
+                let file = match text {
+                    Some(text) => ModelFile::parse(&path, text)?,
+                    None => ModelFile::read(&path)?,
+                };
+                let files = files.iter();
+                let files = files.map(|(name, content)| (name.clone(), Arc::from(&**content)));
+                file.with_files(files).with_overrides(&overrides)
+            };
+            let file = read().map_err(|error| match is_text {
+                true => keyed(error, &path),
+                false => error,
+            })?;
+            Ok(Self { file, is_text })
         })
     }
+}
 
-    fn read(self, overrides: &[Override]) -> Result<(ModelFile, Model), InputError> {
-        let file = match self.text {
-            Some(text) => ModelFile::parse(&self.path, text)?,
-            None => ModelFile::read(&self.path)?,
-        };
-        let files = self.files.iter();
-        let files = files.map(|(name, content)| (name.clone(), Arc::from(&**content)));
-        let file = file.with_files(files).with_overrides(overrides)?;
-        let model = build(&file, BuildMode::Fit)?;
-        Ok((file, model))
+impl RawModel {
+    /// True if all records stand in memory and are small.
+    pub fn is_small(&self) -> bool {
+        let sizes = self.file.files_in_memory();
+        let total: usize = sizes.iter().map(|(_, content)| content.len()).sum();
+        (1..=SMALL).contains(&total)
+    }
+
+    /// The model file.
+    pub fn file(&self) -> &ModelFile {
+        &self.file
+    }
+
+    /// Builds the model for a fit.
+    pub fn build(&self) -> Result<Model, Failure> {
+        build(&self.file, BuildMode::Fit).map_err(|error| self.located(error).into())
+    }
+
+    /// An error of the model, with a key in place of a line where the text was made from arguments.
+    pub fn located(&self, error: kmcfit::error::InputError) -> kmcfit::error::InputError {
+        match self.is_text {
+            true => keyed(error, &self.file.path),
+            false => error,
+        }
     }
 }
 

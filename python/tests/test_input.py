@@ -108,7 +108,7 @@ WRONG = [
     (lambda: km.Model(mass=1.0).fit(T, Y), "record 1", "km.Experiment(time=t"),
     (lambda: km.Model(mass=-1.0).fit(km.Experiment(time=T, displacement=Y)), "functions.mass.fixed", "positive"),
     (lambda: km.Experiment(time=T, displacement=np.where(T > 0.5, np.inf, Y)), "Experiment.displacement", "inf at index 25"),
-    (lambda: km.Model(mass=1.0).fit(km.Experiment(time=T, displacement=Y), set={"fit.stp": 1}), "fit.stp", "did you mean"),
+    (lambda: km.Model(mass=1.0).fit(km.Experiment(time=T, displacement=Y), set={"fit.stp": 1}), "fit", "found: `stp`"),
     (lambda: km.fit_model("no-such-file.yaml"), "no-such-file.yaml", "no such file"),
     (lambda: km.open("no-such-folder"), "no-such-folder", "no such folder"),
     (lambda: km.Model.from_yaml("format: 1\nexperimnts: []\n"), "model.yaml", "did you mean `experiments`?"),

@@ -37,7 +37,21 @@ def test_derivatives_are_those_of_finite_differences(problem):
         assert np.max(np.abs(change - by_difference)) < 1e-6 * np.max(np.abs(change))
 
 
-def test_products_with_the_jacobian_agree(problem):
+@pytest.fixture(scope="module")
+def constants(record):
+    """Constants only, and two records of several channels."""
+    time, force, acceleration = record
+    given = dict(time=time, force=force, sigma=0.02)
+    first = km.Experiment(**given, acceleration=acceleration)
+    second = km.Experiment(
+        **{**given, "sigma": {"acceleration": 0.02, "displacement": 1e-5}}, acceleration=acceleration, displacement=acceleration * 1e-3
+    )
+    return km.Model(mass=2.4, damping=km.Constant(start=1.2), stiffness=km.Constant(start=1480.0)).problem(first, second)
+
+
+@pytest.mark.parametrize("name", ["problem", "constants"])
+def test_products_with_the_jacobian_agree(name, request):
+    problem = request.getfixturevalue(name)
     theta = problem.start
     rng = np.random.default_rng(4)
     along, slopes = rng.standard_normal(len(theta)), rng.standard_normal(len(problem.observed))
@@ -49,6 +63,7 @@ def test_products_with_the_jacobian_agree(problem):
     residuals, weights = problem.residuals(theta), problem.weights(theta)
     assert problem.cost(theta) == pytest.approx(np.sum(weights * residuals**2), rel=1e-12)
     assert problem.gradient(theta) == pytest.approx(2 * problem.vjp(theta, weights * residuals), rel=1e-8)
+    assert len(problem.observed) == (401 if name == "problem" else 3 * 401)
 
 
 def test_scipy_finds_the_optimum_of_the_fit(problem, record):

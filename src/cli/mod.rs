@@ -23,6 +23,7 @@ mod schema;
 mod shell;
 mod simulate;
 mod study;
+mod study_run;
 mod verify;
 
 use crate::config::{Model, ModelFile};
@@ -37,6 +38,7 @@ use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+pub use study::study_into;
 
 /// Identify time-varying mass, damping and stiffness of a vibrating system from measured records.
 #[derive(Debug, Parser)]
@@ -84,7 +86,7 @@ const TERMINATED: u8 = 143;
 
 /// Reason for which a command failed.
 #[derive(Debug)]
-enum CommandError {
+pub enum CommandError {
     /// Invalid input.
     Input(InputError),
     /// Numerical failure before there was a result, as a sentence.

@@ -1,33 +1,24 @@
 //! `kmcfit study`: runs the analyses of a fit, or compares a sequence of models.
 
-use super::compare::{open_analyses, run_sequence};
-use super::fit::{read, search};
-use super::progress::{Activity, Progress};
+use super::compare::run_sequence;
+use super::fit::read;
+use super::study_run::StudyTask;
 use super::{
     CommandError, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, say,
-    stem, unwritable,
+    stem,
 };
-use crate::config::{Model, ModelFile, Override, Sequence};
+use crate::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
 use crate::error::InputError;
-use crate::report::study::{
-    self, AnalysisFailure, Optimum, StudiedFit, StudyDocument, structural_rank,
-};
+use crate::report::study::{StudiedFit, StudyDocument};
 use crate::report::{Run, json, rebuilt_fit};
 use crate::results::{
-    AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, RESULT,
-    RequestedFiles, STUDY_JOURNAL,
+    AnalysisJournal, CHECKPOINT, FIT_JOURNAL, Heading, OutputFolder, RESULT, STUDY_JOURNAL,
 };
 use crate::text_io::quote;
-use kmcfit_core::internals::objective::Evaluation;
-use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{CheckpointStore, Status};
-use kmcfit_core::internals::study::extremes::is_within_rounding;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
-use std::io;
+use kmcfit_core::internals::solvers::Status;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// Analyse what the records determine: profiles, extremes, equivalent systems, next experiments.
 #[derive(Debug, clap::Args)]
@@ -126,55 +117,18 @@ fn run_in(
     finished: Option<StudiedFit>,
     is_resumed: bool,
 ) -> Result<u8, CommandError> {
-    let mut model = read(file)?;
-    can_be_studied(file, &model)?;
-    model.check_study_memory()?;
+    let model = checked(file, read(file)?)?;
     announce(&model);
-    let flag = interrupt::flag();
-    model.settings.interrupt = Some(Arc::clone(&flag));
-    let heading = Heading::of_model("study", file, RequestedFiles::figures(), None);
-    let claim = StudyDocument::claim()
-        .journals(&[STUDY_JOURNAL, FIT_JOURNAL, CHECKPOINT])
-        .inputs(inputs(file));
-    let folder = OutputFolder::prepare(out, claim)?;
-    let journal = open_analyses(&folder, STUDY_JOURNAL, &heading, is_resumed)?;
-    let document = StudyDocument {
-        format: 1,
-        title: model.title.clone(),
-        version: env!("CARGO_PKG_VERSION").into(),
-        status: "interrupted".into(),
-        confidence: model.study.confidence,
-        seed: model.study.seed,
-        structural_rank: structural_rank(&model.problem),
-        ..StudyDocument::default()
-    };
-    let threads = model.threads_within_memory(threads);
-    let mut work = StudyRun {
-        model: Arc::new(model),
-        folder: folder.path(),
-        heading: Heading::of_model("study", file, RequestedFiles::default(), None),
-        is_resumed,
-        finished,
-        journal,
-        flag,
+    let folder = prepare(file, out)?;
+    let plan = StudyTask {
+        file,
+        model,
         threads,
-        begun: 1,
-        document,
+        finished,
+        is_resumed,
+        flag: interrupt::flag(),
     };
-    let done = match work.run() {
-        Ok(()) => true,
-        Err(StudyError::Interrupted) => false,
-        Err(StudyError::Disk(error)) => return Err(unwritable(folder.path(), &error).into()),
-        Err(StudyError::Numerical(reason)) => return Err(CommandError::Numerical(reason)),
-    };
-    let mut document = work.document;
-    if done {
-        document.status = "complete".into();
-    }
-    let written = document
-        .write(&folder, &work.model)
-        .and_then(|()| work.journal.finish_if(done));
-    written.map_err(|error| unwritable(folder.path(), &error))?;
+    let document = plan.run(&folder)?;
     match as_json {
         true => print(&json(&document)),
         false => {
@@ -185,11 +139,52 @@ fn run_in(
             ));
         }
     }
-    Ok(match (done, &document.fit) {
+    Ok(match (document.is_complete(), &document.fit) {
         (false, _) => interrupt::exit_code(),
         (true, Some(fit)) => exit_code(fit.status),
         (true, None) => NOT_CONVERGED,
     })
+}
+
+/// Prepares the folder of a study.
+fn prepare(file: &ModelFile, out: &Path) -> Result<OutputFolder, InputError> {
+    let claim = StudyDocument::claim()
+        .journals(&[STUDY_JOURNAL, FIT_JOURNAL, CHECKPOINT])
+        .inputs(inputs(file));
+    OutputFolder::prepare(out, claim)
+}
+
+/// Studies a model and writes the results into a folder, without output on the terminal; starts from the fit `finished`, or fits first.
+/// `flag` ends the study.
+///
+/// # Errors
+/// If the model cannot be studied, the folder cannot be used, or the fit has no response.
+pub fn study_into(
+    out: &Path,
+    file: &ModelFile,
+    threads: Option<usize>,
+    finished: Option<StudiedFit>,
+    flag: Arc<AtomicBool>,
+) -> Result<StudyDocument, CommandError> {
+    let threads = self::threads(threads)?;
+    let model = checked(file, build(file, BuildMode::Fit)?)?;
+    let folder = prepare(file, out)?;
+    let plan = StudyTask {
+        file,
+        model,
+        threads,
+        finished,
+        is_resumed: false,
+        flag,
+    };
+    plan.run(&folder)
+}
+
+/// A model that can be studied, within the memory.
+fn checked(file: &ModelFile, model: Model) -> Result<Model, InputError> {
+    can_be_studied(file, &model)?;
+    model.check_study_memory()?;
+    Ok(model)
 }
 
 /// The fit of a finished run; `None` where it cannot be rebuilt, is not at its end, or has no parameters: then the model is fitted again.
@@ -215,238 +210,5 @@ fn can_be_studied(file: &ModelFile, model: &Model) -> Result<(), InputError> {
             .error_at("functions", "nothing to study: every function is fixed")
             .expected("at least one function with a basis")),
         _ => Ok(()),
-    }
-}
-
-/// The model on the grid of a fit, with its width of Coulomb friction; `None` if it cannot be built.
-fn on_grid_of(model: &Arc<Model>, fit: &StudiedFit) -> Option<Arc<Model>> {
-    let system = &model.problem.system;
-    let is_same_grid = fit.nodes == system.grid.nodes();
-    if is_same_grid && fit.friction_width == system.friction_width() {
-        return Some(Arc::clone(model));
-    }
-    let mut found = match is_same_grid {
-        true => Model::clone(model),
-        false => model.on_nodes(fit.nodes)?,
-    };
-    found.check_study_memory().ok()?;
-    if let Some(width) = fit.friction_width {
-        found = found.with_friction_width(width);
-    }
-    (found.problem.system.grid.nodes() == fit.nodes).then(|| Arc::new(found))
-}
-
-/// The journal of the fit within a study. A resumed study without one starts its fit over.
-fn fit_journal(folder: &Path, heading: &Heading, is_resumed: bool) -> Option<FitJournal> {
-    let before = is_resumed.then(|| FitJournal::resume(folder, heading));
-    match before {
-        Some(Ok(journal)) => Some(journal),
-        _ => FitJournal::begin(folder, heading).ok(),
-    }
-}
-
-/// Reason for which a study ends early.
-enum StudyError {
-    Interrupted,
-    Disk(io::Error),
-    Numerical(String),
-}
-
-impl From<io::Error> for StudyError {
-    fn from(error: io::Error) -> Self {
-        StudyError::Disk(error)
-    }
-}
-
-/// A running study.
-struct StudyRun<'a> {
-    /// The model; after the fit on the grid of the fit.
-    model: Arc<Model>,
-    folder: &'a Path,
-    /// Heading of the journal of the fit.
-    heading: Heading,
-    is_resumed: bool,
-    /// The fit of a finished run.
-    finished: Option<StudiedFit>,
-    journal: AnalysisJournal,
-    flag: Arc<AtomicBool>,
-    threads: usize,
-    /// Number of analyses begun, the fit included.
-    begun: usize,
-    document: StudyDocument,
-}
-
-impl StudyRun<'_> {
-    /// All analyses, up to an interrupt.
-    fn run(&mut self) -> Result<(), StudyError> {
-        let (problem, theta, evaluation) = self.fit()?;
-        let at = Optimum {
-            problem: &problem,
-            theta: &theta,
-            evaluation: &evaluation,
-        };
-        self.at_the_optimum(at)?;
-        self.further_fits(at)?;
-        self.extremes(at)
-    }
-
-    /// Analyses of the linearised fit, profiles, candidate experiments and equivalent systems.
-    fn at_the_optimum(&mut self, at: Optimum) -> Result<(), StudyError> {
-        let model = Arc::clone(&self.model);
-        let plan = &model.study;
-        self.document.sensitivity = Some(self.analysis("sensitivity", || study::sensitivity(at))?);
-        let bands = || study::bands(at, &model);
-        self.document.bands = Some(self.analysis("bands", bands)?);
-        for target in &plan.profiles {
-            let Some(of) = study::linear(at.problem, target) else {
-                continue;
-            };
-            let profile = || study::profile_of(at, &of, &model);
-            let name = format!("profile of {}", of.name);
-            let found = self.analysis(&name, profile)?;
-            let found = self.or_fail(&name, found);
-            self.document.profiles.extend(found);
-        }
-        if !plan.candidates.is_empty() {
-            let candidates = || study::candidates(at, &plan.candidates);
-            self.document.candidates = self.analysis("candidates", candidates)?;
-        }
-        let equivalent = || study::equivalent(at, &plan.equivalent_systems);
-        self.document.equivalent_systems = self.analysis("equivalent systems", equivalent)?;
-        Ok(())
-    }
-
-    /// Further fits: from random starting points, with constant functions, of resampled records.
-    fn further_fits(&mut self, at: Optimum) -> Result<(), StudyError> {
-        let (model, threads) = (Arc::clone(&self.model), self.threads);
-        let plan = &model.study;
-        if plan.starts > 0 {
-            let starts = || study::starts(&model, at, threads);
-            self.document.multistart = Some(self.analysis("starts", starts)?);
-        }
-        if plan.constancy_test {
-            let test = || study::constancy_test(at, plan, threads);
-            let found = self.analysis("constancy test", test)?;
-            let found = self.or_fail("constancy test", found);
-            self.document.constancy_test = found.unwrap_or_default();
-        }
-        if plan.replicates > 0 {
-            let found = self.analysis("bootstrap", || study::refits(at, plan, threads))?;
-            let mut found = self.or_fail("bootstrap", found).unwrap_or_default();
-            for interval in &mut found {
-                interval.unit = model.converted_unit(&interval.unit).to_owned();
-            }
-            self.document.bootstrap = found;
-        }
-        Ok(())
-    }
-
-    /// Extremes of the functions, and the predictions of the systems that have them.
-    fn extremes(&mut self, at: Optimum) -> Result<(), StudyError> {
-        let (model, threads) = (Arc::clone(&self.model), self.threads);
-        if model.study.misfit_limit.is_none() && is_within_rounding(at.problem, at.evaluation) {
-            let reason = "the samples are matched to machine precision and a penalty determines every function: without a stated \
-                 `study.misfit_limit` the ranges are rounding errors";
-            self.fail("extremes", reason);
-            return Ok(());
-        }
-        let compute = || study::extremes(&model, at, threads);
-        let (extremes, predictions) = self.analysis("extremes", compute)?;
-        if extremes.is_empty() {
-            let reason = "the optimum violates the misfit limit or the constraints";
-            self.fail("extremes", reason);
-        }
-        self.document.extremes = extremes;
-        self.document.roughness_limited = !at.problem.penalties.is_empty();
-        self.document.predictions = predictions;
-        Ok(())
-    }
-
-    /// Result of one analysis, from the journal or computed. The result of an interrupted analysis is discarded.
-    fn analysis<T: Serialize + DeserializeOwned>(
-        &mut self,
-        name: &str,
-        compute: impl FnOnce() -> T,
-    ) -> Result<T, StudyError> {
-        let flag = Arc::clone(&self.flag);
-        let whole = || !flag.load(Ordering::Relaxed);
-        if !whole() {
-            return Err(StudyError::Interrupted);
-        }
-        self.begun += 1;
-        let stage = format!(
-            "study {}/{}: {name}",
-            self.begun,
-            self.model.study.analyses()
-        );
-        let activity = Activity::begin(stage);
-        let found = self.journal.analysis(name, compute, whole)?;
-        drop(activity);
-        found.ok_or(StudyError::Interrupted)
-    }
-
-    /// The result of an analysis; its failure is noted in the document.
-    fn or_fail<T>(&mut self, what: &str, found: Result<T, String>) -> Option<T> {
-        found.map_err(|reason| self.fail(what, &reason)).ok()
-    }
-
-    fn fail(&mut self, what: &str, reason: &str) {
-        self.document.failures.push(AnalysisFailure {
-            analysis: what.to_owned(),
-            reason: reason.to_owned(),
-        });
-    }
-
-    /// The fit, from the journal or computed.
-    fn fit(&mut self) -> Result<(Problem, Vec<f64>, Evaluation), StudyError> {
-        let model = Arc::clone(&self.model);
-        let shown = format!("study 1/{}: fit", model.study.analyses());
-        let progress = Progress::new(&model.settings.stopping).named(&shown);
-        let (folder, heading, is_resumed) = (self.folder, &self.heading, self.is_resumed);
-        let flag = Arc::clone(&self.flag);
-        let finished = self.finished.take();
-        let mut interrupted = None;
-        let compute = || {
-            if let Some(finished) = finished {
-                return Ok(finished);
-            }
-            let mut journal = fit_journal(folder, heading, is_resumed);
-            let journal = journal.as_mut().map(|j| j as &mut dyn CheckpointStore);
-            let (fitted, _, found) = search(&model, &progress, journal)?;
-            let fit = StudiedFit::of(&fitted, &found);
-            interrupted = Some(fit.clone());
-            Ok::<_, String>(fit)
-        };
-        let whole = || !flag.load(Ordering::Relaxed);
-        let is_right = |kept: &Result<StudiedFit, String>| match kept {
-            Ok(fit) => on_grid_of(&model, fit).is_some_and(|model| fit.is_of(&model.problem)),
-            Err(_) => true,
-        };
-        self.journal.forget_unless("fit", is_right);
-        let fitted = self.journal.analysis("fit", compute, whole)?;
-        let Some(fitted) = fitted else {
-            // The document has the best point; the journal of the fit has its checkpoint.
-            self.document.fit = interrupted;
-            return Err(StudyError::Interrupted);
-        };
-        let fit = fitted.map_err(StudyError::Numerical)?;
-        FitJournal::clear(folder)?;
-        let interrupted = fit.status == Status::Interrupted;
-        let model = on_grid_of(&model, &fit);
-        let model = model.ok_or_else(|| {
-            StudyError::Numerical("the grid of the fit does not fit into memory".into())
-        })?;
-        let problem = fit.problem(&model.problem);
-        self.threads = model.threads_within_memory(self.threads);
-        self.model = model;
-        let theta = fit.parameters.clone();
-        self.document.fit = Some(fit);
-        let evaluation = problem
-            .evaluate(&theta)
-            .map_err(|breakdown| StudyError::Numerical(breakdown.to_string()))?;
-        match interrupted {
-            true => Err(StudyError::Interrupted),
-            false => Ok((problem, theta, evaluation)),
-        }
     }
 }

@@ -20,10 +20,11 @@ except ImportError as _error:
         raise ImportError("kmcfit cannot be imported in a subinterpreter; use threads or processes") from _error
     raise
 from ._compare import Comparison, compare
+from ._curve import Curve
 from ._errors import Error, InputError, InternalError, NumericalError
-from ._estimates import Estimate, Estimates
+from ._estimates import Estimate, Estimates, Verdict
 from ._experiment import Experiment
-from ._fit import Curve, Fit, Verdict
+from ._fit import Fit
 from ._fit import open_run as open  # noqa: A001
 from ._functions import (
     BSpline,
@@ -37,18 +38,22 @@ from ._functions import (
 )
 from ._model import Model, fit_model, init
 from ._problem import Problem
+from ._study import Candidate, Direction, Extremes, Profile, Sensitivity, Study, StudyFinding
 
 __version__: str = _kmcfit.version()
 
 __all__ = [
     "BSpline",
+    "Candidate",
     "Comparison",
     "Constant",
     "Curve",
+    "Direction",
     "Error",
     "Estimate",
     "Estimates",
     "Experiment",
+    "Extremes",
     "Fit",
     "Fixed",
     "Function",
@@ -61,6 +66,10 @@ __all__ = [
     "PiecewiseLinear",
     "Polynomial",
     "Problem",
+    "Profile",
+    "Sensitivity",
+    "Study",
+    "StudyFinding",
     "Verdict",
     "compare",
     "fit_model",

@@ -9,6 +9,7 @@ from typing import Any, Dict, List, Mapping
 from . import _kmcfit
 from ._errors import InputError
 from ._fit import Fit, temporary_folder
+from ._page import first_screen
 
 
 class Comparison:
@@ -40,9 +41,7 @@ class Comparison:
         return self._text
 
     def _repr_html_(self) -> str:
-        import html
-
-        return f"<pre>{html.escape(self._text)}</pre>"
+        return first_screen(self._page)
 
     def to_pandas(self) -> Any:
         """The measures as a DataFrame of pandas, one row for each fit."""

@@ -1,9 +1,9 @@
-"""The table of estimates of a fit."""
+"""The table of estimates of a fit, and the verdict on it."""
 
 from __future__ import annotations
 
 import html
-from typing import Any, Iterator, List, NamedTuple, Optional, Tuple, Union
+from typing import Any, Iterator, List, Mapping, NamedTuple, Optional, Tuple, Union
 
 from ._errors import InputError, did_you_mean
 
@@ -57,7 +57,7 @@ class Estimates:
         return isinstance(other, Estimates) and self._rows == other._rows
 
     def __repr__(self) -> str:
-        rows = [("quantity", "estimate", "95 % CI", "unit", "status"), *map(_texts, self._rows)]
+        rows = [("quantity", "estimate", "95 % CI", "unit", "status"), *map(_row, self._rows)]
         width = [max(len(row[i]) for row in rows) for i in range(5)]
         line = "{:<%d}  {:>%d}  {:<%d}  {:<%d}  {}" % tuple(width[:4])
         return "\n".join(line.format(*row).rstrip() for row in rows)
@@ -65,7 +65,7 @@ class Estimates:
     def _repr_html_(self) -> str:
         head = "".join(f"<th>{name}</th>" for name in ("quantity", "estimate", "95 % CI", "unit", "status"))
         cell = "<td>{}</td>".format
-        rows = ("".join(cell(html.escape(text)) for text in _texts(row)) for row in self._rows)
+        rows = ("".join(cell(html.escape(text)) for text in _row(row)) for row in self._rows)
         return f"<table><thead><tr>{head}</tr></thead><tbody>" + "".join(f"<tr>{row}</tr>" for row in rows) + "</tbody></table>"
 
     def to_pandas(self) -> Any:
@@ -84,7 +84,37 @@ def _pair(given: Optional[list]) -> Optional[Tuple[float, float]]:
     return None if given is None else (given[0], given[1])
 
 
-def _texts(row: Estimate) -> Tuple[str, str, str, str, str]:
+def _row(row: Estimate) -> Tuple[str, str, str, str, str]:
     value = "" if row.value is None else f"{row.value:.6g}"
     interval = "" if row.ci95 is None else f"{row.ci95[0]:.6g} to {row.ci95[1]:.6g}"
     return row.quantity, value, interval, row.unit, row.status.replace("_", " ")
+
+
+class Verdict:
+    """Verdict on a fit.
+
+    Attributes
+    ----------
+    level : {"adequate", "check", "inadequate"}
+    reasons : list of str
+        Reasons, the most important first; none for adequate.
+    assumptions : list of str
+        Assumptions that the records cannot test.
+    """
+
+    def __init__(self, given: Mapping[str, Any]) -> None:
+        self.level: str = given.get("level", "")
+        self.reasons: List[str] = texts(given.get("reasons"))
+        self.passed: str = given.get("passed", "")
+        self.assumptions: List[str] = texts(given.get("assumptions"))
+
+    def __str__(self) -> str:
+        return "; ".join([self.level.capitalize(), *(self.reasons or filter(None, [self.passed]))])
+
+    def __repr__(self) -> str:
+        return f"<Verdict {self}>"
+
+
+def texts(findings: Any) -> List[str]:
+    """The sentences of findings."""
+    return [finding["text"] for finding in findings or []]

@@ -125,6 +125,11 @@ class Experiment:
         """Names of the measured responses."""
         return [name for name in CHANNELS if name in self._columns]
 
+    @property
+    def has_force(self) -> bool:
+        """True if a force is given."""
+        return "force" in self._columns or self._waveform is not None
+
     def __len__(self) -> int:
         return len(next(iter(self._columns.values())))
 

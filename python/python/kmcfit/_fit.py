@@ -10,10 +10,14 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from . import _kmcfit, _npz, _table
+from . import _kmcfit, _npz, _table, _yaml
 from ._arrays import column
-from ._errors import InputError, did_you_mean
-from ._estimates import Estimates
+from ._curve import Curve
+from ._errors import InputError, did_you_mean, unknown_keyword
+from ._estimates import Estimates, Verdict, texts
+from ._functions import plain
+from ._page import first_screen, read_files, write_files
+from ._study import Study
 
 #: Quantities over time in `functions.csv`.
 _CURVES = (
@@ -31,77 +35,6 @@ _CURVES = (
     "natural_frequency",
     "damping_ratio",
 )
-
-
-class Verdict:
-    """Verdict on a fit.
-
-    Attributes
-    ----------
-    level : {"adequate", "check", "inadequate"}
-    reasons : list of str
-        Reasons, the most important first; none for adequate.
-    assumptions : list of str
-        Assumptions that the records cannot test.
-    """
-
-    def __init__(self, given: Mapping[str, Any]) -> None:
-        self.level: str = given.get("level", "")
-        self.reasons: List[str] = _texts(given.get("reasons"))
-        self.passed: str = given.get("passed", "")
-        self.assumptions: List[str] = _texts(given.get("assumptions"))
-
-    def __str__(self) -> str:
-        return "; ".join([self.level.capitalize(), *(self.reasons or filter(None, [self.passed]))])
-
-    def __repr__(self) -> str:
-        return f"<Verdict {self}>"
-
-
-class Curve:
-    """A quantity over time: values at the nodes, linear in between."""
-
-    def __init__(self, name: str, unit: str, times: "np.ndarray", values: "np.ndarray", band: Optional[Tuple[Any, Any]]) -> None:
-        self.name = name
-        self.unit = unit
-        #: Times of the nodes, s.
-        self.times = times
-        #: Values at the nodes, in `unit`.
-        self.values = values
-        self._band = band
-
-    def __repr__(self) -> str:
-        low, high = np.nanmin(self.values), np.nanmax(self.values)
-        return f"<Curve {self.name}: {low:.6g} to {high:.6g} {self.unit}>"
-
-    def __call__(self, t: Any) -> Any:
-        """Values at the times `t` (s, any shape), in `unit`; NaN outside the record."""
-        return self._at(t, self.values)
-
-    def band(self, t: Any = None, level: float = 0.95) -> Tuple[Any, Any]:
-        """Lower and upper end of the pointwise confidence interval at the times `t` (default: at the nodes).
-
-        The interval of 95 % is that of the run; others are scaled by the quantiles of the normal distribution.
-
-        Raises
-        ------
-        InputError
-            If the run has no intervals for the quantity, or `level` is not between 0 and 1.
-        """
-        if self._band is None:
-            raise InputError("no confidence intervals", f"{self.name}.band", expected="a fit with `sigma` and identified parameters")
-        if not 0.0 < level < 1.0:
-            raise InputError("invalid level", f"{self.name}.band", repr(level), "a number between 0 and 1")
-        factor = 1.0 if level == 0.95 else _quantile(level) / _quantile(0.95)
-        ends = [self.values + factor * (end - self.values) if factor != 1.0 else end for end in self._band]
-        if t is None:
-            return ends[0].copy(), ends[1].copy()
-        return self._at(t, ends[0]), self._at(t, ends[1])
-
-    def _at(self, t: Any, values: "np.ndarray") -> Any:
-        times = np.asarray(t, dtype=np.float64)
-        found = np.interp(times, self.times, values, left=np.nan, right=np.nan)
-        return float(found) if times.ndim == 0 else found
 
 
 class Fit:
@@ -172,7 +105,7 @@ class Fit:
     def warnings(self) -> List[str]:
         """Warnings about data, model and identifiability."""
         findings = self.result.get("findings", [])
-        return _texts(self.result.get("warnings")) + _texts([f for f in findings if f.get("level") == "warning"])
+        return texts(self.result.get("warnings")) + texts([f for f in findings if f.get("level") == "warning"])
 
     @property
     def parameters(self) -> Dict[str, float]:
@@ -298,13 +231,98 @@ class Fit:
         if self._raw is not None:
             self._raw.save(os.fspath(folder), report, tables, draws)
             return
-        target = Path(folder)
-        if target.exists() and any(target.iterdir()):
-            raise InputError("the folder is not empty", str(target), expected="a new folder")
-        for name, content in (self._files or {}).items():
-            path = target / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
+        write_files(folder, self._files or {})
+
+    def study(
+        self,
+        *,
+        confidence: Optional[float] = None,
+        seed: Optional[int] = None,
+        profiles: Optional[Sequence[Mapping[str, Any]]] = None,
+        extremes: Any = None,
+        misfit_limit: Optional[float] = None,
+        starts: Optional[int] = None,
+        spread: Optional[float] = None,
+        merge_tolerance: Optional[float] = None,
+        bootstrap: Optional[int] = None,
+        noise: Optional[str] = None,
+        equivalent_systems: Optional[Sequence[Mapping[str, Any]]] = None,
+        constancy_test: Optional[bool] = None,
+        candidates: Optional[Sequence[Mapping[str, Any]]] = None,
+        threads: Optional[int] = None,
+        **unknown: Any,
+    ) -> Study:
+        """Analyses what the records determine, as ``kmcfit study`` does: identified directions, profiles, extremes, candidates.
+
+        The arguments are the keys of ``study`` in the model file; those that are not given have the values of the model, or its
+        defaults. Ctrl-C ends the study after the analyses finished so far, with the status ``"interrupted"``.
+
+        Parameters
+        ----------
+        confidence : float
+            Confidence level of bands, profiles, extremes and bootstrap intervals; 0.95.
+        seed : int
+            Seed of all random numbers; 1.
+        profiles : list of dict
+            Quantities for a likelihood profile, e.g. ``[{"function": "stiffness", "mean": True}]``.
+        extremes : float or sequence of float
+            Times of the data-consistent extremes, s; five over the record.
+        misfit_limit : float
+            Largest misfit of a system that is consistent with the data; from the confidence level.
+        starts : int
+            Number of fits from random starting points, within a factor `spread` of the start; minima within `merge_tolerance` count as
+            one.
+        bootstrap : int
+            Number of refits of resampled records, with ``noise="parametric"`` or ``"residual"``.
+        equivalent_systems : list of dict
+            Masses of equivalent systems, e.g. ``[{"name": "constant mass", "mass": 1.0}]``.
+        constancy_test : bool
+            Likelihood-ratio test of each function against a constant.
+        candidates : list of dict
+            Candidate experiments, e.g. ``[{"name": "again", "initial": {"displacement": 0.01, "velocity": 0.0}}]``.
+        threads : int
+            Number of threads, one per core if not given; results do not depend on it.
+
+        Returns
+        -------
+        Study
+        """
+        given = {
+            "confidence": confidence,
+            "seed": seed,
+            "profiles": profiles,
+            "extremes": extremes,
+            "misfit_limit": misfit_limit,
+            "starts": starts,
+            "spread": spread,
+            "merge_tolerance": merge_tolerance,
+            "bootstrap": bootstrap,
+            "noise": noise,
+            "equivalent_systems": equivalent_systems,
+            "constancy_test": constancy_test,
+            "candidates": candidates,
+        }
+        for word in unknown:
+            raise unknown_keyword("Fit.study", word, [*given, "threads"])
+        if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
+            raise InputError("invalid number of threads", "Fit.study.threads", repr(threads), "1 or more")
+        changes = [f"study.{key}={_yaml.flow(plain(value))}" for key, value in given.items() if value is not None]
+        with temporary_folder() as folder:
+            out = os.path.join(folder, "study")
+            if self._raw is not None:
+                findings, text, is_interrupted = _kmcfit.study(self._raw, out, changes, threads)
+            else:
+                run = os.path.join(folder, "run")
+                write_files(run, self._files or {})
+                # A run of arrays has its model with it.
+                own = os.path.join(run, "model.yaml")
+                model = own if os.path.exists(own) else self.result["model"]["file"]
+                findings, text, is_interrupted = _kmcfit.study_run(run, model, out, changes, threads)
+            if is_interrupted:
+                import warnings
+
+                warnings.warn("the study was interrupted; it has the analyses finished so far", RuntimeWarning, stacklevel=2)
+            return Study(findings, text, read_files(out))
 
     def plot(self, quantities: Optional[Sequence[str]] = None) -> Any:
         """A figure of matplotlib: the coefficients that vary (or `quantities`) with their 95 % bands."""
@@ -361,9 +379,11 @@ class Fit:
         return f"<Fit {title!r}: {self.status}>\n{self.verdict}\n{self.estimates!r}"
 
     def _repr_html_(self) -> str:
-        page = f"<h4>{html.escape(self.result['title'])}: {html.escape(self.status)}</h4><p>{html.escape(str(self.verdict))}</p>"
-        chart = self._run().get("figures/functions.svg", b"").decode()
-        return page + self.estimates._repr_html_() + chart[max(chart.find("<svg"), 0) :]
+        page = self._run().get("report.html")
+        if page is not None:
+            return first_screen(page.decode())
+        title = f"<h4>{html.escape(self.result['title'])}: {html.escape(self.status)}</h4>"
+        return f"{title}<p>{html.escape(str(self.verdict))}</p>{self.estimates._repr_html_()}"
 
     def __getstate__(self) -> Dict[str, Any]:
         return {"json": self._document(), "files": self._run()}
@@ -427,25 +447,8 @@ def open_run(folder: Union[str, "os.PathLike[str]"]) -> Fit:
     return Fit._opened(_kmcfit.open_run(path), read_files(path))
 
 
-def read_files(folder: str) -> Dict[str, bytes]:
-    """The files of a folder by their relative names."""
-    root = Path(folder)
-    return {path.relative_to(root).as_posix(): path.read_bytes() for path in sorted(root.rglob("*")) if path.is_file()}
-
-
 def temporary_folder() -> Any:
     """A folder that its context removes. The module is slow to import, and used for few calls."""
     from tempfile import TemporaryDirectory
 
     return TemporaryDirectory()
-
-
-def _quantile(level: float) -> float:
-    """Half width of the central interval of the standard normal distribution with the probability `level`."""
-    from statistics import NormalDist
-
-    return NormalDist().inv_cdf(0.5 + 0.5 * level)
-
-
-def _texts(findings: Any) -> List[str]:
-    return [finding["text"] for finding in findings or []]

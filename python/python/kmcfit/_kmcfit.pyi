@@ -5,6 +5,7 @@ from typing import Callable, final
 __all__ = [
     "Problem",
     "RawFit",
+    "RawModel",
     "compare",
     "fit",
     "main",
@@ -14,8 +15,16 @@ __all__ = [
     "read_text",
     "scaffold",
     "simulate",
+    "study",
+    "study_run",
     "version",
 ]
+
+@final
+class RawModel:
+    """A model with its overrides and the files that stand in memory, ready to be fitted many times."""
+
+    def __new__(cls, text: str | None, path: str, files: dict[str, bytes], overrides: list[str]) -> RawModel: ...
 
 @final
 class RawFit:
@@ -30,7 +39,7 @@ class RawFit:
 class Problem:
     """The problem of a model."""
 
-    def __new__(cls, text: str | None, path: str, files: dict[str, bytes], overrides: list[str]) -> Problem: ...
+    def __new__(cls, model: RawModel) -> Problem: ...
     def names(self) -> list[str]: ...
     def start(self) -> bytes: ...
     def observed(self) -> bytes: ...
@@ -42,13 +51,13 @@ class Problem:
     def vjp(self, theta: bytes, slopes: bytes) -> bytes: ...
     def jacobian(self, theta: bytes) -> bytes: ...
 
-def fit(
-    text: str | None,
-    path: str,
-    files: dict[str, bytes],
-    overrides: list[str],
-    progress: Callable[[int, float], object] | None,
-) -> RawFit: ...
+def fit(model: RawModel, progress: Callable[[int, float], object] | None, is_main_thread: bool) -> RawFit: ...
+def study(
+    fit: RawFit, folder: str, overrides: list[str], threads: int | None
+) -> tuple[list[tuple[str, str]], str, bool]: ...
+def study_run(
+    run: str, model: str, folder: str, overrides: list[str], threads: int | None
+) -> tuple[list[tuple[str, str]], str, bool]: ...
 def parse(text: str, path: str, written: bool) -> str: ...
 def read_text(path: str) -> str: ...
 def read_table(path: str) -> list[tuple[str, bytes]]: ...

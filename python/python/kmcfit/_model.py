@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import operator
 import os
+import threading
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, Union
 
@@ -13,6 +15,7 @@ from ._experiment import Experiment
 from ._fit import Fit
 from ._functions import lowered, plain
 from ._problem import Problem
+from ._study import Study
 
 #: Coefficient functions beside mass, damping and stiffness.
 FURTHER = (
@@ -40,8 +43,9 @@ class Model:
     Parameters
     ----------
     mass, damping, stiffness : float, Constant, Polynomial, PiecewiseLinear, BSpline, Nodal, Fixed or dict, optional
-        Coefficient functions, kg, N s/m and N/m; a number is a fixed value. Without a mass it is unknown, and the other
-        coefficients are ratios to it. Damping and stiffness are constants by default, estimated from the record.
+        Coefficient functions, kg, N s/m and N/m; a number is a fixed value. Without a mass it is a constant, estimated, for records of
+        which one has a force; for others it is unknown, and the other coefficients are ratios to it. Damping and stiffness are constants by
+        default, estimated from the record.
     quadratic_stiffness, cubic_stiffness, quintic_stiffness, quadratic_damping, coulomb_friction, static_force : optional
         Further coefficient functions.
     constraints : list of dict, optional
@@ -102,6 +106,8 @@ class Model:
         }
         self._spec: Dict[str, Any] = {key: value for key, value in spec.items() if value is not None}
         self._path = _PATH
+        self._chooses_mass = mass is None
+        self._last: Optional[Tuple[Tuple[Experiment, ...], List[str], "_kmcfit.RawModel"]] = None
         # Keys and types are checked at once; numbers with the records.
         placeholder = {"initial": "estimate"}
         _kmcfit.parse(_yaml.text({**self._spec, "experiments": [placeholder]}), _PATH, False)
@@ -118,6 +124,8 @@ class Model:
         model = cls.__new__(cls)
         model._spec = json.loads(_kmcfit.parse(given if is_text else _kmcfit.read_text(path), path, True))
         model._path = path
+        model._chooses_mass = False
+        model._last = None
         return model
 
     def to_yaml(self, *data: Experiment) -> str:
@@ -175,11 +183,21 @@ class Model:
         NumericalError
             If no starting point has a response.
         """
-        return Fit._of(_kmcfit.fit(*self._source(data), overrides(set), progress))
+        return Fit._of(_kmcfit.fit(self._ready(data, overrides(set)), progress, _is_main_thread()))
+
+    def study(
+        self,
+        *data: Experiment,
+        set: Optional[Overrides] = None,  # noqa: A002
+        progress: Optional[Progress] = None,
+        **options: Any,
+    ) -> Study:
+        """Fits the model to records and studies the fit, as ``kmcfit study`` does; `options` are those of `Fit.study`."""
+        return self.fit(*data, set=set, progress=progress).study(**options)
 
     def problem(self, *data: Experiment, set: Optional[Overrides] = None) -> Problem:  # noqa: A002
         """The cost and its derivatives as functions of the parameters, for other optimisers; arguments as for `fit`."""
-        return Problem(_kmcfit.Problem(*self._source(data), overrides(set)))
+        return Problem(_kmcfit.Problem(self._ready(data, overrides(set))))
 
     def __repr__(self) -> str:
         return f"<Model {', '.join(self._spec['functions'])}>"
@@ -189,10 +207,23 @@ class Model:
 
     __hash__ = None  # type: ignore[assignment]
 
-    def _source(self, data: Tuple[Experiment, ...]) -> Tuple[str, str, Dict[str, bytes]]:
-        """Text, path and files in memory."""
+    def __getstate__(self) -> Dict[str, Any]:
+        return {"_spec": self._spec, "_path": self._path, "_chooses_mass": self._chooses_mass}
+
+    def __setstate__(self, state: Dict[str, Any]) -> None:
+        self.__dict__.update(state, _last=None)
+
+    def _ready(self, data: Tuple[Experiment, ...], changes: List[str]) -> "_kmcfit.RawModel":
+        """The parsed model with its records; that of the last call is kept for the next one."""
+        last = self._last
+        if last is not None and last[1] == changes and len(last[0]) == len(data) and all(map(operator.is_, last[0], data)):
+            return last[2]
         text, files = self._with(data)
-        return text, os.path.join(os.path.dirname(self._path), _PATH) if files else self._path, files
+        path = os.path.join(os.path.dirname(self._path), _PATH) if files else self._path
+        raw = _kmcfit.RawModel(text, path, files, changes)
+        # Files on disk may change between two calls.
+        self._last = (data, changes, raw) if data else None
+        return raw
 
     def _with(self, data: Tuple[Experiment, ...]) -> Tuple[str, Dict[str, bytes]]:
         """The text with the experiments of `data`, and their files."""
@@ -211,12 +242,20 @@ class Model:
             files[file] = experiment._file(file)
             name = {} if experiment.name is None else {"name": experiment.name}
             experiments.append({**name, "data": file, **experiment._spec})
-        return _yaml.text({**self._spec, "experiments": experiments}), files
+        spec = {**self._spec, "experiments": experiments}
+        if self._chooses_mass and any(experiment.has_force for experiment in data):
+            # A force determines the mass.
+            spec["functions"] = {**spec["functions"], "mass": _FROM_RECORD}
+        return _yaml.text(spec), files
+
+
+def _is_main_thread() -> bool:
+    return threading.current_thread() is threading.main_thread()
 
 
 def overrides(changes: Optional[Overrides]) -> List[str]:
     """Changed keys as the texts of ``--set``."""
-    return [f"{key}={_yaml._flow(plain(value))}" for key, value in (changes or {}).items()]
+    return [f"{key}={_yaml.flow(plain(value))}" for key, value in (changes or {}).items()]
 
 
 def fit_model(
@@ -225,7 +264,7 @@ def fit_model(
     progress: Optional[Progress] = None,
 ) -> Fit:
     """Fits the model of a file, as ``kmcfit fit`` does, with the same results. See `Model.fit`."""
-    return Fit._of(_kmcfit.fit(None, os.fspath(path), {}, overrides(set), progress))
+    return Fit._of(_kmcfit.fit(_kmcfit.RawModel(None, os.fspath(path), {}, overrides(set)), progress, _is_main_thread()))
 
 
 def init(*paths: Union[str, "os.PathLike[str]"]) -> Model:

@@ -71,7 +71,7 @@ class Problem:
         return np.frombuffer(self._raw.jvp(self._bytes("theta", theta, count), self._bytes("along", along, count))).copy()
 
     def vjp(self, theta: Any, slopes: Any) -> "np.ndarray":
-        """Transposed Jacobian of `predict` times `slopes` (shape (n,)), shape (p,)."""
+        """Transposed Jacobian of `predict` times `slopes` (shape (n,)), shape (p,), by one adjoint solve."""
         theta = self._bytes("theta", theta, len(self.names))
         return np.frombuffer(self._raw.vjp(theta, self._bytes("slopes", slopes, len(self.observed)))).copy()
 

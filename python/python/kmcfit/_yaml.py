@@ -23,14 +23,14 @@ def _block(value: Any, depth: int) -> List[str]:
     if isinstance(value, dict):
         for key, item in value.items():
             if _is_inner(item, len(pad) + len(str(key)) + 2):
-                lines.append(f"{pad}{_scalar(str(key))}: {_flow(item)}")
+                lines.append(f"{pad}{_scalar(str(key))}: {flow(item)}")
             else:
                 lines.append(f"{pad}{_scalar(str(key))}:")
                 lines += _block(item, depth + 1)
         return lines
     for item in value:
         if _is_inner(item, len(pad) + 2):
-            lines.append(f"{pad}- {_flow(item)}")
+            lines.append(f"{pad}- {flow(item)}")
         else:
             first, *rest = _block(item, depth + 1)
             lines += [f"{pad}- {first[len(pad) + 2:]}", *rest]
@@ -45,7 +45,7 @@ def _is_inner(value: Any, indent: int) -> bool:
         return True
     items = value.values() if isinstance(value, dict) else value
     depth = max(_depth(item) for item in items)
-    return depth < 2 and indent + len(_flow(value)) <= _WIDTH
+    return depth < 2 and indent + len(flow(value)) <= _WIDTH
 
 
 def _depth(value: Any) -> int:
@@ -55,11 +55,12 @@ def _depth(value: Any) -> int:
     return 1 + max((_depth(item) for item in items), default=0)
 
 
-def _flow(value: Any) -> str:
+def flow(value: Any) -> str:
+    """A value in one line."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_scalar(str(k))}: {_flow(v)}" for k, v in value.items()) + "}"
+        return "{" + ", ".join(f"{_scalar(str(k))}: {flow(v)}" for k, v in value.items()) + "}"
     if isinstance(value, list):
-        return "[" + ", ".join(map(_flow, value)) + "]"
+        return "[" + ", ".join(map(flow, value)) + "]"
     return _scalar(value)
 
 

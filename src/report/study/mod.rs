@@ -26,7 +26,25 @@ use crate::results::{Claim, OutputFolder};
 use kmcfit_core::internals::record::Channel;
 use std::io;
 
+/// Status of a study with all its analyses.
+pub const COMPLETE: &str = "complete";
+
 impl StudyDocument {
+    /// True if all analyses were finished.
+    pub fn is_complete(&self) -> bool {
+        self.status == COMPLETE
+    }
+
+    /// The findings as sentences, each with the name of its part, in the order of the page.
+    pub fn findings(&self) -> Vec<(&'static str, String)> {
+        let parts = text::Part::ALL.into_iter();
+        let of = |part: text::Part| {
+            let sentences = part.sentences(self).into_iter();
+            sentences.map(move |sentence| (part.anchor(), sentence))
+        };
+        parts.flat_map(of).collect()
+    }
+
     /// The study as text for a terminal.
     pub fn text(&self) -> String {
         text::text(self)

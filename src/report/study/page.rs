@@ -42,7 +42,7 @@ fn first_screen(study: &StudyDocument, source: &str, detail: Detail) -> String {
         None => shell::state_line("warn", fit.status.name(), &fit.reason),
     });
     let state = match study.status.as_str() {
-        "complete" => state,
+        super::COMPLETE => state,
         status => state + &shell::paragraph(&format!("The study is {status}.")),
     };
     let text = quantities(study) + &leading(study);

@@ -7,6 +7,9 @@ use crate::simulate::{CoefficientGradient, Engine, Trajectory, continuous_adjoin
 use crate::system::quadrature::trapezoid_weights;
 use crate::system::{NodalCoefficients, State};
 
+/// Derivatives with respect to the predictions of a channel, by the indices of experiment and channel.
+type Slopes<'a> = dyn Fn(usize, usize) -> Vec<f64> + 'a;
+
 /// Adjoint that computes the gradient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GradientKind {
@@ -113,15 +116,45 @@ impl Problem {
         gradient
     }
 
+    /// Transpose of [`Problem::predictions_tangent`] by one adjoint solve: `J' slopes` for the Jacobian `J` of the predictions with respect to
+    /// the parameters, and one slope for each sample of all channels of all experiments, in order.
+    ///
+    /// # Panics
+    /// If `slopes` has fewer elements than there are samples.
+    pub fn predictions_transpose(&self, evaluation: &Evaluation, slopes: &[f64]) -> Vec<f64> {
+        let mut first = vec![Vec::new(); self.experiments.len()];
+        let mut place = 0;
+        for (firsts, experiment) in first.iter_mut().zip(&self.experiments) {
+            for channel in &experiment.channels {
+                firsts.push(place..place + channel.len());
+                place += channel.len();
+            }
+        }
+        self.adjoint_gradient(evaluation, &|e, c| slopes[first[e][c].clone()].to_vec())
+    }
+
     /// Euclidean gradient of the misfit in the parameters.
     fn discrete_gradient(&self, evaluation: &Evaluation) -> Vec<f64> {
+        self.adjoint_gradient(evaluation, &|e, c| {
+            self.experiments[e].channels[c].slopes(&evaluation.predictions[e][c])
+        })
+    }
+
+    /// Gradient in the parameters of a function of the predictions from its derivatives with respect to them.
+    fn adjoint_gradient(&self, evaluation: &Evaluation, slopes: &Slopes) -> Vec<f64> {
         let mut gradient = vec![0.0; self.parameters()];
         let mut nodal: Vec<Option<NodalCoefficients>> =
             vec![None; self.functions.coefficient_sets().len()];
         let mut scalars = vec![0.0; evaluation.scalars.len()];
         for (e, experiment) in self.experiments.iter().enumerate() {
             if experiment.channels.is_empty()
-                || self.add_gradient_of_constants(evaluation, e, &mut gradient, &mut scalars)
+                || self.add_gradient_of_constants(
+                    evaluation,
+                    e,
+                    slopes,
+                    &mut gradient,
+                    &mut scalars,
+                )
             {
                 continue;
             }
@@ -129,7 +162,7 @@ impl Problem {
             let empty = || self.functions.empty_nodal();
             let total = nodal[experiment.coefficient_set].get_or_insert_with(empty);
             let direct = &mut CoefficientGradient::AtNodes(total);
-            let source = self.source(evaluation, e, direct, &mut scalars);
+            let source = self.source(evaluation, e, slopes, direct, &mut scalars);
             let share = view.discrete_adjoint(&source);
             add(total, &share.nodal);
             add_initial(experiment.initial_parameters, share.initial, &mut scalars);
@@ -143,20 +176,20 @@ impl Problem {
         gradient
     }
 
-    /// Derivative of the misfit of experiment `e` with respect to its response. Derivatives at fixed states are added to
-    /// `direct` and `scalars`.
+    /// Derivative with respect to the response of experiment `e`, from those with respect to its predictions. Derivatives at fixed
+    /// states are added to `direct` and `scalars`.
     fn source(
         &self,
         evaluation: &Evaluation,
         e: usize,
+        slopes: &Slopes,
         direct: &mut CoefficientGradient,
         scalars: &mut [f64],
     ) -> Trajectory {
         let (experiment, view) = (&self.experiments[e], self.view(evaluation, e));
         let mut source = Trajectory::zeros(experiment.nodes);
-        for (channel, predicted) in experiment.channels.iter().zip(&evaluation.predictions[e]) {
-            let slopes = channel.slopes(predicted);
-            channel.add_transpose(view, &slopes, &mut source, direct, scalars);
+        for (c, channel) in experiment.channels.iter().enumerate() {
+            channel.add_transpose(view, &slopes(e, c), &mut source, direct, scalars);
         }
         source
     }
@@ -167,6 +200,7 @@ impl Problem {
         &self,
         evaluation: &Evaluation,
         e: usize,
+        slopes: &Slopes,
         gradient: &mut [f64],
         scalars: &mut [f64],
     ) -> bool {
@@ -185,6 +219,7 @@ impl Problem {
         let source = self.source(
             evaluation,
             e,
+            slopes,
             &mut CoefficientGradient::Summed(&mut direct),
             &mut own,
         );
