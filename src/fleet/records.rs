@@ -129,7 +129,11 @@ impl RecordList {
         }
     }
 
-    fn checked(self) -> Result<Self, InputError> {
+    /// The list, if it has records with a name of their own.
+    ///
+    /// # Errors
+    /// No records, or two of one name.
+    pub fn checked(self) -> Result<Self, InputError> {
         if self.records.is_empty() {
             return Err(InputError::argument("RECORDS", "no records")
                 .expected("files, patterns in quotes, or a table with a column `file`"));
@@ -177,7 +181,7 @@ fn matches(pattern: &str) -> Result<Vec<Record>, InputError> {
             .expected("a pattern such as \"records/*.csv\"")
     };
     let paths =
-        glob::glob(pattern).map_err(|error| wrong("this is no pattern").hint(error.to_string()))?;
+        glob::glob(pattern).map_err(|error| wrong("not a pattern").hint(error.to_string()))?;
     let mut records = Vec::new();
     for path in paths.filter_map(Result::ok).filter(|path| path.is_file()) {
         match path.to_str() {
