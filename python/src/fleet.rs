@@ -124,7 +124,10 @@ impl RawFleet {
             Ok(model) => fit_record(&model, &record, content, from, limits),
             Err(error) => {
                 let row = Row::failed(&name, 0.0, error.to_string());
-                return Ok(Some(((line(serde_json::to_string(&row))?, Vec::new()), None)));
+                return Ok(Some((
+                    (line(serde_json::to_string(&row))?, Vec::new()),
+                    None,
+                )));
             }
         };
         let Some(found) = found else {
@@ -162,10 +165,7 @@ fn line(written: serde_json::Result<String>) -> Result<String, Failure> {
 
 /// The records of files, patterns, or one table, and the names of its other columns: the arguments of `kmcfit fleet`.
 #[pyfunction]
-pub fn record_list(
-    py: Python<'_>,
-    arguments: Vec<String>,
-) -> PyResult<(Vec<Given>, Vec<String>)> {
+pub fn record_list(py: Python<'_>, arguments: Vec<String>) -> PyResult<(Vec<Given>, Vec<String>)> {
     guarded(py, || {
         let list = RecordList::read(&arguments)?;
         let given = list.records.into_iter().map(|record| {
@@ -194,7 +194,20 @@ struct State {
     /// Names of records that become known one after another.
     names: HashSet<String>,
     index: RowIndex,
-    journal: Journal,
+    /// None once it is closed.
+    journal: Option<Journal>,
+}
+
+impl State {
+    /// Does `work` on the journal; its errors name the folder.
+    fn write(
+        &mut self,
+        work: impl FnOnce(&mut Journal) -> std::io::Result<()>,
+    ) -> Result<(), Failure> {
+        let closed = || Failure::Numerical("the journal is closed".into());
+        let done = work(self.journal.as_mut().ok_or_else(closed)?);
+        done.map_err(|error| unwritable(&self.folder.path, error).into())
+    }
 }
 
 #[pymethods]
@@ -217,7 +230,9 @@ impl RawJournal {
             };
             let folder = match records {
                 Some(records) => {
-                    let records = records.into_iter().map(|record| listed(record, list.columns.len()));
+                    let records = records
+                        .into_iter()
+                        .map(|record| listed(record, list.columns.len()));
                     list.records = records.collect::<Result<_, _>>()?;
                     list = list.checked()?;
                     FleetFolder::prepare(&folder, model, &list, warm_start)?
@@ -231,7 +246,7 @@ impl RawJournal {
                 list,
                 names: HashSet::new(),
                 index,
-                journal,
+                journal: Some(journal),
             })))
         })
     }
@@ -275,19 +290,19 @@ impl RawJournal {
                     ))
                 };
                 let (row, curves) = read().map_err(|error| Failure::Panic(error.to_string()))?;
-                let appended = state.journal.append(&row, &curves);
-                appended.map_err(|error| unwritable(&state.folder.path, error))?;
+                state.write(|journal| journal.append(&row, &curves))?;
             }
             Ok(())
         })
     }
 
-    /// Makes the rows durable.
-    fn sync(&self, py: Python<'_>) -> PyResult<()> {
+    /// Makes the rows durable and lets other processes work on the folder.
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
         guarded(py, || {
             let mut state = self.state();
-            let synced = state.journal.sync();
-            Ok(synced.map_err(|error| unwritable(&state.folder.path, error))?)
+            let synced = state.write(Journal::sync);
+            state.journal = None;
+            synced
         })
     }
 
@@ -295,8 +310,7 @@ impl RawJournal {
     fn finish(&self, py: Python<'_>, trend: Option<String>) -> PyResult<()> {
         guarded(py, || {
             let mut state = self.state();
-            let synced = state.journal.sync();
-            synced.map_err(|error| unwritable(&state.folder.path, error))?;
+            state.write(Journal::sync)?;
             let folder = state.folder.clone().complete(&state.list)?;
             collected(&folder, state.list.clone(), trend.as_deref())
         })
@@ -358,7 +372,9 @@ pub fn fleet_rows(py: Python<'_>, folder: PathBuf, collect: bool) -> PyResult<Ve
             true => index.lines()?,
             false => {
                 let names = list.records.iter().map(|record| index.line(&record.name));
-                names.filter_map(Result::transpose).collect::<Result<_, _>>()?
+                names
+                    .filter_map(Result::transpose)
+                    .collect::<Result<_, _>>()?
             }
         };
         if collect && !list.records.is_empty() {

@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-import threading
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
@@ -209,7 +208,7 @@ def test_bad_calls_are_refused(tmp_path):
     assert "no data, or several" in message(ARRAYS, [{"record": "a", "mass": 2.0}])
     assert "did you mean" in message(ARRAYS, [{"record": "a", "file": "a.csv", "function.mass": 2.0}])
     assert "the model of a fleet has one experiment" in message(
-        km.Model.from_yaml(MODEL.replace("functions:", "  - data: b.csv\nfunctions:")), pairs(1)
+        km.Model.from_yaml(MODEL.replace("functions:", "  - {data: b.csv, initial: estimate}\nfunctions:")), pairs(1)
     )
 
 
@@ -239,6 +238,8 @@ def test_workers_that_die_and_that_never_answer(expected):
     assert [row.error for row in rows] == ["the worker failed 4 times: OSError: the worker is gone"] * 3
 
     class Silent(Faulty):
+        """Tasks without an answer."""
+
         def submit(self, function, job, blocks):
             return Future()
 
@@ -277,19 +278,23 @@ def test_a_cluster_of_dask(tmp_path, expected):
     distributed = pytest.importorskip("distributed", reason="Dask cannot be installed")
     import dask.bag
 
+    kills = int(os.environ.get("KMCFIT_KILLS", "1"))
+    count = 24 * kills
+    local = expected if kills == 1 else plain(km.fit_many(ARRAYS, pairs(count)))
+    chosen = np.random.default_rng()
     options = dict(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None)
     with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
-        assert plain(km.fit_many(ARRAYS, pairs(24), client)) == expected
-        [first, _] = client.run(os.getpid).values()
-        rows = km.fit_many(ARRAYS, pairs(24), client, out=tmp_path / "fleet", batch=1)
-        begin = [next(rows)]
-        # In mid-run: the worker dies while its tasks are in flight.
-        killer = threading.Thread(target=os.kill, args=(first, signal.SIGKILL))
-        killer.start()
-        begin += rows
-        killer.join()
-        assert plain(begin) == expected
-        assert plain(km.read_fleet(tmp_path / "fleet")) == expected
+        rows = km.fit_many(ARRAYS, pairs(count), client, out=tmp_path / "fleet", batch=1)
+        found = []
+        for row in rows:
+            if len(found) % 24 == 5:
+                # In mid-run: the tasks of the worker are in flight.
+                workers = [nanny.process.pid for nanny in cluster.workers.values() if nanny.process and nanny.process.pid]
+                if workers:
+                    os.kill(int(chosen.choice(workers)), signal.SIGKILL)
+            found.append(row)
+        assert plain(found) == local
+        assert plain(km.read_fleet(tmp_path / "fleet")) == local
         bag = dask.bag.from_sequence(pairs(24), npartitions=4)
         assert plain(bag.map_partitions(lambda part: km.fit_partition(ARRAYS, part)).compute()) == expected
         try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections import deque
-from typing import TYPE_CHECKING, Any, Callable, Deque, Iterator, List, Optional, Tuple
+from typing import TYPE_CHECKING, Any, Callable, Deque, Dict, Iterator, List, Optional, Tuple
 
 from ._errors import Error, NumericalError
 
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 #: Row of a record and its curves, as JSON.
 Lines = Tuple[str, List[str]]
+#: Rows of a task, and its time, s.
+Answer = Tuple[List[Lines], float]
 #: Work of a task for each worker of the executor, s: a scheduler that takes 1 ms a task then takes less than 5 % of the whole time.
 _WORK = 0.02
 #: Most records of a task.
@@ -26,7 +28,7 @@ _AHEAD = 3
 
 def failed(record: str, error: str, seconds: float = 0.0) -> Lines:
     """The row of a record without estimates."""
-    row = {"record": record, "estimates": {}, "verdict": None, "warnings": [], "seconds": seconds, "error": error}
+    row: Dict[str, Any] = {"record": record, "estimates": {}, "verdict": None, "warnings": [], "seconds": seconds, "error": error}
     return json.dumps(row), []
 
 
@@ -45,9 +47,9 @@ class Batches:
 
     def __init__(
         self,
-        task: "Callable[[Job, List[Block]], List[Lines]]",
+        task: "Callable[[Job, List[Block]], Answer]",
         job: "Job",
-        local: "Callable[[List[Block]], List[Lines]]",
+        local: "Callable[[List[Block]], Answer]",
         executor: Any,
         threads: Optional[int],
         size: Optional[int],
@@ -139,7 +141,7 @@ class Batches:
         """The rows of a batch; after errors of its workers rows with an error."""
         while batch.future is not None:
             try:
-                lines: List[Lines] = batch.future.result(self._timeout)
+                lines, seconds = batch.future.result(self._timeout)
             except Error:
                 raise
             except Exception as error:
@@ -152,10 +154,9 @@ class Batches:
                 self._submit(batch)
                 continue
             batch.future = None
-            for line, _ in lines:
-                self._seconds += json.loads(line)["seconds"]
-                self._count += 1
-            return lines
+            self._seconds += seconds
+            self._count += len(lines)
+            return list(lines)
         return []
 
     def _errors(self, batch: _Batch, text: str) -> List[Lines]:
@@ -167,5 +168,5 @@ def workers(executor: Any) -> int:
     """Number of tasks that an executor does at once."""
     threads = getattr(executor, "nthreads", None)
     if callable(threads):
-        return max(1, sum(threads().values()))
+        return max(1, int(sum(threads().values())))
     return max(1, int(getattr(executor, "_max_workers", None) or os.cpu_count() or 1))

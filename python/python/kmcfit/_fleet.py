@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import os
 from itertools import islice
+from time import perf_counter
 from types import TracebackType
 from typing import Any, Dict, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple, Type, Union
 
 from . import _kmcfit, _yaml
-from ._batches import Batches, Lines, failed
+from ._batches import Answer, Batches, Lines, failed
 from ._errors import InputError, unknown_keyword
 from ._model import Model, Overrides, overrides
 from ._records import Item, Source, item, lowered, other_columns
@@ -221,7 +222,8 @@ def fit_partition(
     fleet, source = _source(model, set)
     items, *_ = _items(records)
     job = Job(_kmcfit.version(), source, warm_start, time_limit)
-    return RowList(Row(*lines) for lines in fit_blocks(fleet, job, list(_blocks(items, warm_start))))
+    rows, _ = fit_blocks(fleet, job, list(_blocks(items, warm_start)))
+    return RowList(Row(*lines) for lines in rows)
 
 
 def read_fleet(folder: Union[str, "os.PathLike[str]"], collect: bool = False) -> RowList:
@@ -249,8 +251,8 @@ Block = List[Item]
 _last: Optional[Tuple[Source, "_kmcfit.RawFleet"]] = None
 
 
-def fit_batch(job: Job, blocks: List[Block]) -> List[Lines]:
-    """The task of a worker: rows and curves of the records, as JSON."""
+def fit_batch(job: Job, blocks: List[Block]) -> Answer:
+    """The task of a worker: rows and curves of the records, as JSON, and its time."""
     global _last
     own = _kmcfit.version()
     if own != job.version:
@@ -261,8 +263,9 @@ def fit_batch(job: Job, blocks: List[Block]) -> List[Lines]:
     return fit_blocks(_last[1], job, blocks)
 
 
-def fit_blocks(fleet: "_kmcfit.RawFleet", job: Job, blocks: List[Block]) -> List[Lines]:
-    """Rows and curves of the records of blocks."""
+def fit_blocks(fleet: "_kmcfit.RawFleet", job: Job, blocks: List[Block]) -> Answer:
+    """Rows and curves of the records of blocks, and the time that they took."""
+    begin = perf_counter()
     rows: List[Lines] = []
     for block in blocks:
         part = []
@@ -275,7 +278,7 @@ def fit_blocks(fleet: "_kmcfit.RawFleet", job: Job, blocks: List[Block]) -> List
                 rows.append(failed(record.name, str(error)))
                 part = []
         rows += fleet.fit([part], job.warm_start, job.time_limit)
-    return rows
+    return rows, perf_counter() - begin
 
 
 def _source(model: Any, set: Optional[Overrides]) -> Tuple["_kmcfit.RawFleet", Source]:  # noqa: A002
@@ -382,5 +385,5 @@ def _rows(
     finally:
         batches.close()
         if journal is not None:
-            journal.sync()
+            journal.close()
 

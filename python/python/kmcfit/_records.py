@@ -165,4 +165,4 @@ def lowered(record: Item, source: Source) -> Given:
     changes = [f"experiments.0={_yaml.flow({'data': 'record.npz', **data._spec})}"]
     if source.chooses_mass and data.has_force:
         changes.append("functions.mass={basis: constant}")
-    return name, path, data._file(path), changes + overrides, system, columns
+    return name, path, data._file(), changes + overrides, system, columns
