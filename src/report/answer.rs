@@ -180,7 +180,7 @@ fn fixed_name(document: &ResultDocument) -> Option<&str> {
 /// A quantity in words: `stiffness k`, `damping c of first`.
 pub fn quantity(name: &str) -> String {
     let ratio = match name {
-        "natural_frequency" => "natural frequency",
+        "natural_frequency" => "undamped natural frequency",
         "damping_ratio" => "damping ratio",
         "k_over_m" => "stiffness / mass",
         "c_over_m" => "damping / mass",

@@ -1,14 +1,15 @@
 //! Summary of a fit for the terminal.
 
 use super::answer::answer_table;
-use super::document::{ChannelSummary, PenaltySummary, Prediction, ResultDocument};
+use super::document::{ChannelSummary, NuisanceParameter, PenaltySummary, Prediction, ResultDocument};
 use super::equation::equation_residual;
 use super::findings;
 use super::model_assumptions::{MASS_UNKNOWN, UNITS_ASSUMED};
 use super::rule_names::rule_in_words;
 use super::suggestions;
 use crate::finding::Finding;
-use crate::number_format::{resolved, significant};
+use crate::number_format::{at_most, resolved, significant};
+use kmcfit_core::internals::assessment::POOR;
 use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::identifiability::ClassificationKind;
 use std::fmt::Write;
@@ -35,18 +36,7 @@ fn write_answer(
     document: &ResultDocument,
     plot: Option<&str>,
 ) -> std::fmt::Result {
-    let samples = document
-        .experiments
-        .iter()
-        .map(|e| e.samples)
-        .sum::<usize>();
-    writeln!(
-        text,
-        "{}: {}, {} s",
-        document.title,
-        count(samples, "sample"),
-        significant(document.model.duration, 4)
-    )?;
+    writeln!(text, "{}: {}", document.title, extent(document))?;
     if let Some(verdict) = &document.verdict {
         writeln!(text, "{}", verdict.lines())?;
     }
@@ -72,6 +62,27 @@ fn write_answer(
         }
     }
     Ok(())
+}
+
+/// Number of samples, of several records with their number, and duration, of several records the longest; samples for validation apart.
+pub(super) fn extent(document: &ResultDocument) -> String {
+    let samples = document.experiments.iter().map(|e| e.samples).sum();
+    let mut text = size_in_words(samples, document.experiments.len(), document.model.duration);
+    let held = document.validation.iter().flat_map(|e| &e.channels);
+    let held: usize = held.map(|c| c.samples).sum();
+    if held > 0 {
+        text += &format!("; validation: {}", count(held, "sample"));
+    }
+    text
+}
+
+/// Number of samples, of several records with their number, and duration (s), of several records the longest.
+pub(super) fn size_in_words(samples: usize, records: usize, duration: f64) -> String {
+    let (samples, seconds) = (count(samples, "sample"), significant(duration, 4));
+    match records {
+        0 | 1 => format!("{samples}, {seconds} s"),
+        several => format!("{samples} in {several} records of up to {seconds} s"),
+    }
 }
 
 /// Assumptions of a kind.
@@ -152,7 +163,7 @@ fn write_details(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     write_statistics(text, document)?;
     writeln!(text)?;
     write_functions(text, document)?;
-    write_nuisance_parameters(text, document)?;
+    write_nuisance_parameters(text, &document.nuisance_parameters)?;
     write_constraints(text, document)?;
     write_attempts(text, document)
 }
@@ -179,12 +190,27 @@ fn fit(document: &ResultDocument) -> Vec<String> {
     if outliers > 0 {
         text += &format!("; {} rejected", count(outliers, "outlier"));
     }
-    let validation = document.validation.iter().flat_map(|e| &e.channels);
-    if let Some(worst) = validation.map(|c| c.fit_percent).reduce(f64::min) {
-        text += &format!("; validation records: {}", fit_percent(worst));
+    if let Some(result) = validation(document) {
+        text += &format!("; {result}");
     }
     let classical = document.classical.as_ref().map(findings::classical);
     std::iter::once(text).chain(classical).collect()
+}
+
+/// Result of the validation with its worst fit; `None` without validation records.
+pub(super) fn validation(document: &ResultDocument) -> Option<String> {
+    let records = &document.validation;
+    (!records.is_empty()).then_some(())?;
+    let channels = records.iter().flat_map(|e| &e.channels);
+    let worst = channels.map(|c| c.fit_percent).reduce(f64::min);
+    Some(match worst {
+        _ if records.iter().any(|e| e.failure.is_some()) => {
+            "validation failed: no response".to_owned()
+        }
+        Some(worst) if worst < POOR => format!("validation failed: fit {}", fit_percent(worst)),
+        Some(worst) => format!("validation passed: fit {}", fit_percent(worst)),
+        None => "validation: no samples".to_owned(),
+    })
 }
 
 fn fit_percent(fit: f64) -> String {
@@ -260,7 +286,7 @@ pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> 
         Some(half) => writeln!(
             text,
             "step-size check: halving the step changes the response by at most {} % of its peak",
-            significant(100.0 * half.change_per_sample, 2)
+            at_most(100.0 * half.change_per_sample, 2)
         ),
         None if !document.is_simulated() => Ok(()),
         None => writeln!(text, "step-size check: no response with half the step"),
@@ -270,9 +296,9 @@ pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> 
 /// Nuisance parameters with their confidence intervals.
 pub(super) fn write_nuisance_parameters(
     text: &mut String,
-    document: &ResultDocument,
+    parameters: &[NuisanceParameter],
 ) -> std::fmt::Result {
-    for parameter in &document.nuisance_parameters {
+    for parameter in parameters {
         let (name, unit) = (&parameter.name, &parameter.unit);
         match parameter.half_width() {
             Some(half) => {
