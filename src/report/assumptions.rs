@@ -49,7 +49,9 @@ fn with_unit(model: &Model, name: &str) -> String {
     let bounds = |function: &&CoefficientFunction| {
         let rest = name.strip_prefix(&function.name());
         let limit = rest.and_then(|rest| {
-            [" >= ", " <= ", " = "].iter().find_map(|sign| rest.strip_prefix(sign))
+            [" >= ", " <= ", " = "]
+                .iter()
+                .find_map(|sign| rest.strip_prefix(sign))
         });
         limit.is_some_and(is_number)
     };

@@ -80,7 +80,9 @@ impl FittedModel<'_> {
     pub(super) fn channel_spectra(&self, experiment: usize, channel: usize) -> Vec<Figure> {
         let view = self.channel_view(experiment, channel);
         let estimates = self.estimates().0;
-        let mut frequency = estimates.iter().filter(|(name, _)| name == "natural_frequency");
+        let mut frequency = estimates
+            .iter()
+            .filter(|(name, _)| name == "natural_frequency");
         let frequency = frequency.next().map(|(_, estimate)| estimate.value);
         view.spectra(&self.inputs(experiment, view.channel.times()), frequency)
     }

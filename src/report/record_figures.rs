@@ -287,10 +287,16 @@ pub(super) fn input(times: &[f64], inputs: &[InputSeries]) -> Figure {
         [only] => only.label[..1].to_uppercase() + &only.label[1..],
         _ => "Input".to_owned(),
     };
-    Figure::new("input", title, "At the samples of the response.")
-    .panels(inputs.iter().map(|input| {
-        Panel::of_time(input.label, input.unit).mark(Mark::line("", times, &input.samples, style))
-    }))
+    Figure::new("input", title, "At the samples of the response.").panels(inputs.iter().map(
+        |input| {
+            Panel::of_time(input.label, input.unit).mark(Mark::line(
+                "",
+                times,
+                &input.samples,
+                style,
+            ))
+        },
+    ))
 }
 
 #[cfg(test)]
@@ -405,10 +411,13 @@ mod tests {
         // A response of zero has no spectrum; measured and residuals remain.
         assert_eq!(marks(&figure, 0).len(), 2);
         assert!(
-            spectrum(&SeriesPair {
-                measured: &model,
-                ..pair
-            }, None)
+            spectrum(
+                &SeriesPair {
+                    measured: &model,
+                    ..pair
+                },
+                None
+            )
             .is_none()
         );
     }

@@ -1,7 +1,9 @@
 //! Summary of a fit for the terminal.
 
 use super::answer::answer_table;
-use super::document::{ChannelSummary, NuisanceParameter, PenaltySummary, Prediction, ResultDocument};
+use super::document::{
+    ChannelSummary, NuisanceParameter, PenaltySummary, Prediction, ResultDocument,
+};
 use super::equation::equation_residual;
 use super::findings;
 use super::model_assumptions::{MASS_UNKNOWN, UNITS_ASSUMED};

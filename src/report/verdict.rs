@@ -191,7 +191,9 @@ impl FittedModel<'_> {
             _ => String::new(),
         };
         let residuals = match problem.channels().all(|c| c.weighting().is_sigma()) {
-            true => vec![format!("no significant autocorrelation of the residuals{noise}")],
+            true => vec![format!(
+                "no significant autocorrelation of the residuals{noise}"
+            )],
             false => Vec::new(),
         };
         let assessment = self.run_assessment.assessment.as_ref();
@@ -199,7 +201,10 @@ impl FittedModel<'_> {
         let checks = [
             (self.run_assessment.step_check().is_some(), "step-size"),
             (tests.is_some_and(|t| !t.bases.is_empty()), "refinement"),
-            (tests.is_some_and(|t| !t.extensions.is_empty()), "missing-term"),
+            (
+                tests.is_some_and(|t| !t.extensions.is_empty()),
+                "missing-term",
+            ),
         ];
         let names = checks.iter().filter(|(is_done, _)| *is_done);
         let names: Vec<String> = names.map(|(_, name)| (*name).to_owned()).collect();

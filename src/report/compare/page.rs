@@ -103,9 +103,7 @@ fn records(comparison: &Comparison) -> String {
     }
     let first = comparison.runs.first();
     let common = first.filter(|_| comparison.warning().is_none());
-    let size = common.map(|run| {
-        extent(&run.finished.document)
-    });
+    let size = common.map(|run| extent(&run.finished.document));
     shell::source_line(&files, size)
 }
 

@@ -63,7 +63,11 @@ fn extensions(document: &ResultDocument, tests: &ModelTests) -> String {
     paragraph(&format!(
         "Missing terms and errors of the records, each added alone: estimate, and t = estimate / standard error. One with |t| of {limit} \
          or more is fitted; it is missing if its fit explains the residuals."
-    )) + &table("Missing terms and errors of the records", &["tried", "estimate", "t"], &rows)
+    )) + &table(
+        "Missing terms and errors of the records",
+        &["tried", "estimate", "t"],
+        &rows,
+    )
 }
 
 /// Name and estimate of an extension.
@@ -81,9 +85,10 @@ fn extension(document: &ResultDocument, test: &ExtensionTest) -> (String, String
             };
             (term.name().replace('_', " "), value(test.value, unit))
         }
-        Extension::Delay { experiment } => {
-            (of("delay of the response", experiment), value(test.value, "s"))
-        }
+        Extension::Delay { experiment } => (
+            of("delay of the response", experiment),
+            value(test.value, "s"),
+        ),
         Extension::ClockRate { experiment } => (
             of("rate of the clock of the response", experiment),
             value(100.0 * test.value, "%"),

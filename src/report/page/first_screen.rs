@@ -29,7 +29,8 @@ pub(super) fn first_screen(run: &FittedModel, document: &ResultDocument, detail:
         Some(verdict) => verdict_line(verdict),
         None => state(document),
     };
-    let answer = answers(document) + &scope(run, document) + &glossary(document) + &advice(document);
+    let answer =
+        answers(document) + &scope(run, document) + &glossary(document) + &advice(document);
     screen(
         &(source + &state),
         &answer,
@@ -45,8 +46,11 @@ pub(in crate::report) fn screen(
     main: Option<Figure>,
     detail: Detail,
 ) -> String {
-    let main = figures(&main.into_iter().collect::<Vec<_>>(), detail);
-    format!("{above}<div class=\"first\">\n<div>\n{text}</div>\n<div>\n{main}</div>\n</div>\n")
+    let main = main.map(|main| format!("<div>\n{}</div>\n", figures(&[main], detail)));
+    format!(
+        "{above}<div class=\"first\">\n<div>\n{text}</div>\n{}</div>\n",
+        main.unwrap_or_default()
+    )
 }
 
 /// Data files, number of samples and duration where all records of the page have the same, and date of the last change of a file.
@@ -84,7 +88,9 @@ fn scope(run: &FittedModel, document: &ResultDocument) -> String {
     let records = problem.experiments.len();
     if records > 1 {
         text += &match problem.functions.coefficient_sets().len() {
-            1 => format!("Coefficients, frequency and damping ratio are common to the {records} records. "),
+            1 => format!(
+                "Coefficients, frequency and damping ratio are common to the {records} records. "
+            ),
             _ => "Frequency and damping ratio are those of the shared coefficients. ".to_owned(),
         };
     }
@@ -117,7 +123,9 @@ fn intervals(document: &ResultDocument) -> String {
         false => "force",
     };
     let example = match (assumes("unit"), assumes("clock")) {
-        (true, _) => format!(": a {force} sensor that reads 1 % high makes m, c and k 1 % too large"),
+        (true, _) => {
+            format!(": a {force} sensor that reads 1 % high makes m, c and k 1 % too large")
+        }
         (false, true) => ": a clock that is 1 % fast makes the frequency 1 % too low".to_owned(),
         (false, false) => String::new(),
     };

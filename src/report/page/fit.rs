@@ -1,8 +1,8 @@
 //! The page of a fit, `report.html`: first screen, contents, and the sections from the fit to the work of the solver.
 
 use super::animation::animation;
-use super::first_screen::first_screen;
 use super::checks::checks;
+use super::first_screen::first_screen;
 use super::table::{list, paragraph};
 use super::validation::validation;
 use super::{
@@ -53,7 +53,11 @@ fn page_of(run: &FittedModel, document: &ResultDocument, detail: Detail) -> Stri
             figures(&run.each_channel(FittedModel::channel_tests)),
         ),
         ("checks", "Checks of step and terms", checks(document)),
-        ("validation", "Validation", validation(run, document, detail)),
+        (
+            "validation",
+            "Validation",
+            validation(run, document, detail),
+        ),
         (
             "identifiability",
             "Identifiability",
@@ -215,7 +219,10 @@ fn predictions(document: &ResultDocument) -> String {
 /// The nuisance parameters in the units of the channels of their quantity, where these have one unit.
 fn in_shown_units(document: &ResultDocument) -> Vec<NuisanceParameter> {
     let unit_of = |kind: &str| {
-        let mut units = document.channels().filter(|c| c.kind == kind).map(|c| &c.unit);
+        let mut units = document
+            .channels()
+            .filter(|c| c.kind == kind)
+            .map(|c| &c.unit);
         let first = units.next()?;
         units.all(|unit| unit == first).then(|| first.clone())
     };

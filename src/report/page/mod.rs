@@ -45,8 +45,7 @@ const KEYS: &str = "Charts: hover or touch for values; drag to zoom; double clic
      Escape shows all. The legend entries show and hide curves.";
 
 /// The same in one line.
-const HELP: &str =
-    "Charts: hover or touch for values; drag to zoom; double click or Reset shows all. Keys: arrows move the cursor, + and - zoom, \
+const HELP: &str = "Charts: hover or touch for values; drag to zoom; double click or Reset shows all. Keys: arrows move the cursor, + and - zoom, \
      Escape shows all.";
 
 /// A page from its title and its body, which must be escaped.

@@ -46,8 +46,15 @@ pub(super) fn facts(document: &ResultDocument) -> String {
     if let Some(reduced) = document.statistics.reduced_chi_square {
         facts.push(("chi-square per degree of freedom", number(reduced)));
     }
-    let criteria = [("AIC", document.statistics.aic), ("BIC", document.statistics.bic)];
-    facts.extend(criteria.into_iter().filter_map(|(name, x)| Some((name, number(x?)))));
+    let criteria = [
+        ("AIC", document.statistics.aic),
+        ("BIC", document.statistics.bic),
+    ];
+    facts.extend(
+        criteria
+            .into_iter()
+            .filter_map(|(name, x)| Some((name, number(x?)))),
+    );
     facts.push(("samples", samples.to_string()));
     facts.push(("parameters", document.model.parameters.to_string()));
     let known = &document.identifiability;
@@ -71,7 +78,8 @@ pub(super) fn facts(document: &ResultDocument) -> String {
 /// Table of the functions that vary, in the order of the equation of motion, then those of single experiments: constants stand in the
 /// answer. With a known true system all functions with their errors.
 pub(super) fn functions(document: &ResultDocument) -> String {
-    let is_new = |f: &FunctionSummary| f.truth_max_error.is_some() || (f.min != f.max && !f.negligible);
+    let is_new =
+        |f: &FunctionSummary| f.truth_max_error.is_some() || (f.min != f.max && !f.negligible);
     let functions = document.all_functions().filter(|(_, f)| is_new(f));
     let functions: Vec<(&str, &FunctionSummary)> = functions.collect();
     let has_truth = functions.iter().any(|(_, f)| f.truth_max_error.is_some());

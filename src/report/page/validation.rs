@@ -1,7 +1,7 @@
 //! Section of the validation records: what was predicted, and what was fitted to them.
 
-use super::table::{list, paragraph};
 use super::figures;
+use super::table::{list, paragraph};
 use crate::report::FittedModel;
 use crate::report::chart::Detail;
 use crate::report::document::{ResultDocument, ValidationSummary};
@@ -34,6 +34,10 @@ fn record(record: &ValidationSummary) -> String {
     match names.as_slice() {
         [] => format!("{}: nothing was fitted to it", record.name),
         [only] => format!("{}: only its {only} was fitted to it", record.name),
-        several => format!("{}: only its {} were fitted to it", record.name, and_list(several)),
+        several => format!(
+            "{}: only its {} were fitted to it",
+            record.name,
+            and_list(several)
+        ),
     }
 }

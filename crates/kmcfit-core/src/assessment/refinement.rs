@@ -210,7 +210,9 @@ impl FinerBases {
             let mut tests: Vec<(usize, f64, Minimum)> = tests.collect();
             if finer.is_empty() {
                 let all = tests.iter();
-                test.comparisons = all.map(|(i, p, _)| self.comparison(given, *i, *p)).collect();
+                test.comparisons = all
+                    .map(|(i, p, _)| self.comparison(given, *i, *p))
+                    .collect();
             }
             tests.retain(|(_, p_value, _)| *p_value < level);
             if finer.is_empty() {
