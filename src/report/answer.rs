@@ -199,9 +199,14 @@ pub fn quantity(name: &str) -> String {
     };
     let kind = CoefficientKind::ALL.into_iter().find(|k| k.name() == first);
     match kind {
-        Some(kind) => format!("{} {}{owner}", first.replace('_', " "), kind.symbol()),
+        Some(kind) => format!("{} {}{owner}", in_words(first), kind.symbol()),
         None => name.replace('_', " "),
     }
+}
+
+/// Name of a coefficient in words: `cubic stiffness`, `Coulomb friction`.
+pub fn in_words(name: &str) -> String {
+    name.replace('_', " ").replace("coulomb", "Coulomb")
 }
 
 /// The table as text.

@@ -2,9 +2,11 @@
 
 use super::table::{paragraph, table};
 use crate::number_format::{at_most, significant};
+use crate::report::answer::in_words;
 use crate::report::document::ResultDocument;
 use crate::report::findings;
-use kmcfit_core::internals::assessment::{Extension, ExtensionTest, ModelTests};
+use crate::report::text::decade;
+use kmcfit_core::internals::assessment::{BasisComparison, Extension, ExtensionTest, ModelTests};
 
 /// Step-size check, tests against larger models, and the classical estimates. Empty for a fit without any.
 pub(super) fn checks(document: &ResultDocument) -> String {
@@ -35,7 +37,7 @@ fn bases(tests: &ModelTests) -> String {
     if tests.bases.is_empty() {
         return String::new();
     }
-    let row = |b: &kmcfit_core::internals::assessment::BasisComparison| {
+    let row = |b: &BasisComparison| {
         let finer = match b.parameters {
             1 => "a value for each half of the record".to_owned(),
             _ => format!("{} parameters instead of {}", b.finer, b.parameters),
@@ -56,13 +58,13 @@ fn extensions(document: &ResultDocument, tests: &ModelTests) -> String {
     }
     let row = |test: &ExtensionTest| {
         let (name, estimate) = extension(document, test);
-        vec![name, estimate, significant(test.t, 2)]
+        vec![name, estimate, short(test.t)]
     };
     let rows: Vec<Vec<String>> = tests.extensions.iter().map(row).collect();
     let limit = significant(tests.t_limit, 2);
     paragraph(&format!(
-        "Missing terms and errors of the records, each added alone: estimate, and t = estimate / standard error. One with |t| of {limit} \
-         or more is fitted; it is missing if its fit explains the residuals."
+        "Missing terms and errors of the records, each added alone: estimate, and t = estimate / standard error. A candidate with |t| of {limit} \
+         or more is fitted; it counts as missing if this fit explains the residuals."
     )) + &table(
         "Missing terms and errors of the records",
         &["tried", "estimate", "t"],
@@ -76,14 +78,14 @@ fn extension(document: &ResultDocument, test: &ExtensionTest) -> (String, String
         1 => what.to_owned(),
         _ => format!("{what} of {experiment}"),
     };
-    let value = |x: f64, unit: &str| format!("{} {unit}", significant(x, 2));
+    let value = |x: f64, unit: &str| format!("{} {unit}", short(x));
     match &test.extension {
         Extension::Term { term } => {
             let unit = match document.is_rotation() {
                 true => term.angular_unit(),
                 false => term.unit(),
             };
-            (term.name().replace('_', " "), value(test.value, unit))
+            (in_words(term.name()), value(test.value, unit))
         }
         Extension::Delay { experiment } => (
             of("delay of the response", experiment),
@@ -101,6 +103,18 @@ fn extension(document: &ResultDocument, test: &ExtensionTest) -> (String, String
             value(100.0 * test.value, "%"),
         ),
     }
+}
+
+/// Two significant digits, with powers of ten and a true minus sign.
+fn short(x: f64) -> String {
+    let text = significant(x, 2);
+    let text = match text.split_once('e') {
+        Some((mantissa, exponent)) => {
+            format!("{mantissa}×{}", decade(exponent.parse().unwrap_or(0)))
+        }
+        None => text,
+    };
+    text.replace('-', "−")
 }
 
 fn probability(p: f64) -> String {

@@ -12,7 +12,7 @@ use crate::report::chart::{Detail, Figure};
 use crate::report::document::{ResultDocument, Verdict, level_in_words};
 use crate::report::summary::{count, extent};
 use crate::report::text::{and_list, escape, prose};
-use kmcfit_core::internals::assessment::VerdictLevel;
+use kmcfit_core::internals::assessment::{EstimateStatus, VerdictLevel};
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -94,7 +94,7 @@ fn scope(run: &FittedModel, document: &ResultDocument) -> String {
             _ => "Frequency and damping ratio are those of the shared coefficients. ".to_owned(),
         };
     }
-    let has_intervals = document.estimates.0.iter().any(|(_, e)| e.ci95.is_some());
+    let has_intervals = answer(document).iter().any(|row| !row.interval.is_empty());
     if has_intervals {
         text += &intervals(document);
     }
@@ -110,9 +110,13 @@ fn intervals(document: &ResultDocument) -> String {
         true => "correlated noise of the samples",
         false => "noise of the samples",
     };
-    let fitted = match document.nuisance_parameters.is_empty() {
-        true => "",
-        false => " and the initial states and sensor parameters fitted with them",
+    let is_state = |name: &str| name.starts_with("initial ");
+    let names = || document.nuisance_parameters.iter().map(|p| p.name.as_str());
+    let fitted = match (names().any(is_state), names().any(|name| !is_state(name))) {
+        (false, false) => "",
+        (true, false) => " and the uncertainty of the fitted initial states",
+        (false, true) => " and the uncertainty of the fitted sensor parameters",
+        (true, true) => " and the uncertainty of the fitted initial states and sensor parameters",
     };
     let assumes = |kind: &str| {
         let mut all = document.verdict.iter().flat_map(|v| &v.assumptions);
@@ -122,14 +126,22 @@ fn intervals(document: &ResultDocument) -> String {
         true => "torque",
         false => "force",
     };
-    let example = match (assumes("unit"), assumes("clock")) {
+    // Only a force determines a mass that is estimated.
+    let estimates = || document.estimates.0.iter();
+    let is_forced = document
+        .experiments
+        .iter()
+        .any(|e| e.driven_by.iter().any(|d| d == "force"));
+    let has_scale = is_forced
+        && estimates().any(|(name, e)| name == "mass" && e.status == EstimateStatus::Estimated);
+    let example = match (has_scale, assumes("clock")) {
         (true, _) => {
             format!(": a {force} sensor that reads 1 % high makes m, c and k 1 % too large")
         }
         (false, true) => ": a clock that is 1 % fast makes the frequency 1 % too low".to_owned(),
         (false, false) => String::new(),
     };
-    format!("The intervals cover {noise}{fitted}. They exclude errors of calibration{example}.")
+    format!("The intervals cover the {noise}{fitted}. They exclude errors of calibration{example}.")
 }
 
 /// Name of a file without its folder.

@@ -51,7 +51,7 @@ pub(super) fn glossary(document: &ResultDocument) -> String {
         .map(|(term, text)| (term, text.to_owned()))
         .collect();
     format!(
-        "<details>\n<summary>Terms</summary>\n{}</details>\n",
+        "<details>\n<summary>Terms of this page</summary>\n{}</details>\n",
         pairs(&rows)
     )
 }

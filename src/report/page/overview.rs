@@ -154,9 +154,6 @@ pub(super) fn records(document: &ResultDocument) -> String {
     for (name, channel) in document.records() {
         rows.push(record(&name, channel));
         let about = format!("{name}, {}", channel.kind);
-        if channel.sigma.is_some() {
-            notes.push(format!("{about}: {}", channel.whiteness));
-        }
         notes.extend(channel.ignored.iter().map(|ignored| {
             let samples = count(ignored.samples, "sample");
             format!("{about}: {samples} not used: {}", ignored.reason)
