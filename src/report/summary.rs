@@ -5,13 +5,13 @@ use super::document::{
     ChannelSummary, NuisanceParameter, PenaltySummary, Prediction, ResultDocument,
 };
 use super::equation::equation_residual;
+use super::extent::{extent, validation};
 use super::findings;
 use super::model_assumptions::{MASS_UNKNOWN, UNITS_ASSUMED};
 use super::rule_names::rule_in_words;
 use super::suggestions;
 use crate::finding::Finding;
 use crate::number_format::{at_most, resolved, significant};
-use kmcfit_core::internals::assessment::POOR;
 use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::identifiability::ClassificationKind;
 use std::fmt::Write;
@@ -64,27 +64,6 @@ fn write_answer(
         }
     }
     Ok(())
-}
-
-/// Number of samples, of several records with their number, and duration, of several records the longest; samples for validation apart.
-pub(super) fn extent(document: &ResultDocument) -> String {
-    let samples = document.experiments.iter().map(|e| e.samples).sum();
-    let mut text = size_in_words(samples, document.experiments.len(), document.model.duration);
-    let held = document.validation.iter().flat_map(|e| &e.channels);
-    let held: usize = held.map(|c| c.samples).sum();
-    if held > 0 {
-        text += &format!("; validation: {}", count(held, "sample"));
-    }
-    text
-}
-
-/// Number of samples, of several records with their number, and duration (s), of several records the longest.
-pub(super) fn size_in_words(samples: usize, records: usize, duration: f64) -> String {
-    let (samples, seconds) = (count(samples, "sample"), significant(duration, 4));
-    match records {
-        0 | 1 => format!("{samples}, {seconds} s"),
-        several => format!("{samples} in {several} records of up to {seconds} s"),
-    }
 }
 
 /// Assumptions of a kind.
@@ -197,22 +176,6 @@ fn fit(document: &ResultDocument) -> Vec<String> {
     }
     let classical = document.classical.as_ref().map(findings::classical);
     std::iter::once(text).chain(classical).collect()
-}
-
-/// Result of the validation with its worst fit; `None` without validation records.
-pub(super) fn validation(document: &ResultDocument) -> Option<String> {
-    let records = &document.validation;
-    (!records.is_empty()).then_some(())?;
-    let channels = records.iter().flat_map(|e| &e.channels);
-    let worst = channels.map(|c| c.fit_percent).reduce(f64::min);
-    Some(match worst {
-        _ if records.iter().any(|e| e.failure.is_some()) => {
-            "validation failed: no response".to_owned()
-        }
-        Some(worst) if worst < POOR => format!("validation failed: fit {}", fit_percent(worst)),
-        Some(worst) => format!("validation passed: fit {}", fit_percent(worst)),
-        None => "validation: no samples".to_owned(),
-    })
 }
 
 fn fit_percent(fit: f64) -> String {

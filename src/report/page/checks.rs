@@ -42,7 +42,7 @@ fn bases(tests: &ModelTests) -> String {
             1 => "a value for each half of the record".to_owned(),
             _ => format!("{} parameters instead of {}", b.finer, b.parameters),
         };
-        vec![b.function.clone(), finer, probability(b.p_value)]
+        vec![in_words(&b.function), finer, probability(b.p_value)]
     };
     let rows: Vec<Vec<String>> = tests.bases.iter().map(row).collect();
     let limit = significant(tests.p_limit, 2);

@@ -5,12 +5,12 @@ use super::table::{list, paragraph};
 use crate::report::FittedModel;
 use crate::report::chart::Detail;
 use crate::report::document::{ResultDocument, ValidationSummary};
-use crate::report::summary;
+use crate::report::extent;
 use crate::report::text::and_list;
 
 /// Result, basis and figures of the validation; empty without validation records.
 pub(super) fn validation(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
-    let Some(result) = summary::validation(document) else {
+    let Some(result) = extent::validation(document) else {
         return String::new();
     };
     let mut capital = result.chars();

@@ -19,8 +19,8 @@ pub use document::{
 pub use bands::bands;
 pub use records::*;
 
+use super::extent::size_in_words;
 use super::page::source_line;
-use super::summary::size_in_words;
 use super::{json, render};
 use crate::config::Model;
 use crate::results::{Claim, OutputFolder};
