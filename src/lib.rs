@@ -12,7 +12,8 @@
 //! 2. [`fitting`] fits the problem.
 //! 3. [`report`] writes tables, figures, pages and the result document, loads them back ([`Run::open`]), and compares
 //!    runs; [`results`] makes output folders, journals and files crash-safe.
-//! 4. [`cli`] is one file per command.
+//! 4. [`fleet`] fits one model to many records, with a row of results for each.
+//! 5. [`cli`] is one file per command.
 // All output passes `cli::output`, all changes of files `results`, all thread starts `threads` of the core.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods, clippy::disallowed_macros))]
 #![allow(
@@ -27,6 +28,7 @@ mod escape;
 mod faults;
 pub mod finding;
 pub mod fitting;
+pub mod fleet;
 pub mod formats;
 pub mod guide;
 mod magnitudes;

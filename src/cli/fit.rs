@@ -136,6 +136,25 @@ pub(super) fn resume(
     fit(&file, &now, place, printed, true)
 }
 
+/// Fits a record of a fleet, and prints the summary of a fit.
+pub(super) fn fit_record_page(
+    file: &ModelFile,
+    heading: &Heading,
+    out: &Path,
+) -> Result<u8, CommandError> {
+    let printed = Printed {
+        json: false,
+        timings: false,
+        plots: PlotOptions {
+            plot: false,
+            no_plot: false,
+        },
+        verbose: false,
+        strict: false,
+    };
+    fit(file, heading, out, &printed, false)
+}
+
 fn fit(
     file: &ModelFile,
     heading: &Heading,

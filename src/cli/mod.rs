@@ -10,6 +10,7 @@ mod demo;
 mod environment;
 mod explain;
 mod fit;
+mod fleet;
 mod init;
 mod interrupt;
 mod output;
@@ -53,6 +54,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Fit(fit::Arguments),
+    Fleet(fleet::Arguments),
     Simulate(simulate::Arguments),
     Check(check::Arguments),
     Predict(predict::Arguments),
@@ -128,6 +130,7 @@ pub fn run(mut words: Vec<OsString>) -> u8 {
     }
     let result = match arguments.command {
         Command::Fit(arguments) => fit::run(&arguments),
+        Command::Fleet(arguments) => fleet::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Predict(arguments) => predict::run(&arguments),

@@ -8,6 +8,7 @@ use super::input_limits::{Checked, LONGEST_MODEL};
 use super::key_positions::{key_path, locate, place};
 use super::overrides::Override;
 use super::spec::ModelSpec;
+use super::values::Text;
 use super::yaml_errors;
 use crate::error::InputError;
 use crate::formats::has_data_extension;
@@ -114,6 +115,16 @@ impl ModelFile {
     #[must_use]
     pub fn with_files(mut self, files: impl IntoIterator<Item = (String, Arc<[u8]>)>) -> Self {
         self.files.extend(files);
+        self
+    }
+
+    /// The model with the record `name` in place of the data of its first experiment; its content stands in memory.
+    #[must_use]
+    pub fn with_record(mut self, name: &str, content: Arc<[u8]>) -> Self {
+        if let Some(experiment) = self.spec.experiments.first_mut() {
+            experiment.data = Some(Text(name.to_owned()));
+        }
+        self.files.insert(name.to_owned(), content);
         self
     }
 

@@ -7,9 +7,25 @@ use super::run::{FittedModel, json};
 use crate::config::Model;
 use crate::fitting::ModelFit;
 use crate::results::RequestedFiles;
+use kmcfit_core::internals::functions::CoefficientFunction;
 use kmcfit_core::internals::solvers::{Fit, WeightPath};
 use kmcfit_core::internals::study::predict;
 use kmcfit_core::internals::system::State;
+
+/// A coefficient over the record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoefficientCurve {
+    /// Name, as in the model.
+    pub name: String,
+    /// Times, s.
+    pub t: Vec<f64>,
+    /// Values, SI.
+    pub value: Vec<f64>,
+    /// Lower limits of the pointwise 95 % band, SI; empty without a band.
+    pub low: Vec<f64>,
+    /// Upper limits.
+    pub high: Vec<f64>,
+}
 
 /// A fit with its predictions and assessment.
 #[derive(Debug, Clone)]
@@ -49,6 +65,41 @@ impl CompletedFit {
             requested,
             display: DisplayUnits::default(),
         }
+    }
+
+    /// The coefficients that vary, at `points` equal distances, with their pointwise 95 % bands where there are any.
+    pub fn curves(&self, points: usize) -> Vec<CoefficientCurve> {
+        let problem = &self.model.problem;
+        let run = self.fitted(RequestedFiles::default());
+        let times = problem.system.grid.times();
+        let last = times.len().saturating_sub(1);
+        let steps = points.saturating_sub(1).clamp(1, last.max(1));
+        let rows = |values: &[f64]| -> Vec<f64> {
+            let places = (0..=steps).map(|i| i * last / steps);
+            places
+                .filter_map(|place| values.get(place).copied())
+                .collect()
+        };
+        let t = rows(&times);
+        let varies = |values: &[f64]| values.iter().any(|x| *x != values[0]);
+        let functions = run.named_functions().into_iter().enumerate();
+        let functions = functions.filter(|(_, (_, values))| varies(values));
+        let curve = |(i, (function, values)): (usize, (&CoefficientFunction, Vec<f64>))| {
+            let bands = run.bands();
+            let of_function = bands.and_then(|bands| bands.functions.get(i..=i));
+            let limits = bands
+                .zip(of_function)
+                .and_then(|(bands, of_function)| bands.curves(of_function, &t).into_iter().next());
+            let [low, high] = limits.unwrap_or_default();
+            CoefficientCurve {
+                name: function.name(),
+                value: rows(&values),
+                low,
+                high,
+                t: t.clone(),
+            }
+        };
+        functions.map(curve).collect()
     }
 
     /// Parameters, coefficients, responses and history by the names of their files, with a row for every node.

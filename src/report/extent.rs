@@ -2,7 +2,7 @@
 
 use super::document::ResultDocument;
 use super::suggestions::percent;
-use super::summary::count;
+use super::text::count;
 use crate::number_format::significant;
 use kmcfit_core::internals::assessment::POOR;
 

@@ -1,7 +1,7 @@
 //! Figures of one record: residual tests, spectra, frequency response and input.
 
 use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
-use super::summary::count;
+use super::text::count;
 use kmcfit_core::internals::diagnostics::{ResidualDiagnostics, SIGNIFICANCE};
 use kmcfit_core::internals::signal::{Mobility, Spectrum};
 use statrs::distribution::{ContinuousCDF, Normal};

@@ -10,6 +10,7 @@ use super::findings;
 use super::model_assumptions::{MASS_UNKNOWN, UNITS_ASSUMED};
 use super::rule_names::rule_in_words;
 use super::suggestions;
+pub(crate) use super::text::count;
 use crate::finding::Finding;
 use crate::number_format::{at_most, resolved, significant};
 use kmcfit_core::internals::functions::WeightRule;
@@ -299,14 +300,6 @@ pub(super) fn iterations(document: &ResultDocument) -> String {
     match what.is_empty() {
         true => all,
         false => format!("{all} ({last} in the final fit, {others} {what})"),
-    }
-}
-
-/// A count with its noun in the singular or plural.
-pub(super) fn count(number: usize, thing: &str) -> String {
-    match number {
-        1 => format!("1 {thing}"),
-        _ => format!("{number} {thing}s"),
     }
 }
 

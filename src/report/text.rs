@@ -83,7 +83,7 @@ pub(super) fn clean(text: &str) -> String {
 }
 
 /// Escapes text for XML content and attributes.
-pub(super) fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     clean(text)
         .replace('&', "&amp;")
         .replace('<', "&lt;")
@@ -93,7 +93,7 @@ pub(super) fn escape(text: &str) -> String {
 }
 
 /// [`escape`] for a sentence in a page; text between backquotes becomes code.
-pub(super) fn prose(text: &str) -> String {
+pub(crate) fn prose(text: &str) -> String {
     let escaped = escape(text);
     let parts: Vec<&str> = escaped.split('`').collect();
     if parts.len().is_multiple_of(2) {
@@ -104,6 +104,14 @@ pub(super) fn prose(text: &str) -> String {
         _ => format!("<code>{part}</code>"),
     });
     parts.collect()
+}
+
+/// A count with its noun in the singular or plural.
+pub fn count(number: usize, thing: &str) -> String {
+    match number {
+        1 => format!("1 {thing}"),
+        _ => format!("{number} {thing}s"),
+    }
 }
 
 /// `a, b and c`.

@@ -17,6 +17,17 @@ pub fn write_whole(path: &Path, contents: &str) -> io::Result<()> {
     write_together(&[(path, contents)])
 }
 
+/// Writes the output of `write` to `path` atomically.
+///
+/// # Errors
+/// Errors of the file system or of `write`; the old file is then unchanged.
+pub fn write_stream(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
+    replace_with(folder_of(path), path, write)
+}
+
 /// Writes files that belong together: none of them appears before all are durable.
 ///
 /// # Errors

@@ -13,11 +13,12 @@ mod journal;
 mod lock;
 mod manifest;
 mod output_folder;
+mod row_file;
 mod system;
 mod work_folder;
 
 pub use analysis_journal::AnalysisJournal;
-pub use atomic::{write_together, write_whole};
+pub use atomic::{write_stream, write_together, write_whole};
 pub use claim::{Claim, RESULT};
 pub use exchange::{Stage, complete};
 pub use fit_journal::FitJournal;
@@ -27,3 +28,4 @@ pub use journal::with_checksums;
 pub use journal::{CHECKPOINT, COMPARE_JOURNAL, FIT_JOURNAL, STUDY_JOURNAL};
 pub use manifest::{FileRecord, MANIFEST, Manifest};
 pub use output_folder::OutputFolder;
+pub use row_file::{RowFile, complete_lines};

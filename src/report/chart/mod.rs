@@ -23,4 +23,4 @@ pub(super) use plot_mark::MarkKind;
 pub use plot_mark::{Colour, Dash, Mark, Style};
 pub(super) use svg::sample;
 pub use svg::{render, render_at};
-pub(super) use thin::Detail;
+pub(crate) use thin::Detail;

@@ -5,7 +5,7 @@ use super::plot_mark::{Mark, MarkKind};
 
 /// Detail of the curves of a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::report) struct Detail {
+pub(crate) struct Detail {
     /// Longest curve that is not thinned, points.
     pub(super) few: usize,
     /// Columns of a longer curve, in each of which its first, lowest, highest and last point are kept.

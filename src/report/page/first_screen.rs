@@ -41,12 +41,7 @@ pub(super) fn first_screen(run: &FittedModel, document: &ResultDocument, detail:
 }
 
 /// What stands above the contents: lines over the whole width, and below them a text beside the main figure.
-pub(in crate::report) fn screen(
-    above: &str,
-    text: &str,
-    main: Option<Figure>,
-    detail: Detail,
-) -> String {
+pub(crate) fn screen(above: &str, text: &str, main: Option<Figure>, detail: Detail) -> String {
     let main = main.map(|main| format!("<div>\n{}</div>\n", figures(&[main], detail)));
     format!(
         "{above}<div class=\"first\">\n<div>\n{text}</div>\n{}</div>\n",
@@ -202,7 +197,7 @@ pub(in crate::report) fn verdict_line(verdict: &Verdict) -> String {
 }
 
 /// A word in one of the colours `good`, `warn` and `bad`, and a sentence.
-pub(in crate::report) fn state_line(colour: &str, word: &str, sentence: &str) -> String {
+pub(crate) fn state_line(colour: &str, word: &str, sentence: &str) -> String {
     format!(
         "<p class=\"verdict-line\"><span class=\"state {colour}\">{}</span> {}</p>\n",
         escape(word),

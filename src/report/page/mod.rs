@@ -15,10 +15,12 @@ mod settings;
 mod table;
 mod validation;
 
-pub(super) use first_screen::{screen, source_line, state_line, verdict_line};
+pub(crate) use first_screen::{screen, state_line};
+pub(super) use first_screen::{source_line, verdict_line};
 pub(super) use fit::page as fit_page;
 pub(crate) use reproducibility::quoted as shell_quoted;
-pub(super) use table::{list, marked_table, paragraph, table};
+pub(super) use table::{list, marked_table};
+pub(crate) use table::{paragraph, table};
 
 use super::chart::{Detail, Figure, data, render};
 use super::text::escape;
@@ -73,7 +75,7 @@ fn page(title: &str, body: &str) -> String {
 const LARGEST: usize = 1_900_000;
 
 /// A page of at most [`LARGEST`] bytes: the curves of a larger one are thinned further, down to the coarsest detail.
-pub(super) fn within_limit(page: impl Fn(Detail) -> String) -> String {
+pub(crate) fn within_limit(page: impl Fn(Detail) -> String) -> String {
     let mut detail = Detail::FULL;
     loop {
         let text = page(detail);
@@ -85,10 +87,10 @@ pub(super) fn within_limit(page: impl Fn(Detail) -> String) -> String {
 }
 
 /// A section of a page: anchor, heading, body.
-pub(super) type Section = (&'static str, &'static str, String);
+pub(crate) type Section = (&'static str, &'static str, String);
 
 /// A page with a first screen and, beside contents that stay in sight, its sections; those without a body are omitted.
-pub(super) fn sectioned(title: &str, first: &str, mut sections: Vec<Section>) -> String {
+pub(crate) fn sectioned(title: &str, first: &str, mut sections: Vec<Section>) -> String {
     sections.retain(|(_, _, body)| !body.is_empty());
     let links = sections
         .iter()
@@ -153,7 +155,7 @@ fn help() -> String {
 }
 
 /// Figures one below the other.
-pub(super) fn figures(figures: &[Figure], detail: Detail) -> String {
+pub(crate) fn figures(figures: &[Figure], detail: Detail) -> String {
     figures_without(&[], figures, detail)
 }
 

@@ -5,7 +5,7 @@ use std::iter;
 
 /// A table named `name` with a heading for each column; the first cell of a row is its heading. On narrow screens each row is a list of
 /// its values with their headings, so that no column is hidden; the roles keep it a table for screen readers.
-pub(in crate::report) fn table(name: &str, headings: &[&str], rows: &[Vec<String>]) -> String {
+pub(crate) fn table(name: &str, headings: &[&str], rows: &[Vec<String>]) -> String {
     marked_table(name, headings, &[], rows)
 }
 
@@ -70,7 +70,7 @@ pub(in crate::report) fn list(sentences: &[String]) -> String {
     format!("<ul>\n{items}</ul>\n")
 }
 
-pub(in crate::report) fn paragraph(text: &str) -> String {
+pub(crate) fn paragraph(text: &str) -> String {
     format!("<p>{}</p>\n", prose(text))
 }
 

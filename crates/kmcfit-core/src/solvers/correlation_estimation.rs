@@ -2,7 +2,7 @@
 
 use super::fit::Fit;
 use super::settings::{FitSettings, Solver};
-use crate::diagnostics::{SIGNIFICANCE, standard_deviation};
+use crate::diagnostics::{SIGNIFICANCE, Whiteness, standard_deviation};
 use crate::noise::{
     Autoregression, Correlation, CorrelationLaw, HIGHEST_ORDER, burg, select_exponential,
     select_order, uninterrupted_runs,
@@ -122,14 +122,14 @@ fn are_noise(channel: &Channel, residuals: &[f64], normalised: &[f64]) -> bool {
     (NOISE[0]..NOISE[1]).contains(&share) && (is_estimated || rms(normalised) <= BEYOND_SIGMA)
 }
 
-/// True if the residuals of a channel, whitened for its correlation, are not white. Residuals at rounding and step-size errors have
-/// no distribution.
-pub(super) fn is_misspecified(channel: &Channel, predicted: &[f64]) -> bool {
+/// The test of the residuals of a channel, whitened for its correlation, if they are not white, and their size relative to that of the
+/// samples. Residuals at rounding and step-size errors have no distribution.
+pub(super) fn misspecification(channel: &Channel, predicted: &[f64]) -> Option<(Whiteness, f64)> {
     let residuals: Vec<f64> = channel.residuals(predicted).collect();
-    let is_noise = rms(&residuals) >= NOISE[0] * standard_deviation(channel.observed());
-    channel.weighting().is_sigma()
-        && is_noise
-        && diagnostics(channel, predicted).whiteness.p_value < SIGNIFICANCE
+    let share = rms(&residuals) / standard_deviation(channel.observed());
+    let is_noise = channel.weighting().is_sigma() && share >= NOISE[0];
+    let whiteness = is_noise.then(|| diagnostics(channel, predicted).whiteness)?;
+    (whiteness.p_value < SIGNIFICANCE).then_some((whiteness, share))
 }
 
 /// Marks the channels whose innovations are not white: the covariance of their scores is that of a kernel.
@@ -138,7 +138,7 @@ pub(super) fn mark_misspecified(problem: &mut Problem, found: &Fit) {
         return;
     }
     let marks: Vec<bool> = (problem.predicted(&found.best.evaluation))
-        .map(|(channel, predicted)| is_misspecified(channel, predicted))
+        .map(|(channel, predicted)| misspecification(channel, predicted).is_some())
         .collect();
     let experiments = problem.parts_mut().experiments.iter_mut();
     let channels = experiments.flat_map(|e| &mut e.channels);

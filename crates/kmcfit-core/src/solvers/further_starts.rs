@@ -6,7 +6,7 @@
 //! of their function, which the record hardly determines, are moved towards it, and the search is repeated.
 
 use super::checkpoint::Observer;
-use super::correlation_estimation::is_misspecified;
+use super::correlation_estimation::misspecification;
 use super::executor::search;
 use super::fit::{Attempt, Fit};
 use super::rounds::{is_ended, with_round};
@@ -16,7 +16,7 @@ use super::timings::timed;
 use crate::functions::CoefficientKind;
 use crate::host::Instant;
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::record::Weighting;
+use crate::record::{Channel, Weighting};
 use crate::simulate::SimulationError;
 use std::sync::atomic::Ordering;
 
@@ -30,6 +30,9 @@ const MOVED: f64 = 1.2;
 const MOST_NODES: usize = 500_000;
 /// Most searches from a fit without outliers.
 const MOST_MOVES: usize = 3;
+/// Residual, relative to the samples, and sum of its squared autocorrelations of a fit that has the right natural frequency.
+const SMALL_RESIDUAL: f64 = 0.3;
+const SMALL_CORRELATION: f64 = 0.02;
 /// Relative decrease of the cost by which another minimum is lower.
 const LOWER: f64 = 1e-6;
 
@@ -184,6 +187,14 @@ fn has_likelihood(problem: &Problem) -> bool {
     problem.channels().all(|c| c.weighting().is_sigma())
 }
 
+/// True if the residuals of a channel are correlated as those of a fit with another natural frequency, which oscillate with the response.
+/// In long records the test of whiteness finds much smaller correlations.
+fn oscillates(channel: &Channel, predicted: &[f64]) -> bool {
+    misspecification(channel, predicted).is_some_and(|(whiteness, share)| {
+        share > SMALL_RESIDUAL || whiteness.statistic > SMALL_CORRELATION * channel.len() as f64
+    })
+}
+
 /// True if the residuals of a fit are noise, or no likelihood says what noise is.
 fn is_noise(problem: &Problem, found: &Fit) -> bool {
     let mut channels = problem.predicted(&found.best.evaluation);
@@ -191,7 +202,7 @@ fn is_noise(problem: &Problem, found: &Fit) -> bool {
         Weighting::Sigma(_) | Weighting::Sigmas(_) => {
             channel.cost(predicted) <= LARGEST_MEAN_SQUARE * channel.len() as f64
         }
-        Weighting::Estimated { .. } => !is_misspecified(channel, predicted),
+        Weighting::Estimated { .. } => !oscillates(channel, predicted),
         Weighting::Integral { .. } | Weighting::Trapezoid(_) => true,
     })
 }

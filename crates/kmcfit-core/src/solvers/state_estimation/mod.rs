@@ -36,13 +36,29 @@ pub(super) struct Kinematics {
     pub grouping: Option<Grouping>,
 }
 
+/// Nodes of a long record whose samples determine its initial state, which later ones do not change, and its smoothing.
+const MOST_NODES: usize = 20_000;
+
 /// Initial state of each experiment, estimated from its samples; `None` if they are too few or start later.
 pub fn estimate_states(problem: &Problem) -> Vec<Option<State>> {
     let start = problem.start();
     let scalars = problem.scalars(&start);
+    let initial = |experiment: &Experiment| Kinematics::of(problem, experiment, scalars)?.initial;
     (problem.experiments.iter())
-        .map(|experiment| Kinematics::of(problem, experiment, scalars)?.initial)
+        .map(|experiment| match experiment.nodes > MOST_NODES {
+            true => initial(&beginning(experiment)),
+            false => initial(experiment),
+        })
         .collect()
+}
+
+/// The samples of an experiment on its first [`MOST_NODES`] nodes.
+fn beginning(experiment: &Experiment) -> Experiment {
+    let channels = experiment.channels.iter();
+    Experiment {
+        channels: channels.filter_map(|c| c.within(MOST_NODES - 1)).collect(),
+        ..Experiment::free(&*experiment.name, experiment.initial, MOST_NODES)
+    }
 }
 
 impl Kinematics {

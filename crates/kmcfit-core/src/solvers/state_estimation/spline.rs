@@ -6,7 +6,7 @@
 //! `omega^4 / (omega^4 + omega_0^4)`.
 
 use super::stencil::weights;
-use super::{Kinematics, noise_of, unsensed};
+use super::{Kinematics, MOST_NODES, noise_of, unsensed};
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 use crate::record::{Channel, ChannelKind, Experiment, Weighting};
@@ -182,52 +182,100 @@ fn differences(x: f64, first: usize, step: f64) -> [Vec<f64>; 3] {
     [value, slope, curvature]
 }
 
-/// Displacement at the nodes.
+/// Displacement at the nodes, smoothed as much as the noise allows; in a long record, as much as that of its first [`MOST_NODES`] nodes.
 fn curve(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> Option<Vec<f64>> {
-    let mut sub = Subproblem::new(nodes);
-    sub.elimination_order = (0..nodes as u32).collect();
-    let mut count = 0.0;
-    for plain in channels {
-        for (i, (place, value)) in plain.channel.places().iter().zip(&plain.values).enumerate() {
-            let x = place.step as f64 + place.fraction;
-            let first = first_point(*place, nodes);
-            let weight = 1.0 / plain.noise_at(i);
-            let row = &differences(x, first, step)[plain.order()];
-            let row = row.iter().enumerate().map(|(j, w)| (first + j, weight * w));
-            sub.residuals
-                .push(row.filter(|(_, w)| *w != 0.0), weight * value);
-            count += 1.0;
+    let part = Equations::of(channels, nodes.min(MOST_NODES), step, ridge);
+    let (weight, curve) = part.smoothest(ridge)?;
+    match nodes > MOST_NODES {
+        true => Equations::of(channels, nodes, step, ridge).smooth(weight),
+        false => Some(curve),
+    }
+}
+
+/// Equations for the displacement at the nodes.
+struct Equations {
+    program: Subproblem,
+    nodes: usize,
+    samples: usize,
+}
+
+impl Equations {
+    /// Equations of the samples at the first `nodes` nodes, and of the ridge term.
+    fn of(channels: &[Plain], nodes: usize, step: f64, ridge: Option<Ridge>) -> Self {
+        let mut program = Subproblem::new(nodes);
+        program.elimination_order = (0..nodes as u32).collect();
+        for plain in channels {
+            let places = plain.channel.places().iter();
+            let inside = places.take_while(|place| place.step + 1 < nodes);
+            for (i, (place, value)) in inside.zip(&plain.values).enumerate() {
+                let x = place.step as f64 + place.fraction;
+                let first = first_point(*place, nodes);
+                let weight = 1.0 / plain.noise_at(i);
+                let row = &differences(x, first, step)[plain.order()];
+                let row = row.iter().enumerate().map(|(j, w)| (first + j, weight * w));
+                (program.residuals).push(row.filter(|(_, w)| *w != 0.0), weight * value);
+            }
+        }
+        let samples = program.residuals.len();
+        if let Some(ridge) = ridge {
+            // Weighted like the samples, as if there were as many as nodes.
+            let share = (samples as f64 / nodes as f64).sqrt();
+            for i in 0..nodes {
+                program.residuals.push([(i, ridge.root * share)], 0.0);
+            }
+        }
+        Self {
+            program,
+            nodes,
+            samples,
         }
     }
-    let samples = sub.residuals.len();
-    if let Some(ridge) = ridge {
-        // Weighted like the samples, as if there were as many as nodes.
-        let share = (count / nodes as f64).sqrt();
-        for i in 0..nodes {
-            sub.residuals.push([(i, ridge.root * share)], 0.0);
-        }
-    }
-    let misfit = |candidate: &[f64]| -> f64 {
-        let fitted = sub.residuals.multiply(candidate);
-        let pairs = fitted.iter().zip(sub.residuals.right()).take(samples);
+
+    /// Squared distance of a curve from the samples, in their noise.
+    fn misfit(&self, curve: &[f64]) -> f64 {
+        let residuals = &self.program.residuals;
+        let fitted = residuals.multiply(curve);
+        let pairs = fitted.iter().zip(residuals.right()).take(self.samples);
         pairs.map(|(a, b)| (a - b) * (a - b)).sum()
-    };
-    let [mut low, mut high] = EXPONENTS;
-    // The ridge term may exceed the noise.
-    let mut best = smooth(&sub, nodes, 10f64.powf(low))?;
-    let bias = ridge.map_or(1.0, |r| r.bias.max(1.0));
-    let enough = (ALLOWED * misfit(&best)).max(count * bias * bias);
-    for _ in 0..ROUNDS {
-        let middle = 0.5 * (low + high);
-        let candidate = smooth(&sub, nodes, 10f64.powf(middle))?;
-        if misfit(&candidate) <= enough {
-            low = middle;
-            best = candidate;
-        } else {
-            high = middle;
-        }
     }
-    Some(best)
+
+    /// The largest weight that the noise allows, and its curve.
+    fn smoothest(&self, ridge: Option<Ridge>) -> Option<(f64, Vec<f64>)> {
+        let [mut low, mut high] = EXPONENTS;
+        // The ridge term may exceed the noise.
+        let mut best = self.smooth(10f64.powf(low))?;
+        let bias = ridge.map_or(1.0, |r| r.bias.max(1.0));
+        let enough = (ALLOWED * self.misfit(&best)).max(self.samples as f64 * bias * bias);
+        for _ in 0..ROUNDS {
+            let middle = 0.5 * (low + high);
+            let candidate = self.smooth(10f64.powf(middle))?;
+            if self.misfit(&candidate) <= enough {
+                low = middle;
+                best = candidate;
+            } else {
+                high = middle;
+            }
+        }
+        Some((10f64.powf(low), best))
+    }
+
+    /// The curve with third differences in units of its size, so that the weight is dimensionless.
+    fn smooth(&self, weight: f64) -> Option<Vec<f64>> {
+        let mut program = self.program.clone();
+        let residuals = &mut program.residuals;
+        let scale = (0..residuals.len()).map(|i| residuals.scale(i));
+        let root = weight.sqrt() * scale.fold(0.0f64, f64::max);
+        for i in 0..self.nodes - 3 {
+            let row = [
+                (i, -root),
+                (i + 1, 3.0 * root),
+                (i + 2, -3.0 * root),
+                (i + 3, root),
+            ];
+            residuals.push(row, 0.0);
+        }
+        program.solve_equality_constrained()
+    }
 }
 
 impl Plain<'_> {
@@ -243,23 +291,6 @@ impl Plain<'_> {
 fn first_point(place: TimePoint, nodes: usize) -> usize {
     let nearest = place.step + usize::from(place.fraction > 0.5);
     nearest.saturating_sub(POINTS / 2).min(nodes - POINTS)
-}
-
-/// Adds third differences in units of the curve's size, so that the weight is dimensionless.
-fn smooth(sub: &Subproblem, nodes: usize, weight: f64) -> Option<Vec<f64>> {
-    let mut sub = sub.clone();
-    let scale = (0..sub.residuals.len()).map(|i| sub.residuals.scale(i));
-    let root = weight.sqrt() * scale.fold(0.0f64, f64::max);
-    for i in 0..nodes - 3 {
-        let row = [
-            (i, -root),
-            (i + 1, 3.0 * root),
-            (i + 2, -3.0 * root),
-            (i + 3, root),
-        ];
-        sub.residuals.push(row, 0.0);
-    }
-    sub.solve_equality_constrained()
 }
 
 /// Nodes near the samples of the channel with the most samples.

@@ -1,0 +1,110 @@
+//! The journal of a shard: its rows, and beside it its curves.
+
+use super::row::{Curve, Row};
+use super::shard::Shard;
+use crate::error::InputError;
+use crate::results::RowFile;
+use serde::Deserialize;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Time between two calls that make the rows durable.
+const SYNC: Duration = Duration::from_secs(5);
+
+/// The file of the rows of a shard.
+pub fn rows_path(folder: &Path, shard: Shard) -> PathBuf {
+    folder.join(format!("rows-{shard}.jsonl"))
+}
+
+/// The file of its curves.
+pub fn curves_path(folder: &Path, shard: Shard) -> PathBuf {
+    folder.join(format!("curves-{shard}.jsonl"))
+}
+
+/// The record of a line.
+#[derive(Deserialize)]
+pub struct LineName<'a> {
+    #[serde(borrow)]
+    pub record: std::borrow::Cow<'a, str>,
+}
+
+/// The record of a line of a journal.
+pub fn record_of(line: &str) -> io::Result<std::borrow::Cow<'_, str>> {
+    let name: LineName = serde_json::from_str(line)?;
+    Ok(name.record)
+}
+
+/// The journal of a shard. A record's curves are written before its row, so that a row has all of its curves; curves without a row are those
+/// of a process that was killed between the two, and have no effect.
+#[derive(Debug)]
+pub struct Journal {
+    rows: RowFile,
+    curves: RowFile,
+    synced: Instant,
+}
+
+impl Journal {
+    /// Opens or creates the journal, and hands the names of the records that have rows to `each`.
+    ///
+    /// # Errors
+    /// If another process works on the shard, or the files cannot be read or written to.
+    pub fn open(
+        folder: &Path,
+        shard: Shard,
+        mut each: impl FnMut(&str),
+    ) -> Result<Self, InputError> {
+        let open = |path: PathBuf, each: &mut dyn FnMut(&str)| {
+            let opened = RowFile::open(&path, |line| {
+                each(&record_of(line)?);
+                Ok(())
+            });
+            opened.map_err(|error| match error.kind() {
+                io::ErrorKind::WouldBlock => {
+                    InputError::file(&path, "another process works on this shard")
+                        .expected("one process for each shard")
+                        .hint("wait for it, or give each process a shard of its own")
+                }
+                _ => InputError::file(&path, "the rows cannot be read or written to")
+                    .found(error)
+                    .expected("a journal of a fleet that can be written to"),
+            })
+        };
+        Ok(Self {
+            rows: open(rows_path(folder, shard), &mut each)?,
+            curves: open(curves_path(folder, shard), &mut |_| {})?,
+            synced: Instant::now(),
+        })
+    }
+
+    /// Appends the results of a record.
+    ///
+    /// # Errors
+    /// Errors of the file system; the journal then lacks this row.
+    pub fn append(&mut self, row: &Row, curves: &[Curve]) -> io::Result<()> {
+        let line = |text: serde_json::Result<String>| Ok::<_, io::Error>(text? + "\n");
+        let mut text = String::new();
+        for curve in curves {
+            text += &line(serde_json::to_string(curve))?;
+        }
+        if !text.is_empty() {
+            self.curves.append(text.as_bytes())?;
+        }
+        self.rows
+            .append(line(serde_json::to_string(row))?.as_bytes())?;
+        if self.synced.elapsed() >= SYNC {
+            self.sync()?;
+        }
+        Ok(())
+    }
+
+    /// Makes the rows durable.
+    ///
+    /// # Errors
+    /// Errors of the file system.
+    pub fn sync(&mut self) -> io::Result<()> {
+        self.synced = Instant::now();
+        self.curves.sync()?;
+        self.rows.sync()
+    }
+}

@@ -1,0 +1,253 @@
+//! The page of a fleet.
+
+use super::collect::Collected;
+use super::figures::{histograms, trend_figure};
+use super::folder::FleetFolder;
+use super::statistics::{Distribution, Statistics};
+use super::summary::{between, counts, shown};
+use super::trend::Trend;
+use crate::number_format::significant;
+use crate::report::chart::Detail;
+use crate::report::page as shell;
+use crate::report::text::{escape, prose};
+use crate::report::{Figure, count};
+use kmcfit_core::internals::assessment::VerdictLevel::{Check, Inadequate};
+
+/// Most records in a table of the page.
+const MOST_ROWS: usize = 50;
+
+/// The page of a fleet.
+pub fn fleet_page(
+    title: &str,
+    folder: &FleetFolder,
+    collected: &Collected,
+    trend: &Trend,
+) -> String {
+    shell::within_limit(|detail| page_of(title, folder, collected, trend, detail))
+}
+
+fn page_of(
+    title: &str,
+    folder: &FleetFolder,
+    collected: &Collected,
+    trend: &Trend,
+    detail: Detail,
+) -> String {
+    let statistics = &collected.statistics;
+    let drawn = |figures: Vec<Figure>| shell::figures(&figures, detail);
+    let shown = shown(statistics);
+    let sections: Vec<shell::Section> = vec![
+        (
+            "outliers",
+            "Records that stand out",
+            outliers(folder, statistics),
+        ),
+        (
+            "distributions",
+            "Distribution of each estimate",
+            drawn(vec![histograms(&shown)].into_iter().flatten().collect()),
+        ),
+        (
+            "trend",
+            "Trend",
+            drawn(
+                shown
+                    .iter()
+                    .filter_map(|d| trend_figure(d, trend))
+                    .collect(),
+            ),
+        ),
+        ("verdicts", "Verdicts", verdicts(collected)),
+        ("errors", "Errors", errors(collected)),
+        ("reproduction", "Reproduction", reproduction(folder)),
+    ];
+    let above = format!(
+        "<p class=\"soft\">{}</p>\n",
+        escape(&folder.identity.model.display().to_string())
+    ) + &state(statistics);
+    let main = shown
+        .first()
+        .and_then(|d| trend_figure(d, trend))
+        .map(|figure| Figure {
+            name: "main".into(),
+            ..figure
+        });
+    let first = shell::screen(&above, &answers(&shown), main, detail);
+    shell::sectioned(title, &first, sections)
+}
+
+fn state(statistics: &Statistics) -> String {
+    let [_, check, inadequate] = statistics.verdicts;
+    let (colour, word) = match (statistics.errors + inadequate + statistics.missing, check) {
+        (0, 0) => ("good", "All adequate"),
+        (0, _) => ("warn", "To check"),
+        _ => ("bad", "Incomplete"),
+    };
+    let word = match (word, statistics.errors + statistics.missing) {
+        ("Incomplete", 0) => "Some inadequate",
+        _ => word,
+    };
+    shell::state_line(colour, word, &counts(statistics))
+}
+
+fn answers(shown: &[&Distribution]) -> String {
+    let rows: Vec<Vec<String>> = shown
+        .iter()
+        .map(|d| {
+            vec![
+                d.name.replace('_', " "),
+                significant(d.median, 5),
+                between(d.central95),
+                d.unit.clone(),
+                d.outliers.to_string(),
+            ]
+        })
+        .collect();
+    shell::table(
+        "Estimates over all records",
+        &[
+            "Estimate",
+            "Median",
+            "95 % of the records",
+            "Unit",
+            "Outliers",
+        ],
+        &rows,
+    )
+}
+
+fn outliers(folder: &FleetFolder, statistics: &Statistics) -> String {
+    let all = statistics.outliers.len();
+    let unit = |name: &str| {
+        let distribution = statistics.distributions.iter().find(|d| d.name == name);
+        distribution.map_or(String::new(), |d| d.unit.clone())
+    };
+    let rows: Vec<Vec<String>> = statistics
+        .outliers
+        .iter()
+        .take(MOST_ROWS)
+        .map(|o| {
+            vec![
+                o.record.clone(),
+                o.estimate.replace('_', " "),
+                significant(o.value, 5),
+                unit(&o.estimate),
+                significant(o.score, 3),
+            ]
+        })
+        .collect();
+    let meaning = match all {
+        0 => "No estimate lies more than 3.5 standard deviations from its median (modified z-score, Iglewicz and Hoaglin 1993).".to_owned(),
+        _ => format!(
+            "{}, whose farthest estimate lies more than 3.5 standard deviations from the median (modified z-score, Iglewicz and Hoaglin \
+             1993){}. `kmcfit fleet page {} RECORD` makes the page of a record.",
+            count(all, "record"),
+            if all > MOST_ROWS { format!("; the first {MOST_ROWS} are listed") } else { String::new() },
+            shell::shell_quoted(&folder.path.display().to_string()),
+        ),
+    };
+    let headings = [
+        "Record",
+        "Estimate",
+        "Value",
+        "Unit",
+        "Standard deviations from the median",
+    ];
+    shell::paragraph(&meaning)
+        + &shell::table("Records that stand out", &headings, &rows)
+        + &pages(folder, statistics.outliers.iter().map(|o| o.index))
+}
+
+/// Links to the pages that have been made.
+fn pages(folder: &FleetFolder, indices: impl Iterator<Item = usize>) -> String {
+    let made = indices.filter_map(|index| {
+        let name = page_folder(index);
+        let page = folder.path.join(&name).join("report.html");
+        page.is_file().then_some((index, name))
+    });
+    let links: String = made
+        .take(MOST_ROWS)
+        .map(|(index, name)| {
+            format!(
+                "<li><a href=\"{name}/report.html\">Page of record {}</a></li>\n",
+                index + 1
+            )
+        })
+        .collect();
+    match links.is_empty() {
+        true => String::new(),
+        false => format!("<ul>\n{links}</ul>\n"),
+    }
+}
+
+/// Records that are not adequate, the inadequate first.
+fn verdicts(collected: &Collected) -> String {
+    let of = |level| {
+        let verdicts = collected.verdicts.iter().enumerate();
+        verdicts
+            .filter(move |(_, verdict)| **verdict == Some(level))
+            .map(|(i, _)| i)
+    };
+    let rows: Vec<Vec<String>> = [(Inadequate, "Inadequate"), (Check, "Check")]
+        .into_iter()
+        .flat_map(|(level, word)| of(level).map(move |i| (i, word)))
+        .take(MOST_ROWS)
+        .map(|(i, word)| vec![collected.list.records[i].name.clone(), word.to_owned()])
+        .collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let text = format!(
+        "{}. The reasons stand in the column `warnings` of rows.parquet and in the rows.",
+        counts(&collected.statistics)
+    );
+    shell::paragraph(&text)
+        + &shell::table(
+            "Records that are not adequate",
+            &["Record", "Verdict"],
+            &rows,
+        )
+}
+
+fn errors(collected: &Collected) -> String {
+    let rows: Vec<Vec<String>> = collected
+        .errors
+        .iter()
+        .take(MOST_ROWS)
+        .map(|(record, error)| vec![record.clone(), error.clone()])
+        .collect();
+    shell::table("Records without estimates", &["Record", "Error"], &rows)
+}
+
+fn reproduction(folder: &FleetFolder) -> String {
+    let identity = &folder.identity;
+    let facts = [
+        format!("kmcfit {}", identity.version),
+        format!(
+            "model {} (SHA-256 {})",
+            identity.model.display(),
+            identity.model_sha256
+        ),
+        format!(
+            "{} (SHA-256 of the list {})",
+            count(identity.records, "record"),
+            identity.records_sha256
+        ),
+    ];
+    let overrides = identity
+        .overrides
+        .iter()
+        .map(|text| format!("--set {text}"));
+    let warm = identity.warm_start.then(|| "--warm-start".to_owned());
+    let facts: Vec<String> = facts.into_iter().chain(overrides).chain(warm).collect();
+    let items: String = facts
+        .iter()
+        .map(|fact| format!("<li>{}</li>\n", prose(fact)))
+        .collect();
+    format!("<ul>\n{items}</ul>\n")
+}
+
+/// The folder of the page of the record with an index, within that of its fleet.
+pub fn page_folder(index: usize) -> String {
+    format!("page-{:06}", index + 1)
+}

@@ -1,0 +1,118 @@
+//! Summary of a fleet in the terminal.
+
+use super::collect::Collected;
+use super::folder::FleetFolder;
+use super::statistics::{Distribution, Outlier, Statistics};
+use crate::number_format::significant;
+use crate::report::count;
+use std::fmt::Write;
+
+/// The summary for the terminal.
+pub fn fleet_summary(folder: &FleetFolder, collected: &Collected) -> String {
+    let statistics = &collected.statistics;
+    let mut text = format!("{}\n\n", counts(statistics));
+    let shown = shown(statistics);
+    if !shown.is_empty() {
+        let mut rows = vec![
+            [
+                "",
+                "median",
+                "middle half",
+                "95 % of records",
+                "unit",
+                "outliers",
+            ]
+            .map(String::from),
+        ];
+        rows.extend(shown.iter().map(|d| {
+            [
+                d.name.replace('_', " "),
+                significant(d.median, 5),
+                between(d.quartiles),
+                between(d.central95),
+                d.unit.clone(),
+                d.outliers.to_string(),
+            ]
+        }));
+        let widths: Vec<usize> = (0..6)
+            .map(|i| {
+                rows.iter()
+                    .map(|row| row[i].chars().count())
+                    .max()
+                    .unwrap_or(0)
+            })
+            .collect();
+        for row in &rows {
+            let cells = row
+                .iter()
+                .zip(&widths)
+                .map(|(cell, width)| format!("{cell:<width$}"));
+            let line = cells.collect::<Vec<_>>().join("  ");
+            let _ = writeln!(text, "{}", line.trim_end());
+        }
+        text.push('\n');
+    }
+    let outliers = statistics.outliers.iter().take(5);
+    for outlier in outliers {
+        let _ = writeln!(text, "outlier {}", outlier_in_words(outlier, statistics));
+    }
+    for (record, error) in collected.errors.iter().take(5) {
+        let _ = writeln!(text, "error   {record}: {}", first_line(error));
+    }
+    let _ = writeln!(text, "results in {}", folder.path.display());
+    text
+}
+
+fn outlier_in_words(outlier: &Outlier, statistics: &Statistics) -> String {
+    let distribution = statistics
+        .distributions
+        .iter()
+        .find(|d| d.name == outlier.estimate);
+    let unit = distribution.map_or("", |d| d.unit.as_str());
+    format!(
+        "{}: {} {} {unit}, {} standard deviations from the median",
+        outlier.record,
+        outlier.estimate.replace('_', " "),
+        significant(outlier.value, 5),
+        significant(outlier.score, 2)
+    )
+}
+
+fn first_line(text: &str) -> &str {
+    text.lines().next().unwrap_or_default()
+}
+
+/// Estimates that differ between records.
+pub(super) fn shown(statistics: &Statistics) -> Vec<&Distribution> {
+    statistics
+        .distributions
+        .iter()
+        .filter(|d| !d.is_constant())
+        .collect()
+}
+
+pub(super) fn between([low, high]: [f64; 2]) -> String {
+    format!("{} to {}", significant(low, 5), significant(high, 5))
+}
+
+/// Numbers of records, verdicts, errors and missing rows.
+pub(super) fn counts(statistics: &Statistics) -> String {
+    let [adequate, check, inadequate] = statistics.verdicts;
+    let mut parts = vec![
+        count(statistics.records, "record"),
+        format!("{adequate} Adequate"),
+        format!("{check} Check"),
+        format!("{inadequate} Inadequate"),
+        count(statistics.errors, "error"),
+    ];
+    if statistics.time_limits > 0 {
+        parts.push(format!(
+            "of these {} by the time limit",
+            statistics.time_limits
+        ));
+    }
+    if statistics.missing > 0 {
+        parts.push(format!("{} without a row yet", statistics.missing));
+    }
+    parts.join(", ")
+}
