@@ -19,7 +19,7 @@ use std::time::Duration;
 #[command(
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    after_help = "Examples:\n  kmcfit fleet model.yaml \"records/*.csv\" --out fleets/bridge\n  kmcfit fleet model.yaml records.csv --out fleets/bridge --shard 2/10\n  kmcfit fleet collect fleets/bridge\n\nThe same command again goes on after the rows that are written."
+    after_help = "Examples:\n  kmcfit fleet model.yaml \"records/*.csv\" --out fleets/bridge\n  kmcfit fleet model.yaml records.csv --out fleets/bridge --shard 2/10\n  kmcfit fleet collect fleets/bridge\n\nThe same command again continues after the rows that are written."
 )]
 pub struct Arguments {
     #[command(subcommand)]
@@ -155,7 +155,7 @@ fn fit(arguments: &Arguments, model: &Path, out: &Path) -> Result<u8, CommandErr
         say(
             "note",
             format!(
-                "{rows} of {} records have their row; the same command goes on after them",
+                "{rows} of {} records have their row; the same command continues after them",
                 done.all
             ),
         );

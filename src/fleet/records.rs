@@ -177,7 +177,7 @@ fn matches(pattern: &str) -> Result<Vec<Record>, InputError> {
             .expected("a pattern such as \"records/*.csv\"")
     };
     let paths =
-        glob::glob(pattern).map_err(|error| wrong("this is no pattern").hint(error.to_string()))?;
+        glob::glob(pattern).map_err(|error| wrong("the pattern cannot be read").hint(error.to_string()))?;
     let mut records = Vec::new();
     for path in paths.filter_map(Result::ok).filter(|path| path.is_file()) {
         match path.to_str() {

@@ -115,7 +115,7 @@ pub fn run(
         return Err(InputError::file(&folder.path, "a row cannot be written")
             .found(error)
             .expected("room for the rows")
-            .hint("the same command goes on after the rows that are written"));
+            .hint("the same command continues after the rows that are written"));
     }
     Ok(RunSummary {
         before,
