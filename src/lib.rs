@@ -36,6 +36,7 @@ mod memory;
 #[cfg(test)]
 mod message_list_tests;
 mod number_format;
+mod reading_share;
 pub mod report;
 pub mod results;
 mod source_snippet;

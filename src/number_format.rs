@@ -1,6 +1,6 @@
 //! Numbers as people write them in a sentence.
 
-pub(crate) use kmcfit_core::internals::number_format::significant;
+pub(crate) use kmcfit_core::internals::number_format::{at_most, significant};
 
 /// A ratio with one decimal, or four significant digits if it is large.
 pub(crate) fn times_in_words(times: f64) -> String {

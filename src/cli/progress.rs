@@ -2,9 +2,11 @@
 
 use crate::escape::harmless;
 use crate::faults::{self, Operation};
+use crate::reading_share;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use kmcfit_core::internals::solvers::{IterationEvent, Stopping};
 use std::cell::Cell;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Mutex, PoisonError};
 use std::thread::{Builder, JoinHandle};
@@ -15,9 +17,13 @@ const DELAY: Duration = Duration::from_secs(1);
 /// Time between updates of the elapsed time.
 const TICK: Duration = Duration::from_millis(500);
 
-/// Line of a stage, and of one with jobs.
+/// Line of a stage, of one that reads a table, and of one with jobs.
 const STAGE: &str = "{msg}  {elapsed}";
+const READING: &str = "{msg}  {bar:24} {percent} % of {total_bytes}  {elapsed}";
 const JOBS: &str = "{msg}  {bar:24} {pos}/{len}  {elapsed}, about {eta} remaining";
+
+/// Finished jobs and all jobs of the current list.
+static DONE: [AtomicUsize; 2] = [const { AtomicUsize::new(0) }; 2];
 
 /// The line that shows the jobs of the numerics.
 static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
@@ -75,9 +81,26 @@ fn update(bar: &ProgressBar, target: ProgressDrawTarget, ended: &Receiver<()>) {
         return;
     }
     bar.set_draw_target(target);
-    bar.tick();
-    while goes_on(TICK) {
+    let mut is_reading = false;
+    let mut show = || {
+        match (reading_share::get(), is_reading) {
+            (Some([read, all]), _) => {
+                bar.set_style(style(READING));
+                bar.set_length(all);
+                bar.set_position(read);
+                is_reading = true;
+            }
+            (None, true) => {
+                bar.set_style(style(STAGE));
+                is_reading = false;
+            }
+            (None, false) => {}
+        }
         bar.tick();
+    };
+    show();
+    while goes_on(TICK) {
+        show();
     }
 }
 
@@ -95,6 +118,11 @@ impl Drop for Activity {
 
 /// Shows the number of finished jobs of all in the line of the current [`Activity`].
 pub fn show_jobs(done: usize, all: usize) {
+    // The largest number is that of the threads that report out of order.
+    match DONE[1].swap(all, Ordering::Relaxed) == all && done > 1 {
+        true => DONE[0].fetch_max(done, Ordering::Relaxed),
+        false => DONE[0].swap(done, Ordering::Relaxed),
+    };
     let shown = SHOWN.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(bar) = shown.as_ref() else {
         return;
@@ -109,6 +137,18 @@ pub fn show_jobs(done: usize, all: usize) {
     }
     // Threads report out of order.
     bar.set_position(done.max(bar.position()));
+}
+
+/// Forgets the jobs of earlier lists.
+pub fn forget_jobs() {
+    DONE.iter()
+        .for_each(|count| count.store(0, Ordering::Relaxed));
+}
+
+/// Finished jobs and all jobs of the last list; `None` without one.
+pub fn jobs() -> Option<[usize; 2]> {
+    let counts = [0, 1].map(|i: usize| DONE[i].load(Ordering::Relaxed));
+    (counts[1] > 0).then_some(counts)
 }
 
 fn style(template: &str) -> ProgressStyle {

@@ -2,7 +2,7 @@
 
 use super::compare::open_analyses;
 use super::fit::search;
-use super::progress::{Activity, Progress};
+use super::progress::{self, Activity, Progress};
 use super::{CommandError, unwritable};
 use crate::config::{Model, ModelFile};
 use crate::report::study::{
@@ -245,8 +245,17 @@ impl StudyRun<'_> {
             self.model.study.analyses()
         );
         let activity = Activity::begin(stage);
+        progress::forget_jobs();
         let found = self.journal.analysis(name, compute, whole)?;
         drop(activity);
+        if found.is_none() {
+            let done = progress::jobs().map(|[done, all]| format!(" after {done} of {all} jobs"));
+            let reason = format!(
+                "interrupted{}; none of its results is used, and `kmcfit resume` begins it again",
+                done.unwrap_or_default()
+            );
+            self.fail(name, &reason);
+        }
         found.ok_or(StudyError::Interrupted)
     }
 

@@ -69,7 +69,7 @@ pub fn fit_record(
         return Some(failed(text));
     }
     match result {
-        Ok(Ok(_)) | Ok(Err(_)) if limits.interrupt.load(Ordering::Relaxed) => None,
+        Ok(Ok(_) | Err(_)) if limits.interrupt.load(Ordering::Relaxed) => None,
         Ok(Ok(mut found)) => {
             found.row.seconds = seconds;
             Some(found)

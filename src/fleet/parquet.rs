@@ -75,7 +75,7 @@ impl<'a> ParquetWriter<'a> {
             let cell = cells.next().unwrap_or(Cell::Null);
             match (values, cell) {
                 (Values::Numbers(list), Cell::Number(x)) => {
-                    list.push(Some(x).filter(|x| !x.is_nan()))
+                    list.push(Some(x).filter(|x| !x.is_nan()));
                 }
                 (Values::Texts(list), Cell::Text(text)) => list.push(Some(text)),
                 (Values::Numbers(list), _) => list.push(None),

@@ -180,8 +180,8 @@ fn matches(pattern: &str) -> Result<Vec<Record>, InputError> {
             .found(quote(pattern))
             .expected("a pattern such as \"records/*.csv\"")
     };
-    let paths =
-        glob::glob(pattern).map_err(|error| wrong("not a pattern").hint(error.to_string()))?;
+    let paths = glob::glob(pattern)
+        .map_err(|error| wrong("the pattern cannot be read").hint(error.to_string()))?;
     let mut records = Vec::new();
     for path in paths.filter_map(Result::ok).filter(|path| path.is_file()) {
         match path.to_str() {

@@ -136,31 +136,35 @@ impl Jobs {
     fn of(list: &RecordList, options: &RunOptions) -> Self {
         let count = u32::try_from(list.records.len()).unwrap_or(u32::MAX);
         let mut order: Vec<u32> = (0..count).collect();
-        let mut blocks: Vec<Range<usize>> = Vec::new();
-        let single = |i: usize| i..i + 1;
-        if !options.warm_start {
-            blocks.extend((0..order.len()).map(single));
-        } else {
-            let mut first: HashMap<&str, usize> = HashMap::new();
-            for record in &list.records {
-                let next = first.len();
-                first.entry(&record.system).or_insert(next);
-            }
-            let system = |i: &u32| first[list.records[*i as usize].system.as_str()];
-            order.sort_by_key(system);
-            let mut begin = 0;
-            for group in order.chunk_by(|a, b| system(a) == system(b)) {
-                let end = begin + group.len();
-                let starts = (begin..end).step_by(BLOCK);
-                blocks.extend(starts.map(|start| start..end.min(start + BLOCK)));
-                begin = end;
-            }
-        }
+        let blocks = match options.warm_start {
+            false => (0..order.len()).map(|i| i..i + 1).collect(),
+            true => Self::blocks_of_systems(list, &mut order),
+        };
         Self {
             order,
             blocks,
             shard: options.shard,
         }
+    }
+
+    /// Sorts the records by their systems, in the order of the first record of each; blocks within one system.
+    fn blocks_of_systems(list: &RecordList, order: &mut [u32]) -> Vec<Range<usize>> {
+        let mut first: HashMap<&str, usize> = HashMap::new();
+        for record in &list.records {
+            let next = first.len();
+            first.entry(&record.system).or_insert(next);
+        }
+        let system = |i: &u32| first[list.records[*i as usize].system.as_str()];
+        order.sort_by_key(system);
+        let mut blocks = Vec::new();
+        let mut begin = 0;
+        for group in order.chunk_by(|a, b| system(a) == system(b)) {
+            let end = begin + group.len();
+            let starts = (begin..end).step_by(BLOCK);
+            blocks.extend(starts.map(|start| start..end.min(start + BLOCK)));
+            begin = end;
+        }
+        blocks
     }
 
     /// Indices of the records of each block of the shard.

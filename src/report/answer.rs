@@ -180,7 +180,7 @@ fn fixed_name(document: &ResultDocument) -> Option<&str> {
 /// A quantity in words: `stiffness k`, `damping c of first`.
 pub fn quantity(name: &str) -> String {
     let ratio = match name {
-        "natural_frequency" => "natural frequency",
+        "natural_frequency" => "undamped natural frequency",
         "damping_ratio" => "damping ratio",
         "k_over_m" => "stiffness / mass",
         "c_over_m" => "damping / mass",
@@ -199,9 +199,14 @@ pub fn quantity(name: &str) -> String {
     };
     let kind = CoefficientKind::ALL.into_iter().find(|k| k.name() == first);
     match kind {
-        Some(kind) => format!("{} {}{owner}", first.replace('_', " "), kind.symbol()),
+        Some(kind) => format!("{} {}{owner}", in_words(first), kind.symbol()),
         None => name.replace('_', " "),
     }
+}
+
+/// Name of a coefficient in words: `cubic stiffness`, `Coulomb friction`.
+pub fn in_words(name: &str) -> String {
+    name.replace('_', " ").replace("coulomb", "Coulomb")
 }
 
 /// The table as text.

@@ -41,7 +41,7 @@ impl FittedModel<'_> {
         let problem = &self.model.problem;
         let mut summary = IdentifiabilitySummary {
             parameters: problem.parameters(),
-            assumptions: assumptions(problem),
+            assumptions: assumptions(self.model),
             covariance: (self.run_assessment.bands())
                 .map(|bands| bands.covariance_kind)
                 .or(self.large_covariance().map(|large| large.kind))

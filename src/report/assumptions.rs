@@ -1,11 +1,13 @@
 //! Assumptions of a model besides its samples, as text.
 
-use kmcfit_core::internals::functions::Basis;
+use crate::config::Model;
+use kmcfit_core::internals::functions::{Basis, CoefficientFunction};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Experiment};
 
 /// Assumptions: records, fixed functions, bases with few parameters, constraints, smoothness.
-pub fn assumptions(problem: &Problem) -> Vec<String> {
+pub fn assumptions(model: &Model) -> Vec<String> {
+    let problem = &model.problem;
     let mut known = vec![records(problem)];
     for function in problem.functions.iter() {
         let name = function.name();
@@ -18,7 +20,8 @@ pub fn assumptions(problem: &Problem) -> Vec<String> {
             }),
         }
     }
-    known.extend(problem.constraints.groups.iter().map(|g| g.name.clone()));
+    let groups = problem.constraints.groups.iter();
+    known.extend(groups.map(|group| with_unit(model, &group.name)));
     known.extend(problem.constraints.cones.iter().map(|c| c.name.clone()));
     for penalty in &problem.penalties {
         let name = problem.functions.get(penalty.function).name();
@@ -38,6 +41,23 @@ pub fn assumptions(problem: &Problem) -> Vec<String> {
     }
     known.extend(problem.soft.iter().map(|g| format!("{} (soft)", g.name)));
     known
+}
+
+/// The name of a bound of a function, `mass >= 0.003`, with its unit; other names, and a bound of zero, unchanged.
+fn with_unit(model: &Model, name: &str) -> String {
+    let is_number = |text: &str| text.parse::<f64>().is_ok_and(|x| x != 0.0);
+    let bounds = |function: &&CoefficientFunction| {
+        let rest = name.strip_prefix(&function.name());
+        let limit = rest.and_then(|rest| {
+            [" >= ", " <= ", " = "]
+                .iter()
+                .find_map(|sign| rest.strip_prefix(sign))
+        });
+        limit.is_some_and(is_number)
+    };
+    let unit = model.problem.functions.iter().find(bounds);
+    let unit = unit.map_or("", |function| model.unit(function));
+    format!("{name} {unit}").trim_end().to_owned()
 }
 
 fn basis_in_words(basis: &Basis) -> &str {

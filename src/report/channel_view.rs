@@ -7,7 +7,7 @@ use super::record_figures::{self, InputSeries, SeriesPair, frequency_response, s
 use crate::config::ChannelNote;
 use crate::units::Unit;
 use kmcfit_core::internals::diagnostics::{ResidualDiagnostics, Whiteness};
-use kmcfit_core::internals::record::Channel;
+use kmcfit_core::internals::record::{Channel, Weighting};
 use kmcfit_core::internals::signal::even_spacing;
 
 /// A channel, its prediction, and its notes for reports.
@@ -38,6 +38,14 @@ impl ChannelView<'_> {
     pub fn unit(&self) -> &'static str {
         self.shown()
             .map_or(self.channel.kind().unit(), |unit| unit.symbol())
+    }
+
+    /// Standard deviation of a sample in this unit; `None` if it differs between samples, and without one.
+    pub fn sigma(&self) -> Option<f64> {
+        match self.channel.weighting() {
+            Weighting::Sigma(sigma) | Weighting::Estimated { sigma } => Some(sigma / self.factor()),
+            Weighting::Sigmas(_) | Weighting::Integral { .. } | Weighting::Trapezoid(_) => None,
+        }
     }
 
     fn scaled(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
@@ -79,6 +87,7 @@ impl ChannelView<'_> {
                 label,
                 times,
                 &self.residuals(),
+                self.sigma(),
                 &whiteness(self.channel, &self.diagnostics.whiteness),
             ),
         ]
@@ -91,11 +100,13 @@ impl ChannelView<'_> {
             Some(_) => "innovations",
         };
         let residuals = self.channel.innovations(self.predicted);
-        record_figures::residual_tests(name, &residuals, self.diagnostics)
+        let result = whiteness(self.channel, &self.diagnostics.whiteness);
+        record_figures::residual_tests(name, &residuals, self.diagnostics, &result)
     }
 
-    /// Figures of the spectra, and of the frequency response to an only input at the samples; none for samples at unequal times.
-    pub fn spectra(&self, inputs: &[InputSeries]) -> Vec<Figure> {
+    /// Figures of the spectra, and of the frequency response to an only input at the samples, with the undamped natural frequency
+    /// `mark`; none for samples at unequal times.
+    pub fn spectra(&self, inputs: &[InputSeries], mark: Option<f64>) -> Vec<Figure> {
         let Some(spacing) = even_spacing(self.channel.times()) else {
             return Vec::new();
         };
@@ -109,10 +120,10 @@ impl ChannelView<'_> {
         };
         // With several inputs the ratio to one of them is no frequency response.
         let response = match inputs {
-            [input] => frequency_response(&pair, input),
+            [input] => frequency_response(&pair, input, mark),
             _ => None,
         };
-        spectrum(&pair).into_iter().chain(response).collect()
+        spectrum(&pair, mark).into_iter().chain(response).collect()
     }
 
     /// Table of samples and prediction, in the unit of the file.

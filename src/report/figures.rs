@@ -1,7 +1,7 @@
 //! The standard figures of a fit, from plain slices.
 
 use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
-use crate::number_format::significant;
+use crate::number_format::at_most;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
@@ -60,16 +60,28 @@ pub fn channel((label, unit): (&str, &str), t: &[f64], observed: &[f64], model: 
     .panel(Panel::of_time(label, unit).marks([samples, Mark::line("model", t, model, line)]))
 }
 
-/// The residuals of a channel against time; `description` says what their test of whiteness gave.
+/// The residuals of a channel against time with twice their standard deviation `sigma`, where it is one for all; `description` says
+/// what their test of autocorrelation gave.
 pub fn residuals(
     (label, unit): (&str, &str),
     t: &[f64],
     residuals: &[f64],
+    sigma: Option<f64>,
     description: &str,
 ) -> Figure {
     let dots = Mark::points("", t, residuals, dots(Colour::Blue, t.len()));
-    Figure::new("residuals", "Residuals", description)
-        .panel(Panel::of_time(format!("{label}, measured - model"), unit).mark(dots))
+    let dashed = Style::new(Colour::Black).dash(Dash::Dashed).width(1.0);
+    let bounds = sigma.into_iter().flat_map(|sigma| {
+        [
+            Mark::horizontal("±2 sigma", 2.0 * sigma, dashed),
+            Mark::horizontal("", -2.0 * sigma, dashed),
+        ]
+    });
+    Figure::new("residuals", "Residuals", description).panel(
+        Panel::of_time(format!("{label}, measured - model"), unit)
+            .mark(dots)
+            .marks(bounds),
+    )
 }
 
 /// Cost J/J₀ and squared gradient norm G²/G₀² against the iteration, both relative to the start;
@@ -179,7 +191,7 @@ impl<'a> FunctionCurve<'a> {
         if is_visible || half_width == 0.0 {
             return label.into();
         }
-        let percent = significant(100.0 * half_width / range.0.abs().max(range.1.abs()), 2);
+        let percent = at_most(100.0 * half_width / range.0.abs().max(range.1.abs()), 2);
         let symbol = self.name.split(' ').next_back().unwrap_or_default();
         format!("{label}, at most ±{percent} % of max {symbol}")
     }

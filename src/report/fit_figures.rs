@@ -79,7 +79,12 @@ impl FittedModel<'_> {
     /// Spectra of a channel, and its frequency response where one input acts.
     pub(super) fn channel_spectra(&self, experiment: usize, channel: usize) -> Vec<Figure> {
         let view = self.channel_view(experiment, channel);
-        view.spectra(&self.inputs(experiment, view.channel.times()))
+        let estimates = self.estimates().0;
+        let mut frequency = estimates
+            .iter()
+            .filter(|(name, _)| name == "natural_frequency");
+        let frequency = frequency.next().map(|(_, estimate)| estimate.value);
+        view.spectra(&self.inputs(experiment, view.channel.times()), frequency)
     }
 
     /// Tests of the residuals of a channel.
@@ -136,7 +141,15 @@ impl FittedModel<'_> {
             let times = self.channel_view(e, c).channel.times();
             let inputs = self.inputs(e, times);
             let figure = record_figures::input(times, &inputs);
-            (!inputs.is_empty()).then(|| self.titled(figure, e, c))
+            (!inputs.is_empty()).then(|| {
+                let mut figure = figure;
+                figure.name += &self.suffix(e, c);
+                let record = &self.model.problem.experiments[e];
+                if self.model.problem.experiments.len() > 1 {
+                    figure.title += &format!(" of {}", record.name);
+                }
+                figure
+            })
         });
         figures.collect()
     }

@@ -17,10 +17,6 @@ pub fn channel(view: &ChannelView) -> ChannelSummary {
     let (channel, note, predicted) = (view.channel, view.note, view.predicted);
     let factor = view.factor();
     let diagnostics = view.diagnostics;
-    let sigma = match channel.weighting() {
-        Weighting::Sigma(sigma) | Weighting::Estimated { sigma } => Some(sigma / factor),
-        Weighting::Sigmas(_) | Weighting::Integral { .. } | Weighting::Trapezoid(_) => None,
-    };
     let residuals: Vec<f64> = channel.residuals(predicted).collect();
     ChannelSummary {
         kind: channel.kind().name().into(),
@@ -36,7 +32,7 @@ pub fn channel(view: &ChannelView) -> ChannelSummary {
         outliers: outliers(channel, &residuals).len(),
         rms_residual: diagnostics.rms / factor,
         fit_percent: diagnostics.fit_percent,
-        sigma,
+        sigma: view.sigma(),
         sigma_estimated: matches!(channel.weighting(), Weighting::Estimated { .. }),
         noise: channel.correlation().map(noise),
         robust: channel.loss() != Loss::Squares,

@@ -27,6 +27,7 @@ mod csv;
 mod display_units;
 pub mod document;
 mod equation;
+mod extent;
 pub mod figures;
 pub(crate) mod findings;
 mod fit_assessment;

@@ -1,7 +1,8 @@
 //! Figures of one record: residual tests, spectra, frequency response and input.
 
 use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
-use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
+use super::text::count;
+use kmcfit_core::internals::diagnostics::{ResidualDiagnostics, SIGNIFICANCE};
 use kmcfit_core::internals::signal::{Mobility, Spectrum};
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -32,11 +33,13 @@ pub(super) struct InputSeries {
 }
 
 /// Autocorrelation of the residuals with the bounds that 95 % of the lags of white noise keep, and the quantiles of the residuals
-/// relative to their standard deviation against those of the normal distribution. `name` is `residuals` or `innovations`.
+/// relative to their standard deviation against those of the normal distribution. `name` is `residuals` or `innovations`, `result` that
+/// of the test of autocorrelation.
 pub(super) fn residual_tests(
     name: &str,
     residuals: &[f64],
     diagnostics: &ResidualDiagnostics,
+    result: &str,
 ) -> Option<Figure> {
     let quantiles = normal_quantiles(residuals)?;
     let lags = 0..diagnostics.autocorrelation.len();
@@ -48,7 +51,7 @@ pub(super) fn residual_tests(
         Axis::linear("autocorrelation", ""),
     )
     .marks([
-        Mark::horizontal("95 % of white noise", diagnostics.band, bound),
+        Mark::horizontal("95 % bounds", diagnostics.band, bound),
         Mark::horizontal("", -diagnostics.band, bound),
         Mark::stems(name, &lags, &diagnostics.autocorrelation, stem),
     ]);
@@ -69,8 +72,10 @@ pub(super) fn residual_tests(
             "residual_tests",
             "Residual tests",
             format!(
-                "Left: autocorrelation of the {name}. Right: the {name}, divided by their standard deviation, in order \
-                 of size against the quantiles of the normal distribution."
+                "Left: autocorrelation of the {name}; without any, 95 % of the lags are within the bounds. Ljung-Box test of {}, \
+                 significance level {SIGNIFICANCE}: {result}. Right: the {name}, divided by their standard deviation, in order \
+                 of size against the quantiles of the normal distribution.",
+                count(diagnostics.autocorrelation.len().saturating_sub(1), "lag"),
             ),
         )
         .columns(2)
@@ -103,8 +108,19 @@ fn normal_quantiles(residuals: &[f64]) -> Option<[Vec<f64>; 2]> {
     Some([normal.collect(), sorted])
 }
 
-/// Power spectral densities of the samples, of the fitted response and of the residuals; `None` where the samples have no spectrum.
-pub(super) fn spectrum(pair: &SeriesPair) -> Option<Figure> {
+/// A line at the undamped natural frequency, where it is on the axis.
+fn natural_frequency(mark: Option<f64>, frequencies: &[f64]) -> Option<Mark> {
+    let [first, .., last] = frequencies else {
+        return None;
+    };
+    let style = Style::new(Colour::Green).dash(Dash::DashDot).width(1.2);
+    let inside = mark.filter(|f| (*first..=*last).contains(f))?;
+    Some(Mark::vertical("undamped natural frequency", inside, style))
+}
+
+/// Power spectral densities of the samples, of the fitted response and of the residuals, with the undamped natural frequency `mark`;
+/// `None` where the samples have no spectrum.
+pub(super) fn spectrum(pair: &SeriesPair, mark: Option<f64>) -> Option<Figure> {
     let (name, unit) = pair.label;
     let residuals: Vec<f64> = pair
         .measured
@@ -141,7 +157,9 @@ pub(super) fn spectrum(pair: &SeriesPair) -> Option<Figure> {
         Axis::log("power spectral density", density_unit(unit)),
         measured.density().iter().skip(1).copied(),
     );
-    let panel = Panel::new(over(&frequencies), y).marks(marks.into_iter().flatten());
+    let panel = Panel::new(over(&frequencies), y)
+        .marks(marks.into_iter().flatten())
+        .marks(natural_frequency(mark, &frequencies));
     Some(
         Figure::new(
             "spectra",
@@ -170,7 +188,11 @@ fn factor(unit: &str) -> String {
 
 /// Frequency responses of samples and fitted response to the input, and the coherence of samples and of residuals with it; `None` for
 /// records too short for averages over segments.
-pub(super) fn frequency_response(pair: &SeriesPair, input: &InputSeries) -> Option<Figure> {
+pub(super) fn frequency_response(
+    pair: &SeriesPair,
+    input: &InputSeries,
+    mark: Option<f64>,
+) -> Option<Figure> {
     let (name, unit) = pair.label;
     let residuals: Vec<f64> = pair
         .measured
@@ -208,6 +230,7 @@ pub(super) fn frequency_response(pair: &SeriesPair, input: &InputSeries) -> Opti
         Mark::line("measured", &frequencies, &measured_size, grey),
         Mark::line("model", &frequencies, &model_size, Style::new(Colour::Blue)),
     ]);
+    let response = response.marks(natural_frequency(mark, &frequencies));
     let coherence = |label: &str, of: &Mobility, style: Style| {
         Some(Mark::line(
             label,
@@ -257,17 +280,23 @@ fn within(axis: Axis, values: impl Iterator<Item = f64>) -> Axis {
     axis.limits(0.5 * low, 2.0 * high)
 }
 
-/// Inputs against time, one panel each.
+/// Inputs against time, one panel each, titled by what is measured.
 pub(super) fn input(times: &[f64], inputs: &[InputSeries]) -> Figure {
     let style = Style::new(Colour::Green).width(1.2);
-    Figure::new(
-        "input",
-        "Input",
-        "The measured force or motion of the base at the samples of the response.",
-    )
-    .panels(inputs.iter().map(|input| {
-        Panel::of_time(input.label, input.unit).mark(Mark::line("", times, &input.samples, style))
-    }))
+    let title = match inputs {
+        [only] => only.label[..1].to_uppercase() + &only.label[1..],
+        _ => "Input".to_owned(),
+    };
+    Figure::new("input", title, "At the samples of the response.").panels(inputs.iter().map(
+        |input| {
+            Panel::of_time(input.label, input.unit).mark(Mark::line(
+                "",
+                times,
+                &input.samples,
+                style,
+            ))
+        },
+    ))
 }
 
 #[cfg(test)]
@@ -332,7 +361,7 @@ mod tests {
             unit: "N",
             samples: force,
         };
-        let figure = frequency_response(&pair, &input).expect("long enough");
+        let figure = frequency_response(&pair, &input, None).expect("long enough");
         let [measured, model] = [&marks(&figure, 0)[0].y, &marks(&figure, 0)[1].y];
         let worst = |values: &[f64], expected: f64| {
             values
@@ -354,7 +383,8 @@ mod tests {
                     measured: &pair.measured[..100],
                     ..pair
                 },
-                &input
+                &input,
+                None
             )
             .is_none()
         );
@@ -371,7 +401,7 @@ mod tests {
             measured: &measured,
             model: &model,
         };
-        let figure = spectrum(&pair).expect("it varies");
+        let figure = spectrum(&pair, None).expect("it varies");
         let mark = &marks(&figure, 0)[0];
         let sum = mark.y.iter().sum::<f64>() / (2000.0 * 0.02);
         let variance = measured.iter().map(|x| x * x).sum::<f64>() / 2000.0;
@@ -381,10 +411,13 @@ mod tests {
         // A response of zero has no spectrum; measured and residuals remain.
         assert_eq!(marks(&figure, 0).len(), 2);
         assert!(
-            spectrum(&SeriesPair {
-                measured: &model,
-                ..pair
-            })
+            spectrum(
+                &SeriesPair {
+                    measured: &model,
+                    ..pair
+                },
+                None
+            )
             .is_none()
         );
     }

@@ -1,14 +1,18 @@
 //! Summary of a fit for the terminal.
 
 use super::answer::answer_table;
-use super::document::{ChannelSummary, PenaltySummary, Prediction, ResultDocument};
+use super::document::{
+    ChannelSummary, NuisanceParameter, PenaltySummary, Prediction, ResultDocument,
+};
 use super::equation::equation_residual;
+use super::extent::{extent, validation};
 use super::findings;
 use super::model_assumptions::{MASS_UNKNOWN, UNITS_ASSUMED};
 use super::rule_names::rule_in_words;
 use super::suggestions;
+pub(crate) use super::text::count;
 use crate::finding::Finding;
-use crate::number_format::{resolved, significant};
+use crate::number_format::{at_most, resolved, significant};
 use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::identifiability::ClassificationKind;
 use std::fmt::Write;
@@ -35,18 +39,7 @@ fn write_answer(
     document: &ResultDocument,
     plot: Option<&str>,
 ) -> std::fmt::Result {
-    let samples = document
-        .experiments
-        .iter()
-        .map(|e| e.samples)
-        .sum::<usize>();
-    writeln!(
-        text,
-        "{}: {}, {} s",
-        document.title,
-        count(samples, "sample"),
-        significant(document.model.duration, 4)
-    )?;
+    writeln!(text, "{}: {}", document.title, extent(document))?;
     if let Some(verdict) = &document.verdict {
         writeln!(text, "{}", verdict.lines())?;
     }
@@ -152,7 +145,7 @@ fn write_details(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     write_statistics(text, document)?;
     writeln!(text)?;
     write_functions(text, document)?;
-    write_nuisance_parameters(text, document)?;
+    write_nuisance_parameters(text, &document.nuisance_parameters)?;
     write_constraints(text, document)?;
     write_attempts(text, document)
 }
@@ -179,9 +172,8 @@ fn fit(document: &ResultDocument) -> Vec<String> {
     if outliers > 0 {
         text += &format!("; {} rejected", count(outliers, "outlier"));
     }
-    let validation = document.validation.iter().flat_map(|e| &e.channels);
-    if let Some(worst) = validation.map(|c| c.fit_percent).reduce(f64::min) {
-        text += &format!("; validation records: {}", fit_percent(worst));
+    if let Some(result) = validation(document) {
+        text += &format!("; {result}");
     }
     let classical = document.classical.as_ref().map(findings::classical);
     std::iter::once(text).chain(classical).collect()
@@ -260,7 +252,7 @@ pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> 
         Some(half) => writeln!(
             text,
             "step-size check: halving the step changes the response by at most {} % of its peak",
-            significant(100.0 * half.change_per_sample, 2)
+            at_most(100.0 * half.change_per_sample, 2)
         ),
         None if !document.is_simulated() => Ok(()),
         None => writeln!(text, "step-size check: no response with half the step"),
@@ -270,9 +262,9 @@ pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> 
 /// Nuisance parameters with their confidence intervals.
 pub(super) fn write_nuisance_parameters(
     text: &mut String,
-    document: &ResultDocument,
+    parameters: &[NuisanceParameter],
 ) -> std::fmt::Result {
-    for parameter in &document.nuisance_parameters {
+    for parameter in parameters {
         let (name, unit) = (&parameter.name, &parameter.unit);
         match parameter.half_width() {
             Some(half) => {
@@ -308,14 +300,6 @@ pub(super) fn iterations(document: &ResultDocument) -> String {
     match what.is_empty() {
         true => all,
         false => format!("{all} ({last} in the final fit, {others} {what})"),
-    }
-}
-
-/// A count with its noun in the singular or plural.
-pub(crate) fn count(number: usize, thing: &str) -> String {
-    match number {
-        1 => format!("1 {thing}"),
-        _ => format!("{number} {thing}s"),
     }
 }
 

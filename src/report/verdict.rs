@@ -191,14 +191,30 @@ impl FittedModel<'_> {
             _ => String::new(),
         };
         let residuals = match problem.channels().all(|c| c.weighting().is_sigma()) {
-            true => format!("residuals are white{noise}; "),
-            false => String::new(),
+            true => vec![format!(
+                "no significant autocorrelation of the residuals{noise}"
+            )],
+            false => Vec::new(),
         };
-        let bases = match self.model.tests_bases {
-            true => "step-size, refinement and missing-term checks passed",
-            false => "step-size check passed",
+        let assessment = self.run_assessment.assessment.as_ref();
+        let tests = assessment.map(|a| &a.model_tests);
+        let checks = [
+            (self.run_assessment.step_check().is_some(), "step-size"),
+            (tests.is_some_and(|t| !t.bases.is_empty()), "refinement"),
+            (
+                tests.is_some_and(|t| !t.extensions.is_empty()),
+                "missing-term",
+            ),
+        ];
+        let names = checks.iter().filter(|(is_done, _)| *is_done);
+        let names: Vec<String> = names.map(|(_, name)| (*name).to_owned()).collect();
+        let checks = match names.as_slice() {
+            [] => None,
+            [only] => Some(format!("{only} check passed")),
+            several => Some(format!("{} checks passed", and_list(several))),
         };
-        residuals + bases
+        let parts: Vec<String> = residuals.into_iter().chain(checks).collect();
+        parts.join("; ")
     }
 
     /// Estimates of the fit, with an unknown mass as ratios to it; none where it failed.

@@ -6,6 +6,7 @@ use std::path::Path;
 use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::error::InputError;
+use crate::reading_share;
 
 /// A text prepared for the csv crate: runs of blanks replaced by tabs, leading lines removed.
 pub struct CsvText<'a> {
@@ -108,10 +109,13 @@ impl TableRows<'_> {
                 InputError::file(self.path, format!("the file cannot be read: {error}"))
             })?;
             if !more {
+                reading_share::set(0, 0);
                 return Ok(None);
             }
             let byte = record.position().map_or(0, csv::Position::byte);
-            let line = self.line_from(usize::try_from(byte).unwrap_or(usize::MAX));
+            let byte = usize::try_from(byte).unwrap_or(usize::MAX);
+            reading_share::set(byte, self.text.len());
+            let line = self.line_from(byte);
             let first = record.get(0).unwrap_or_default();
             let blank = record.len() == 1 && first.is_empty();
             if !blank && !first.starts_with('#') {

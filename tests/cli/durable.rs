@@ -167,8 +167,8 @@ fn a_study_whose_fit_is_ended() {
     }
 }
 
-/// A killed sequence continues within a fit; finished fits are kept, and results of older runs in its folders are not
-/// used.
+/// A sequence that Ctrl-C ends and one that is killed continue within a fit; finished fits are kept, and results of older runs in its folders
+/// are not used.
 #[test]
 #[cfg(unix)]
 fn a_sequence_whose_fit_is_ended() {
@@ -184,9 +184,17 @@ fn a_sequence_whose_fit_is_ended() {
     bench.write("models/sequence.yaml", sequence);
     let mut child = started(&bench, &["study", "models/sequence.yaml", "--out", "run"]);
     wait_for_line(&bench, "run/slow/fit.journal", 20);
+    signal(&child, "-INT");
+    assert_eq!(child.wait().expect("it ends").code(), Some(130));
+    let ended: serde_json::Value =
+        serde_json::from_str(&bench.read("run/slow/result.json")).expect("JSON");
+    assert_eq!(ended["outcome"]["status"], "interrupted");
+    assert!(bench.read("run/compare.html").contains("interrupted"));
+    let first = bench.read("run/paper/result.json");
+    let mut child = started(&bench, &["resume", "run"]);
+    wait_for_line(&bench, "run/slow/fit.journal", 60);
     child.kill().expect("a child");
     child.wait().expect("it ends");
-    let first = bench.read("run/paper/result.json");
     bench.run_to(0, &["resume", "run"]);
     assert_eq!(bench.read("run/paper/result.json"), first, "fitted again");
     assert!(bits(&bench, "run/slow") == bits(&bench, "whole"));

@@ -291,13 +291,13 @@ fn an_unknown_mass_leaves_ratios() {
     assert_eq!(cubic["estimates"].get("cubic_stiffness"), None);
     assert_snapshot!(bench.run_to(0, &["fit", "ring.yaml", "--out", "shown"]), @"
     ring: 600 samples, 5.99 s
-    Adequate   residuals are white; step-size, refinement and missing-term checks passed
+    Adequate   no significant autocorrelation of the residuals; step-size, refinement and missing-term checks passed
 
-                       estimate  95 % CI               unit   status
-    natural frequency  2.000001  1.999957 to 2.000045  Hz     estimated
-    damping ratio      0.010047  0.010025 to 0.010069         estimated
-    stiffness / mass   157.9138  157.9068 to 157.9208  1/s^2  estimated
-    damping / mass      0.25250  0.25195 to 0.25306    1/s    estimated
+                                estimate  95 % CI               unit   status
+    undamped natural frequency  2.000001  1.999957 to 2.000045  Hz     estimated
+    damping ratio               0.010047  0.010025 to 0.010069         estimated
+    stiffness / mass            157.9138  157.9068 to 157.9208  1/s^2  estimated
+    damping / mass               0.25250  0.25195 to 0.25306    1/s    estimated
 
     Mass   the mass is unknown: all coefficients are ratios to it; `--set functions.mass.fixed=4.5` (kg) states it
     Fit    99.44 % of displacement; residual 5.74e-5 m rms

@@ -153,4 +153,16 @@ fn a_study_shows_its_progress_and_keeps_what_is_done() {
         study["sensitivity"].is_object() && study["bands"].is_object(),
         "{study}"
     );
+    // The refits that were done are counted, and none is used.
+    let failure = &study["failures"][0];
+    assert_eq!(failure["analysis"], "bootstrap", "{study}");
+    let reason = failure["reason"].as_str().expect("a reason");
+    let count = reason.strip_prefix("interrupted after ");
+    let count =
+        count.and_then(|rest| rest.split_once(" of 4000 jobs; none of its results is used"));
+    let count: usize = count
+        .and_then(|(n, _)| n.parse().ok())
+        .unwrap_or_else(|| panic!("{reason}"));
+    assert!((1..4000).contains(&count), "{reason}");
+    assert_eq!(study["bootstrap"].as_array().map(Vec::len), Some(0));
 }

@@ -821,7 +821,7 @@ fn failed_validation_and_negative_stiffness_are_in_the_first_lines() {
     bench.write("model.yaml", &model);
     let (_, summary, stderr) = bench.run(&["fit", "model.yaml", "--no-report", "--verbose"]);
     assert!(
-        summary.contains("; validation records: "),
+        summary.contains("; validation failed: fit "),
         "{summary}{stderr}"
     );
     assert!(

@@ -154,6 +154,124 @@ fn a_report_is_complete() {
     }
 }
 
+/// The page of a shipped model with several records: what was checked has the numbers of `result.json`, the validation says what it
+/// proves, initial states have the unit of their channel, and facts of the solver are folded.
+#[test]
+fn a_page_has_the_numbers_of_its_checks() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("run");
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_kmcfit"))
+        .args(["fit", "models/hammer-and-shaker.yaml", "--out"])
+        .arg(&out)
+        .current_dir(repository(""))
+        .output()
+        .expect("the program runs");
+    assert!(output.status.success(), "{output:?}");
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).expect("a file");
+    let html = read("report.html");
+    let page = parsed(&html);
+    let result: Value = serde_json::from_str(&read("result.json")).expect("JSON");
+    let rows = |id: &str| -> Vec<Vec<String>> {
+        let section = page.descendants().find(|n| n.attribute("id") == Some(id));
+        let rows = section
+            .expect(id)
+            .descendants()
+            .filter(|n| n.has_tag_name("tr"));
+        let cells = |row: Node| {
+            row.children()
+                .filter(Node::is_element)
+                .map(text_of)
+                .collect()
+        };
+        rows.map(cells).collect()
+    };
+    let shown = rows("checks");
+    let number = |text: &str| text.replace('−', "-").parse::<f64>().expect("a number");
+    let tests = &result["model_tests"];
+    let (bases, extensions) = (&tests["bases"], &tests["extensions"]);
+    let bases = bases.as_array().expect("tests");
+    let extensions = extensions.as_array().expect("tests");
+    // Three constants; four terms and two errors of the clock, each with a row, besides two rows of headings.
+    assert!(bases.len() == 3 && extensions.len() >= 5, "{tests}");
+    assert_eq!(shown.len(), bases.len() + extensions.len() + 2);
+    for (row, test) in shown[1..].iter().zip(bases) {
+        assert_eq!(row[0], test["function"].as_str().expect("a name"));
+        // Two digits, rounded upward.
+        let (p, stored) = (number(&row[2]), test["p_value"].as_f64().expect("p"));
+        assert!(p >= stored && p <= 1.1 * stored, "{row:?} {test}");
+    }
+    for (row, test) in shown[bases.len() + 2..].iter().zip(extensions) {
+        let stored = test["t"].as_f64().expect("t");
+        assert!(
+            (number(&row[2]) - stored).abs() <= 0.05 * stored.abs(),
+            "{row:?} {test}"
+        );
+        // A term is missing from 4.5 standard errors on.
+        assert!(stored.abs() < tests["t_limit"].as_f64().expect("a limit"));
+    }
+    let section = |id: &str| {
+        let section = page.descendants().find(|n| n.attribute("id") == Some(id));
+        text_of(section.expect(id))
+    };
+    assert!(section("validation").contains("Validation passed: fit 99."));
+    assert!(
+        section("validation")
+            .contains("only its initial displacement and initial velocity were fitted to it")
+    );
+    assert!(section("identifiability").contains("initial velocity of hammer 2 = -100.09 mm/s"));
+    assert!(section("identifiability").contains("mass >= 0.003 kg"));
+    let link = |n: &Node| n.has_tag_name("a") && n.attribute("href") == Some("#validation");
+    assert!(
+        page.descendants().any(|n| link(&n)),
+        "the contents name the validation"
+    );
+    // The constants stand in the answer alone.
+    assert!(
+        !page
+            .descendants()
+            .any(|n| n.attribute("id") == Some("functions"))
+    );
+    let text = text_of(page.root_element());
+    assert!(text.contains("a force sensor that reads 1 % high makes m, c and k 1 % too large"));
+    assert!(text.contains("common to the 3 records"));
+    let titles = page.descendants().filter(|n| n.has_tag_name("strong"));
+    assert!(titles.map(text_of).any(|title| title == "Force of shaker"));
+    for fact in ["J fell from", "iterations 1000"] {
+        let place = page
+            .descendants()
+            .find(|n| n.is_text() && n.text().is_some_and(|t| t.contains(fact)));
+        let folded = place
+            .expect(fact)
+            .ancestors()
+            .any(|n| n.has_tag_name("details"));
+        assert!(folded, "{fact}");
+    }
+    let labels: Vec<Value> = all(&page, "figure")
+        .map(numbers)
+        .flat_map(|f| f["panels"].as_array().cloned().unwrap_or_default())
+        .flat_map(|p| p["marks"].as_array().cloned().unwrap_or_default())
+        .collect();
+    let sigma = labels
+        .iter()
+        .find(|m| m["label"] == "±2 sigma")
+        .expect("a line");
+    // The sigma of the first record is 0.02 mm.
+    assert_eq!(sigma["y"][0].as_f64(), Some(0.04));
+    let frequency = result["estimates"]["natural_frequency"]["value"]
+        .as_f64()
+        .expect("Hz");
+    let marked = labels
+        .iter()
+        .filter(|m| m["label"] == "undamped natural frequency");
+    let marked: Vec<f64> = marked.filter_map(|m| m["x"][0].as_f64()).collect();
+    // Three spectra and one frequency response; charts have six digits.
+    assert_eq!(marked.len(), 4);
+    assert!(
+        marked.iter().all(|f| (f / frequency - 1.0).abs() < 1e-5),
+        "{marked:?}"
+    );
+}
+
 /// Each finding of a study with a chart stands beside it, what can be acted on first; extremes are curves, and the wider band has dashed edges.
 #[test]
 fn a_study_shows_findings_beside_their_charts() {

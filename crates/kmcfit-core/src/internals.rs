@@ -3,10 +3,11 @@
 
 pub mod assessment {
     pub use crate::assessment::{
-        AmplitudeRival, BEYOND_SIGMA, BasisTest, ClassicalEstimate, ClassicalMethod, CoarseBasis,
-        Draw, EXACT, EquationErrorIntervals, Estimate, EstimateErrors, EstimateStatus,
-        FitAssessment, FitStatistics, FitWarning, FunctionInGap, FunctionSummary, GapAssessment,
-        GapStatus, Implausible, LargeCovariance, MOST_WITH_COVARIANCE, NoDraws, NoIntervals, POOR,
+        AmplitudeRival, BEYOND_SIGMA, BasisComparison, BasisTest, ClassicalEstimate,
+        ClassicalMethod, CoarseBasis, Draw, EXACT, EquationErrorIntervals, Estimate,
+        EstimateErrors, EstimateStatus, Extension, ExtensionTest, FitAssessment, FitStatistics,
+        FitWarning, FunctionInGap, FunctionSummary, GapAssessment, GapStatus, Implausible,
+        LargeCovariance, MOST_WITH_COVARIANCE, ModelTests, NoDraws, NoIntervals, POOR,
         Plausibility, RECOVERY_TOLERANCE, RecordError, ResidualPattern, Roughness, SampleFault,
         StepCheck, TruthErrors, Unidentified, VerdictAssumption, VerdictLevel, VerdictReason,
         constant_probability, diagnostics, draws, estimates, function_summaries, is_same_truth,
@@ -72,7 +73,7 @@ pub mod noise {
     };
 }
 pub mod number_format {
-    pub use crate::number_format::significant;
+    pub use crate::number_format::{at_most, significant};
 }
 pub mod record {
     pub use crate::record::{

@@ -10,9 +10,39 @@ pub fn significant(x: f64, digits: usize) -> String {
     }
 }
 
+/// The smallest number with `digits` significant digits that is not below a positive `x`, without powers of ten from 1e-6: an upper
+/// limit.
+pub fn at_most(x: f64, digits: usize) -> String {
+    let nearest: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
+    let unit = 10f64.powf(nearest.abs().log10().floor() + 1.0 - digits as f64);
+    let up = match nearest < x && unit.is_finite() {
+        true => nearest + unit,
+        false => nearest,
+    };
+    match (1e-6..1e-4).contains(&up) {
+        true => {
+            let decimals = digits as f64 - 1.0 - up.log10().floor();
+            format!("{up:.*}", decimals.clamp(0.0, 12.0) as usize)
+        }
+        false => significant(up, digits),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn upper_limits_are_not_below_the_number() {
+        let written =
+            [0.0, 0.0501, 0.050, 1e-5, 0.00104, 9.96, 1.71e-5, 3e-9].map(|x| at_most(x, 2));
+        assert_eq!(
+            written,
+            [
+                "0", "0.051", "0.05", "0.000010", "0.0011", "10", "0.000018", "3e-9"
+            ]
+        );
+    }
 
     #[test]
     fn numbers_of_any_size() {

@@ -4,6 +4,7 @@ use super::Comparison;
 use super::measures::Measures;
 use super::run::{ComparedRun, ValidationChannel};
 use super::table::short;
+use crate::number_format::significant;
 use crate::report::chart::{Axis, Colour, Dash, Figure, Mark, MarkKind, Panel, Style};
 use crate::report::summary::count;
 use kmcfit_core::internals::assessment::is_same_truth;
@@ -105,7 +106,8 @@ pub(super) fn functions(Comparison { runs, measures, .. }: &Comparison) -> Optio
     let errors = list(measures, |m| {
         let e = m.errors?;
         let (m, c, k) = (e.mass, e.damping, e.stiffness);
-        Some(format!("m {m:.1e} kg, c {c:.1e} N s/m, k {k:.1e} N/m"))
+        let [m, c, k] = [m, c, k].map(|x| significant(x, 2));
+        Some(format!("m {m} kg, c {c} N s/m, k {k} N/m"))
     });
     let figure = Figure::new(
         "functions",
@@ -127,7 +129,8 @@ pub(super) fn ratios(Comparison { runs, measures, .. }: &Comparison) -> Option<F
     let errors = list(measures, |m| {
         let e = m.errors?;
         let (k, c) = (e.k_over_m, e.c_over_m);
-        Some(format!("k/m {k:.1e} per s², c/m {c:.1e} per s"))
+        let [k, c] = [k, c].map(|x| significant(x, 2));
+        Some(format!("k/m {k} per s², c/m {c} per s"))
     });
     let figure = Figure::new(
         "ratios",

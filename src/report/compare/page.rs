@@ -9,6 +9,7 @@ use super::verdict::Agreement;
 use super::{CLOSE, Comparison, MATCHED};
 use crate::config::DataFile;
 use crate::report::chart::{Detail, Figure, Style, sample};
+use crate::report::extent::extent;
 use crate::report::page as shell;
 use crate::report::text::{escape, prose};
 use kmcfit_core::internals::assessment::RECOVERY_TOLERANCE;
@@ -102,11 +103,7 @@ fn records(comparison: &Comparison) -> String {
     }
     let first = comparison.runs.first();
     let common = first.filter(|_| comparison.warning().is_none());
-    let size = common.map(|run| {
-        let document = &run.finished.document;
-        let samples = document.experiments.iter().map(|e| e.samples).sum();
-        (samples, document.model.duration)
-    });
+    let size = common.map(|run| extent(&run.finished.document));
     shell::source_line(&files, size)
 }
 

@@ -16,7 +16,7 @@ use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
 use kmcfit_core::internals::assessment::{
-    ClassicalEstimate, FitStatistics, FunctionSummary, StepCheck,
+    ClassicalEstimate, FitStatistics, FunctionSummary, ModelTests, StepCheck,
 };
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::identifiability::ClassificationKind;
@@ -102,6 +102,9 @@ pub struct ResultDocument {
     /// Step-size check: the optimum simulated with half the step; `null` if there is no response.
     #[serde(default)]
     pub step_check: Option<StepCheck>,
+    /// Tests of the model against larger ones: further terms, errors of the records, finer bases; absent where none applies.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_tests: Option<ModelTests>,
     /// Residual of the equation of motion beside its forces; absent for fits that simulate the response.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub equation: Option<EquationBalance>,

@@ -1,34 +1,37 @@
 //! First screen of the page of a fit: data file and date, verdict with its reasons, answer, main figure, advice.
 
 use super::figures;
+use super::glossary::glossary;
 use super::overview::state;
-use super::table::{list, table};
+use super::table::{list, paragraph, table};
 use crate::config::DataFile;
 use crate::finding::Finding;
-use crate::number_format::significant;
 use crate::report::FittedModel;
 use crate::report::answer::{AnswerRow, answer};
 use crate::report::chart::{Detail, Figure};
 use crate::report::document::{ResultDocument, Verdict, level_in_words};
+use crate::report::extent::extent;
 use crate::report::summary::count;
-use crate::report::text::{escape, prose};
-use kmcfit_core::internals::assessment::VerdictLevel;
+use crate::report::text::{and_list, escape, prose};
+use kmcfit_core::internals::assessment::{EstimateStatus, VerdictLevel};
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Number of further files from which they are counted and not named.
+const MOST_FILES: usize = 4;
 
 /// Seconds of a day.
 const DAY: u64 = 86_400;
 
 /// Everything above the contents.
 pub(super) fn first_screen(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
-    let samples = document.experiments.iter().map(|e| e.samples).sum();
-    let size = Some((samples, document.model.duration));
-    let source = source_line(&run.model.source.data, size);
+    let source = source_line(&run.model.source.data, Some(extent(document)));
     let state = match &document.verdict {
         Some(verdict) => verdict_line(verdict),
         None => state(document),
     };
-    let answer = answers(document) + &advice(document);
+    let answer =
+        answers(document) + &scope(run, document) + &glossary(document) + &advice(document);
     screen(
         &(source + &state),
         &answer,
@@ -39,32 +42,102 @@ pub(super) fn first_screen(run: &FittedModel, document: &ResultDocument, detail:
 
 /// What stands above the contents: lines over the whole width, and below them a text beside the main figure.
 pub(crate) fn screen(above: &str, text: &str, main: Option<Figure>, detail: Detail) -> String {
-    let main = figures(&main.into_iter().collect::<Vec<_>>(), detail);
-    format!("{above}<div class=\"first\">\n<div>\n{text}</div>\n<div>\n{main}</div>\n</div>\n")
+    let main = main.map(|main| format!("<div>\n{}</div>\n", figures(&[main], detail)));
+    format!(
+        "{above}<div class=\"first\">\n<div>\n{text}</div>\n{}</div>\n",
+        main.unwrap_or_default()
+    )
 }
 
-/// Data files, number of samples and duration (s) where all records of the page have the same, and date of the last change of a file.
+/// Data files, number of samples and duration where all records of the page have the same, and date of the last change of a file.
 /// Empty without any of them.
-pub(in crate::report) fn source_line(files: &[DataFile], size: Option<(usize, f64)>) -> String {
+pub(in crate::report) fn source_line(files: &[DataFile], size: Option<String>) -> String {
+    let names: Vec<String> = files.iter().map(name).collect();
     let mut parts = Vec::new();
-    parts.extend(match files {
+    parts.extend(match names.as_slice() {
         [] => None,
-        [only] => Some(name(only)),
-        [first, rest @ ..] => Some(format!(
-            "{} and {}",
-            name(first),
-            count(rest.len(), "further file")
-        )),
+        [first, rest @ ..] if rest.len() >= MOST_FILES => {
+            Some(format!("{first} and {}", count(rest.len(), "further file")))
+        }
+        few => Some(and_list(few)),
     });
-    if let Some((samples, duration)) = size {
-        parts.push(count(samples, "sample"));
-        parts.push(format!("{} s", significant(duration, 4)));
+    parts.extend(size);
+    let mut text = escape(&parts.join(": "));
+    let modified = files.iter().filter_map(|f| f.modified).max();
+    if let Some(day) = modified.and_then(date) {
+        let what = match files.len() {
+            1 => "file",
+            _ => "files",
+        };
+        text += &format!("; {what} last changed on <time>{day}</time>");
     }
-    parts.extend(files.iter().filter_map(|f| f.modified).max().and_then(date));
-    match parts.is_empty() {
-        true => String::new(),
-        false => format!("<p class=\"soft\">{}</p>\n", escape(&parts.join(", "))),
+    match text.is_empty() {
+        true => text,
+        false => format!("<p class=\"soft\">{text}</p>\n"),
     }
+}
+
+/// Scope of the answer: the records to which the coefficients belong, and what the intervals contain.
+fn scope(run: &FittedModel, document: &ResultDocument) -> String {
+    let mut text = String::new();
+    let problem = &run.model.problem;
+    let records = problem.experiments.len();
+    if records > 1 {
+        text += &match problem.functions.coefficient_sets().len() {
+            1 => format!(
+                "Coefficients, frequency and damping ratio are common to the {records} records. "
+            ),
+            _ => "Frequency and damping ratio are those of the shared coefficients. ".to_owned(),
+        };
+    }
+    let has_intervals = answer(document).iter().any(|row| !row.interval.is_empty());
+    if has_intervals {
+        text += &intervals(document);
+    }
+    match text.trim() {
+        "" => String::new(),
+        text => paragraph(text).replace("<p>", "<p class=\"soft\">"),
+    }
+}
+
+/// What the intervals contain, and what an error of calibration changes.
+fn intervals(document: &ResultDocument) -> String {
+    let noise = match document.channels().any(|c| c.noise.is_some()) {
+        true => "correlated noise of the samples",
+        false => "noise of the samples",
+    };
+    let is_state = |name: &str| name.starts_with("initial ");
+    let names = || document.nuisance_parameters.iter().map(|p| p.name.as_str());
+    let fitted = match (names().any(is_state), names().any(|name| !is_state(name))) {
+        (false, false) => "",
+        (true, false) => " and the uncertainty of the fitted initial states",
+        (false, true) => " and the uncertainty of the fitted sensor parameters",
+        (true, true) => " and the uncertainty of the fitted initial states and sensor parameters",
+    };
+    let assumes = |kind: &str| {
+        let mut all = document.verdict.iter().flat_map(|v| &v.assumptions);
+        all.any(|assumption| assumption.kind == kind)
+    };
+    let force = match document.is_rotation() {
+        true => "torque",
+        false => "force",
+    };
+    // Only a force determines a mass that is estimated.
+    let estimates = || document.estimates.0.iter();
+    let is_forced = document
+        .experiments
+        .iter()
+        .any(|e| e.driven_by.iter().any(|d| d == "force"));
+    let has_scale = is_forced
+        && estimates().any(|(name, e)| name == "mass" && e.status == EstimateStatus::Estimated);
+    let example = match (has_scale, assumes("clock")) {
+        (true, _) => {
+            format!(": a {force} sensor that reads 1 % high makes m, c and k 1 % too large")
+        }
+        (false, true) => ": a clock that is 1 % fast makes the frequency 1 % too low".to_owned(),
+        (false, false) => String::new(),
+    };
+    format!("The intervals cover the {noise}{fitted}. They exclude errors of calibration{example}.")
 }
 
 /// Name of a file without its folder.

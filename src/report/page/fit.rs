@@ -1,22 +1,24 @@
 //! The page of a fit, `report.html`: first screen, contents, and the sections from the fit to the work of the solver.
 
 use super::animation::animation;
+use super::checks::checks;
 use super::first_screen::first_screen;
 use super::table::{list, paragraph};
+use super::validation::validation;
 use super::{
     Section, figures, figures_without, overview, reproducibility, sectioned, settings, within_limit,
 };
 use crate::finding::Finding;
 use crate::report::FittedModel;
 use crate::report::chart::{Detail, Figure};
-use crate::report::document::ResultDocument;
+use crate::report::document::{NuisanceParameter, ResultDocument};
 use crate::report::equation::equation_residual;
 use crate::report::figures::weight_path;
 use crate::report::summary::{
     prediction_table, write_attempts, write_constraints, write_nuisance_parameters,
-    write_statistics,
 };
 use crate::report::text::escape;
+use crate::units::{Quantity, Unit};
 
 /// Curves that are hidden at first: the start may be far from the estimate.
 const START: &[&str] = &["start"];
@@ -50,6 +52,12 @@ fn page_of(run: &FittedModel, document: &ResultDocument, detail: Detail) -> Stri
             "Residual tests",
             figures(&run.each_channel(FittedModel::channel_tests)),
         ),
+        ("checks", "Checks of step and terms", checks(document)),
+        (
+            "validation",
+            "Validation",
+            validation(run, document, detail),
+        ),
         (
             "identifiability",
             "Identifiability",
@@ -62,7 +70,7 @@ fn page_of(run: &FittedModel, document: &ResultDocument, detail: Detail) -> Stri
             predictions(document),
         ),
         ("data", "Data", data(document)),
-        ("settings", "Settings", settings::settings(run, document)),
+        ("settings", "Settings", settings::settings(document)),
         (
             "repeat",
             "Reproduce",
@@ -79,14 +87,12 @@ fn page_of(run: &FittedModel, document: &ResultDocument, detail: Detail) -> Stri
 
 /// Fit of each channel, key figures, and figures of records and residuals.
 fn fit_and_residuals(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
-    let mut drawn = run.each_channel(FittedModel::channel_fit);
-    drawn.extend(run.validation_figures());
+    let drawn = run.each_channel(FittedModel::channel_fit);
     let equation = document.equation.iter();
     let equation = equation.map(|b| equation_residual(b, document.is_rotation()));
     overview::records(document)
         + &overview::facts(document)
         + &list(&equation.collect::<Vec<_>>())
-        + &list(&lines(|text| write_statistics(text, document)))
         + &figures(&drawn, detail)
         + &animation(run, document)
 }
@@ -107,7 +113,9 @@ fn coefficients(run: &FittedModel, document: &ResultDocument, detail: Detail) ->
     }
     let varying = [run.functions_figure(), ratios].map(Figure::varying);
     let varying: Vec<Figure> = varying.into_iter().flatten().collect();
-    overview::functions(document) + &figures_without(START, &varying, detail)
+    overview::functions(document)
+        + &overview::ratios_of_records(run)
+        + &figures_without(START, &varying, detail)
 }
 
 /// Findings in the data and what was done with them, warnings, and automatic choices.
@@ -133,13 +141,17 @@ fn solver(run: &FittedModel, document: &ResultDocument, detail: Detail) -> Strin
     }
     for (i, experiment) in run.model.problem.experiments.iter().enumerate() {
         let channel = experiment.channels.first().filter(|c| c.stride().is_some());
-        let Some(channel) = channel.filter(|_| !run.fit.snapshots.is_empty()) else {
+        // The response is in SI units; the page has one unit for a quantity.
+        let is_si = run.channel_view(i, 0).factor() == 1.0;
+        let Some(channel) = channel.filter(|_| is_si && !run.fit.snapshots.is_empty()) else {
             continue;
         };
         let response = run.response(i, channel.times(), channel.observed());
         drawn.push(run.titled(response, i, 0));
     }
-    let work = overview::state(document) + &paragraph(&overview::work(document));
+    let work = overview::state(document)
+        + &paragraph(&overview::work(document))
+        + &settings::solver(run, document);
     let attempts = list(&lines(|text| write_attempts(text, document)));
     format!(
         "<details>\n<summary>End of the search, work and convergence</summary>\n{work}{attempts}{}</details>\n",
@@ -177,7 +189,9 @@ fn identifiability(run: &FittedModel, document: &ResultDocument) -> String {
         [] => String::new(),
         list => paragraph(&format!("Assumptions: {}.", list.join("; "))),
     };
-    text += &list(&lines(|text| write_nuisance_parameters(text, document)));
+    text += &list(&lines(|text| {
+        write_nuisance_parameters(text, &in_shown_units(document))
+    }));
     if let Some(bands) = run.bands() {
         let notes = bands.functions.iter().chain(&bands.ratios);
         let notes = notes.flat_map(|b| b.notes.iter().map(|n| format!("{}: {n}", b.name)));
@@ -200,6 +214,39 @@ fn predictions(document: &ResultDocument) -> String {
             escape(&prediction_table(some, document.is_rotation()))
         ),
     }
+}
+
+/// The nuisance parameters in the units of the channels of their quantity, where these have one unit.
+fn in_shown_units(document: &ResultDocument) -> Vec<NuisanceParameter> {
+    let unit_of = |kind: &str| {
+        let mut units = document
+            .channels()
+            .filter(|c| c.kind == kind)
+            .map(|c| &c.unit);
+        let first = units.next()?;
+        units.all(|unit| unit == first).then(|| first.clone())
+    };
+    let displacement = unit_of("displacement");
+    let velocity = unit_of("velocity").or(displacement.as_ref().map(|unit| format!("{unit}/s")));
+    let shown = |parameter: &NuisanceParameter| {
+        let (quantity, unit) = match parameter.unit.as_str() {
+            "m" | "rad" => (Quantity::Displacement, displacement.as_ref()?),
+            "m/s" | "rad/s" => (Quantity::Velocity, velocity.as_ref()?),
+            _ => return None,
+        };
+        Unit::recognise(quantity, unit).filter(|unit| !unit.is_arbitrary())
+    };
+    let each = document.nuisance_parameters.iter();
+    each.map(|parameter| match shown(parameter) {
+        None => parameter.clone(),
+        Some(unit) => NuisanceParameter {
+            unit: unit.symbol().to_owned(),
+            value: parameter.value / unit.factor(),
+            standard_error: parameter.standard_error.map(|error| error / unit.factor()),
+            ..parameter.clone()
+        },
+    })
+    .collect()
 }
 
 /// Lines of a part of the summary.

@@ -5,12 +5,15 @@
 //! text of a model can run as a script; and images within the page, by which a drawing becomes a PNG file.
 
 mod animation;
+mod checks;
 mod first_screen;
 mod fit;
+mod glossary;
 mod overview;
 mod reproducibility;
 mod settings;
 mod table;
+mod validation;
 
 pub(crate) use first_screen::{screen, state_line};
 pub(super) use first_screen::{source_line, verdict_line};
@@ -39,12 +42,13 @@ const SCRIPTS: [&str; 8] = [
 ];
 
 /// Instructions for charts, referenced by every chart.
-const KEYS: &str = "Hover over a chart to show values; drag to zoom. Click, then use the wheel to zoom in time; hold \
-     Shift to zoom the vertical axis. Keys: arrows, Home and End move the cursor; hold Shift for larger steps; + and - zoom; Escape or a \
-     double click resets the view. The legend entries show and hide curves.";
+const KEYS: &str = "Charts: hover or touch for values; drag to zoom; double click or Reset shows all. After a click the wheel zooms in \
+     time, with Shift the vertical axis. Keys: arrows, Home and End move the cursor, with Shift in larger steps; + and - zoom; \
+     Escape shows all. The legend entries show and hide curves.";
 
 /// The same in one line.
-const HELP: &str = "Charts: hover for values, drag to zoom, double click to reset; arrow keys, + and - do the same.";
+const HELP: &str = "Charts: hover or touch for values; drag to zoom; double click or Reset shows all. Keys: arrows move the cursor, + and - zoom, \
+     Escape shows all.";
 
 /// A page from its title and its body, which must be escaped.
 fn page(title: &str, body: &str) -> String {

@@ -1,11 +1,13 @@
 //! Status, key figures, and the tables of coefficients, records and work.
 
 use super::table::{list, number, table};
+use crate::report::FittedModel;
 use crate::report::document::{ChannelSummary, ResultDocument};
 use crate::report::suggestions;
 use crate::report::summary::{count, iterations};
 use crate::report::text::{escape, prose};
 use kmcfit_core::internals::assessment::FunctionSummary;
+use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::identifiability::ClassificationKind;
 use kmcfit_core::internals::solvers::Status;
 
@@ -24,13 +26,10 @@ pub(super) fn state(document: &ResultDocument) -> String {
     )
 }
 
-/// Main figures: cost ratio, fit, chi-square, samples, parameters, rank bound.
+/// Main figures: fit, chi-square, information criteria, samples, parameters, rank bound.
 pub(super) fn facts(document: &ResultDocument) -> String {
     let samples: usize = document.experiments.iter().map(|e| e.samples).sum();
     let mut facts = Vec::new();
-    if document.has_ratio() {
-        facts.push(("cost ratio J/J0", number(document.cost.ratio)));
-    }
     if let Some(balance) = &document.equation {
         let unit = if document.is_rotation() { "N m" } else { "N" };
         facts.push((
@@ -47,6 +46,15 @@ pub(super) fn facts(document: &ResultDocument) -> String {
     if let Some(reduced) = document.statistics.reduced_chi_square {
         facts.push(("chi-square per degree of freedom", number(reduced)));
     }
+    let criteria = [
+        ("AIC", document.statistics.aic),
+        ("BIC", document.statistics.bic),
+    ];
+    facts.extend(
+        criteria
+            .into_iter()
+            .filter_map(|(name, x)| Some((name, number(x?)))),
+    );
     facts.push(("samples", samples.to_string()));
     facts.push(("parameters", document.model.parameters.to_string()));
     let known = &document.identifiability;
@@ -67,9 +75,13 @@ pub(super) fn facts(document: &ResultDocument) -> String {
     format!("<dl class=\"facts\">\n{facts}</dl>\n")
 }
 
-/// Table of the functions in the order of the equation of motion, then those of single experiments.
+/// Table of the functions that vary, in the order of the equation of motion, then those of single experiments: constants stand in the
+/// answer. With a known true system all functions with their errors.
 pub(super) fn functions(document: &ResultDocument) -> String {
-    let functions: Vec<(&str, &FunctionSummary)> = document.all_functions().collect();
+    let is_new =
+        |f: &FunctionSummary| f.truth_max_error.is_some() || (f.min != f.max && !f.negligible);
+    let functions = document.all_functions().filter(|(_, f)| is_new(f));
+    let functions: Vec<(&str, &FunctionSummary)> = functions.collect();
     let has_truth = functions.iter().any(|(_, f)| f.truth_max_error.is_some());
     let has_error = functions.iter().any(|(_, f)| f.standard_error.is_some());
     let has_verdict = functions.iter().any(|(_, f)| f.verdict.is_some());
@@ -102,6 +114,26 @@ pub(super) fn functions(document: &ResultDocument) -> String {
     table("Coefficients", &headings, &rows)
 }
 
+/// Table of undamped natural frequency and damping ratio of each record, means over it, where records have coefficients of their own.
+pub(super) fn ratios_of_records(run: &FittedModel) -> String {
+    let problem = &run.model.problem;
+    if problem.functions.coefficient_sets().len() < 2 {
+        return String::new();
+    }
+    let mean = |values: &[f64]| number(values.iter().sum::<f64>() / values.len().max(1) as f64);
+    let rows = problem.experiments.iter().map(|experiment| {
+        let nodal = run.fit.best.evaluation.nodal_of(experiment.coefficient_set);
+        let ratios = Ratios::of(nodal);
+        vec![
+            experiment.name.clone(),
+            format!("{} Hz", mean(&ratios.frequency)),
+            mean(&ratios.damping_ratio),
+        ]
+    });
+    let headings = ["record", "undamped natural frequency", "damping ratio"];
+    table("Records", &headings, &rows.collect::<Vec<_>>())
+}
+
 /// A classification as an entry of the table.
 fn verdict_in_words(verdict: Option<ClassificationKind>) -> &'static str {
     match verdict {
@@ -122,9 +154,6 @@ pub(super) fn records(document: &ResultDocument) -> String {
     for (name, channel) in document.records() {
         rows.push(record(&name, channel));
         let about = format!("{name}, {}", channel.kind);
-        if channel.sigma.is_some() {
-            notes.push(format!("{about}: {}", channel.whiteness));
-        }
         notes.extend(channel.ignored.iter().map(|ignored| {
             let samples = count(ignored.samples, "sample");
             format!("{about}: {samples} not used: {}", ignored.reason)

@@ -1,4 +1,4 @@
-//! Settings of a fit: grid, stepper, method, gradient, stopping tests and cost.
+//! Settings of a fit: grid, stepper and method; gradient, stopping tests and cost of the solver.
 
 use super::table::{number, pairs};
 use crate::report::FittedModel;
@@ -6,7 +6,7 @@ use crate::report::document::ResultDocument;
 use kmcfit_core::internals::solvers::Stopping;
 
 /// Table of the settings.
-pub(super) fn settings(run: &FittedModel, document: &ResultDocument) -> String {
+pub(super) fn settings(document: &ResultDocument) -> String {
     let model = &document.model;
     let end = model.start + model.duration;
     let mut rows = vec![
@@ -22,7 +22,6 @@ pub(super) fn settings(run: &FittedModel, document: &ResultDocument) -> String {
         ),
         ("stepper", model.stepper.clone()),
         ("method", model.method.clone()),
-        ("gradient", model.gradient.clone()),
         (
             "terms",
             std::iter::once("mass")
@@ -31,14 +30,22 @@ pub(super) fn settings(run: &FittedModel, document: &ResultDocument) -> String {
                 .join(", "),
         ),
         ("parameters", model.parameters.to_string()),
-        ("stop", stopping(&run.model.settings.stopping)),
-        ("cost", model.cost_definition.clone()),
     ];
     if let Some(weights) = &document.weights {
         let weight = format!("{} by {}", number(weights.weight), weights.rule);
         rows.push(("penalty weight", weight));
     }
     pairs(&rows)
+}
+
+/// Gradient, stopping tests and cost.
+pub(super) fn solver(run: &FittedModel, document: &ResultDocument) -> String {
+    let model = &document.model;
+    pairs(&[
+        ("gradient", model.gradient.clone()),
+        ("stop", stopping(&run.model.settings.stopping)),
+        ("cost", model.cost_definition.clone()),
+    ])
 }
 
 /// Stopping tests, with the keys of the model file.

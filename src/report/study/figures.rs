@@ -71,14 +71,14 @@ pub fn bands_alone(study: &StudyDocument) -> Vec<(&str, Figure)> {
 }
 
 /// The figure of the first screen: the function or ratio that varies most relative to its interval, with its extremes; without one the first
-/// profile, else the fits from random starting points or the singular values.
+/// profile, else the fits from random starting points; `None` without any.
 pub fn main(study: &StudyDocument) -> Option<Figure> {
     let panels = band_panels(study).into_iter();
     let scored = panels.filter_map(|(name, panel)| Some((variation(&panel)?, name, panel)));
     let most = scored.max_by(|a, b| a.0.total_cmp(&b.0));
     let Some((_, name, panel)) = most else {
         let others = profiles_alone(study).into_iter().flatten();
-        let mut others = others.chain(waterfall(study)).chain(spectrum(study));
+        let mut others = others.chain(waterfall(study));
         let name = "main".to_owned();
         return others.next().map(|figure| Figure { name, ..figure });
     };

@@ -19,6 +19,7 @@ pub use document::{
 pub use bands::bands;
 pub use records::*;
 
+use super::extent::size_in_words;
 use super::page::source_line;
 use super::{json, render};
 use crate::config::Model;
@@ -68,7 +69,8 @@ impl StudyDocument {
         }
         let samples = model.problem.channels().map(Channel::len).sum();
         let duration = model.problem.system.grid.duration();
-        let source = source_line(&model.source.data, Some((samples, duration)));
+        let size = size_in_words(samples, model.problem.experiments.len(), duration);
+        let source = source_line(&model.source.data, Some(size));
         stage.write("study.html", page::page(self, &source))?;
         stage.write("study.json", json(self))?;
         stage.commit()

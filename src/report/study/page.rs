@@ -1,8 +1,9 @@
 //! The page of a study, `study.html`: first screen, then each finding beside its chart.
 
-use super::StudyDocument;
 use super::figures;
 use super::text::{Part, widest_range};
+use super::{BandRecord, StudyDocument};
+use crate::number_format::{resolved, significant};
 use crate::report::chart::{Detail, Figure};
 use crate::report::page as shell;
 use crate::report::text::{escape, prose};
@@ -54,6 +55,44 @@ fn first_screen(study: &StudyDocument, source: &str, detail: Detail) -> String {
     )
 }
 
+/// Undamped natural frequency and damping ratio with their interval, or range where they vary.
+fn ratios(study: &StudyDocument) -> Vec<Vec<String>> {
+    let names = [
+        ("natural frequency", "undamped natural frequency"),
+        ("damping ratio", "damping ratio"),
+    ];
+    let bands = study
+        .bands
+        .iter()
+        .filter(|bands| !bands.classification.is_empty());
+    let all: Vec<&BandRecord> = bands.flat_map(|bands| &bands.bands).collect();
+    let row = |(name, shown): (&str, &str)| {
+        let band = all.iter().find(|band| band.name == name)?;
+        let finite = || band.values.iter().copied().flatten();
+        let least = finite().reduce(f64::min)?;
+        let most = finite().reduce(f64::max)?;
+        let ends = [&band.low, &band.high].map(|end| end.first().copied().flatten());
+        let text = match ends {
+            [Some(low), Some(high)] if least == most && high > low => {
+                let [value, low, high] = resolved([least, low, high], 0.5 * (high - low));
+                let level = significant(100.0 * study.confidence, 3);
+                format!("{value} {} ({level} % CI {low} to {high})", band.unit)
+            }
+            _ if least == most => format!("{} {}", significant(least, 4), band.unit),
+            _ => {
+                let [low, high] = [least, most].map(|x| significant(x, 4));
+                format!("{low} to {high} {} over the record", band.unit)
+            }
+        };
+        Some(vec![
+            shown.to_owned(),
+            text.replace("  ", " "),
+            String::new(),
+        ])
+    };
+    names.into_iter().filter_map(row).collect()
+}
+
 /// Table of the functions and ratios: extremes and classification of each.
 fn quantities(study: &StudyDocument) -> String {
     let known = study.bands.iter().flat_map(|bands| &bands.classification);
@@ -71,7 +110,8 @@ fn quantities(study: &StudyDocument) -> String {
         "determined by the records",
         "data-consistent extremes",
     ];
-    let table = shell::table("Quantities", &headings, &rows.collect::<Vec<_>>());
+    let rows: Vec<Vec<String>> = ratios(study).into_iter().chain(rows).collect();
+    let table = shell::table("Quantities", &headings, &rows);
     format!("<div class=\"words\">\n{table}</div>\n")
 }
 

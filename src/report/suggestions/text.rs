@@ -43,7 +43,7 @@ impl fmt::Display for Suggestion {
             ),
             Suggestion::NoiseLimited { channel, fit } => write!(
                 f,
-                "{channel}: fit {}, but the residuals are white: measurement noise limits the fit, not the model",
+                "{channel}: fit {}, but the residuals have no significant autocorrelation: measurement noise limits the fit, not the model",
                 percent(*fit, 0)
             ),
             Suggestion::OutliersLimited { channel, fit } => write!(

@@ -15,6 +15,7 @@ mod input_correlation;
 mod input_disturbance;
 mod input_pulses;
 mod large_covariance;
+mod model_tests;
 mod plausibility;
 mod record_error;
 mod record_errors;
@@ -43,6 +44,7 @@ pub use function::{EstimateErrors, FunctionSummary, function_summaries};
 pub use gaps::{FunctionInGap, GapAssessment, GapStatus};
 pub use implausible::Implausible;
 pub use large_covariance::{LargeCovariance, MOST_WITH_COVARIANCE};
+pub use model_tests::{BasisComparison, Extension, ExtensionTest, ModelTests};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
 pub use record_error::RecordError;
 pub use recovery::{RECOVERY_TOLERANCE, Roughness, TruthErrors, is_same_truth};
@@ -93,6 +95,8 @@ pub struct FitAssessment {
     pub classifications: Vec<FunctionClassification>,
     /// Natural frequency and damping ratio by a classical method, where a record allows it.
     pub classical: Option<ClassicalEstimate>,
+    /// Tests against larger models.
+    pub model_tests: ModelTests,
 }
 
 impl FitAssessment {
@@ -125,10 +129,16 @@ impl FitAssessment {
             large_covariance: None,
             classifications: Vec::new(),
             classical: None,
+            model_tests: ModelTests {
+                t_limit: score_tests::SIGNIFICANT,
+                p_limit: refinement::LEVEL,
+                ..ModelTests::default()
+            },
         };
         if reports_errors && fit.outcome.status != Status::Failed {
-            let causes = causes(problem, fit, &assessment.plausibility, tests_bases);
+            let (causes, tests) = causes(problem, fit, &assessment.plausibility, tests_bases);
             assessment.plausibility.warnings.extend(causes);
+            assessment.model_tests.extensions = tests;
         }
         let mut gaps = Vec::new();
         if reports_errors && assessment.plausibility.errors_hold {
@@ -148,6 +158,10 @@ impl FitAssessment {
             );
             assessment.classifications = classify_functions(problem, &best.evaluation, &bands);
             condition_on_bases(problem, &mut assessment.classifications, &test.doubtful);
+            if !test.comparisons.is_empty() {
+                assessment.model_tests.p_limit = test.level;
+                assessment.model_tests.bases = test.comparisons;
+            }
             if assessment.plausibility.is_disturbed {
                 condition_on_inputs(&mut assessment.classifications);
             }
@@ -219,34 +233,37 @@ impl FitAssessment {
 }
 
 /// Causes of residuals that the model does not explain: the width of friction and, with `tests` of finer models, a missing term, an error of a
-/// record, or a second mode.
+/// record, or a second mode; and the score tests of terms and errors of the records.
 fn causes(
     problem: &Problem,
     fit: &Fit,
     plausibility: &Plausibility,
     tests: bool,
-) -> Vec<FitWarning> {
+) -> (Vec<FitWarning>, Vec<ExtensionTest>) {
     let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);
     let is_noise = plausibility.errors_hold && !plausibility.is_coloured;
     let is_modelled = is_noise && !plausibility.is_disturbed;
     let is_system = plausibility.unidentified.is_none();
     // A width of friction on which estimates depend leaves residuals like those of a missing term.
     let width = is_system.then(|| width_warning(problem, theta, evaluation));
-    let small = || {
-        let found = || missing(problem, theta, evaluation, is_modelled);
-        is_system.then(found).flatten()
-    };
     let large = || large_error(problem, theta, evaluation).map(FitWarning::RecordError);
     let pulses = || {
         let found = || input_pulses(problem, theta, evaluation).map(FitWarning::RecordError);
         is_system.then(found).flatten()
     };
     match (width.flatten(), tests) {
-        (Some(width), _) => vec![width],
-        (None, false) => Vec::new(),
-        (None, true) => match small().or_else(large).or_else(pulses) {
-            Some(cause) => vec![cause],
-            None => second_modes(problem, evaluation),
-        },
+        (Some(width), _) => (vec![width], Vec::new()),
+        (None, false) => Default::default(),
+        (None, true) => {
+            let (small, tests) = match is_system {
+                true => missing(problem, theta, evaluation, is_modelled),
+                false => Default::default(),
+            };
+            let found = match small.or_else(large).or_else(pulses) {
+                Some(cause) => vec![cause],
+                None => second_modes(problem, evaluation),
+            };
+            (found, tests)
+        }
     }
 }

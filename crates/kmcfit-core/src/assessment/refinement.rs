@@ -10,6 +10,7 @@
 //! has an F distribution. A nonlinear refit gives the same verdict at several times the cost. The test is of no use where residuals
 //! are far from noise, and for an estimate that a constraint holds; there it is left out.
 
+use super::model_tests::BasisComparison;
 use crate::diagnostics::{rms, standard_deviation};
 use crate::functions::{Basis, CoefficientFunction, Parameterization};
 use crate::identifiability::{BandSettings, Bands, Factorisation, has_active_rows};
@@ -24,7 +25,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use std::ops::Range;
 
 /// Probability of a false alarm over all functions of a fit.
-const LEVEL: f64 = 0.01;
+pub(super) const LEVEL: f64 = 0.01;
 /// Smallest number of samples per parameter of the finer bases.
 const SAMPLES_PER_PARAMETER: usize = 4;
 /// Largest number of parameters of the finer bases.
@@ -64,6 +65,10 @@ pub struct BasisTest {
     /// Indices of all functions for which a finer basis alone fits significantly better: a variation of one function can appear
     /// as that of another, and the intervals of all of them exclude it.
     pub doubtful: Vec<usize>,
+    /// Each basis against its finer one alone, in the order of the functions.
+    pub comparisons: Vec<BasisComparison>,
+    /// p-value below which a finer basis fits significantly better: [`LEVEL`] over the number of tests.
+    pub level: f64,
 }
 
 impl BasisTest {
@@ -188,7 +193,10 @@ impl FinerBases {
             .collect();
         let level = LEVEL / open.len() as f64;
         let sizes = given.median_scales(evaluation);
-        let mut test = BasisTest::default();
+        let mut test = BasisTest {
+            level,
+            ..BasisTest::default()
+        };
         let mut finer: Vec<usize> = Vec::new();
         let mut coarse = Minimum::of(&self.columns(&jacobian, &finer), &residuals);
         // The most significant first: a basis that is too coarse makes other functions appear to vary.
@@ -197,9 +205,16 @@ impl FinerBases {
                 let with = [finer.as_slice(), &[index]].concat();
                 let minimum = Minimum::of(&self.columns(&jacobian, &with), &residuals);
                 let p_value = minimum.p_value(&coarse, residuals.len())?;
-                (p_value < level).then_some((index, p_value, minimum))
+                Some((index, p_value, minimum))
             });
-            let tests: Vec<(usize, f64, Minimum)> = tests.collect();
+            let mut tests: Vec<(usize, f64, Minimum)> = tests.collect();
+            if finer.is_empty() {
+                let all = tests.iter();
+                test.comparisons = all
+                    .map(|(i, p, _)| self.comparison(given, *i, *p))
+                    .collect();
+            }
+            tests.retain(|(_, p_value, _)| *p_value < level);
             if finer.is_empty() {
                 test.doubtful = tests.iter().map(|(index, ..)| *index).collect();
             }
@@ -237,11 +252,13 @@ impl FinerBases {
         let columns = self.columns(&jacobian, &constants);
         let minimum = Minimum::of(&columns, &residuals);
         let mut found: Vec<CoarseBasis> = Vec::new();
+        let mut comparisons = Vec::new();
+        let level = LEVEL / constants.len().max(1) as f64;
         for &index in &constants {
             let place = self.place(index, &constants);
             let p_value = minimum.difference(&columns, &residuals, place, &records);
-            let is_significant = |p: &f64| *p < LEVEL / constants.len() as f64;
-            if let Some(p_value) = p_value.filter(is_significant) {
+            comparisons.extend(p_value.map(|p| self.comparison(given, index, p)));
+            if let Some(p_value) = p_value.filter(|p| *p < level) {
                 let to = minimum.change.rows(place, 2).into_owned();
                 let from = coarse.change[self.place(index, &[])];
                 let change = [to.clone(), to.add_scalar(-from)];
@@ -252,6 +269,18 @@ impl FinerBases {
         BasisTest {
             doubtful: found.iter().map(|basis| basis.index).collect(),
             coarse: found,
+            comparisons,
+            level,
+        }
+    }
+
+    fn comparison(&self, given: &Problem, index: usize, p_value: f64) -> BasisComparison {
+        let function = given.functions.get(index);
+        BasisComparison {
+            function: function.name(),
+            parameters: function.parameters(),
+            finer: self.problem.functions.get(index).parameters(),
+            p_value,
         }
     }
 

@@ -13,6 +13,7 @@
 //! residuals, or the smallest of all refits and at most half of those before; so are a delay, a difference of clocks and a gain, with their [own derivatives](super::record_parameters). Where the noise model does not describe the residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
 
 use super::FitWarning;
+use super::model_tests::{Extension, ExtensionTest};
 use super::record_errors::small_error;
 use super::record_parameters::{self, RecordParameter};
 use super::refinement::applies;
@@ -31,7 +32,7 @@ use nalgebra::DVector;
 /// Width of the sign of the velocity in the candidate for Coulomb friction, relative to the root mean square of the velocity.
 const WIDTH: f64 = 0.01;
 /// Smallest `|t|` of a missing term: of 4000 standard normal numbers one has a larger value by chance.
-const SIGNIFICANT: f64 = 4.5;
+pub(super) const SIGNIFICANT: f64 = 4.5;
 /// Fit of a channel, per cent, below which a fit is not near the system, and a linearisation in further terms says nothing.
 const UNRELATED: f64 = 50.0;
 /// Number of the most significant candidates that are refitted.
@@ -45,15 +46,34 @@ enum Candidate {
     Record(RecordParameter),
 }
 
-/// The most significant missing term or error of a record at the optimum `theta`; `None` where the residuals show none, and where the test
-/// does not apply: without a likelihood, at an active constraint, for residuals at machine precision or as large as the response, and with few
+impl Candidate {
+    fn extension(&self, problem: &Problem) -> Extension {
+        let experiment = |e: usize| problem.experiments[e].name.clone();
+        match *self {
+            Self::Term(term, _) => Extension::Term { term },
+            Self::Record(RecordParameter::Delay(e)) => Extension::Delay {
+                experiment: experiment(e),
+            },
+            Self::Record(RecordParameter::Rate(e)) => Extension::ClockRate {
+                experiment: experiment(e),
+            },
+            Self::Record(RecordParameter::Gain(e, c)) => Extension::Gain {
+                experiment: experiment(e),
+                channel: problem.experiments[e].channels[c].kind().name().to_owned(),
+            },
+        }
+    }
+}
+
+/// The score tests at the optimum `theta`, each with its estimate and `t`, in the order of the candidates; `None` where they do
+/// not apply: without a likelihood, at an active constraint, for residuals at machine precision or as large as the response, and with few
 /// samples or many parameters. `is_modelled` is true for residuals that the noise model describes.
-pub(super) fn missing(
+fn score_tests(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
     is_modelled: bool,
-) -> Option<FitWarning> {
+) -> Option<Vec<(Candidate, f64, f64)>> {
     let is_few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
     let is_long = problem.sample_count() >= SAMPLES_PER_PARAMETER * problem.parameters();
     (is_few && is_long && applies(problem, theta, evaluation)).then_some(())?;
@@ -84,7 +104,34 @@ pub(super) fn missing(
         let (value, t) = test?;
         Some((candidate, value, t))
     });
-    let mut tests: Vec<_> = tests.collect();
+    Some(tests.collect())
+}
+
+/// The most significant missing term or error of a record at the optimum `theta`, `None` where the residuals show none, and all score
+/// tests, none where they do not apply.
+pub(super) fn missing(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+    is_modelled: bool,
+) -> (Option<FitWarning>, Vec<ExtensionTest>) {
+    let tests = score_tests(problem, theta, evaluation, is_modelled).unwrap_or_default();
+    let results = tests.iter().map(|(candidate, value, t)| ExtensionTest {
+        extension: candidate.extension(problem),
+        value: *value,
+        t: *t,
+    });
+    let results = results.collect();
+    (most_significant(problem, theta, evaluation, tests), results)
+}
+
+/// The candidate whose refit explains the residuals.
+fn most_significant(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+    mut tests: Vec<(Candidate, f64, f64)>,
+) -> Option<FitWarning> {
     tests.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
     // Far from the optimum of the right candidate another one may be more significant: friction resembles a negative quadratic damping.
     (tests.first()?.2.abs() >= SIGNIFICANT).then_some(())?;
@@ -92,12 +139,12 @@ pub(super) fn missing(
     for (candidate, value, t) in tests.into_iter().take(REFITTED) {
         match candidate {
             Candidate::Term(kind, term) => {
-                let size = (value * force(&evaluation, term)).abs();
+                let size = (value * force(evaluation, term)).abs();
                 let missing = MissingTerm {
                     term: kind,
                     value,
                     t,
-                    share: size / largest_force(problem, &evaluation),
+                    share: size / largest_force(problem, evaluation),
                 };
                 let Some(refit) = refit(problem, theta, &missing) else {
                     continue;
@@ -118,7 +165,7 @@ pub(super) fn missing(
             }
         }
     }
-    let before = worst_misfit(problem, &evaluation);
+    let before = worst_misfit(problem, evaluation);
     let (_, missing) = best.filter(|(misfit, _)| *misfit < EXPLAINED * before)?;
     Some(FitWarning::MissingTerm(missing))
 }

@@ -3,6 +3,7 @@
 use super::band::Band;
 use super::bands::Bands;
 use crate::diagnostics::median_size;
+use crate::number_format::at_most;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::spans::{span_words, spans};
@@ -301,11 +302,12 @@ fn half_width_and_value(band: &Band, size: f64) -> [f64; 2] {
     ]
 }
 
-/// A share in per cent with two decimals; a small one in powers of ten.
+/// A share in per cent, rounded upward: two decimals, of a small one the first digit.
 fn percent(share: f64) -> String {
-    match share < 1e-4 {
-        true => format!("{:.0e} %", 100.0 * share),
-        false => format!("{:.2} %", 100.0 * share),
+    let percent = 100.0 * share;
+    match percent < 0.01 {
+        true => format!("{} %", at_most(percent, 1)),
+        false => format!("{:.2} %", (100.0 * percent - 1e-9).ceil() / 100.0),
     }
 }
 

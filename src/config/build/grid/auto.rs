@@ -89,8 +89,8 @@ pub fn nodes(
     let cycles = (fastest * duration).min(MOST_CYCLES);
     let phase_error = TAU * cycles * (TAU * fastest * step).powf(order) / constant;
     let text = format!(
-        "grid: {nodes} nodes, {steps_per_period:.0} steps per period at {} Hz ({:.0} % of the record's energy lies \
-         below); phase error about {phase_error:.0e} rad after {cycles:.0} cycles",
+        "grid: {nodes} nodes, {steps_per_period:.0} steps per period at {} Hz, the frequency below which {:.0} % of the record's \
+         energy lies; phase error about {phase_error:.0e} rad after {cycles:.0} cycles",
         significant(fastest, 4),
         100.0 * ENERGY,
     );

@@ -80,7 +80,11 @@ const linearTicks = ([low, high], most) => {
 
 /** Ticks of a range in even space: at decades, or where few are in sight at round values. */
 const ticksOf = (log, range, most) => {
-  if (!log) return linearTicks(range, most);
+  if (!log) {
+    const ticks = linearTicks(range, most);
+    // One value alone gives no scale.
+    return ticks.length > 1 ? ticks : linearTicks(range, 2 * most);
+  }
   const [first, last] = [Math.ceil(range[0] - 1e-9), Math.floor(range[1] + 1e-9)];
   if (1 > last - first) {
     const values = linearTicks([10 ** range[0], 10 ** range[1]], most);
