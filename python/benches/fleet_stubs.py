@@ -28,7 +28,7 @@ def stub(job, blocks, template, seconds):
 def main():
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
     workers = int(sys.argv[2]) if len(sys.argv) > 2 else 100
-    seconds = float(sys.argv[3]) if len(sys.argv) > 3 else 0.003
+    seconds = float(sys.argv[3]) if len(sys.argv) > 3 else 0.02
     model = km.Model(mass=1.0, damping=km.Constant(start=0.2), stiffness=km.Constant(start=4.0))
     t = 0.1 * np.arange(101)
     y = np.exp(-0.1 * t) * np.cos(2 * t) + 0.01 * np.random.default_rng(1).standard_normal(101)

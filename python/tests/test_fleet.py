@@ -226,7 +226,7 @@ class Faulty:
         name = blocks[0][0].name
         self.tries[name] = self.tries.get(name, 0) + 1
         if self.tries[name] <= self.failures:
-            future.set_exception(OSError("the worker is gone"))
+            future.set_exception(OSError("the connection is closed"))
         else:
             future.set_result(function(job, blocks))
         return future
@@ -235,7 +235,7 @@ class Faulty:
 def test_workers_that_die_and_that_never_answer(expected):
     assert plain(km.fit_many(ARRAYS, pairs(24), Faulty(3))) == expected
     rows = list(km.fit_many(ARRAYS, pairs(3), Faulty(4)))
-    assert [row.error for row in rows] == ["the worker failed 4 times: OSError: the worker is gone"] * 3
+    assert [row.error for row in rows] == ["the worker failed 4 times: OSError: the connection is closed"] * 3
 
     class Silent(Faulty):
         """Tasks without an answer."""

@@ -20,6 +20,8 @@ Answer = Tuple[List[Lines], float]
 _WORK = 0.02
 #: Most records of a task.
 _MOST = 10_000
+#: Most blocks of a task that have their rows.
+_DONE = 1000
 #: Tries of a task whose worker dies.
 _TRIES = 4
 #: Tasks in flight for each worker.
@@ -102,12 +104,13 @@ class Batches:
     def _next(self, blocks: "Iterator[Block]", is_todo: "Callable[[Block], bool]") -> Optional[_Batch]:
         taken: "List[Block]" = []
         todo: "List[Block]" = []
-        size = self._records()
+        left = self._records()
         for block in blocks:
             taken.append(block)
             if is_todo(block):
                 todo.append(block)
-            if sum(map(len, todo)) >= size or len(taken) >= _MOST:
+                left -= len(block)
+            if left <= 0 or len(taken) - len(todo) >= _DONE:
                 break
         return _Batch(taken, todo) if taken else None
 
