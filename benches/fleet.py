@@ -128,7 +128,7 @@ def fleet(folder, count, *options, name="out"):
 def main():
     folder, count = Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 10_000
     make(folder, count)
-    few, single = min(count, 1000), 30
+    few, single = min(count, 400), 30
     paths = [folder / f"decays/{i:05}.npz" for i in range(few)]
     lines = []
 
