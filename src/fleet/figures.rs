@@ -2,7 +2,7 @@
 
 use super::statistics::Distribution;
 use super::trend::Trend;
-use crate::report::{Axis, Colour, Figure, Mark, Panel, Style};
+use crate::report::{Axis, Colour, Figure, Mark, Panel, Style, quantity};
 
 /// Largest number of bars of a histogram.
 const MOST_BARS: usize = 40;
@@ -47,7 +47,7 @@ fn histogram(distribution: &Distribution) -> Panel {
     }
     x.push(high);
     y.push(0.0);
-    let name = distribution.name.replace('_', " ");
+    let name = quantity(&distribution.name);
     Panel::new(
         Axis::linear(name, distribution.unit.clone()),
         Axis::linear("records", ""),
@@ -79,7 +79,7 @@ pub(super) fn trend_figure(distribution: &Distribution, trend: &Trend) -> Option
         (middle(x), middle(y))
     });
     let (middle_x, middle_y): (Vec<f64>, Vec<f64>) = medians.unzip();
-    let name = distribution.name.replace('_', " ");
+    let name = quantity(&distribution.name);
     let panel = Panel::new(
         Axis::linear(trend.name.clone(), trend.unit.clone()),
         Axis::linear(name.clone(), distribution.unit.clone()),

