@@ -8,6 +8,7 @@
 
 mod errors;
 mod fit;
+mod fleet;
 mod problem;
 mod runs;
 mod source;
@@ -27,6 +28,8 @@ mod _kmcfit {
 
     #[pymodule_export]
     use crate::fit::{RawFit, fit};
+    #[pymodule_export]
+    use crate::fleet::{RawFleet, RawJournal, fleet_rows, record_list};
     #[pymodule_export]
     use crate::problem::Problem;
     #[pymodule_export]

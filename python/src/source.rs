@@ -38,9 +38,7 @@ impl RawModel {
                     Some(text) => ModelFile::parse(&path, text)?,
                     None => ModelFile::read(&path)?,
                 };
-                let files = files.iter();
-                let files = files.map(|(name, content)| (name.clone(), Arc::from(&**content)));
-                file.with_files(files).with_overrides(&overrides)
+                file.with_files(contents(&files)).with_overrides(&overrides)
             };
             let file = read().map_err(|error| match is_text {
                 true => keyed(error, &path),
@@ -49,6 +47,21 @@ impl RawModel {
             Ok(Self { file, is_text })
         })
     }
+
+    /// The same model with other files in memory.
+    fn with_files(&self, py: Python<'_>, files: BTreeMap<String, PyBackedBytes>) -> PyResult<Self> {
+        guarded(py, || {
+            Ok(Self {
+                file: self.file.clone().with_files(contents(&files)),
+                is_text: self.is_text,
+            })
+        })
+    }
+}
+
+fn contents(files: &BTreeMap<String, PyBackedBytes>) -> impl Iterator<Item = (String, Arc<[u8]>)> {
+    let files = files.iter();
+    files.map(|(name, content)| (name.clone(), Arc::from(&**content)))
 }
 
 impl RawModel {

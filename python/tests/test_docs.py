@@ -22,3 +22,18 @@ def test_the_code_of_a_page_runs(page, capsys):
         printed = capsys.readouterr().out
         if expected:
             assert printed == expected
+
+
+def test_the_chapter_on_fleets_runs(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("pandas")
+    text = (ROOT / "docs/fleets.md").read_text()
+    blocks = re.findall(r"```python\n(import kmcfit.*?|import numpy.*?)```", text, re.S)
+    assert len(blocks) == 2
+    monkeypatch.chdir(ROOT)
+    names: dict = {}
+    for code in blocks:
+        exec(compile(code.replace("fleets/", f"{tmp_path}/"), "docs/fleets.md", "exec"), names)
+    printed = capsys.readouterr().out.splitlines()
+    assert len(printed) == len(names["table"]) == 12
+    assert printed[0].startswith("footbridge_01.csv adequate ")
+    assert (tmp_path / "footbridge/fleet.html").exists()

@@ -218,3 +218,13 @@ def test_draws_have_the_covariance_of_the_estimates(fit):
     posterior = fit.to_arviz(100)["posterior"]
     assert posterior["stiffness_N_per_m"].shape == (1, 100)
     assert np.isclose(float(posterior["stiffness_N_per_m"].mean()), fit.parameters["stiffness"], rtol=1e-3)
+
+
+def test_the_text_of_a_model_is_kept_for_the_next_record(record):
+    time, force, acceleration = record
+    records = [km.Experiment(time=time, force=force, acceleration=acceleration * factor) for factor in (1.0, 1.001)]
+    records.append(km.Experiment(time=time, force=force, acceleration=acceleration, window={"min": 0.0, "max": 1.5}))
+    model = km.Model(mass=2.4)
+    estimates = [model.fit(data).parameters for data in records]
+    assert estimates == [km.Model(mass=2.4).fit(data).parameters for data in records]
+    assert estimates[0] != estimates[1] != estimates[2]

@@ -92,11 +92,51 @@ impl FleetFolder {
         list: &RecordList,
         warm_start: bool,
     ) -> Result<Self, InputError> {
-        let identity = FleetIdentity::of(model, list, warm_start);
-        if path.join(IDENTITY).exists() {
-            let found = Self::open(path)?;
-            found.check(&identity)?;
+        let own = FleetIdentity::of(model, list, warm_start);
+        if let Some(found) = Self::existing(path)? {
+            found.check(&own)?;
             return Ok(found);
+        }
+        Self::written(path, own, list)
+    }
+
+    /// As [`FleetFolder::prepare`], for records that become known one after another: their list is that of [`FleetFolder::complete`].
+    ///
+    /// # Errors
+    /// If the folder belongs to another model or command, or cannot be written to.
+    pub fn begin(path: &Path, model: &FleetModel, warm_start: bool) -> Result<Self, InputError> {
+        let list = RecordList::default();
+        let own = FleetIdentity::of(model, &list, warm_start);
+        if let Some(found) = Self::existing(path)? {
+            found.check(&FleetIdentity {
+                records_sha256: found.identity.records_sha256.clone(),
+                ..own
+            })?;
+            return Ok(found);
+        }
+        Self::written(path, own, &list)
+    }
+
+    /// The folder of [`FleetFolder::begin`] with the list of its records.
+    ///
+    /// # Errors
+    /// If an earlier list has other records, or the folder cannot be written to.
+    pub fn complete(self, list: &RecordList) -> Result<Self, InputError> {
+        let own = FleetIdentity {
+            records: list.records.len(),
+            records_sha256: list.digest(),
+            ..self.identity.clone()
+        };
+        match self.identity.records {
+            0 => Self::written(&self.path, own, list),
+            _ => self.check(&own).map(|()| self),
+        }
+    }
+
+    /// The fleet of a folder that is there; `None` for a folder that may become that of a fleet.
+    fn existing(path: &Path) -> Result<Option<Self>, InputError> {
+        if path.join(IDENTITY).exists() {
+            return Self::open(path).map(Some);
         }
         if path.join(MANIFEST).exists() {
             return Err(
@@ -105,13 +145,21 @@ impl FleetFolder {
                     .expected("a folder of its own for the fleet"),
             );
         }
-        if path.is_dir() && !journals(path)?.is_empty() {
-            return Err(
+        match path.is_dir() && !journals(path)?.is_empty() {
+            true => Err(
                 InputError::file(path, "the folder holds rows of an unknown fleet")
                     .found(format!("rows without {IDENTITY}"))
                     .expected("a folder of its own for the fleet"),
-            );
+            ),
+            false => Ok(None),
         }
+    }
+
+    fn written(
+        path: &Path,
+        identity: FleetIdentity,
+        list: &RecordList,
+    ) -> Result<Self, InputError> {
         let lines = std::iter::once(Ok(json_line(&list.columns))).chain(list.records.iter().map(
             |record| {
                 Ok::<_, InputError>(json_line(&RecordLine {

@@ -58,7 +58,8 @@ pub fn recorded(path: &Path, each: &mut dyn FnMut(&str)) -> Result<(), InputErro
     read.map(drop).map_err(|error| unreadable(path, error))
 }
 
-fn unreadable(path: &Path, error: io::Error) -> InputError {
+/// A journal that cannot be used.
+pub fn unreadable(path: &Path, error: io::Error) -> InputError {
     InputError::file(path, "the rows cannot be read or written to")
         .found(error)
         .expected("a journal of a fleet that can be written to")

@@ -46,14 +46,18 @@ impl FleetModel {
         record: &Record,
         content: Option<Arc<[u8]>>,
     ) -> Result<ModelFile, InputError> {
-        let content = match content {
-            Some(content) => content,
-            None => read_bytes(&record.path, RECORD, LONGEST)?.into(),
+        let (name, content) = match content {
+            // The name of the file states its format.
+            Some(content) => (record.path.to_string_lossy(), content),
+            None => {
+                let content = read_bytes(&record.path, RECORD, LONGEST)?;
+                (record.name.as_str().into(), content.into())
+            }
         };
         let file = match record.overrides.is_empty() {
             true => self.file.clone(),
             false => self.file.clone().with_overrides(&record.overrides)?,
         };
-        Ok(file.with_record(&record.name, content))
+        Ok(file.with_record(&name, content))
     }
 }

@@ -129,7 +129,11 @@ impl RecordList {
         }
     }
 
-    fn checked(self) -> Result<Self, InputError> {
+    /// The list, if it has records with a name of their own.
+    ///
+    /// # Errors
+    /// No records, or two of one name.
+    pub fn checked(self) -> Result<Self, InputError> {
         if self.records.is_empty() {
             return Err(InputError::argument("RECORDS", "no records")
                 .expected("files, patterns in quotes, or a table with a column `file`"));

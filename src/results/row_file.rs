@@ -64,6 +64,13 @@ impl RowFile {
     }
 }
 
+impl Drop for RowFile {
+    fn drop(&mut self) {
+        // A forked process holds the file open, and with it the lock.
+        let _ = self.file.unlock();
+    }
+}
+
 /// Hands the complete lines of a file, each with the position of its first byte, to `each`; returns the bytes of all. The last one is
 /// incomplete without a newline.
 ///

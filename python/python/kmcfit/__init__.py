@@ -26,6 +26,7 @@ from ._estimates import Estimate, Estimates, Verdict
 from ._experiment import Experiment
 from ._fit import Fit
 from ._fit import open_run as open  # noqa: A001
+from ._fleet import Row, RowList, Rows, fit_many, fit_partition, read_fleet
 from ._functions import (
     BSpline,
     Constant,
@@ -67,15 +68,21 @@ __all__ = [
     "Polynomial",
     "Problem",
     "Profile",
+    "Row",
+    "RowList",
+    "Rows",
     "Sensitivity",
     "Study",
     "StudyFinding",
     "Verdict",
     "compare",
+    "fit_many",
     "fit_model",
+    "fit_partition",
     "init",
     "open",
     "read",
+    "read_fleet",
 ]
 
 

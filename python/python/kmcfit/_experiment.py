@@ -211,7 +211,7 @@ class Experiment:
             spec[str(name)] = value
         return spec
 
-    def _file(self, name: str) -> bytes:
+    def _file(self) -> bytes:
         """The columns as an archive of NumPy."""
         if self._content is None:
             self._content = _npz.archive(self._columns)

@@ -7,7 +7,7 @@ import operator
 import os
 import threading
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, Union
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple, Union
 
 from . import _kmcfit, _yaml
 from ._errors import InputError, unknown_keyword
@@ -107,7 +107,7 @@ class Model:
         self._spec: Dict[str, Any] = {key: value for key, value in spec.items() if value is not None}
         self._path = _PATH
         self._chooses_mass = mass is None
-        self._last: Optional[Tuple[Tuple[Experiment, ...], List[str], "_kmcfit.RawModel"]] = None
+        self._last: Optional[_Ready] = None
         # Keys and types are checked at once; numbers with the records.
         placeholder = {"initial": "estimate"}
         _kmcfit.parse(_yaml.text({**self._spec, "experiments": [placeholder]}), _PATH, False)
@@ -214,15 +214,20 @@ class Model:
         self.__dict__.update(state, _last=None)
 
     def _ready(self, data: Tuple[Experiment, ...], changes: List[str]) -> "_kmcfit.RawModel":
-        """The parsed model with its records; that of the last call is kept for the next one."""
+        """The parsed model with its records; that of the last call is kept for the next one, whose records may be others."""
         last = self._last
-        if last is not None and last[1] == changes and len(last[0]) == len(data) and all(map(operator.is_, last[0], data)):
-            return last[2]
+        if last is not None and last.changes == changes and len(last.data) == len(data):
+            if all(map(operator.is_, last.data, data)):
+                return last.raw
+            if all(map(_is_alike, last.data, data)):
+                files = {f"record-{i}.npz": experiment._file() for i, experiment in enumerate(data, 1)}
+                self._last = last._replace(data=data, raw=last.raw.with_files(files))
+                return self._last.raw
         text, files = self._with(data)
         path = os.path.join(os.path.dirname(self._path), _PATH) if files else self._path
         raw = _kmcfit.RawModel(text, path, files, changes)
         # Files on disk may change between two calls.
-        self._last = (data, changes, raw) if data else None
+        self._last = _Ready(data, changes, raw) if data else None
         return raw
 
     def _with(self, data: Tuple[Experiment, ...]) -> Tuple[str, Dict[str, bytes]]:
@@ -239,7 +244,7 @@ class Model:
                     "not an experiment", f"record {i}", found, "an `Experiment`", "wrap arrays: `km.Experiment(time=t, …)`"
                 )
             file = f"record-{i}.npz"
-            files[file] = experiment._file(file)
+            files[file] = experiment._file()
             name = {} if experiment.name is None else {"name": experiment.name}
             experiments.append({**name, "data": file, **experiment._spec})
         spec = {**self._spec, "experiments": experiments}
@@ -247,6 +252,19 @@ class Model:
             # A force determines the mass.
             spec["functions"] = {**spec["functions"], "mass": _FROM_RECORD}
         return _yaml.text(spec), files
+
+
+class _Ready(NamedTuple):
+    """The parsed model of a call."""
+
+    data: Tuple[Experiment, ...]
+    changes: List[str]
+    raw: "_kmcfit.RawModel"
+
+
+def _is_alike(one: Experiment, other: Any) -> bool:
+    """True if the records have the same text in a model."""
+    return isinstance(other, Experiment) and (one._spec, one.name, one.has_force) == (other._spec, other.name, other.has_force)
 
 
 def _is_main_thread() -> bool:

@@ -371,6 +371,20 @@ fn jacobian_is_that_of_single_tangents(
             prop_assert!((a - b).abs() <= 1e-12 * size, "{j}: {a} is not {b}");
         }
     }
+    // Transposed, by one adjoint solve.
+    let slopes: Vec<f64> = (0..jacobian.nrows())
+        .map(|i| (1.7 * i as f64).sin())
+        .collect();
+    let transposed = problem.predictions_transpose(evaluation, &slopes);
+    prop_assert_eq!(transposed.len(), jacobian.ncols());
+    for (j, (found, column)) in transposed.iter().zip(jacobian.column_iter()).enumerate() {
+        let terms = || column.iter().zip(&slopes).map(|(d, s)| d * s);
+        let (expected, size) = (terms().sum::<f64>(), terms().map(f64::abs).sum::<f64>());
+        prop_assert!(
+            (found - expected).abs() <= 1e-11 * size,
+            "{j}: {found} is not {expected}"
+        );
+    }
     Ok(())
 }
 
