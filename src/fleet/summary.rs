@@ -58,7 +58,7 @@ pub(super) fn headings(trend: &Trend) -> [String; COLUMNS] {
 pub(super) fn cells(distribution: &Distribution) -> [String; COLUMNS] {
     let d = distribution;
     [
-        d.name.replace('_', " "),
+        in_words(&d.name),
         significant(d.median, 5),
         between(d.central95),
         significant(d.slope, 3),
@@ -76,10 +76,19 @@ fn outlier_in_words(outlier: &Outlier, statistics: &Statistics) -> String {
     format!(
         "{}: {} {} {unit}, {} standard deviations from the trend",
         outlier.record,
-        outlier.estimate.replace('_', " "),
+        in_words(&outlier.estimate),
         significant(outlier.value, 5),
-        significant(outlier.score, 2)
+        significant(outlier.score, 3)
     )
+}
+
+/// Name of an estimate in words.
+pub(super) fn in_words(name: &str) -> String {
+    match name {
+        "k_over_m" => "stiffness / mass".to_owned(),
+        "c_over_m" => "damping / mass".to_owned(),
+        name => name.replace('_', " "),
+    }
 }
 
 fn first_line(text: &str) -> &str {
