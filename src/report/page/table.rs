@@ -77,7 +77,7 @@ pub(crate) fn paragraph(text: &str) -> String {
 /// A number with five significant digits and a true minus sign.
 pub(super) fn number(x: f64) -> String {
     // Rounded first: 0.999999 has the decimals of 1.
-    let size = format!("{:.4e}", x.abs()).parse().unwrap_or(x.abs());
+    let size: f64 = format!("{:.4e}", x.abs()).parse().unwrap_or(x.abs());
     let text = match size {
         _ if !x.is_finite() => "unknown".into(),
         0.0 => "0".into(),
