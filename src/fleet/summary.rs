@@ -78,7 +78,7 @@ fn outlier_in_words(outlier: &Outlier, statistics: &Statistics) -> String {
         outlier.record,
         quantity(&outlier.estimate),
         significant(outlier.value, 5),
-        significant(outlier.score, 2)
+        significant(outlier.score, 3)
     )
 }
 

@@ -620,24 +620,6 @@ fn wrong_arguments() {
     "#);
 }
 
-/// Rows name a record by its path, which must be text.
-#[cfg(target_os = "linux")]
-#[test]
-fn a_pattern_finds_a_name_that_is_not_utf_8() {
-    use std::ffi::OsStr;
-    use std::os::unix::ffi::OsStrExt;
-    let bench = bench(1);
-    let odd = bench.path("records").join(OsStr::from_bytes(b"r\xff.csv"));
-    fs::write(odd, record(2.0)).expect("room");
-    let (code, _, message) = bench.run(&["fleet", "model.yaml", "records/*.csv", "--out", "fleet"]);
-    assert_eq!(code, 2);
-    assert!(
-        message.contains("the name of the record is not UTF-8"),
-        "{message}"
-    );
-    assert!(!bench.path("fleet").exists());
-}
-
 /// A folder belongs to one fleet.
 #[test]
 fn other_fleets_are_refused() {
