@@ -14,6 +14,10 @@ pub(crate) fn times_in_words(times: f64) -> String {
 pub(crate) fn resolved<const N: usize>(numbers: [f64; N], half: f64) -> [String; N] {
     let order = |x: f64| x.abs().log10().floor();
     let largest = numbers.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    // An interval within the rounding errors of its numbers.
+    if half <= 1e-12 * largest {
+        return numbers.map(|x| significant(x, 4));
+    }
     let decimals = 1.0 - order(half);
     if (1e-3..1e7).contains(&largest) && (..=12.0).contains(&decimals) {
         let decimals = decimals.max(0.0) as usize;
@@ -58,6 +62,8 @@ mod tests {
             resolved([1.2e8, 1.1e8, 1.3e8], 1e7),
             ["1.20e8", "1.10e8", "1.30e8"]
         );
+        let rate = 49.987_496_874_218_6;
+        assert_eq!(resolved([rate; 3], 1e-14), ["49.99"; 3]);
         assert_eq!(
             resolved([1e-10, -1.3e-4, 1.3e-4], 1.3e-4),
             ["0", "-1.3e-4", "1.3e-4"]

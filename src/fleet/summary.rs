@@ -5,7 +5,7 @@ use super::folder::FleetFolder;
 use super::statistics::{Distribution, Outlier, Statistics};
 use super::trend::Trend;
 use crate::number_format::significant;
-use crate::report::count;
+use crate::report::{count, quantity};
 use std::fmt::Write;
 
 /// The summary for the terminal.
@@ -58,7 +58,7 @@ pub(super) fn headings(trend: &Trend) -> [String; COLUMNS] {
 pub(super) fn cells(distribution: &Distribution) -> [String; COLUMNS] {
     let d = distribution;
     [
-        d.name.replace('_', " "),
+        quantity(&d.name),
         significant(d.median, 5),
         between(d.central95),
         significant(d.slope, 3),
@@ -76,9 +76,9 @@ fn outlier_in_words(outlier: &Outlier, statistics: &Statistics) -> String {
     format!(
         "{}: {} {} {unit}, {} standard deviations from the trend",
         outlier.record,
-        outlier.estimate.replace('_', " "),
+        quantity(&outlier.estimate),
         significant(outlier.value, 5),
-        significant(outlier.score, 2)
+        significant(outlier.score, 3)
     )
 }
 

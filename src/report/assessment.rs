@@ -146,7 +146,8 @@ impl FittedModel<'_> {
         let summaries = self.function_summaries();
         let damping = summaries.get(CoefficientKind::Damping.name())?;
         let (value, half) = (damping.min, damping.half_width()?);
-        (damping.max == value && value + half < 0.0).then(|| {
+        let is_constant = damping.max == value && !damping.negligible;
+        (is_constant && value + half < 0.0).then(|| {
             let [low, high] = resolved([value - half, value + half], half);
             let text = format!(
                 "c is negative (95 % CI {low} to {high} {}): the system gains energy",

@@ -10,6 +10,9 @@ use kmcfit_core::internals::diagnostics::{ResidualDiagnostics, Whiteness};
 use kmcfit_core::internals::record::{Channel, Weighting};
 use kmcfit_core::internals::signal::even_spacing;
 
+/// Size of residuals relative to the samples below which they are rounding errors.
+const ROUNDING: f64 = 1e-10;
+
 /// A channel, its prediction, and its notes for reports.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ChannelView<'a> {
@@ -88,9 +91,18 @@ impl ChannelView<'_> {
                 times,
                 &self.residuals(),
                 self.sigma(),
-                &whiteness(self.channel, &self.diagnostics.whiteness),
+                &sentence(&self.whiteness()),
             ),
         ]
+    }
+
+    /// Result of the test of whiteness; rounding errors are not tested.
+    fn whiteness(&self) -> String {
+        let squares = |values: &[f64]| values.iter().map(|x| x * x).sum::<f64>();
+        match squares(&self.residuals()) <= ROUNDING * ROUNDING * squares(&self.observed()) {
+            true => "the residuals are rounding errors of samples without noise".to_owned(),
+            false => whiteness(self.channel, &self.diagnostics.whiteness),
+        }
     }
 
     /// Figure of the tests of the residuals, or of the innovations of correlated noise; `None` for fewer than three.
@@ -100,8 +112,7 @@ impl ChannelView<'_> {
             Some(_) => "innovations",
         };
         let residuals = self.channel.innovations(self.predicted);
-        let result = whiteness(self.channel, &self.diagnostics.whiteness);
-        record_figures::residual_tests(name, &residuals, self.diagnostics, &result)
+        record_figures::residual_tests(name, &residuals, self.diagnostics, &self.whiteness())
     }
 
     /// Figures of the spectra, and of the frequency response to an only input at the samples, with the undamped natural frequency
@@ -133,6 +144,15 @@ impl ChannelView<'_> {
             .column("measured", self.observed())
             .column("predicted", self.model())
             .column("residual", self.residuals())
+    }
+}
+
+/// A text with a capital letter and a full stop.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    match letters.next() {
+        None => String::new(),
+        Some(first) => format!("{}{}.", first.to_uppercase(), letters.as_str()),
     }
 }
 

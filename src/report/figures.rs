@@ -10,6 +10,8 @@ use kmcfit_core::internals::study::PredictedResponse;
 
 /// Number of samples beyond which the dots are smaller.
 const MANY: usize = 400;
+/// Multiple of the median spacing of samples from which a spacing is a gap.
+const GAP: f64 = 10.0;
 
 /// Largest extent of a band beyond the curves, relative to their range, that the axis includes.
 const WIDE_BAND: f64 = 1.5;
@@ -32,6 +34,27 @@ fn dots(colour: Colour, count: usize) -> Style {
     Style::new(colour).width(if count > MANY { 2.0 } else { 3.5 })
 }
 
+/// A curve over the times of samples, undefined within each gap.
+fn broken_at_gaps(t: &[f64], y: &[f64]) -> [Vec<f64>; 2] {
+    let mut spacings: Vec<f64> = t.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    spacings.sort_by(f64::total_cmp);
+    let median = spacings.get(spacings.len() / 2).copied().unwrap_or(0.0);
+    let (mut times, mut values) = (Vec::new(), Vec::new());
+    let mut last: Option<f64> = None;
+    for (time, value) in t.iter().copied().zip(y.iter().copied()) {
+        if let Some(before) = last
+            && time - before > GAP * median
+        {
+            times.push(0.5 * (before + time));
+            values.push(f64::NAN);
+        }
+        times.push(time);
+        values.push(value);
+        last = Some(time);
+    }
+    [times, values]
+}
+
 /// A measured channel: quantity, unit, times in s, and samples.
 pub type ChannelSamples<'a> = (&'a str, &'a str, &'a [f64], &'a [f64]);
 
@@ -52,12 +75,15 @@ pub fn observation(channels: &[ChannelSamples]) -> Figure {
 pub fn channel((label, unit): (&str, &str), t: &[f64], observed: &[f64], model: &[f64]) -> Figure {
     let samples = Mark::points("samples", t, observed, dots(Colour::Grey, t.len()));
     let line = Style::new(Colour::Blue).width(1.4);
+    let [times, response] = broken_at_gaps(t, model);
     Figure::new(
         "channel",
         "Samples and model",
         "Samples of the channel and the fitted response against time.",
     )
-    .panel(Panel::of_time(label, unit).marks([samples, Mark::line("model", t, model, line)]))
+    .panel(
+        Panel::of_time(label, unit).marks([samples, Mark::line("model", &times, &response, line)]),
+    )
 }
 
 /// The residuals of a channel against time with twice their standard deviation `sigma`, where it is one for all; `description` says

@@ -57,6 +57,7 @@ mod timings;
 mod verdict;
 mod verify;
 
+pub(crate) use answer::quantity;
 pub use answer::{AnswerRow, answer};
 pub use chart::{
     Axis, Colour, Dash, Figure, FigureWidth, Mark, Panel, Scale, Style, render, render_at,

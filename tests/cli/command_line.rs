@@ -142,7 +142,7 @@ fn invalid_arguments_have_found_expected_and_hint() {
     $ kmcfit fti model.yaml
     error: kmcfit: unknown command
       found: `fti`
-      expected: one of: fit, simulate, check, predict, compare, verify, report, study, resume, init, explain, schema, demo, completions, man
+      expected: one of: fit, fleet, simulate, check, predict, compare, verify, report, study, resume, init, explain, schema, demo, completions, man
       hint: did you mean `fit`?
 
     $ kmcfit --jsn

@@ -361,7 +361,7 @@ fn a_table_lists_records() {
         "date",
     ]);
     assert_eq!(code, 0, "{out}{notes}");
-    assert_snapshot!(notes, @"");
+    assert_snapshot!(notes, @"note: columns: `file` names the record; `mass` is the known mass; `start` is the first time used; `end` is the last time used; `functions.damping.start` overrides that key; `date` is kept for the summary; `system` groups records of one system");
     let rows = rows(&bench, "fleet");
     let mass = |name: &str| rows[name]["estimates"]["mass"]["value"].as_f64();
     assert_eq!(mass("records/r01.csv"), Some(2.0));
@@ -400,7 +400,11 @@ fn two_processes_do_not_share_a_shard() {
     rows.lock().expect("a lock");
     let (code, _, message) = bench.run(&arguments);
     assert_eq!(code, 2);
-    assert_snapshot!(message, @"");
+    assert_snapshot!(message, @"
+    error: fleet/rows-1-of-1.jsonl: another process works on this shard
+      expected: one process for each shard
+      hint: wait for it, or give each process a shard of its own
+    ");
 }
 
 /// The shipped model with its records: eleven of twelve have a falling frequency with temperature, one stands out.
@@ -503,10 +507,117 @@ fn wrong_arguments() {
         run(&["model.yaml", "twice.csv", "--out", "fleet"]),
         run(&["model.yaml", "empty.csv", "--out", "fleet"]),
         run(&["model.yaml", "value.csv", "--out", "fleet"]),
+        run(&["model.yaml", "", "--out", "fleet"]),
+        run(&["model.yaml", "records/*.csv", "--out", "/proc/fleet"]),
         run(&["collect", "records"]),
         run(&["page", "records", "r01.csv"]),
     ];
-    assert_snapshot!(all.join("\n"), @"");
+    assert_snapshot!(all.join("\n"), @r#"
+    error: RECORDS: no file matches this pattern
+      found: `absent/*.csv`
+      expected: a pattern such as "records/*.csv"
+
+    error: RECORDS: the pattern cannot be read
+      found: `a[`
+      expected: a pattern such as "records/*.csv"
+      hint: Pattern syntax error near position 1: invalid range pattern
+
+    error: records: a folder in place of records
+      expected: files, or a pattern in quotes
+      hint: "records/*.csv"
+
+    error: RECORDS: two records have the same name
+      found: `records/r01.csv` as number 1 and number 2
+      expected: every record once
+
+    error: --shard: no such shard
+      found: `3/2`
+      expected: I/N with I from 1 to N, as 2/10 for the second of ten shards
+
+    error: --threads: invalid number of threads
+      found: 0
+      expected: 1 to 256
+
+    error: --time-limit: invalid time
+      found: -1
+      expected: seconds, greater than 0
+
+    error: --trend: no such column
+      found: `date`
+      expected: a table of records with further columns
+
+    error: two.yaml:7:5: experiments[1]: the model of a fleet has one experiment
+      |
+    7 |   - data: records/r02.csv
+      |     ^^^^
+      found: 2 experiments
+      expected: one experiment, whose `data` each record replaces
+
+    error: none.yaml:4:5: experiments[0].data: the experiment has no data
+      |
+    4 |   - sigma: {displacement: estimate}
+      |     ^^^^^
+      expected: `data: FILE`, in whose place each record is read
+
+    error: text.csv:2:1: not a number
+      |
+    2 | records/r01.csv,heavy
+      | ^^^^^^^^^^^^^^^^^^^^^
+      found: `heavy`
+      expected: a number, or nothing
+
+    error: nofile.csv:2:1: a row without a file
+      |
+    2 | ,1
+      | ^^
+      expected: the path of a record
+
+    error: short.csv:2:1: a row of another length
+      |
+    2 | records/r01.csv
+      | ^^^^^^^^^^^^^^^
+      found: 1 values
+      expected: 2, one for each column
+
+    error: key.csv:1:1: a column with the name of no key
+      |
+    1 | file,functoins.mass
+      | ^^^^^^^^^^^^^^^^^^^
+      found: `functoins.mass`
+      expected: a key that begins with one of: experiments, functions, fit, grid, constraints, parameters, or a name without a point
+      hint: did you mean `functions`?
+
+    error: twice.csv:1:1: two columns `file`
+      |
+    1 | file,file
+      | ^^^^^^^^^
+      expected: one
+
+    error: RECORDS: no records
+      expected: files, patterns in quotes, or a table with a column `file`
+
+    error: value.csv:2:1: the value cannot be read
+      |
+    2 | records/r01.csv,}
+      | ^^^^^^^^^^^^^^^^^
+      found: `functions.mass=}`
+      expected: a value as in a model file: 50, constant, {order: 2, weight: 0.1}, …
+
+    error: : the path of the record is invalid
+      found: cannot make an empty path absolute
+
+    error: /proc/fleet: the folder of the fleet cannot be written to
+      found: No such file or directory (os error 2)
+      expected: a folder that can be written to
+
+    error: records: this is not the folder of a fleet
+      found: no fleet.json
+      expected: the folder of `kmcfit fleet --out`
+
+    error: records: this is not the folder of a fleet
+      found: no fleet.json
+      expected: the folder of `kmcfit fleet --out`
+    "#);
 }
 
 /// A folder belongs to one fleet.
@@ -565,5 +676,70 @@ fn other_fleets_are_refused() {
     bench.write("fleet/rows-1-of-1.jsonl", "text\n");
     all.push(refused(&["model.yaml", "list.csv", "--out", "fleet"]));
     // The numbers of lines and columns in messages of the parser of JSON are its own.
-    assert_snapshot!(all.join("\n"), @"");
+    assert_snapshot!(all.join("\n"), @"
+    error: fleet: the folder belongs to a fleet of other records
+      found: 2 records
+      expected: the same records in the same order, of which 1 are given
+      hint: give another folder with --out
+
+    error: fleet: the fleet began with another option
+      found: without --warm-start
+      expected: without --warm-start
+      hint: give another folder with --out
+
+    error: run: the folder holds a run of another command
+      found: kmcfit-manifest.json
+      expected: a folder of its own for the fleet
+
+    error: --trend: no such column
+      found: `notes`
+      expected: `note`
+      hint: did you mean `note`?
+
+    error: --trend: the column holds neither numbers nor dates
+      found: `note`
+      expected: a column of which at least half of the cells are numbers, or dates such as 2026-03-02
+
+    error: RECORD: no such record in this fleet
+      found: `records/r1.csv`
+      expected: a record as its row names it
+      hint: did you mean `records/r01.csv`?
+
+    error: fleet: the folder belongs to a fleet of another model
+      found: `model.yaml`
+      expected: the same model
+      hint: give another folder with --out
+
+    error: fleet: the model has changed since this fleet began
+      found: `model.yaml`
+      expected: the same model
+      hint: give another folder with --out
+
+    error: fleet: the fleet began with another version of kmcfit
+      found: 0.1.0
+      expected: 0.2.0-dev
+      hint: give another folder with --out
+
+    error: fleet: the folder holds rows of an unknown fleet
+      found: rows without fleet.json
+      expected: a folder of its own for the fleet
+
+    error: fleet/fleet.json: the identity of the fleet is damaged
+      found: EOF while parsing an object at line 1 column 1
+
+    error: fleet/records.jsonl: the list of records is damaged
+      found: 1 records
+      expected: 2
+
+    error: fleet/records.jsonl: the list of records cannot be read
+      found: expected ident at line 1 column 2
+
+    error: fleet/rows-1-of-1.jsonl: the fleet cannot be collected
+      found: a record of another fleet: records/r07.csv
+
+    note: columns: `file` names the record; `note` is kept for the summary
+    error: fleet/rows-1-of-1.jsonl: the rows cannot be read or written to
+      found: expected ident at line 1 column 2
+      expected: a journal of a fleet that can be written to
+    ");
 }

@@ -76,7 +76,7 @@ fn shipped_runs_hold() {
         bench.run_to(0, &["verify", &format!("runs/{name}")]);
         count += 1;
     }
-    assert_eq!(count, 19);
+    assert_eq!(count, 20);
 }
 
 /// Seeded edits by 1e-6 of a number that is not zero, each found.

@@ -27,7 +27,13 @@ fn page_of(comparison: &Comparison, detail: Detail) -> String {
         (None, count) => format!("Comparison of {count} runs"),
     };
     let conclusions = match comparison.sequence {
-        Some(_) => shell::list(&conclusions(&comparison.measures)),
+        // The first screen has those on the true system.
+        Some(_) => {
+            let above = on_the_truth(&comparison.measures);
+            let mut sentences = conclusions(&comparison.measures);
+            sentences.retain(|sentence| !above.contains(sentence));
+            shell::list(&sentences)
+        }
         None => String::new(),
     };
     let drawn = |figures: &[Option<Figure>]| {
@@ -115,7 +121,9 @@ fn state(comparison: &Comparison, sentences: &mut Vec<String>) -> String {
     let best = selection::best(comparison).filter(|_| !is_sequence);
     match comparison.warning() {
         // The records of a sequence may differ on purpose.
-        Some(warning) if is_sequence && lead.is_some() => sentences.push(warning),
+        Some(warning) if is_sequence && lead.is_some() => {
+            sentences.push(format!("{}.", capital(&warning)));
+        }
         Some(warning) => {
             sentences.extend(lead);
             return shell::state_line("warn", "Not ranked", &warning);

@@ -6,7 +6,9 @@ use crate::report::answer::in_words;
 use crate::report::document::ResultDocument;
 use crate::report::findings;
 use crate::report::text::decade;
-use kmcfit_core::internals::assessment::{BasisComparison, Extension, ExtensionTest, ModelTests};
+use kmcfit_core::internals::assessment::{
+    BasisComparison, EXACT, Extension, ExtensionTest, ModelTests,
+};
 
 /// Step-size check, tests against larger models, and the classical estimates. Empty for a fit without any.
 pub(super) fn checks(document: &ResultDocument) -> String {
@@ -14,12 +16,19 @@ pub(super) fn checks(document: &ResultDocument) -> String {
     if let Some(step) = &document.step_check
         && step.change_per_sample.is_finite()
     {
+        // Residuals that are rounding errors are no measure of the step.
+        let is_exact = document.worst_fit().is_some_and(|worst| worst > EXACT);
+        let beside_residuals = match is_exact {
+            true => ".".to_owned(),
+            false => format!(
+                ", {} % of the rms residual. The step is too large if it changes the response by more than the rms residual.",
+                at_most(100.0 * step.change_per_residual, 2)
+            ),
+        };
         text += &paragraph(&format!(
-            "Step size: half the step ({} s) changes the response by at most {} % of its peak, {} % of the rms residual. \
-             From 100 % of the rms residual on the step is too large.",
+            "Step size: half the step ({} s) changes the response by at most {} % of its peak{beside_residuals}",
             significant(step.step, 4),
             at_most(100.0 * step.change_per_sample, 2),
-            at_most(100.0 * step.change_per_residual, 2),
         ));
     }
     if let Some(tests) = &document.model_tests {

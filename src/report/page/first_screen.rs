@@ -42,10 +42,15 @@ pub(super) fn first_screen(run: &FittedModel, document: &ResultDocument, detail:
 
 /// What stands above the contents: lines over the whole width, and below them a text beside the main figure.
 pub(crate) fn screen(above: &str, text: &str, main: Option<Figure>, detail: Detail) -> String {
-    let main = main.map(|main| format!("<div>\n{}</div>\n", figures(&[main], detail)));
+    let part = |inner: &str| match inner.is_empty() {
+        true => String::new(),
+        false => format!("<div>\n{inner}</div>\n"),
+    };
+    let main = main.map(|main| figures(&[main], detail));
     format!(
-        "{above}<div class=\"first\">\n<div>\n{text}</div>\n{}</div>\n",
-        main.unwrap_or_default()
+        "{above}<div class=\"first\">\n{}{}</div>\n",
+        part(text),
+        part(&main.unwrap_or_default())
     )
 }
 
@@ -215,12 +220,16 @@ fn answers(document: &ResultDocument) -> String {
         };
         vec![row.quantity, estimate, row.interval, status]
     };
-    let rows: Vec<Vec<String>> = answer(document).into_iter().map(row).collect();
-    table(
-        "Answer",
-        &["quantity", "estimate", "95 % CI", "status"],
-        &rows,
-    )
+    let mut rows: Vec<Vec<String>> = answer(document).into_iter().map(row).collect();
+    let mut headings = vec!["quantity", "estimate", "95 % CI", "status"];
+    // Samples without noise have no intervals.
+    if rows.iter().all(|row| row[2].is_empty()) {
+        headings.remove(2);
+        for row in &mut rows {
+            row.remove(2);
+        }
+    }
+    table("Answer", &headings, &rows)
 }
 
 /// The recommendations, the most urgent first.

@@ -3,21 +3,19 @@
 use super::animation::animation;
 use super::checks::checks;
 use super::first_screen::first_screen;
-use super::table::{list, paragraph};
+use super::table::{list, number, paragraph, table};
 use super::validation::validation;
 use super::{
     Section, figures, figures_without, overview, reproducibility, sectioned, settings, within_limit,
 };
 use crate::finding::Finding;
+use crate::number_format::significant;
 use crate::report::FittedModel;
 use crate::report::chart::{Detail, Figure};
 use crate::report::document::{NuisanceParameter, ResultDocument};
 use crate::report::equation::equation_residual;
 use crate::report::figures::weight_path;
-use crate::report::summary::{
-    prediction_table, write_attempts, write_constraints, write_nuisance_parameters,
-};
-use crate::report::text::escape;
+use crate::report::summary::{write_attempts, write_constraints, write_nuisance_parameters};
 use crate::units::{Quantity, Unit};
 
 /// Curves that are hidden at first: the start may be far from the estimate.
@@ -206,14 +204,43 @@ fn identifiability(run: &FittedModel, document: &ResultDocument) -> String {
     text
 }
 
+/// The predictions: with a known true system their error, else the size of the response.
 fn predictions(document: &ResultDocument) -> String {
-    match document.predictions.as_slice() {
-        [] => String::new(),
-        some => format!(
-            "<pre tabindex=\"0\">{}</pre>\n",
-            escape(&prediction_table(some, document.is_rotation()))
-        ),
-    }
+    let all = &document.predictions;
+    let m = if document.is_rotation() { "rad" } else { "m" };
+    let has_truth = all.iter().any(|p| p.cost.is_some() || p.energy.is_some());
+    let headings = match has_truth {
+        true => [
+            "initial state".to_owned(),
+            format!("integral of the squared error ({m}² s)"),
+            format!("integral of the squared true response ({m}² s)"),
+        ],
+        false => [
+            "initial state".to_owned(),
+            format!("largest |y| ({m})"),
+            format!("y at the end ({m})"),
+        ],
+    };
+    let state = |y: f64, v: f64| {
+        let [y, v] = [y, v].map(|x| significant(x, 6).replace('-', "−"));
+        format!("y = {y} {m}, v = {v} {m}/s")
+    };
+    let rows = all.iter().map(|p| {
+        let numbers = match has_truth {
+            true => [p.cost, p.energy],
+            false => [p.largest, p.last],
+        };
+        let [one, other] = numbers.map(|x| x.map_or_else(|| "unknown".to_owned(), number));
+        vec![state(p.displacement, p.velocity), one, other]
+    });
+    let rows: Vec<Vec<String>> = rows.collect();
+    let failures = all.iter().filter_map(|p| {
+        let failure = p.failure.as_ref()?;
+        let state = state(p.displacement, p.velocity);
+        Some(format!("{state}: no response: {failure}"))
+    });
+    let headings = headings.each_ref().map(String::as_str);
+    table("Predicted free responses", &headings, &rows) + &list(&failures.collect::<Vec<_>>())
 }
 
 /// The nuisance parameters in the units of the channels of their quantity, where these have one unit.

@@ -83,7 +83,9 @@ pub(super) fn functions(document: &ResultDocument) -> String {
     let functions = document.all_functions().filter(|(_, f)| is_new(f));
     let functions: Vec<(&str, &FunctionSummary)> = functions.collect();
     let has_truth = functions.iter().any(|(_, f)| f.truth_max_error.is_some());
-    let has_error = functions.iter().any(|(_, f)| f.standard_error.is_some());
+    let has_error = functions
+        .iter()
+        .any(|(_, f)| f.standard_error.is_some() && !f.negligible);
     let has_verdict = functions.iter().any(|(_, f)| f.verdict.is_some());
     let mut headings = vec!["function", "smallest", "largest", "unit"];
     headings.extend(has_error.then_some("standard error"));

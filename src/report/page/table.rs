@@ -76,7 +76,8 @@ pub(crate) fn paragraph(text: &str) -> String {
 
 /// A number with five significant digits and a true minus sign.
 pub(super) fn number(x: f64) -> String {
-    let size = x.abs();
+    // Rounded first: 0.999999 has the decimals of 1.
+    let size: f64 = format!("{:.4e}", x.abs()).parse().unwrap_or(x.abs());
     let text = match size {
         _ if !x.is_finite() => "unknown".into(),
         0.0 => "0".into(),

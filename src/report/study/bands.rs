@@ -85,6 +85,10 @@ fn with_numbers(at: Optimum, bands: &Bands, found: &FunctionClassification) -> S
     let (Some(mean), true) = (mean, is_identified) else {
         return found.sentence.clone();
     };
+    // The numbers of a function that is zero are rounding errors.
+    if found.sentence.ends_with("is zero to machine precision") {
+        return found.sentence.clone();
+    }
     let Some([low, high]) = mean.interval() else {
         return found.sentence.clone();
     };

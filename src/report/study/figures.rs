@@ -4,6 +4,7 @@ use super::{
     BandRecord, BandsRecord, DirectionRecord, EquivalentSystemRecord, ExtremeSearch,
     ExtremesRecord, Numbers, PredictionRecord, ProfileRecord, StudyDocument,
 };
+use crate::number_format::significant;
 use crate::report::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
 use crate::report::figures::truth;
 use crate::report::main_figure::variation;
@@ -173,9 +174,15 @@ pub fn spectrum(study: &StudyDocument) -> Option<Figure> {
             &relative,
             Style::new(Colour::Blue),
         ),
+        Mark::points(
+            "",
+            &ranks(values.len()),
+            &relative,
+            Style::new(Colour::Blue).width(5.0),
+        ),
         Mark::vertical("rank", rank, dashed),
     ]);
-    let text = spectrum.text.as_str();
+    let text = "Relative to the largest one; the dashed line is at the number of identifiable parameter combinations.";
     Some(Figure::new("spectrum", "Singular values of the sensitivity", text).panel(panel))
 }
 
@@ -185,9 +192,18 @@ pub fn directions(study: &StudyDocument) -> Vec<Figure> {
     };
     let figure = |(name, set): (&str, &[DirectionRecord])| {
         let names = set.first()?.functions.iter().enumerate();
+        // A fixed function has no change.
+        let changes = |f: usize| {
+            set.iter()
+                .any(|d| d.functions[f].1.iter().any(|x| *x != 0.0))
+        };
+        let names = names.filter(|(f, _)| changes(*f));
         let panels = names.map(|(f, (name, _))| {
             let line = |(k, direction): (usize, &DirectionRecord)| {
-                let label = format!("{:.1e}", direction.singular_value);
+                let label = format!(
+                    "singular value {}",
+                    significant(direction.singular_value, 2)
+                );
                 Mark::line(
                     label,
                     &spectrum.times,
@@ -208,7 +224,13 @@ pub fn directions(study: &StudyDocument) -> Vec<Figure> {
         varies.then_some(figure)
     };
     let sets = [("best", &spectrum.best[..]), ("worst", &spectrum.worst)];
-    sets.into_iter().filter_map(figure).collect()
+    // The best and the worst of a few are the same.
+    let shown = if spectrum.rank > spectrum.best.len() {
+        2
+    } else {
+        1
+    };
+    sets.into_iter().take(shown).filter_map(figure).collect()
 }
 
 /// A figure with the panels of all records that have one.

@@ -217,7 +217,11 @@ fn widest(e: &ExtremesRecord) -> String {
             "{}: {range} to machine precision: the fit reproduces the samples exactly",
             e.name
         ),
-        false => format!("{}: {range} (misfit limit {:.4e})", e.name, e.misfit_limit),
+        false => format!(
+            "{}: {range} (misfit limit {})",
+            e.name,
+            significant(e.misfit_limit, 5)
+        ),
     }
 }
 

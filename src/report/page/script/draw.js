@@ -127,13 +127,17 @@ const drawAxes = (space, view, parent) => {
   for (const tick of view.xTicks) {
     const at = fixed(view.xAt(tick.place));
     shape(space, "path", { class: "grid", d: `M${at} ${top}V${bottom}` }, parent);
-    const text = shape(space, "text", { x: at, y: bottom + 16, "text-anchor": "middle" }, parent);
+    // A long label at the right end stays within the drawing.
+    const middle = fixed(Math.min(view.xAt(tick.place), view.outer - 3.5 * tick.label.length));
+    const text = shape(space, "text", { x: middle, y: bottom + 16, "text-anchor": "middle" }, parent);
     text.textContent = tick.label;
   }
   for (const tick of view.yTicks) {
     const at = fixed(view.yAt(tick.place));
     shape(space, "path", { class: "grid", d: `M${left} ${at}H${right}` }, parent);
-    const text = shape(space, "text", { x: left - 6, y: at, "text-anchor": "end", dy: "0.35em" }, parent);
+    // A label of many digits is narrowed to the margin.
+    const narrow = tick.label.length > 8 ? { textLength: left - 8, lengthAdjust: "spacingAndGlyphs" } : {};
+    const text = shape(space, "text", { x: left - 6, y: at, "text-anchor": "end", dy: "0.35em", ...narrow }, parent);
     text.textContent = tick.label;
   }
 };
