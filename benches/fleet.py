@@ -137,7 +137,8 @@ def main():
         print(lines[-1], flush=True)
 
     row_of = {}
-    peer(paths[0], "lm"), peer(paths[0], "trf")  # compiled
+    for method in ("lm", "trf"):
+        peer(paths[0], method)  # compiled
     for method in ("lm", "trf"):
         joblib.Parallel(2)(joblib.delayed(peer)(path, method) for path in paths[:8])
         found, seconds = timed(lambda: joblib.Parallel(2)(joblib.delayed(peer)(path, method) for path in paths))
