@@ -128,7 +128,7 @@ def fleet(folder, count, *options, name="out"):
 def main():
     folder, count = Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 10_000
     make(folder, count)
-    few, single = min(count, 400), 30
+    few, single = max(1, min(count // 10, 1000)), 30
     paths = [folder / f"decays/{i:05}.npz" for i in range(few)]
     lines = []
 
@@ -150,7 +150,7 @@ def main():
         speeds[threads] = few / statistics.median(times)
         row(f"`kmcfit fleet --threads {threads}`", few, statistics.median(times))
     rows = km.read_fleet(folder / "out")
-    many, seconds = timed(lambda: list(km.fit_many(folder / "model.yaml", list(map(str, paths)), threads=2)))
+    _, seconds = timed(lambda: list(km.fit_many(folder / "model.yaml", list(map(str, paths)), threads=2)))
     row("`km.fit_many`, 2 threads", few, seconds)
     warm = fleet(folder, few, "--threads", "2", "--warm-start", name="warm")[0]
     row("`kmcfit fleet --threads 2 --warm-start`", few, warm)
@@ -159,7 +159,7 @@ def main():
     forced = run(folder, "fleet", "forced.yaml", "forced/*.npz", "--out", "out-forced", "--threads", "2")[0]
     row("`kmcfit fleet --threads 2`, records with a force", FORCED, forced)
     memory = {}
-    for number in (min(1000, count), count):
+    for number in (few, count):
         seconds, memory[number] = fleet(folder, number, "--threads", "2", name="many")
         row("`kmcfit fleet --threads 2`", number, seconds, f"peak {memory[number]:.0f} MB")
 
@@ -175,7 +175,6 @@ def main():
     best = max(("lm", "trf"), key=lambda method: row_of[method][0])
     to_scipy = distance([x[0] for x, _ in row_of[best][1]])
     to_warm = distance([row["estimates"]["damping"]["value"] for row in km.read_fleet(folder / "warm")])
-    assert [row["estimates"] for row in many] == [row["estimates"] for row in rows]
     verdicts = [sum(row["verdict"] == level for row in rows) for level in ("adequate", "check", "inadequate")]
     ratios = [
         ("records per second against SciPy under joblib", speeds["2"] / row_of[best][0], 30),
@@ -191,7 +190,7 @@ def main():
 NumPy archives on disk. A row of kmcfit has intervals, tests of the residuals and a verdict beside the estimates; SciPy gives estimates and
 a Jacobian.
 
-| | records | time | decays/s | |
+| | records | time | records/s | |
 |---|---|---|---|---|
 {chr(10).join(lines)}
 
