@@ -128,7 +128,7 @@ def fleet(folder, count, *options, name="out"):
 def main():
     folder, count = Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 10_000
     make(folder, count)
-    few, single = min(count, 1000), 30
+    few, single = min(count, 400), 30
     paths = [folder / f"decays/{i:05}.npz" for i in range(few)]
     lines = []
 
@@ -137,7 +137,8 @@ def main():
         print(lines[-1], flush=True)
 
     row_of = {}
-    peer(paths[0], "lm"), peer(paths[0], "trf")  # compiled
+    for method in ("lm", "trf"):
+        peer(paths[0], method)  # compiled
     for method in ("lm", "trf"):
         joblib.Parallel(2)(joblib.delayed(peer)(path, method) for path in paths[:8])
         found, seconds = timed(lambda: joblib.Parallel(2)(joblib.delayed(peer)(path, method) for path in paths))

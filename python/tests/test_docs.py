@@ -35,5 +35,5 @@ def test_the_chapter_on_fleets_runs(tmp_path, monkeypatch, capsys):
         exec(compile(code.replace("fleets/", f"{tmp_path}/"), "docs/fleets.md", "exec"), names)
     printed = capsys.readouterr().out.splitlines()
     assert len(printed) == len(names["table"]) == 12
-    assert printed[0].startswith("footbridge_01.csv adequate ")
+    assert printed[0].startswith("footbridge_01.csv check ")
     assert (tmp_path / "footbridge/fleet.html").exists()
