@@ -200,7 +200,8 @@ fn trend_of(name: Option<&str>, list: &RecordList) -> Result<Trend, InputError> 
 fn collected(folder: &FleetFolder, list: RecordList, trend: &Trend) -> Result<(), CommandError> {
     let activity = Activity::begin("collecting the rows");
     let found = collect(folder, list, trend)?;
-    let title = format!("{} records fitted", found.list.records.len());
+    let model = super::stem(&folder.identity.model);
+    let title = format!("{model}: {} records", found.list.records.len());
     let text = fleet_page(&title, folder, &found, trend);
     let path = folder.path.join("fleet.html");
     write_whole(&path, &text).map_err(|error| unwritable(&folder.path, &error))?;

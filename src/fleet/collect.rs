@@ -36,6 +36,8 @@ pub struct Collected {
     pub errors: Vec<(String, String)>,
 }
 
+/// Most different reasons that are counted.
+const MOST_REASONS: usize = 1000;
 /// Most errors that are kept.
 const MOST_ERRORS: usize = 1000;
 
@@ -78,6 +80,8 @@ pub fn collect(
         })
         .collect();
     statistics.outliers = Statistics::find_outliers(&statistics.distributions, &names);
+    statistics.reasons = gathered.reasons.into_iter().collect();
+    (statistics.reasons).sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
     statistics.records = list.records.len();
     statistics.missing = statistics.records - rows.count();
     let path = folder.path.join(ROWS);
@@ -162,6 +166,7 @@ struct Gathered {
     count: usize,
     has_row: Vec<bool>,
     estimates: Vec<Column>,
+    reasons: HashMap<String, usize>,
     verdicts: Vec<Option<VerdictLevel>>,
     errors: Vec<(String, String)>,
     statistics: Statistics,
@@ -173,6 +178,7 @@ impl Gathered {
             count,
             has_row: vec![false; count],
             estimates: Vec::new(),
+            reasons: HashMap::new(),
             verdicts: vec![None; count],
             errors: Vec::new(),
             statistics: Statistics::default(),
@@ -198,6 +204,12 @@ impl Gathered {
             self.statistics.verdicts[level as usize] += 1;
         }
         self.verdicts[index] = row.verdict;
+        if row.verdict != Some(VerdictLevel::Adequate)
+            && let Some(reason) = row.warnings.into_iter().next()
+            && (self.reasons.len() < MOST_REASONS || self.reasons.contains_key(&reason))
+        {
+            *self.reasons.entry(reason).or_default() += 1;
+        }
         for (name, estimate) in row.estimates.0 {
             let known = self.estimates.iter().position(|column| column.name == name);
             let column = known.unwrap_or_else(|| {

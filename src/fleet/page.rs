@@ -179,10 +179,15 @@ fn verdicts(collected: &Collected) -> String {
         return String::new();
     }
     let text = format!(
-        "{}. The column `warnings` of rows.parquet gives the reasons.",
+        "{}. The column `warnings` of rows.parquet has all reasons of a record.",
         counts(&collected.statistics)
     );
+    let reasons = collected.statistics.reasons.iter().take(MOST_ROWS);
+    let reasons: Vec<Vec<String>> = reasons
+        .map(|(reason, count)| vec![reason.clone(), count.to_string()])
+        .collect();
     shell::paragraph(&text)
+        + &shell::table("First reasons", &["First reason", "Records"], &reasons)
         + &shell::table(
             "Records that are not adequate",
             &["Record", "Verdict"],

@@ -168,6 +168,8 @@ pub struct Statistics {
     pub missing: usize,
     /// Rows with the verdicts Adequate, Check and Inadequate.
     pub verdicts: [usize; 3],
+    /// First reasons of the verdicts other than Adequate, each with its number of rows, the most frequent first.
+    pub reasons: Vec<(String, usize)>,
     /// Rows with an error.
     pub errors: usize,
     /// Of these, rows that a time limit ended.
