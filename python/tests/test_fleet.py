@@ -259,6 +259,20 @@ def test_a_broken_executor_ends_the_fleet_without_false_rows(tmp_path, expected)
     assert plain(km.fit_many(ARRAYS, pairs(24), out=out)) == expected
 
 
+def test_the_tables_are_read_by_an_independent_reader(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    rows = km.fit_many(ARRAYS, pairs(5), out=tmp_path / "fleet").to_list()
+    table = parquet.read_table(tmp_path / "fleet" / "rows.parquet").to_pydict()
+    assert table["record"] == [row.record for row in rows]
+    for name in ("stiffness", "damping"):
+        assert table[name] == [row.estimates[name]["value"] for row in rows]
+        assert table[name + "_low"] == [row.estimates[name]["ci95"][0] for row in rows]
+    assert table["mass_low"] == [None] * 5
+    assert table["verdict"] == [row.verdict for row in rows]
+    assert table["error"] == [None] * 5
+    assert parquet.read_table(tmp_path / "fleet" / "curves.parquet").num_rows == sum(len(curve["t"]) for row in rows for curve in row.curves)
+
+
 def test_a_time_limit_marks_rows():
     [row] = km.fit_many(ARRAYS, pairs(1), time_limit=1e-9)
     assert row.error.startswith("time limit: ")

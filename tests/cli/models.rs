@@ -87,7 +87,6 @@ fn every_shipped_model_is_run_here() {
         "duffing.yaml",
         "friction.yaml",
         "roll-decay.yaml",
-        // In fleet.rs.
         "footbridge.yaml",
         "moving-support.yaml",
         "shaking-table.yaml",
@@ -552,6 +551,23 @@ fn camera() {
     assert!((sigma.expect("a number") - 0.002).abs() < 3e-4, "{sigma:?}");
     let drift = scalar(&result, "drift of the displacement of photographs");
     assert!((drift - 0.002).abs() < 2e-4, "{drift}");
+}
+
+/// The first of twelve tests; its frequency at -3 degrees and damping ratio are those of `data/README.md`, within four standard errors.
+#[test]
+fn footbridge() {
+    let (_, result) = fitted("footbridge", 0);
+    let frequency = 2.05 * (1.0f64 + 0.0016 * 13.0).sqrt();
+    for (name, truth) in [("natural_frequency", frequency), ("damping_ratio", 0.006)] {
+        let estimate = &result["estimates"][name];
+        let value = estimate["value"].as_f64().expect("a number");
+        let end = |i: usize| estimate["ci95"][i].as_f64().expect("a limit");
+        let standard_error = (end(1) - end(0)) / (2.0 * 1.96);
+        assert!(
+            (value - truth).abs() < 4.0 * standard_error,
+            "{name}: {estimate}"
+        );
+    }
 }
 
 /// The equation error: one convex problem without active inequalities, and no simulation.

@@ -129,6 +129,51 @@ fit: {stop: {iterations: 20, tolerance: 1e-10}}
     same_way(&built, &written);
 }
 
+/// The initial state of a record of 25,000 nodes is estimated from its first 20,000, and is that of a record that ends there: the one sample by
+/// which they differ lies 600 periods from the first node. One channel and two are estimated in different ways.
+#[test]
+fn the_initial_state_of_a_long_record_is_that_of_its_beginning() {
+    let mut seed = 1u64;
+    let mut noise = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        // Uniform, of standard deviation 1e-3.
+        1e-3 * 12f64.sqrt() * ((seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5)
+    };
+    let times: Vec<f64> = (0..25_000).map(|i| 0.1 * f64::from(i)).collect();
+    let y: Vec<f64> = (times.iter())
+        .map(|t| (2.0 * t).sin() + 0.5 + noise())
+        .collect();
+    let v: Vec<f64> = (times.iter())
+        .map(|t| 2.0 * (2.0 * t).cos() + noise())
+        .collect();
+    let initial = |count: usize, has_velocity: bool| {
+        let record = Record::new("long")
+            .displacement(&times[..count], &y[..count])
+            .sigma(1e-3);
+        let record = match has_velocity {
+            true => record.velocity(&times[..count], &v[..count]).sigma(1e-3),
+            false => record,
+        };
+        let device = [1.0, 0.1, 4.0].map(CoefficientSpec::constant);
+        let built = Builder::new(device)
+            .record(record)
+            .nodes(count)
+            .build()
+            .unwrap();
+        let start = built.start();
+        built.experiments[0].initial_state(built.scalars(&start))
+    };
+    for has_velocity in [false, true] {
+        let [long, short] = [25_000, 20_000].map(|count| initial(count, has_velocity));
+        // A sample more or less moves the weight of the smoothing, and the state by less than the noise: that of a sample, 1e-3, and that of
+        // a difference of two, 1e-3 / 0.1.
+        let apart = (long.displacement - short.displacement).abs();
+        assert!(apart < 1e-3, "{long:?} {short:?}");
+        let apart = (long.velocity - short.velocity).abs();
+        assert!(apart < 1e-2, "{long:?} {short:?}");
+    }
+}
+
 /// An invalid part is rejected with its key, without a panic.
 #[test]
 fn invalid_parts_are_refused_with_their_key() {
