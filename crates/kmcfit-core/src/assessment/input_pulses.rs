@@ -65,7 +65,13 @@ pub(super) fn input_pulses(
     let own: Vec<usize> = (0..first).chain(first + nodes..jacobian.ncols()).collect();
     let model = Span::of(&jacobian.select_columns(&own));
     // A static force acts against positive displacements.
-    let by_sample = -jacobian.columns(first, nodes) * hats(&problem.system.grid, nodes, signal);
+    let mut by_sample = DMatrix::zeros(jacobian.nrows(), signal.times().len());
+    for (node, sample, share) in hats(&problem.system.grid, nodes, signal) {
+        by_sample
+            .column_mut(sample)
+            .axpy(-share, &jacobian.column(first + node), 1.0);
+    }
+    drop(jacobian);
     let residuals = model.orthogonal(&weighted_residuals(&extended, &evaluation));
     let found = pursuit(
         &model,
@@ -98,23 +104,24 @@ fn peaks(values: &[f64]) -> Vec<(usize, f64)> {
     signs.enumerate().filter(|(_, sign)| *sign != 0.0).collect()
 }
 
-/// Values at the nodes of a signal that is 1 at one of its samples and 0 at the others, in one column for each sample.
-fn hats(grid: &Grid, nodes: usize, signal: &Signal) -> DMatrix<f64> {
+/// Values at the nodes of signals that are 1 at one of the samples and 0 at the others, as node, sample and value other than 0.
+fn hats(grid: &Grid, nodes: usize, signal: &Signal) -> Vec<(usize, usize, f64)> {
     let times = signal.times();
-    let mut hats = DMatrix::zeros(nodes, times.len());
+    let mut hats = Vec::with_capacity(2 * nodes);
     for node in 0..nodes {
         let t = grid.time(node);
         let right = times.partition_point(|time| *time <= t);
         match (right.checked_sub(1), times.get(right)) {
             (Some(left), Some(next)) => {
                 let share = (t - times[left]) / (next - times[left]);
-                hats[(node, left)] = 1.0 - share;
-                hats[(node, right)] = share;
+                hats.push((node, left, 1.0 - share));
+                hats.push((node, right, share));
             }
-            (Some(last), None) => hats[(node, last)] = 1.0,
+            (Some(last), None) => hats.push((node, last, 1.0)),
             (None, _) => {}
         }
     }
+    hats.retain(|(.., share)| *share != 0.0);
     hats
 }
 
@@ -128,10 +135,7 @@ fn pursuit(
     peaks: &[(usize, f64)],
 ) -> Option<Vec<(usize, f64)>> {
     let sizes: Vec<f64> = columns.column_iter().map(|c| c.norm()).collect();
-    for mut column in columns.column_iter_mut() {
-        let apart = model.orthogonal(&column.clone_owned());
-        column.copy_from(&apart);
-    }
+    model.make_orthogonal(&mut columns);
     let mut found = Vec::new();
     for threshold in std::iter::once(SIGNIFICANT).chain([REMAINS; MOST]) {
         let left = residuals.len().checked_sub(parameters + found.len() + 1)?;

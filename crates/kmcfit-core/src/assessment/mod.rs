@@ -24,6 +24,7 @@ mod recovery;
 mod refinement;
 mod refit;
 mod residual_mean;
+mod rival_screen;
 mod rivals;
 mod score_tests;
 mod second_mode;

@@ -412,7 +412,7 @@ fn embedding(
 }
 
 /// Minimum of `|r + J d|^2`.
-struct Minimum {
+pub(super) struct Minimum {
     squares: f64,
     rank: usize,
     change: DVector<f64>,
@@ -421,7 +421,7 @@ struct Minimum {
 }
 
 impl Minimum {
-    fn of(jacobian: &DMatrix<f64>, residuals: &DVector<f64>) -> Self {
+    pub(super) fn of(jacobian: &DMatrix<f64>, residuals: &DVector<f64>) -> Self {
         let sizes: Vec<f64> = (jacobian.column_iter())
             .map(|column| column.norm().max(f64::MIN_POSITIVE))
             .collect();
@@ -440,6 +440,16 @@ impl Minimum {
             change,
             root,
         }
+    }
+
+    /// The minimum.
+    pub(super) fn squares(&self) -> f64 {
+        self.squares
+    }
+
+    /// The minimiser.
+    pub(super) fn change(&self) -> &DVector<f64> {
+        &self.change
     }
 
     /// Probability of at least this difference of the parameters at `place` and `place + 1` by noise, from the covariance

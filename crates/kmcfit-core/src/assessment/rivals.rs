@@ -19,10 +19,11 @@
 
 use super::constants::constant_probability;
 use super::refinement::applies;
+use super::rival_screen::RivalScreen;
 use crate::functions::{CoefficientFunction, CoefficientKind, CoefficientSet, Parameterization};
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::record::{Loss, Weighting};
+use crate::record::{Channel, Loss, Weighting};
 use crate::solvers::{FitSettings, Stopping, fit_from};
 use crate::system::Term;
 use nalgebra::DMatrix;
@@ -33,6 +34,12 @@ use std::f64::consts::PI;
 const VARIES: f64 = 0.01;
 /// Difference of BIC up to which a rival is named: 10 is very strong evidence (Kass and Raftery 1995).
 const CLOSE: f64 = 10.0;
+/// Ratio of the linearised residuals of a rival to those of the fit, in squares, above which it is not fitted. Coulomb friction may be better than
+/// the fit at a ratio of 3; other terms are worse from 1.2 on.
+const FAR: f64 = 100.0;
+/// Multiple of the error of the linearisation at its minimum that a further decrease of BIC by the search may have. Fits of rivals go below by
+/// 0.2 to 2 times it.
+const ERRORS: f64 = 5.0;
 /// Ratio of the ninth and the first decile of the amplitude below which it does not vary.
 const AMPLITUDES: f64 = 1.3;
 /// Width of the sign of the velocity of a Coulomb friction, relative to the root mean square of the velocity.
@@ -84,19 +91,23 @@ pub(super) fn amplitude_rival(
     let response = Response::of(problem, evaluation)?;
     let own = problem.parameters() as f64 - penalty_freedom(problem, effective);
     let here = criterion(problem, evaluation, own);
-    let best = |sets: Vec<Vec<CoefficientKind>>| {
-        let rivals = sets.into_iter().filter_map(|kinds| {
-            let bic = rival_criterion(problem, theta, &indices, &kinds, &response)?;
-            Some((bic - here, kinds)).filter(|(difference, _)| difference.is_finite())
-        });
-        rivals.min_by(|a, b| a.0.total_cmp(&b.0))
+    let comparison = Comparison {
+        problem,
+        theta,
+        indices: &indices,
+        screen: RivalScreen::at(problem, theta, &indices, &terms(problem, &response)),
+        response,
+        here,
+        own,
     };
-    let first = best(first_terms(problem, &indices))?;
-    let second = best(with_another(problem, &first.1));
-    let (bic_difference, terms) = match second {
-        Some(second) if second.0 < first.0 => second,
-        _ => first,
-    };
+    let first = comparison.best(first_terms(problem, &indices), None)?;
+    let second = comparison.best(with_another(problem, &first.kinds), Some(&first));
+    let best = second.filter(|second| second.difference < first.difference);
+    let Rival {
+        difference: bic_difference,
+        kinds: terms,
+        ..
+    } = best.unwrap_or(first);
     (bic_difference <= CLOSE).then_some(())?;
     Some(AmplitudeRival {
         functions: indices
@@ -109,28 +120,131 @@ pub(super) fn amplitude_rival(
     })
 }
 
-/// BIC of the fitted rival with the terms `kinds`; `None` without a response.
-fn rival_criterion(
-    problem: &Problem,
-    theta: &[f64],
-    indices: &[usize],
-    kinds: &[CoefficientKind],
-    response: &Response,
-) -> Option<f64> {
-    let (rival, start) = rival(problem, theta, indices, kinds, response)?;
-    let settings = FitSettings {
-        stopping: Stopping {
-            tolerance: Some(1e-6),
-            ..Stopping::exactly(ITERATIONS)
-        },
-        ..FitSettings::default()
-    };
-    let fit = fit_from(&rival, &start, &settings).ok()?;
-    Some(criterion(
-        &rival,
-        &fit.best.evaluation,
-        rival.parameters() as f64,
-    ))
+/// A rival with the terms `kinds`.
+struct Rival {
+    kinds: Vec<CoefficientKind>,
+    /// BIC minus that of the fit: of the fitted rival, or of its linearisation where that [decides](Comparison::decided).
+    difference: f64,
+    /// The same by the linearisation.
+    linear: f64,
+    /// True if the linearisation decides.
+    is_decided: bool,
+}
+
+/// Rivals beside a fit.
+struct Comparison<'a> {
+    problem: &'a Problem,
+    theta: &'a [f64],
+    indices: &'a [usize],
+    response: Response,
+    screen: Option<RivalScreen>,
+    /// BIC of the fit.
+    here: f64,
+    /// Effective number of parameters of the fit.
+    own: f64,
+}
+
+impl Comparison<'_> {
+    /// The rival with the smallest BIC. Those that are worse than `found` in the linearisation are left out where it decides.
+    fn best(&self, sets: Vec<Vec<CoefficientKind>>, found: Option<&Rival>) -> Option<Rival> {
+        let decided = found.filter(|rival| rival.is_decided);
+        let rivals = sets.into_iter().filter_map(|kinds| {
+            let linear = self.linear(&kinds);
+            let is_worse = |known: &Rival| linear > known.linear && is_near(&kinds);
+            if decided.is_some_and(is_worse) {
+                return None;
+            }
+            let decision = self.decided(&kinds, linear);
+            let difference = match decision {
+                Some(difference) => difference,
+                None => self.criterion(&kinds)? - self.here,
+            };
+            difference.is_finite().then_some(Rival {
+                kinds,
+                difference,
+                linear,
+                is_decided: decision.is_some(),
+            })
+        });
+        rivals.min_by(|a, b| a.difference.total_cmp(&b.difference))
+    }
+
+    /// BIC of a rival minus that of the fit where no fit of it is needed: its residuals are [much larger](FAR), or the linearisation, with the
+    /// difference `linear` and confirmed by a response at its minimum, leaves it above [`CLOSE`].
+    fn decided(&self, kinds: &[CoefficientKind], linear: f64) -> Option<f64> {
+        let screen = self.screen.as_ref()?;
+        if screen.difference(kinds) > FAR * screen.here() {
+            return Some(linear);
+        }
+        (linear > CLOSE && is_near(kinds)).then_some(())?;
+        let (rival, _) = rival(
+            self.problem,
+            self.theta,
+            self.indices,
+            kinds,
+            &self.response,
+        )?;
+        let at = screen.minimum(kinds);
+        (at.len() == rival.parameters()).then_some(())?;
+        let evaluation = rival.evaluate(&at).ok()?;
+        let there = criterion(&rival, &evaluation, rival.parameters() as f64) - self.here;
+        let error = (there - linear).abs();
+        (there.min(linear) - ERRORS * error > CLOSE).then_some(there)
+    }
+
+    /// BIC of a rival minus that of the fit by the linearisation at the optimum; zero without one.
+    fn linear(&self, kinds: &[CoefficientKind]) -> f64 {
+        let Some(screen) = &self.screen else {
+            return 0.0;
+        };
+        let is_estimated = |c: &Channel| matches!(c.weighting(), Weighting::Estimated { .. });
+        let samples = self.problem.sample_count() as f64;
+        let worse = screen.difference(kinds);
+        let deviance = match self.problem.channels().all(is_estimated) {
+            true => samples * (worse / screen.here()).ln_1p(),
+            false => worse,
+        };
+        deviance + (screen.parameters(kinds) as f64 - self.own) * samples.ln()
+    }
+
+    /// BIC of the fitted rival with the terms `kinds`; `None` without a response.
+    fn criterion(&self, kinds: &[CoefficientKind]) -> Option<f64> {
+        let (rival, start) = rival(
+            self.problem,
+            self.theta,
+            self.indices,
+            kinds,
+            &self.response,
+        )?;
+        let settings = FitSettings {
+            stopping: Stopping {
+                tolerance: Some(1e-6),
+                ..Stopping::exactly(ITERATIONS)
+            },
+            ..FitSettings::default()
+        };
+        let fit = fit_from(&rival, &start, &settings).ok()?;
+        Some(criterion(
+            &rival,
+            &fit.best.evaluation,
+            rival.parameters() as f64,
+        ))
+    }
+}
+
+/// True if a rival has no better minimum far from the fit. One with friction, which ends a motion, may have: it was better by 100 where the response
+/// at the linearised minimum confirmed that it is worse by 500.
+fn is_near(kinds: &[CoefficientKind]) -> bool {
+    !kinds.contains(&CoefficientKind::CoulombFriction)
+}
+
+/// Terms of all rivals that the model does not have.
+fn terms(problem: &Problem, response: &Response) -> Vec<(CoefficientKind, Term)> {
+    let width = WIDTH * response.speed;
+    let all = [STIFFNESS, DAMPING].map(|kinds| absent(problem, kinds));
+    let all = all.into_iter().flatten();
+    all.filter_map(|kind| Some((kind, kind.term(width)?)))
+        .collect()
 }
 
 /// Functions with several parameters that are no constants.

@@ -52,6 +52,12 @@ impl Span {
         vector - &self.basis * self.basis.tr_mul(vector)
     }
 
+    /// Leaves the parts of the columns orthogonal to the derivatives of the model.
+    pub(super) fn make_orthogonal(&self, columns: &mut DMatrix<f64>) {
+        let shares = self.basis.tr_mul(columns);
+        columns.gemm(-1.0, &self.basis, &shares, 1.0);
+    }
+
     /// Estimate of the coefficient with the derivatives `column`, and its ratio to the standard error.
     pub(super) fn test(
         &self,

@@ -181,7 +181,9 @@ impl Bands {
             let function = problem.functions.get(f);
             let at_nodes = maker.nodes.iter().map(|i| values[f][*i]).collect();
             let unit = function.quantity.unit();
-            let entries = |i: usize| maker.entries(f, maker.nodes[i], 1.0);
+            let entries = |i: usize, into: &mut Vec<(usize, f64)>| {
+                maker.add_entries(f, maker.nodes[i], 1.0, into);
+            };
             let degrees = maker.degrees(&entries);
             maker.band(function.name(), unit, at_nodes, linear, (degrees, Some(f)))
         });
@@ -248,19 +250,21 @@ impl Maker<'_> {
         self.directions.row(row.map(|(j, b)| (first + j, b)))
     }
 
-    /// Entries of `factor` times the value of function `f` at node `i` in the parameters.
-    fn entries(&self, f: usize, i: usize, factor: f64) -> Vec<(usize, f64)> {
+    /// Adds the entries of `factor` times the value of function `f` at node `i` in the parameters.
+    fn add_entries(&self, f: usize, i: usize, factor: f64, into: &mut Vec<(usize, f64)>) {
         let functions = &self.problem.functions;
         let first = functions.ranges()[f].start;
         let row = functions.get(f).design.row(i);
-        row.map(|(j, b)| (first + j, factor * b)).collect()
+        into.extend(row.map(|(j, b)| (first + j, factor * b)));
     }
 
     /// Degrees of freedom of the values with these entries at each node of the band, and the gradient of their mean.
-    fn degrees(&self, entries: &dyn Fn(usize) -> Vec<(usize, f64)>) -> (Vec<f64>, Vec<f64>) {
+    fn degrees(&self, add: &dyn Fn(usize, &mut Vec<(usize, f64)>)) -> (Vec<f64>, Vec<f64>) {
         let mut gradient = vec![0.0; self.problem.parameters()];
+        let mut entries = Vec::new();
         let degrees = (0..self.nodes.len()).map(|i| {
-            let entries = entries(i);
+            entries.clear();
+            add(i, &mut entries);
             let weight = self.shares[i];
             entries.iter().for_each(|(j, a)| gradient[*j] += weight * a);
             self.variants
@@ -309,8 +313,9 @@ impl Maker<'_> {
             out
         };
         let size = |i: &usize| {
-            let slope = self.slope(f, *i);
-            slope.iter().map(|x| x * x).sum::<f64>().sqrt()
+            let row = functions.get(f).design.row(*i);
+            self.directions
+                .slope_norm(row.map(|(j, b)| (range.start + j, b)))
         };
         LinearisedCurve {
             roots: self.factors.map(|factor| image(&factor.root)),
@@ -337,14 +342,12 @@ impl Maker<'_> {
         ((degrees, gradient), function): ((Vec<f64>, Vec<f64>), Option<usize>),
     ) -> Band {
         let count = self.nodes.len();
-        let error = |which: usize, i: usize| {
-            let hidden = linear.hidden[which].row(i).norm();
-            match hidden > UNSEEN_SHARE * linear.sizes[i] {
+        let norms = [0, 1].map(|case| linear.norms(case));
+        let error = |case: usize, i: usize| {
+            let [known, hidden] = &norms[case];
+            match hidden[i] > UNSEEN_SHARE * linear.sizes[i] {
                 true => f64::INFINITY,
-                false => linear.roots[which]
-                    .row(i)
-                    .norm()
-                    .hypot(linear.basis_error[i]),
+                false => known[i].hypot(linear.basis_error[i]),
             }
         };
         let (mut errors, mut sides) = (Vec::with_capacity(count), Vec::with_capacity(count));
@@ -454,14 +457,13 @@ impl Maker<'_> {
     fn ratios(&self, values: &[Vec<f64>], linearised: &[LinearisedCurve]) -> Vec<Band> {
         let band = |ratio: &RatioOfSet| {
             let functions = ratio.functions();
-            let at = |node: &usize| ratio.at(values, *node);
-            let (ratios, slopes): (Vec<_>, Vec<_>) = self.nodes.iter().map(at).unzip();
+            let (ratios, slopes) = ratio.at_nodes(values, &self.nodes);
             let linear = combine(linearised, &functions, &slopes);
-            let entries = |i: usize| -> Vec<(usize, f64)> {
-                let pairs = functions.iter().zip(&slopes[i]);
-                pairs
-                    .flat_map(|(f, slope)| self.entries(*f, self.nodes[i], *slope))
-                    .collect()
+            let entries = |i: usize, into: &mut Vec<(usize, f64)>| {
+                let slopes = &slopes[i * functions.len()..];
+                for (f, slope) in functions.iter().zip(slopes) {
+                    self.add_entries(*f, self.nodes[i], *slope, into);
+                }
             };
             let degrees = self.degrees(&entries);
             self.band(

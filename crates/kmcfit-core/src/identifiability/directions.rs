@@ -137,6 +137,16 @@ impl Directions {
         self.columns.iter().map(of).collect()
     }
 
+    /// Norm of a sparse linear functional, with each parameter at most once, in the coordinates `z`.
+    pub(super) fn slope_norm(&self, entries: impl Iterator<Item = (usize, f64)>) -> f64 {
+        let squares: f64 = match self.is_coarse() {
+            true => self.row(entries).iter().map(|x| x * x).sum(),
+            // One direction per parameter, of this length.
+            false => entries.map(|(j, a)| a * a / self.metric[j]).sum(),
+        };
+        squares.sqrt()
+    }
+
     /// Sparse linear functional of the parameters in the coordinates `z`.
     pub(super) fn row(&self, entries: impl Iterator<Item = (usize, f64)>) -> Vec<f64> {
         let mut slopes = vec![0.0; self.parameters()];

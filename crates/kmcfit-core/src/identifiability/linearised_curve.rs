@@ -14,37 +14,54 @@ pub(super) struct LinearisedCurve {
     pub basis_error: Vec<f64>,
 }
 
-/// Linear combination `sum_f slope_f(t) p_f(t)`, with slopes at each node.
+impl LinearisedCurve {
+    /// Norms of the rows of `roots` and of `hidden`, in one of the cases.
+    pub fn norms(&self, case: usize) -> [Vec<f64>; 2] {
+        [&self.roots[case], &self.hidden[case]].map(|matrix| {
+            let mut squares = vec![0.0; matrix.nrows()];
+            for column in matrix.column_iter() {
+                for (sum, x) in squares.iter_mut().zip(column.iter()) {
+                    *sum += x * x;
+                }
+            }
+            squares.iter().map(|x| x.sqrt()).collect()
+        })
+    }
+}
+
+/// Linear combination `sum_f slope_f(t) p_f(t)`, with the slopes of all functions at each node after one another.
 pub(super) fn combine(
     linearised: &[LinearisedCurve],
     functions: &[usize],
-    slopes: &[Vec<f64>],
+    slopes: &[f64],
 ) -> LinearisedCurve {
+    let at_nodes = || slopes.chunks_exact(functions.len());
     let sum = |of: &dyn Fn(&LinearisedCurve) -> &DMatrix<f64>| {
-        let parts = functions.iter().enumerate().map(|(p, f)| {
-            let mut part = of(&linearised[*f]).clone();
-            for (mut row, slopes) in part.row_iter_mut().zip(slopes) {
-                row *= slopes[p];
+        let first = of(&linearised[functions[0]]);
+        let mut all = DMatrix::zeros(first.nrows(), first.ncols());
+        for (p, f) in functions.iter().enumerate() {
+            let columns = of(&linearised[*f]).column_iter();
+            for (mut sum, part) in all.column_iter_mut().zip(columns) {
+                for ((sum, x), slopes) in sum.iter_mut().zip(part.iter()).zip(at_nodes()) {
+                    *sum += slopes[p] * x;
+                }
             }
-            part
-        });
-        parts
-            .reduce(|sum, part| sum + part)
-            .expect("at least one function")
+        }
+        all
     };
-    let size = |(i, slopes): (usize, &Vec<f64>)| {
+    let size = |(i, slopes): (usize, &[f64])| {
         let each = functions.iter().zip(slopes);
         let each = each.map(|(f, by)| (linearised[*f].sizes[i] * by).abs());
         each.fold(0.0, f64::max)
     };
-    let error = |(i, slopes): (usize, &Vec<f64>)| {
+    let error = |(i, slopes): (usize, &[f64])| {
         let each = functions.iter().zip(slopes);
         each.map(|(f, by)| linearised[*f].basis_error[i] * by).sum()
     };
     LinearisedCurve {
         roots: [sum(&|l| &l.roots[0]), sum(&|l| &l.roots[1])],
         hidden: [sum(&|l| &l.hidden[0]), sum(&|l| &l.hidden[1])],
-        sizes: slopes.iter().enumerate().map(size).collect(),
-        basis_error: slopes.iter().enumerate().map(error).collect(),
+        sizes: at_nodes().enumerate().map(size).collect(),
+        basis_error: at_nodes().enumerate().map(error).collect(),
     }
 }

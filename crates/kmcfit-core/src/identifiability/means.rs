@@ -66,8 +66,10 @@ pub(crate) fn means_at(
         let places = ratio.functions();
         let mut gradient = vec![0.0; problem.parameters()];
         let (mut value, mut basis_error) = (0.0, 0.0);
-        for (i, share) in shares.iter().enumerate() {
-            let (at_node, slopes) = ratio.at(&values, i);
+        let nodes: Vec<usize> = (0..shares.len()).collect();
+        let (ratios, slopes) = ratio.at_nodes(&values, &nodes);
+        let each = ratios.iter().zip(slopes.chunks_exact(places.len()));
+        for ((i, share), (at_node, slopes)) in shares.iter().enumerate().zip(each) {
             value += share * at_node;
             for (f, slope) in places.iter().zip(slopes) {
                 add(&mut gradient, *f, i, share * slope);

@@ -59,41 +59,52 @@ impl RatioOfSet {
         self.coefficients.iter().flatten().copied().collect()
     }
 
-    /// The ratio at `node`, and its slopes in the [`functions`](Self::functions), whose `values` are given by function and node.
-    pub fn at(&self, values: &[Vec<f64>], node: usize) -> (f64, Vec<f64>) {
-        let sum = |c: &Vec<usize>| c.iter().map(|f| values[*f][node]).sum();
-        let at_node: Vec<f64> = self.coefficients.iter().map(sum).collect();
-        let (value, slopes) = (self.ratio)(&at_node);
-        let each = self.coefficients.iter().zip(slopes);
-        let each = each.flat_map(|(c, slope)| c.iter().map(move |_| slope));
-        (value, each.collect())
+    /// The ratio at each of the `nodes`, and its slopes in the [`functions`](Self::functions), those of a node after one another; `values`
+    /// are given by function and node.
+    pub fn at_nodes(&self, values: &[Vec<f64>], nodes: &[usize]) -> (Vec<f64>, Vec<f64>) {
+        let (mut ratios, mut all) = (Vec::with_capacity(nodes.len()), Vec::new());
+        for node in nodes {
+            let mut at_node = [0.0; MOST_COEFFICIENTS];
+            for (sum, functions) in at_node.iter_mut().zip(&self.coefficients) {
+                *sum = functions.iter().map(|f| values[*f][*node]).sum();
+            }
+            let (value, slopes) = (self.ratio)(at_node);
+            ratios.push(value);
+            for (functions, slope) in self.coefficients.iter().zip(slopes) {
+                all.extend(functions.iter().map(|_| slope));
+            }
+        }
+        (ratios, all)
     }
 }
 
-/// A ratio at a node: its value and its derivatives with respect to the coefficients.
-pub type Ratio = fn(&[f64]) -> (f64, Vec<f64>);
+/// Most coefficients of a ratio.
+const MOST_COEFFICIENTS: usize = 3;
+
+/// A ratio at a node: its value and its derivatives with respect to the coefficients, zero for those that it does not have.
+pub type Ratio = fn([f64; MOST_COEFFICIENTS]) -> (f64, [f64; MOST_COEFFICIENTS]);
 
 /// `p/m`.
-pub fn over_mass(at: &[f64]) -> (f64, Vec<f64>) {
+pub fn over_mass(at: [f64; MOST_COEFFICIENTS]) -> (f64, [f64; MOST_COEFFICIENTS]) {
     let ratio = at[0] / at[1];
-    (ratio, vec![1.0 / at[1], -ratio / at[1]])
+    (ratio, [1.0 / at[1], -ratio / at[1], 0.0])
 }
 
 /// `f = sqrt(k/m)/(2 pi)`: `df = f/2 (dk/k - dm/m)`.
-pub fn frequency(at: &[f64]) -> (f64, Vec<f64>) {
+pub fn frequency(at: [f64; MOST_COEFFICIENTS]) -> (f64, [f64; MOST_COEFFICIENTS]) {
     let frequency = (at[0] / at[1]).sqrt() / TAU;
     let half = |p: f64| 0.5 * frequency / p;
-    (frequency, vec![half(at[0]), -half(at[1])])
+    (frequency, [half(at[0]), -half(at[1]), 0.0])
 }
 
 /// `zeta = c/(2 sqrt(k m))`: `d zeta = dc/(2 sqrt(k m)) - zeta/2 (dk/k + dm/m)`.
-pub fn damping_ratio(at: &[f64]) -> (f64, Vec<f64>) {
-    let [c, k, m] = [at[0], at[1], at[2]];
+pub fn damping_ratio(at: [f64; MOST_COEFFICIENTS]) -> (f64, [f64; MOST_COEFFICIENTS]) {
+    let [c, k, m] = at;
     let root = if k > 0.0 {
         2.0 * (k * m).sqrt()
     } else {
         f64::NAN
     };
     let zeta = c / root;
-    (zeta, vec![1.0 / root, -0.5 * zeta / k, -0.5 * zeta / m])
+    (zeta, [1.0 / root, -0.5 * zeta / k, -0.5 * zeta / m])
 }

@@ -47,15 +47,12 @@ impl Engine {
         nodes: usize,
         mode: EngineMode,
     ) -> Self {
-        let has_blocks = nodes > SHORTEST_IN_BLOCKS && is_linear_midpoint(system);
+        let is_free = is_linear_midpoint(system) && system.is_linear_and_free(excitation);
         match mode {
             EngineMode::Reference => Self::Reference,
-            // Gradient descent depends on every bit; for linear free responses the bits of the reference are kept on records that
-            // are not divided.
-            EngineMode::Fastest if system.is_linear_and_free(excitation) => match has_blocks {
-                true => Self::ParallelInTime,
-                false => Self::Reference,
-            },
+            EngineMode::Fastest if is_free && nodes > SHORTEST_IN_BLOCKS => Self::ParallelInTime,
+            // Gradient descent depends on every bit; those of the reference are kept on records that are not divided.
+            EngineMode::Fastest if is_free => Self::Reference,
             EngineMode::Fastest => Self::Prefactored,
         }
     }

@@ -25,8 +25,7 @@ use crate::simulate::SimulationError;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// Misfit of a channel, as a share of its zero-response misfit, below which a fit explains the samples; a misfit within the
-/// stated noise also does. Spurious minima leave per cents (a mass close to zero) to tens of per cent (a wrong period); a
+/// Misfit of a channel beyond the stated noise, as a share of its zero-response misfit, below which a fit explains the samples. Spurious minima leave per cents (a mass close to zero) to tens of per cent (a wrong period); a
 /// fit in between costs another attempt.
 const EXPLAINED: f64 = 1e-3;
 /// Iteration limit of an attempt; Gauss–Newton from a good start takes about ten.
@@ -334,7 +333,7 @@ fn explains(problem: &Problem, fit: &Fit) -> bool {
             let silence = channel.cost(&vec![0.0; channel.len()]);
             let noise = channel.largest_chi_square();
             let misfit = channel.cost(predicted);
-            misfit <= EXPLAINED * silence || noise.is_some_and(|noise| misfit <= noise)
+            misfit <= EXPLAINED * silence + noise.unwrap_or(0.0)
         })
 }
 

@@ -1,15 +1,16 @@
 //! State estimation from displacements at equally spaced nodes: smoothing, then fourth-order differences.
 
 use super::{Kinematics, noise_of};
-use crate::qp::Subproblem;
 use crate::record::Channel;
 use crate::simd::sum::rms;
 use crate::system::State;
 
 /// Fewest samples from which states are estimated.
 const LEAST: usize = 8;
-/// Rounds of the bisection for the exponent of the smoothing weight.
-const ROUNDS: u32 = 14;
+/// Weights of the smoothing that are tried at a time.
+const LANES: usize = 4;
+/// Rounds of the search for the exponent of the smoothing weight, each of which divides its interval by five.
+const ROUNDS: u32 = 6;
 /// Decimal exponents of the smoothing weight. The rounding error of a smoothed curve, relative to its samples, is the weight
 /// times that of a number: 1e-6 at most.
 const EXPONENTS: [f64; 2] = [-12.0, 10.0];
@@ -144,47 +145,125 @@ fn smoothed(channel: &Channel) -> Option<Smoothed> {
     }
 }
 
-/// Smoothest curve within `noise` of the samples, and its weight.
+/// Smoothest curve within `noise` of the samples, and its weight; its distance from the samples increases with the weight.
 fn smoothed_to(samples: &[f64], noise: f64) -> Option<(Vec<f64>, Option<f64>)> {
     let [mut low, mut high] = EXPONENTS;
-    let mut best = (samples.to_vec(), None);
+    let mut weight = None;
     for _ in 0..ROUNDS {
-        let middle = 0.5 * (low + high);
-        let weight = 10f64.powf(middle);
-        let candidate = smooth(samples, weight)?;
-        if distance(samples, &candidate) <= noise {
-            (low, best) = (middle, (candidate, Some(weight)));
-        } else {
-            high = middle;
+        let part = (high - low) / (LANES + 1) as f64;
+        let exponents: [f64; LANES] = std::array::from_fn(|lane| low + (lane + 1) as f64 * part);
+        let weights = exponents.map(|exponent| 10f64.powf(exponent));
+        let curves = penalised(samples, weights);
+        let is_within =
+            |lane: &usize| distance_of(samples, curves.iter().map(|y| y[*lane])) <= noise;
+        let within = (0..LANES).take_while(is_within).count();
+        if within > 0 {
+            (low, weight) = (exponents[within - 1], Some(weights[within - 1]));
         }
+        high = exponents.get(within).copied().unwrap_or(high);
     }
-    Some(best)
+    match weight {
+        Some(weight) => Some((smooth(samples, weight)?, Some(weight))),
+        None => Some((samples.to_vec(), None)),
+    }
 }
 
 /// Root mean square of the differences of two curves.
 fn distance(one: &[f64], other: &[f64]) -> f64 {
+    distance_of(one, other.iter().copied())
+}
+
+fn distance_of(one: &[f64], other: impl Iterator<Item = f64>) -> f64 {
     let squares = one.iter().zip(other).map(|(a, b)| (a - b) * (a - b));
     (squares.sum::<f64>() / one.len() as f64).sqrt()
 }
 
-/// Minimises `|y - observed|^2 + weight |third differences of y|^2`.
+/// Minimises `|y - observed|^2 + weight |third differences of y|^2`; `None` for fewer than four values or an infinite result.
 pub fn smooth(observed: &[f64], weight: f64) -> Option<Vec<f64>> {
-    let mut sub = Subproblem::new(observed.len());
-    sub.elimination_order = (0..observed.len() as u32).collect();
-    for (i, y) in observed.iter().enumerate() {
-        sub.residuals.push([(i, 1.0)], *y);
+    if observed.len() <= DEGREE {
+        return None;
     }
-    let root = weight.sqrt();
-    for i in 0..observed.len() - 3 {
-        let row = [
-            (i, -root),
-            (i + 1, 3.0 * root),
-            (i + 2, -3.0 * root),
-            (i + 3, root),
-        ];
-        sub.residuals.push(row, 0.0);
+    let curve = |values: &[f64]| -> Vec<f64> {
+        let found = penalised(values, [weight]);
+        found.into_iter().map(|[y]| y).collect()
+    };
+    let mut y = curve(observed);
+    // One refinement: the factors are rounded by up to 64 times the weight.
+    let mut rest: Vec<f64> = observed.iter().zip(&y).map(|(o, y)| o - y).collect();
+    for (i, w) in y.windows(DEGREE + 1).enumerate() {
+        let difference: f64 = THIRD.iter().zip(w).map(|(d, y)| d * y).sum();
+        for (rest, d) in rest[i..].iter_mut().zip(THIRD) {
+            *rest -= weight * d * difference;
+        }
     }
-    sub.solve_equality_constrained()
+    for (y, correction) in y.iter_mut().zip(curve(&rest)) {
+        *y += correction;
+    }
+    y.iter().all(|y| y.is_finite()).then_some(y)
+}
+
+/// Order of the differences that are penalised.
+const DEGREE: usize = 3;
+/// A third difference.
+const THIRD: [f64; DEGREE + 1] = [-1.0, 3.0, -3.0, 1.0];
+
+/// The minimiser of [`smooth`] for `L` weights at a time, by the factors `L D L'` of the banded matrix `I + weight D3' D3`.
+fn penalised<const L: usize>(observed: &[f64], weights: [f64; L]) -> Vec<[f64; L]> {
+    let n = observed.len();
+    // Products of columns `i` and `i - k` of the differences, summed over the rows that there are.
+    let product = |i: usize, k: usize| -> f64 {
+        let rows = i.saturating_sub(DEGREE)..(i + 1 - k).min(n - DEGREE);
+        rows.map(|row| THIRD[i - row] * THIRD[i - k - row]).sum()
+    };
+    let inner: [f64; DEGREE + 1] = std::array::from_fn(|k| product(DEGREE.max(n / 2), k));
+    let is_inner = |i: usize| i >= 2 * DEGREE && i + 2 * DEGREE < n;
+    let mut lower = vec![[[0.0; L]; DEGREE]; n];
+    let mut curve = vec![[0.0; L]; n];
+    // Of the last three rows: reciprocals of the pivots, and the solution of `L`.
+    let mut inverse = [[1.0; L]; DEGREE];
+    let mut solved = [[0.0; L]; DEGREE];
+    for i in 0..n {
+        let entries: [f64; DEGREE + 1] = match is_inner(i) {
+            true => inner,
+            false => std::array::from_fn(|k| if k <= i { product(i, k) } else { 0.0 }),
+        };
+        let before = |k: usize| i.checked_sub(k).map_or([[0.0; L]; DEGREE], |j| lower[j]);
+        let (one, two) = (before(1), before(2));
+        let mut row = [[0.0; L]; DEGREE];
+        let (mut reciprocal, mut solution) = ([0.0; L], [0.0; L]);
+        for lane in 0..L {
+            let w = weights[lane];
+            let scaled3 = w * entries[3];
+            let scaled2 = w * entries[2] - scaled3 * two[0][lane];
+            let scaled1 = w * entries[1] - scaled3 * one[1][lane] - scaled2 * one[0][lane];
+            let [l1, l2, l3] = [
+                scaled1 * inverse[0][lane],
+                scaled2 * inverse[1][lane],
+                scaled3 * inverse[2][lane],
+            ];
+            row[0][lane] = l1;
+            row[1][lane] = l2;
+            row[2][lane] = l3;
+            let pivot = 1.0 + w * entries[0] - l1 * scaled1 - l2 * scaled2 - l3 * scaled3;
+            reciprocal[lane] = 1.0 / pivot;
+            solution[lane] = observed[i]
+                - l1 * solved[0][lane]
+                - l2 * solved[1][lane]
+                - l3 * solved[2][lane];
+            curve[i][lane] = solution[lane] * reciprocal[lane];
+        }
+        lower[i] = row;
+        inverse = [reciprocal, inverse[0], inverse[1]];
+        solved = [solution, solved[0], solved[1]];
+    }
+    for i in (0..n).rev() {
+        for (k, later) in (i + 1..n.min(i + 1 + DEGREE)).enumerate() {
+            for lane in 0..L {
+                curve[i][lane] -= lower[later][k][lane] * curve[later][lane];
+            }
+        }
+    }
+    curve
 }
 
 /// [`differences`] of eighth order, of fourth order at the two values at each end: for values without smoothing on the spacing of groups,
@@ -208,11 +287,48 @@ pub fn fine_differences(values: &[f64], spacing: f64) -> Differences {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::qp::Subproblem;
     use crate::record::Weighting;
     use crate::system::Grid;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
+
+    /// The banded factors against the general solver of least squares.
+    #[test]
+    fn smoothing_minimises_its_penalised_sum() {
+        let mut random = ChaCha8Rng::seed_from_u64(4);
+        for n in [4, 5, 7, 9, 13, 14, 300] {
+            let observed: Vec<f64> = (0..n)
+                .map(|i| {
+                    let noise: f64 = StandardNormal.sample(&mut random);
+                    (0.05 * i as f64).sin() + 0.1 * noise
+                })
+                .collect();
+            for weight in [1e-12, 1e-2, 1.0, 1e3, 1e10] {
+                let mut sub = Subproblem::new(n);
+                sub.elimination_order = (0..n as u32).collect();
+                for (i, y) in observed.iter().enumerate() {
+                    sub.residuals.push([(i, 1.0)], *y);
+                }
+                let root = f64::sqrt(weight);
+                for i in 0..n - DEGREE {
+                    let row = THIRD
+                        .iter()
+                        .enumerate()
+                        .map(|(k, d)| (i + k, root * d))
+                        .collect::<Vec<_>>();
+                    sub.residuals.push(row, 0.0);
+                }
+                let exact = sub.solve_equality_constrained().unwrap_or_else(|| panic!("{n} {weight}"));
+                let found = smooth(&observed, weight).expect("a solution");
+                // Rounding of a stable least-squares solution: the root of the condition 64 w, and its square times the residual.
+                let limit = 1e-15 * (1.0 + weight) * 10.0;
+                let error = distance(&exact, &found);
+                assert!(error < limit, "{n} {weight:e}: {error:e}");
+            }
+        }
+    }
 
     /// Differences of five samples are exact for polynomials of degree 4, for any step and number of steps between samples.
     #[test]
