@@ -19,6 +19,7 @@ use kmcfit_core::internals::solvers::{
     CheckpointStore, Fit, IterationEvent, IterationRecord, Observer, Status, WeightPath,
 };
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::time::Instant;
 
 /// Fit a model to its records; write results, tables, figures and a report.
@@ -316,6 +317,7 @@ pub(super) fn fit_into(
         weights: path.as_ref(),
         requested,
         display: DisplayUnits::default(),
+        drawn: OnceLock::new(),
     };
     let mut document = run.document();
     let draws = run.draws();

@@ -11,6 +11,7 @@ use kmcfit_core::internals::functions::CoefficientFunction;
 use kmcfit_core::internals::solvers::{Fit, WeightPath};
 use kmcfit_core::internals::study::predict;
 use kmcfit_core::internals::system::State;
+use std::sync::OnceLock;
 
 /// A coefficient over the record.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,6 +65,7 @@ impl CompletedFit {
             run_assessment: &self.assessment,
             requested,
             display: DisplayUnits::default(),
+            drawn: OnceLock::new(),
         }
     }
 

@@ -8,6 +8,16 @@ use super::tables::FUNCTION_ROWS;
 use crate::units::Unit;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::solvers::IterationRecord;
+use kmcfit_core::internals::threads::both;
+
+/// Figures of all channels with their titles.
+#[derive(Debug, Clone)]
+pub(crate) struct ChannelFigures {
+    /// Spectra, and frequency responses where one input acts.
+    pub spectra: Vec<Figure>,
+    /// Tests of the residuals.
+    pub tests: Vec<Figure>,
+}
 
 impl FittedModel<'_> {
     /// The figures of a fit.
@@ -24,8 +34,8 @@ impl FittedModel<'_> {
             list.iter_mut().for_each(|figure| figure.name += &suffix);
             figures.extend(list);
         }
-        figures.extend(self.each_channel(Self::channel_spectra));
-        figures.extend(self.each_channel(Self::channel_tests));
+        let ChannelFigures { spectra, tests } = self.drawn_channels();
+        figures.extend(spectra.iter().chain(tests).cloned());
         figures.extend(self.input_figures());
         figures.extend(self.validation_figures());
         figures
@@ -76,8 +86,19 @@ impl FittedModel<'_> {
         figures.collect()
     }
 
+    /// The figures that both page and files have, drawn once.
+    pub(super) fn drawn_channels(&self) -> &ChannelFigures {
+        self.drawn.get_or_init(|| {
+            let (spectra, tests) = both(
+                || self.each_channel(Self::channel_spectra),
+                || self.each_channel(Self::channel_tests),
+            );
+            ChannelFigures { spectra, tests }
+        })
+    }
+
     /// Spectra of a channel, and its frequency response where one input acts.
-    pub(super) fn channel_spectra(&self, experiment: usize, channel: usize) -> Vec<Figure> {
+    fn channel_spectra(&self, experiment: usize, channel: usize) -> Vec<Figure> {
         let view = self.channel_view(experiment, channel);
         let estimates = self.estimates().0;
         let mut frequency = estimates
@@ -88,7 +109,7 @@ impl FittedModel<'_> {
     }
 
     /// Tests of the residuals of a channel.
-    pub(super) fn channel_tests(&self, experiment: usize, channel: usize) -> Vec<Figure> {
+    fn channel_tests(&self, experiment: usize, channel: usize) -> Vec<Figure> {
         let tests = self.channel_view(experiment, channel).residual_tests();
         tests.into_iter().collect()
     }

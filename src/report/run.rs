@@ -9,6 +9,7 @@ use super::document::{
     PenaltySummary, Prediction, ResultDocument, SlackSummary, WeightSummary,
 };
 use super::fit_assessment::RunAssessment;
+use super::fit_figures::ChannelFigures;
 use super::fit_quality;
 use super::npy::npy;
 use super::page::fit_page;
@@ -27,6 +28,7 @@ use kmcfit_core::internals::solvers::{
 use kmcfit_core::internals::system::{Excitation, Term};
 use kmcfit_core::internals::threads::both;
 use std::io;
+use std::sync::OnceLock;
 use std::time::Duration;
 
 /// The page.
@@ -41,7 +43,7 @@ const FACTOR: &str = "factor.npy";
 const MOST_PARAMETERS: usize = 10_000;
 
 /// A fitted model with its predictions and assessment.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct FittedModel<'a> {
     /// Model.
     pub model: &'a Model,
@@ -57,6 +59,8 @@ pub struct FittedModel<'a> {
     pub requested: RequestedFiles,
     /// Units of page and figures.
     pub display: DisplayUnits,
+    /// Figures that both page and files have.
+    pub(crate) drawn: OnceLock<ChannelFigures>,
 }
 
 impl Model {
@@ -99,12 +103,10 @@ impl FittedModel<'_> {
             self.write_tables(stage, document, &mut writing)?;
             return Ok(writing);
         }
-        let own = || {
-            self.write_tables(stage, document, &mut writing)?;
-            Ok::<_, io::Error>(self.svg_figures(FigureWidth::Double))
-        };
-        let (figures, page) = both(own, || self.page(document));
-        for (name, text) in figures?.into_iter().chain([(PAGE.to_owned(), page)]) {
+        let tables = || self.write_tables(stage, document, &mut writing);
+        let (written, _) = both(tables, || self.drawn_channels());
+        written?;
+        for (name, text) in self.drawings(document, FigureWidth::Double) {
             timed(&mut writing, || stage.write(&name, text.as_bytes()))?;
         }
         Ok(writing)

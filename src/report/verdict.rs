@@ -19,6 +19,7 @@ use kmcfit_core::internals::assessment::{
 use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::solvers::{EquationBalance, Fit, Status};
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 impl FittedModel<'_> {
     /// Verdict on a fit of a model.
@@ -31,6 +32,7 @@ impl FittedModel<'_> {
             weights: None,
             run_assessment: &RunAssessment::of(model, fit),
             requested: RequestedFiles::default(),
+            drawn: OnceLock::new(),
         };
         fitted.verdict()
     }

@@ -40,15 +40,11 @@ fn page_of(run: &FittedModel, document: &ResultDocument, detail: Detail) -> Stri
             coefficients(run, document, detail),
         ),
         ("input", "Input", figures(&run.input_figures())),
-        (
-            "spectra",
-            "Spectra",
-            figures(&run.each_channel(FittedModel::channel_spectra)),
-        ),
+        ("spectra", "Spectra", figures(&run.drawn_channels().spectra)),
         (
             "tests",
             "Residual tests",
-            figures(&run.each_channel(FittedModel::channel_tests)),
+            figures(&run.drawn_channels().tests),
         ),
         ("checks", "Checks of step and terms", checks(document)),
         (

@@ -17,8 +17,10 @@ use crate::identifiability::{BandSettings, Bands, Factorisation, has_active_rows
 use crate::noise::KernelCovariance;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::simd::tall_qr::Triangle;
 use crate::solvers::weighted_jacobian;
 use crate::spans::spans;
+use crate::system::Grid;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
@@ -32,6 +34,8 @@ const SAMPLES_PER_PARAMETER: usize = 4;
 const MOST_PARAMETERS: usize = 200;
 /// Residuals below this share of the variation of the samples are rounding and step-size errors.
 const EXACT: f64 = 1e-4;
+/// Nodes for each cell of a finer basis, where the given one is expressed in it.
+const EMBEDDING_NODES: f64 = 16.0;
 /// Share of the largest change that counts as the place of the change.
 const PLACE: f64 = 0.5;
 
@@ -400,15 +404,44 @@ fn embedding(
     finer: &Basis,
 ) -> Option<DMatrix<f64>> {
     let grid = &problem.system.grid;
-    let mut unit = vec![0.0; function.parameters()];
+    let own = function.basis.as_ref()?;
+    // The functions are those of the finer basis, so any grid with several nodes in each of its cells gives the same.
+    let knots = finer.knot_times(grid);
+    let narrowest = knots.windows(2).map(|ends| ends[1] - ends[0]);
+    let narrowest = narrowest.fold(grid.duration(), f64::min);
+    let nodes = (EMBEDDING_NODES * grid.duration() / narrowest) as usize
+        + EMBEDDING_NODES as usize * finer.parameters(grid);
+    let coarse = Grid::new(grid.start(), grid.duration(), nodes).filter(|_| nodes < grid.nodes());
+    let grid = coarse.as_ref().unwrap_or(grid);
+    let design = own.design(grid);
+    let mut unit = vec![0.0; own.parameters(grid)];
     let mut columns = Vec::with_capacity(unit.len());
     for j in 0..unit.len() {
         unit[j] = 1.0;
-        let values = function.design.multiply(&unit, grid.nodes());
+        let values = design.multiply(&unit, grid.nodes());
         unit[j] = 0.0;
         columns.push(DVector::from_vec(finer.project(grid, &values)?));
     }
     Some(DMatrix::from_columns(&columns))
+}
+
+/// Root `F` of `(J^T J)^-1 = F F^T` on the combinations of parameters that `J` determines, with columns of unit length for the decision.
+pub(super) fn inverse_root(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut scaled = match jacobian.nrows() > jacobian.ncols() {
+        true => Triangle::factor(jacobian),
+        false => jacobian.clone(),
+    };
+    let sizes: Vec<f64> = (scaled.column_iter())
+        .map(|column| column.norm().max(f64::MIN_POSITIVE))
+        .collect();
+    for (mut column, size) in scaled.column_iter_mut().zip(&sizes) {
+        column /= *size;
+    }
+    let mut root = Factorisation::of(&scaled).inverse_root();
+    for (mut row, size) in root.row_iter_mut().zip(&sizes) {
+        row /= *size;
+    }
+    root
 }
 
 /// Minimum of `|r + J d|^2`.
@@ -422,17 +455,7 @@ pub(super) struct Minimum {
 
 impl Minimum {
     pub(super) fn of(jacobian: &DMatrix<f64>, residuals: &DVector<f64>) -> Self {
-        let sizes: Vec<f64> = (jacobian.column_iter())
-            .map(|column| column.norm().max(f64::MIN_POSITIVE))
-            .collect();
-        let mut scaled = jacobian.clone();
-        for (mut column, size) in scaled.column_iter_mut().zip(&sizes) {
-            column /= *size;
-        }
-        let mut root = Factorisation::of(&scaled).inverse_root();
-        for (mut row, size) in root.row_iter_mut().zip(&sizes) {
-            row /= *size;
-        }
+        let root = inverse_root(jacobian);
         let change = -(&root * root.tr_mul(&jacobian.tr_mul(residuals)));
         Self {
             squares: (residuals + jacobian * &change).norm_squared(),

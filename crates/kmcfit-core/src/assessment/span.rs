@@ -1,6 +1,6 @@
 //! Derivatives of a model at its optimum, and score tests of a further parameter beside them.
 
-use crate::identifiability::Factorisation;
+use super::refinement::inverse_root;
 use crate::noise::KernelCovariance;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
@@ -36,14 +36,8 @@ impl Span {
     }
 
     pub(super) fn of(jacobian: &DMatrix<f64>) -> Self {
-        let mut scaled = jacobian.clone();
-        for mut column in scaled.column_iter_mut() {
-            let size = column.norm().max(f64::MIN_POSITIVE);
-            column /= size;
-        }
-        let root = Factorisation::of(&scaled).inverse_root();
         Self {
-            basis: scaled * root,
+            basis: jacobian * inverse_root(jacobian),
         }
     }
 

@@ -138,8 +138,21 @@ fn listed(key: &str, given: &[f64], grid: &Grid) -> Result<Vec<f64>, BuildError>
     Ok(times)
 }
 
+/// Steps in a cell between knots with which the functions of a basis are independent.
+const NODES_OF_CELL: f64 = 5.0;
+
 /// Error if a basis function is zero at all nodes, or basis functions are linearly dependent at the nodes.
 fn check_independent(key: &str, basis: &Basis, grid: &Grid) -> Result<(), BuildError> {
+    let is_local = !matches!(basis, Basis::Polynomial { .. } | Basis::Nodal);
+    let knots = match is_local {
+        true => basis.knot_times(grid),
+        false => Vec::new(),
+    };
+    let mut cells = knots.windows(2).map(|ends| ends[1] - ends[0]);
+    // As many nodes in each cell as functions that are nonzero there.
+    if is_local && cells.all(|width| width > NODES_OF_CELL * grid.step()) {
+        return Ok(());
+    }
     let design = basis.design(grid);
     let Design::Sparse(rows) = &design else {
         return Ok(());

@@ -5,7 +5,7 @@ use crate::rows::Rows;
 use nalgebra::DMatrix;
 use nalgebra_sparse::csc::CscCol;
 use nalgebra_sparse::factorization::CscCholesky;
-use nalgebra_sparse::{CscMatrix, CsrMatrix, SparseEntry};
+use nalgebra_sparse::{CooMatrix, CscMatrix, CsrMatrix, SparseEntry};
 
 /// Smallest squared sine of the angle between a column of the design matrix and the previous ones for which they count as
 /// independent. Rounding errors are about 1e-15, and gradients are amplified by the inverse.
@@ -36,19 +36,7 @@ impl Gram {
                 let sum = weights.iter().sum();
                 Self::factored(&CsrMatrix::from(&DMatrix::from_element(1, 1, sum)))
             }
-            Design::Sparse(rows) => {
-                let (starts, columns, values) = rows.compressed();
-                let parts = (starts.to_vec(), columns.to_vec(), values.to_vec());
-                let (count, width) = (rows.len(), rows.width());
-                let matrix =
-                    CsrMatrix::try_from_csr_data(count, width, parts.0, parts.1, parts.2).ok()?;
-                let mut weighted = matrix.clone();
-                for (i, weight) in weights.iter().enumerate() {
-                    let mut row = weighted.row_mut(i);
-                    row.values_mut().iter_mut().for_each(|b| *b *= weight);
-                }
-                Self::factored(&(matrix.transpose() * weighted))
-            }
+            Design::Sparse(rows) => Self::factored(&weighted_products(rows, weights)),
         }
     }
 
@@ -121,6 +109,37 @@ impl Gram {
             }
         }
     }
+}
+
+/// `B^T W B`. Neighbouring rows have mostly the same columns, those of the functions of one cell.
+fn weighted_products(rows: &Rows, weights: &[f64]) -> CsrMatrix<f64> {
+    let (starts, columns, values) = rows.compressed();
+    let mut products = CooMatrix::new(rows.width(), rows.width());
+    let mut cell: &[usize] = &[];
+    let mut sums: Vec<f64> = Vec::new();
+    let mut add = |cell: &[usize], sums: &[f64]| {
+        let places = cell.iter().flat_map(|j| cell.iter().map(move |k| (*j, *k)));
+        for ((j, k), sum) in places.zip(sums) {
+            products.push(j, k, *sum);
+        }
+    };
+    for (ends, weight) in starts.windows(2).zip(weights) {
+        let own = &columns[ends[0]..ends[1]];
+        if own != cell {
+            add(cell, &sums);
+            cell = own;
+            sums.clear();
+            sums.resize(cell.len() * cell.len(), 0.0);
+        }
+        let entries = &values[ends[0]..ends[1]];
+        for (a, sums) in entries.iter().zip(sums.chunks_exact_mut(cell.len().max(1))) {
+            for (b, sum) in entries.iter().zip(sums) {
+                *sum += a * (weight * b);
+            }
+        }
+    }
+    add(cell, &sums);
+    CsrMatrix::from(&products)
 }
 
 fn rows_of(matrix: &CsrMatrix<f64>) -> Rows {

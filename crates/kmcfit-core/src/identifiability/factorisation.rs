@@ -1,6 +1,7 @@
 //! Singular value decomposition of weighted rows, with the rank threshold that decides which combinations of parameters
 //! are determined: for standard errors, bands, classification, constancy test, predictions, extremes and experiment design.
 
+use crate::simd::tall_qr::Triangle;
 use nalgebra::{DMatrix, DMatrixView};
 
 /// Rank threshold relative to the largest singular value.
@@ -121,7 +122,7 @@ fn right_svd(matrix: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
         return (svd.singular_values.as_slice().to_vec(), qr.q() * inner);
     }
     let square = if rows > columns {
-        matrix.clone().qr().r()
+        Triangle::factor(matrix)
     } else {
         matrix.clone()
     };

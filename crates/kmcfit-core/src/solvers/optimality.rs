@@ -5,13 +5,13 @@
 
 use super::history::number_or_nan;
 use super::iterate::Iterate;
-use super::linearization::{Linearization, linearise};
+use super::linearization::{Linearization, Reduced, linearise};
 use super::reason::{ConditionFailure, Reason};
 use super::termination::{Outcome, Status};
 use super::timings::Timings;
 use crate::constraints::TOLERANCE;
 use crate::host;
-use crate::problem::Problem;
+use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::qp::{Solution, Subproblem};
 use serde::{Deserialize, Serialize};
 
@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 const NEGLIGIBLE: f64 = 1e-20;
 /// Relative rounding error of a computed response, in units of machine precision: some thousand steps.
 const MOTION_ROUNDING: f64 = 1000.0;
-/// Memory of a linearised problem: 3564 bytes per node were measured for nodal functions.
+/// Memory of a linearised problem with many parameters: 3564 bytes per node were measured for nodal functions.
 const BYTES_PER_NODE: u64 = 4000;
 
 /// First-order condition at a point; all values are dimensionless.
@@ -106,8 +106,7 @@ impl Optimality {
                 tolerance,
             });
         }
-        let nodes: usize = problem.experiments.iter().map(|e| e.nodes).sum();
-        if !host::has_memory(BYTES_PER_NODE.saturating_mul(nodes as u64)) {
+        if !host::has_memory(linearisation_memory(problem)) {
             return None;
         }
         let (mut sub, _) = linearise(
@@ -139,6 +138,21 @@ impl Optimality {
             tolerance,
         })
     }
+}
+
+/// Memory of the linearised problem, bytes.
+fn linearisation_memory(problem: &Problem) -> u64 {
+    let (parameters, samples) = (problem.parameters(), problem.sample_count() as u64);
+    if parameters > FEW_PARAMETERS {
+        let nodes: usize = problem.experiments.iter().map(|e| e.nodes).sum();
+        return BYTES_PER_NODE.saturating_mul(nodes as u64);
+    }
+    // Root and residual of a sample, and its derivatives where they are not reduced in blocks.
+    let numbers = match Reduced::is_computed_by_blocks(problem) {
+        true => 2,
+        false => 2 + 2 * parameters as u64,
+    };
+    samples.saturating_mul(8 * numbers)
 }
 
 /// Change of the cost caused by the rounding error of the response, which changes a sum of squared residuals by their

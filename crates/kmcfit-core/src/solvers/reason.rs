@@ -209,10 +209,7 @@ fn ratios(cost: Option<&BoundedValue>, gradient: Option<&BoundedValue>) -> Strin
 fn no_minimum(failure: Option<&ConditionFailure>) -> String {
     match failure {
         Some(failure) => format!("however, the first-order condition is violated: {failure}"),
-        None => format!(
-            "the first-order condition could not be evaluated: {}",
-            ConicStatus::Stalled.sentence()
-        ),
+        None => "the first-order condition could not be evaluated: it needs more memory than there is, or its quadratic program could not be solved".to_owned(),
     }
 }
 

@@ -53,6 +53,18 @@ impl Triangle {
         (triangle, order)
     }
 
+    /// Square matrix `R` with `R^T R = A^T A`: the triangle, its columns in the order of those of `A`.
+    pub fn factor(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let height = matrix.nrows();
+        let (ones, zeros) = (vec![1.0; height], vec![0.0; height]);
+        let (triangle, order) = Self::of(matrix, &ones, &zeros);
+        let mut factor = DMatrix::zeros(order.len(), order.len());
+        for (i, (entries, _)) in triangle.rows().enumerate() {
+            entries.for_each(|(place, r)| factor[(i, order[place])] = r);
+        }
+        factor
+    }
+
     /// Adds the rows of a block, with `D` and `d` for each; the contents of the block are then undefined.
     pub fn add_weighted(&mut self, block: &mut RowBlock, roots: &[f64], right: &[f64]) {
         let places = self.begin(block);

@@ -246,10 +246,8 @@ fn penalised<const L: usize>(observed: &[f64], weights: [f64; L]) -> Vec<[f64; L
             row[2][lane] = l3;
             let pivot = 1.0 + w * entries[0] - l1 * scaled1 - l2 * scaled2 - l3 * scaled3;
             reciprocal[lane] = 1.0 / pivot;
-            solution[lane] = observed[i]
-                - l1 * solved[0][lane]
-                - l2 * solved[1][lane]
-                - l3 * solved[2][lane];
+            solution[lane] =
+                observed[i] - l1 * solved[0][lane] - l2 * solved[1][lane] - l3 * solved[2][lane];
             curve[i][lane] = solution[lane] * reciprocal[lane];
         }
         lower[i] = row;
@@ -320,7 +318,9 @@ mod tests {
                         .collect::<Vec<_>>();
                     sub.residuals.push(row, 0.0);
                 }
-                let exact = sub.solve_equality_constrained().unwrap_or_else(|| panic!("{n} {weight}"));
+                let exact = sub
+                    .solve_equality_constrained()
+                    .unwrap_or_else(|| panic!("{n} {weight}"));
                 let found = smooth(&observed, weight).expect("a solution");
                 // Rounding of a stable least-squares solution: the root of the condition 64 w, and its square times the residual.
                 let limit = 1e-15 * (1.0 + weight) * 10.0;
