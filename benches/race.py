@@ -34,7 +34,7 @@ import figures
 ROOT = Path(__file__).resolve().parent.parent
 WORK = ROOT / "target" / "race"
 SHARED = Path(os.environ.get("KMCFIT_SHARED", ROOT.parent / "shared"))
-ROWS = ["evaluation", "million", "paper", "lbfgs", "smooth", "scaling", "knots", "starts", "duffing", "start-up", "contention", "noisy", "noisy-500", "noisy-long", "noisy-costs", "bounded", "bounded-kinds", "bounded-long", "defaults"]
+ROWS = ["evaluation", "million", "paper", "lbfgs", "smooth", "scaling", "knots", "starts", "duffing", "start-up", "contention", "noisy", "noisy-500", "noisy-long", "noisy-costs", "bounded", "bounded-kinds", "bounded-long", "defaults", "whole", "whole-long", "studies"]
 DURATION = 25.0
 SCALING = [2000, 8000, 40_000, 200_000]
 KNOTS = [4, 8, 16, 32, 64, 128, 256, 512, 1024]
@@ -802,6 +802,70 @@ def defaults(race, row):
     row.notes += [f"{name}: {seconds(m['as shipped'])}, {seconds(m['plain'])} plain, {ratio:.3g} times" for ratio, name, m in worst]
 
 
+def whole_command(race, model, name, row):
+    """Wall clock of a fit with all results and its page, the seconds of its search, and its peak memory in bytes."""
+    walls, searches, peak = [], [], 0
+    for _ in race.rounds():
+        out = WORK / "runs" / name
+        shutil.rmtree(out, ignore_errors=True)
+        clock = time.perf_counter()
+        process = subprocess.Popen([race.kmcfit, "fit", model, "--out", out], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        _, _, usage = os.wait4(process.pid, 0)
+        walls.append(time.perf_counter() - clock)
+        peak = max(peak, usage.ru_maxrss * 1024)
+        document = json.loads((out / "result.json").read_text())
+        searches.append(document["seconds"])
+        if document["outcome"]["status"] != "converged":
+            raise Skip(f"{name}: {document['outcome']}")
+    wall, search = statistics.median(walls), statistics.median(searches)
+    row.notes.append(f"{name}: {spread(walls)} for the whole, {seconds(search)} for the search, {peak / 1e6:.0f} MB at the peak")
+    return wall, search, peak
+
+
+def whole(race, row):
+    """65,000 samples of two sensors: the model of the row `duffing`, with analysis, tables and page."""
+    peer = ROOT / "benches" / "peers" / "duffing_scipy.py"
+    race.once("duffing data", lambda: python_peer(peer, ["numpy", "scipy", "numba"], WORK, one_thread=True))
+    wall, search, _ = whole_command(race, WORK / "duffing_long.yaml", "whole-65000", row)
+    row.peer_result = f"search {seconds(search)}"
+    row.result = seconds(wall)
+    row.ratio = f"60 ms + {(wall - 0.06) / search:.3g} times"
+    row.met = wall <= 0.06 + 3 * search
+
+
+def whole_long(race, row):
+    """10⁶ and 5·10⁶ samples of an acceleration and a force, eight parameters, sigma and grid automatic."""
+    limits = []
+    for samples in (100_000,) if race.quick else (1_000_000, 5_000_000):
+        make = ROOT / "benches" / "long_record.py"
+        race.once(f"long {samples}", lambda: python_peer(make, ["numpy", "numba"], WORK, samples, one_thread=True))
+        wall, search, peak = whole_command(race, WORK / f"long-{samples}.yaml", f"whole-{samples}", row)
+        limits.append((samples, wall, search, peak))
+    _, wall, search, _ = limits[0]
+    row.peer_result = f"search {seconds(search)}"
+    row.result = f"{seconds(wall)}; {limits[-1][3] / 1e9:.3g} GB for {limits[-1][0]:,}"
+    row.ratio = f"60 ms + {(wall - 0.06) / search:.3g} times"
+    row.met = wall <= 0.06 + 3 * search and limits[-1][3] <= 1.5e9
+
+
+def studies(race, row):
+    """Studies of the smooth model of 6000 parameters, and of splines with 12."""
+    few = ["--set", "functions.mass.knots=4", "--set", "functions.damping.knots=4"]
+    times = {}
+    for name, model, more in (("smooth", "paper-smooth", []), ("twelve", "spline", few)):
+        for _ in race.rounds():
+            out = WORK / "runs" / f"study-{name}"
+            shutil.rmtree(out, ignore_errors=True)
+            _, trouble, code, wall = run([race.kmcfit, "study", ROOT / "models" / f"{model}.yaml", "--out", out, *more], timeout=race.longest)
+            if code not in (0, 3):
+                raise Skip(trouble[-300:])
+            times.setdefault(name, []).append(wall)
+    row.notes += [f"{name}: {spread(values)}" for name, values in times.items()]
+    smooth, twelve = (statistics.median(times[name]) for name in ("smooth", "twelve"))
+    row.result = f"{seconds(smooth)}; {seconds(twelve)}"
+    row.met = smooth <= 15 and twelve <= 1
+
+
 def table(race):
     """The rows of the issue: what, peer, target, and the function that fills them."""
     return [
@@ -823,6 +887,9 @@ def table(race):
         (Row("bounded", "positive, smooth, normalised, without noise", "CasADi and FATROP", "1/15"), bounded),
         (Row("bounded-kinds", "noisy with other constraints and records", "noisy", "none"), bounded_kinds),
         (Row("bounded-long", "noise, bounds, one weight, 200,000 nodes", "2000 nodes", "1.5 per node; memory"), bounded_long),
+        (Row("whole", "the whole command on 65,000 samples, with page", "its search", "60 ms + 3 times"), whole),
+        (Row("whole-long", "the same on 10⁶ samples", "its search", "60 ms + 3 times; 5·10⁶ in 1.5 GB"), whole_long),
+        (Row("studies", "studies of 6000 parameters, and of 12", "", "15 s; 1 s"), studies),
         (Row("defaults", "the shipped models with their intervals and tests", "white noise, no test of bases", "2 times"), defaults),
     ]
 

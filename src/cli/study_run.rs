@@ -2,6 +2,7 @@
 
 use super::compare::open_analyses;
 use super::fit::search;
+use super::output::message;
 use super::progress::{self, Activity, Progress};
 use super::{CommandError, unwritable};
 use crate::config::{Model, ModelFile};
@@ -17,7 +18,7 @@ use kmcfit_core::internals::solvers::{CheckpointStore, Status};
 use kmcfit_core::internals::study::extremes::is_within_rounding;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::io;
+use std::io::{self, IsTerminal};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -62,6 +63,9 @@ impl From<io::Error> for StudyError {
     }
 }
 
+/// Most findings of a part that are shown before the end.
+const FIRST_FINDINGS: usize = 3;
+
 /// A study that is to be run.
 pub(super) struct StudyTask<'a> {
     pub file: &'a ModelFile,
@@ -92,6 +96,7 @@ impl StudyTask<'_> {
             structural_rank: structural_rank(&model.problem),
             ..StudyDocument::default()
         };
+        show_findings(&document, "structural-rank");
         let threads = model.threads_within_memory(self.threads);
         let mut work = StudyRun {
             model: Arc::new(model),
@@ -120,6 +125,15 @@ impl StudyTask<'_> {
             .and_then(|()| work.journal.finish_if(done));
         written.map_err(|error| unwritable(folder.path(), &error))?;
         Ok(document)
+    }
+}
+
+/// The first findings of a part of a study while the others are computed, on standard error where that is a terminal.
+fn show_findings(document: &StudyDocument, part: &str) {
+    if io::stderr().is_terminal() {
+        let findings = document.findings().into_iter();
+        let own = findings.filter(|(of, _)| *of == part).take(FIRST_FINDINGS);
+        own.for_each(|(of, sentence)| message(&format!("{of}: {sentence}")));
     }
 }
 
@@ -160,8 +174,10 @@ impl StudyRun<'_> {
         let model = Arc::clone(&self.model);
         let plan = &model.study;
         self.document.sensitivity = Some(self.analysis("sensitivity", || study::sensitivity(at))?);
+        show_findings(&self.document, "sensitivity");
         let bands = || study::bands(at, &model);
         self.document.bands = Some(self.analysis("bands", bands)?);
+        show_findings(&self.document, "bands");
         for target in &plan.profiles {
             let Some(of) = study::linear(at.problem, target) else {
                 continue;

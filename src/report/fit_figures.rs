@@ -12,7 +12,7 @@ use kmcfit_core::internals::threads::both;
 
 /// Figures of all channels with their titles.
 #[derive(Debug, Clone)]
-pub(crate) struct ChannelFigures {
+pub struct ChannelFigures {
     /// Spectra, and frequency responses where one input acts.
     pub spectra: Vec<Figure>,
     /// Tests of the residuals.

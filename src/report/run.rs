@@ -60,7 +60,7 @@ pub struct FittedModel<'a> {
     /// Units of page and figures.
     pub display: DisplayUnits,
     /// Figures that both page and files have.
-    pub(crate) drawn: OnceLock<ChannelFigures>,
+    pub drawn: OnceLock<ChannelFigures>,
 }
 
 impl Model {

@@ -108,7 +108,7 @@ fn the_summary_plots_the_varying_coefficient() {
 #[test]
 fn a_study_shows_its_progress_and_keeps_what_is_done() {
     let bench = bench();
-    let study = "study: {seed: 1, bootstrap: 4000}\n";
+    let study = "study: {seed: 1, bootstrap: 40000}\n";
     bench.write("model.yaml", &(bench.read("model.yaml") + study));
     let command = format!(
         "{} study model.yaml --out study",
@@ -135,7 +135,7 @@ fn a_study_shows_its_progress_and_keeps_what_is_done() {
             break;
         }
         shown += &String::from_utf8_lossy(&buffer[..count]);
-        if !is_interrupted && shown.contains("/4000  ") && shown.contains(" remaining") {
+        if !is_interrupted && shown.contains("/40000  ") && shown.contains(" remaining") {
             keys.write_all(b"\x03").expect("a key");
             is_interrupted = true;
         }
@@ -145,6 +145,10 @@ fn a_study_shows_its_progress_and_keeps_what_is_done() {
         is_interrupted && shown.contains("study 5/6: bootstrap"),
         "{shown}"
     );
+    // The first findings stand on the screen while the others are computed.
+    let [rank, bands, refits] =
+        ["structural-rank: ", "\nbands: ", "study 5/6: bootstrap"].map(|words| shown.find(words));
+    assert!(rank.is_some() && rank < bands && bands < refits, "{shown}");
     assert_eq!(status.code(), Some(130), "{shown}");
     let study: serde_json::Value =
         serde_json::from_str(&bench.read("study/study.json")).expect("JSON");
@@ -159,10 +163,10 @@ fn a_study_shows_its_progress_and_keeps_what_is_done() {
     let reason = failure["reason"].as_str().expect("a reason");
     let count = reason.strip_prefix("interrupted after ");
     let count =
-        count.and_then(|rest| rest.split_once(" of 4000 jobs; none of its results is used"));
+        count.and_then(|rest| rest.split_once(" of 40000 jobs; none of its results is used"));
     let count: usize = count
         .and_then(|(n, _)| n.parse().ok())
         .unwrap_or_else(|| panic!("{reason}"));
-    assert!((1..4000).contains(&count), "{reason}");
+    assert!((1..40000).contains(&count), "{reason}");
     assert_eq!(study["bootstrap"].as_array().map(Vec::len), Some(0));
 }

@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 use nalgebra_sparse::csc::CscCol;
 use nalgebra_sparse::factorization::CscCholesky;
 use nalgebra_sparse::{CooMatrix, CscMatrix, CsrMatrix, SparseEntry};
+use std::collections::BTreeMap;
 
 /// Smallest squared sine of the angle between a column of the design matrix and the previous ones for which they count as
 /// independent. Rounding errors are about 1e-15, and gradients are amplified by the inverse.
@@ -111,25 +112,23 @@ impl Gram {
     }
 }
 
-/// `B^T W B`. Neighbouring rows have mostly the same columns, those of the functions of one cell.
+/// `B^T W B`, each entry summed in the order of the rows. Neighbouring rows have mostly the same columns, those of the functions of one cell.
 fn weighted_products(rows: &Rows, weights: &[f64]) -> CsrMatrix<f64> {
     let (starts, columns, values) = rows.compressed();
-    let mut products = CooMatrix::new(rows.width(), rows.width());
+    let mut products: BTreeMap<(usize, usize), f64> = BTreeMap::new();
     let mut cell: &[usize] = &[];
     let mut sums: Vec<f64> = Vec::new();
-    let mut add = |cell: &[usize], sums: &[f64]| {
-        let places = cell.iter().flat_map(|j| cell.iter().map(move |k| (*j, *k)));
-        for ((j, k), sum) in places.zip(sums) {
-            products.push(j, k, *sum);
-        }
+    let places = |cell: &[usize]| -> Vec<(usize, usize)> {
+        let pairs = cell.iter().flat_map(|j| cell.iter().map(move |k| (*j, *k)));
+        pairs.collect()
     };
     for (ends, weight) in starts.windows(2).zip(weights) {
         let own = &columns[ends[0]..ends[1]];
         if own != cell {
-            add(cell, &sums);
+            products.extend(places(cell).into_iter().zip(sums));
             cell = own;
-            sums.clear();
-            sums.resize(cell.len() * cell.len(), 0.0);
+            let known = |place| products.get(&place).copied().unwrap_or(0.0);
+            sums = places(cell).into_iter().map(known).collect();
         }
         let entries = &values[ends[0]..ends[1]];
         for (a, sums) in entries.iter().zip(sums.chunks_exact_mut(cell.len().max(1))) {
@@ -138,8 +137,12 @@ fn weighted_products(rows: &Rows, weights: &[f64]) -> CsrMatrix<f64> {
             }
         }
     }
-    add(cell, &sums);
-    CsrMatrix::from(&products)
+    products.extend(places(cell).into_iter().zip(sums));
+    let mut matrix = CooMatrix::new(rows.width(), rows.width());
+    for ((j, k), product) in products {
+        matrix.push(j, k, product);
+    }
+    CsrMatrix::from(&matrix)
 }
 
 fn rows_of(matrix: &CsrMatrix<f64>) -> Rows {

@@ -171,6 +171,7 @@ impl Bands {
             factors: [&tight, &loose],
             directions: &information.sensitivity().directions,
             active: &active,
+            bounds_of: bounds_of(problem.parameters(), &active),
             settings,
         };
         let linearised: Vec<LinearisedCurve> = (0..problem.functions.ranges().len())
@@ -227,6 +228,15 @@ impl Bands {
     }
 }
 
+/// Indices of the active rows without equality that have each parameter.
+fn bounds_of(parameters: usize, active: &[ActiveRow]) -> Vec<Vec<usize>> {
+    let mut all = vec![Vec::new(); parameters];
+    for (i, row) in active.iter().enumerate().filter(|(_, row)| !row.equality) {
+        row.entries.iter().for_each(|(j, _)| all[*j].push(i));
+    }
+    all
+}
+
 struct Maker<'a> {
     problem: &'a Problem,
     theta: &'a [f64],
@@ -238,6 +248,8 @@ struct Maker<'a> {
     factors: [&'a CovarianceRoot; 2],
     directions: &'a Directions,
     active: &'a [ActiveRow],
+    /// Active bounds, by the parameters that they have.
+    bounds_of: Vec<Vec<usize>>,
     settings: &'a BandSettings,
 }
 
@@ -397,7 +409,15 @@ impl Maker<'_> {
     fn side(&self, f: usize, i: usize) -> BandSide {
         let slope = self.slope(f, i);
         let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
-        for row in self.active.iter().filter(|r| !r.equality) {
+        let functions = &self.problem.functions;
+        let first = functions.ranges()[f].start;
+        let own = functions.get(f).design.row(i).map(|(j, _)| first + j);
+        let mut rows: Vec<usize> = own
+            .flat_map(|j| self.bounds_of[j].iter().copied())
+            .collect();
+        rows.sort_unstable();
+        rows.dedup();
+        for row in rows.into_iter().map(|r| &self.active[r]) {
             let inwards = self.directions.row(row.entries.iter().copied());
             let dot: f64 = inwards.iter().zip(&slope).map(|(a, b)| a * b).sum();
             let cosine = dot / (norm(&inwards) * norm(&slope)).max(f64::MIN_POSITIVE);

@@ -47,12 +47,12 @@ impl Engine {
         nodes: usize,
         mode: EngineMode,
     ) -> Self {
-        let is_free = is_linear_midpoint(system) && system.is_linear_and_free(excitation);
+        let is_free = system.is_linear_and_free(excitation);
         match mode {
             EngineMode::Reference => Self::Reference,
-            EngineMode::Fastest if is_free && nodes > SHORTEST_IN_BLOCKS => Self::ParallelInTime,
-            // Gradient descent depends on every bit; those of the reference are kept on records that are not divided.
-            EngineMode::Fastest if is_free => Self::Reference,
+            // Gradient descent depends on every bit; those of the reference are kept on short records.
+            EngineMode::Fastest if is_free && nodes <= SHORTEST_IN_BLOCKS => Self::Reference,
+            EngineMode::Fastest if is_free && is_linear_midpoint(system) => Self::ParallelInTime,
             EngineMode::Fastest => Self::Prefactored,
         }
     }
