@@ -156,6 +156,7 @@ def main():
     row("`kmcfit fleet --threads 2 --warm-start`", few, warm)
     singles = sum(run(folder, "fit", "model.yaml", "--set", f"experiments.0.data=decays/{i:05}.npz", "--out", "single")[0] for i in range(single))
     row("single runs of `kmcfit fit`", single, singles)
+    subprocess.run(["rm", "-rf", str(folder / "out-forced")], check=True)
     forced = run(folder, "fleet", "forced.yaml", "forced/*.npz", "--out", "out-forced", "--threads", "2")[0]
     row("`kmcfit fleet --threads 2`, records with a force", FORCED, forced)
     memory = {}
@@ -168,6 +169,8 @@ def main():
         parts = []
         for own, other in zip(rows, others):
             damping = own["estimates"]["damping"]
+            if damping["ci95"] is None:  # residuals that chance made significant
+                continue
             error = (damping["ci95"][1] - damping["ci95"][0]) / (2 * 1.96)
             parts.append(abs(damping["value"] - other) / error)
         return statistics.median(parts), max(parts)

@@ -52,7 +52,7 @@ pub use recovery::{RECOVERY_TOLERANCE, Roughness, TruthErrors, is_same_truth};
 pub use refinement::{BasisTest, CoarseBasis};
 pub use rivals::AmplitudeRival;
 pub use statistics::{FitStatistics, statistics};
-pub use step_check::{StepCheck, StepCheckOutcome, step_check};
+pub use step_check::{StepCheck, StepCheckOutcome};
 pub use verdict::{SampleFault, VerdictLevel, VerdictReason, verdict_level, verdict_reasons};
 
 use classical::classical_estimate;
@@ -105,7 +105,12 @@ impl FitAssessment {
     /// against finer ones.
     pub fn of(problem: &Problem, fit: &Fit, tests_bases: bool) -> Self {
         let best = &fit.best;
-        let step_check = step_check(problem, &best.evaluation);
+        let halved = problem.on_half_step(&best.evaluation);
+        let check = |refined| StepCheck::of(problem, &best.evaluation, refined);
+        let step_check: StepCheckOutcome = match &halved {
+            Ok(refined) => Ok(refined.as_ref().map(check)),
+            Err(error) => Err(*error),
+        };
         let statistics = statistics(problem, &best.evaluation);
         let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
         let reports_errors = few && problem.sample_count() > problem.parameters();
@@ -150,7 +155,7 @@ impl FitAssessment {
             let (theta, evaluation) = (&best.parameters, &best.evaluation);
             let is_coloured = assessment.plausibility.is_coloured;
             let (bands, test) = both(
-                || Bands::at(problem, theta, evaluation, &settings),
+                || Bands::beside(problem, theta, evaluation, halved.ok().flatten(), &settings),
                 || match (tests_bases, is_coloured) {
                     (true, false) => BasisTest::of(problem, theta, evaluation),
                     (true, true) => BasisTest::of_halves(problem, theta, evaluation),

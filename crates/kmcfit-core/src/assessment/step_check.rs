@@ -31,34 +31,34 @@ pub type StepCheckOutcome = Result<Option<StepCheck>, SimulationError>;
 /// # Errors
 /// A [`SimulationError`] if the simulation with half the step fails.
 pub fn step_check(problem: &Problem, evaluation: &Evaluation) -> StepCheckOutcome {
-    let Some(Refined {
-        step,
-        misfit,
-        changes,
-    }) = problem.on_half_step(evaluation)?
-    else {
-        return Ok(None);
-    };
-    let mut summary = StepCheck {
-        step,
-        misfit,
-        change_per_residual: 0.0,
-        change_per_sample: 0.0,
-    };
-    let channels = problem
-        .channels()
-        .zip(evaluation.predictions.iter().flatten());
-    for ((channel, predicted), change) in channels.zip(changes.into_iter().flatten()) {
-        let residuals: Vec<f64> = channel.residuals(predicted).collect();
-        let rms = rms(&residuals);
-        let largest = channel
-            .observed()
-            .iter()
-            .fold(0.0f64, |m, y| m.max(y.abs()));
-        let change = change.iter().fold(0.0f64, |m, d| m.max(d.abs()));
-        let share = |of: f64| if change == 0.0 { 0.0 } else { change / of };
-        summary.change_per_residual = summary.change_per_residual.max(share(rms));
-        summary.change_per_sample = summary.change_per_sample.max(share(largest));
+    let refined = problem.on_half_step(evaluation)?;
+    Ok(refined.map(|refined| StepCheck::of(problem, evaluation, &refined)))
+}
+
+impl StepCheck {
+    /// Compares an evaluation with the results on half the step.
+    pub(super) fn of(problem: &Problem, evaluation: &Evaluation, refined: &Refined) -> Self {
+        let mut summary = StepCheck {
+            step: refined.step,
+            misfit: refined.misfit,
+            change_per_residual: 0.0,
+            change_per_sample: 0.0,
+        };
+        let channels = problem
+            .channels()
+            .zip(evaluation.predictions.iter().flatten());
+        for ((channel, predicted), change) in channels.zip(refined.changes.iter().flatten()) {
+            let residuals: Vec<f64> = channel.residuals(predicted).collect();
+            let rms = rms(&residuals);
+            let largest = channel
+                .observed()
+                .iter()
+                .fold(0.0f64, |m, y| m.max(y.abs()));
+            let change = change.iter().fold(0.0f64, |m, d| m.max(d.abs()));
+            let share = |of: f64| if change == 0.0 { 0.0 } else { change / of };
+            summary.change_per_residual = summary.change_per_residual.max(share(rms));
+            summary.change_per_sample = summary.change_per_sample.max(share(largest));
+        }
+        summary
     }
-    Ok(Some(summary))
 }

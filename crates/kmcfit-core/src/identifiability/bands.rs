@@ -38,7 +38,7 @@ use super::linearised_curve::{LinearisedCurve, combine};
 use super::means::Means;
 use super::ratios::{RatioOfSet, ratios_of_set};
 use super::sensitivity::Sensitivity;
-use crate::objective::Evaluation;
+use crate::objective::{Evaluation, Refined};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::spans::{span_words, spans};
 use crate::system::quadrature::trapezoid_weights;
@@ -116,13 +116,24 @@ impl Bands {
         evaluation: &Evaluation,
         settings: &BandSettings,
     ) -> Self {
+        Self::beside(problem, theta, evaluation, None, settings)
+    }
+
+    /// [`Bands::at`], with the results on half the step where they are known.
+    pub(crate) fn beside(
+        problem: &Problem,
+        theta: &[f64],
+        evaluation: &Evaluation,
+        halved: Option<Refined>,
+        settings: &BandSettings,
+    ) -> Self {
         let samples = problem.sample_count().max(1) as f64;
         let affordable = (MOST_WORK / samples).sqrt() as usize;
         let smooth = affordable.min(MOST_SMOOTH);
         let directions = Directions::new(problem, evaluation, MOST_PARAMETERS, smooth);
         let sensitivity = Sensitivity::along(problem, evaluation, directions);
-        let information =
-            Information::new(problem, theta, sensitivity).with_numerical_error(problem, evaluation);
+        let information = Information::new(problem, theta, sensitivity)
+            .with_error_of_steps(problem, evaluation, halved);
         Self::from_information(problem, theta, evaluation, &information, settings)
     }
 
@@ -168,7 +179,10 @@ impl Bands {
             times: nodes.iter().map(|i| problem.system.grid.time(*i)).collect(),
             shares: trapezoid_weights(nodes.len(), 1.0 / (nodes.len() - 1).max(1) as f64),
             nodes,
-            factors: [&tight, &loose],
+            factors: match bounded {
+                true => vec![&tight, &loose],
+                false => vec![&loose],
+            },
             directions: &information.sensitivity().directions,
             active: &active,
             bounds_of: bounds_of(problem.parameters(), &active),
@@ -245,7 +259,8 @@ struct Maker<'a> {
     times: Vec<f64>,
     /// Weight of each node in a mean over the record.
     shares: Vec<f64>,
-    factors: [&'a CovarianceRoot; 2],
+    /// With all active rows fixed, and with only the equalities fixed; a single one where no bound is active.
+    factors: Vec<&'a CovarianceRoot>,
     directions: &'a Directions,
     active: &'a [ActiveRow],
     /// Active bounds, by the parameters that they have.
@@ -290,8 +305,10 @@ impl Maker<'_> {
         let shares = DVector::from_column_slice(&self.shares);
         let sum = |values: &[f64]| values.iter().zip(&self.shares).map(|(x, w)| x * w).sum();
         let size: f64 = sum(&linear.sizes);
-        let hidden = linear.hidden[1].tr_mul(&shares).norm();
-        let error = linear.roots[1].tr_mul(&shares).norm();
+        // With only the equalities fixed.
+        let case = linear.roots.len() - 1;
+        let hidden = linear.hidden[case].tr_mul(&shares).norm();
+        let error = linear.roots[case].tr_mul(&shares).norm();
         let basis_error: f64 = sum(&linear.basis_error);
         let is_known = hidden <= UNSEEN_SHARE * size && error.is_finite();
         let entries: Vec<(usize, f64)> = gradient.iter().copied().enumerate().collect();
@@ -330,8 +347,10 @@ impl Maker<'_> {
                 .slope_norm(row.map(|(j, b)| (range.start + j, b)))
         };
         LinearisedCurve {
-            roots: self.factors.map(|factor| image(&factor.root)),
-            hidden: self.factors.map(|factor| image(&factor.undetermined)),
+            roots: self.factors.iter().map(|f| image(&f.root)).collect(),
+            hidden: (self.factors.iter())
+                .map(|f| image(&f.undetermined))
+                .collect(),
             sizes: self.nodes.iter().map(size).collect(),
             basis_error: match self.is_penalised(f) {
                 true => vec![0.0; self.nodes.len()],
@@ -354,7 +373,8 @@ impl Maker<'_> {
         ((degrees, gradient), function): ((Vec<f64>, Vec<f64>), Option<usize>),
     ) -> Band {
         let count = self.nodes.len();
-        let norms = [0, 1].map(|case| linear.norms(case));
+        let cases = 0..linear.roots.len();
+        let norms: Vec<[Vec<f64>; 2]> = cases.map(|case| linear.norms(case)).collect();
         let error = |case: usize, i: usize| {
             let [known, hidden] = &norms[case];
             match hidden[i] > UNSEEN_SHARE * linear.sizes[i] {
@@ -364,7 +384,11 @@ impl Maker<'_> {
         };
         let (mut errors, mut sides) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for (i, value) in values.iter().enumerate() {
-            let (tight, loose) = (error(0, i), error(1, i));
+            let tight = error(0, i);
+            let loose = match norms.len() {
+                1 => tight,
+                _ => error(1, i),
+            };
             let (standard_error, side) = if !value.is_finite() || tight.is_nan() {
                 (f64::INFINITY, BandSide::Both)
             } else if loose == 0.0 {

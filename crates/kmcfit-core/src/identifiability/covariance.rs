@@ -9,11 +9,11 @@ use super::equation_rows::{EquationRows, Scores};
 use super::factorisation::Factorisation;
 use super::misspecified::kernels;
 use super::sensitivity::Sensitivity;
-use super::step_error::step_error;
+use super::step_error::{self, step_error};
 use super::width_shift::width_error;
 use crate::functions::{Penalty, Prior, WeightRule};
 use crate::noise::KernelCovariance;
-use crate::objective::Evaluation;
+use crate::objective::{Evaluation, Refined};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use nalgebra::{DMatrix, DVector, DVectorView};
 use std::ops::Range;
@@ -147,6 +147,23 @@ impl Information {
             false => step_error(problem, evaluation, roots),
         };
         Self { error, ..self }
+    }
+
+    /// [`Information::with_numerical_error`], with the results on half the step where they are known.
+    pub fn with_error_of_steps(
+        self,
+        problem: &Problem,
+        evaluation: &Evaluation,
+        halved: Option<Refined>,
+    ) -> Self {
+        match halved.filter(|_| !problem.friction_is_ideal) {
+            None => self.with_numerical_error(problem, evaluation),
+            Some(halved) => {
+                let roots = &self.sensitivity.roots;
+                let error = step_error::of_changes(problem, evaluation, roots, halved);
+                Self { error, ..self }
+            }
+        }
     }
 
     /// Includes this error of the weighted predictions alone.

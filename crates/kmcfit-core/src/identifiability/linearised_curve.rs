@@ -4,10 +4,11 @@ use nalgebra::DMatrix;
 
 /// A curve over time, linearised in the parameters.
 pub(super) struct LinearisedCurve {
-    /// Products with the columns of the covariance root, with all active rows fixed, and with only the equalities fixed.
-    pub roots: [DMatrix<f64>; 2],
-    /// Norm of the slope in undetermined directions, in both cases.
-    pub hidden: [DMatrix<f64>; 2],
+    /// Products with the columns of the covariance root, with all active rows fixed, and with only the equalities fixed; a single one where no
+    /// bound is active.
+    pub roots: Vec<DMatrix<f64>>,
+    /// Slopes in undetermined directions, in the same cases.
+    pub hidden: Vec<DMatrix<f64>>,
     /// Norm of the full slope.
     pub sizes: Vec<f64>,
     /// Error of the basis, which the standard errors include.
@@ -36,6 +37,7 @@ pub(super) fn combine(
     slopes: &[f64],
 ) -> LinearisedCurve {
     let at_nodes = || slopes.chunks_exact(functions.len());
+    let cases = 0..linearised[functions[0]].roots.len();
     let sum = |of: &dyn Fn(&LinearisedCurve) -> &DMatrix<f64>| {
         let first = of(&linearised[functions[0]]);
         let mut all = DMatrix::zeros(first.nrows(), first.ncols());
@@ -59,8 +61,8 @@ pub(super) fn combine(
         each.map(|(f, by)| linearised[*f].basis_error[i] * by).sum()
     };
     LinearisedCurve {
-        roots: [sum(&|l| &l.roots[0]), sum(&|l| &l.roots[1])],
-        hidden: [sum(&|l| &l.hidden[0]), sum(&|l| &l.hidden[1])],
+        roots: cases.clone().map(|case| sum(&|l| &l.roots[case])).collect(),
+        hidden: cases.map(|case| sum(&|l| &l.hidden[case])).collect(),
         sizes: at_nodes().enumerate().map(size).collect(),
         basis_error: at_nodes().enumerate().map(error).collect(),
     }

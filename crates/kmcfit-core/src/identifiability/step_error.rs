@@ -11,7 +11,7 @@
 //! interval derived from it contains the shift.
 
 use crate::diagnostics::rms;
-use crate::objective::Evaluation;
+use crate::objective::{Evaluation, Refined};
 use crate::problem::Problem;
 use nalgebra::DVector;
 
@@ -25,7 +25,21 @@ pub(crate) fn step_error(
     evaluation: &Evaluation,
     roots: &[f64],
 ) -> Option<DVector<f64>> {
-    let halved = problem.on_half_step(evaluation).ok()??;
+    of_changes(
+        problem,
+        evaluation,
+        roots,
+        problem.on_half_step(evaluation).ok()??,
+    )
+}
+
+/// [`step_error`] from the results on half the step.
+pub(super) fn of_changes(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    roots: &[f64],
+    halved: Refined,
+) -> Option<DVector<f64>> {
     let changes: Vec<Vec<f64>> = halved.changes.into_iter().flatten().collect();
     let pairs = problem.predicted(evaluation).zip(&changes);
     let is_of_these_steps = pairs.fold(true, |all, ((channel, predicted), changes)| {

@@ -2,7 +2,7 @@
 
 use super::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
-use crate::simulate::{SimulationError, Trajectory, reference};
+use crate::simulate::{Engine, EngineMode, SimulationError, Trajectory};
 use crate::system::{NodalCoefficients, System};
 
 /// Results on half the step.
@@ -44,17 +44,14 @@ impl Problem {
             };
             let nodal = halved(evaluation.nodal_of(experiment.coefficient_set));
             let mut response = Trajectory::zeros(experiment.nodes);
-            reference::forward_into(
-                &system,
-                &nodal,
-                experiment.initial_state(&evaluation.scalars),
-                experiment.excitation.as_ref(),
-                &mut response,
-            )?;
+            let excitation = experiment.excitation.as_ref();
+            let engine = Engine::choose(&system, excitation, experiment.nodes, EngineMode::Fastest);
+            let initial = experiment.initial_state(&evaluation.scalars);
+            engine.forward_into(&system, &nodal, initial, excitation, &mut response)?;
             let view = SimulatedRecord {
                 system: &system,
                 nodal: &nodal,
-                excitation: experiment.excitation.as_ref(),
+                excitation,
                 response: &response,
                 scalars: &evaluation.scalars,
             };
