@@ -11,7 +11,7 @@ use kmcfit::results::write_whole;
 use kmcfit_core::internals::threads::sharing;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -86,7 +86,8 @@ impl RawFleet {
     ) -> PyResult<Vec<Lines>> {
         let limits = Limits {
             interrupt: Arc::clone(&self.interrupt),
-            time: time_limit.map(Duration::from_secs_f64),
+            // The callers refuse other times.
+            time: time_limit.and_then(|limit| Duration::try_from_secs_f64(limit).ok()),
         };
         guarded(py, || {
             let mut rows = Vec::new();
@@ -193,6 +194,10 @@ struct State {
     list: RecordList,
     /// Names of records that become known one after another.
     names: HashSet<String>,
+    /// Records of a folder that is complete, by their names, where they become known one after another.
+    known: Option<HashMap<String, Record>>,
+    /// True to fit records again whose rows have errors.
+    retry_errors: bool,
     index: RowIndex,
     /// None once it is closed.
     journal: Option<Journal>,
@@ -221,6 +226,8 @@ impl RawJournal {
         records: Option<Vec<Given>>,
         columns: Vec<String>,
         warm_start: bool,
+        retry_errors: bool,
+        trend: Option<String>,
     ) -> PyResult<Self> {
         let model = &model.get().model;
         guarded(py, || {
@@ -235,16 +242,28 @@ impl RawJournal {
                         .map(|record| listed(record, list.columns.len()));
                     list.records = records.collect::<Result<_, _>>()?;
                     list = list.checked()?;
+                    axis(&list, trend.as_deref())?;
                     FleetFolder::prepare(&folder, model, &list, warm_start)?
                 }
                 None => FleetFolder::begin(&folder, model, warm_start)?,
             };
+            let folder = folder.with_trend(trend.as_deref())?;
+            let known = match list.records.is_empty() && folder.identity.records > 0 {
+                true => Some(folder.records()?.records),
+                false => None,
+            };
+            let known = known.map(|records| {
+                let lines = records.into_iter();
+                lines.map(|record| (record.name.clone(), record)).collect()
+            });
             let journal = Journal::open(&folder.path, Shard::ALL, |_| {})?;
             let index = RowIndex::read(&folder.path)?;
             Ok(Self(Mutex::new(State {
                 folder,
                 list,
                 names: HashSet::new(),
+                known,
+                retry_errors,
                 index,
                 journal: Some(journal),
             })))
@@ -263,7 +282,21 @@ impl RawJournal {
                 ));
             }
             let columns = state.list.columns.len();
-            state.list.records.push(listed(record, columns)?);
+            let record = listed(record, columns)?;
+            let known = state.known.as_ref();
+            if known
+                .is_some_and(|known| !known.get(&record.name).is_some_and(|k| is_same(k, &record)))
+            {
+                return Err(Failure::Input(
+                    InputError::file(
+                        &state.folder.path,
+                        "the folder belongs to a fleet of other records",
+                    )
+                    .found(format!("`{}`, which is new or has changed", record.name))
+                    .expected("the records with which it was completed"),
+                ));
+            }
+            state.list.records.push(record);
             Ok(())
         })
     }
@@ -271,7 +304,11 @@ impl RawJournal {
     /// The row that a record had before, as JSON.
     fn row(&self, py: Python<'_>, record: &str) -> PyResult<Option<String>> {
         let state = self.state();
-        if !state.index.has(record) {
+        let has_row = match state.retry_errors {
+            true => state.index.has_estimates(record),
+            false => state.index.has(record),
+        };
+        if !has_row {
             return Ok(None);
         }
         guarded(py, || Ok(state.index.line(record)?))
@@ -323,6 +360,17 @@ impl RawJournal {
     }
 }
 
+/// True if a record is the one of a list that was written: same place, changed keys and system.
+fn is_same(written: &Record, record: &Record) -> bool {
+    let place = |record: &Record| match record.is_in_memory() {
+        true => record.path.clone(),
+        false => std::path::absolute(&record.path).unwrap_or_else(|_| record.path.clone()),
+    };
+    place(written) == place(record)
+        && written.overrides == record.overrides
+        && written.system == record.system
+}
+
 /// A record without its content, with a cell for each column.
 fn listed(given: Given, width: usize) -> Result<Record, InputError> {
     let (name, path, _, overrides, system, mut columns) = given;
@@ -343,19 +391,24 @@ fn unwritable(folder: &Path, error: std::io::Error) -> InputError {
         .hint("the same call continues after the rows that are written")
 }
 
-/// Joins the shards of a fleet: tables, statistics and page.
-fn collected(folder: &FleetFolder, list: RecordList, trend: Option<&str>) -> Result<(), Failure> {
-    let axis = Trend::of(&list, trend).ok_or_else(|| {
+/// The axis of the page of a fleet.
+fn axis(list: &RecordList, trend: Option<&str>) -> Result<Trend, InputError> {
+    Trend::of(list, trend).ok_or_else(|| {
         InputError::argument("trend", "no column of numbers or dates with this name")
             .found(format!("`{}`", trend.unwrap_or_default()))
             .expected(match list.columns.is_empty() {
                 true => "records with further keys".into(),
                 false => format!("one of: {}", list.columns.join(", ")),
             })
-    })?;
+    })
+}
+
+/// Joins the shards of a fleet: tables, statistics and page.
+fn collected(folder: &FleetFolder, list: RecordList, trend: Option<&str>) -> Result<(), Failure> {
+    let trend = trend.or(folder.identity.trend.as_deref());
+    let axis = axis(&list, trend)?;
     let found = collect(folder, list, &axis)?;
-    let title = format!("{} records fitted", found.list.records.len());
-    let page = fleet_page(&title, folder, &found, &axis);
+    let page = fleet_page(folder, &found, &axis);
     let path = folder.path.join("fleet.html");
     Ok(write_whole(&path, &page).map_err(|error| unwritable(&folder.path, error))?)
 }

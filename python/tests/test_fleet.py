@@ -247,6 +247,70 @@ def test_workers_that_die_and_that_never_answer(expected):
     assert [row.error for row in rows] == ["time limit: no answer of the worker within 0.05 s"] * 2
 
 
+    with pytest.raises(km.NumericalError, match="no worker answers any more"):
+        list(km.fit_many(ARRAYS, pairs(5), Silent(0), timeout=0.05))
+    with pytest.raises(km.NumericalError, match="the workers fail .OSError: the connection is closed"):
+        list(km.fit_many(ARRAYS, pairs(20), Faulty(99)))
+
+
+class Killer(Faulty):
+    """An executor one record of which kills its worker."""
+
+    def submit(self, function, job, blocks):
+        future = Future()
+        if any(record.name == "a002" for block in blocks for record in block):
+            future.set_exception(OSError("the worker died"))
+        else:
+            future.set_result(function(job, blocks))
+        return future
+
+
+def test_a_record_that_kills_its_worker_stops_no_other(tmp_path, expected):
+    out = tmp_path / "fleet"
+    rows = list(km.fit_many(ARRAYS, pairs(24), Killer(0), batch=6, out=out))
+    errors = {row.record: row.error for row in rows if row.error}
+    assert errors == {"a002": "the worker failed 4 times: OSError: the worker died"}
+    assert plain(row for row in rows if row.record != "a002") == [row for row in expected if row["record"] != "a002"]
+    # The failure of a worker is not in the journal: the record is fitted by the next call.
+    assert plain(km.fit_many(ARRAYS, pairs(24), out=out)) == expected
+
+
+def test_errors_are_tried_again_on_request(tmp_path):
+    good = dict(pairs(1))["a000"]
+    (tmp_path / "good.csv").write_text("t,y\n" + "".join(f"{t},{y}\n" for t, y in zip(good["time"], good["displacement"])))
+    model = tmp_path / "model.yaml"
+    model.write_text(
+        "experiments: [{data: good.csv, columns: {time: t, displacement: y}, sigma: {displacement: estimate}, initial: estimate}]\n"
+        "functions: {mass: {fixed: 1.0}, damping: {basis: constant, start: 0.1}, stiffness: {basis: constant, start: 4.0}}\n"
+    )
+    bad = tmp_path / "bad.csv"
+    bad.write_text("")
+    files = [str(tmp_path / "good.csv"), str(bad)]
+    out = tmp_path / "fleet"
+    assert [row.error is None for row in km.fit_many(model, files, out=out)] == [True, False]
+    bad.write_bytes((tmp_path / "good.csv").read_bytes())
+    assert [row.error is None for row in km.fit_many(model, files, out=out)] == [True, False]
+    assert [row.error is None for row in km.fit_many(model, files, out=out, retry_errors=True)] == [True, True]
+    assert [row.error is None for row in km.read_fleet(out)] == [True, True]
+
+
+def test_rows_are_those_of_the_records_given(tmp_path):
+    out = tmp_path / "fleet"
+    first = list(pairs(2))
+    list(km.fit_many(ARRAYS, first, out=out))
+    other = [(name, {**arrays, "displacement": 2 * arrays["displacement"]}) for name, arrays in first]
+    with pytest.raises(km.InputError, match="a fleet of other records"):
+        km.fit_many(ARRAYS, other, out=out)
+    before = (out / "rows-1-of-1.jsonl").read_bytes()
+    for records in (other, list(pairs(3))):
+        with pytest.raises(km.InputError, match="a fleet of other records"):
+            list(km.fit_many(ARRAYS, iter(records), out=out))
+    assert (out / "rows-1-of-1.jsonl").read_bytes() == before
+    # Without a folder records may have equal names.
+    [one, two] = km.fit_many(ARRAYS, iter([("a", first[0][1]), ("a", first[1][1])]), batch=2)
+    assert [one.estimates["stiffness"], two.estimates["stiffness"]] == [row.estimates["stiffness"] for row in km.fit_many(ARRAYS, first)]
+
+
 def test_a_broken_executor_ends_the_fleet_without_false_rows(tmp_path, expected):
     out = tmp_path / "fleet"
     with ProcessPoolExecutor(2) as executor:

@@ -5,12 +5,12 @@ use super::{CommandError, OK, Overrides, interrupt, print, say, unwritable};
 use crate::config::{ModelFile, Override};
 use crate::error::InputError;
 use crate::fleet::{
-    FleetFolder, FleetModel, RecordList, RunOptions, Shard, Trend, collect, fleet_page,
+    FleetFolder, FleetModel, RecordList, RowIndex, RunOptions, Shard, Trend, collect, fleet_page,
     fleet_summary, page_folder, run as run_shard,
 };
-use crate::results::{Heading, RequestedFiles, write_whole};
+use crate::results::{Heading, RESULT, RequestedFiles, write_whole};
 use crate::spelling::nearest;
-use crate::text_io::{one_of, quote};
+use crate::text_io::{one_of, quote, read_text};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -44,6 +44,9 @@ pub struct Arguments {
     /// Longest time of a record; its row then has an error.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time_limit: Option<f64>,
+    /// Fit the records again whose rows have errors, as after a file was repaired or with another time limit.
+    #[arg(long)]
+    retry_errors: bool,
     /// Start each fit from the estimates of the record before, of the same `system` where the table has that column.
     #[arg(long)]
     warm_start: bool,
@@ -81,13 +84,17 @@ struct Page {
 const LONGEST: f64 = 1e9;
 /// Most threads.
 const MOST_THREADS: usize = 256;
+/// Longest result document of a record, bytes.
+const LONGEST_RESULT: u64 = 1 << 30;
 
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     match (&arguments.command, &arguments.model, &arguments.out) {
         (Some(Command::Collect(arguments)), ..) => {
             let folder = FleetFolder::open(&arguments.folder)?;
             let list = folder.records()?;
-            let trend = trend_of(arguments.trend.as_deref(), &list)?;
+            let trend = arguments.trend.as_deref();
+            let trend = trend.or(folder.identity.trend.as_deref());
+            let trend = trend_of(trend, &list)?;
             collected(&folder, list, &trend)?;
             Ok(OK)
         }
@@ -125,8 +132,10 @@ fn fit(arguments: &Arguments, model: &Path, out: &Path) -> Result<u8, CommandErr
     let reading = Activity::begin("reading the list of records");
     let model = FleetModel::new(arguments.set.read(model)?)?;
     let list = RecordList::read(&arguments.records)?;
-    let trend = trend_of(arguments.trend.as_deref(), &list)?;
+    trend_of(arguments.trend.as_deref(), &list)?;
     let folder = FleetFolder::prepare(out, &model, &list, arguments.warm_start)?;
+    let folder = folder.with_trend(arguments.trend.as_deref())?;
+    let trend = trend_of(folder.identity.trend.as_deref(), &list)?;
     drop(reading);
     if !list.uses.is_empty() {
         say("note", format!("columns: {}", list.uses.join("; ")));
@@ -136,6 +145,7 @@ fn fit(arguments: &Arguments, model: &Path, out: &Path) -> Result<u8, CommandErr
         threads,
         time: seconds.map(Duration::from_secs_f64),
         warm_start: arguments.warm_start,
+        retry_errors: arguments.retry_errors,
         interrupt: interrupt::flag(),
     };
     let activity = Activity::begin(format!("fitting {} records", list.records.len()));
@@ -200,9 +210,7 @@ fn trend_of(name: Option<&str>, list: &RecordList) -> Result<Trend, InputError> 
 fn collected(folder: &FleetFolder, list: RecordList, trend: &Trend) -> Result<(), CommandError> {
     let activity = Activity::begin("collecting the rows");
     let found = collect(folder, list, trend)?;
-    let model = super::stem(&folder.identity.model);
-    let title = format!("{model}: {} records", found.list.records.len());
-    let text = fleet_page(&title, folder, &found, trend);
+    let text = fleet_page(folder, &found, trend);
     let path = folder.path.join("fleet.html");
     write_whole(&path, &text).map_err(|error| unwritable(&folder.path, &error))?;
     drop(activity);
@@ -214,11 +222,7 @@ fn collected(folder: &FleetFolder, list: RecordList, trend: &Trend) -> Result<()
 fn page(arguments: &Page) -> Result<u8, CommandError> {
     let folder = FleetFolder::open(&arguments.folder)?;
     let list = folder.records()?;
-    let index = list
-        .records
-        .iter()
-        .position(|record| record.name == arguments.record);
-    let Some(index) = index else {
+    let Some(index) = position_of(&list, &arguments.record) else {
         let names = list.records.iter().map(|record| record.name.as_str());
         return Err(
             InputError::argument("RECORD", "no such record in this fleet")
@@ -231,15 +235,58 @@ fn page(arguments: &Page) -> Result<u8, CommandError> {
         );
     };
     let record = &list.records[index];
+    if record.is_in_memory() {
+        return Err(
+            InputError::argument("RECORD", "the record was in memory, not in a file")
+                .found(quote(&record.name))
+                .expected("a record of a file")
+                .into(),
+        );
+    }
+    let own = Override::parse_all(&folder.identity.overrides)?;
+    let model = ModelFile::read_with_overrides(&folder.identity.model, &own)?;
+    folder.check_model(model.effective_text())?;
     let data = format!("experiments.0.data={}", quoted_scalar(&record.path));
     let mut overrides = folder.identity.overrides.clone();
     overrides.extend(record.overrides.iter().map(Override::to_string));
     overrides.push(data);
+    if !record.name.contains(char::is_control) {
+        overrides.push(format!("title={}", quoted_scalar(Path::new(&record.name))));
+    }
     let overrides = Override::parse_all(&overrides)?;
     let file = ModelFile::read_with_overrides(&folder.identity.model, &overrides)?;
     let heading = Heading::of_model("fit", &file, RequestedFiles::figures(), None);
     let out = folder.path.join(page_folder(index));
-    super::fit::fit_record_page(&file, &heading, &out)
+    let code = super::fit::fit_record_page(&file, &heading, &out)?;
+    if !agrees_with_row(&folder, &record.name, &out)? {
+        say(
+            "warning",
+            "the results differ from the row of the record: its file has changed since, or the row has an error".to_owned(),
+        );
+    }
+    Ok(code)
+}
+
+/// The record of this name, or the only one whose path ends with it.
+fn position_of(list: &RecordList, name: &str) -> Option<usize> {
+    let records = list.records.iter().enumerate();
+    let exact = records.clone().find(|(_, record)| record.name == name);
+    let mut near = records.filter(|(_, record)| Path::new(&record.name).ends_with(name));
+    let only = near.next().filter(|_| near.next().is_none());
+    exact.or(only).map(|(index, _)| index)
+}
+
+/// True if the estimates of a page are those of the row of the record, or there is no row.
+fn agrees_with_row(folder: &FleetFolder, name: &str, page: &Path) -> Result<bool, InputError> {
+    let Some(line) = RowIndex::read(&folder.path)?.line(name)? else {
+        return Ok(true);
+    };
+    let estimates = |text: &str| {
+        let document: Option<serde_json::Value> = serde_json::from_str(text).ok();
+        document.map(|document| document["estimates"].clone())
+    };
+    let result = read_text(&page.join(RESULT), "the result of a fit", LONGEST_RESULT)?;
+    Ok(estimates(&line) == estimates(&result))
 }
 
 /// A path as a scalar of YAML in single quotes.

@@ -2,7 +2,7 @@
 
 use super::fit::TIME_LIMIT;
 use super::folder::FleetFolder;
-use super::journal::{curve_files, journals, record_of};
+use super::journal::{LineName, curve_files, journals};
 use super::parquet::{Cell, ColumnKind, ParquetWriter};
 use super::records::RecordList;
 use super::row::{Curve, Row};
@@ -61,15 +61,19 @@ pub fn collect(
     let mut curves = Lines::default();
     let mut gathered = Gathered::new(list.records.len());
     for path in journals(&folder.path)? {
-        rows.read(&path, &positions, &mut |i, line| gathered.add(i, line))
-            .map_err(at(&path))?;
+        rows.read(&path, &positions).map_err(at(&path))?;
     }
     for path in curve_files(&folder.path)? {
-        curves
-            .read(&path, &positions, &mut |_, _| Ok(true))
-            .map_err(at(&path))?;
+        curves.read(&path, &positions).map_err(at(&path))?;
     }
     drop(positions);
+    rows.keep_one_each();
+    curves.places.sort_unstable();
+    for place in 0..rows.count() {
+        let line = rows.line(place).map_err(at(&folder.path))?;
+        let index = rows.places[place].record as usize;
+        gathered.add(index, &line).map_err(at(&folder.path))?;
+    }
     let names = |i: usize| list.records[i].name.clone();
     let mut statistics = gathered.statistics;
     statistics.distributions = gathered
@@ -99,40 +103,57 @@ pub fn collect(
     })
 }
 
+/// Place of the line of a record, in the order of records, files and lines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Place {
+    record: u32,
+    file: u32,
+    position: u64,
+    is_error: bool,
+}
+
 /// Places of the lines of records in files.
 #[derive(Default)]
 struct Lines {
     files: Vec<PathBuf>,
     open: Vec<BufReader<File>>,
-    /// Of each record in ascending order, the file and the position in it.
-    places: Vec<(u32, u32, u64)>,
+    places: Vec<Place>,
 }
 
 impl Lines {
-    /// Adds the lines of a file that `each` accepts.
-    fn read(
-        &mut self,
-        path: &Path,
-        positions: &HashMap<&str, usize>,
-        each: &mut dyn FnMut(usize, &str) -> io::Result<bool>,
-    ) -> io::Result<()> {
+    /// Adds the lines of a file.
+    fn read(&mut self, path: &Path, positions: &HashMap<&str, usize>) -> io::Result<()> {
         let number = self.files.len() as u32;
         complete_lines(path, |position, line| {
-            let name = record_of(line)?;
-            let Some(index) = positions.get(&*name) else {
+            let name = LineName::of(line)?;
+            let Some(index) = positions.get(&*name.record) else {
                 return Err(io::Error::other(format!(
-                    "a record of another fleet: {name}"
+                    "a record of another fleet: {}",
+                    name.record
                 )));
             };
-            if each(*index, line)? {
-                self.places.push((*index as u32, number, position));
-            }
+            self.places.push(Place {
+                record: *index as u32,
+                file: number,
+                position,
+                is_error: name.is_error(),
+            });
             Ok(())
         })?;
         self.files.push(path.to_path_buf());
         self.open.push(BufReader::new(File::open(path)?));
-        self.places.sort_unstable();
         Ok(())
+    }
+
+    /// Keeps one line of each record: the first one with estimates, which shards of another number may have written twice, or else the last error.
+    fn keep_one_each(&mut self) {
+        let rank = |place: &Place| match place.is_error {
+            false => (false, place.file, place.position),
+            true => (true, u32::MAX - place.file, u64::MAX - place.position),
+        };
+        self.places
+            .sort_unstable_by_key(|place| (place.record, rank(place)));
+        self.places.dedup_by_key(|place| place.record);
     }
 
     fn count(&self) -> usize {
@@ -141,12 +162,12 @@ impl Lines {
 
     fn has(&self, index: u32) -> bool {
         self.places
-            .binary_search_by_key(&index, |place| place.0)
+            .binary_search_by_key(&index, |place| place.record)
             .is_ok()
     }
 
     fn line(&mut self, place: usize) -> io::Result<String> {
-        let (_, file, position) = self.places[place];
+        let Place { file, position, .. } = self.places[place];
         let reader = &mut self.open[file as usize];
         reader.seek(SeekFrom::Start(position))?;
         let mut line = String::new();
@@ -164,7 +185,6 @@ struct Column {
 
 struct Gathered {
     count: usize,
-    has_row: Vec<bool>,
     estimates: Vec<Column>,
     reasons: HashMap<String, usize>,
     verdicts: Vec<Option<VerdictLevel>>,
@@ -176,7 +196,6 @@ impl Gathered {
     fn new(count: usize) -> Self {
         Self {
             count,
-            has_row: vec![false; count],
             estimates: Vec::new(),
             reasons: HashMap::new(),
             verdicts: vec![None; count],
@@ -185,12 +204,9 @@ impl Gathered {
         }
     }
 
-    /// Adds a row; false for a second one of the same record, which shards of another number may have written.
-    fn add(&mut self, index: usize, line: &str) -> io::Result<bool> {
+    /// Adds the row of a record.
+    fn add(&mut self, index: usize, line: &str) -> io::Result<()> {
         let row: Row = serde_json::from_str(line)?;
-        if std::mem::replace(&mut self.has_row[index], true) {
-            return Ok(false);
-        }
         self.statistics.seconds += row.seconds;
         if let Some(error) = row.error {
             self.statistics.errors += 1;
@@ -198,7 +214,7 @@ impl Gathered {
             if self.errors.len() < MOST_ERRORS {
                 self.errors.push((row.record, error));
             }
-            return Ok(true);
+            return Ok(());
         }
         if let Some(level) = row.verdict {
             self.statistics.verdicts[level as usize] += 1;
@@ -222,7 +238,7 @@ impl Gathered {
             });
             self.estimates[column].values[index] = estimate.value;
         }
-        Ok(true)
+        Ok(())
     }
 }
 
@@ -234,8 +250,9 @@ fn write_rows(
     distributions: &[Distribution],
 ) -> io::Result<()> {
     let mut names = vec![("record".to_owned(), ColumnKind::Text)];
-    let of_table = |name: &String| (format!("table_{name}"), ColumnKind::Text);
-    names.extend(list.columns.iter().map(of_table));
+    let kinds: Vec<ColumnKind> = (0..list.columns.len()).map(|i| kind_of(list, i)).collect();
+    let of_table = list.columns.iter().zip(&kinds);
+    names.extend(of_table.map(|(name, kind)| (format!("table_{name}"), *kind)));
     for distribution in distributions {
         let name = &distribution.name;
         let ends = ["", "_low", "_high"].map(|end| (format!("{name}{end}"), ColumnKind::Number));
@@ -252,10 +269,14 @@ fn write_rows(
     write_stream(path, |out| {
         let mut table = ParquetWriter::begin(out, names)?;
         for place in 0..rows.count() {
-            let index = rows.places[place].0 as usize;
+            let index = rows.places[place].record as usize;
             let row: Row = serde_json::from_str(&rows.line(place)?)?;
             let mut cells = vec![Cell::Text(row.record)];
-            cells.extend(list.records[index].columns.iter().cloned().map(Cell::Text));
+            let of_table = list.records[index].columns.iter().zip(&kinds);
+            cells.extend(of_table.map(|(text, kind)| match kind {
+                ColumnKind::Text => Cell::Text(text.clone()),
+                ColumnKind::Number => Cell::Number(text.parse().unwrap_or(f64::NAN)),
+            }));
             for distribution in distributions {
                 let estimate = row.estimates.get(&distribution.name);
                 let ci95 = estimate.and_then(|e| e.ci95).unwrap_or([f64::NAN; 2]);
@@ -273,6 +294,19 @@ fn write_rows(
         }
         table.end()
     })
+}
+
+/// Numbers where all cells of a column of the table are numbers or empty.
+fn kind_of(list: &RecordList, column: usize) -> ColumnKind {
+    let cells = list
+        .records
+        .iter()
+        .map(|record| record.columns[column].as_str());
+    let mut filled = cells.filter(|cell| !cell.is_empty()).peekable();
+    match filled.peek().is_some() && filled.all(|cell| cell.parse::<f64>().is_ok()) {
+        true => ColumnKind::Number,
+        false => ColumnKind::Text,
+    }
 }
 
 /// The level as in a row.
@@ -301,7 +335,7 @@ fn write_curves(path: &Path, curves: &mut Lines, rows: &Lines) -> io::Result<()>
         // The lines of a process that was killed before it wrote the row are there once more.
         let mut written: (u32, Vec<String>) = (u32::MAX, Vec::new());
         for place in 0..curves.count() {
-            let index = curves.places[place].0;
+            let index = curves.places[place].record;
             if !rows.has(index) {
                 continue;
             }

@@ -104,6 +104,14 @@ pub(super) fn trend_figure(distribution: &Distribution, trend: &Trend) -> Option
         &middle_y,
         Style::nth(1),
     ));
+    let panel = match &distribution.trend {
+        Some(line) => {
+            let at = |x: f64| line.value + line.slope * (x - line.at);
+            let ends = [at(low), at(high)];
+            panel.mark(Mark::line("trend", &[low, high], &ends, Style::nth(2)))
+        }
+        None => panel,
+    };
     let thinned = match every {
         1 => String::new(),
         every => format!(" One record of {every} is drawn."),
@@ -112,7 +120,7 @@ pub(super) fn trend_figure(distribution: &Distribution, trend: &Trend) -> Option
         Figure::new(
             format!("trend-{}", distribution.name),
             format!("{name} over {}", trend.name),
-            format!("Each record, and the medians of equal numbers of neighbours.{thinned}"),
+            format!("Each record, the medians of equal numbers of neighbours, and the line with the median slope of all pairs of records.{thinned}"),
         )
         .panel(panel),
     )

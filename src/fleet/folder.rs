@@ -16,6 +16,13 @@ use std::path::{Path, PathBuf};
 const IDENTITY: &str = "fleet.json";
 /// Its records.
 const RECORDS: &str = "records.jsonl";
+/// Files of a fleet without which a folder that has one of them is none of a fleet.
+const OWN_FILES: [&str; 4] = [
+    "fleet.html",
+    "rows.parquet",
+    "curves.parquet",
+    "summary.json",
+];
 /// Version of the format.
 const FORMAT: u32 = 1;
 /// Longest identity, bytes.
@@ -41,20 +48,31 @@ pub struct FleetIdentity {
     pub records_sha256: String,
     /// True where a fit starts from the estimates of the record before.
     pub warm_start: bool,
+    /// Column of the table over which the page shows the estimates, where one was chosen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trend: Option<String>,
 }
 
 impl FleetIdentity {
+    /// File name of the model.
+    pub fn model_name(&self) -> String {
+        let name = self.model.file_name().unwrap_or_default();
+        name.to_string_lossy().into_owned()
+    }
+
     /// Identity of a model on records.
     pub fn of(model: &FleetModel, list: &RecordList, warm_start: bool) -> Self {
         Self {
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION").into(),
-            model: model.file.path.clone(),
+            model: std::path::absolute(&model.file.path)
+                .unwrap_or_else(|_| model.file.path.clone()),
             model_sha256: digest(model.file.effective_text().as_bytes()),
             overrides: model.file.override_texts(),
             records: list.records.len(),
             records_sha256: list.digest(),
             warm_start,
+            trend: None,
         }
     }
 }
@@ -98,6 +116,30 @@ impl FleetFolder {
             return Ok(found);
         }
         Self::written(path, own, list)
+    }
+
+    /// The folder with this column as the axis of its page, if one is given.
+    ///
+    /// # Errors
+    /// If the folder cannot be written to.
+    pub fn with_trend(mut self, trend: Option<&str>) -> Result<Self, InputError> {
+        if trend.is_some() && self.identity.trend.as_deref() != trend {
+            self.identity.trend = trend.map(str::to_owned);
+            write_identity(&self.path, &self.identity)?;
+        }
+        Ok(self)
+    }
+
+    /// Refuses a model that has changed since the fleet began.
+    ///
+    /// # Errors
+    /// With what has changed.
+    pub fn check_model(&self, effective_text: &str) -> Result<(), InputError> {
+        self.check(&FleetIdentity {
+            model_sha256: digest(effective_text.as_bytes()),
+            version: env!("CARGO_PKG_VERSION").into(),
+            ..self.identity.clone()
+        })
     }
 
     /// As [`FleetFolder::prepare`], for records that become known one after another: their list is that of [`FleetFolder::complete`].
@@ -145,14 +187,22 @@ impl FleetFolder {
                     .expected("a folder of its own for the fleet"),
             );
         }
-        match path.is_dir() && !journals(path)?.is_empty() {
-            true => Err(
+        if path.is_dir() && !journals(path)?.is_empty() {
+            return Err(
                 InputError::file(path, "the folder holds rows of an unknown fleet")
                     .found(format!("rows without {IDENTITY}"))
                     .expected("a folder of its own for the fleet"),
-            ),
-            false => Ok(None),
+            );
         }
+        if let Some(foreign) = OWN_FILES.iter().find(|name| path.join(name).exists()) {
+            return Err(InputError::file(
+                path,
+                "the folder holds a file that the fleet would replace",
+            )
+            .found(*foreign)
+            .expected("a folder of its own for the fleet"));
+        }
+        Ok(None)
     }
 
     fn written(
@@ -164,7 +214,10 @@ impl FleetFolder {
             |record| {
                 Ok::<_, InputError>(json_line(&RecordLine {
                     record: record.name.clone(),
-                    path: absolute(&record.path)?,
+                    path: match record.is_in_memory() {
+                        true => record.path.clone(),
+                        false => absolute(&record.path)?,
+                    },
                     overrides: record.overrides.iter().map(Override::to_string).collect(),
                     system: record.system.clone(),
                     columns: record.columns.clone(),
@@ -173,17 +226,8 @@ impl FleetFolder {
         ));
         let lines: String = lines.collect::<Result<_, _>>()?;
         // The identity comes last: a folder with it has its records.
-        let files = [
-            (path.join(RECORDS), lines),
-            (path.join(IDENTITY), json_line(&identity)),
-        ];
-        for (file, text) in &files {
-            write_together(&[(file, text)]).map_err(|error| {
-                InputError::file(path, "the folder of the fleet cannot be written to")
-                    .found(error)
-                    .expected("a folder that can be written to")
-            })?;
-        }
+        write_file(path, RECORDS, &lines)?;
+        write_identity(path, &identity)?;
         Ok(Self {
             path: path.to_path_buf(),
             identity,
@@ -225,11 +269,7 @@ impl FleetFolder {
                 true => "the model has changed since this fleet began",
                 false => "the folder belongs to a fleet of another model",
             };
-            return other(
-                problem,
-                quote(&there.model.display().to_string()),
-                "the same model".into(),
-            );
+            return other(problem, quote(&there.model_name()), "the same model".into());
         }
         if there.records_sha256 != own.records_sha256 {
             return other(
@@ -298,6 +338,19 @@ impl FleetFolder {
                 .expected(format!("{}", self.identity.records))),
         }
     }
+}
+
+fn write_identity(path: &Path, identity: &FleetIdentity) -> Result<(), InputError> {
+    write_file(path, IDENTITY, &json_line(identity))
+}
+
+fn write_file(path: &Path, name: &str, text: &str) -> Result<(), InputError> {
+    let file = path.join(name);
+    write_together(&[(&file, text)]).map_err(|error| {
+        InputError::file(path, "the folder of the fleet cannot be written to")
+            .found(error)
+            .expected("a folder that can be written to")
+    })
 }
 
 fn json_line(value: &impl Serialize) -> String {

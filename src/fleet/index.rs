@@ -1,6 +1,6 @@
 //! Rows by the names of their records.
 
-use super::journal::{journals, record_of, unreadable};
+use super::journal::{LineName, journals, unreadable};
 use crate::error::InputError;
 use crate::results::complete_lines;
 use std::collections::HashMap;
@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Default)]
 pub struct RowIndex {
     files: Vec<PathBuf>,
-    /// Of each record, the number of its file and the position of its line.
-    places: HashMap<String, (usize, u64)>,
+    /// Of each record, the number of its file, the position of its line, and true for an error.
+    places: HashMap<String, (usize, u64, bool)>,
 }
 
 impl RowIndex {
@@ -28,8 +28,16 @@ impl RowIndex {
         };
         for (number, path) in index.files.iter().enumerate() {
             let read = complete_lines(path, |position, line| {
-                let name = record_of(line)?.into_owned();
-                index.places.entry(name).or_insert((number, position));
+                let name = LineName::of(line)?;
+                let place = (number, position, name.is_error());
+                let known = index
+                    .places
+                    .entry(name.record.into_owned())
+                    .or_insert(place);
+                // The first one with estimates, or else the last error.
+                if known.2 {
+                    *known = place;
+                }
                 Ok(())
             });
             read.map_err(|error| unreadable(path, error))?;
@@ -40,6 +48,13 @@ impl RowIndex {
     /// True if the record has a row.
     pub fn has(&self, record: &str) -> bool {
         self.places.contains_key(record)
+    }
+
+    /// True if the record has a row with estimates.
+    pub fn has_estimates(&self, record: &str) -> bool {
+        self.places
+            .get(record)
+            .is_some_and(|(.., is_error)| !is_error)
     }
 
     /// All rows in the order in which they stand in the journals.
@@ -59,7 +74,7 @@ impl RowIndex {
     /// If the journal cannot be read.
     pub fn line(&self, record: &str) -> Result<Option<String>, InputError> {
         let place = self.places.get(record);
-        let Some((path, position)) = place.and_then(|(n, at)| Some((self.files.get(*n)?, at)))
+        let Some((path, position)) = place.and_then(|(n, at, _)| Some((self.files.get(*n)?, at)))
         else {
             return Ok(None);
         };

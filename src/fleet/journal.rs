@@ -5,6 +5,7 @@ use super::shard::Shard;
 use crate::error::InputError;
 use crate::results::{RowFile, complete_lines};
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -49,10 +50,10 @@ fn files(folder: &Path, start: &str) -> io::Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Hands the records of the complete lines of a file of rows to `each`.
-pub fn recorded(path: &Path, each: &mut dyn FnMut(&str)) -> Result<(), InputError> {
+/// Hands the complete lines of a file of rows to `each`.
+pub fn recorded(path: &Path, each: &mut dyn FnMut(&LineName)) -> Result<(), InputError> {
     let read = complete_lines(path, |_, line| {
-        each(&record_of(line)?);
+        each(&LineName::of(line)?);
         Ok(())
     });
     read.map(drop).map_err(|error| unreadable(path, error))
@@ -65,17 +66,27 @@ pub fn unreadable(path: &Path, error: io::Error) -> InputError {
         .expected("a journal of a fleet that can be written to")
 }
 
-/// The record of a line.
-#[derive(Deserialize)]
-struct LineName<'a> {
+/// The record of a line of a journal.
+#[derive(Debug, Deserialize)]
+pub struct LineName<'a> {
+    /// Its name.
     #[serde(borrow)]
-    record: Cow<'a, str>,
+    pub record: Cow<'a, str>,
+    #[serde(default)]
+    error: Option<IgnoredAny>,
 }
 
-/// The record of a line of a journal.
-pub fn record_of(line: &str) -> io::Result<Cow<'_, str>> {
-    let name: LineName = serde_json::from_str(line)?;
-    Ok(name.record)
+impl<'a> LineName<'a> {
+    /// # Errors
+    /// If the line is not one of a journal.
+    pub fn of(line: &'a str) -> io::Result<Self> {
+        Ok(serde_json::from_str(line)?)
+    }
+
+    /// True for a row without estimates.
+    pub fn is_error(&self) -> bool {
+        self.error.is_some()
+    }
 }
 
 /// The journal of a shard. A record's curves are written before its row, so that a row has all of its curves; curves without a row are those
@@ -88,18 +99,18 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens or creates the journal, and hands the names of the records that have rows to `each`.
+    /// Opens or creates the journal, and hands its rows to `each`.
     ///
     /// # Errors
     /// If another process works on the shard, or the files cannot be read or written to.
     pub fn open(
         folder: &Path,
         shard: Shard,
-        mut each: impl FnMut(&str),
+        mut each: impl FnMut(&LineName),
     ) -> Result<Self, InputError> {
-        let open = |path: PathBuf, each: &mut dyn FnMut(&str)| {
+        let open = |path: PathBuf, each: &mut dyn FnMut(&LineName)| {
             let opened = RowFile::open(&path, |line| {
-                each(&record_of(line)?);
+                each(&LineName::of(line)?);
                 Ok(())
             });
             opened.map_err(|error| match error.kind() {

@@ -4,7 +4,7 @@ use super::collect::Collected;
 use super::figures::{histograms, trend_figure};
 use super::folder::FleetFolder;
 use super::statistics::{Distribution, Statistics};
-use super::summary::{cells, counts, headings, shown};
+use super::summary::{cells, counts, headings, incomplete_axis, shown};
 use super::trend::Trend;
 use crate::number_format::significant;
 use crate::report::chart::Detail;
@@ -15,24 +15,15 @@ use kmcfit_core::internals::assessment::VerdictLevel::{Check, Inadequate};
 
 /// Most records in a table of the page.
 const MOST_ROWS: usize = 50;
+/// Most links to pages of records.
+const MOST_LINKS: usize = 200;
 
 /// The page of a fleet.
-pub fn fleet_page(
-    title: &str,
-    folder: &FleetFolder,
-    collected: &Collected,
-    trend: &Trend,
-) -> String {
-    shell::within_limit(|detail| page_of(title, folder, collected, trend, detail))
+pub fn fleet_page(folder: &FleetFolder, collected: &Collected, trend: &Trend) -> String {
+    shell::within_limit(|detail| page_of(folder, collected, trend, detail))
 }
 
-fn page_of(
-    title: &str,
-    folder: &FleetFolder,
-    collected: &Collected,
-    trend: &Trend,
-    detail: Detail,
-) -> String {
+fn page_of(folder: &FleetFolder, collected: &Collected, trend: &Trend, detail: Detail) -> String {
     let statistics = &collected.statistics;
     let drawn = |figures: Vec<Figure>| shell::figures(&figures, detail);
     let shown = shown(statistics);
@@ -40,7 +31,7 @@ fn page_of(
         (
             "outliers",
             "Records that stand out",
-            outliers(folder, statistics),
+            outliers(folder, collected),
         ),
         (
             "distributions",
@@ -63,7 +54,7 @@ fn page_of(
     ];
     let above = format!(
         "<p class=\"soft\">{}</p>\n",
-        escape(&folder.identity.model.display().to_string())
+        escape(&folder.identity.model_name())
     ) + &state(statistics);
     let main = shown
         .first()
@@ -72,32 +63,33 @@ fn page_of(
             name: "main".into(),
             ..figure
         });
-    let first = shell::screen(&above, &answers(&shown, trend), main, detail);
-    shell::sectioned(title, &first, sections)
+    let first = shell::screen(&above, &answers(statistics, &shown, trend), main, detail);
+    let title = format!("Fleet of {}", count(collected.list.records.len(), "record"));
+    shell::sectioned(&title, &first, sections)
 }
 
 fn state(statistics: &Statistics) -> String {
     let [_, check, inadequate] = statistics.verdicts;
-    let (colour, word) = match (statistics.errors + inadequate + statistics.missing, check) {
-        (0, 0) => ("good", "All adequate"),
-        (0, _) => ("warn", "To check"),
+    let (colour, word) = match (statistics.missing, statistics.errors, inadequate, check) {
+        (0, 0, 0, 0) => ("good", "All adequate"),
+        (0, 0, 0, _) => ("warn", "To check"),
+        (0, 0, ..) => ("bad", "Some inadequate"),
+        (0, ..) => ("bad", "Some errors"),
         _ => ("bad", "Incomplete"),
-    };
-    let word = match (word, statistics.errors + statistics.missing) {
-        ("Incomplete", 0) => "Some inadequate",
-        _ => word,
     };
     shell::state_line(colour, word, &counts(statistics))
 }
 
-fn answers(shown: &[&Distribution], trend: &Trend) -> String {
+fn answers(statistics: &Statistics, shown: &[&Distribution], trend: &Trend) -> String {
     let rows: Vec<Vec<String>> = shown.iter().map(|d| cells(d).to_vec()).collect();
     let headings = headings(trend);
     let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
-    shell::table("Estimates over all records", &headings, &rows)
+    let used = incomplete_axis(statistics, trend).map_or(String::new(), |s| shell::paragraph(&s));
+    shell::table("Estimates over all records", &headings, &rows) + &used
 }
 
-fn outliers(folder: &FleetFolder, statistics: &Statistics) -> String {
+fn outliers(folder: &FleetFolder, collected: &Collected) -> String {
+    let statistics = &collected.statistics;
     let all = statistics.outliers.len();
     let unit = |name: &str| {
         let distribution = statistics.distributions.iter().find(|d| d.name == name);
@@ -120,7 +112,7 @@ fn outliers(folder: &FleetFolder, statistics: &Statistics) -> String {
     let meaning = match all {
         0 => "No estimate lies more than 3.5 standard deviations from its trend (modified z-score, Iglewicz and Hoaglin 1993).".to_owned(),
         _ => format!(
-            "{} with an estimate more than 3.5 standard deviations from its trend, the line with the median slope of all pairs of records (modified z-score, Iglewicz and Hoaglin \
+            "{} with an estimate more than 3.5 standard deviations from its trend, the line with the median slope of the pairs of at most 1000 records (modified z-score, Iglewicz and Hoaglin \
              1993){}. The table shows the estimate that lies farthest. `kmcfit fleet page {} RECORD` makes the page of a record.",
             count(all, "record"),
             if all > MOST_ROWS { format!("; the first {MOST_ROWS} are listed") } else { String::new() },
@@ -136,28 +128,29 @@ fn outliers(folder: &FleetFolder, statistics: &Statistics) -> String {
     ];
     shell::paragraph(&meaning)
         + &shell::table("Records that stand out", &headings, &rows)
-        + &pages(folder, statistics.outliers.iter().map(|o| o.index))
+        + &pages(folder, collected)
 }
 
-/// Links to the pages that have been made.
-fn pages(folder: &FleetFolder, indices: impl Iterator<Item = usize>) -> String {
-    let made = indices.filter_map(|index| {
+/// Links to the pages of records that have been made.
+fn pages(folder: &FleetFolder, collected: &Collected) -> String {
+    let records = collected.list.records.iter().enumerate();
+    let made = records.filter_map(|(index, record)| {
         let name = page_folder(index);
         let page = folder.path.join(&name).join("report.html");
-        page.is_file().then_some((index, name))
+        page.is_file().then_some((name, &record.name))
     });
     let links: String = made
-        .take(MOST_ROWS)
-        .map(|(index, name)| {
+        .take(MOST_LINKS)
+        .map(|(folder, record)| {
             format!(
-                "<li><a href=\"{name}/report.html\">Page of record {}</a></li>\n",
-                index + 1
+                "<li><a href=\"{folder}/report.html\">{}</a></li>\n",
+                escape(record)
             )
         })
         .collect();
     match links.is_empty() {
         true => String::new(),
-        false => format!("<ul>\n{links}</ul>\n"),
+        false => shell::paragraph("Pages of records:") + &format!("<ul>\n{links}</ul>\n"),
     }
 }
 

@@ -6,6 +6,7 @@ use crate::error::InputError;
 use crate::spelling::nearest;
 use crate::text_io::{one_of, quote, read_text};
 use std::collections::HashMap;
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// Column of a table that names the file.
@@ -25,6 +26,19 @@ const KEYS: [&str; 6] = [
     "constraints",
     "parameters",
 ];
+/// Beginning of the path of a record of arrays.
+const IN_MEMORY: &str = "sha256:";
+/// Headings that are meant as [`FILE`].
+const LIKE_FILE: [&str; 6] = [
+    "files",
+    "filename",
+    "file_name",
+    "path",
+    "record",
+    "records",
+];
+/// Longest line of headings, bytes.
+const LONGEST_HEADING: u64 = 1 << 16;
 /// Longest table of records, bytes.
 const LONGEST: u64 = 1 << 32;
 
@@ -53,6 +67,11 @@ impl Record {
             system: String::new(),
             columns: Vec::new(),
         }
+    }
+
+    /// True for a record of arrays: its path is the digest of its content.
+    pub fn is_in_memory(&self) -> bool {
+        self.path.to_string_lossy().starts_with(IN_MEMORY)
     }
 }
 
@@ -86,6 +105,12 @@ impl RecordList {
                     .expected("files, or a pattern in quotes")
                     .hint(format!("\"{}\"", path.join("*.csv").display())));
             }
+            if Self::of_table(path)?.is_some() {
+                return Err(
+                    InputError::file(path, "a table of records among several arguments")
+                        .expected("one table of records alone, or files and patterns"),
+                );
+            }
             let is_pattern = argument.contains(['*', '?', '[']) && !path.exists();
             match is_pattern {
                 true => records.extend(matches(argument)?),
@@ -114,18 +139,30 @@ impl RecordList {
         if !is_text {
             return Ok(None);
         }
-        let Ok(text) = read_text(path, "a table of records", LONGEST) else {
-            return Ok(None);
-        };
-        let first = text.lines().next().unwrap_or_default();
+        let first = first_line(path);
+        let first = first.as_str();
         let delimiter = [',', ';', '\t']
             .into_iter()
             .find(|d| first.contains(*d))
             .unwrap_or(',');
         let mut headings = first.split(delimiter).map(|h| h.trim().trim_matches('"'));
-        match headings.any(|heading| heading == FILE) {
-            true => TableReader::new(path, delimiter).read(&text).map(Some),
-            false => Ok(None),
+        if headings.clone().any(|heading| heading == FILE) {
+            let text = read_text(path, "a table of records", LONGEST)?;
+            return TableReader::new(path, delimiter).read(&text).map(Some);
+        }
+        let is_meant = |heading: &&str| {
+            let lower = heading.to_lowercase();
+            lower == FILE || LIKE_FILE.contains(&lower.as_str())
+        };
+        match headings.find(is_meant) {
+            Some(heading) => {
+                Err(
+                    InputError::line(path, 1, 1, "a table of records without the column `file`")
+                        .found(quote(heading))
+                        .expected("the column `file`, with the paths of the records"),
+                )
+            }
+            None => Ok(None),
         }
     }
 
@@ -160,7 +197,12 @@ impl RecordList {
     pub fn digest(&self) -> String {
         let line = |r: &Record| {
             let overrides: Vec<String> = r.overrides.iter().map(Override::to_string).collect();
-            format!("{:?}\n", (&r.name, overrides, &r.system, &r.columns))
+            let place = match r.is_in_memory() {
+                true => r.path.clone(),
+                // Files of one name in two folders are two records.
+                false => std::path::absolute(&r.path).unwrap_or_else(|_| r.path.clone()),
+            };
+            format!("{:?}\n", (&r.name, place, overrides, &r.system, &r.columns))
         };
         let text: String = self.records.iter().map(line).collect();
         digest(text.as_bytes())
@@ -170,6 +212,21 @@ impl RecordList {
     pub fn positions(&self) -> HashMap<&str, usize> {
         let pairs = self.records.iter().enumerate();
         pairs.map(|(i, record)| (record.name.as_str(), i)).collect()
+    }
+}
+
+/// First line of a file, as far as it is text.
+fn first_line(path: &Path) -> String {
+    let mut line = Vec::new();
+    let read = std::fs::File::open(path).and_then(|file| {
+        let mut reader = BufReader::new(file.take(LONGEST_HEADING));
+        reader.read_until(b'\n', &mut line)
+    });
+    match read {
+        Ok(_) => String::from_utf8_lossy(&line)
+            .trim_start_matches('\u{feff}')
+            .to_owned(),
+        Err(_) => String::new(),
     }
 }
 
@@ -256,6 +313,12 @@ impl<'a> TableReader<'a> {
         InputError::line(self.path, line, 1, problem)
     }
 
+    fn repeated(&self, heading: &str) -> InputError {
+        self.at(1, "two columns of one name")
+            .found(quote(heading))
+            .expected("every column once")
+    }
+
     fn use_of(
         &self,
         heading: &str,
@@ -270,7 +333,13 @@ impl<'a> TableReader<'a> {
             };
         }
         if let Some(known) = KNOWN.into_iter().find(|known| *known == heading) {
-            return Ok(Use::Known(known));
+            return match before
+                .iter()
+                .any(|u| matches!(u, Use::Known(name) if *name == known))
+            {
+                true => Err(self.repeated(heading)),
+                false => Ok(Use::Known(known)),
+            };
         }
         if let Some(end) = WINDOW.iter().position(|name| *name == heading) {
             return Ok(Use::Window(end));
@@ -291,6 +360,9 @@ impl<'a> TableReader<'a> {
                     ))
                     .hint_if(nearest(first, KEYS).map(|near| format!("did you mean `{near}`?")))),
             };
+        }
+        if columns.iter().any(|known| known == heading) {
+            return Err(self.repeated(heading));
         }
         columns.push(heading.to_owned());
         Ok(Use::Other(columns.len() - 1))
@@ -325,12 +397,12 @@ impl<'a> TableReader<'a> {
                 Use::Other(index) => record.columns[*index] = cell.to_owned(),
                 _ if cell.is_empty() => {}
                 Use::Known(name) => {
-                    let value = self.number(cell, line)?;
+                    let value = self.number(cell, line, name)?;
                     record
                         .overrides
                         .push(set(format!("functions.{name}={{fixed: {value:?}}}"))?);
                 }
-                Use::Window(end) => window[*end] = Some(self.number(cell, line)?),
+                Use::Window(end) => window[*end] = Some(self.number(cell, line, WINDOW[*end])?),
                 Use::Key(key) => record.overrides.push(set(format!("{key}={cell}"))?),
             }
         }
@@ -349,11 +421,11 @@ impl<'a> TableReader<'a> {
         Ok(record)
     }
 
-    fn number(&self, cell: &str, line: usize) -> Result<f64, InputError> {
+    fn number(&self, cell: &str, line: usize, heading: &str) -> Result<f64, InputError> {
         let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
         value.ok_or_else(|| {
             self.at(line, "not a number")
-                .found(quote(cell))
+                .found(format!("{} in the column `{heading}`", quote(cell)))
                 .expected("a number, or nothing")
         })
     }

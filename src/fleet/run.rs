@@ -2,7 +2,7 @@
 
 use super::fit::{Limits, fit_record};
 use super::folder::FleetFolder;
-use super::journal::{Journal, journals, recorded};
+use super::journal::{Journal, LineName, journals, recorded};
 use super::model::FleetModel;
 use super::records::{Record, RecordList};
 use super::shard::Shard;
@@ -31,6 +31,8 @@ pub struct RunOptions {
     pub time: Option<Duration>,
     /// True to start a fit from the estimates of the record before of the same system.
     pub warm_start: bool,
+    /// True to fit the records again whose rows have errors.
+    pub retry_errors: bool,
     /// Set where the work is to end after the rows that are complete.
     pub interrupt: Arc<AtomicBool>,
 }
@@ -70,9 +72,9 @@ pub fn run(
     let jobs = Jobs::of(list, options);
     let mut has_row = vec![false; list.records.len()];
     let positions = list.positions();
-    let mut found = |name: &str| {
-        if let Some(i) = positions.get(name) {
-            has_row[*i] = true;
+    let mut found = |line: &LineName| {
+        if let Some(i) = positions.get(&*line.record) {
+            has_row[*i] |= !(options.retry_errors && line.is_error());
         }
     };
     // Shards of another number may have fitted some of the records.
@@ -183,13 +185,23 @@ struct Watched {
 }
 
 impl Watched {
-    fn begins(&self, at: Option<Instant>) {
-        *self.begin.lock().unwrap_or_else(PoisonError::into_inner) = at;
+    /// Begins the fit of a record.
+    fn begin(&self) {
+        let mut begin = self.begin.lock().unwrap_or_else(PoisonError::into_inner);
+        self.interrupt.store(false, Ordering::Relaxed);
+        *begin = Some(Instant::now());
     }
 
-    fn is_over(&self, limit: Duration) -> bool {
+    fn end(&self) {
+        *self.begin.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    /// Ends the fit where it has taken longer; under the lock, so that it is not the next one that ends.
+    fn end_after(&self, limit: Duration) {
         let begin = self.begin.lock().unwrap_or_else(PoisonError::into_inner);
-        begin.is_some_and(|begin| begin.elapsed() > limit)
+        if begin.is_some_and(|begin| begin.elapsed() > limit) {
+            self.interrupt.store(true, Ordering::Relaxed);
+        }
     }
 }
 
@@ -248,9 +260,11 @@ impl ShardRun<'_> {
         while !is_done.load(Ordering::Relaxed) {
             let is_interrupted = self.options.interrupt.load(Ordering::Relaxed);
             for watched in &self.watched {
-                let limit = self.options.time;
-                if is_interrupted || limit.is_some_and(|limit| watched.is_over(limit + POLL)) {
+                if is_interrupted {
                     watched.interrupt.store(true, Ordering::Relaxed);
+                }
+                if let Some(limit) = self.options.time {
+                    watched.end_after(limit + POLL);
                 }
             }
             std::thread::sleep(POLL);
@@ -289,14 +303,13 @@ impl ShardRun<'_> {
             if !self.options.warm_start && !lacks_row(i) {
                 continue;
             }
-            watched.interrupt.store(false, Ordering::Relaxed);
-            watched.begins(Some(Instant::now()));
+            watched.begin();
             let limits = Limits {
                 interrupt: Arc::clone(&watched.interrupt),
                 time: self.options.time,
             };
             let found = fit_record(self.model, record, None, from.as_deref(), &limits);
-            watched.begins(None);
+            watched.end();
             let Some(found) = found else {
                 return;
             };

@@ -1,15 +1,24 @@
 //! Distribution of the estimates over the records, and records that stand out.
 
+use rand::SeedableRng;
+use rand::seq::IndexedRandom;
+use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 /// Modified z-score from which a value is an outlier (Iglewicz and Hoaglin 1993).
 const OUTLYING: f64 = 3.5;
-/// Fewest records of which a trend is read.
+/// Fewest records of which trend and outliers are read.
 const FEWEST: usize = 8;
-/// Most records of whose pairs the median slope is taken; of more every second, third, ... is used.
+/// Most records of whose pairs the median slope is taken, chosen at random with [`SEED`].
 const MOST_PAIRED: usize = 1000;
+/// Seed of the choice of records.
+const SEED: u64 = 1;
 /// Deviations below this share of the median are rounding errors.
 const ROUNDING: f64 = 1e-12;
+/// Ratio of the standard deviation to the mean absolute deviation of a normal distribution.
+const MEAN_DEVIATION: f64 = 1.2533;
+/// Quantile 0.975 of the normal distribution.
+const NORMAL: f64 = 1.96;
 /// Ratio of the standard deviation to the median absolute deviation of a normal distribution.
 const DEVIATION: f64 = 1.4826;
 
@@ -30,8 +39,8 @@ pub struct Distribution {
     pub central95: [f64; 2],
     /// Smallest and largest value.
     pub range: [f64; 2],
-    /// Change for a unit of the axis of the fleet: the median slope of all pairs of records (Theil 1950, Sen 1968); 0 without an axis.
-    pub slope: f64,
+    /// Trend over the axis of the fleet; none with fewer than 8 records on it.
+    pub trend: Option<LinearTrend>,
     /// Standard deviation about that line of a normal distribution with the same median absolute deviation.
     pub deviation: f64,
     /// Number of outliers.
@@ -39,7 +48,8 @@ pub struct Distribution {
     /// Values in the order of the records; NaN where a record has none.
     #[serde(skip)]
     pub values: Vec<f64>,
-    /// Distances from the line, in standard deviations; 0 where half of the values lie on it.
+    /// Distances from the line, in standard deviations; 0 where half of the values lie on it. Of a record without a place on the axis, and without a
+    /// trend, from the median of all values, in their deviation from it.
     #[serde(skip)]
     pub scores: Vec<f64>,
 }
@@ -51,18 +61,33 @@ impl Distribution {
         sorted.sort_by(f64::total_cmp);
         let (first, last) = (*sorted.first()?, *sorted.last()?);
         let median = quantile(&sorted, 0.5);
-        let slope = slope(axis, &values);
-        let residuals: Vec<f64> = line_residuals(axis, &values, slope);
-        let mut deviations: Vec<f64> = (residuals.iter().filter(|r| r.is_finite()))
-            .map(|residual| residual.abs())
-            .collect();
-        deviations.sort_by(f64::total_cmp);
-        let deviation = DEVIATION * quantile(&deviations, 0.5);
-        let score = |residual: &f64| match deviation > ROUNDING * median.abs() {
-            true => residual / deviation,
-            false => 0.0,
+        let trend = LinearTrend::of(axis, &values);
+        let of_line = |(i, y): (usize, &f64)| match (&trend, axis.get(i)) {
+            (Some(trend), Some(x)) => y - trend.value - trend.slope * (x - trend.at),
+            _ => f64::NAN,
         };
-        let scores: Vec<f64> = residuals.iter().map(score).collect();
+        let residuals: Vec<f64> = values.iter().enumerate().map(of_line).collect();
+        let from_median: Vec<f64> = values.iter().map(|y| y - median).collect();
+        let spread = deviation_of(&from_median);
+        let deviation = match trend {
+            Some(_) => deviation_of(&residuals),
+            None => spread,
+        };
+        let score = |(residual, alone): (&f64, &f64)| {
+            let (distance, deviation) = match residual.is_finite() {
+                true => (*residual, deviation),
+                false => (*alone, spread),
+            };
+            match deviation > ROUNDING * median.abs() {
+                true => distance / deviation,
+                false => 0.0,
+            }
+        };
+        // The deviation of few values is uncertain: of three normal ones a quarter has an outlier.
+        let scores: Vec<f64> = match sorted.len() < FEWEST {
+            true => vec![0.0; values.len()],
+            false => residuals.iter().zip(&from_median).map(score).collect(),
+        };
         Some(Self {
             name,
             unit,
@@ -71,9 +96,12 @@ impl Distribution {
             quartiles: [0.25, 0.75].map(|share| quantile(&sorted, share)),
             central95: [0.025, 0.975].map(|share| quantile(&sorted, share)),
             range: [first, last],
-            slope,
+            trend,
             deviation,
-            outliers: scores.iter().filter(|score| score.abs() > OUTLYING).count(),
+            outliers: match sorted.len() < FEWEST {
+                true => 0,
+                false => scores.iter().filter(|score| score.abs() > OUTLYING).count(),
+            },
             values,
             scores,
         })
@@ -85,54 +113,78 @@ impl Distribution {
     }
 }
 
-/// Median slope of all pairs, of at most [`MOST_PAIRED`] records; 0 with fewer than [`FEWEST`] values of which a trend would be read.
-fn slope(axis: &[f64], values: &[f64]) -> f64 {
-    let points = axis.iter().zip(values).map(|(x, y)| (*x, *y));
-    let points: Vec<(f64, f64)> = points
-        .filter(|(x, y)| x.is_finite() && y.is_finite())
-        .collect();
-    if points.len() < FEWEST {
-        return 0.0;
-    }
-    let every = points.len().div_ceil(MOST_PAIRED);
-    let points: Vec<(f64, f64)> = points.into_iter().step_by(every).collect();
-    let mut slopes = Vec::new();
-    for (i, a) in points.iter().enumerate() {
-        let later = points[i + 1..].iter().filter(|b| b.0 != a.0);
-        slopes.extend(later.map(|b| (b.1 - a.1) / (b.0 - a.0)));
-    }
-    slopes.sort_by(f64::total_cmp);
-    match slopes.is_empty() {
-        true => 0.0,
-        false => quantile(&slopes, 0.5),
+/// Standard deviation of a normal distribution with the median absolute value of the finite `residuals`, or with their mean where more than half
+/// of them are zero (Iglewicz and Hoaglin 1993); 0 without any.
+fn deviation_of(residuals: &[f64]) -> f64 {
+    let finite = residuals.iter().filter(|r| r.is_finite());
+    let sizes: Vec<f64> = finite.map(|residual| residual.abs()).collect();
+    let mean = sizes.iter().sum::<f64>() / sizes.len().max(1) as f64;
+    match median_of(sizes) {
+        0.0 => MEAN_DEVIATION * mean,
+        median => DEVIATION * median,
     }
 }
 
-/// Distances from the line with a slope, whose median is 0; without a place on the axis from the median of the values.
-fn line_residuals(axis: &[f64], values: &[f64], slope: f64) -> Vec<f64> {
-    let median_of = |list: &mut dyn Iterator<Item = f64>| {
-        let mut list: Vec<f64> = list.filter(|x| x.is_finite()).collect();
-        list.sort_by(f64::total_cmp);
-        if list.is_empty() {
-            0.0
-        } else {
-            quantile(&list, 0.5)
+/// Median; 0 without values.
+fn median_of(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    match values.is_empty() {
+        true => 0.0,
+        false => quantile(&values, 0.5),
+    }
+}
+
+/// A straight line through an estimate over the axis of a fleet.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LinearTrend {
+    /// Change for a unit of the axis: the median slope of all pairs of records (Theil 1950).
+    pub slope: f64,
+    /// 95 % confidence interval of the slope, from the variance of Kendall's statistic (Sen 1968).
+    pub slope95: [f64; 2],
+    /// Median of the axis.
+    pub at: f64,
+    /// Value of the line there.
+    pub value: f64,
+    /// Number of records on the axis.
+    pub records: usize,
+}
+
+impl LinearTrend {
+    /// Of at most [`MOST_PAIRED`] records; `None` with fewer than [`FEWEST`] or equal places.
+    fn of(axis: &[f64], values: &[f64]) -> Option<Self> {
+        let points = axis.iter().zip(values).map(|(x, y)| (*x, *y));
+        let points: Vec<(f64, f64)> = points
+            .filter(|(x, y)| x.is_finite() && y.is_finite())
+            .collect();
+        (points.len() >= FEWEST).then_some(())?;
+        // Of many records a random part: those of a table may alternate between sensors.
+        let mut used = points.clone();
+        if used.len() > MOST_PAIRED {
+            let mut random = ChaCha8Rng::seed_from_u64(SEED);
+            used = points.sample(&mut random, MOST_PAIRED).copied().collect();
         }
-    };
-    let middle = median_of(&mut axis.iter().copied());
-    let place = |i: usize| {
-        axis.get(i)
-            .copied()
-            .filter(|x| x.is_finite())
-            .unwrap_or(middle)
-    };
-    let moved = |(i, y): (usize, &f64)| y - slope * (place(i) - middle);
-    let level = median_of(&mut values.iter().enumerate().map(moved));
-    values
-        .iter()
-        .enumerate()
-        .map(|(i, y)| moved((i, y)) - level)
-        .collect()
+        let mut slopes = Vec::new();
+        for (i, a) in used.iter().enumerate() {
+            let later = used[i + 1..].iter().filter(|b| b.0 != a.0);
+            slopes.extend(later.map(|b| (b.1 - a.1) / (b.0 - a.0)));
+        }
+        (!slopes.is_empty()).then_some(())?;
+        slopes.sort_by(f64::total_cmp);
+        let slope = quantile(&slopes, 0.5);
+        let n = used.len() as f64;
+        let width = NORMAL * (n * (n - 1.0) * (2.0 * n + 5.0) / 18.0).sqrt();
+        let share = 0.5 * width / slopes.len() as f64;
+        let limits = [0.5 - share, 0.5 + share].map(|share| share.clamp(0.0, 1.0));
+        let at = median_of(points.iter().map(|(x, _)| *x).collect());
+        let moved = points.iter().map(|(x, y)| y - slope * (x - at));
+        Some(Self {
+            slope,
+            slope95: limits.map(|share| quantile(&slopes, share)),
+            at,
+            value: median_of(moved.collect()),
+            records: points.len(),
+        })
+    }
 }
 
 /// Quantile of sorted values, interpolated linearly between them.
@@ -245,9 +297,60 @@ mod tests {
         let mut values: Vec<f64> = axis.iter().map(value).collect();
         values[20] += 5.0;
         let found = of(values, &axis).expect("values");
-        assert!((found.slope + 2.0).abs() < 0.01, "{}", found.slope);
+        let trend = found.trend.expect("a trend");
+        assert!((trend.slope + 2.0).abs() < 0.01, "{trend:?}");
+        let [low, high] = trend.slope95;
+        assert!(low < -2.0 && -2.0 < high && high - low < 0.02, "{trend:?}");
         assert_eq!(found.outliers, 1);
         assert!(found.scores[20] > 20.0);
+    }
+
+    /// The interval of Sen's slope for pure noise contains zero in 95 of 100 series.
+    #[test]
+    fn the_interval_of_the_slope_has_its_level() {
+        let mut state = 1u64;
+        let mut noise = || {
+            // Sum of uniform numbers of a linear congruential generator.
+            let mut uniform = || {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+            };
+            (0..6).map(|_| uniform()).sum::<f64>()
+        };
+        let axis: Vec<f64> = (0..30).map(f64::from).collect();
+        let contains = |values: Vec<f64>| {
+            let [low, high] = LinearTrend::of(&axis, &values).expect("a trend").slope95;
+            low <= 0.0 && 0.0 <= high
+        };
+        let count = (0..400)
+            .filter(|_| contains((0..30).map(|_| noise()).collect()))
+            .count();
+        // Three standard deviations of 400 trials are 13.
+        assert!((367..=393).contains(&count), "{count}");
+    }
+
+    /// A record whose place on the axis is unknown is judged by the distribution of all values.
+    #[test]
+    fn a_record_without_a_place_is_no_outlier_of_the_trend() {
+        let mut axis: Vec<f64> = (0..40).map(f64::from).collect();
+        let value = |x: &f64| 10.0 - 2.0 * x + 0.1 * (x * 2.4).sin();
+        let mut values: Vec<f64> = axis.iter().map(value).collect();
+        axis[3] = f64::NAN;
+        let found = of(values.clone(), &axis).expect("values");
+        assert_eq!(
+            (found.outliers, found.trend.map(|t| t.records)),
+            (0, Some(39))
+        );
+        values[3] = 1e4;
+        assert_eq!(of(values, &axis).expect("values").outliers, 1);
+        assert_eq!(
+            of(vec![1.0, 2.0, 3.0], &[1.0, 2.0, 3.0])
+                .expect("values")
+                .trend,
+            None
+        );
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::collect::Collected;
 use super::folder::FleetFolder;
-use super::statistics::{Distribution, Outlier, Statistics};
+use super::statistics::{Distribution, LinearTrend, Outlier, Statistics};
 use super::trend::Trend;
 use crate::number_format::significant;
 use crate::report::{count, quantity};
@@ -26,15 +26,42 @@ pub fn fleet_summary(folder: &FleetFolder, collected: &Collected, trend: &Trend)
         }
         text.push('\n');
     }
-    let outliers = statistics.outliers.iter().take(5);
-    for outlier in outliers {
+    if let Some(used) = incomplete_axis(statistics, trend) {
+        let _ = writeln!(text, "{used}\n");
+    }
+    for outlier in statistics.outliers.iter().take(MOST_LISTED) {
         let _ = writeln!(text, "outlier {}", outlier_in_words(outlier, statistics));
     }
-    for (record, error) in collected.errors.iter().take(5) {
+    let _ = write!(text, "{}", further(statistics.outliers.len(), "outlier"));
+    for (record, error) in collected.errors.iter().take(MOST_LISTED) {
         let _ = writeln!(text, "error   {record}: {}", first_line(error));
     }
+    let _ = write!(text, "{}", further(statistics.errors, "error  "));
     let _ = writeln!(text, "results in {}", folder.path.display());
     text
+}
+
+/// Most outliers, and most errors, in the terminal.
+const MOST_LISTED: usize = 5;
+
+/// A line on the entries of a list that are left out.
+fn further(count: usize, what: &str) -> String {
+    match count.saturating_sub(MOST_LISTED) {
+        0 => String::new(),
+        more => format!("{what} and {more} more: fleet.html\n"),
+    }
+}
+
+/// A sentence where records have no place on the axis.
+pub(super) fn incomplete_axis(statistics: &Statistics, trend: &Trend) -> Option<String> {
+    let placed = trend.values.iter().filter(|x| x.is_finite()).count();
+    let all = statistics.records;
+    (placed < all).then(|| {
+        format!(
+            "{} of {all} records have a {}; the others are compared with the median of all",
+            placed, trend.name
+        )
+    })
 }
 
 /// Columns of the table of estimates.
@@ -42,7 +69,7 @@ const COLUMNS: usize = 6;
 
 /// Headings of the table of estimates.
 pub(super) fn headings(trend: &Trend) -> [String; COLUMNS] {
-    let change = format!("change per {}", trend.step());
+    let change = format!("change per {} (95 % CI)", trend.step());
     [
         "estimate",
         "median",
@@ -61,10 +88,16 @@ pub(super) fn cells(distribution: &Distribution) -> [String; COLUMNS] {
         quantity(&d.name),
         significant(d.median, 5),
         between(d.central95),
-        significant(d.slope, 3),
+        d.trend.map_or("—".to_owned(), |trend| change(&trend)),
         d.unit.clone(),
         d.outliers.to_string(),
     ]
+}
+
+/// The slope with its 95 % confidence interval.
+fn change(trend: &LinearTrend) -> String {
+    let [low, high] = trend.slope95.map(|limit| significant(limit, 3));
+    format!("{} ({low} to {high})", significant(trend.slope, 3))
 }
 
 fn outlier_in_words(outlier: &Outlier, statistics: &Statistics) -> String {
@@ -73,11 +106,16 @@ fn outlier_in_words(outlier: &Outlier, statistics: &Statistics) -> String {
         .iter()
         .find(|d| d.name == outlier.estimate);
     let unit = distribution.map_or("", |d| d.unit.as_str());
+    let value = format!("{} {unit}", significant(outlier.value, 5));
+    let reference = match distribution.is_some_and(|d| d.trend.is_some()) {
+        true => "trend",
+        false => "median",
+    };
     format!(
-        "{}: {} {} {unit}, {} standard deviations from the trend",
+        "{}: {} {}, {} standard deviations from the {reference}",
         outlier.record,
         quantity(&outlier.estimate),
-        significant(outlier.value, 5),
+        value.trim_end(),
         significant(outlier.score, 3)
     )
 }

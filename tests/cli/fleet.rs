@@ -340,6 +340,99 @@ fn a_time_limit_marks_rows() {
     }
 }
 
+/// A record that was repaired is fitted again on request, and its row takes the place of the error.
+#[test]
+fn repaired_records_are_fitted_again() {
+    let bench = bench(3);
+    let arguments = ["fleet", "model.yaml", "records/*.csv", "--out", "fleet"];
+    let whole = record(2.18);
+    bench.write("records/r02.csv", "");
+    bench.write("records/r03.csv", "t_s,y_m\n");
+    assert!(bench.run_to(0, &arguments).contains("2 errors"));
+    bench.write("records/r02.csv", &whole);
+    bench.write("records/r03.csv", "t_s,z\n0,1\n");
+    assert!(bench.run_to(0, &arguments).contains("2 errors"));
+    let again = [&arguments[..], &["--retry-errors"]].concat();
+    let out = bench.run_to(0, &again);
+    // Of two errors the last one counts.
+    assert!(
+        out.contains("1 error\n") && out.contains("error   records/r03.csv"),
+        "{out}"
+    );
+    let line = out
+        .lines()
+        .find(|line| line.contains("r03"))
+        .expect("an error");
+    assert!(line.contains("`z`") || line.contains("column"), "{line}");
+    let rows = lines(&bench, "fleet", "rows-");
+    assert_eq!(rows.len(), 5);
+    assert!(bench.run_to(0, &arguments).contains("1 error\n"));
+    let single = bench.run_to(0, &["fleet", "page", "fleet", "r02.csv"]);
+    assert!(single.starts_with("records/r02.csv: "), "{single}");
+    // The page is of the file as it is now.
+    bench.write("records/r02.csv", &record(2.0));
+    let (code, _, notes) = bench.run(&["fleet", "page", "fleet", "r02.csv"]);
+    assert_eq!(code, 0, "{notes}");
+    assert!(
+        notes.contains("warning: the results differ from the row of the record"),
+        "{notes}"
+    );
+}
+
+/// Files of the same names in another folder are other records.
+#[test]
+fn records_of_another_folder_are_others() {
+    let bench = bench(1);
+    let list = "file\nr.csv\n";
+    for (folder, frequency) in [("a", 2.0), ("b", 2.2)] {
+        bench.write(&format!("{folder}/list.csv"), list);
+        bench.write(&format!("{folder}/r.csv"), &record(frequency));
+    }
+    bench.run_to(0, &["fleet", "model.yaml", "a/list.csv", "--out", "fleet"]);
+    let (code, _, message) = bench.run(&["fleet", "model.yaml", "b/list.csv", "--out", "fleet"]);
+    assert_eq!(code, 2);
+    assert!(message.contains("a fleet of other records"), "{message}");
+}
+
+/// The axis of a fleet is kept for its collection; a record without a place on it is no outlier of the trend.
+#[test]
+fn a_trend_over_a_column_with_gaps() {
+    let bench = bench(12);
+    let mut table = String::from("file,when\n");
+    for i in 1..=12 {
+        let place = if i == 4 {
+            String::new()
+        } else {
+            (10 * i).to_string()
+        };
+        table += &format!("records/r{i:02}.csv,{place}\n");
+    }
+    bench.write("list.csv", &table);
+    let arguments = ["fleet", "model.yaml", "list.csv", "--out", "fleet"];
+    let out = bench.run_to(0, &[&arguments[..], &["--trend", "when"]].concat());
+    let axis = "11 of 12 records have a when; the others are compared with the median of all";
+    assert!(
+        out.contains(axis) && !out.contains("outlier records/r04"),
+        "{out}"
+    );
+    assert!(out.contains("change per when (95 % CI)"), "{out}");
+    let collected = bench.run_to(0, &["fleet", "collect", "fleet"]);
+    assert_eq!(collected, out);
+    let summary: Value = serde_json::from_str(&bench.read("fleet/summary.json")).expect("JSON");
+    let frequency = &summary["distributions"][0];
+    assert_eq!(frequency["name"], "natural_frequency");
+    let slope = |value: &Value| value.as_f64().expect("a slope");
+    // The angular frequency falls by 0.01 from one record to the next.
+    let expected = -0.01 / 10.0 / std::f64::consts::TAU;
+    let trend = &frequency["trend"];
+    assert!(
+        (slope(&trend["slope"]) / expected - 1.0).abs() < 0.05,
+        "{trend}"
+    );
+    let [low, high] = [0, 1].map(|i| slope(&trend["slope95"][i]));
+    assert!(low < expected && expected < high, "{trend}");
+}
+
 /// A table states known masses, windows, further keys and columns for the summary.
 #[test]
 fn a_table_lists_records() {
@@ -455,7 +548,22 @@ fn wrong_arguments() {
     bench.write("twice.csv", "file,file\na,b\n");
     bench.write("empty.csv", "file\n");
     bench.write("value.csv", "file,functions.mass\nrecords/r01.csv,}\n");
+    bench.write("path.csv", "Path,mass\nrecords/r01.csv,1\n");
+    bench.write("equal.csv", "file,mass,mass\nrecords/r01.csv,1,50\n");
+    bench.write("same.csv", "file,x,x\nrecords/r01.csv,1,50\n");
+    fs::write(
+        bench.path("latin.csv"),
+        b"file,syst\xe8me\nrecords/r01.csv,1\n",
+    )
+    .expect("written");
+    bench.write("own/summary.json", "{}");
     let all = [
+        run(&["model.yaml", "path.csv", "--out", "fleet"]),
+        run(&["model.yaml", "equal.csv", "--out", "fleet"]),
+        run(&["model.yaml", "same.csv", "--out", "fleet"]),
+        run(&["model.yaml", "latin.csv", "--out", "fleet"]),
+        run(&["model.yaml", "text.csv", "value.csv", "--out", "fleet"]),
+        run(&["model.yaml", "records/*.csv", "--out", "own"]),
         run(&["model.yaml", "absent/*.csv", "--out", "fleet"]),
         run(&["model.yaml", "a[", "--out", "fleet"]),
         run(&["model.yaml", "records", "--out", "fleet"]),
@@ -513,6 +621,46 @@ fn wrong_arguments() {
         run(&["page", "records", "r01.csv"]),
     ];
     assert_snapshot!(all.join("\n"), @r#"
+    error: path.csv:1:1: a table of records without the column `file`
+      |
+    1 | Path,mass
+      | ^^^^^^^^^
+      found: `Path`
+      expected: the column `file`, with the paths of the records
+
+    error: equal.csv:1:1: two columns of one name
+      |
+    1 | file,mass,mass
+      | ^^^^^^^^^^^^^^
+      found: `mass`
+      expected: every column once
+
+    error: same.csv:1:1: two columns of one name
+      |
+    1 | file,x,x
+      | ^^^^^^^^
+      found: `x`
+      expected: every column once
+
+    error: latin.csv:1:10: the file is not UTF-8 text
+      |
+    1 | file,syst�me
+      |          ^^^
+      found: the byte 0xe8
+      expected: a table of records
+      hint: save it as UTF-8, or write only plain letters there
+
+    error: text.csv:2:1: not a number
+      |
+    2 | records/r01.csv,heavy
+      | ^^^^^^^^^^^^^^^^^^^^^
+      found: `heavy` in the column `mass`
+      expected: a number, or nothing
+
+    error: own: the folder holds a file that the fleet would replace
+      found: summary.json
+      expected: a folder of its own for the fleet
+
     error: RECORDS: no file matches this pattern
       found: `absent/*.csv`
       expected: a pattern such as "records/*.csv"
@@ -563,7 +711,7 @@ fn wrong_arguments() {
       |
     2 | records/r01.csv,heavy
       | ^^^^^^^^^^^^^^^^^^^^^
-      found: `heavy`
+      found: `heavy` in the column `mass`
       expected: a number, or nothing
 
     error: nofile.csv:2:1: a row without a file
@@ -670,6 +818,18 @@ fn other_fleets_are_refused() {
     bench.write("fleet/records.jsonl", "text\n");
     all.push(refused(&["collect", "fleet"]));
     bench.write("fleet/records.jsonl", &records);
+    // A record of arrays has the digest of its content in place of a path.
+    let parts: Vec<&str> = records.split('"').collect();
+    let path = parts.iter().find(|part| part.ends_with("/records/r01.csv"));
+    bench.write(
+        "fleet/records.jsonl",
+        &records.replace(path.expect("a path"), "sha256:0"),
+    );
+    all.push(refused(&["page", "fleet", "records/r01.csv"]));
+    bench.write("fleet/records.jsonl", &records);
+    bench.write("model.yaml", &MODEL.replace("fixed: 1.0", "fixed: 5.0"));
+    all.push(refused(&["page", "fleet", "records/r01.csv"]));
+    bench.write("model.yaml", MODEL);
     let rows = bench.read("fleet/rows-1-of-1.jsonl");
     bench.write("fleet/rows-1-of-1.jsonl", &rows.replace("r01", "r07"));
     all.push(refused(&["collect", "fleet"]));
@@ -720,8 +880,8 @@ fn other_fleets_are_refused() {
       expected: 0.2.0-dev
       hint: give another folder with --out
 
-    error: fleet: the folder holds rows of an unknown fleet
-      found: rows without fleet.json
+    error: fleet: the folder holds a file that the fleet would replace
+      found: fleet.html
       expected: a folder of its own for the fleet
 
     error: fleet/fleet.json: the identity of the fleet is damaged
@@ -733,6 +893,15 @@ fn other_fleets_are_refused() {
 
     error: fleet/records.jsonl: the list of records cannot be read
       found: expected ident at line 1 column 2
+
+    error: RECORD: the record was in memory, not in a file
+      found: `records/r01.csv`
+      expected: a record of a file
+
+    error: fleet: the model has changed since this fleet began
+      found: `model.yaml`
+      expected: the same model
+      hint: give another folder with --out
 
     error: fleet/rows-1-of-1.jsonl: the fleet cannot be collected
       found: a record of another fleet: records/r07.csv

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections import deque
-from typing import TYPE_CHECKING, Any, Callable, Deque, Dict, Iterator, List, Optional, Tuple
+from typing import TYPE_CHECKING, Any, Callable, Deque, Dict, Iterator, List, Optional, Set, Tuple
 
 from ._errors import Error, NumericalError
 
@@ -24,6 +24,8 @@ _MOST = 10_000
 _DONE = 1000
 #: Tries of a task whose worker dies.
 _TRIES = 4
+#: Failed tasks one after another, without an answer before, after which the executor counts as broken.
+_FAILED = 8
 #: Tasks in flight for each worker.
 _AHEAD = 3
 
@@ -71,9 +73,15 @@ class Batches:
         self._seconds = 0.0
         self._count = 0
         self._pending: Deque[_Batch] = deque()
+        #: Records whose rows are failures of workers: another call may fit them.
+        self.unanswered: Set[str] = set()
+        #: Tasks one after another that workers failed, and that they did not answer.
+        self._failed = self._late = 0
 
-    def run(self, blocks: "Iterator[Block]", is_todo: "Callable[[Block], bool]") -> "Iterator[Tuple[List[Block], List[Lines]]]":
-        """The blocks in their order with the new rows of those that lack one; the blocks are read as far as workers need them."""
+    def run(
+        self, blocks: "Iterator[Block]", is_todo: "Callable[[Block], bool]"
+    ) -> "Iterator[Tuple[List[Block], List[Block], List[Lines]]]":
+        """The blocks in their order, those that lacked a row, and the rows of these; the blocks are read as far as workers need them."""
         if self._executor is None:
             from concurrent.futures import ThreadPoolExecutor
 
@@ -90,7 +98,7 @@ class Batches:
                 return
             lines = self._finished(self._pending[0])
             batch = self._pending.popleft()
-            yield batch.blocks, lines
+            yield batch.blocks, batch.todo, lines
 
     def close(self) -> None:
         """Gives up the tasks that are left."""
@@ -151,20 +159,42 @@ class Batches:
                 is_late = "Timeout" in type(error).__name__ and not batch.future.done()
                 if is_late:
                     batch.future.cancel()
-                    return self._errors(batch, f"time limit: no answer of the worker within {self._timeout:g} s")
+                    self._late += 1
+                    text = f"no answer of the worker within {self._timeout:g} s"
+                    if self._late > self._workers:
+                        raise self._ended(f"no worker answers any more ({text})") from error
+                    return self._singly(batch, f"time limit: {text}")
                 if batch.tries == _TRIES or self._own is not None:
-                    return self._errors(batch, f"the worker failed {batch.tries} times: {type(error).__name__}: {error}")
+                    self._failed += 1
+                    text = f"{type(error).__name__}: {error}"
+                    if self._failed > _FAILED and self._count == 0:
+                        raise self._ended(f"the workers fail ({text})") from error
+                    return self._singly(batch, f"the worker failed {batch.tries} times: {text}")
                 self._submit(batch)
                 continue
             batch.future = None
+            self._failed = self._late = 0
             self._seconds += seconds
             self._count += len(lines)
             return list(lines)
         return []
 
-    def _errors(self, batch: _Batch, text: str) -> List[Lines]:
+    def _singly(self, batch: _Batch, text: str) -> List[Lines]:
+        """The rows of the blocks of a failed task, each in a task of its own; of a single one rows with the error."""
         batch.future = None
-        return [failed(record.name, text) for block in batch.todo for record in block]
+        if len(batch.todo) > 1:
+            parts = [_Batch([block], [block]) for block in batch.todo]
+            rows: List[Lines] = []
+            for part in parts:
+                self._submit(part)
+                rows += self._finished(part)
+            return rows
+        names = [record.name for block in batch.todo for record in block]
+        self.unanswered.update(names)
+        return [failed(name, text) for name in names]
+
+    def _ended(self, text: str) -> NumericalError:
+        return NumericalError(f"{text}; rows so far are kept, and the same call with `out=…` and a working executor continues after them")
 
 
 def workers(executor: Any) -> int:

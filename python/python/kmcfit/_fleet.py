@@ -18,7 +18,9 @@ from ._records import Item, Source, item, lowered, other_columns
 _KEYS = ("record", "estimates", "verdict", "warnings", "seconds", "error")
 #: Records of one system that are fitted one after another with `warm_start`, as in `kmcfit fleet`.
 _BLOCK = 32
-_WORDS = ("executor", "out", "set", "threads", "batch", "time_limit", "timeout", "warm_start", "trend")
+#: Most blocks that wait for further records of their systems.
+_OPEN = 256
+_WORDS = ("executor", "out", "set", "threads", "batch", "time_limit", "timeout", "retry_errors", "warm_start", "trend")
 
 
 class Row(Dict[str, Any]):
@@ -133,6 +135,7 @@ def fit_many(
     batch: Optional[int] = None,
     time_limit: Optional[float] = None,
     timeout: Optional[float] = None,
+    retry_errors: bool = False,
     warm_start: bool = False,
     trend: Optional[str] = None,
     **unknown: Any,
@@ -164,7 +167,10 @@ def fit_many(
     time_limit : float, optional
         Longest time of a record, s; its row has then an error that begins with ``time limit``.
     timeout : float, optional
-        Longest time without an answer to the oldest task, s; its rows have then an error that begins with ``time limit``.
+        Longest time without an answer to the oldest task, s; its rows have then an error that begins with ``time limit``. Errors of workers
+        are not in the journal: the same call fits their records again.
+    retry_errors : bool
+        Fit the records again whose rows in `out` have errors.
     warm_start : bool
         Start each fit from the estimates of the record before of the same system, in blocks of 32.
     trend : str, optional
@@ -185,9 +191,8 @@ def fit_many(
     for name, count in (("threads", threads), ("batch", batch)):
         if count is not None and (isinstance(count, bool) or not isinstance(count, int) or count < 1):
             raise InputError("invalid number", f"fit_many.{name}", repr(count), "1 or more")
-    for name, limit in (("time_limit", time_limit), ("timeout", timeout)):
-        if limit is not None and not 0.0 < limit <= 1e9:
-            raise InputError("invalid time", f"fit_many.{name}", repr(limit), "seconds, greater than 0")
+    _check_time("fit_many.time_limit", time_limit)
+    _check_time("fit_many.timeout", timeout)
     fleet, source = _source(model, set)
     items, columns, count, is_listed = _items(records)
     journal = None
@@ -195,13 +200,18 @@ def fit_many(
         known = None
         if is_listed:
             items = list(items)
-            known = [record.listed() for record in items]
-        journal = _kmcfit.RawJournal(os.fspath(out), fleet, known, columns, warm_start)
+            known = [record.listed(source) for record in items]
+        journal = _kmcfit.RawJournal(os.fspath(out), fleet, known, columns, warm_start, retry_errors, trend)
     job = Job(_kmcfit.version(), source, warm_start, time_limit)
     batches = Batches(fit_batch, job, lambda blocks: fit_blocks(fleet, job, blocks), executor, threads, batch, timeout)
-    unlisted = None if is_listed else journal
-    rows = _rows(fleet, batches, _blocks(items, warm_start), journal, unlisted, trend)
+    rows = _rows(fleet, batches, _blocks(items, warm_start), journal, None if is_listed else source, trend)
     return Rows(rows, count)
+
+
+def _check_time(name: str, limit: Optional[float]) -> None:
+    is_number = isinstance(limit, (int, float)) and not isinstance(limit, bool)
+    if limit is not None and not (is_number and 0.0 < limit <= 1e9):
+        raise InputError("invalid time", name, repr(limit), "seconds, greater than 0")
 
 
 def fit_partition(
@@ -219,6 +229,7 @@ def fit_partition(
     -------
     RowList
     """
+    _check_time("fit_partition.time_limit", time_limit)
     fleet, source = _source(model, set)
     items, *_ = _items(records)
     job = Job(_kmcfit.version(), source, warm_start, time_limit)
@@ -272,10 +283,11 @@ def fit_blocks(fleet: "_kmcfit.RawFleet", job: Job, blocks: List[Block]) -> Answ
         for record in block:
             try:
                 part.append(lowered(record, job.source))
-            except InputError as error:
+            except Exception as error:  # whatever a record of a user raises is its own error
+                text = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
                 # The next record starts as the model states.
                 rows += fleet.fit([part], job.warm_start, job.time_limit)
-                rows.append(failed(record.name, str(error)))
+                rows.append(failed(record.name, text))
                 part = []
         rows += fleet.fit([part], job.warm_start, job.time_limit)
     return rows, perf_counter() - begin
@@ -340,6 +352,8 @@ def _blocks(items: Iterable[Item], warm_start: bool) -> Iterator[Block]:
         block.append(record)
         if len(block) == _BLOCK:
             yield open_blocks.pop(record.system)
+        elif len(open_blocks) > _OPEN:
+            yield open_blocks.pop(next(iter(open_blocks)))
     yield from open_blocks.values()
 
 
@@ -348,18 +362,18 @@ def _rows(
     batches: Batches,
     blocks: Iterator[Block],
     journal: Optional["_kmcfit.RawJournal"],
-    unlisted: Optional["_kmcfit.RawJournal"],
+    source: Optional[Source],
     trend: Optional[str],
 ) -> Iterator[Row]:
-    """Rows in the order of `blocks`; those of the journal are not fitted again."""
+    """Rows in the order of `blocks`; those of the journal are not fitted again. With a `source` the records become known one after another."""
     before: Dict[str, str] = {}
 
     def todo(block: Block) -> bool:
         """True if a record of the block has no row yet."""
         is_open = journal is None
         for record in block:
-            if unlisted is not None:
-                unlisted.add(record.listed())
+            if source is not None and journal is not None:
+                journal.add(record.listed(source))
             line = None if journal is None else journal.row(record.name)
             if line is None:
                 is_open = True
@@ -368,15 +382,24 @@ def _rows(
         return is_open
 
     try:
-        for found_blocks, lines in batches.run(blocks, todo):
-            new = {row.record: (row, line) for row, line in ((Row(*line), line) for line in lines)}
-            names = [record.name for block in found_blocks for record in block]
-            had = {name: before.pop(name) for name in names if name in before}
-            added = [line for name, (_, line) in new.items() if name not in had]
+        for found_blocks, fitted, lines in batches.run(blocks, todo):
+            # Rows come in the order of their records, whose names may be equal without a journal.
+            given = iter(lines)
+            new = {id(block): [next(given) for _ in block] for block in fitted}
+            rows = [
+                (before.pop(record.name, None), record.name, line)
+                for block in found_blocks
+                for record, line in zip(block, new.get(id(block)) or [None] * len(block))
+            ]
+            added = [line for had, name, line in rows if had is None and line is not None and name not in batches.unanswered]
             if journal is not None and added:
                 journal.append(added)
-            for name in names:
-                yield Row(had[name]) if name in had else new[name][0]
+            for had, name, line in rows:
+                batches.unanswered.discard(name)
+                if had is not None:
+                    yield Row(had)
+                elif line is not None:
+                    yield Row(*line)
         if journal is not None:
             journal.finish(trend)
     except BaseException:

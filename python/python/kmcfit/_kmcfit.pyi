@@ -56,7 +56,14 @@ class RawJournal:
     """Folder and journal of a fleet, as `kmcfit fleet` writes them."""
 
     def __new__(
-        cls, folder: str, model: RawFleet, records: list[_Given] | None, columns: list[str], warm_start: bool
+        cls,
+        folder: str,
+        model: RawFleet,
+        records: list[_Given] | None,
+        columns: list[str],
+        warm_start: bool,
+        retry_errors: bool,
+        trend: str | None,
     ) -> RawJournal: ...
     def add(self, record: _Given) -> None: ...
     def row(self, record: str) -> str | None: ...

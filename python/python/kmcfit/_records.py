@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from hashlib import sha256
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
@@ -38,9 +39,17 @@ class Item(NamedTuple):
     system: str
     columns: List[str]
 
-    def listed(self) -> Given:
-        """The record for a journal, without its data."""
-        return self.name, self.path, None, self.overrides, self.system, self.columns
+    def listed(self, source: "Source") -> Given:
+        """The record for a journal, without its data: their digest stands for them."""
+        path, overrides = self.path, self.overrides
+        if self.data is not None:
+            try:
+                _, _, content, changes, *_ = lowered(self, source)
+            except Exception as error:  # the error of its row
+                content, changes = str(error).encode(errors="backslashreplace"), []
+            text = repr(changes).encode(errors="backslashreplace")
+            path = "sha256:" + sha256((content or b"") + text).hexdigest()
+        return self.name, path, None, overrides, self.system, self.columns
 
 
 class Source(NamedTuple):
@@ -81,6 +90,8 @@ def other_columns(given: Any) -> List[str]:
 
 
 def _of_data(name: str, data: Any, settings: Optional[Dict[str, Any]] = None) -> Item:
+    # Names of files need not be text.
+    name = name.encode(errors="backslashreplace").decode()
     if isinstance(data, (str, os.PathLike)):
         return Item(name, os.fspath(data), None, [], "", [])
     if isinstance(data, (bytes, bytearray)):
