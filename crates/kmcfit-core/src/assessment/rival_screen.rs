@@ -66,8 +66,8 @@ impl RivalScreen {
             let constant = function.basis.as_ref().filter(|_| is_whole)?;
             let constant = constant.constant(&problem.system.grid, 1.0);
             let values = DVector::from_column_slice(&theta[range.clone()]);
-            right -= &derivatives * values;
-            columns.push(&derivatives * DVector::from_vec(constant));
+            right -= derivatives * values;
+            columns.push(derivatives * DVector::from_vec(constant));
             from.push(0.0);
         }
         let count = from.len();

@@ -251,6 +251,9 @@ fn bounds_of(parameters: usize, active: &[ActiveRow]) -> Vec<Vec<usize>> {
     all
 }
 
+/// Adds the entries of a value at a node in the parameters to a list.
+type AddEntries<'a> = dyn Fn(usize, &mut Vec<(usize, f64)>) + 'a;
+
 struct Maker<'a> {
     problem: &'a Problem,
     theta: &'a [f64],
@@ -286,7 +289,7 @@ impl Maker<'_> {
     }
 
     /// Degrees of freedom of the values with these entries at each node of the band, and the gradient of their mean.
-    fn degrees(&self, add: &dyn Fn(usize, &mut Vec<(usize, f64)>)) -> (Vec<f64>, Vec<f64>) {
+    fn degrees(&self, add: &AddEntries) -> (Vec<f64>, Vec<f64>) {
         let mut gradient = vec![0.0; self.problem.parameters()];
         let mut entries = Vec::new();
         let degrees = (0..self.nodes.len()).map(|i| {
