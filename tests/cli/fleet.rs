@@ -556,13 +556,14 @@ fn wrong_arguments() {
         b"file,syst\xe8me\nrecords/r01.csv,1\n",
     )
     .expect("written");
+    bench.write("one.csv", "file\nrecords/r01.csv\n");
     bench.write("own/summary.json", "{}");
     let all = [
         run(&["model.yaml", "path.csv", "--out", "fleet"]),
         run(&["model.yaml", "equal.csv", "--out", "fleet"]),
         run(&["model.yaml", "same.csv", "--out", "fleet"]),
         run(&["model.yaml", "latin.csv", "--out", "fleet"]),
-        run(&["model.yaml", "text.csv", "value.csv", "--out", "fleet"]),
+        run(&["model.yaml", "one.csv", "records/r02.csv", "--out", "fleet"]),
         run(&["model.yaml", "records/*.csv", "--out", "own"]),
         run(&["model.yaml", "absent/*.csv", "--out", "fleet"]),
         run(&["model.yaml", "a[", "--out", "fleet"]),
@@ -650,12 +651,8 @@ fn wrong_arguments() {
       expected: a table of records
       hint: save it as UTF-8, or write only plain letters there
 
-    error: text.csv:2:1: not a number
-      |
-    2 | records/r01.csv,heavy
-      | ^^^^^^^^^^^^^^^^^^^^^
-      found: `heavy` in the column `mass`
-      expected: a number, or nothing
+    error: one.csv: a table of records among several arguments
+      expected: one table of records alone, or files and patterns
 
     error: own: the folder holds a file that the fleet would replace
       found: summary.json
@@ -880,8 +877,8 @@ fn other_fleets_are_refused() {
       expected: 0.2.0-dev
       hint: give another folder with --out
 
-    error: fleet: the folder holds a file that the fleet would replace
-      found: fleet.html
+    error: fleet: the folder holds rows of an unknown fleet
+      found: rows without fleet.json
       expected: a folder of its own for the fleet
 
     error: fleet/fleet.json: the identity of the fleet is damaged

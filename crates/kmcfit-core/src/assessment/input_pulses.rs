@@ -10,10 +10,10 @@
 //! is removed from the residuals `e` until no score is significant (orthogonal matching pursuit, Pati et al. 1993). Few pulses that leave no
 //! significant one explain the residuals; a missing term or a varying coefficient leaves many.
 
+use super::extension::extended;
 use super::input_correlation::measured;
 use super::record_error::RecordError;
 use super::refinement::applies;
-use super::score_tests::extended;
 use super::span::{Span, weighted_residuals};
 use crate::functions::{CoefficientFunction, CoefficientKind};
 use crate::objective::Evaluation;

@@ -7,6 +7,7 @@ mod constants;
 mod draws;
 mod equation_error;
 mod estimates;
+mod extension;
 mod friction_width;
 mod function;
 mod gaps;

@@ -7,8 +7,8 @@
 //! min |r + J d|^2 + ...,    theta_f + d_f the parameters of a constant for each function that varies.
 //! ```
 
+use super::extension::extended;
 use super::refinement::Minimum;
-use super::score_tests::extended;
 use super::span::weighted_residuals;
 use crate::functions::{CoefficientFunction, CoefficientKind};
 use crate::problem::Problem;

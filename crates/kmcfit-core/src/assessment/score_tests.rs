@@ -13,13 +13,14 @@
 //! residuals, or the smallest of all refits and at most half of those before; so are a delay, a difference of clocks and a gain, with their [own derivatives](super::record_parameters). Where the noise model does not describe the residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
 
 use super::FitWarning;
+use super::extension::extended;
 use super::model_tests::{Extension, ExtensionTest};
 use super::record_errors::small_error;
 use super::record_parameters::{self, RecordParameter};
 use super::refinement::applies;
 use super::refit::{EXPLAINED, Refit, without_correlation, worst_fit, worst_misfit};
 use super::span::{Span, weighted_residuals};
-use crate::functions::{CoefficientFunction, CoefficientKind, CoefficientSet, Parameterization};
+use crate::functions::{CoefficientFunction, CoefficientKind};
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::simd::sum::rms;
@@ -219,43 +220,6 @@ fn constants(
     let each = kinds.iter();
     each.map(|(kind, term)| (CoefficientFunction::constant(*kind, 0.0, nodes), *term))
         .collect()
-}
-
-/// The problem with further coefficients, at zero, and their terms, without penalties and constraints, and its parameters.
-pub(super) fn extended(
-    problem: &Problem,
-    theta: &[f64],
-    further: Vec<(CoefficientFunction, Term)>,
-) -> Option<(Problem, Vec<f64>)> {
-    let functions = &problem.functions;
-    let (nodes, step) = (functions.nodes(), problem.system.grid.step());
-    let mut list: Vec<CoefficientFunction> = functions.iter().cloned().collect();
-    let first = list.len();
-    let (new, terms): (Vec<CoefficientFunction>, Vec<Term>) = further.into_iter().unzip();
-    let zeros = vec![0.0; new.iter().map(CoefficientFunction::parameters).sum()];
-    list.extend(new);
-    let set = |set: &CoefficientSet| {
-        let all = set.iter().copied().chain(first..list.len());
-        CoefficientSet::from(all.collect::<Vec<usize>>())
-            .with_known_parts(set.known_parts().to_vec())
-    };
-    let sets: Vec<CoefficientSet> = functions.coefficient_sets().iter().map(set).collect();
-    let longer = Parameterization::with_coefficient_sets(list, sets, nodes, step)?
-        .with_scalars(functions.scalars().to_vec());
-    let extended = problem.clone().with(|parts| {
-        parts.functions = longer;
-        parts.system.terms.extend(terms);
-        parts.penalties.clear();
-        parts.variations.clear();
-        parts.constraints = Default::default();
-        parts.soft.clear();
-        parts.jumps.clear();
-    });
-    let scalars = functions.scalar_range().start;
-    Some((
-        extended.ok()?,
-        [&theta[..scalars], &zeros, &theta[scalars..]].concat(),
-    ))
 }
 
 /// Root mean square of `phi` of a term over all records.

@@ -219,3 +219,25 @@ pub(super) fn judged(outcome: Outcome, optimality: Option<&Optimality>) -> Outco
     };
     Outcome::new(Status::Stalled, reason)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, CoefficientSpec, Record};
+
+    /// Few parameters need two numbers a sample, and not the 4000 bytes a node of a program with states.
+    #[test]
+    fn few_parameters_need_little_memory() {
+        let times: Vec<f64> = (0..1000).map(|i| 0.05 * f64::from(i)).collect();
+        let samples: Vec<f64> = times.iter().map(|t| (1.1 * t).cos()).collect();
+        let bytes = |stiffness: CoefficientSpec| {
+            let record = Record::new("decay").displacement(&times, &samples);
+            let mass = CoefficientSpec::fixed(1.0);
+            let parts = [mass, CoefficientSpec::constant(0.1), stiffness];
+            let problem = Builder::new(parts).record(record).build();
+            linearisation_memory(&problem.expect("a problem"))
+        };
+        assert!(bytes(CoefficientSpec::constant(1.2)) <= 1000 * 8 * 6);
+        assert!(bytes(CoefficientSpec::nodal(1.2)) >= 1000 * BYTES_PER_NODE);
+    }
+}

@@ -1,0 +1,42 @@
+//! Problems with further terms.
+
+use crate::functions::{CoefficientFunction, CoefficientSet, Parameterization};
+use crate::problem::Problem;
+use crate::system::Term;
+
+/// The problem with further coefficients, at zero, and their terms, without penalties and constraints, and its parameters.
+pub(super) fn extended(
+    problem: &Problem,
+    theta: &[f64],
+    further: Vec<(CoefficientFunction, Term)>,
+) -> Option<(Problem, Vec<f64>)> {
+    let functions = &problem.functions;
+    let (nodes, step) = (functions.nodes(), problem.system.grid.step());
+    let mut list: Vec<CoefficientFunction> = functions.iter().cloned().collect();
+    let first = list.len();
+    let (new, terms): (Vec<CoefficientFunction>, Vec<Term>) = further.into_iter().unzip();
+    let zeros = vec![0.0; new.iter().map(CoefficientFunction::parameters).sum()];
+    list.extend(new);
+    let set = |set: &CoefficientSet| {
+        let all = set.iter().copied().chain(first..list.len());
+        CoefficientSet::from(all.collect::<Vec<usize>>())
+            .with_known_parts(set.known_parts().to_vec())
+    };
+    let sets: Vec<CoefficientSet> = functions.coefficient_sets().iter().map(set).collect();
+    let longer = Parameterization::with_coefficient_sets(list, sets, nodes, step)?
+        .with_scalars(functions.scalars().to_vec());
+    let extended = problem.clone().with(|parts| {
+        parts.functions = longer;
+        parts.system.terms.extend(terms);
+        parts.penalties.clear();
+        parts.variations.clear();
+        parts.constraints = Default::default();
+        parts.soft.clear();
+        parts.jumps.clear();
+    });
+    let scalars = functions.scalar_range().start;
+    Some((
+        extended.ok()?,
+        [&theta[..scalars], &zeros, &theta[scalars..]].concat(),
+    ))
+}
