@@ -385,11 +385,11 @@ def _rows(
         for found_blocks, fitted, lines in batches.run(blocks, todo):
             # Rows come in the order of their records, whose names may be equal without a journal.
             given = iter(lines)
-            new = {id(block): [next(given) for _ in block] for block in fitted}
+            new: Dict[int, List[Optional[Lines]]] = {id(block): [next(given) for _ in block] for block in fitted}
             rows = [
                 (before.pop(record.name, None), record.name, line)
                 for block in found_blocks
-                for record, line in zip(block, new.get(id(block)) or [None] * len(block))
+                for record, line in zip(block, new.get(id(block), [None] * len(block)))
             ]
             added = [line for had, name, line in rows if had is None and line is not None and name not in batches.unanswered]
             if journal is not None and added:
