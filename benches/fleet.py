@@ -117,12 +117,21 @@ def run(folder, *words):
     return time.perf_counter() - begin, usage.ru_maxrss / 1024
 
 
+def without_errors(out, count):
+    """Stops where a row is missing or has an error: its time would be none of a fit."""
+    rows = km.read_fleet(out)
+    if len(rows) != count or any(row.error for row in rows):
+        sys.exit(f"{out}: rows are missing or have errors")
+
+
 def fleet(folder, count, *options, name="out"):
     """Time and memory of a fleet of the first records."""
     table = folder / f"first-{count}.csv"
     table.write_text("file,system\n" + "".join(f"decays/{i:05}.npz,a\n" for i in range(count)))
     subprocess.run(["rm", "-rf", str(folder / name)], check=True)
-    return run(folder, "fleet", "model.yaml", table.name, "--out", name, *options)
+    found = run(folder, "fleet", "model.yaml", table.name, "--out", name, *options)
+    without_errors(folder / name, count)
+    return found
 
 
 def main():
@@ -158,6 +167,7 @@ def main():
     row("single runs of `kmcfit fit`", single, singles)
     subprocess.run(["rm", "-rf", str(folder / "out-forced")], check=True)
     forced = run(folder, "fleet", "forced.yaml", "forced/*.npz", "--out", "out-forced", "--threads", "2")[0]
+    without_errors(folder / "out-forced", FORCED)
     row("`kmcfit fleet --threads 2`, records with a force", FORCED, forced)
     memory = {}
     for number in (few, count):
