@@ -81,8 +81,16 @@ fn state(statistics: &Statistics) -> String {
 }
 
 fn answers(statistics: &Statistics, shown: &[&Distribution], trend: &Trend) -> String {
-    let rows: Vec<Vec<String>> = shown.iter().map(|d| cells(d).to_vec()).collect();
-    let headings = headings(trend);
+    // The unit beside the name leaves room for the interval of the change.
+    let in_columns = |[name, median, central, change, unit, outliers]: [String; 6]| {
+        let name = match unit.as_str() {
+            "" => name,
+            unit => format!("{name}, {unit}"),
+        };
+        vec![name, median, central, change, outliers]
+    };
+    let rows: Vec<Vec<String>> = shown.iter().map(|d| in_columns(cells(d))).collect();
+    let headings = in_columns(headings(trend));
     let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
     let used = incomplete_axis(statistics, trend).map_or(String::new(), |s| shell::paragraph(&s));
     shell::table("Estimates over all records", &headings, &rows) + &used
