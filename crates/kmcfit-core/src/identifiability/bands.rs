@@ -172,6 +172,7 @@ impl Bands {
             true => None,
             false => NoiseVariants::of(problem, evaluation),
         };
+        let directions = &information.sensitivity().directions;
         let maker = Maker {
             problem,
             theta,
@@ -183,9 +184,9 @@ impl Bands {
                 true => vec![&tight, &loose],
                 false => vec![&loose],
             },
-            directions: &information.sensitivity().directions,
-            active: &active,
+            directions,
             bounds_of: bounds_of(problem.parameters(), &active),
+            inwards: active.iter().map(|row| inwards(directions, row)).collect(),
             settings,
         };
         let linearised: Vec<LinearisedCurve> = (0..problem.functions.ranges().len())
@@ -242,6 +243,21 @@ impl Bands {
     }
 }
 
+fn norm(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Slope of an active row along the directions, and its norm.
+fn inwards(directions: &Directions, row: &ActiveRow) -> (Vec<f64>, f64) {
+    let slope = match row.equality {
+        // Not asked for.
+        true => Vec::new(),
+        false => directions.row(row.entries.iter().copied()),
+    };
+    let length = norm(&slope);
+    (slope, length)
+}
+
 /// Indices of the active rows without equality that have each parameter.
 fn bounds_of(parameters: usize, active: &[ActiveRow]) -> Vec<Vec<usize>> {
     let mut all = vec![Vec::new(); parameters];
@@ -265,9 +281,10 @@ struct Maker<'a> {
     /// With all active rows fixed, and with only the equalities fixed; a single one where no bound is active.
     factors: Vec<&'a CovarianceRoot>,
     directions: &'a Directions,
-    active: &'a [ActiveRow],
     /// Active bounds, by the parameters that they have.
     bounds_of: Vec<Vec<usize>>,
+    /// Slope of each active row along the directions, inwards, and its norm.
+    inwards: Vec<(Vec<f64>, f64)>,
     settings: &'a BandSettings,
 }
 
@@ -435,7 +452,7 @@ impl Maker<'_> {
     /// Sides on which function `f` may change at node `i`, where the active rows leave it no freedom.
     fn side(&self, f: usize, i: usize) -> BandSide {
         let slope = self.slope(f, i);
-        let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let size = norm(&slope);
         let functions = &self.problem.functions;
         let first = functions.ranges()[f].start;
         let own = functions.get(f).design.row(i).map(|(j, _)| first + j);
@@ -444,10 +461,9 @@ impl Maker<'_> {
             .collect();
         rows.sort_unstable();
         rows.dedup();
-        for row in rows.into_iter().map(|r| &self.active[r]) {
-            let inwards = self.directions.row(row.entries.iter().copied());
+        for (inwards, length) in rows.into_iter().map(|r| &self.inwards[r]) {
             let dot: f64 = inwards.iter().zip(&slope).map(|(a, b)| a * b).sum();
-            let cosine = dot / (norm(&inwards) * norm(&slope)).max(f64::MIN_POSITIVE);
+            let cosine = dot / (length * size).max(f64::MIN_POSITIVE);
             if cosine.abs() > 1.0 - HELD {
                 return if cosine > 0.0 {
                     BandSide::Above
