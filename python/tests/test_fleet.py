@@ -295,6 +295,20 @@ def test_errors_are_tried_again_on_request(tmp_path):
     assert [row.error is None for row in km.read_fleet(out)] == [True, True]
 
 
+def test_numbers_of_a_table_are_numbers(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    records = [{"record": name, **arrays, "place": "east", "load": 2.5 * i} for i, (name, arrays) in enumerate(pairs(3))]
+    list(km.fit_many(km.Model(mass=1.0), records, out=tmp_path / "fleet"))
+    table = parquet.read_table(tmp_path / "fleet" / "rows.parquet").to_pydict()
+    assert table["table_load"] == [0.0, 2.5, 5.0] and table["table_place"] == ["east"] * 3
+
+
+@pytest.mark.parametrize("limit", [-1.0, float("nan"), 1e300, "1"])
+def test_a_partition_has_a_valid_time_limit(limit):
+    with pytest.raises(km.InputError, match="invalid time"):
+        km.fit_partition(ARRAYS, list(pairs(1)), time_limit=limit)
+
+
 def test_rows_are_those_of_the_records_given(tmp_path):
     out = tmp_path / "fleet"
     first = list(pairs(2))

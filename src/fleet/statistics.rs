@@ -353,6 +353,24 @@ mod tests {
         );
     }
 
+    /// Of more records than are paired a random part is used: every third one would be all of one of three sensors that take turns.
+    #[test]
+    fn sensors_that_take_turns_are_all_used() {
+        let axis: Vec<f64> = (0..2004).map(f64::from).collect();
+        let value = |(i, x): (usize, &f64)| if i % 3 == 0 { -1e-3 * x } else { 1e-3 * x };
+        let values: Vec<f64> = axis.iter().enumerate().map(value).collect();
+        let trend = LinearTrend::of(&axis, &values).expect("a trend");
+        assert!(trend.slope > 3e-4, "{trend:?}");
+    }
+
+    /// Half of the values at one point, as at a bound, leave the others to be judged.
+    #[test]
+    fn values_at_a_bound_hide_no_outlier() {
+        let mut values = vec![1.0; 20];
+        values[3] = 2.0;
+        assert_eq!(of(values, &[]).expect("values").outliers, 1);
+    }
+
     #[test]
     fn equal_values_have_no_outliers() {
         let found = of(vec![2.0; 5], &[]).expect("values");

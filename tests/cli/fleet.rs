@@ -379,6 +379,23 @@ fn repaired_records_are_fitted_again() {
     );
 }
 
+/// Of many errors five are listed and the others counted; a fleet in which every record has its row is not incomplete.
+#[test]
+fn long_lists_are_cut_with_a_word() {
+    let bench = bench(1);
+    for i in 2..=8 {
+        bench.write(&format!("records/r{i:02}.csv"), "");
+    }
+    let out = bench.run_to(
+        0,
+        &["fleet", "model.yaml", "records/*.csv", "--out", "fleet"],
+    );
+    assert_eq!(out.matches("error   records/").count(), 5, "{out}");
+    assert!(out.contains("error   and 2 more: fleet.html\n"), "{out}");
+    let page = bench.read("fleet/fleet.html");
+    assert!(page.contains("Some errors") && !page.contains("Incomplete"));
+}
+
 /// Files of the same names in another folder are other records.
 #[test]
 fn records_of_another_folder_are_others() {
