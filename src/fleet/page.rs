@@ -3,7 +3,7 @@
 use super::collect::Collected;
 use super::figures::{histograms, trend_figure};
 use super::folder::FleetFolder;
-use super::statistics::{Distribution, Statistics};
+use super::statistics::{Distribution, FEWEST, Statistics};
 use super::summary::{cells, counts, headings, incomplete_axis, shown};
 use super::trend::Trend;
 use crate::number_format::significant;
@@ -118,6 +118,9 @@ fn outliers(folder: &FleetFolder, collected: &Collected) -> String {
         })
         .collect();
     let meaning = match all {
+        0 if statistics.records < FEWEST => {
+            format!("Outliers are read from {FEWEST} records on.")
+        }
         0 => "No estimate lies more than 3.5 standard deviations from its trend (modified z-score, Iglewicz and Hoaglin 1993).".to_owned(),
         _ => format!(
             "{} with an estimate more than 3.5 standard deviations from its trend, the line with the median slope of the pairs of at most 1000 records (modified z-score, Iglewicz and Hoaglin \

@@ -29,14 +29,7 @@ const KEYS: [&str; 6] = [
 /// Beginning of the path of a record of arrays.
 const IN_MEMORY: &str = "sha256:";
 /// Headings that are meant as [`FILE`].
-const LIKE_FILE: [&str; 6] = [
-    "files",
-    "filename",
-    "file_name",
-    "path",
-    "record",
-    "records",
-];
+const LIKE_FILE: [&str; 5] = ["file", "files", "filename", "file_name", "path"];
 /// Longest line of headings, bytes.
 const LONGEST_HEADING: u64 = 1 << 16;
 /// Longest table of records, bytes.
@@ -105,7 +98,7 @@ impl RecordList {
                     .expected("files, or a pattern in quotes")
                     .hint(format!("\"{}\"", path.join("*.csv").display())));
             }
-            if Self::of_table(path)?.is_some() {
+            if Headings::of(path).is_some_and(|headings| headings.has(FILE)) {
                 return Err(
                     InputError::file(path, "a table of records among several arguments")
                         .expected("one table of records alone, or files and patterns"),
@@ -130,35 +123,20 @@ impl RecordList {
     /// # Errors
     /// An invalid table.
     pub fn of_table(path: &Path) -> Result<Option<Self>, InputError> {
-        let is_text = path.is_file()
-            && path.extension().and_then(|e| e.to_str()).is_some_and(|e| {
-                ["csv", "tsv", "txt"]
-                    .iter()
-                    .any(|known| e.eq_ignore_ascii_case(known))
-            });
-        if !is_text {
+        let Some(headings) = Headings::of(path) else {
             return Ok(None);
-        }
-        let first = first_line(path);
-        let first = first.as_str();
-        let delimiter = [',', ';', '\t']
-            .into_iter()
-            .find(|d| first.contains(*d))
-            .unwrap_or(',');
-        let mut headings = first.split(delimiter).map(|h| h.trim().trim_matches('"'));
-        if headings.clone().any(|heading| heading == FILE) {
-            let text = read_text(path, "a table of records", LONGEST)?;
-            return TableReader::new(path, delimiter).read(&text).map(Some);
-        }
-        let is_meant = |heading: &&str| {
-            let lower = heading.to_lowercase();
-            lower == FILE || LIKE_FILE.contains(&lower.as_str())
         };
-        match headings.find(is_meant) {
-            Some(heading) => {
+        if headings.has(FILE) {
+            let text = read_text(path, "a table of records", LONGEST)?;
+            let reader = TableReader::new(path, headings.delimiter);
+            return reader.read(&text).map(Some);
+        }
+        let is_meant = |name: &&String| LIKE_FILE.contains(&name.to_lowercase().as_str());
+        match headings.names.iter().find(is_meant) {
+            Some(name) => {
                 Err(
                     InputError::line(path, 1, 1, "a table of records without the column `file`")
-                        .found(quote(heading))
+                        .found(quote(name))
                         .expected("the column `file`, with the paths of the records"),
                 )
             }
@@ -215,18 +193,35 @@ impl RecordList {
     }
 }
 
-/// First line of a file, as far as it is text.
-fn first_line(path: &Path) -> String {
-    let mut line = Vec::new();
-    let read = std::fs::File::open(path).and_then(|file| {
+/// The first line of a table.
+struct Headings {
+    delimiter: char,
+    names: Vec<String>,
+}
+
+impl Headings {
+    /// Of a text table by its ending; `None` for any other file.
+    fn of(path: &Path) -> Option<Self> {
+        let ending = path.extension().and_then(|e| e.to_str())?.to_lowercase();
+        (["csv", "tsv", "txt"].contains(&ending.as_str()) && path.is_file()).then_some(())?;
+        let mut line = Vec::new();
+        let file = std::fs::File::open(path).ok()?;
         let mut reader = BufReader::new(file.take(LONGEST_HEADING));
-        reader.read_until(b'\n', &mut line)
-    });
-    match read {
-        Ok(_) => String::from_utf8_lossy(&line)
-            .trim_start_matches('\u{feff}')
-            .to_owned(),
-        Err(_) => String::new(),
+        reader.read_until(b'\n', &mut line).ok()?;
+        let text = String::from_utf8_lossy(&line);
+        let text = text.trim_start_matches('\u{feff}');
+        let delimiter = [',', ';', '\t'].into_iter().find(|d| text.contains(*d));
+        let delimiter = delimiter.unwrap_or(',');
+        let names = text.split(delimiter);
+        let names = names.map(|name| name.trim().trim_matches('"').to_owned());
+        Some(Self {
+            delimiter,
+            names: names.collect(),
+        })
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.names.iter().any(|own| own == name)
     }
 }
 

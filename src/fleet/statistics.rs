@@ -8,7 +8,7 @@ use serde::Serialize;
 /// Modified z-score from which a value is an outlier (Iglewicz and Hoaglin 1993).
 const OUTLYING: f64 = 3.5;
 /// Fewest records of which trend and outliers are read.
-const FEWEST: usize = 8;
+pub(super) const FEWEST: usize = 8;
 /// Most records of whose pairs the median slope is taken, chosen at random with [`SEED`].
 const MOST_PAIRED: usize = 1000;
 /// Seed of the choice of records.
@@ -48,7 +48,7 @@ pub struct Distribution {
     /// Values in the order of the records; NaN where a record has none.
     #[serde(skip)]
     pub values: Vec<f64>,
-    /// Distances from the line, in standard deviations; 0 where half of the values lie on it. Of a record without a place on the axis, and without a
+    /// Distances from the line, in standard deviations; 0 with fewer than 8 values, and where all lie on it. Of a record without a place on the axis, and without a
     /// trend, from the median of all values, in their deviation from it.
     #[serde(skip)]
     pub scores: Vec<f64>,

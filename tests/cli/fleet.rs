@@ -396,6 +396,23 @@ fn long_lists_are_cut_with_a_word() {
     assert!(page.contains("Some errors") && !page.contains("Incomplete"));
 }
 
+/// A column of a logger with the number of each record makes a file no table of records.
+#[test]
+fn records_may_have_a_column_of_their_numbers() {
+    let bench = bench(1);
+    bench.write("logger.csv", &record(2.0).replace("y_m", "record"));
+    let model = MODEL.replace(
+        "sigma:",
+        "columns: {time: t_s, displacement: record}\n    sigma:",
+    );
+    bench.write("model.yaml", &model);
+    let out = bench.run_to(0, &["fleet", "model.yaml", "logger.csv", "--out", "fleet"]);
+    assert!(
+        out.contains("1 record, ") && out.contains("0 errors"),
+        "{out}"
+    );
+}
+
 /// Files of the same names in another folder are other records.
 #[test]
 fn records_of_another_folder_are_others() {

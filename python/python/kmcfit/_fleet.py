@@ -385,7 +385,7 @@ def _rows(
         for found_blocks, fitted, lines in batches.run(blocks, todo):
             # Rows come in the order of their records, whose names may be equal without a journal.
             given = iter(lines)
-            new: Dict[int, List[Optional[Lines]]] = {id(block): [next(given) for _ in block] for block in fitted}
+            new: Dict[int, List[Optional[Lines]]] = {id(block): [next(given, None) for _ in block] for block in fitted}
             rows = [
                 (before.pop(record.name, None), record.name, line)
                 for block in found_blocks

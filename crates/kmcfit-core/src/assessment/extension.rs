@@ -25,8 +25,21 @@ pub(super) fn extended(
     let sets: Vec<CoefficientSet> = functions.coefficient_sets().iter().map(set).collect();
     let longer = Parameterization::with_coefficient_sets(list, sets, nodes, step)?
         .with_scalars(functions.scalars().to_vec());
-    let extended = problem.clone().with(|parts| {
-        parts.functions = longer;
+    let scalars = functions.scalar_range().start;
+    Some((
+        with_functions(problem, longer, terms)?,
+        [&theta[..scalars], &zeros, &theta[scalars..]].concat(),
+    ))
+}
+
+/// The problem with these functions and further terms, without penalties and constraints.
+pub(super) fn with_functions(
+    problem: &Problem,
+    functions: Parameterization,
+    terms: Vec<Term>,
+) -> Option<Problem> {
+    let changed = problem.clone().with(|parts| {
+        parts.functions = functions;
         parts.system.terms.extend(terms);
         parts.penalties.clear();
         parts.variations.clear();
@@ -34,9 +47,5 @@ pub(super) fn extended(
         parts.soft.clear();
         parts.jumps.clear();
     });
-    let scalars = functions.scalar_range().start;
-    Some((
-        extended.ok()?,
-        [&theta[..scalars], &zeros, &theta[scalars..]].concat(),
-    ))
+    changed.ok()
 }

@@ -16,6 +16,7 @@ mod input_correlation;
 mod input_disturbance;
 mod input_pulses;
 mod large_covariance;
+mod minimum;
 mod model_tests;
 mod plausibility;
 mod record_error;

@@ -1,14 +1,16 @@
 //! Rivals of coefficients that vary with time, compared with the fit by one linearisation at its optimum, before they are fitted.
 //!
-//! With the weighted residuals `r` and their derivatives `J` in the parameters, `J_f` in those of a function that varies and `K` in the
-//! coefficients of further terms, a rival has about the chi-square
+//! With the weighted residuals `r` and their derivatives `J_f` in the parameters `theta_f` of the functions `f` that vary, `J` in the other
+//! parameters, and `K` in the coefficients of further terms, a rival has about the chi-square
 //!
 //! ```text
-//! min |r + J d|^2 + ...,    theta_f + d_f the parameters of a constant for each function that varies.
+//! min over d, kappa, p of |r - sum_f J_f theta_f + J d + sum_f (J_f e_f) kappa_f + K p|^2
 //! ```
+//!
+//! where `e_f` are the parameters of the constant 1 in the basis of `f`, and `kappa_f` is the constant in its place.
 
 use super::extension::extended;
-use super::refinement::Minimum;
+use super::minimum::Minimum;
 use super::span::weighted_residuals;
 use crate::functions::{CoefficientFunction, CoefficientKind};
 use crate::problem::Problem;
@@ -110,13 +112,13 @@ impl RivalScreen {
 
     /// Linearised chi-square of the rival with the terms `kinds`, minus that of the fit.
     pub(super) fn difference(&self, kinds: &[CoefficientKind]) -> f64 {
-        self.solve(kinds).squares() + self.rest - self.here
+        self.solve(kinds).squares + self.rest - self.here
     }
 
     /// Parameters of the rival with the terms `kinds` at its minimum: of the functions, the terms, and the scalars.
     pub(super) fn minimum(&self, kinds: &[CoefficientKind]) -> Vec<f64> {
         let minimum = self.solve(kinds);
-        let change = minimum.change().as_slice();
+        let change = minimum.change.as_slice();
         let own = self.columns.ncols() - self.kinds.len();
         let mut all: Vec<f64> = self.from.iter().zip(change).map(|(a, d)| a + d).collect();
         let scalars = all.split_off(self.functions);

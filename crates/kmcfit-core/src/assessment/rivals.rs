@@ -8,7 +8,7 @@
 //! ```
 //!
 //! The rivals have constants for the functions that vary, and such terms in their place: first one for a stiffness or damping that varies, then one of
-//! the other force beside the best of these. Each is fitted with the noise model
+//! the other force beside the best of these. Each one that a [linearisation](super::rival_screen) does not decide is fitted with the noise model
 //! of the fit, started at the regression of the functions on these powers of `A`, and compared by
 //!
 //! ```text
@@ -18,6 +18,7 @@
 //! with the sum `S` of squared weighted and whitened residuals.
 
 use super::constants::constant_probability;
+use super::extension::with_functions;
 use super::refinement::applies;
 use super::rival_screen::RivalScreen;
 use crate::functions::{CoefficientFunction, CoefficientKind, CoefficientSet, Parameterization};
@@ -177,19 +178,24 @@ impl Comparison<'_> {
             return Some(linear);
         }
         (linear > CLOSE && is_near(kinds)).then_some(())?;
-        let (rival, _) = rival(
-            self.problem,
-            self.theta,
-            self.indices,
-            kinds,
-            &self.response,
-        )?;
+        let (rival, _) = self.rival(kinds)?;
         let at = screen.minimum(kinds);
         (at.len() == rival.parameters()).then_some(())?;
         let evaluation = rival.evaluate(&at).ok()?;
         let there = criterion(&rival, &evaluation, rival.parameters() as f64) - self.here;
         let error = (there - linear).abs();
         (there.min(linear) - ERRORS * error > CLOSE).then_some(there)
+    }
+
+    /// The rival with the terms `kinds`, and its start.
+    fn rival(&self, kinds: &[CoefficientKind]) -> Option<(Problem, Vec<f64>)> {
+        rival(
+            self.problem,
+            self.theta,
+            self.indices,
+            kinds,
+            &self.response,
+        )
     }
 
     /// BIC of a rival minus that of the fit by the linearisation at the optimum; zero without one.
@@ -209,13 +215,7 @@ impl Comparison<'_> {
 
     /// BIC of the fitted rival with the terms `kinds`; `None` without a response.
     fn criterion(&self, kinds: &[CoefficientKind]) -> Option<f64> {
-        let (rival, start) = rival(
-            self.problem,
-            self.theta,
-            self.indices,
-            kinds,
-            &self.response,
-        )?;
+        let (rival, start) = self.rival(kinds)?;
         let settings = FitSettings {
             stopping: Stopping {
                 tolerance: Some(1e-6),
@@ -460,14 +460,5 @@ fn rival(
     ];
     let constants = Parameterization::with_coefficient_sets(list, sets, nodes, step)?
         .with_scalars(functions.scalars().to_vec());
-    let rival = problem.clone().with(|parts| {
-        parts.functions = constants;
-        parts.system.terms.extend(terms);
-        parts.penalties.clear();
-        parts.variations.clear();
-        parts.constraints = Default::default();
-        parts.soft.clear();
-        parts.jumps.clear();
-    });
-    Some((rival.ok()?, start))
+    Some((with_functions(problem, constants, terms)?, start))
 }

@@ -1,6 +1,6 @@
 //! Derivatives of a model at its optimum, and score tests of a further parameter beside them.
 
-use super::refinement::inverse_root;
+use super::minimum::inverse_root;
 use crate::noise::KernelCovariance;
 use crate::objective::Evaluation;
 use crate::problem::Problem;

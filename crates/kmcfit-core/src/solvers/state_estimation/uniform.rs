@@ -322,8 +322,8 @@ mod tests {
                     .solve_equality_constrained()
                     .unwrap_or_else(|| panic!("{n} {weight}"));
                 let found = smooth(&observed, weight).expect("a solution");
-                // Rounding of a stable least-squares solution: the root of the condition 64 w, and its square times the residual.
-                let limit = 1e-15 * (1.0 + weight) * 10.0;
+                // Rounding of a stable least-squares solution: the root of the condition `1 + 64 w`.
+                let limit = 4.0 * f64::EPSILON * (1.0 + 64.0 * weight).sqrt();
                 let error = distance(&exact, &found);
                 assert!(error < limit, "{n} {weight:e}: {error:e}");
             }

@@ -1,0 +1,87 @@
+//! Minima of linearised sums of squares.
+
+use crate::identifiability::Factorisation;
+use crate::noise::KernelCovariance;
+use crate::simd::tall_qr::Triangle;
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+use std::ops::Range;
+
+/// Root `F` of `(J^T J)^-1 = F F^T` on the combinations of parameters that `J` determines, with columns of unit length for the decision.
+pub(super) fn inverse_root(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut scaled = match jacobian.nrows() > jacobian.ncols() {
+        true => Triangle::factor(jacobian),
+        false => jacobian.clone(),
+    };
+    let sizes: Vec<f64> = (scaled.column_iter())
+        .map(|column| column.norm().max(f64::MIN_POSITIVE))
+        .collect();
+    for (mut column, size) in scaled.column_iter_mut().zip(&sizes) {
+        column /= *size;
+    }
+    let mut root = Factorisation::of(&scaled).inverse_root();
+    for (mut row, size) in root.row_iter_mut().zip(&sizes) {
+        row /= *size;
+    }
+    root
+}
+
+/// Minimum of `|r + J d|^2`.
+pub(super) struct Minimum {
+    /// The minimum.
+    pub(super) squares: f64,
+    rank: usize,
+    /// The minimiser.
+    pub(super) change: DVector<f64>,
+    /// Root `F` of `(J^T J)^-1 = F F^T`.
+    root: DMatrix<f64>,
+}
+
+impl Minimum {
+    pub(super) fn of(jacobian: &DMatrix<f64>, residuals: &DVector<f64>) -> Self {
+        let root = inverse_root(jacobian);
+        let change = -(&root * root.tr_mul(&jacobian.tr_mul(residuals)));
+        Self {
+            squares: (residuals + jacobian * &change).norm_squared(),
+            rank: root.ncols(),
+            change,
+            root,
+        }
+    }
+
+    /// Probability of at least this difference of the parameters at `place` and `place + 1` by noise, from the covariance
+    /// `F F^T S F F^T` with the kernel's covariance `S` of the scores.
+    pub(super) fn difference(
+        &self,
+        jacobian: &DMatrix<f64>,
+        residuals: &DVector<f64>,
+        place: usize,
+        records: &[Range<usize>],
+    ) -> Option<f64> {
+        let left = residuals + jacobian * &self.change;
+        let mut scores = jacobian * &self.root;
+        for (mut row, r) in scores.row_iter_mut().zip(left.iter()) {
+            row *= *r;
+        }
+        let covariance = KernelCovariance::of(&scores, records, self.rank as f64)?.sum;
+        let contrast = (self.root.row(place) - self.root.row(place + 1)).transpose();
+        let variance = contrast.dot(&(covariance * &contrast));
+        let difference = self.change[place] - self.change[place + 1];
+        let statistic = difference * difference / variance;
+        let law = ChiSquared::new(1.0).ok()?;
+        statistic.is_finite().then(|| law.sf(statistic))
+    }
+
+    /// Probability of at least this improvement over `coarse` by noise alone.
+    pub(super) fn p_value(&self, coarse: &Self, samples: usize) -> Option<f64> {
+        let more = self
+            .rank
+            .checked_sub(coarse.rank)
+            .filter(|more| *more > 0)? as f64;
+        let left = samples.checked_sub(self.rank).filter(|left| *left > 0)? as f64;
+        let gain = (coarse.squares - self.squares).max(0.0);
+        let statistic = (gain / more) / (self.squares / left);
+        let law = FisherSnedecor::new(more, left).ok()?;
+        statistic.is_finite().then(|| law.sf(statistic))
+    }
+}
