@@ -319,7 +319,7 @@ pub(super) fn fit_into(
         display: DisplayUnits::default(),
         drawn: OnceLock::new(),
     };
-    let mut document = run.document();
+    let mut document = run.document_and_figures();
     let draws = run.draws();
     let mut stage = folder.stage().map_err(full)?;
     activity.stage(progress.named_stage("writing the results"));

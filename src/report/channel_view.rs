@@ -137,13 +137,13 @@ impl ChannelView<'_> {
         spectrum(&pair, mark).into_iter().chain(response).collect()
     }
 
-    /// Table of samples and prediction, in the unit of the file.
-    pub fn table(&self) -> CsvTable {
+    /// Table of samples and prediction, in the unit of the file, at the samples that `rows` chooses.
+    pub fn table(&self, rows: impl Fn(&[f64]) -> Vec<f64>) -> CsvTable {
         CsvTable::new()
-            .column("t_s", self.channel.times().to_vec())
-            .column("measured", self.observed())
-            .column("predicted", self.model())
-            .column("residual", self.residuals())
+            .column("t_s", rows(self.channel.times()))
+            .column("measured", rows(&self.observed()))
+            .column("predicted", rows(&self.model()))
+            .column("residual", rows(&self.residuals()))
     }
 }
 

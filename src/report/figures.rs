@@ -5,6 +5,7 @@ use crate::number_format::at_most;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
+use kmcfit_core::internals::signal::median;
 use kmcfit_core::internals::solvers::{PathPoint, WeightPath};
 use kmcfit_core::internals::study::PredictedResponse;
 
@@ -36,9 +37,11 @@ fn dots(colour: Colour, count: usize) -> Style {
 
 /// A curve over the times of samples, undefined within each gap.
 fn broken_at_gaps(t: &[f64], y: &[f64]) -> [Vec<f64>; 2] {
-    let mut spacings: Vec<f64> = t.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    spacings.sort_by(f64::total_cmp);
-    let median = spacings.get(spacings.len() / 2).copied().unwrap_or(0.0);
+    let spacings: Vec<f64> = t.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let median = match spacings.is_empty() {
+        true => 0.0,
+        false => median(&spacings),
+    };
     let (mut times, mut values) = (Vec::new(), Vec::new());
     let mut last: Option<f64> = None;
     for (time, value) in t.iter().copied().zip(y.iter().copied()) {

@@ -2,6 +2,7 @@
 
 use super::FittedModel;
 use super::chart::Figure;
+use super::document::ResultDocument;
 use super::figures::{self, FunctionCurve};
 use super::record_figures::{self, InputSeries};
 use super::tables::FUNCTION_ROWS;
@@ -13,10 +14,18 @@ use kmcfit_core::internals::threads::both;
 /// Figures of all channels with their titles.
 #[derive(Debug, Clone)]
 pub struct ChannelFigures {
+    /// Samples with the prediction, and residuals, of each channel, without its title.
+    fits: Vec<[Figure; 2]>,
     /// Spectra, and frequency responses where one input acts.
     pub spectra: Vec<Figure>,
     /// Tests of the residuals.
     pub tests: Vec<Figure>,
+}
+
+impl ChannelFigures {
+    fn with_spectra(self, spectra: Vec<Figure>) -> Self {
+        Self { spectra, ..self }
+    }
 }
 
 impl FittedModel<'_> {
@@ -28,14 +37,14 @@ impl FittedModel<'_> {
             self.functions_figure(),
             self.ratios_figure(),
         ]);
-        for (experiment, channel) in self.channels() {
-            let mut list = self.channel_figures(experiment, channel);
+        let drawn = self.drawn_channels();
+        for ((experiment, channel), fit) in self.channels().into_iter().zip(&drawn.fits) {
+            let mut list = self.channel_figures(experiment, channel, fit);
             let suffix = self.suffix(experiment, channel);
             list.iter_mut().for_each(|figure| figure.name += &suffix);
             figures.extend(list);
         }
-        let ChannelFigures { spectra, tests } = self.drawn_channels();
-        figures.extend(spectra.iter().chain(tests).cloned());
+        figures.extend(drawn.spectra.iter().chain(&drawn.tests).cloned());
         figures.extend(self.input_figures());
         figures.extend(self.validation_figures());
         figures
@@ -89,12 +98,33 @@ impl FittedModel<'_> {
     /// The figures that both page and files have, drawn once.
     pub(super) fn drawn_channels(&self) -> &ChannelFigures {
         self.drawn.get_or_init(|| {
-            let (spectra, tests) = both(
-                || self.each_channel(Self::channel_spectra),
-                || self.each_channel(Self::channel_tests),
-            );
-            ChannelFigures { spectra, tests }
+            let spectra = || self.each_channel(Self::channel_spectra);
+            let (others, spectra) = both(|| self.fits_and_tests(), spectra);
+            others.with_spectra(spectra)
         })
+    }
+
+    /// The result document, beside which the figures of [`FittedModel::drawn_channels`] are drawn if figures are requested.
+    pub fn document_and_figures(&self) -> ResultDocument {
+        if !self.requested.figures {
+            return self.document();
+        }
+        let ((document, others), spectra) = both(
+            || (self.document(), self.fits_and_tests()),
+            || self.each_channel(Self::channel_spectra),
+        );
+        self.drawn.get_or_init(|| others.with_spectra(spectra));
+        document
+    }
+
+    fn fits_and_tests(&self) -> ChannelFigures {
+        let channels = self.channels().into_iter();
+        let fits = channels.map(|(e, c)| self.channel_view(e, c).figures());
+        ChannelFigures {
+            fits: fits.collect(),
+            spectra: Vec::new(),
+            tests: self.each_channel(Self::channel_tests),
+        }
     }
 
     /// Spectra of a channel, and its frequency response where one input acts.
@@ -114,9 +144,14 @@ impl FittedModel<'_> {
         tests.into_iter().collect()
     }
 
-    /// Samples and residuals of a channel against time.
-    pub(super) fn channel_fit(&self, experiment: usize, channel: usize) -> Vec<Figure> {
-        self.channel_view(experiment, channel).figures().into()
+    /// Samples and residuals of all channels against time.
+    pub(super) fn channel_fits(&self) -> Vec<Figure> {
+        let channels = self.channels().into_iter().zip(&self.drawn_channels().fits);
+        let figures = channels.flat_map(|((e, c), fit)| {
+            let titled = move |figure: &Figure| self.titled(figure.clone(), e, c);
+            fit.iter().map(titled)
+        });
+        figures.collect()
     }
 
     /// Force and motion of the base at some times, in SI units.
@@ -176,17 +211,21 @@ impl FittedModel<'_> {
     }
 
     /// The figures of one channel: samples, samples with the response, residuals.
-    fn channel_figures(&self, experiment: usize, index: usize) -> [Figure; 3] {
+    fn channel_figures(
+        &self,
+        experiment: usize,
+        index: usize,
+        [beside, residuals]: &[Figure; 2],
+    ) -> [Figure; 3] {
         let view = self.channel_view(experiment, index);
-        let [beside, residuals] = view.figures();
         let channel = view.channel;
         let beside = match channel.stride() {
             Some(_) if view.factor() == 1.0 => {
                 self.response(experiment, channel.times(), channel.observed())
             }
-            _ => beside,
+            _ => beside.clone(),
         };
-        [view.observation(), beside, residuals]
+        [view.observation(), beside, residuals.clone()]
     }
 
     /// Validation records with their predictions and residuals.

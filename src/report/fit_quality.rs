@@ -12,8 +12,8 @@ use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Loss, Weighting};
 
-/// One channel with its predictions.
-pub fn channel(view: &ChannelView) -> ChannelSummary {
+/// One channel with its predictions, and the samples between the rows of its table.
+pub fn channel(view: &ChannelView, samples_per_row: usize) -> ChannelSummary {
     let (channel, note, predicted) = (view.channel, view.note, view.predicted);
     let factor = view.factor();
     let diagnostics = view.diagnostics;
@@ -22,6 +22,7 @@ pub fn channel(view: &ChannelView) -> ChannelSummary {
         kind: channel.kind().name().into(),
         unit: view.unit().into(),
         samples: channel.len(),
+        samples_per_row,
         ignored: note.map_or(Vec::new(), |n| {
             let ignored = n.ignored.iter().map(|(samples, reason)| IgnoredSummary {
                 samples: *samples,
@@ -95,7 +96,7 @@ pub fn scalars(
 /// Summary of a validation record.
 pub(super) fn validation(held: &ValidationRecord, display: DisplayUnits) -> ValidationSummary {
     let channels = held.channels(display);
-    let summaries = channels.iter().map(channel);
+    let summaries = channels.iter().map(|view| channel(view, 1));
     let mut summary = ValidationSummary {
         name: held.out.experiment.name.clone(),
         channels: summaries.collect(),

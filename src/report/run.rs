@@ -103,10 +103,12 @@ impl FittedModel<'_> {
             self.write_tables(stage, document, &mut writing)?;
             return Ok(writing);
         }
-        let tables = || self.write_tables(stage, document, &mut writing);
-        let (written, _) = both(tables, || self.drawn_channels());
-        written?;
-        for (name, text) in self.drawings(document, FigureWidth::Double) {
+        let own = || {
+            self.write_tables(stage, document, &mut writing)?;
+            io::Result::Ok(self.svg_figures(FigureWidth::Double))
+        };
+        let (figures, page) = both(own, || self.page(document));
+        for (name, text) in figures?.into_iter().chain([(PAGE.to_owned(), page)]) {
             timed(&mut writing, || stage.write(&name, text.as_bytes()))?;
         }
         Ok(writing)
@@ -380,7 +382,10 @@ impl FittedModel<'_> {
             .map(|(e, (experiment, predictions))| {
                 let channels = 0..predictions.len();
                 let channels: Vec<ChannelSummary> = channels
-                    .map(|i| fit_quality::channel(&self.channel_view(e, i)))
+                    .map(|i| {
+                        let view = self.channel_view(e, i);
+                        fit_quality::channel(&view, self.samples_per_row(view.channel.len()))
+                    })
                     .collect();
                 let factor = match channels.is_empty() {
                     true => 1.0,

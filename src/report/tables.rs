@@ -13,7 +13,7 @@ use kmcfit_core::internals::system::NodalCoefficients;
 
 /// Most rows of the functions where a curve through them has the values in between.
 pub(super) const FUNCTION_ROWS: usize = 4000;
-/// Most rows of the trajectories: what spreadsheets open at once.
+/// Most rows of the trajectories and of the samples of a channel: what spreadsheets open at once.
 pub(super) const TRAJECTORY_ROWS: usize = 50_000;
 /// Seed of the draws.
 const DRAWS_SEED: u64 = 1;
@@ -21,22 +21,25 @@ const DRAWS_SEED: u64 = 1;
 impl FittedModel<'_> {
     /// Steps between the rows of a table of at most so many rows: 1 where all rows are requested or the functions have many parameters.
     pub(super) fn steps_per_row(&self, most: usize) -> usize {
-        let problem = &self.model.problem;
-        let few = problem.functions.parameters() <= FEW_PARAMETERS;
-        match (problem.system.grid.nodes() - 1).div_ceil(most) {
-            steps if few && !self.requested.tables => steps,
+        self.values_per_row(self.model.problem.system.grid.nodes(), most)
+    }
+
+    /// Samples between the rows of the table of a channel with so many samples.
+    pub(super) fn samples_per_row(&self, samples: usize) -> usize {
+        self.values_per_row(samples, TRAJECTORY_ROWS)
+    }
+
+    fn values_per_row(&self, count: usize, most: usize) -> usize {
+        let few = self.model.problem.functions.parameters() <= FEW_PARAMETERS;
+        match count.saturating_sub(1).div_ceil(most) {
+            steps if few && !self.requested.tables => steps.max(1),
             _ => 1,
         }
     }
 
     /// The values of every node with a row in a table of at most so many rows: one in so many steps, and the last one.
     pub(super) fn rows(&self, values: &[f64], most: usize) -> Vec<f64> {
-        let Some(last) = values.len().checked_sub(1) else {
-            return Vec::new();
-        };
-        let steps = self.steps_per_row(most);
-        let nodes = (0..last).step_by(steps).chain([last]);
-        nodes.map(|node| values[node]).collect()
+        every(values, self.steps_per_row(most))
     }
 
     /// Draws from the distribution of the estimates, one row each: estimates, then initial states and sensor parameters; `None` where
@@ -186,21 +189,31 @@ impl FittedModel<'_> {
     }
 
     /// Tables of the samples and predictions of each channel in the unit of the file, with their names; validation
-    /// records last.
+    /// records last, with all samples.
     pub(super) fn samples(&self) -> Vec<(String, CsvTable)> {
         let fitted = self.channels().into_iter().map(|(e, c)| {
             let view = self.channel_view(e, c);
             let name = format!("channels/{}-{}.csv", e + 1, view.channel.kind().name());
-            (name, view.table())
+            let steps = self.samples_per_row(view.channel.len());
+            (name, view.table(|values| every(values, steps)))
         });
         let validation = self.run_assessment.validation.iter().enumerate();
         let validation = validation.flat_map(|(i, out)| {
             out.channels(self.display).into_iter().map(move |view| {
                 let kind = view.channel.kind().name();
                 let name = format!("channels/validation-{}-{kind}.csv", i + 1);
-                (name, view.table())
+                (name, view.table(<[f64]>::to_vec))
             })
         });
         fitted.chain(validation).collect()
     }
+}
+
+/// One value in so many steps, and the last one.
+fn every(values: &[f64], steps: usize) -> Vec<f64> {
+    let Some(last) = values.len().checked_sub(1) else {
+        return Vec::new();
+    };
+    let places = (0..last).step_by(steps).chain([last]);
+    places.map(|place| values[place]).collect()
 }

@@ -32,21 +32,31 @@ impl<'a> CsvText<'a> {
 
     /// Its rows; messages name `path`.
     pub fn rows(&'a self, path: &'a Path) -> TableRows<'a> {
-        let records = ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .delimiter(self.delimiter)
-            .comment(Some(b'#'))
-            .trim(Trim::All)
-            .from_reader(self.text.as_bytes());
+        let reader = || {
+            ReaderBuilder::new()
+                .has_headers(false)
+                .flexible(true)
+                .delimiter(self.delimiter)
+                .comment(Some(b'#'))
+                .trim(Trim::All)
+                .from_reader(self.text.as_bytes())
+        };
         TableRows {
             path,
             text: &self.text,
-            records,
+            delimiter: char::from(self.delimiter),
+            quoted: (!is_plain(&self.text)).then(reader),
             counted: 0,
             line: self.first_line,
         }
     }
+}
+
+/// True for a text whose lines are its rows: without quotes, and with line ends `\n` or `\r\n` only.
+fn is_plain(text: &str) -> bool {
+    let bytes = text.as_bytes();
+    let mut returns = text.match_indices('\r');
+    !text.contains('"') && returns.all(|(at, _)| bytes.get(at + 1) == Some(&b'\n'))
 }
 
 /// Replaces line ends `\r` by `\n`: for the csv crate a comment ends at `\n` only.
@@ -96,7 +106,10 @@ fn runs_to_tabs(text: &str) -> String {
 pub struct TableRows<'a> {
     path: &'a Path,
     text: &'a str,
-    records: csv::Reader<&'a [u8]>,
+    delimiter: char,
+    /// Reads a text with quotes or other line ends.
+    quoted: Option<csv::Reader<&'a [u8]>>,
+    /// Bytes whose lines are counted, and the line of the next one.
     counted: usize,
     line: usize,
 }
@@ -105,23 +118,45 @@ impl TableRows<'_> {
     /// Reads the next row into `record` and returns its line number; `None` at the end.
     pub fn read(&mut self, record: &mut StringRecord) -> Result<Option<usize>, InputError> {
         loop {
-            let more = self.records.read_record(record).map_err(|error| {
-                InputError::file(self.path, format!("the file cannot be read: {error}"))
-            })?;
-            if !more {
+            let Some(line) = self.next_line(record)? else {
                 reading_share::set(0, 0);
                 return Ok(None);
-            }
-            let byte = record.position().map_or(0, csv::Position::byte);
-            let byte = usize::try_from(byte).unwrap_or(usize::MAX);
-            reading_share::set(byte, self.text.len());
-            let line = self.line_from(byte);
+            };
+            reading_share::set(self.counted, self.text.len());
             let first = record.get(0).unwrap_or_default();
             let blank = record.len() == 1 && first.is_empty();
             if !blank && !first.starts_with('#') {
                 return Ok(Some(line));
             }
         }
+    }
+
+    /// The next row, blank rows and comments after blanks included.
+    fn next_line(&mut self, record: &mut StringRecord) -> Result<Option<usize>, InputError> {
+        if let Some(records) = &mut self.quoted {
+            let more = records.read_record(record).map_err(|error| {
+                InputError::file(self.path, format!("the file cannot be read: {error}"))
+            })?;
+            let byte = record.position().map_or(0, csv::Position::byte);
+            let byte = usize::try_from(byte).unwrap_or(usize::MAX);
+            return Ok(more.then(|| self.line_from(byte)));
+        }
+        while let Some(rest) = self
+            .text
+            .get(self.counted..)
+            .filter(|rest| !rest.is_empty())
+        {
+            let end = rest.find('\n').unwrap_or(rest.len());
+            let (text, line) = (rest[..end].trim_end_matches('\r'), self.line);
+            self.counted += end + 1;
+            self.line += 1;
+            if !text.is_empty() && !text.starts_with('#') {
+                record.clear();
+                (text.split(self.delimiter)).for_each(|field| record.push_field(field.trim()));
+                return Ok(Some(line));
+            }
+        }
+        Ok(None)
     }
 
     /// The line of the first field at or after a byte: the csv crate's position of a record is
@@ -156,6 +191,29 @@ mod tests {
             runs_to_tabs("  t \t y  \r\n\" a b\"   1\n"),
             "t\ty\r\n\" a b\"\t1\n"
         );
+    }
+
+    /// Rows and lines of a text are those of the csv crate, which reads it where a field has quotes.
+    #[test]
+    fn plain_texts_have_the_rows_of_the_csv_crate() {
+        let rows = |text: &str| {
+            let source = CsvText::new(text, 1, ';');
+            let (mut rows, mut record) = (source.rows(Path::new("t")), StringRecord::new());
+            let mut found = Vec::new();
+            while let Some(line) = rows.read(&mut record).unwrap() {
+                found.push((line, record.iter().map(str::to_owned).collect::<Vec<_>>()));
+            }
+            found
+        };
+        let plain = "head\n# a; b\n\n t;  y\r\n1; 2 \n \n  # c;d\n;\n3;4;\u{a0}5";
+        assert!(is_plain(plain));
+        let quoted = plain.replace("4", "\"4\"");
+        let alone = plain.replace("\r\n", "\r");
+        assert!(!is_plain(&quoted) && !is_plain(&alone));
+        assert_eq!(rows(plain), rows(&quoted));
+        assert_eq!(rows(plain), rows(&alone));
+        let lines: Vec<usize> = rows(plain).iter().map(|row| row.0).collect();
+        assert_eq!(lines, [4, 5, 8, 9]);
     }
 
     #[test]

@@ -69,7 +69,7 @@ pub mod qp {
 pub mod noise {
     pub use crate::noise::{
         Autoregression, Correlation, CorrelationLaw, KernelCovariance, automatic_bandwidth,
-        kernel_sum, quadratic_spectral,
+        kernel_sum,
     };
 }
 pub mod number_format {

@@ -67,11 +67,10 @@ fn kept(
     detail: Detail,
 ) -> (Vec<usize>, bool) {
     let count = (ys.iter().map(|(y, _)| y.len())).fold(x.0.len(), usize::min);
-    let all: Vec<usize> = (0..count).collect();
     let thinned = count > detail.few;
     let points = match thinned {
-        true => columns(x, ys, &all, f64::from(detail.columns)),
-        false => all,
+        true => columns(x, ys, count, f64::from(detail.columns)),
+        false => (0..count).collect(),
     };
     let [(y, scale)] = ys else {
         return (points, thinned);
@@ -91,30 +90,43 @@ fn kept(
 fn columns(
     (x, scale): (&[f64], Scale),
     ys: &[(&[f64], Scale)],
-    points: &[usize],
+    count: usize,
     columns: f64,
 ) -> Vec<usize> {
     let (low, high) = extent(scale, x).unwrap_or((0.0, 1.0));
     let column = |i: usize| (columns * (even(scale, x[i]) - low) / (high - low)).floor();
-    let alike = |a: &usize, b: &usize| column(*a).total_cmp(&column(*b)).is_eq();
     let mut kept = Vec::new();
-    for chunk in points.chunk_by(alike) {
-        let mut few: Vec<usize> = chunk
-            .first()
-            .into_iter()
-            .chain(chunk.last())
-            .copied()
-            .collect();
+    let mut first = 0;
+    while first < count {
+        let here = column(first);
+        let alike = |i: &usize| column(*i).total_cmp(&here).is_eq();
+        let end = (first + 1..count).take_while(alike).last().unwrap_or(first) + 1;
+        let mut few = vec![first, end - 1];
         for (y, scale) in ys {
-            let place = |i: &&usize| even(*scale, y[**i]);
-            let finite = || chunk.iter().filter(|i| place(i).is_finite());
-            few.extend(finite().min_by(|a, b| place(a).total_cmp(&place(b))));
-            few.extend(finite().max_by(|a, b| place(a).total_cmp(&place(b))));
-            few.extend(chunk.iter().find(|i| place(i).is_nan()));
+            let mut ends: Option<[(usize, f64); 2]> = None;
+            let mut gap = None;
+            for (i, y) in y.iter().enumerate().take(end).skip(first) {
+                let place = even(*scale, *y);
+                if place.is_nan() {
+                    gap = gap.or(Some(i));
+                }
+                if !place.is_finite() {
+                    continue;
+                }
+                let [least, most] = ends.get_or_insert([(i, place); 2]);
+                if place < least.1 {
+                    *least = (i, place);
+                }
+                if place >= most.1 {
+                    *most = (i, place);
+                }
+            }
+            few.extend(ends.into_iter().flatten().map(|(i, _)| i).chain(gap));
         }
         few.sort_unstable();
         few.dedup();
         kept.extend(few);
+        first = end;
     }
     kept
 }

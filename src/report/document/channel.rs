@@ -1,5 +1,6 @@
 //! Channels, nuisance parameters and validation records in the result document.
 
+use super::{is_one, one};
 use crate::number_format::significant;
 use kmcfit_core::internals::assessment::ResidualPattern;
 use kmcfit_core::internals::diagnostics::student_half_width;
@@ -15,6 +16,9 @@ pub struct ChannelSummary {
     pub unit: String,
     /// Number of used samples.
     pub samples: usize,
+    /// Samples between the rows of its table: 1, more in long records.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub samples_per_row: usize,
     /// Unused samples.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ignored: Vec<IgnoredSummary>,

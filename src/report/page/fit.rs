@@ -81,7 +81,7 @@ fn page_of(run: &FittedModel, document: &ResultDocument, detail: Detail) -> Stri
 
 /// Fit of each channel, key figures, and figures of records and residuals.
 fn fit_and_residuals(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
-    let drawn = run.each_channel(FittedModel::channel_fit);
+    let drawn = run.channel_fits();
     let equation = document.equation.iter();
     let equation = equation.map(|b| equation_residual(b, document.is_rotation()));
     overview::records(document)

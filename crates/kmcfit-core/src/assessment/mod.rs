@@ -63,7 +63,7 @@ use gaps::gap_assessments;
 use input_pulses::input_pulses;
 use record_errors::large_error;
 use rivals::amplitude_rival;
-use score_tests::missing;
+use score_tests::{ScoreTests, missing};
 use second_mode::second_modes;
 
 use crate::identifiability::{
@@ -107,22 +107,32 @@ impl FitAssessment {
     /// against finer ones.
     pub fn of(problem: &Problem, fit: &Fit, tests_bases: bool) -> Self {
         let best = &fit.best;
-        let halved = problem.on_half_step(&best.evaluation);
-        let check = |refined| StepCheck::of(problem, &best.evaluation, refined);
-        let step_check: StepCheckOutcome = match &halved {
-            Ok(refined) => Ok(refined.as_ref().map(check)),
-            Err(error) => Err(*error),
-        };
-        let statistics = statistics(problem, &best.evaluation);
         let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
         let reports_errors = few && problem.sample_count() > problem.parameters();
-        let mut plausibility = Plausibility::of(
-            problem,
-            &best.evaluation,
-            &step_check,
-            &statistics,
-            reports_errors,
-        );
+        let has_causes = reports_errors && fit.outcome.status != Status::Failed;
+        let plausibility = || {
+            let halved = problem.on_half_step(&best.evaluation);
+            let check = |refined| StepCheck::of(problem, &best.evaluation, refined);
+            let step_check: StepCheckOutcome = match &halved {
+                Ok(refined) => Ok(refined.as_ref().map(check)),
+                Err(error) => Err(*error),
+            };
+            let statistics = statistics(problem, &best.evaluation);
+            let plausibility = Plausibility::of(
+                problem,
+                &best.evaluation,
+                &step_check,
+                &statistics,
+                reports_errors,
+            );
+            (halved, step_check, statistics, plausibility)
+        };
+        let score_tests = || {
+            let at = || ScoreTests::at(problem, &best.parameters, &best.evaluation);
+            (has_causes && tests_bases).then(at).flatten()
+        };
+        let ((halved, step_check, statistics, mut plausibility), score_tests) =
+            both(plausibility, score_tests);
         if fit.outcome.status == Status::Failed {
             plausibility.fail();
         }
@@ -143,11 +153,13 @@ impl FitAssessment {
                 ..ModelTests::default()
             },
         };
-        if reports_errors && fit.outcome.status != Status::Failed {
-            let (causes, tests) = causes(problem, fit, &assessment.plausibility, tests_bases);
+        if has_causes {
+            let (plausibility, tests) = (&assessment.plausibility, score_tests.as_ref());
+            let (causes, tests) = causes(problem, fit, plausibility, tests_bases, tests);
             assessment.plausibility.warnings.extend(causes);
             assessment.model_tests.extensions = tests;
         }
+        drop(score_tests);
         let mut gaps = Vec::new();
         if reports_errors && assessment.plausibility.errors_hold {
             let settings = BandSettings {
@@ -240,13 +252,14 @@ impl FitAssessment {
     }
 }
 
-/// Causes of residuals that the model does not explain: the width of friction and, with `tests` of finer models, a missing term, an error of a
-/// record, or a second mode; and the score tests of terms and errors of the records.
+/// Causes of residuals that the model does not explain: the width of friction and, with `tests` of larger models, a missing term, an error of a
+/// record, or a second mode; and the score tests of terms and errors of the records, where they apply.
 fn causes(
     problem: &Problem,
     fit: &Fit,
     plausibility: &Plausibility,
     tests: bool,
+    score_tests: Option<&ScoreTests>,
 ) -> (Vec<FitWarning>, Vec<ExtensionTest>) {
     let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);
     let is_noise = plausibility.errors_hold && !plausibility.is_coloured;
@@ -264,7 +277,7 @@ fn causes(
         (None, false) => Default::default(),
         (None, true) => {
             let (small, tests) = match is_system {
-                true => missing(problem, theta, evaluation, is_modelled),
+                true => missing(problem, theta, evaluation, score_tests, is_modelled),
                 false => Default::default(),
             };
             let found = match small.or_else(large).or_else(pulses) {

@@ -15,6 +15,7 @@ use crate::functions::CoefficientKind;
 use crate::objective::{Evaluation, channel_fit_percent, diagnostics};
 use crate::problem::Problem;
 use crate::record::{Channel, Loss, ScoreCovariance};
+use crate::signal::median;
 use crate::simulate::SimulationError;
 use crate::solvers::MissingTerm;
 use crate::system::{Excitation, InputQuantity, Term};
@@ -385,9 +386,7 @@ fn implausible(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
         .zip(evaluation.nodal.functions());
     for (&f, values) in values {
         let function = problem.functions.get(f);
-        let mut sorted = values.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        let is_negative = sorted[sorted.len() / 2] < -NEGATIVE * sizes[f];
+        let is_negative = median(values) < -NEGATIVE * sizes[f];
         if is_negative && function.parameters() > 0 && passive.contains(&function.quantity) {
             warnings.push(FitWarning::Negative {
                 function: function.name(),
@@ -442,10 +441,9 @@ fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
     let place = (problem.system.terms.iter()).position(|term| *term == Term::Stiffness)?;
     let nodal = &evaluation.nodal;
     let pairs = nodal.mass.iter().zip(&nodal.coefficients[place]);
-    let mut squares: Vec<f64> = pairs.map(|(m, k)| (k / m).max(0.0)).collect();
-    squares.sort_by(f64::total_cmp);
+    let squares: Vec<f64> = pairs.map(|(m, k)| (k / m).max(0.0)).collect();
     // Median over time, because k/m may be arbitrary at the ends of a record.
-    let frequency = squares[squares.len() / 2].sqrt() / TAU;
+    let frequency = median(&squares).sqrt() / TAU;
     (frequency * spacing > PERIODS_PER_SAMPLE).then(|| FitWarning::Aliased {
         per_period: 1.0 / (frequency * spacing),
         frequency,

@@ -7,7 +7,7 @@
 use super::plausibility::POOR;
 use super::record_error::RecordError;
 use super::record_parameters::{
-    Clock, RecordParameter, column, on_clock, predict, with_clock, with_gain,
+    Clock, RecordColumns, RecordParameter, on_clock, predict, with_clock, with_gain,
 };
 use super::refit::{Refit, without_correlation, worst_fit};
 use super::span::Span;
@@ -117,7 +117,8 @@ fn on_best_clock(
         let refit = Refit::of(with_clock(problem, e, clock)?, &start)?;
         start.clone_from(&refit.fit.best.parameters);
         let evaluation = refit.evaluation();
-        let change = column(&refit.problem, evaluation, parameter)
+        let change = RecordColumns::of(&refit.problem, evaluation, &[parameter])
+            .column(&refit.problem, evaluation, parameter)
             .and_then(|column| Span::score(&refit.problem, evaluation, column))
             .filter(|(_, t)| t.abs() > AT_REST);
         found = Some((clock, refit));

@@ -14,6 +14,7 @@ use crate::objective::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, Sensor, Weighting};
 use crate::system::{Grid, InputSample};
+use crate::threads::{available, map};
 
 /// Share of a step by which the clock of the response is moved for derivatives.
 const SMALL: f64 = 0.01;
@@ -56,40 +57,74 @@ pub(super) fn parameters(problem: &Problem) -> Vec<RecordParameter> {
     found
 }
 
-/// Derivatives of the weighted and whitened predictions of all channels in a parameter of a record; for a gain in its logarithm.
-pub(super) fn column(
-    problem: &Problem,
-    evaluation: &Evaluation,
-    parameter: RecordParameter,
-) -> Option<Vec<f64>> {
-    let mut all = Vec::with_capacity(problem.sample_count());
-    for (e, experiment) in problem.experiments.iter().enumerate() {
-        for (c, channel) in experiment.channels.iter().enumerate() {
-            let predicted = &evaluation.predictions[e][c];
-            let mut rows = match parameter {
-                RecordParameter::Gain(of, which) if (of, which) == (e, c) => predicted.clone(),
-                RecordParameter::Delay(of) if of == e => {
-                    let slopes = slopes(problem, evaluation, e, channel, predicted)?;
-                    slopes.iter().map(|slope| -slope).collect()
-                }
-                RecordParameter::Rate(of) if of == e => {
-                    let start = problem.system.grid.start();
-                    let slopes = slopes(problem, evaluation, e, channel, predicted)?;
-                    let ages = channel.times().iter().map(|t| t - start);
-                    slopes
-                        .iter()
-                        .zip(ages)
-                        .map(|(slope, age)| slope * age)
-                        .collect()
-                }
-                _ => vec![0.0; channel.len()],
-            };
-            channel.whiten_rows(&mut rows);
-            let roots = channel.majorant(predicted).roots;
-            all.extend(rows.iter().zip(roots).map(|(row, root)| row * root));
+/// Derivatives of the weighted and whitened predictions of all channels in parameters of records; for a gain in its logarithm.
+pub(super) struct RecordColumns {
+    /// Derivatives in time of the predictions of each channel of an experiment; `None` where they are not asked for or do not exist.
+    slopes: Vec<Option<Vec<Vec<f64>>>>,
+    /// Roots of the weights of each channel.
+    roots: Vec<Vec<f64>>,
+}
+
+impl RecordColumns {
+    /// For these parameters.
+    pub(super) fn of(
+        problem: &Problem,
+        evaluation: &Evaluation,
+        parameters: &[RecordParameter],
+    ) -> Self {
+        let of_clock = |e: usize| {
+            let is_clock = |parameter: &RecordParameter| matches!(parameter, RecordParameter::Delay(of) | RecordParameter::Rate(of) if *of == e);
+            let channels = problem.experiments[e].channels.iter();
+            let pairs = channels.zip(&evaluation.predictions[e]);
+            let each = pairs
+                .map(|(channel, predicted)| slopes(problem, evaluation, e, channel, predicted));
+            let asked = parameters.iter().any(is_clock);
+            asked.then(|| each.collect::<Option<Vec<_>>>()).flatten()
+        };
+        let experiments = problem.experiments.len();
+        Self {
+            slopes: map(experiments, available(), of_clock),
+            roots: (problem.predicted(evaluation))
+                .map(|(channel, predicted)| channel.majorant(predicted).roots)
+                .collect(),
         }
     }
-    Some(all)
+
+    /// The column of a parameter, at the evaluation of the problem.
+    pub(super) fn column(
+        &self,
+        problem: &Problem,
+        evaluation: &Evaluation,
+        parameter: RecordParameter,
+    ) -> Option<Vec<f64>> {
+        let predictions = &evaluation.predictions;
+        let start = problem.system.grid.start();
+        let mut all = Vec::with_capacity(problem.sample_count());
+        let mut roots = self.roots.iter();
+        for (e, experiment) in problem.experiments.iter().enumerate() {
+            for (c, channel) in experiment.channels.iter().enumerate() {
+                let mut rows = match parameter {
+                    RecordParameter::Gain(of, which) if (of, which) == (e, c) => {
+                        predictions[e][c].clone()
+                    }
+                    RecordParameter::Delay(of) if of == e => {
+                        let slopes = &self.slopes[e].as_ref()?[c];
+                        slopes.iter().map(|slope| -slope).collect()
+                    }
+                    RecordParameter::Rate(of) if of == e => {
+                        let slopes = &self.slopes[e].as_ref()?[c];
+                        let pairs = slopes.iter().zip(channel.times());
+                        pairs.map(|(slope, t)| slope * (t - start)).collect()
+                    }
+                    _ => vec![0.0; channel.len()],
+                };
+                channel.whiten_rows(&mut rows);
+                let pairs = rows.iter().zip(roots.next()?);
+                all.extend(pairs.map(|(row, root)| row * root));
+            }
+        }
+        Some(all)
+    }
 }
 
 /// Derivatives of the predictions of a channel in time.

@@ -12,12 +12,13 @@
 
 use super::minimum::Minimum;
 use super::model_tests::BasisComparison;
+use super::span::weighted_residuals;
 use crate::diagnostics::{rms, standard_deviation};
 use crate::functions::{Basis, CoefficientFunction, Parameterization};
 use crate::identifiability::{BandSettings, Bands, has_active_rows};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::solvers::weighted_jacobian;
+use crate::solvers::{reduced_jacobian, weighted_jacobian};
 use crate::spans::spans;
 use crate::system::Grid;
 use nalgebra::{DMatrix, DVector};
@@ -187,8 +188,8 @@ impl FinerBases {
     }
 
     fn test(&self, given: &Problem, evaluation: &Evaluation) -> BasisTest {
-        let jacobian = weighted_jacobian(&self.problem, evaluation);
-        let residuals = self.residuals(evaluation);
+        let (jacobian, residuals) = reduced_jacobian(&self.problem, evaluation);
+        let samples = given.sample_count();
         let mut open: Vec<usize> = (0..self.maps.len())
             .filter(|i| self.maps[*i].is_some())
             .collect();
@@ -205,7 +206,7 @@ impl FinerBases {
             let tests = open.iter().filter_map(|&index| {
                 let with = [finer.as_slice(), &[index]].concat();
                 let minimum = Minimum::of(&self.columns(&jacobian, &with), &residuals);
-                let p_value = minimum.p_value(&coarse, residuals.len())?;
+                let p_value = minimum.p_value(&coarse, samples)?;
                 Some((index, p_value, minimum))
             });
             let mut tests: Vec<(usize, f64, Minimum)> = tests.collect();
@@ -232,18 +233,11 @@ impl FinerBases {
         }
     }
 
-    /// Weighted and whitened residuals.
-    fn residuals(&self, evaluation: &Evaluation) -> DVector<f64> {
-        let each = (self.problem.predicted(evaluation))
-            .flat_map(|(channel, predicted)| channel.majorant(predicted).weighted);
-        DVector::from_vec(each.collect())
-    }
-
     /// Wald test of each constant, with all of them in halves: the difference of its values beside its standard error by the kernel's
     /// covariance.
     fn halves(&self, given: &Problem, evaluation: &Evaluation) -> BasisTest {
         let jacobian = weighted_jacobian(&self.problem, evaluation);
-        let residuals = self.residuals(evaluation);
+        let residuals = weighted_residuals(&self.problem, evaluation);
         let records = self.problem.channel_samples();
         let constants: Vec<usize> = (0..self.maps.len())
             .filter(|i| self.maps[*i].is_some() && given.functions.is_constant(*i))

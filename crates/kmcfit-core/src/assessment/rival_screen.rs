@@ -11,21 +11,17 @@
 
 use super::extension::extended;
 use super::minimum::Minimum;
-use super::span::weighted_residuals;
 use crate::functions::{CoefficientFunction, CoefficientKind};
 use crate::problem::Problem;
-use crate::simd::tall_qr::Triangle;
-use crate::solvers::weighted_jacobian;
+use crate::solvers::reduced_jacobian;
 use crate::system::Term;
 use nalgebra::{DMatrix, DVector};
 
 /// Linearised model with constants for the functions that vary, and with the terms of all rivals.
 pub(super) struct RivalScreen {
-    /// Triangle of the derivatives: those of the model, then those of the terms.
+    /// Derivatives, reduced: those of the model, then those of the terms.
     columns: DMatrix<f64>,
     right: DVector<f64>,
-    /// Sum of squares that no column changes.
-    rest: f64,
     /// Sum of squares of the fit.
     here: f64,
     kinds: Vec<CoefficientKind>,
@@ -49,9 +45,8 @@ impl RivalScreen {
             .map(|(kind, term)| (CoefficientFunction::constant(*kind, 0.0, nodes), *term));
         let (extended, at) = extended(problem, theta, further.collect())?;
         let evaluation = extended.evaluate(&at).ok()?;
-        let mut right = weighted_residuals(&extended, &evaluation);
+        let (jacobian, mut right) = reduced_jacobian(&extended, &evaluation);
         let here = right.norm_squared();
-        let jacobian = weighted_jacobian(&extended, &evaluation);
         let functions = &problem.functions;
         let own = functions.scalar_range().start;
         let mut columns: Vec<DVector<f64>> = Vec::new();
@@ -79,20 +74,9 @@ impl RivalScreen {
         for j in scalars.chain(own..own + terms.len()) {
             columns.push(jacobian.column(j).into_owned());
         }
-        drop(jacobian);
-        let height = right.len();
-        let columns = DMatrix::from_columns(&columns);
-        let (triangle, order) = Triangle::of(&columns, &vec![1.0; height], right.as_slice());
-        let n = columns.ncols();
-        let (mut reduced, mut reduced_right) = (DMatrix::zeros(n, n), DVector::zeros(n));
-        for (i, (entries, b)) in triangle.rows().enumerate() {
-            entries.for_each(|(place, r)| reduced[(i, order[place])] = r);
-            reduced_right[i] = b;
-        }
         Some(Self {
-            columns: reduced,
-            right: reduced_right,
-            rest: triangle.rest().powi(2),
+            columns: DMatrix::from_columns(&columns),
+            right,
             here,
             kinds: terms.iter().map(|(kind, _)| *kind).collect(),
             from,
@@ -112,7 +96,7 @@ impl RivalScreen {
 
     /// Linearised chi-square of the rival with the terms `kinds`, minus that of the fit.
     pub(super) fn difference(&self, kinds: &[CoefficientKind]) -> f64 {
-        self.solve(kinds).squares + self.rest - self.here
+        self.solve(kinds).squares - self.here
     }
 
     /// Parameters of the rival with the terms `kinds` at its minimum: of the functions, the terms, and the scalars.

@@ -16,7 +16,7 @@ use super::FitWarning;
 use super::extension::extended;
 use super::model_tests::{Extension, ExtensionTest};
 use super::record_errors::small_error;
-use super::record_parameters::{self, RecordParameter};
+use super::record_parameters::{self, RecordColumns, RecordParameter};
 use super::refinement::applies;
 use super::refit::{EXPLAINED, Refit, without_correlation, worst_fit, worst_misfit};
 use super::span::{Span, weighted_residuals};
@@ -28,7 +28,7 @@ use crate::simulate::Trajectory;
 use crate::solvers::{MissingTerm, TESTED_TERMS, weighted_jacobian};
 use crate::system::Term;
 use crate::threads::{available, map};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// Width of the sign of the velocity in the candidate for Coulomb friction, relative to the root mean square of the velocity.
 const WIDTH: f64 = 0.01;
@@ -66,57 +66,89 @@ impl Candidate {
     }
 }
 
-/// The score tests at the optimum `theta`, each with its estimate and `t`, in the order of the candidates; `None` where they do
-/// not apply: without a likelihood, at an active constraint, for residuals at machine precision or as large as the response, and with few
-/// samples or many parameters. `is_modelled` is true for residuals that the noise model describes.
-fn score_tests(
-    problem: &Problem,
-    theta: &[f64],
-    evaluation: &Evaluation,
-    is_modelled: bool,
-) -> Option<Vec<(Candidate, f64, f64)>> {
-    let is_few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
-    let is_long = problem.sample_count() >= SAMPLES_PER_PARAMETER * problem.parameters();
-    (is_few && is_long && applies(problem, theta, evaluation)).then_some(())?;
-    (worst_fit(problem, evaluation) > UNRELATED).then_some(())?;
-    let kinds = candidates(problem, evaluation);
-    let (extended, at) = extended(problem, theta, constants(problem, &kinds))?;
-    let evaluation = extended.evaluate(&at).ok()?;
-    let jacobian = weighted_jacobian(&extended, &evaluation);
-    let residuals = weighted_residuals(&extended, &evaluation);
-    let first = problem.functions.scalar_range().start;
-    let is_new = |j: &usize| (first..first + kinds.len()).contains(j);
-    let own: Vec<usize> = (0..jacobian.ncols()).filter(|j| !is_new(j)).collect();
-    let model = Span::of(&jacobian.select_columns(&own));
-    let records = record_parameters::parameters(problem);
-    let column = |i: usize| match i.checked_sub(kinds.len()) {
-        None => Some(jacobian.column(first + i).into_owned()),
-        Some(i) => {
-            record_parameters::column(&extended, &evaluation, records[i]).map(DVector::from_vec)
-        }
-    };
-    let test = |i: usize| model.test(&extended, &column(i)?, &residuals, is_modelled);
-    let tests = map(kinds.len() + records.len(), available(), test);
-    let terms = kinds
-        .iter()
-        .map(|(kind, term)| Candidate::Term(*kind, *term));
-    let candidates = terms.chain(records.iter().copied().map(Candidate::Record));
-    let tests = candidates.zip(tests).filter_map(|(candidate, test)| {
-        let (value, t) = test?;
-        Some((candidate, value, t))
-    });
-    Some(tests.collect())
+/// Linearisation at an optimum in the parameters of the model and those of all candidates.
+pub(super) struct ScoreTests {
+    kinds: Vec<(CoefficientKind, Term)>,
+    records: Vec<RecordParameter>,
+    extended: Problem,
+    evaluation: Evaluation,
+    model: Span,
+    /// Derivatives in the coefficients of the terms.
+    terms: DMatrix<f64>,
+    of_records: RecordColumns,
+    /// Part of the residuals orthogonal to the derivatives of the model.
+    rest: DVector<f64>,
 }
 
-/// The most significant missing term or error of a record at the optimum `theta`, `None` where the residuals show none, and all score
-/// tests, none where they do not apply.
+impl ScoreTests {
+    /// `None` where the tests do not apply: without a likelihood, at an active constraint, for residuals at machine precision or as large as
+    /// the response, and with few samples or many parameters.
+    pub(super) fn at(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Option<Self> {
+        let is_few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
+        let is_long = problem.sample_count() >= SAMPLES_PER_PARAMETER * problem.parameters();
+        (is_few && is_long && applies(problem, theta, evaluation)).then_some(())?;
+        (worst_fit(problem, evaluation) > UNRELATED).then_some(())?;
+        let kinds = candidates(problem, evaluation);
+        let (extended, at) = extended(problem, theta, constants(problem, &kinds))?;
+        let evaluation = extended.evaluate(&at).ok()?;
+        let jacobian = weighted_jacobian(&extended, &evaluation);
+        let first = problem.functions.scalar_range().start;
+        let terms = jacobian.columns(first, kinds.len()).into_owned();
+        let model = Span::of(&jacobian.remove_columns(first, kinds.len()));
+        let rest = model.orthogonal(&weighted_residuals(&extended, &evaluation));
+        let records = record_parameters::parameters(problem);
+        let of_records = RecordColumns::of(&extended, &evaluation, &records);
+        Some(Self {
+            kinds,
+            records,
+            extended,
+            evaluation,
+            model,
+            terms,
+            of_records,
+            rest,
+        })
+    }
+
+    /// The tests, each with its estimate and `t`, in the order of the candidates. `is_modelled` is true for residuals that the noise model
+    /// describes.
+    fn results(&self, is_modelled: bool) -> Vec<(Candidate, f64, f64)> {
+        let column = |i: usize| match i.checked_sub(self.kinds.len()) {
+            None => Some(self.terms.column(i).into_owned()),
+            Some(i) => {
+                let (problem, evaluation) = (&self.extended, &self.evaluation);
+                let column = (self.of_records).column(problem, evaluation, self.records[i])?;
+                Some(DVector::from_vec(column))
+            }
+        };
+        let test = |i: usize| {
+            self.model
+                .test(&self.extended, &column(i)?, &self.rest, is_modelled)
+        };
+        let count = self.kinds.len() + self.records.len();
+        let tests = map(count, available(), test);
+        let terms = self.kinds.iter();
+        let terms = terms.map(|(kind, term)| Candidate::Term(*kind, *term));
+        let records = self.records.iter().copied().map(Candidate::Record);
+        let tests = terms.chain(records).zip(tests);
+        let tests = tests.filter_map(|(candidate, test)| {
+            let (value, t) = test?;
+            Some((candidate, value, t))
+        });
+        tests.collect()
+    }
+}
+
+/// The most significant missing term or error of a record at the optimum `theta`, `None` where the residuals show none, and the results of
+/// all score tests.
 pub(super) fn missing(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
+    tests: Option<&ScoreTests>,
     is_modelled: bool,
 ) -> (Option<FitWarning>, Vec<ExtensionTest>) {
-    let tests = score_tests(problem, theta, evaluation, is_modelled).unwrap_or_default();
+    let tests = tests.map_or_else(Vec::new, |tests| tests.results(is_modelled));
     let results = tests.iter().map(|(candidate, value, t)| ExtensionTest {
         extension: candidate.extension(problem),
         value: *value,

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! so that the factors are linear least squares for given frequencies and ratios, and these four follow by the method of Levenberg and
-//! Marquardt (variable projection, Golub and Pereyra 1973). Two modes are named where they explain the samples better than the model and its
+//! Marquardt (variable projection, Golub and Pereyra 1973, with the derivatives of the residuals by Kaufman 1975). Two modes are named where they explain the samples better than the model and its
 //! noise by the Bayesian information criterion, their residuals are white or much smaller, and their frequencies are apart.
 
 use super::FitWarning;
@@ -17,9 +17,10 @@ use crate::functions::Ratios;
 use crate::objective::{Evaluation, diagnostics};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, ChannelKind, Experiment};
-use crate::signal::{Spectrum, even_spacing};
+use crate::signal::{Spectrum, even_spacing, median};
+use crate::simd::sum::rms;
 use crate::threads::{available, map};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::f64::consts::TAU;
 
 /// Fewest samples, and the number from the beginning of a record that is used.
@@ -96,14 +97,14 @@ fn second_mode(problem: &Problem, evaluation: &Evaluation, e: usize) -> Option<[
     let after = found.square / count as f64;
     let n = count as f64;
     let order = channel.correlation().map_or(0, |c| c.order());
-    let more = 2.0 + found.columns as f64 - order as f64;
+    let more = 2.0 + found.of_mode() as f64 - order as f64;
     let gain = n * (before / after).ln() - more * n.ln();
     let is_explained =
         mean_square(&residuals) > SMALLER * after || record.is_white(channel, &found);
     let [low, high] = [modes[0][0].min(modes[1][0]), modes[0][0].max(modes[1][0])];
     let is_resolved = low > FEWEST_PERIODS / (spacing * n) && high < 0.5 / spacing;
     let are_modes = high > (1.0 + APART) * low && modes.iter().all(|m| m[1] < DAMPED);
-    let [first, second] = found.sizes;
+    let [first, second] = found.sizes();
     let is_noticeable = first.min(second) > WEAKEST * first.max(second);
     (gain > EVIDENCE && is_explained && is_resolved && are_modes && is_noticeable).then(|| {
         match first >= second {
@@ -124,14 +125,15 @@ struct Samples<'a> {
     is_from_rest: bool,
 }
 
-/// Least squares of a sum of modes.
+/// Least squares of the samples by the responses of two modes and a constant.
 struct Sum {
     square: f64,
-    residuals: Vec<f64>,
-    /// Root mean squares of the contributions of the modes.
-    sizes: [f64; 2],
-    /// Number of columns of a mode.
-    columns: usize,
+    /// Columns of the first mode, of the second, and the constant.
+    columns: DMatrix<f64>,
+    factors: DVector<f64>,
+    /// Factor of the normal matrix of the columns.
+    normal: Cholesky<f64, Dyn>,
+    residuals: DVector<f64>,
 }
 
 impl<'a> Samples<'a> {
@@ -197,44 +199,29 @@ impl<'a> Samples<'a> {
                 [logs[2].exp(), logs[3].exp()],
             ]
         };
-        let mut own = modes(&logs).map(|mode| self.columns(mode));
-        let mut found = self.sum(own.each_ref())?;
+        let mut found = self.sum(modes(&logs))?;
         let mut damping = 1e-2;
+        let mut derivatives = self.derivatives(&logs, modes, &found);
         for _ in 0..STEPS {
-            let mut jacobian = DMatrix::zeros(self.observed.len(), 4);
-            for j in 0..4 {
-                let mut moved = logs;
-                moved[j] += SMALL;
-                let other = self.columns(modes(&moved)[j / 2]);
-                let there = match j / 2 {
-                    0 => self.sum([&other, &own[1]]),
-                    _ => self.sum([&own[0], &other]),
-                }?;
-                let pairs = there.residuals.iter().zip(&found.residuals);
-                let change = DVector::from_iterator(
-                    self.observed.len(),
-                    pairs.map(|(a, b)| (a - b) / SMALL),
-                );
-                jacobian.set_column(j, &change);
-            }
-            let mut normal = jacobian.tr_mul(&jacobian);
-            let gradient = jacobian.tr_mul(&DVector::from_column_slice(&found.residuals));
+            let [normal, gradient] = &derivatives;
+            let mut normal = normal.clone();
             for j in 0..4 {
                 normal[(j, j)] *= 1.0 + damping;
             }
-            let step = normal.cholesky()?.solve(&gradient);
+            let step = normal.cholesky()?.solve(gradient);
             // A factor of 2 at most.
             let moved: [f64; 4] = std::array::from_fn(|j| logs[j] - step[j].clamp(-0.7, 0.7));
             let is_possible = moved[1] < 0.0 && moved[3] < 0.0;
-            let other = modes(&moved).map(|mode| self.columns(mode));
-            match (self.sum(other.each_ref())).filter(|s| is_possible && s.square < found.square) {
+            let there = is_possible.then(|| self.sum(modes(&moved))).flatten();
+            match there.filter(|sum| sum.square < found.square) {
                 Some(next) => {
                     let is_at_rest = next.square > (1.0 - AT_REST) * found.square;
-                    (logs, own, found) = (moved, other, next);
+                    (logs, found) = (moved, next);
                     damping = (0.1 * damping).max(1e-6);
                     if is_at_rest {
                         break;
                     }
+                    derivatives = self.derivatives(&logs, modes, &found);
                 }
                 None => damping *= 10.0,
             }
@@ -245,76 +232,120 @@ impl<'a> Samples<'a> {
         Some((modes(&logs), found))
     }
 
-    /// Least squares of the samples by the [columns](Self::columns) of two modes and a constant.
-    fn sum(&self, each: [&Vec<Vec<f64>>; 2]) -> Option<Sum> {
-        let columns = each[0].len();
-        let count = self.observed.len();
-        let constant = vec![1.0; count];
-        let all: Vec<&Vec<f64>> = each.into_iter().flatten().chain([&constant]).collect();
-        let matrix = DMatrix::from_fn(count, all.len(), |i, j| all[j][i]);
-        let sizes: Vec<f64> = matrix.column_iter().map(|c| c.norm()).collect();
-        let scaled = DMatrix::from_fn(count, all.len(), |i, j| {
-            matrix[(i, j)] / sizes[j].max(f64::MIN_POSITIVE)
+    /// `J^T J` and `J^T r` of the residuals `r` and their derivatives `J` in the logarithms of frequencies and ratios: the changes of the
+    /// contributions at the present factors, as far as the columns do not have them.
+    fn derivatives(
+        &self,
+        logs: &[f64; 4],
+        modes: impl Fn(&[f64; 4]) -> [Mode; 2],
+        found: &Sum,
+    ) -> [DMatrix<f64>; 2] {
+        let moved: [Mode; 4] = std::array::from_fn(|j| {
+            let mut moved = *logs;
+            moved[j] += SMALL;
+            modes(&moved)[j / 2]
         });
+        let count = found.of_mode();
+        let factors = |j: usize, column: usize| found.factors[j / 2 * count + column];
+        let has_input = self.input.is_some();
+        let inputs = std::array::from_fn(|j| if has_input { factors(j, 0) } else { 0.0 });
+        let starts = std::array::from_fn(|j| match self.is_from_rest {
+            true => [0.0; 2],
+            false => [
+                factors(j, count - 2),
+                factors(j, count - 1) * TAU * moved[j][0],
+            ],
+        });
+        let mut changes = self.responses(moved, inputs, starts);
+        for (j, mut change) in changes.column_iter_mut().enumerate() {
+            change -= found.contribution(j / 2);
+        }
+        changes /= -SMALL;
+        let known = found.columns.tr_mul(&changes);
+        let normal = changes.tr_mul(&changes) - known.tr_mul(&found.normal.solve(&known));
+        let gradient = changes.tr_mul(&found.residuals);
+        [
+            normal,
+            DMatrix::from_column_slice(4, 1, gradient.as_slice()),
+        ]
+    }
+
+    /// Least squares of the samples by the columns of two modes and a constant.
+    fn sum(&self, modes: [Mode; 2]) -> Option<Sum> {
+        let count = self.observed.len();
+        let still = [[0.0; 2]; 2];
+        let mut each = Vec::new();
+        if self.input.is_some() {
+            each.push(self.responses(modes, [1.0; 2], still));
+        }
+        if !self.is_from_rest {
+            each.push(self.responses(modes, [0.0; 2], [[1.0, 0.0]; 2]));
+            let speeds = modes.map(|mode| [0.0, TAU * mode[0]]);
+            each.push(self.responses(modes, [0.0; 2], speeds));
+        }
+        let mut columns = DMatrix::from_element(count, 2 * each.len() + 1, 1.0);
+        for (place, pair) in each.iter().enumerate() {
+            columns.set_column(place, &pair.column(0));
+            columns.set_column(each.len() + place, &pair.column(1));
+        }
         let observed = DVector::from_column_slice(self.observed);
-        let normal = scaled.tr_mul(&scaled);
-        let factors = normal.cholesky()?.solve(&scaled.tr_mul(&observed));
-        let residuals = &observed - &scaled * &factors;
-        let part = |from: usize| {
-            let part = scaled.columns(from, columns) * factors.rows(from, columns);
-            part.norm() / (count as f64).sqrt()
-        };
+        let mut normal = columns.tr_mul(&columns);
+        let sizes = normal.diagonal().map(f64::sqrt);
+        let is_regular = sizes.iter().all(|size| *size > 0.0);
+        // Columns of length 1 for the factorisation.
+        for (i, mut row) in normal.row_iter_mut().enumerate() {
+            row.component_div_assign(&(sizes[i] * &sizes).transpose());
+        }
+        let normal = normal.cholesky().filter(|_| is_regular)?;
+        let moments = columns.tr_mul(&observed).component_div(&sizes);
+        let factors = normal.solve(&moments).component_div(&sizes);
+        let residuals = &observed - &columns * &factors;
         let square = residuals.norm_squared();
+        let mut lower = normal.unpack();
+        for (i, mut row) in lower.row_iter_mut().enumerate() {
+            row *= sizes[i];
+        }
         square.is_finite().then(|| Sum {
             square,
-            sizes: [part(0), part(columns)],
-            residuals: residuals.as_slice().to_vec(),
             columns,
+            factors,
+            normal: Cholesky::pack_dirty(lower),
+            residuals,
         })
     }
 
-    /// Responses of a mode at the samples: from rest to the input, and from a displacement and a velocity.
-    fn columns(&self, mode: Mode) -> Vec<Vec<f64>> {
-        let mut columns = Vec::new();
-        if let Some(input) = &self.input {
-            columns.push(self.response(mode, [0.0, 0.0], input));
-        }
-        if !self.is_from_rest {
-            let still = vec![0.0; self.observed.len()];
-            columns.push(self.response(mode, [1.0, 0.0], &still));
-            columns.push(self.response(mode, [0.0, TAU * mode[0]], &still));
-        }
-        columns
-    }
-
-    /// Response to an input that is linear between samples, exactly.
-    fn response(&self, [frequency, ratio]: Mode, start: [f64; 2], input: &[f64]) -> Vec<f64> {
+    /// Responses of modes at the samples, as columns, to factors of the input, linear between samples, from displacements and
+    /// velocities, exactly.
+    fn responses<const N: usize>(
+        &self,
+        modes: [Mode; N],
+        factors: [f64; N],
+        starts: [[f64; 2]; N],
+    ) -> DMatrix<f64> {
         let h = self.spacing;
-        let omega = TAU * frequency;
-        let decay = ratio * omega;
-        let damped = omega * (1.0 - ratio * ratio).max(0.0).sqrt().max(1e-6);
-        let (sine, cosine) = (damped * h).sin_cos();
-        let (c, s, shrink) = (cosine, sine / damped, (-decay * h).exp());
-        let [[a, b], [d, e]] = [
-            [shrink * (c + decay * s), shrink * s],
-            [-shrink * omega * omega * s, shrink * (c - decay * s)],
-        ];
-        let [mut q, mut v] = start;
-        let mut out = Vec::with_capacity(input.len());
-        for i in 0..input.len() {
-            let u = input[i];
-            out.push(match self.kind {
-                ChannelKind::Displacement => q,
-                ChannelKind::Velocity => v,
-                ChannelKind::Acceleration => u - 2.0 * decay * v - omega * omega * q,
+        let steps: [ModeStep; N] = std::array::from_fn(|j| ModeStep::of(modes[j], h));
+        let count = self.observed.len();
+        let mut out = DMatrix::zeros(count, N);
+        let (mut q, mut v) = (starts.map(|s| s[0]), starts.map(|s| s[1]));
+        for i in 0..count {
+            let [now, next] = self.input.as_ref().map_or([0.0; 2], |input| {
+                [input[i], input.get(i + 1).copied().unwrap_or(input[i])]
             });
-            let next = input.get(i + 1).copied().unwrap_or(u);
-            // Particular solution, linear in time.
-            let slope = (next - u) / (h * omega * omega);
-            let level = u / (omega * omega) - 2.0 * ratio * slope / omega;
-            let (x, y) = (q - level, v - slope);
-            q = a * x + b * y + level + slope * h;
-            v = d * x + e * y + slope;
+            for j in 0..N {
+                let step = &steps[j];
+                let (u, w) = (factors[j] * now, factors[j] * next);
+                out[(i, j)] = match self.kind {
+                    ChannelKind::Displacement => q[j],
+                    ChannelKind::Velocity => v[j],
+                    ChannelKind::Acceleration => u - step.pull[0] * q[j] - step.pull[1] * v[j],
+                };
+                let forced = [0, 1].map(|k| step.input[k][0] * u + step.input[k][1] * w);
+                let [a, b] = step.state;
+                (q[j], v[j]) = (
+                    a[0] * q[j] + a[1] * v[j] + forced[0],
+                    b[0] * q[j] + b[1] * v[j] + forced[1],
+                );
+            }
         }
         out
     }
@@ -329,10 +360,62 @@ impl<'a> Samples<'a> {
     }
 }
 
-fn mean_square(values: &[f64]) -> f64 {
-    values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
+impl Sum {
+    /// Number of columns of a mode.
+    fn of_mode(&self) -> usize {
+        self.columns.ncols() / 2
+    }
+
+    fn contribution(&self, mode: usize) -> DVector<f64> {
+        let (from, count) = (mode * self.of_mode(), self.of_mode());
+        self.columns.columns(from, count) * self.factors.rows(from, count)
+    }
+
+    /// Root mean squares of the contributions of the modes.
+    fn sizes(&self) -> [f64; 2] {
+        [0, 1].map(|mode| rms(self.contribution(mode).as_slice()))
+    }
 }
 
-fn median(values: &[f64]) -> f64 {
-    crate::signal::median(values)
+/// Step of a mode from a sample to the next.
+struct ModeStep {
+    /// Displacement and velocity from those before.
+    state: [[f64; 2]; 2],
+    /// Displacement and velocity from the input before and after.
+    input: [[f64; 2]; 2],
+    /// Acceleration from displacement and velocity, negative.
+    pull: [f64; 2],
+}
+
+impl ModeStep {
+    fn of([frequency, ratio]: Mode, h: f64) -> Self {
+        let omega = TAU * frequency;
+        let decay = ratio * omega;
+        let damped = omega * (1.0 - ratio * ratio).max(0.0).sqrt().max(1e-6);
+        let (sine, cosine) = (damped * h).sin_cos();
+        let (c, s, shrink) = (cosine, sine / damped, (-decay * h).exp());
+        let square = omega * omega;
+        let state = [
+            [shrink * (c + decay * s), shrink * s],
+            [-shrink * square * s, shrink * (c - decay * s)],
+        ];
+        // The particular solution to an input linear in time is linear.
+        let slope = 1.0 / (h * square);
+        let level = |slope: f64| -2.0 * ratio * slope / omega;
+        let from = |level: f64, slope: f64| {
+            let end = [level + slope * h, slope];
+            [0, 1].map(|k| end[k] - state[k][0] * level - state[k][1] * slope)
+        };
+        let before = from(1.0 / square + level(-slope), -slope);
+        let after = from(level(slope), slope);
+        Self {
+            state,
+            input: [[before[0], after[0]], [before[1], after[1]]],
+            pull: [square, 2.0 * decay],
+        }
+    }
+}
+
+fn mean_square(values: &[f64]) -> f64 {
+    rms(values).powi(2)
 }

@@ -30,9 +30,9 @@ impl Span {
         evaluation: &Evaluation,
         column: Vec<f64>,
     ) -> Option<(f64, f64)> {
-        let residuals = weighted_residuals(problem, evaluation);
         let model = Self::of(&weighted_jacobian(problem, evaluation));
-        model.test(problem, &DVector::from_vec(column), &residuals, true)
+        let rest = model.orthogonal(&weighted_residuals(problem, evaluation));
+        model.test(problem, &DVector::from_vec(column), &rest, true)
     }
 
     pub(super) fn of(jacobian: &DMatrix<f64>) -> Self {
@@ -43,7 +43,9 @@ impl Span {
 
     /// Part of a vector orthogonal to the derivatives of the model.
     pub(super) fn orthogonal(&self, vector: &DVector<f64>) -> DVector<f64> {
-        vector - &self.basis * self.basis.tr_mul(vector)
+        let mut rest = vector.clone();
+        rest.gemv(-1.0, &self.basis, &self.basis.tr_mul(vector), 1.0);
+        rest
     }
 
     /// Leaves the parts of the columns orthogonal to the derivatives of the model.
@@ -52,24 +54,27 @@ impl Span {
         columns.gemm(-1.0, &self.basis, &shares, 1.0);
     }
 
-    /// Estimate of the coefficient with the derivatives `column`, and its ratio to the standard error.
+    /// Estimate of the coefficient with the derivatives `column`, and its ratio to the standard error; `e` is the part of the residuals
+    /// orthogonal to the derivatives of the model.
     pub(super) fn test(
         &self,
         problem: &Problem,
         column: &DVector<f64>,
-        residuals: &DVector<f64>,
+        e: &DVector<f64>,
         is_modelled: bool,
     ) -> Option<(f64, f64)> {
-        let (z, e) = (self.orthogonal(column), self.orthogonal(residuals));
+        let z = self.orthogonal(column);
         let square = z.norm_squared();
         (square > APART * APART * column.norm_squared()).then_some(())?;
-        let value = -z.dot(&e) / square;
-        let rest = &e + value * &z;
+        let value = -z.dot(e) / square;
+        let mut rest = e.clone();
+        rest.axpy(value, &z, 1.0);
         let estimated = (self.basis.ncols() + 1) as f64;
         let is_kernel = |c: &crate::record::Channel| c.noise().scores == ScoreCovariance::Kernel;
         let variance = match !is_modelled || problem.channels().any(is_kernel) {
             true => {
-                let scores = DMatrix::from_columns(&[z.component_mul(&rest)]);
+                rest.component_mul_assign(&z);
+                let scores = DMatrix::from_vec(rest.len(), 1, rest.data.into());
                 let found = KernelCovariance::of(&scores, &problem.channel_samples(), estimated)?;
                 found.sum[(0, 0)] / (square * square)
             }

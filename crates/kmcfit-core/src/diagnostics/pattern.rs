@@ -93,8 +93,11 @@ pub fn offset_and_drift(times: &[f64], residuals: &[f64]) -> [f64; 2] {
 /// Median absolute value, 0 for no values.
 pub(crate) fn median_size(values: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    sizes.get(sizes.len() / 2).copied().unwrap_or_default()
+    let middle = sizes.len() / 2;
+    match sizes.is_empty() {
+        true => 0.0,
+        false => *sizes.select_nth_unstable_by(middle, f64::total_cmp).1,
+    }
 }
 
 #[cfg(test)]

@@ -170,7 +170,7 @@ impl Bands {
         let nodes: Vec<usize> = (0..problem.functions.nodes()).step_by(stride).collect();
         let variants = match information.is_equation() {
             true => None,
-            false => NoiseVariants::of(problem, evaluation),
+            false => NoiseVariants::of(problem, evaluation, Some(information.sensitivity())),
         };
         let directions = &information.sensitivity().directions;
         let maker = Maker {

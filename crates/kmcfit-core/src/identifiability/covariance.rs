@@ -15,13 +15,14 @@ use crate::functions::{Penalty, Prior, WeightRule};
 use crate::noise::KernelCovariance;
 use crate::objective::{Evaluation, Refined};
 use crate::problem::{FEW_PARAMETERS, Problem};
+use crate::simd::tall_qr::Triangle;
 use nalgebra::{DMatrix, DVector, DVectorView};
 use std::ops::Range;
 
 /// Information on the parameters, in scaled directions.
 pub(super) struct Information {
     sensitivity: Sensitivity,
-    /// Rows of measurements: samples, then priors.
+    /// Rows of measurements, samples and then priors; their triangular factor where no sample is looked at by itself.
     measured: DMatrix<f64>,
     /// Rows of penalties and violated soft constraints.
     pulled: DMatrix<f64>,
@@ -30,7 +31,7 @@ pub(super) struct Information {
     is_bayesian: bool,
     /// Bound of the accumulated rounding error of a response as large as the largest sample.
     rounding: f64,
-    /// Numerical error of the weighted predictions, where it is included.
+    /// Products `J^T W^(1/2) e` with the numerical error of the weighted predictions, where it is included.
     error: Option<DVector<f64>>,
     /// Samples of channels whose scores have the covariance of a kernel.
     kernels: Vec<Range<usize>>,
@@ -57,7 +58,15 @@ impl Information {
         let priors: Vec<Vec<f64>> = priors.map(row).collect();
         let n = directions.len();
         let priors = DMatrix::from_fn(priors.len(), n, |i, k| priors[i][k]);
-        let measured = stacked(&sensitivity.jacobian, &priors);
+        // Otherwise some samples have an estimated variance, or scores with the covariance of a kernel.
+        let is_reduced = kernels(problem).is_empty()
+            && sensitivity.has_sigma.iter().all(|known| *known)
+            && sensitivity.jacobian.nrows() > n
+            && sensitivity.jacobian.iter().all(|x| x.is_finite());
+        let measured = match is_reduced {
+            true => stacked(&Triangle::factor(&sensitivity.jacobian), &priors),
+            false => stacked(&sensitivity.jacobian, &priors),
+        };
         Self::of_measured(problem, theta, sensitivity, measured)
     }
 
@@ -146,7 +155,10 @@ impl Information {
             true => width_error(problem, evaluation, roots),
             false => step_error(problem, evaluation, roots),
         };
-        Self { error, ..self }
+        match error {
+            Some(error) => self.with_error(&error),
+            None => self,
+        }
     }
 
     /// [`Information::with_numerical_error`], with the results on half the step where they are known.
@@ -160,16 +172,18 @@ impl Information {
             None => self.with_numerical_error(problem, evaluation),
             Some(halved) => {
                 let roots = &self.sensitivity.roots;
-                let error = step_error::of_changes(problem, evaluation, roots, halved);
-                Self { error, ..self }
+                match step_error::of_changes(problem, evaluation, roots, halved) {
+                    Some(error) => self.with_error(&error),
+                    None => self,
+                }
             }
         }
     }
 
     /// Includes this error of the weighted predictions alone.
-    pub fn with_error(self, error: DVector<f64>) -> Self {
+    pub fn with_error(self, error: &DVector<f64>) -> Self {
         Self {
-            error: Some(error),
+            error: Some(self.sensitivity.jacobian.tr_mul(error)),
             ..self
         }
     }
@@ -198,12 +212,10 @@ impl Information {
 
     /// The covariance root with the shift of the estimates by the included error as a further column.
     fn with_shift(&self, root: DMatrix<f64>, inverse_root: &DMatrix<f64>) -> DMatrix<f64> {
-        let Some(error) = &self.error else {
+        let Some(moments) = &self.error else {
             return root;
         };
-        // Priors, the last rows, have no such error.
-        let moments = self.measured.rows(0, error.len()).tr_mul(error);
-        with_column(root, &-(inverse_root * inverse_root.tr_mul(&moments)))
+        with_column(root, &-(inverse_root * inverse_root.tr_mul(moments)))
     }
 
     /// Rows of samples, priors and penalties, stacked.

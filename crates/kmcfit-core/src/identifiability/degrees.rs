@@ -14,9 +14,10 @@ use super::directions::Directions;
 use super::sensitivity::Sensitivity;
 use crate::noise::STEP;
 use crate::objective::Evaluation;
-use crate::problem::Problem;
+use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, Weighting};
 use nalgebra::DMatrix;
+use std::cell::LazyCell;
 
 /// Covariances of the parameters with the noise moved along its coordinates.
 pub struct NoiseVariants {
@@ -32,25 +33,35 @@ struct ChannelVariants {
 }
 
 impl NoiseVariants {
-    /// Variants at an evaluated point; `None` where no noise was estimated with a covariance, or the parameters have none.
-    pub fn of(problem: &Problem, evaluation: &Evaluation) -> Option<Self> {
+    /// Variants at an evaluated point, with the `known` sensitivity of all parameters or a new one; `None` where no noise was estimated with a
+    /// covariance, or the parameters have none.
+    pub fn of(
+        problem: &Problem,
+        evaluation: &Evaluation,
+        known: Option<&Sensitivity>,
+    ) -> Option<Self> {
         let is_estimated = |c: &Channel| !c.noise().covariance.is_empty();
-        if !problem.channels().any(is_estimated) {
+        let (n, samples) = (problem.parameters(), problem.sample_count());
+        let is_few = (1..=FEW_PARAMETERS).contains(&n) && samples > n;
+        if !is_few || !problem.channels().any(is_estimated) {
             return None;
         }
-        let here = problem.covariance(evaluation)?;
-        let n = problem.parameters();
         let directions = Directions::new(problem, evaluation, n, n);
-        let jacobian = directions.of_jacobian(problem.predictions_jacobian(evaluation));
+        let here = match known {
+            Some(sensitivity) => covariance(problem, sensitivity)?,
+            None => problem.covariance(evaluation)?,
+        };
+        let jacobian =
+            LazyCell::new(|| directions.of_jacobian(problem.predictions_jacobian(evaluation)));
         let is_alone = problem.channels().count() == 1;
         let mut channels = Vec::new();
         for (e, experiment) in problem.experiments.iter().enumerate() {
             for (c, channel) in experiment.channels.iter().enumerate() {
-                let mut moved = problem.clone();
-                let mut side = |index: usize, step: f64| {
+                let side = |index: usize, step: f64| {
+                    let mut moved = problem.clone();
                     let noise = channel.with_moved_noise(index, step);
                     moved.parts_mut().experiments[e].channels[c] = noise;
-                    let (directions, jacobian) = (directions.clone(), jacobian.clone());
+                    let (directions, jacobian) = (directions.clone(), (*jacobian).clone());
                     let sensitivity =
                         Sensitivity::weighted(&moved, evaluation, directions, jacobian);
                     covariance(&moved, &sensitivity)
@@ -109,7 +120,7 @@ impl Problem {
     /// Degrees of freedom of the estimate of each parameter: Student's t distribution gives their intervals. Infinite, for the
     /// normal distribution, where the noise counts as known.
     pub fn degrees_of_freedom(&self, evaluation: &Evaluation) -> Vec<f64> {
-        degrees_of_parameters(self, NoiseVariants::of(self, evaluation).as_ref())
+        degrees_of_parameters(self, NoiseVariants::of(self, evaluation, None).as_ref())
     }
 }
 

@@ -53,7 +53,7 @@ impl Problem {
         let sensitivity = Sensitivity::along(self, evaluation, directions);
         let error = weighted(self, changes, &sensitivity.roots, factor)?;
         let active = active_rows(self, theta);
-        let information = Information::new(self, theta, sensitivity).with_error(error);
+        let information = Information::new(self, theta, sensitivity).with_error(&error);
         Some((information, active))
     }
 }

@@ -2,6 +2,7 @@
 
 use super::autoregression::Autoregression;
 use super::input_errors::InputErrors;
+use crate::signal::median;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 use std::sync::Arc;
@@ -50,15 +51,14 @@ struct Predictor {
 
 /// Runs of equally spaced samples without a gap; `None` if the samples are not equally spaced apart from gaps.
 pub fn uninterrupted_runs(times: &[f64]) -> Option<Vec<Range<usize>>> {
-    let mut spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let mut sorted = spacings.clone();
-    sorted.sort_by(f64::total_cmp);
-    let Some(&usual) = sorted.get(sorted.len() / 2) else {
+    let spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    if spacings.is_empty() {
         return Some(std::iter::once(0..times.len()).collect());
-    };
+    }
+    let usual = median(&spacings);
     let mut runs = Vec::new();
     let mut first = 0;
-    for (i, spacing) in spacings.drain(..).enumerate() {
+    for (i, spacing) in spacings.into_iter().enumerate() {
         let steps = spacing / usual;
         if (steps - 1.0).abs() <= UNEVEN {
             continue;

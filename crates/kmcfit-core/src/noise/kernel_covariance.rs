@@ -15,23 +15,27 @@
 //!
 //! Source: Andrews (1991), *Heteroskedasticity and autocorrelation consistent covariance matrix estimation*, Econometrica 59,
 //! Eqs. (2.7), (6.2) and (6.4), with each score scaled to unit variance, so that `S` transforms with the units of the parameters.
-//! The kernel is positive definite, so `S` is a covariance. It is summed over the
-//! frequencies of a circle of `L >= 2 N` samples, with the discrete transforms `X_a` of the scores and `K` of the kernel (Parseval),
+//! The sum is the integral of the spectrum of the scores with the spectral window of the kernel (Priestley 1962), which vanishes above a
+//! frequency and is positive, so that `S` is a covariance. On a circle of `L` samples, with the discrete transforms `X_a` of the scores,
 //!
 //! ```text
-//! sum_(i,j) kappa((i - j)/b) s_ia s_jb = 1/L sum_f K_f conj(X_fa) X_fb
+//! sum_(i,j) kappa((i - j)/b) s_ia s_jb = 1/L sum_f W_f conj(X_fa) X_fb
+//! W_f = sum_m w(omega_f + 2 pi m),    w(omega) = 5 b/4 (1 - (omega/omega_b)^2) for |omega| < omega_b = 6 pi/(5 b)
 //! ```
+//!
+//! The kernel continues on the other side of the circle, where it is below `2e-4`: `L >= max(2 N, N + 32 b)`.
 
-use crate::signal::{forward_transform, of_pair};
+use crate::signal::RealTransform;
 use nalgebra::{DMatrix, DMatrixView};
-use rustfft::num_complex::Complex;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 /// Largest absolute autocorrelation in the bandwidth (Andrews & Monahan 1992), which bounds it for scores near a random walk.
 const LARGEST_CORRELATION: f64 = 0.97;
-/// Arguments below which the kernel is `1 - z^2/10`, its expansion to machine precision.
-const SMALL: f64 = 1e-4;
+/// Frequency at which the spectral window ends, times the bandwidth in samples.
+const WINDOW: f64 = 1.2 * PI;
+/// Smallest number of bandwidths between the last sample and the first one of the next turn of the circle.
+const APART: f64 = 32.0;
 
 /// Covariance of a sum of scores.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,16 +95,6 @@ fn correlation(score: &[f64], records: &[Range<usize>]) -> Option<f64> {
     (squares > 0.0).then(|| products / squares)
 }
 
-/// Quadratic-spectral kernel `kappa(x)`, 1 at zero.
-pub fn quadratic_spectral(x: f64) -> f64 {
-    let z = 1.2 * PI * x;
-    match z.abs() {
-        small if small < SMALL => 1.0 - 0.1 * z * z,
-        z if z.is_finite() => 3.0 / (z * z) * (z.sin() / z - z.cos()),
-        _ => 0.0,
-    }
-}
-
 /// `sum_records sum_(i,j) kappa((i - j)/b) s_i s_j^T` for the bandwidth `b >= 0`; zero stands for independent scores.
 pub fn kernel_sum(scores: &DMatrix<f64>, records: &[Range<usize>], bandwidth: f64) -> DMatrix<f64> {
     let parameters = scores.ncols();
@@ -116,69 +110,49 @@ pub fn kernel_sum(scores: &DMatrix<f64>, records: &[Range<usize>], bandwidth: f6
     0.5 * (&sum + sum.transpose())
 }
 
-/// Rows of the transforms that are multiplied at once.
+/// Values of the spectra that are multiplied at once.
 const ROWS: usize = 4096;
 
-/// The sum over one record, from the transforms of the scores and of the kernel.
+/// The sum over one record.
 fn correlated_sum(scores: &DMatrixView<f64>, bandwidth: f64) -> DMatrix<f64> {
     let (count, parameters) = scores.shape();
-    let length = (2 * count).next_power_of_two();
-    let half = length / 2;
-    // The transforms of two real series are one of their complex sum; of like size, for the precision of both.
-    let sizes: Vec<f64> = (scores.column_iter())
-        .map(|score| Some(score.amax()).filter(|a| *a > 0.0).unwrap_or(1.0))
-        .collect();
-    let score = |a: usize, i: usize| match a < parameters && i < count {
-        true => scores[(i, a)] / sizes[a],
-        false => 0.0,
-    };
-    // Even: the second half mirrors the first.
-    let kernel: Vec<f64> = (0..=half)
-        .map(|lag| quadratic_spectral(lag as f64 / bandwidth))
-        .collect();
-    let transform = forward_transform(length);
-    let mut scratch = vec![Complex::default(); transform.get_inplace_scratch_len()];
-    let mut weights = Vec::new();
-    // Real and imaginary parts of the scores at the frequencies up to a half.
-    let mut parts = DMatrix::zeros(2 * (half + 1), parameters);
-    for pair in 0..=parameters / 2 {
-        // The kernel with score 0, then scores 1 and 2, 3 and 4, ...
-        let at = |i: usize| match pair {
-            0 => Complex::new(kernel[i.min(length - i)], score(0, i)),
-            _ => Complex::new(score(2 * pair - 1, i), score(2 * pair, i)),
-        };
-        let mut both: Vec<Complex<f64>> = (0..length).map(at).collect();
-        transform.process_with_scratch(&mut both, &mut scratch);
-        for k in 0..=half {
-            let [first, second] = of_pair(&both, k);
-            let mut set = |a: usize, value: Complex<f64>| {
-                if a < parameters {
-                    parts[(2 * k, a)] = value.re;
-                    parts[(2 * k + 1, a)] = value.im;
-                }
-            };
-            set(2 * pair, second);
-            match pair {
-                0 => {
-                    let sides = if k == 0 || k == half { 1.0 } else { 2.0 };
-                    weights.push(sides * first.re / length as f64);
-                }
-                _ => set(2 * pair - 1, first),
-            }
-        }
+    let least = (2 * count).max(count + (APART * bandwidth) as usize);
+    let length = least.next_power_of_two();
+    let weights = window(length, bandwidth);
+    let mut transform = RealTransform::new(length, weights.len());
+    // Real and imaginary parts of the scores, times the roots of their weights.
+    let mut parts = DMatrix::zeros(2 * weights.len(), parameters);
+    for (score, mut part) in scores.column_iter().zip(parts.column_iter_mut()) {
+        let into = part.as_mut_slice();
+        transform.process(score.iter().copied(), |k, x| {
+            into[2 * k] = weights[k] * x.re;
+            into[2 * k + 1] = weights[k] * x.im;
+        });
     }
     let mut sum = DMatrix::zeros(parameters, parameters);
     for first in (0..parts.nrows()).step_by(ROWS) {
         let rows = parts.rows(first, ROWS.min(parts.nrows() - first));
-        let mut weighted = rows.into_owned();
-        for mut column in weighted.column_iter_mut() {
-            (column.iter_mut().enumerate()).for_each(|(i, x)| *x *= weights[(first + i) / 2]);
-        }
-        sum += rows.tr_mul(&weighted);
+        sum += rows.tr_mul(&rows);
     }
-    DMatrix::from_fn(parameters, parameters, |a, b| {
-        sum[(a, b)] * sizes[a] * sizes[b]
-    })
+    sum
+}
+
+/// Roots of the weights `W_f/L` of both signs of a frequency on a circle, up to the end of the spectral window.
+fn window(length: usize, bandwidth: f64) -> Vec<f64> {
+    let end = WINDOW / bandwidth;
+    let half = length / 2;
+    let last = ((end / TAU * length as f64) as usize).min(half);
+    let turns = (end / TAU).ceil() as i64;
+    let weight = |k: usize| {
+        let frequency = TAU * k as f64 / length as f64;
+        let each = (-turns..=turns).map(|m| {
+            let place = (frequency + TAU * m as f64) / end;
+            (1.0 - place * place).max(0.0)
+        });
+        let sides = if k == 0 || k == half { 1.0 } else { 2.0 };
+        (sides * 1.25 * bandwidth * each.sum::<f64>() / length as f64).sqrt()
+    };
+    (0..=last).map(weight).collect()
 }
 
 #[cfg(test)]
@@ -201,23 +175,59 @@ mod tests {
         )
     }
 
-    /// The sum over all pairs with the kernel of the module comment, for several bandwidths.
+    /// The kernel of the module comment.
+    fn kappa(x: f64) -> f64 {
+        let z = 6.0 * PI * x / 5.0;
+        match x == 0.0 {
+            true => 1.0,
+            false => 25.0 / (12.0 * PI * PI * x * x) * (z.sin() / z - z.cos()),
+        }
+    }
+
+    /// The kernel at a lag on a circle.
+    fn on_circle(length: usize, bandwidth: f64, lag: usize) -> f64 {
+        let each = window(length, bandwidth).into_iter().enumerate();
+        let each = each.map(|(k, root)| {
+            root * root * f64::cos(TAU * (k * lag % length) as f64 / length as f64)
+        });
+        each.sum()
+    }
+
+    /// Those of the next turns are at least 32 bandwidths away, where the kernel is below 2.1e-4 and changes its sign.
+    #[test]
+    fn the_window_is_that_of_the_kernel() {
+        for (length, bandwidth) in [(128, 0.3), (128, 1.7), (256, 4.0), (4096, 50.0)] {
+            for lag in (0..length / 2).step_by(7) {
+                let found = on_circle(length, bandwidth, lag);
+                let off = (found - kappa(lag as f64 / bandwidth)).abs();
+                assert!(off <= 2.1e-4, "{length} {bandwidth} {lag}: {off}");
+            }
+        }
+    }
+
+    /// The sum over all pairs with the kernel on the circle, for several bandwidths.
     #[test]
     fn the_sum_is_that_over_all_pairs() {
         let (scores, records) = scores();
-        for bandwidth in [0.0, 0.3, 4.0, 50.0] {
+        for (bandwidth, lengths) in [
+            (0.0, [1, 1, 1]),
+            (0.3, [128, 16, 64]),
+            (4.0, [256, 256, 256]),
+            (50.0, [2048, 2048, 2048]),
+        ] {
             let found = kernel_sum(&scores, &records, bandwidth);
             let mut expected = DMatrix::zeros(3, 3);
-            for record in &records {
+            for (record, length) in records.iter().zip(lengths) {
+                let kernel: Vec<f64> = match bandwidth == 0.0 {
+                    true => (0..40).map(|lag| f64::from(lag == 0)).collect(),
+                    false => {
+                        let lags = 0..record.len();
+                        lags.map(|l| on_circle(length, bandwidth, l)).collect()
+                    }
+                };
                 for i in record.clone() {
                     for j in record.clone() {
-                        let x = (i as f64 - j as f64) / bandwidth;
-                        let z = 6.0 * PI * x / 5.0;
-                        let kappa = match i == j {
-                            true => 1.0,
-                            false if bandwidth == 0.0 => 0.0,
-                            false => 25.0 / (12.0 * PI * PI * x * x) * (z.sin() / z - z.cos()),
-                        };
+                        let kappa = kernel[i.abs_diff(j)];
                         expected += kappa * scores.row(i).transpose() * scores.row(j);
                     }
                 }
@@ -226,8 +236,8 @@ mod tests {
                 for b in 0..3 {
                     let size = f64::sqrt(expected[(a, a)] * expected[(b, b)]);
                     let off = (found[(a, b)] - expected[(a, b)]).abs();
-                    // Rounding of 64 terms and of a transform of length 128.
-                    assert!(off <= 1e-13 * size, "{bandwidth} {a} {b}: {off}");
+                    // Rounding of 64 terms and of transforms of lengths up to 2048.
+                    assert!(off <= 1e-12 * size, "{bandwidth} {a} {b}: {off}");
                 }
             }
             let smallest = found.clone().symmetric_eigenvalues().min();

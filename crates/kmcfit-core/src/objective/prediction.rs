@@ -5,7 +5,7 @@ use super::{RecordTangent, SimulatedRecord};
 use crate::record::{Channel, ChannelKind, Sensor};
 use crate::signal::{zero_phase, zero_phase_transpose};
 use crate::simd;
-use crate::simulate::reference::{Observation, observe};
+use crate::simulate::reference::{Observation, observe, observe_value};
 use crate::simulate::{CoefficientGradient, Trajectory};
 use crate::system::{InputSample, TimePoint};
 
@@ -42,12 +42,7 @@ impl Channel {
     }
 
     fn sensed_at(&self, view: SimulatedRecord, i: usize, place: TimePoint) -> Observation {
-        let is_delayed = self.sensor().is_delayed();
-        let input = match (is_delayed, view.excitation) {
-            (false, excitation) => self.input_at_sample(excitation, i),
-            (true, Some(excitation)) => excitation.input_at(place),
-            (true, None) => InputSample::default(),
-        };
+        let (input, base) = self.inputs_at(view, i, place);
         let mut sensed = observe(
             view.system,
             self.kind(),
@@ -57,11 +52,39 @@ impl Channel {
             place,
             input,
         );
-        if let Some(base) = self.base().get(i) {
-            let moves = is_delayed && self.kind() == ChannelKind::Acceleration;
-            sensed.value += if moves { input.base } else { *base };
-        }
+        sensed.value += base;
         sensed
+    }
+
+    /// Value of [`Channel::sensed_at`].
+    fn value_at(&self, view: SimulatedRecord, i: usize, place: TimePoint) -> f64 {
+        let (input, base) = self.inputs_at(view, i, place);
+        base + observe_value(
+            view.system,
+            self.kind(),
+            view.nodal,
+            view.excitation,
+            view.response,
+            place,
+            input,
+        )
+    }
+
+    /// Input at sample `i`, and the motion of the base in its value.
+    fn inputs_at(&self, view: SimulatedRecord, i: usize, place: TimePoint) -> (InputSample, f64) {
+        let is_delayed = self.sensor().is_delayed();
+        let input = match (is_delayed, view.excitation) {
+            (false, excitation) => self.input_at_sample(excitation, i),
+            (true, Some(excitation)) => excitation.input_at(place),
+            (true, None) => InputSample::default(),
+        };
+        let moves = is_delayed && self.kind() == ChannelKind::Acceleration;
+        let base = match self.base().get(i) {
+            Some(_) if moves => input.base,
+            Some(base) => *base,
+            None => 0.0,
+        };
+        (input, base)
     }
 
     /// Time derivative of [`Channel::sensed`] at sample `i`, in its unit per s; zero outside the response.
@@ -76,7 +99,7 @@ impl Channel {
         let at = |by: f64| {
             let fraction = place.fraction + by;
             let moved = TimePoint { fraction, ..place };
-            self.sensed_at(view, i, moved).value
+            self.value_at(view, i, moved)
         };
         (at(FRACTION) - at(-FRACTION)) / (2.0 * FRACTION * view.system.grid.step())
     }
@@ -99,14 +122,14 @@ impl Channel {
     }
 
     /// Value of [`Channel::sensed`].
-    fn observed_value(&self, view: SimulatedRecord, i: usize) -> f64 {
+    pub(crate) fn observed_value(&self, view: SimulatedRecord, i: usize) -> f64 {
         match (
             self.kind(),
             self.place(view, i).as_node(),
             self.base().is_empty(),
         ) {
             (ChannelKind::Displacement, Some(node), true) => view.response.displacement[node],
-            _ => self.sensed(view, i).value,
+            _ => self.value_at(view, i, self.place(view, i)),
         }
     }
 

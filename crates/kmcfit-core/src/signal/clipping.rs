@@ -49,6 +49,9 @@ pub fn cut_off(values: &[f64], step: f64) -> Vec<f64> {
 
 /// True for more samples at an extreme level than at the next ones, with a change beside them that no peak has.
 fn is_cut_finely(values: &[f64], level: f64, step: f64) -> bool {
+    if values.iter().filter(|y| **y == level).count() < FEW {
+        return false;
+    }
     let mut near: Vec<f64> = values.to_vec();
     near.sort_by(|a, b| (a - level).abs().total_cmp(&(b - level).abs()));
     let mut counts = near.chunk_by(|a, b| a == b).map(<[f64]>::len);
@@ -58,7 +61,7 @@ fn is_cut_finely(values: &[f64], level: f64, step: f64) -> bool {
         .windows(2)
         .filter(|w| (w[0] == level) != (w[1] == level));
     let largest = changes.map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
-    here >= FEW && here >= FEW * next && largest > CHANGE * step
+    here >= FEW * next && largest > CHANGE * step
 }
 
 /// True if the signal moves on both sides of a sample at a level.

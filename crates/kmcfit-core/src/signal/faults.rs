@@ -149,13 +149,29 @@ pub fn quantisation(values: &[f64]) -> Option<f64> {
     /// Largest number of steps in the range of the samples, and largest distance of a level from a multiple, in steps.
     const MOST: f64 = 1e7;
     const OFF: f64 = 0.02;
+    /// Number of samples that refuse a step before all are sorted, and the ratio of its limit to that of all: samples that count as equal
+    /// may be part of a difference.
+    const SOME: usize = 8192;
+    const SLACK: f64 = 4.0;
+    let smallest_of = |levels: &[f64]| levels.windows(2).map(|w| w[1] - w[0]).reduce(f64::min);
+    if values.len() > 2 * SOME {
+        let mut levels = values[..SOME].to_vec();
+        let ends = [f64::INFINITY, f64::NEG_INFINITY];
+        let ends = (values.iter()).fold(ends, |r, y| [r[0].min(*y), r[1].max(*y)]);
+        let same = 4.0 * f64::EPSILON * ends[0].abs().max(ends[1].abs());
+        levels.sort_by(f64::total_cmp);
+        levels.dedup_by(|a, b| *a - *b <= same);
+        let smallest = smallest_of(&levels);
+        if smallest.is_some_and(|smallest| ends[1] - ends[0] > SLACK * MOST * smallest) {
+            return None;
+        }
+    }
     let mut levels = values.to_vec();
     levels.sort_by(f64::total_cmp);
     let (first, last) = (*levels.first()?, *levels.last()?);
     let same = 4.0 * f64::EPSILON * first.abs().max(last.abs());
     levels.dedup_by(|a, b| *a - *b <= same);
-    let steps = levels.windows(2).map(|w| w[1] - w[0]);
-    let smallest = steps.reduce(f64::min)?;
+    let smallest = smallest_of(&levels)?;
     if values.len() < 20 || levels.len() < 3 || last - first > MOST * smallest {
         return None;
     }

@@ -27,7 +27,7 @@ pub use clipping::{clipped, cut_off};
 pub use decimate::{decimate, decimation_filter};
 pub use faults::{dropouts, quantisation, spikes};
 pub use filter::{SecondOrder, band_pass, high_pass, low_pass, zero_phase, zero_phase_transpose};
-pub(crate) use fourier::{forward_transform, of_pair};
+pub(crate) use fourier::RealTransform;
 pub use frequency_response::{Mobility, driven_oscillator, two_forced_modes};
 pub use interpolate::{Interpolation, Signal};
 pub use modes::two_modes;

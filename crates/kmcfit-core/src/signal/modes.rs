@@ -1,6 +1,7 @@
 //! Modes of vibration in a free response, from its spectrum.
 
 use super::Spectrum;
+use super::median;
 
 /// Fewest values of a record.
 const FEWEST: usize = 256;
@@ -25,9 +26,7 @@ pub fn two_modes(values: &[f64], spacing: f64) -> Option<[f64; 2]> {
     let spectrum = Spectrum::of(&values[..values.len() / 2], spacing)?;
     let density = spectrum.density();
     (density.len() >= FEWEST / 4).then_some(())?;
-    let mut sorted = density.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let floor = sorted[sorted.len() / 2];
+    let floor = median(density);
     let highest = |bins: &mut dyn Iterator<Item = usize>| {
         bins.max_by(|a, b| density[*a].total_cmp(&density[*b]))
     };

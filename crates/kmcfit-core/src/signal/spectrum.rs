@@ -1,9 +1,7 @@
 //! Spectra of equally spaced series.
 
-use std::f64::consts::TAU;
-
-use super::fourier::forward_transform;
-use rustfft::num_complex::Complex;
+use super::fourier::{RealTransform, Turns};
+use super::median;
 
 /// Ratio to the mean that one density of white noise in twenty thousand exceeds.
 const ABOVE_NOISE: f64 = 10.0;
@@ -39,8 +37,8 @@ pub struct Spectrum {
 
 /// The Hann window `w_j = (1 - cos(2π j/n))/2`.
 pub(super) fn hann_window(n: usize) -> Vec<f64> {
-    let weight = |j: usize| 0.5 - 0.5 * (TAU * j as f64 / n as f64).cos();
-    (0..n).map(weight).collect()
+    let turns = Turns::new(n, n);
+    (0..n).map(|j| 0.5 - 0.5 * turns.at(j).re).collect()
 }
 
 impl Spectrum {
@@ -57,15 +55,14 @@ impl Spectrum {
         }
         let mean = values.iter().sum::<f64>() / n as f64;
         let window = hann_window(n);
-        let windowed = |(w, x): (&f64, &f64)| Complex::from(w * (x - mean));
-        let mut buffer: Vec<Complex<f64>> = window.iter().zip(values).map(windowed).collect();
-        forward_transform(n).process(&mut buffer);
+        let windowed = window.iter().zip(values).map(|(w, x)| w * (x - mean));
         let squares: f64 = window.iter().map(|w| w * w).sum();
-        let density = |k: usize| {
+        let count = n / 2 + 1;
+        let mut density = Vec::with_capacity(count);
+        RealTransform::new(n, count).process(windowed, |k, x| {
             let sides = if k == 0 || 2 * k == n { 1.0 } else { 2.0 };
-            sides * spacing * buffer[k].norm_sqr() / squares
-        };
-        let density: Vec<f64> = (0..=n / 2).map(density).collect();
+            density.push(sides * spacing * x.norm_sqr() / squares);
+        });
         let whole: f64 = density.iter().sum();
         (whole > 0.0 && whole.is_finite()).then(|| Self {
             resolution: 1.0 / (n as f64 * spacing),
@@ -137,9 +134,7 @@ impl Spectrum {
     /// assert!(spectrum.without_noise().energy_quantile(0.999) < 1.2 * frequency);
     /// ```
     pub fn without_noise(&self) -> Self {
-        let mut sorted = self.density.clone();
-        sorted.sort_by(f64::total_cmp);
-        let floor = sorted[sorted.len() / 2] / std::f64::consts::LN_2;
+        let floor = median(&self.density) / std::f64::consts::LN_2;
         let kept = |density: &f64| {
             if *density > ABOVE_NOISE * floor {
                 *density
@@ -176,6 +171,7 @@ impl Spectrum {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     fn tones(n: usize, spacing: f64, tones: &[(f64, f64)]) -> Vec<f64> {
         let at = |t: f64| -> f64 {

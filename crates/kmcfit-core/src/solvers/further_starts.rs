@@ -17,6 +17,7 @@ use crate::functions::CoefficientKind;
 use crate::host::Instant;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, Weighting};
+use crate::signal::median;
 use crate::simulate::SimulationError;
 use std::sync::atomic::Ordering;
 
@@ -162,9 +163,7 @@ fn without_outliers(problem: &Problem, theta: &[f64]) -> Option<Vec<f64>> {
             function.quantity,
             CoefficientKind::Mass | CoefficientKind::Stiffness
         );
-        let mut sorted = values.clone();
-        sorted.sort_by(f64::total_cmp);
-        let median = sorted[sorted.len() / 2];
+        let median = median(&values);
         let range = median / OUTLYING..=median * OUTLYING;
         if !is_wanted || median <= 0.0 || values.iter().all(|value| range.contains(value)) {
             continue;

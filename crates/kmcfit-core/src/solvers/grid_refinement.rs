@@ -1,6 +1,7 @@
 //! Refinement of an automatic grid: fits on finer grids until the discretisation error is below a tenth of the standard errors.
 //!
-//! After a fit, the problem is built with half the step and simulated with the same parameters. The changes of the predictions
+//! After a fit, the problem is simulated with half the step and the same parameters: on the same functions where these are linear between
+//! the nodes, otherwise built anew. The changes of the predictions
 //! give the shift of the estimates by the discretisation error ([`Problem::shift_by_steps`]), and by the order of the stepper the
 //! number of nodes for which it is small enough. The next fit starts from the estimates, or from the start values where the
 //! response changes so much that the estimates belong to another system.
@@ -11,6 +12,7 @@ use super::rounds::is_ended;
 use super::termination::Status;
 use crate::functions::Basis;
 use crate::number_format::significant;
+use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
 use serde::Serialize;
@@ -34,6 +36,9 @@ const OTHER_SYSTEM: f64 = 0.01;
 const FACTORS: [f64; 2] = [1.1, 16.0];
 /// Smallest observed order of convergence: that of a jump within a step.
 const LEAST_ORDER: f64 = 1.0;
+/// Largest second difference of a function at the nodes, relative to its largest value, for which it is linear between the nodes: its
+/// deviation in between changes no response by a share of [`RESOLUTION`].
+const LINEAR: f64 = 1e-10;
 /// Largest number of finer grids.
 const ROUNDS: usize = 6;
 
@@ -205,32 +210,35 @@ impl GridError {
         if !found.is_explained() {
             return None;
         }
-        let theta = &fit.best.parameters;
-        let finer = on_nodes(2 * nodes(problem) - 1)?;
-        let finer_theta = carried(found, &finer)?;
-        let Ok(halved) = finer.evaluate(&finer_theta) else {
+        let evaluation = &fit.best.evaluation;
+        let changes = match are_linear_between_nodes(evaluation) {
+            true => problem.on_half_step(evaluation).map(|halved| {
+                let changes = halved?.changes.into_iter().flatten();
+                Some(changes.collect())
+            }),
+            false => Ok(None),
+        };
+        let changes = match changes {
+            Ok(None) => changes_on_finer_grid(found, on_nodes),
+            changes => changes,
+        };
+        let Ok(changes) = changes else {
             return Some(Self {
                 shift: None,
                 change: f64::INFINITY,
             });
         };
-        let pairs = problem.predicted(&fit.best.evaluation);
-        let pairs = pairs.zip(halved.predictions.iter().flatten());
+        let changes: Vec<Vec<f64>> = changes?;
         let mut change = 0.0f64;
-        let mut changes = Vec::new();
-        for ((channel, here), there) in pairs {
-            if here.len() != there.len() {
-                return None;
-            }
-            let of_channel: Vec<f64> = there.iter().zip(here).map(|(a, b)| a - b).collect();
+        for (channel, of_channel) in problem.channels().zip(&changes) {
             let largest = |list: &[f64]| list.iter().fold(0.0f64, |most, x| most.max(x.abs()));
-            let most = largest(&of_channel);
+            let most = largest(of_channel);
             if most > 0.0 {
                 change = change.max(most / largest(channel.observed()));
             }
-            changes.push(of_channel);
         }
-        let shift = problem.shift_by_steps(theta, &fit.best.evaluation, changes)?;
+        let theta = &fit.best.parameters;
+        let shift = problem.shift_by_steps(theta, evaluation, changes)?;
         Some(Self {
             shift: Some(shift),
             change,
@@ -281,6 +289,37 @@ impl GridError {
         let error = self.shift.unwrap_or(f64::INFINITY);
         (error > LARGEST_ERROR).then_some(GridNotice::GridLimited { nodes, error })
     }
+}
+
+/// True for functions that a grid of half the step has at the same values as linear interpolation.
+fn are_linear_between_nodes(evaluation: &Evaluation) -> bool {
+    let sets = std::iter::once(&evaluation.nodal).chain(&evaluation.own_nodal);
+    sets.flat_map(|nodal| nodal.functions()).all(|values| {
+        let largest = values.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        let bends = values.windows(3).map(|w| w[0] - 2.0 * w[1] + w[2]);
+        bends.fold(0.0f64, |most, x| most.max(x.abs())) <= LINEAR * largest
+    })
+}
+
+/// Changes of the predictions of each channel on a grid of half the step, built anew; `None` where it cannot be.
+fn changes_on_finer_grid<T>(
+    found: &RefinedFit<T>,
+    on_nodes: &mut OnNodes,
+) -> Result<Option<Vec<Vec<f64>>>, SimulationError> {
+    let problem = &found.problem;
+    let finer = on_nodes(2 * nodes(problem) - 1);
+    let finer = finer.and_then(|finer| Some((carried(found, &finer)?, finer)));
+    let Some((theta, finer)) = finer else {
+        return Ok(None);
+    };
+    let halved = finer.evaluate(&theta)?;
+    let pairs = problem.predicted(&found.fit.best.evaluation);
+    let pairs = pairs.zip(halved.predictions.iter().flatten());
+    let each = pairs.map(|((_, here), there)| {
+        let change = || there.iter().zip(here).map(|(a, b)| a - b).collect();
+        (here.len() == there.len()).then(change)
+    });
+    Ok(each.collect())
 }
 
 /// Parameters of a fit for the same problem on another grid; `None` for functions with one value per node.

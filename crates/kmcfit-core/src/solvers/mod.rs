@@ -58,7 +58,7 @@ pub use history::{IterationRecord, number_or_nan};
 pub(crate) use input_errors::input_error_effect;
 pub use iterate::Iterate;
 pub(crate) use linearization::{
-    add_penalties, add_priors, add_soft, linear_predictions, weighted_jacobian,
+    add_penalties, add_priors, add_soft, linear_predictions, reduced_jacobian, weighted_jacobian,
 };
 pub(crate) use methods::equation_error::TESTED_TERMS;
 pub use methods::equation_error::{

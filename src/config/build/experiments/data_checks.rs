@@ -14,9 +14,10 @@ use crate::magnitudes::{Magnitude, implausible, mains_hum};
 use kmcfit_core::internals::diagnostics::{detrended, outlier_indices, standard_deviation};
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::signal::{
-    Interpolation, Signal, Spectrum, driven_oscillator, onset, two_forced_modes, two_modes,
+    Interpolation, Signal, Spectrum, driven_oscillator, median, onset, two_forced_modes, two_modes,
 };
 use kmcfit_core::internals::system::round_time;
+use kmcfit_core::internals::threads::both;
 use std::f64::consts::{PI, TAU};
 
 /// Factors between units that a ratio between channels, or between a sample and the given state, suggests.
@@ -54,16 +55,25 @@ const FEWEST_IN_A_PERIOD: f64 = 4.0;
 /// Warnings about the record of experiment `i`.
 pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord) -> Vec<Finding> {
     let name = file.experiment_name(i);
-    let mut warnings = unit_factors(spec, record);
-    warnings.extend(magnitudes(record));
-    warnings.extend(implied_mass(file, record));
-    warnings.extend(opposite_signs(spec, record));
-    warnings.extend(record.channels.iter().filter_map(|c| outliers(spec, c)));
-    // The equation error simulates no response from an initial state.
-    if !is_equation_error(file) {
-        warnings.extend(rest_before_motion(spec, record));
-    }
-    warnings.extend(modes(spec, record));
+    let of_units = || {
+        let mut warnings = unit_factors(spec, record);
+        warnings.extend(magnitudes(record));
+        warnings.extend(implied_mass(file, record));
+        warnings.extend(opposite_signs(spec, record));
+        warnings
+    };
+    let of_motion = || {
+        let outliers = record.channels.iter().filter_map(|c| outliers(spec, c));
+        let mut warnings: Vec<DataWarning> = outliers.collect();
+        // The equation error simulates no response from an initial state.
+        if !is_equation_error(file) {
+            warnings.extend(rest_before_motion(spec, record));
+        }
+        warnings.extend(modes(spec, record));
+        warnings
+    };
+    let (mut warnings, others) = both(of_units, of_motion);
+    warnings.extend(others);
     let place = format!("experiments[{i}] ({name})");
     let each = warnings.iter();
     each.map(|warning| warning.at(&place).with("experiment", &name))
@@ -300,9 +310,7 @@ fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<DataWarning> 
     if !channel.is_squared() {
         return None;
     }
-    let mut sorted = channel.values.clone();
-    sorted.sort_by(f64::total_cmp);
-    let level = sorted[sorted.len() / 2];
+    let level = median(&channel.values);
     let away: Vec<f64> = channel.values.iter().map(|value| value - level).collect();
     let far = outlier_indices(&away);
     let first = *far.first()?;

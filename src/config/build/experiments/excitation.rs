@@ -2,7 +2,7 @@
 
 use super::column_samples::{self, ColumnRequest};
 use super::data_facts::{DataAction, DataFact, RecordNotes};
-use super::faults::{Column, coarse_step};
+use super::faults::{Column, is_coarse, quantisation_step};
 use crate::config::ModelFile;
 use crate::config::spec::{ExperimentSpec, ForceShape, ForceSpec};
 use crate::config::values::Number;
@@ -207,8 +207,9 @@ fn signal(
         is_input: true,
         is_robust: false,
     };
-    column.check(&mut source, notes);
-    if let Some(step) = coarse_step(&source.values) {
+    let quantisation = quantisation_step(&source.values);
+    column.check(&mut source, quantisation, notes);
+    if let Some(step) = quantisation.filter(|step| is_coarse(*step, &source.values)) {
         let fact = DataFact::Quantisation {
             channel: column.name.to_owned(),
             step: step / source.unit.factor(),

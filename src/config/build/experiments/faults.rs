@@ -37,10 +37,12 @@ struct Faulty {
 }
 
 impl Column<'_> {
-    /// States the faults of the samples, sets those that the model excludes to NaN, and returns the number of each.
+    /// States the faults of the samples, with the quantisation step `step`, sets those that the model excludes to NaN, and returns the
+    /// number of each.
     pub fn check(
         &self,
         source: &mut ColumnSamples,
+        step: Option<f64>,
         notes: &mut RecordNotes,
     ) -> Vec<(usize, String)> {
         let present: Vec<usize> = (0..source.values.len())
@@ -52,7 +54,7 @@ impl Column<'_> {
             return Vec::new();
         }
         self.gaps(&times, notes);
-        let step = quantisation(&values).unwrap_or(0.0);
+        let step = step.unwrap_or(0.0);
         let mut excluded = Vec::new();
         for Faulty { fault, samples } in self.faulty(&times, &values, step) {
             let excludes = self.excludes(fault);
@@ -275,13 +277,18 @@ fn is_sustained(values: &[f64], spikes: &[usize]) -> bool {
     rms > SUSTAINED * largest
 }
 
-/// Quantisation step of the samples that is worth stating, SI.
-pub fn coarse_step(values: &[f64]) -> Option<f64> {
+/// Quantisation step of the samples, SI.
+pub fn quantisation_step(values: &[f64]) -> Option<f64> {
     let present: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
-    let range = present
+    quantisation(&present)
+}
+
+/// True for a quantisation step that is worth stating.
+pub fn is_coarse(step: f64, values: &[f64]) -> bool {
+    let range = values
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |r, y| {
             [r[0].min(*y), r[1].max(*y)]
         });
-    quantisation(&present).filter(|step| *step > FINE * (range[1] - range[0]))
+    step > FINE * (range[1] - range[0])
 }

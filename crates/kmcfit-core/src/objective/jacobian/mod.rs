@@ -227,7 +227,7 @@ fn add_sensor(channel: &Channel, view: SimulatedRecord, row: usize, jacobian: &m
     let sensor = channel.sensor();
     if sensor.is_estimated() {
         for i in 0..channel.len() {
-            let factors = channel.sensor_factors(view, i, channel.sensed(view, i).value);
+            let factors = channel.sensor_factors(view, i, channel.observed_value(view, i));
             for (index, factor) in sensor.indices().into_iter().zip(factors) {
                 if let Some(index) = index {
                     jacobian[(row + i, scalars + index)] += factor;

@@ -24,6 +24,6 @@ pub use continuous_adjoint::continuous_adjoint;
 pub(crate) use continuous_adjoint::{Adjoint, AdjointEquation};
 pub use discrete_adjoint::discrete_adjoint;
 pub use forward::{forward, forward_into};
-pub use observation::{Observation, observe};
+pub use observation::{Observation, observe, observe_value};
 pub use step_jacobian::{StateChange, StepJacobian, input_derivatives, step_jacobians};
 pub use tangent::tangent;

@@ -32,6 +32,7 @@ impl Observation {
         functions: [[0.0; FUNCTIONS]; 2],
     };
 
+    #[inline(always)]
     fn add(&mut self, factor: f64, other: &Self) {
         self.value += factor * other.value;
         for (a, b) in self.states.iter_mut().zip(&other.states) {
@@ -45,6 +46,7 @@ impl Observation {
     }
 
     /// One of the four states of a step, as a value with derivatives.
+    #[inline(always)]
     fn state(index: usize, value: f64) -> Self {
         let mut sensed = Self::NOTHING;
         sensed.value = value;
@@ -60,6 +62,7 @@ impl Observation {
 ///
 /// # Panics
 /// If `place` is not within `states`.
+#[inline(always)]
 pub fn observe(
     system: &System,
     kind: ChannelKind,
@@ -86,7 +89,22 @@ pub fn observe(
     }
 }
 
+/// Value of [`observe`]: in one place, where its derivatives are not computed.
+#[inline(never)]
+pub fn observe_value(
+    system: &System,
+    kind: ChannelKind,
+    nodal: &NodalCoefficients,
+    excitation: Option<&Excitation>,
+    states: &Trajectory,
+    place: TimePoint,
+    input: InputSample,
+) -> f64 {
+    observe(system, kind, nodal, excitation, states, place, input).value
+}
+
 /// Cubic Hermite weights at `x` of a step of length `h`: value and slope on the left, on the right.
+#[inline(always)]
 fn hermite(x: f64, h: f64) -> [f64; 4] {
     let (x2, x3) = (x * x, x * x * x);
     [
@@ -97,6 +115,7 @@ fn hermite(x: f64, h: f64) -> [f64; 4] {
     ]
 }
 
+#[inline(always)]
 fn displacement(h: f64, states: &Trajectory, place: TimePoint) -> Observation {
     let (y, v, i) = (&states.displacement, &states.velocity, place.step);
     match place.fraction {
@@ -114,6 +133,7 @@ fn displacement(h: f64, states: &Trajectory, place: TimePoint) -> Observation {
     }
 }
 
+#[inline(always)]
 fn velocity(equation: EquationOfMotion, states: &Trajectory, place: TimePoint) -> Observation {
     let (y, v, i) = (&states.displacement, &states.velocity, place.step);
     match place.fraction {
@@ -147,6 +167,7 @@ fn velocity(equation: EquationOfMotion, states: &Trajectory, place: TimePoint) -
 }
 
 /// Acceleration `y'' = (f - sum_j p_j phi_j) / m - b''` at fraction `x` of step `i`, at the state `(y, v)`.
+#[inline(always)]
 fn acceleration(
     equation: EquationOfMotion,
     i: usize,

@@ -8,7 +8,7 @@ use crate::qp::Subproblem;
 use crate::simd::LANES;
 use crate::simd::tall_qr::Triangle;
 use crate::solvers::timings::{Timings, timed};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::time::Duration;
 
 /// Number of columns up to which the reduction of a block of rows is as fast as reading the clock.
@@ -27,6 +27,13 @@ impl Reduced {
     /// True if the Jacobian of a problem can be reduced block by block ([`Problem::each_row_block`]) with a benefit.
     pub fn is_computed_by_blocks(problem: &Problem) -> bool {
         problem.is_computed_by_blocks() && problem.sample_count() > problem.parameters()
+    }
+
+    /// Reduction of the whole Jacobian of the predictions.
+    pub(super) fn of(jacobian: &DMatrix<f64>, residuals: &Residuals) -> Self {
+        let Residuals { roots, weighted } = residuals;
+        let (triangle, order) = Triangle::of(jacobian, roots, weighted);
+        Self { triangle, order }
     }
 
     /// Reduction at an evaluated point, in one pass.
@@ -86,6 +93,18 @@ impl Reduced {
         sub
     }
 
+    /// The same as a matrix `R` in the order of the parameters and the right-hand side `b`, with the rest in a row of its own.
+    pub(super) fn matrix(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let n = self.order.len();
+        let (mut matrix, mut right) = (DMatrix::zeros(n + 1, n), DVector::zeros(n + 1));
+        for (i, (entries, b)) in self.triangle.rows().enumerate() {
+            entries.for_each(|(place, r)| matrix[(i, self.order[place])] = r);
+            right[i] = b;
+        }
+        right[n] = self.triangle.rest();
+        (matrix, right)
+    }
+
     /// Gradient of the misfit; `None` where it is not finite.
     pub fn misfit_gradient(&self) -> Option<Vec<f64>> {
         let mut gradient = vec![0.0; self.order.len()];
@@ -117,8 +136,7 @@ pub(super) fn of_whole_jacobian(
     timed(&mut timings.linear_algebra, || {
         let Residuals { roots, weighted } = &residuals;
         if jacobian.nrows() > jacobian.ncols() {
-            let (triangle, order) = Triangle::of(&jacobian, roots, weighted);
-            return Reduced { triangle, order }.subproblem();
+            return Reduced::of(&jacobian, &residuals).subproblem();
         }
         let mut sub = empty(jacobian.ncols());
         for ((row, root), r) in jacobian.row_iter().zip(roots).zip(weighted) {

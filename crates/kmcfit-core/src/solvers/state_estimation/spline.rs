@@ -10,6 +10,7 @@ use super::{Kinematics, MOST_NODES, noise_of, unsensed};
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 use crate::record::{Channel, ChannelKind, Experiment, Weighting};
+use crate::signal::median_spacing;
 use crate::signal::{Interpolation, Signal, Spectrum};
 use crate::simd::sum::rms;
 use crate::simulate::Trajectory;
@@ -121,11 +122,10 @@ impl<'a> Plain<'a> {
 
     /// Median spacing of the samples, s.
     fn spacing(&self) -> f64 {
-        let mut spacings: Vec<f64> = (self.channel.times().windows(2))
-            .map(|w| w[1] - w[0])
-            .collect();
-        spacings.sort_by(f64::total_cmp);
-        spacings.get(spacings.len() / 2).copied().unwrap_or(0.0)
+        match self.channel.times() {
+            [] | [_] => 0.0,
+            times => median_spacing(times),
+        }
     }
 
     /// Spectrum of equally spaced values, interpolated linearly between the samples.

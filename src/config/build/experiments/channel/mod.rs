@@ -5,7 +5,7 @@ mod sampling;
 
 use super::column_samples::{self, ColumnRequest};
 use super::data_facts::{DataFact, RecordNotes};
-use super::faults::{Column, coarse_step};
+use super::faults::{Column, is_coarse, quantisation_step};
 use super::warning::DataWarning;
 use super::{ChannelNote, names};
 use crate::config::ModelFile;
@@ -228,8 +228,11 @@ fn read_one(
     let mut ignored = Vec::new();
     let loss = loss(file, &key, of_kind)?;
     let missing = source.values.iter().filter(|v| v.is_nan()).count();
-    let step =
-        coarse_step(&source.values).filter(|_| spec.band.is_none() && spec.decimate.is_none());
+    let quantisation = quantisation_step(&source.values);
+    let is_stated = |step: &f64| {
+        spec.band.is_none() && spec.decimate.is_none() && is_coarse(*step, &source.values)
+    };
+    let step = quantisation.filter(is_stated);
     let column = Column {
         file,
         experiment: i,
@@ -238,7 +241,7 @@ fn read_one(
         is_input: false,
         is_robust: loss != Loss::Squares,
     };
-    let excluded = column.check(&mut source, notes);
+    let excluded = column.check(&mut source, quantisation, notes);
     if source.outside > 0 {
         ignored.push((source.outside, "outside the window".to_owned()));
     }
