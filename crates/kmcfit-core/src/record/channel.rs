@@ -3,6 +3,7 @@
 use super::{ChannelKind, Loss, NoiseEstimate, NoiseModel, Sensor, Weighting};
 use crate::signal::{SecondOrder, zero_phase};
 use crate::system::{Excitation, Grid, InputQuantity, InputSample, TimePoint};
+use std::sync::Arc;
 
 /// The samples of one sensor.
 ///
@@ -12,11 +13,12 @@ use crate::system::{Excitation, Grid, InputQuantity, InputSample, TimePoint};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
     kind: ChannelKind,
-    times: Vec<f64>,
-    places: Vec<TimePoint>,
-    observed: Vec<f64>,
+    // Shared by copies: problems are copied often.
+    times: Arc<Vec<f64>>,
+    places: Arc<Vec<TimePoint>>,
+    observed: Arc<Vec<f64>>,
     /// Samples before the filter; empty without a filter.
-    unfiltered: Vec<f64>,
+    unfiltered: Arc<Vec<f64>>,
     weighting: Weighting,
     loss: Loss,
     pub(super) noise_model: NoiseModel,
@@ -33,6 +35,23 @@ pub struct Channel {
     on_every_node: bool,
 }
 
+/// Positions of times on the grid; `None` where one is not within the first `nodes` nodes.
+fn places(times: &[f64], grid: &Grid, nodes: usize) -> Option<Vec<TimePoint>> {
+    let place = |t: &f64| {
+        let place = TimePoint::of(grid, *t)?;
+        match place.as_node() {
+            Some(node) => (node < nodes).then(|| TimePoint::node(node, nodes)),
+            None => (place.step + 1 < nodes).then_some(place),
+        }
+    };
+    times.iter().map(place).collect()
+}
+
+/// True if sample `i` lies on node `i`.
+fn are_all_nodes(places: &[TimePoint]) -> bool {
+    (places.iter().enumerate()).all(|(i, p)| p.as_node() == Some(i))
+}
+
 impl Channel {
     /// A channel of samples `values` (in the SI unit of `kind`) at `times` (s, increasing), for a response over the first `nodes` nodes
     /// of `grid`; `None` unless there is at least one sample, one time for each, and all times are within the response.
@@ -44,24 +63,15 @@ impl Channel {
         grid: &Grid,
         nodes: usize,
     ) -> Option<Self> {
-        let place = |t: &f64| {
-            let place = TimePoint::of(grid, *t)?;
-            match place.as_node() {
-                Some(node) => (node < nodes).then(|| TimePoint::node(node, nodes)),
-                None => (place.step + 1 < nodes).then_some(place),
-            }
-        };
-        let places: Option<Vec<TimePoint>> = times.iter().map(place).collect();
         let fits = times.len() == values.len() && !values.is_empty();
-        let places = places?;
-        let on_every_node = (places.iter().enumerate()).all(|(i, p)| p.as_node() == Some(i));
-        fits.then_some(Self {
+        let places = places(&times, grid, nodes)?;
+        fits.then(|| Self {
             kind,
-            on_every_node,
-            places,
-            times,
-            observed: values,
-            unfiltered: Vec::new(),
+            on_every_node: are_all_nodes(&places),
+            places: Arc::new(places),
+            times: Arc::new(times),
+            observed: Arc::new(values),
+            unfiltered: Arc::default(),
             weighting,
             loss: Loss::Squares,
             noise_model: NoiseModel::default(),
@@ -175,8 +185,8 @@ impl Channel {
             false => zero_phase(&self.filter, noise),
         };
         let pairs = predicted.iter().zip(&filtered);
-        self.observed = pairs.map(|(y, e)| y + e).collect();
-        self.unfiltered.clear();
+        self.observed = Arc::new(pairs.map(|(y, e)| y + e).collect());
+        self.unfiltered = Arc::default();
         self
     }
 
@@ -187,8 +197,8 @@ impl Channel {
             return Some(self.clone());
         }
         (!self.unfiltered.is_empty()).then(|| Self {
-            observed: self.unfiltered.clone(),
-            unfiltered: Vec::new(),
+            observed: Arc::clone(&self.unfiltered),
+            unfiltered: Arc::default(),
             filter: Vec::new(),
             ..self.clone()
         })
@@ -201,8 +211,8 @@ impl Channel {
     #[must_use]
     pub(crate) fn with_samples(mut self, samples: Vec<f64>) -> Self {
         assert_eq!(samples.len(), self.len(), "one in place of each");
-        self.observed = samples;
-        self.unfiltered.clear();
+        self.observed = Arc::new(samples);
+        self.unfiltered = Arc::default();
         self
     }
 
@@ -232,7 +242,7 @@ impl Channel {
 
     fn filter_samples(&mut self) {
         if !self.unfiltered.is_empty() {
-            self.observed = zero_phase(&self.filter, &self.unfiltered);
+            self.observed = Arc::new(zero_phase(&self.filter, &self.unfiltered));
         }
     }
 
@@ -256,10 +266,10 @@ impl Channel {
             noise_model: self.noise_model,
             noise,
             kind: self.kind,
-            times: short(&self.times),
-            places: self.places[..count.min(self.len())].to_vec(),
-            observed: short(&self.observed),
-            unfiltered: short(&self.unfiltered),
+            times: Arc::new(short(&self.times)),
+            places: Arc::new(self.places[..count.min(self.len())].to_vec()),
+            observed: Arc::new(short(&self.observed)),
+            unfiltered: Arc::new(short(&self.unfiltered)),
             weighting,
             loss: self.loss,
             sensor: self.sensor,
@@ -287,17 +297,10 @@ impl Channel {
 
     /// The channel on another grid over the same time; `None` if a sample does not lie on it.
     pub fn on(&self, grid: &Grid, nodes: usize) -> Option<Self> {
-        let unfiltered = Self::new(
-            self.kind,
-            self.times.clone(),
-            self.observed.clone(),
-            self.weighting.clone(),
-            grid,
-            nodes,
-        )?;
+        let places = places(&self.times, grid, nodes)?;
         Some(Self {
-            places: unfiltered.places,
-            on_every_node: unfiltered.on_every_node && !self.sensor.is_delayed(),
+            on_every_node: are_all_nodes(&places) && !self.sensor.is_delayed(),
+            places: Arc::new(places),
             ..self.clone()
         })
     }

@@ -3,22 +3,23 @@
 use super::TimePoint;
 use super::integrator::StagePosition;
 use serde::Serialize;
+use std::sync::Arc;
 
 /// A function of time at the left end, the middle and the right end of every step. The value at a right end is the limit from the
 /// left, so a jump at a node belongs to the following step.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StageSamples(Vec<[f64; 3]>);
+pub struct StageSamples(Arc<Vec<[f64; 3]>>);
 
 impl StageSamples {
     /// Values at the left end, middle and right end of each step.
     pub fn new(steps: Vec<[f64; 3]>) -> Self {
-        Self(steps)
+        Self(Arc::new(steps))
     }
 
     /// The piecewise linear function through `nodes`.
     pub fn linear(nodes: &[f64]) -> Self {
         let step = |w: &[f64]| [w[0], (w[1] + w[0]) * 0.5, w[1]];
-        Self(nodes.windows(2).map(step).collect())
+        Self::new(nodes.windows(2).map(step).collect())
     }
 
     /// Number of steps.
@@ -89,7 +90,7 @@ impl Excitation {
                     [middle, 0.5 * (middle + right), right],
                 ]
             });
-            StageSamples(halves.collect())
+            StageSamples::new(halves.collect())
         };
         Self {
             force: self.force.as_ref().map(halves),
@@ -123,9 +124,9 @@ impl Excitation {
         *part = Some(match part {
             None => added,
             Some(part) => {
-                let pairs = part.0.iter().zip(&added.0);
+                let pairs = part.0.iter().zip(added.0.iter());
                 let step = |(a, b): (&[f64; 3], &[f64; 3])| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
-                StageSamples(pairs.map(step).collect())
+                StageSamples::new(pairs.map(step).collect())
             }
         });
         sum
