@@ -104,7 +104,7 @@ impl FittedModel<'_> {
         })
     }
 
-    /// The result document, beside which the figures of [`FittedModel::drawn_channels`] are drawn if figures are requested.
+    /// The result document, beside which the figures of the channels are drawn if figures are requested.
     pub fn document_and_figures(&self) -> ResultDocument {
         if !self.requested.figures {
             return self.document();
