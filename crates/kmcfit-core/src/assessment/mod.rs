@@ -159,6 +159,7 @@ impl FitAssessment {
             assessment.plausibility.warnings.extend(causes);
             assessment.model_tests.extensions = tests;
         }
+        // Its Jacobian is as large as those that follow.
         drop(score_tests);
         let mut gaps = Vec::new();
         if reports_errors && assessment.plausibility.errors_hold {
