@@ -80,7 +80,13 @@ impl Workshop {
 fn workshop() -> &'static Workshop {
     static WORKSHOP: OnceLock<Workshop> = OnceLock::new();
     WORKSHOP.get_or_init(|| {
-        let folder = tempfile::tempdir().expect("a folder");
+        // In memory where that can be had: each input is written and synced.
+        let memory = Path::new("/dev/shm");
+        let folder = match memory.is_dir() {
+            true => tempfile::tempdir_in(memory),
+            false => tempfile::tempdir(),
+        };
+        let folder = folder.expect("a folder");
         let shipped = Path::new(env!("CARGO_MANIFEST_DIR"));
         let shipped = match shipped.join("data").is_dir() {
             true => shipped.join("data"),

@@ -1,5 +1,5 @@
 //! Every operation that writes, renames, syncs, removes or spawns fails once, fails from then on, or is the moment of a
-//! kill (`src/faults.rs`), for every command that writes files.
+//! kill (`src/faults.rs`), for every command that writes files. `.ci/long faults` tries each operation, the short run every second one.
 
 use crate::tree::{Entry, Tree, settled, tree, whole_run};
 use crate::workbench::{MODEL, Workbench};
@@ -13,7 +13,7 @@ struct Case {
     /// Folders of runs that it writes, and single files that belong together.
     runs: &'static [&'static str],
     files: &'static [&'static str],
-    /// Stride of the tried operations: long commands have many.
+    /// Stride of the tried operations in the long run: long commands have many.
     stride: usize,
 }
 
@@ -202,7 +202,11 @@ fn check(case: &Case, mode: Mode, over_an_older_run: bool) {
         case.arguments
     );
     let new_files = tree(&whole.path(""));
-    let mut number = 1;
+    // Each second one in the short run: odd ones over an empty folder, even ones over older results.
+    let (mut number, stride) = match is_long() {
+        true => (1, case.stride),
+        false => (1 + usize::from(over_an_older_run), 2 * case.stride),
+    };
     let mut tried = 0;
     loop {
         let bench = Workbench::in_memory();
@@ -282,7 +286,7 @@ fn check(case: &Case, mode: Mode, over_an_older_run: bool) {
             let (code, _, stderr) = bench.run(case.arguments);
             assert_eq!(code, expected, "{what}, then without: {stderr}");
         }
-        number += case.stride;
+        number += stride;
     }
     assert!(tried >= 5, "{:?}: {tried} faults", case.arguments);
     println!("{:?}: {tried} faults", case.arguments);
@@ -311,13 +315,16 @@ fn is_new(found: &Tree, whole: &Path, what: &str) {
     }
 }
 
+fn is_long() -> bool {
+    std::env::var_os("KMCFIT_LONG").is_some()
+}
+
 fn check_all(mode: Mode) {
     if !cfg!(debug_assertions) {
         eprintln!("SKIPPED: faults are injected in builds with debug assertions only");
         return;
     }
-    let is_long = std::env::var_os("KMCFIT_LONG").is_some();
-    for case in CASES.iter().chain(is_long.then_some(&DEMO)) {
+    for case in CASES.iter().chain(is_long().then_some(&DEMO)) {
         for over_an_older_run in [false, true] {
             check(case, mode, over_an_older_run);
         }
