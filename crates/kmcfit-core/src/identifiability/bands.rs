@@ -456,12 +456,16 @@ impl Maker<'_> {
         let functions = &self.problem.functions;
         let first = functions.ranges()[f].start;
         let own = functions.get(f).design.row(i).map(|(j, _)| first + j);
-        let mut rows: Vec<usize> = own
-            .flat_map(|j| self.bounds_of[j].iter().copied())
-            .collect();
-        rows.sort_unstable();
-        rows.dedup();
-        for (inwards, length) in rows.into_iter().map(|r| &self.inwards[r]) {
+        let mut lists: Vec<&[usize]> = own.map(|j| self.bounds_of[j].as_slice()).collect();
+        // Each row of these ascending lists once, in ascending order: bounds at all nodes are thousands of rows.
+        let rows = std::iter::from_fn(|| {
+            let next = *lists.iter().filter_map(|list| list.first()).min()?;
+            for list in &mut lists {
+                *list = list.strip_prefix(&[next]).unwrap_or(list);
+            }
+            Some(next)
+        });
+        for (inwards, length) in rows.map(|r| &self.inwards[r]) {
             let dot: f64 = inwards.iter().zip(&slope).map(|(a, b)| a * b).sum();
             let cosine = dot / (length * size).max(f64::MIN_POSITIVE);
             if cosine.abs() > 1.0 - HELD {
