@@ -111,13 +111,12 @@ impl Heading {
     /// Adds a file to the sources.
     #[must_use]
     pub fn with_file(mut self, file: PathBuf) -> Self {
-        // A file that no command reads needs no digest, which takes half a minute for ten gigabytes.
-        let is_readable = file.metadata().is_ok_and(|is| is.len() <= LONGEST_TABLE);
-        let sha256 = match is_readable {
-            true => digest_of_file(&file).ok(),
-            false => None,
-        };
-        let sha256 = sha256.unwrap_or_else(|| "not readable".into());
+        // The command refuses a longer file; its digest would take half a minute for ten gigabytes.
+        let size = file.metadata().ok().map(|found| found.len());
+        let sha256 = size
+            .filter(|size| *size <= LONGEST_TABLE)
+            .and_then(|_| digest_of_file(&file).ok())
+            .unwrap_or_else(|| "not readable".into());
         self.sources.push(SourceFile { file, sha256 });
         self
     }

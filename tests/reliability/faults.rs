@@ -1,5 +1,6 @@
 //! Every operation that writes, renames, syncs, removes or spawns fails once, fails from then on, or is the moment of a
-//! kill (`src/faults.rs`), for every command that writes files. `.ci/long faults` tries each operation, the short run every second one.
+//! kill (`src/faults.rs`), for every command that writes files. The short run tries half of the operations that
+//! `.ci/long faults` tries.
 
 use crate::tree::{Entry, Tree, settled, tree, whole_run};
 use crate::workbench::{MODEL, Workbench};
@@ -202,7 +203,7 @@ fn check(case: &Case, mode: Mode, over_an_older_run: bool) {
         case.arguments
     );
     let new_files = tree(&whole.path(""));
-    // Each second one in the short run: odd ones over an empty folder, even ones over older results.
+    // The short run takes odd operations over an empty folder, even ones over older results.
     let (mut number, stride) = match is_long() {
         true => (1, case.stride),
         false => (1 + usize::from(over_an_older_run), 2 * case.stride),

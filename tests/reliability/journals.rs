@@ -21,7 +21,7 @@ fn edited_numbers_in_a_study_journal_are_not_taken_over() {
         .filter(|i| journal[*i].is_ascii_digit())
         .collect();
     let mut random = ChaCha8Rng::seed_from_u64(23);
-    for _ in 0..9 {
+    for _ in 0..18 {
         let at = digits[random.random_range(0..digits.len())];
         let mut edited = journal.clone();
         edited[at] = match edited[at] {

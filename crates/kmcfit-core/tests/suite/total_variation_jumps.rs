@@ -160,7 +160,7 @@ fn shares(seeds: u64) -> f64 {
 
 #[test]
 fn jumps_at_knots_are_found_and_their_levels_hold() {
-    let share = shares(10);
+    let share = shares(20);
     assert!((0.91..=0.98).contains(&share), "{share}");
 }
 
