@@ -263,12 +263,8 @@ impl FittedModel<'_> {
         let grid_times = &grid_times[..nodes];
         let mut snapshots: Vec<(usize, &[f64], &[f64])> = (self.fit.snapshots.iter())
             .map(|s| {
-                let response = &s.trajectories[experiment];
-                (
-                    s.iteration as usize,
-                    grid_times,
-                    response.displacement.as_slice(),
-                )
+                let displacement = s.displacements[experiment].as_slice();
+                (s.iteration as usize, grid_times, displacement)
             })
             .collect();
         let last = self.fit.history.len();

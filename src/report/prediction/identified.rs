@@ -12,6 +12,7 @@ use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::study::IdentifiedSystem;
 use kmcfit_core::internals::system::Grid;
 use nalgebra::DMatrix;
+use std::sync::Arc;
 
 /// An identified system with the noise of its channels.
 pub(super) struct SystemOfRun {
@@ -156,9 +157,8 @@ fn function(
     let largest = values.iter().fold(0.0f64, |most, x| most.max(x.abs()));
     let remainder = values.iter().zip(&own).map(|(value, own)| value - own);
     // Rounding is no fixed part.
-    function.offset = remainder
-        .map(|x| if x.abs() <= 1e-12 * largest { 0.0 } else { x })
-        .collect();
+    let fixed = remainder.map(|x| if x.abs() <= 1e-12 * largest { 0.0 } else { x });
+    function.offset = Arc::new(fixed.collect());
     function.is_known_part = is_known_part;
     Ok(function)
 }

@@ -2,6 +2,7 @@
 
 use crate::rows::Rows;
 use crate::simd::sum::largest;
+use std::sync::Arc;
 
 /// A matrix `B` of shape `nodes x parameters`.
 #[derive(Debug, Clone)]
@@ -15,8 +16,8 @@ pub enum Design {
         /// Number of nodes.
         nodes: usize,
     },
-    /// General sparse matrix, by rows.
-    Sparse(Rows),
+    /// General sparse matrix, by rows; shared by copies.
+    Sparse(Arc<Rows>),
 }
 
 impl Design {

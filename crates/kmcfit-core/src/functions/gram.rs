@@ -166,6 +166,7 @@ fn independent(gram: &CsrMatrix<f64>, lower: &CscMatrix<f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
     /// The squared norm equals the weighted sum over the nodes for every basis.
     #[test]
     fn squared_norms_equal_those_of_the_nodal_values() {
@@ -175,7 +176,7 @@ mod tests {
         for i in 0..5 {
             rows.push([(0, 1.0), (1, 0.25 * i as f64)], 0.0);
         }
-        let design = Design::Sparse(rows);
+        let design = Design::Sparse(Arc::new(rows));
         let gram = Gram::new(&design, &weights).expect("independent columns");
         let value = |i: usize| theta[0] + theta[1] * 0.25 * i as f64;
         let expected: f64 = (0..5).map(|i| weights[i] * value(i).powi(2)).sum();

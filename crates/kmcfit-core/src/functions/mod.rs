@@ -28,6 +28,7 @@ pub use total_variation::TotalVariation;
 
 use crate::rows::Rows;
 use crate::system::Grid;
+use std::sync::Arc;
 
 /// One coefficient function with its start.
 #[derive(Debug, Clone)]
@@ -45,7 +46,7 @@ pub struct CoefficientFunction {
     /// Design matrix.
     pub design: Design,
     /// Fixed part at the nodes, in the unit of the quantity.
-    pub offset: Vec<f64>,
+    pub offset: Arc<Vec<f64>>,
     /// Start of the parameters, in the unit of the quantity.
     pub start: Vec<f64>,
     /// True if positive parameters make the function positive at all times (nonnegative basis functions without a fixed part), so
@@ -63,7 +64,7 @@ impl CoefficientFunction {
             prior: None,
             basis: None,
             design: Design::Empty,
-            offset: values,
+            offset: Arc::new(values),
             start: Vec::new(),
             positive_parameters: false,
         }
@@ -108,7 +109,7 @@ impl CoefficientFunction {
             is_known_part: false,
             prior: None,
             design,
-            offset: vec![0.0; nodes],
+            offset: Arc::new(vec![0.0; nodes]),
             start,
             positive_parameters: basis.positive_parameters(),
             basis: Some(basis),
@@ -159,11 +160,11 @@ impl CoefficientFunction {
                     let right = self.design.row(step + 1).map(|(j, b)| (j, x * b));
                     rows.push(left.chain(right), 0.0);
                 }
-                Design::Sparse(rows)
+                Design::Sparse(Arc::new(rows))
             }
         };
         Self {
-            offset: offset.collect(),
+            offset: Arc::new(offset.collect()),
             design,
             ..self.clone()
         }

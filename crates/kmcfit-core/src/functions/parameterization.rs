@@ -275,7 +275,7 @@ impl Parameterization {
             let values = nodal.functions_mut().nth(place);
             let values = values.expect("a coefficient for each known part");
             let part = &self.list[f];
-            (values.iter_mut().zip(&part.offset)).for_each(|(value, known)| *value += known);
+            (values.iter_mut().zip(part.offset.iter())).for_each(|(value, known)| *value += known);
             part.design
                 .multiply_add(&theta[self.ranges[f].clone()], values);
         }

@@ -89,7 +89,7 @@ impl Component {
         let mut known = vec![false; problem.functions.nodes()];
         for function in self.given(problem) {
             let is_known = |p: &f64| *p != 0.0 || function.prior.is_some();
-            let values = known.iter_mut().zip(&function.offset);
+            let values = known.iter_mut().zip(function.offset.iter());
             values.for_each(|(k, p)| *k |= is_known(p));
         }
         known

@@ -25,9 +25,9 @@ pub struct Channel {
     pub(super) noise: NoiseEstimate,
     sensor: Sensor,
     /// Forces (N) and base accelerations (m/s^2) at the samples, if given.
-    inputs_at_samples: Option<[Vec<f64>; 2]>,
+    inputs_at_samples: Option<Arc<[Vec<f64>; 2]>>,
     /// Added to the response; empty if zero.
-    base: Vec<f64>,
+    base: Arc<Vec<f64>>,
     filter: Vec<SecondOrder>,
     /// Quantisation step of the samples, in the SI unit of the kind; 0 where unknown.
     resolution: f64,
@@ -44,7 +44,11 @@ fn places(times: &[f64], grid: &Grid, nodes: usize) -> Option<Vec<TimePoint>> {
             None => (place.step + 1 < nodes).then_some(place),
         }
     };
-    times.iter().map(place).collect()
+    let mut places = Vec::with_capacity(times.len());
+    for t in times {
+        places.push(place(t)?);
+    }
+    Some(places)
 }
 
 /// True if sample `i` lies on node `i`.
@@ -78,7 +82,7 @@ impl Channel {
             noise: NoiseEstimate::default(),
             sensor: Sensor::default(),
             inputs_at_samples: None,
-            base: Vec::new(),
+            base: Arc::default(),
             filter: Vec::new(),
             resolution: 0.0,
         })
@@ -146,7 +150,7 @@ impl Channel {
         assert_eq!(inputs.len(), self.times.len(), "one for each sample");
         let forces = inputs.iter().map(|input| input.force).collect();
         let bases = inputs.iter().map(|input| input.base).collect();
-        self.inputs_at_samples = Some([forces, bases]);
+        self.inputs_at_samples = Some(Arc::new([forces, bases]));
         self
     }
 
@@ -157,7 +161,7 @@ impl Channel {
     #[must_use]
     pub fn with_base(mut self, base: Vec<f64>) -> Self {
         assert_eq!(base.len(), self.times.len(), "one for each sample");
-        self.base = base;
+        self.base = Arc::new(base);
         self
     }
 
@@ -231,11 +235,13 @@ impl Channel {
         assert_eq!(inputs.len(), self.len(), "one for each sample");
         assert_eq!(changes.len(), self.len(), "one for each sample");
         if let Some(parts) = &mut self.inputs_at_samples {
-            let part = &mut parts[usize::from(quantity == InputQuantity::BaseAcceleration)];
+            let part =
+                &mut Arc::make_mut(parts)[usize::from(quantity == InputQuantity::BaseAcceleration)];
             part.iter_mut().zip(inputs).for_each(|(a, b)| *a += b);
         }
-        self.base.resize(self.observed.len(), 0.0);
-        let pairs = self.base.iter_mut().zip(changes);
+        let base = Arc::make_mut(&mut self.base);
+        base.resize(self.observed.len(), 0.0);
+        let pairs = base.iter_mut().zip(changes);
         pairs.for_each(|(base, change)| *base -= change);
         self
     }
@@ -274,8 +280,8 @@ impl Channel {
             loss: self.loss,
             sensor: self.sensor,
             inputs_at_samples: (self.inputs_at_samples.as_ref())
-                .map(|parts| parts.each_ref().map(|p| short(p))),
-            base: short(&self.base),
+                .map(|parts| Arc::new(parts.each_ref().map(|p| short(p)))),
+            base: Arc::new(short(&self.base)),
             filter: self.filter.clone(),
             resolution: self.resolution,
             on_every_node: self.on_every_node,
@@ -358,9 +364,9 @@ impl Channel {
     /// Force and base acceleration at sample `i`: as given, or linear over the step.
     pub(crate) fn input_at_sample(&self, excitation: Option<&Excitation>, i: usize) -> InputSample {
         match (&self.inputs_at_samples, excitation) {
-            (Some([forces, bases]), _) => InputSample {
-                force: forces[i],
-                base: bases[i],
+            (Some(inputs), _) => InputSample {
+                force: inputs[0][i],
+                base: inputs[1][i],
             },
             (None, Some(excitation)) => excitation.input_at(self.places[i]),
             (None, None) => InputSample::default(),
@@ -407,7 +413,7 @@ impl Channel {
     /// Forces (N) and base accelerations (m/s^2) at the samples, if given.
     #[inline(always)]
     pub(crate) fn inputs_at_samples(&self) -> Option<&[Vec<f64>; 2]> {
-        self.inputs_at_samples.as_ref()
+        self.inputs_at_samples.as_deref()
     }
 
     /// Filtered series of values at the samples.

@@ -1,6 +1,7 @@
 //! Interpolation of a signal between its samples.
 
 use super::spline;
+use std::sync::Arc;
 
 /// Largest distance, relative to the nearest spacing, of a time that is taken as a sample, and of a time outside the samples that is
 /// taken as their end, because times are rounded.
@@ -23,11 +24,12 @@ pub enum Interpolation {
 /// Outside the samples the first or last value holds; [`covers`](Self::covers) tests a span.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signal {
-    times: Vec<f64>,
-    values: Vec<f64>,
+    // Shared by copies: problems are copied often.
+    times: Arc<Vec<f64>>,
+    values: Arc<Vec<f64>>,
     interpolation: Interpolation,
     /// Second derivatives at the samples; empty unless cubic.
-    curvatures: Vec<f64>,
+    curvatures: Arc<Vec<f64>>,
 }
 
 impl Signal {
@@ -49,10 +51,10 @@ impl Signal {
         };
         let bent = curvatures.iter().all(|bend| bend.is_finite());
         bent.then_some(Self {
-            times,
-            values,
+            times: Arc::new(times),
+            values: Arc::new(values),
             interpolation,
-            curvatures,
+            curvatures: Arc::new(curvatures),
         })
     }
 

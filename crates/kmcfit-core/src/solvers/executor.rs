@@ -179,7 +179,7 @@ impl SearchDriver<'_, '_> {
         };
         let point = work.complete(parameters, evaluation);
         Ok(SearchProgress {
-            recorder: Recorder::new(&point, self.reference),
+            recorder: Recorder::new(work.problem(), &point, self.reference),
             point,
         })
     }
@@ -215,7 +215,8 @@ impl SearchDriver<'_, '_> {
         }
         let snapshots = state.snapshots.into_iter();
         let snapshots = snapshots.map(|(iteration, at)| (iteration, at.0)).collect();
-        let recorder = Recorder::restored(rows, &state.references.0, snapshots, responses)?;
+        let (problem, references) = (work.problem(), &state.references.0);
+        let recorder = Recorder::restored(problem, rows, references, snapshots, responses)?;
         let mut point = work.again(state.parameters.0, state.fingerprint)?;
         if state.outcome.is_none()
             && !(self.method).restore(state.memory, work.problem(), &mut point)

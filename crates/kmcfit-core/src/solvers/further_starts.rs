@@ -170,7 +170,7 @@ fn without_outliers(problem: &Problem, theta: &[f64]) -> Option<Vec<f64>> {
         }
         let inside = values
             .iter()
-            .zip(&function.offset)
+            .zip(function.offset.iter())
             .map(|(value, offset)| value.clamp(median / MOVED, median * MOVED) - offset);
         let inside: Vec<f64> = inside.collect();
         let basis = function.basis.as_ref();

@@ -2,6 +2,7 @@
 
 use super::iterate::Iterate;
 use crate::problem::Problem;
+use crate::record::{ChannelKind, Experiment};
 use crate::simulate::Trajectory;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -32,8 +33,25 @@ pub struct IterationRecord {
 pub struct ResponseSnapshot {
     /// Iteration; 0 is the start.
     pub iteration: u64,
-    /// Response of each experiment.
-    pub trajectories: Vec<Trajectory>,
+    /// Displacements (m) of each experiment at its nodes; none for an experiment without measured displacements.
+    pub displacements: Vec<Vec<f64>>,
+}
+
+impl ResponseSnapshot {
+    fn new(iteration: u64, problem: &Problem, responses: &[Trajectory]) -> Self {
+        let of = |(experiment, response): (&Experiment, &Trajectory)| {
+            let mut channels = experiment.channels.iter();
+            match channels.any(|c| c.kind() == ChannelKind::Displacement) {
+                true => response.displacement.clone(),
+                false => Vec::new(),
+            }
+        };
+        let pairs = problem.experiments.iter().zip(responses);
+        Self {
+            iteration,
+            displacements: pairs.map(of).collect(),
+        }
+    }
 }
 
 /// Iterations whose responses are kept for figures: the paper's Fig. 3b and its continuation.
@@ -60,7 +78,7 @@ pub(super) struct Recorder {
 
 impl Recorder {
     /// Starts at `start`, with ratios to `reference`, by default the start.
-    pub fn new(start: &Iterate, reference: Option<Reference>) -> Self {
+    pub fn new(problem: &Problem, start: &Iterate, reference: Option<Reference>) -> Self {
         let reference = reference.unwrap_or(Reference {
             cost: start.evaluation.cost,
             norm_squared: start.gradient.norm_squared,
@@ -73,13 +91,14 @@ impl Recorder {
             initial_norm_squared: reference.norm_squared,
             snapshot_parameters: Vec::new(),
         };
-        recorder.keep_snapshot(0, start);
+        recorder.keep_snapshot(problem, 0, start);
         recorder
     }
 
     /// Restores the history of a saved search from [`Recorder::references`] and [`Recorder::snapshot_points`], with responses
     /// computed by `at`; `None` where it is incomplete.
     pub fn restored(
+        problem: &Problem,
         rows: Vec<IterationRecord>,
         references: &[f64],
         snapshots: Vec<(u64, Vec<f64>)>,
@@ -95,10 +114,7 @@ impl Recorder {
             return None;
         }
         let restored = snapshots.iter().map(|(iteration, parameters)| {
-            Some(ResponseSnapshot {
-                iteration: *iteration,
-                trajectories: at(parameters)?,
-            })
+            Some(ResponseSnapshot::new(*iteration, problem, &at(parameters)?))
         });
         Some(Self {
             rows,
@@ -139,15 +155,13 @@ impl Recorder {
             step,
             relative_change: before.relative_change(problem, &after.parameters),
         });
-        self.keep_snapshot(iteration, after);
+        self.keep_snapshot(problem, iteration, after);
     }
 
-    fn keep_snapshot(&mut self, iteration: u64, point: &Iterate) {
+    fn keep_snapshot(&mut self, problem: &Problem, iteration: u64, point: &Iterate) {
         if SNAPSHOT_ITERATIONS.contains(&iteration) {
-            self.snapshots.push(ResponseSnapshot {
-                iteration,
-                trajectories: point.evaluation.trajectories.clone(),
-            });
+            let responses = &point.evaluation.trajectories;
+            (self.snapshots).push(ResponseSnapshot::new(iteration, problem, responses));
             self.snapshot_parameters.push(point.parameters.clone());
         }
     }

@@ -11,6 +11,7 @@ use kmcfit_core::internals::system::Grid;
 use kmcfit_core::internals::system::quadrature::trapezoid_weights;
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
+use std::sync::Arc;
 
 use crate::common::properties::properties;
 
@@ -58,7 +59,7 @@ fn times(grid: &Grid) -> Vec<f64> {
 
 fn apply(matrix: &Rows, theta: &[f64]) -> Vec<f64> {
     assert_eq!(matrix.width(), theta.len());
-    Design::Sparse(matrix.clone()).multiply(theta, matrix.len())
+    Design::Sparse(Arc::new(matrix.clone())).multiply(theta, matrix.len())
 }
 
 /// `|L theta|^2`.

@@ -17,6 +17,7 @@ use num_dual::{Dual64, DualNum};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::sync::Arc;
 
 const WIDTH: f64 = 0.3;
 const TERMS: [(Response, Term, CoefficientKind); 8] = [
@@ -404,7 +405,7 @@ fn on_few_parameters(problem: &Problem, with_knots: bool) -> Problem {
                 CoefficientFunction::free(nodal.quantity, knots.clone(), &grid, vec![start; 3])
             }
             2 => CoefficientFunction {
-                offset: nodal.start.iter().map(|x| x.abs()).collect(),
+                offset: Arc::new(nodal.start.iter().map(|x| x.abs()).collect()),
                 ..CoefficientFunction::constant(nodal.quantity, start, grid.nodes())
             },
             _ => CoefficientFunction::constant(nodal.quantity, start, grid.nodes()),

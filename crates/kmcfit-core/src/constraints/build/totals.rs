@@ -25,7 +25,10 @@ fn total(all: &All<'_>, j: usize) -> LinearForm {
     let function = all.list[j];
     let first = all.functions.ranges()[j].start;
     let weights = trapezoid_weights(all.grid.nodes(), all.grid.step());
-    let of_offset = weights.iter().zip(&function.offset).map(|(w, p)| w * p);
+    let of_offset = weights
+        .iter()
+        .zip(function.offset.iter())
+        .map(|(w, p)| w * p);
     let ends = all.ends();
     let mut form = LinearForm {
         entries: Vec::new(),

@@ -31,6 +31,8 @@ pub(super) fn matrix<S: BasisFunctions + ?Sized>(
     derivative: usize,
 ) -> Rows {
     let mut matrix = Rows::of_width(space.parameters());
+    let count = rows.size_hint().0;
+    matrix.reserve(count, count * (space.degree() + 1));
     let mut entries = Vec::new();
     for (t, factor) in rows {
         entries.clear();

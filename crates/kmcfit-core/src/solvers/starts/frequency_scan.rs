@@ -124,7 +124,7 @@ fn transferred(from: &Problem, theta: &[f64], to: &Problem) -> Vec<f64> {
         }
         let free: Vec<f64> = nodal
             .iter()
-            .zip(&function.offset)
+            .zip(function.offset.iter())
             .map(|(v, o)| v - o)
             .collect();
         let basis = function.basis.as_ref();

@@ -16,6 +16,7 @@ use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::timings::{Timings, timed};
 use crate::system::{Excitation, Grid, StageSamples, System};
 use crate::threads;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Numbers of steps: the larger one if the smaller part has too few samples. Powers of two give the truncated grid exactly the
@@ -88,7 +89,7 @@ fn shorter(function: &CoefficientFunction, nodes: usize) -> Option<CoefficientFu
     let short = match (&function.basis, function.start.as_slice()) {
         (None, []) => CoefficientFunction::fixed(function.quantity, offset),
         (Some(Basis::Constant), [start]) => CoefficientFunction {
-            offset,
+            offset: Arc::new(offset),
             ..CoefficientFunction::constant(function.quantity, *start, nodes)
         },
         _ => return None,
