@@ -3,6 +3,7 @@
 use super::{ChannelKind, Loss, NoiseEstimate, NoiseModel, Sensor, Weighting};
 use crate::signal::{SecondOrder, zero_phase};
 use crate::system::{Excitation, Grid, InputQuantity, InputSample, TimePoint};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// The samples of one sensor.
@@ -15,6 +16,8 @@ pub struct Channel {
     kind: ChannelKind,
     // Shared by copies: problems are copied often.
     times: Arc<Vec<f64>>,
+    /// Time from which a drift counts, s.
+    origin: f64,
     places: Arc<Vec<TimePoint>>,
     observed: Arc<Vec<f64>>,
     /// Samples before the filter; empty without a filter.
@@ -73,6 +76,7 @@ impl Channel {
             kind,
             on_every_node: are_all_nodes(&places),
             places: Arc::new(places),
+            origin: times[0],
             times: Arc::new(times),
             observed: Arc::new(values),
             unfiltered: Arc::default(),
@@ -273,6 +277,7 @@ impl Channel {
             noise,
             kind: self.kind,
             times: Arc::new(short(&self.times)),
+            origin: self.origin,
             places: Arc::new(self.places[..count.min(self.len())].to_vec()),
             observed: Arc::new(short(&self.observed)),
             unfiltered: Arc::new(short(&self.unfiltered)),
@@ -301,12 +306,28 @@ impl Channel {
         self.places.partition_point(|p| p.step < steps)
     }
 
-    /// The channel on another grid over the same time; `None` if a sample does not lie on it.
-    pub fn on(&self, grid: &Grid, nodes: usize) -> Option<Self> {
-        let places = places(&self.times, grid, nodes)?;
+    /// The samples `samples` before the filter, for a response over the first `nodes` nodes of another grid; `None` if one does not lie
+    /// on it.
+    pub(crate) fn part(&self, samples: Range<usize>, grid: &Grid, nodes: usize) -> Option<Self> {
+        let places = places(&self.times[samples.clone()], grid, nodes)?;
+        let cut = |list: &Arc<Vec<f64>>| match list.len() == samples.len() || list.is_empty() {
+            true => Arc::clone(list),
+            false => Arc::new(list[samples.clone()].to_vec()),
+        };
+        let inputs = self.inputs_at_samples.as_ref();
+        let inputs = inputs.map(|inputs| match samples.len() == self.len() {
+            true => Arc::clone(inputs),
+            false => Arc::new(inputs.each_ref().map(|list| list[samples.clone()].to_vec())),
+        });
         Some(Self {
             on_every_node: are_all_nodes(&places) && !self.sensor.is_delayed(),
             places: Arc::new(places),
+            times: cut(&self.times),
+            observed: cut(&self.observed),
+            base: cut(&self.base),
+            inputs_at_samples: inputs,
+            unfiltered: Arc::default(),
+            filter: Vec::new(),
             ..self.clone()
         })
     }
@@ -386,7 +407,7 @@ impl Channel {
 
     /// Time since the first sample, s.
     pub fn age(&self, i: usize) -> f64 {
-        self.times[i] - self.times[0]
+        self.times[i] - self.origin
     }
 
     /// True for displacements of an ideal sensor without a filter.

@@ -2,6 +2,7 @@
 
 use super::{Channel, Input, InputError};
 use crate::system::{Excitation, Grid, State};
+use std::ops::Range;
 
 /// One record of a system.
 #[derive(Debug, Clone)]
@@ -66,23 +67,28 @@ impl Experiment {
         }
     }
 
-    /// The experiment on a grid of half the step; `None` if a sample does not lie on it. An excitation given on the old grid is linear
-    /// between its stages.
-    pub fn halved(&self, grid: &Grid) -> Option<Self> {
-        let nodes = 2 * self.nodes - 1;
-        let channels: Option<Vec<Channel>> =
-            self.channels.iter().map(|c| c.on(grid, nodes)).collect();
+    /// The steps `steps` and the samples within them before their filters, from the state `initial`, on a grid of half the step that
+    /// begins with them; `None` if a sample does not lie on it. An excitation given on the old grid is linear between its stages.
+    pub(crate) fn halved(&self, steps: Range<usize>, initial: State, grid: &Grid) -> Option<Self> {
+        let nodes = 2 * steps.len() + 1;
+        let part = |channel: &Channel| {
+            let samples = channel.count_within(steps.start)..channel.count_within(steps.end);
+            channel.part(samples, grid, nodes)
+        };
+        let channels: Option<Vec<Channel>> = self.channels.iter().map(part).collect();
         let excitation = self
             .excitation
             .as_ref()
             .map(|old| match self.input == Input::default() {
                 false => self.input.on(grid, nodes),
-                true => old.halved(),
+                true => old.halved(steps.clone()),
             });
         Some(Self {
             channels: channels?,
             excitation,
             nodes,
+            initial,
+            initial_parameters: [None; 2],
             ..self.clone()
         })
     }

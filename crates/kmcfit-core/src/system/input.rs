@@ -3,6 +3,7 @@
 use super::TimePoint;
 use super::integrator::StagePosition;
 use serde::Serialize;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// A function of time at the left end, the middle and the right end of every step. The value at a right end is the limit from the
@@ -80,16 +81,19 @@ impl Excitation {
         zero(&self.force) && zero(&self.base)
     }
 
-    /// Excitation on steps of half the length: old stages become ends of new steps, with linear interpolation between them.
+    /// Excitation of the steps `steps` on steps of half the length: old stages become ends of new steps, with linear interpolation
+    /// between them.
     #[must_use]
-    pub fn halved(&self) -> Self {
+    pub fn halved(&self, steps: Range<usize>) -> Self {
         let halves = |part: &StageSamples| {
-            let halves = part.0.iter().flat_map(|&[left, middle, right]| {
-                [
-                    [left, 0.5 * (left + middle), middle],
-                    [middle, 0.5 * (middle + right), right],
-                ]
-            });
+            let halves = part.0[steps.clone()]
+                .iter()
+                .flat_map(|&[left, middle, right]| {
+                    [
+                        [left, 0.5 * (left + middle), middle],
+                        [middle, 0.5 * (middle + right), right],
+                    ]
+                });
             StageSamples::new(halves.collect())
         };
         Self {
@@ -184,9 +188,9 @@ mod tests {
     fn half_steps_meet_the_old_stages_and_are_linear_between() {
         let whole = Excitation {
             force: Some(StageSamples::new(vec![[1.0, 4.0, 3.0], [-2.0, 0.0, 8.0]])),
-            base: Some(StageSamples::new(vec![[0.5, 0.25, 1.0]])),
+            base: Some(StageSamples::new(vec![[0.5, 0.25, 1.0], [0.0; 3]])),
         };
-        let halves = whole.halved();
+        let halves = whole.halved(0..2);
         let force = halves.force.unwrap();
         let expected = [
             [1.0, 2.5, 4.0],
@@ -196,7 +200,10 @@ mod tests {
         ];
         assert_eq!(force.values(), expected);
         let base = halves.base.unwrap();
-        assert_eq!(base.values(), [[0.5, 0.375, 0.25], [0.25, 0.625, 1.0]]);
-        assert_eq!(Excitation::default().halved(), Excitation::default());
+        let expected = [[0.5, 0.375, 0.25], [0.25, 0.625, 1.0]];
+        assert_eq!(base.values()[..2], expected);
+        let second = whole.halved(1..2).force.unwrap();
+        assert_eq!(second.values(), &force.values()[2..]);
+        assert_eq!(Excitation::default().halved(0..0), Excitation::default());
     }
 }
