@@ -114,21 +114,11 @@ impl Rows {
 
     /// Adds `a_i^T z` to the values, which may be fewer than the rows.
     pub fn multiply_add(&self, z: &[f64], values: &mut [f64]) {
-        if self.is_column() {
-            let pairs = values.iter_mut().zip(&self.values);
-            pairs.for_each(|(value, a)| *value += a * z[0]);
-            return;
-        }
         self.each_product(z, values.len(), |i, product| values[i] += product);
     }
 
     /// Adds `sum_i y_i a_i` to `out`.
     pub fn transpose_multiply_add(&self, y: &[f64], out: &mut [f64]) {
-        if self.is_column() {
-            let pairs = self.values.iter().zip(y);
-            out[0] = pairs.fold(out[0], |sum, (a, y)| sum + a * y);
-            return;
-        }
         for (i, y) in (0..self.len()).zip(y) {
             self.row(i).for_each(|(j, a)| out[j] += a * y);
         }
@@ -136,26 +126,12 @@ impl Rows {
 
     /// Largest `|a_i^T z|`.
     pub fn largest(&self, z: &[f64]) -> f64 {
-        if self.is_column() {
-            // Rounding preserves the order of magnitudes.
-            return (largest(&self.values) * z[0]).abs();
-        }
         // Several maxima, because a single one is a chain of dependent operations.
         let mut most = [0.0f64; 4];
         self.each_product(z, self.len(), |i, product| {
             most[i % 4] = most[i % 4].max(product.abs());
         });
         largest(&most)
-    }
-
-    /// True for a single column with equal entries in all rows.
-    pub fn is_constant(&self) -> bool {
-        self.is_column() && self.values.windows(2).all(|pair| pair[0] == pair[1])
-    }
-
-    /// True for a single column with an entry in every row.
-    fn is_column(&self) -> bool {
-        self.width == 1 && !self.is_empty() && self.entries() == self.len()
     }
 
     /// Calls `act` with the index and the product with `z` of each of the first `count` rows.
@@ -173,11 +149,6 @@ impl Rows {
             };
             act(i, product);
         }
-    }
-
-    /// Starts of the rows and one past the last, columns and values.
-    pub(crate) fn compressed(&self) -> (&[usize], &[usize], &[f64]) {
-        (&self.starts, &self.columns, &self.values)
     }
 
     /// Dense matrix of the rows.

@@ -1,6 +1,6 @@
 //! Design matrices: linear maps from parameters to nodal values.
 
-use crate::rows::Rows;
+use super::LocalRows;
 use crate::simd::sum::largest;
 use std::sync::Arc;
 
@@ -16,8 +16,8 @@ pub enum Design {
         /// Number of nodes.
         nodes: usize,
     },
-    /// General sparse matrix, by rows; shared by copies.
-    Sparse(Arc<Rows>),
+    /// Sparse matrix, by rows; shared by copies.
+    Sparse(Arc<LocalRows>),
 }
 
 impl Design {

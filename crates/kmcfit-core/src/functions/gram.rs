@@ -1,12 +1,13 @@
 //! Gram matrices of the L2 inner product in parameters: `G = B^T W B` with trapezoid weights `W`.
 
-use super::Design;
+use super::{Design, LocalRows};
 use crate::rows::Rows;
 use nalgebra::DMatrix;
 use nalgebra_sparse::csc::CscCol;
 use nalgebra_sparse::factorization::CscCholesky;
 use nalgebra_sparse::{CooMatrix, CscMatrix, CsrMatrix, SparseEntry};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Smallest squared sine of the angle between a column of the design matrix and the previous ones for which they count as
 /// independent. Rounding errors are about 1e-15, and gradients are amplified by the inverse.
@@ -113,31 +114,30 @@ impl Gram {
 }
 
 /// `B^T W B`, each entry summed in the order of the rows. Neighbouring rows have mostly the same columns, those of the functions of one cell.
-fn weighted_products(rows: &Rows, weights: &[f64]) -> CsrMatrix<f64> {
-    let (starts, columns, values) = rows.compressed();
+fn weighted_products(rows: &LocalRows, weights: &[f64]) -> CsrMatrix<f64> {
     let mut products: BTreeMap<(usize, usize), f64> = BTreeMap::new();
-    let mut cell: &[usize] = &[];
+    let mut cell = 0..0;
     let mut sums: Vec<f64> = Vec::new();
-    let places = |cell: &[usize]| -> Vec<(usize, usize)> {
-        let pairs = cell.iter().flat_map(|j| cell.iter().map(move |k| (*j, *k)));
+    let places = |cell: &Range<usize>| -> Vec<(usize, usize)> {
+        let pairs = cell.clone().flat_map(|j| cell.clone().map(move |k| (j, k)));
         pairs.collect()
     };
-    for (ends, weight) in starts.windows(2).zip(weights) {
-        let own = &columns[ends[0]..ends[1]];
+    for (i, weight) in (0..rows.len()).zip(weights) {
+        let (first, entries) = rows.nonzero(i);
+        let own = first..first + entries.len();
         if own != cell {
-            products.extend(places(cell).into_iter().zip(sums));
+            products.extend(places(&cell).into_iter().zip(sums));
             cell = own;
             let known = |place| products.get(&place).copied().unwrap_or(0.0);
-            sums = places(cell).into_iter().map(known).collect();
+            sums = places(&cell).into_iter().map(known).collect();
         }
-        let entries = &values[ends[0]..ends[1]];
         for (a, sums) in entries.iter().zip(sums.chunks_exact_mut(cell.len().max(1))) {
             for (b, sum) in entries.iter().zip(sums) {
                 *sum += a * (weight * b);
             }
         }
     }
-    products.extend(places(cell).into_iter().zip(sums));
+    products.extend(places(&cell).into_iter().zip(sums));
     let mut matrix = CooMatrix::new(rows.width(), rows.width());
     for ((j, k), product) in products {
         matrix.push(j, k, product);
@@ -172,9 +172,9 @@ mod tests {
     fn squared_norms_equal_those_of_the_nodal_values() {
         let weights = [0.5, 1.0, 1.0, 1.0, 0.5];
         let theta = [1.5, -2.0];
-        let mut rows = Rows::new();
+        let mut rows = LocalRows::new(2, 2);
         for i in 0..5 {
-            rows.push([(0, 1.0), (1, 0.25 * i as f64)], 0.0);
+            rows.push([(0, 1.0), (1, 0.25 * i as f64)].into_iter());
         }
         let design = Design::Sparse(Arc::new(rows));
         let gram = Gram::new(&design, &weights).expect("independent columns");

@@ -9,6 +9,7 @@ mod coefficient_kind;
 mod coefficient_set;
 mod design;
 mod gram;
+mod local_rows;
 mod parameterization;
 mod penalty;
 mod ratios;
@@ -20,13 +21,13 @@ pub use coefficient_kind::CoefficientKind;
 pub use coefficient_set::CoefficientSet;
 pub use design::Design;
 pub use gram::Gram;
+pub use local_rows::LocalRows;
 pub use parameterization::Parameterization;
 pub use penalty::{Penalty, WeightRule};
 pub use ratios::Ratios;
 pub use scalar::{Prior, ScalarParameter, ScalarValue};
 pub use total_variation::TotalVariation;
 
-use crate::rows::Rows;
 use crate::system::Grid;
 use std::sync::Arc;
 
@@ -154,11 +155,23 @@ impl CoefficientFunction {
             Design::Empty => Design::Empty,
             Design::Constant { .. } => Design::Constant { nodes: to.nodes() },
             Design::Identity | Design::Sparse(_) => {
-                let mut rows = Rows::of_width(self.parameters());
-                for (step, x) in (0..to.nodes()).map(place) {
+                let entries = |step: usize, x: f64| -> Vec<(usize, f64)> {
                     let left = self.design.row(step).map(|(j, b)| (j, (1.0 - x) * b));
                     let right = self.design.row(step + 1).map(|(j, b)| (j, x * b));
-                    rows.push(left.chain(right), 0.0);
+                    left.chain(right).collect()
+                };
+                let span = |step: usize| {
+                    let columns = entries(step, 0.5).into_iter().map(|(j, _)| j);
+                    columns
+                        .clone()
+                        .max()
+                        .zip(columns.min())
+                        .map_or(1, |(end, first)| end - first + 1)
+                };
+                let span = (0..last).map(span).max().unwrap_or(1);
+                let mut rows = LocalRows::new(self.parameters(), span);
+                for (step, x) in (0..to.nodes()).map(place) {
+                    rows.push(entries(step, x).into_iter());
                 }
                 Design::Sparse(Arc::new(rows))
             }

@@ -5,13 +5,12 @@ use kmcfit_core::internals::functions::basis::{
     from_physical_powers, physical_powers, uniform_knots,
 };
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Design, Gram, Parameterization,
+    Basis, CoefficientFunction, CoefficientKind, Gram, Parameterization,
 };
 use kmcfit_core::internals::system::Grid;
 use kmcfit_core::internals::system::quadrature::trapezoid_weights;
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
-use std::sync::Arc;
 
 use crate::common::properties::properties;
 
@@ -59,7 +58,7 @@ fn times(grid: &Grid) -> Vec<f64> {
 
 fn apply(matrix: &Rows, theta: &[f64]) -> Vec<f64> {
     assert_eq!(matrix.width(), theta.len());
-    Design::Sparse(Arc::new(matrix.clone())).multiply(theta, matrix.len())
+    matrix.multiply(theta)
 }
 
 /// `|L theta|^2`.

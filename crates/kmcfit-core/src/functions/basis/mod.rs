@@ -20,7 +20,7 @@ use super::{Design, Gram};
 use crate::rows::Rows;
 use crate::system::Grid;
 use crate::system::quadrature::trapezoid_weights;
-use space::{BasisFunctions, matrix};
+use space::{BasisFunctions, local, matrix};
 use std::sync::Arc;
 
 /// Passes of the iterative refinement of the normal equations in [`Basis::project`]; the second removes the rounding error of
@@ -119,7 +119,7 @@ impl Basis {
             Basis::Constant => Design::Constant {
                 nodes: grid.nodes(),
             },
-            _ => Design::Sparse(Arc::new(self.rows(grid, &grid.times(), 0))),
+            _ => Design::Sparse(Arc::new(local(self.on(grid).as_ref(), grid))),
         }
     }
 

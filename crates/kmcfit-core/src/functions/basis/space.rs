@@ -1,7 +1,9 @@
 //! Interface of a basis on a record.
 
 use super::legendre;
+use crate::functions::LocalRows;
 use crate::rows::Rows;
+use crate::system::Grid;
 
 /// Functions `b_j` of a basis on a record: polynomials between break points.
 pub(super) trait BasisFunctions {
@@ -31,8 +33,6 @@ pub(super) fn matrix<S: BasisFunctions + ?Sized>(
     derivative: usize,
 ) -> Rows {
     let mut matrix = Rows::of_width(space.parameters());
-    let count = rows.size_hint().0;
-    matrix.reserve(count, count * (space.degree() + 1));
     let mut entries = Vec::new();
     for (t, factor) in rows {
         entries.clear();
@@ -41,6 +41,20 @@ pub(super) fn matrix<S: BasisFunctions + ?Sized>(
         matrix.push(nonzero.map(|(j, value)| (*j, factor * value)), 0.0);
     }
     matrix
+}
+
+/// Functions at the nodes of a grid.
+pub(super) fn local(space: &dyn BasisFunctions, grid: &Grid) -> LocalRows {
+    let span = (space.degree() + 1).min(space.parameters());
+    let mut rows = LocalRows::new(space.parameters(), span);
+    rows.reserve(grid.nodes());
+    let mut entries = Vec::new();
+    for i in 0..grid.nodes() {
+        entries.clear();
+        space.row(grid.time(i), 0, &mut entries);
+        rows.push(entries.iter().copied());
+    }
+    rows
 }
 
 /// Rows `L` with `|L theta|^2 = integral (d^order p / dt^order)^2 dt`, by the shortest exact Gauss rule: `degree - order + 1`
