@@ -63,7 +63,7 @@ pub(super) fn input_pulses(
     let jacobian = weighted_jacobian(&extended, &evaluation);
     let first = problem.functions.scalar_range().start;
     let own: Vec<usize> = (0..first).chain(first + nodes..jacobian.ncols()).collect();
-    let model = Span::of(&jacobian.select_columns(&own));
+    let model = Span::of(jacobian.select_columns(&own));
     // A static force acts against positive displacements.
     let mut by_sample = DMatrix::zeros(jacobian.nrows(), signal.times().len());
     for (node, sample, share) in hats(&problem.system.grid, nodes, signal) {

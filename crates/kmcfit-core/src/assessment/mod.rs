@@ -260,7 +260,7 @@ fn causes(
     fit: &Fit,
     plausibility: &Plausibility,
     tests: bool,
-    score_tests: Option<&ScoreTests>,
+    score_tests: Option<&ScoreTests<'_>>,
 ) -> (Vec<FitWarning>, Vec<ExtensionTest>) {
     let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);
     let is_noise = plausibility.errors_hold && !plausibility.is_coloured;

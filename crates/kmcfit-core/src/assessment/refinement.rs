@@ -86,8 +86,7 @@ impl BasisTest {
         let test = || {
             applies(problem, theta, evaluation).then_some(())?;
             let finer = FinerBases::new(problem, theta)?;
-            let evaluation = finer.problem.evaluate(&finer.theta).ok()?;
-            Some(finer.halves(problem, &evaluation))
+            Some(finer.halves(problem, evaluation))
         };
         test().unwrap_or_default()
     }
@@ -98,8 +97,7 @@ impl BasisTest {
         let parameters = finer.problem.parameters();
         let is_long = problem.sample_count() >= SAMPLES_PER_PARAMETER * parameters;
         (parameters <= MOST_PARAMETERS && is_long).then_some(())?;
-        let evaluation = finer.problem.evaluate(&finer.theta).ok()?;
-        Some(finer.test(problem, &evaluation))
+        Some(finer.test(problem, evaluation))
     }
 }
 
@@ -187,6 +185,7 @@ impl FinerBases {
         is_few.then(|| Bands::at(&self.problem, &self.theta, &evaluation, settings))
     }
 
+    /// Test at the evaluation of the given problem: the finer bases have the same functions.
     fn test(&self, given: &Problem, evaluation: &Evaluation) -> BasisTest {
         let (jacobian, residuals) = reduced_jacobian(&self.problem, evaluation);
         let samples = given.sample_count();

@@ -67,11 +67,11 @@ impl Candidate {
 }
 
 /// Linearisation at an optimum in the parameters of the model and those of all candidates.
-pub(super) struct ScoreTests {
+pub(super) struct ScoreTests<'a> {
+    problem: &'a Problem,
+    evaluation: &'a Evaluation,
     kinds: Vec<(CoefficientKind, Term)>,
     records: Vec<RecordParameter>,
-    extended: Problem,
-    evaluation: Evaluation,
     model: Span,
     /// Derivatives in the coefficients of the terms.
     terms: DMatrix<f64>,
@@ -80,29 +80,32 @@ pub(super) struct ScoreTests {
     rest: DVector<f64>,
 }
 
-impl ScoreTests {
+impl<'a> ScoreTests<'a> {
     /// `None` where the tests do not apply: without a likelihood, at an active constraint, for residuals at machine precision or as large as
     /// the response, and with few samples or many parameters.
-    pub(super) fn at(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Option<Self> {
+    pub(super) fn at(
+        problem: &'a Problem,
+        theta: &[f64],
+        evaluation: &'a Evaluation,
+    ) -> Option<Self> {
         let is_few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
         let is_long = problem.sample_count() >= SAMPLES_PER_PARAMETER * problem.parameters();
         (is_few && is_long && applies(problem, theta, evaluation)).then_some(())?;
         (worst_fit(problem, evaluation) > UNRELATED).then_some(())?;
         let kinds = candidates(problem, evaluation);
-        let (extended, at) = extended(problem, theta, constants(problem, &kinds))?;
-        let evaluation = extended.evaluate(&at).ok()?;
-        let jacobian = weighted_jacobian(&extended, &evaluation);
+        let (extended, _) = extended(problem, theta, constants(problem, &kinds))?;
+        let jacobian = weighted_jacobian(&extended, &with_zeros(evaluation, kinds.len()));
         let first = problem.functions.scalar_range().start;
         let terms = jacobian.columns(first, kinds.len()).into_owned();
-        let model = Span::of(&jacobian.remove_columns(first, kinds.len()));
-        let rest = model.orthogonal(&weighted_residuals(&extended, &evaluation));
+        let model = Span::of(jacobian.remove_columns(first, kinds.len()));
+        let rest = model.orthogonal(&weighted_residuals(problem, evaluation));
         let records = record_parameters::parameters(problem);
-        let of_records = RecordColumns::of(&extended, &evaluation, &records);
+        let of_records = RecordColumns::of(problem, evaluation, &records);
         Some(Self {
+            problem,
+            evaluation,
             kinds,
             records,
-            extended,
-            evaluation,
             model,
             terms,
             of_records,
@@ -116,14 +119,14 @@ impl ScoreTests {
         let column = |i: usize| match i.checked_sub(self.kinds.len()) {
             None => Some(self.terms.column(i).into_owned()),
             Some(i) => {
-                let (problem, evaluation) = (&self.extended, &self.evaluation);
+                let (problem, evaluation) = (self.problem, self.evaluation);
                 let column = (self.of_records).column(problem, evaluation, self.records[i])?;
                 Some(DVector::from_vec(column))
             }
         };
         let test = |i: usize| {
             self.model
-                .test(&self.extended, &column(i)?, &self.rest, is_modelled)
+                .test(self.problem, &column(i)?, &self.rest, is_modelled)
         };
         let count = self.kinds.len() + self.records.len();
         let tests = map(count, available(), test);
@@ -145,7 +148,7 @@ pub(super) fn missing(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
-    tests: Option<&ScoreTests>,
+    tests: Option<&ScoreTests<'_>>,
     is_modelled: bool,
 ) -> (Option<FitWarning>, Vec<ExtensionTest>) {
     let tests = tests.map_or_else(Vec::new, |tests| tests.results(is_modelled));
@@ -252,6 +255,17 @@ fn constants(
     let each = kinds.iter();
     each.map(|(kind, term)| (CoefficientFunction::constant(*kind, 0.0, nodes), *term))
         .collect()
+}
+
+/// The evaluation with `terms` further coefficients that are zero: the response is the same.
+fn with_zeros(evaluation: &Evaluation, terms: usize) -> Evaluation {
+    let mut longer = evaluation.clone();
+    for nodal in std::iter::once(&mut longer.nodal).chain(&mut longer.own_nodal) {
+        let nodes = nodal.mass.len();
+        let zeros = (0..terms).map(|_| vec![0.0; nodes]);
+        nodal.coefficients.extend(zeros);
+    }
+    longer
 }
 
 /// Root mean square of `phi` of a term over all records.

@@ -11,6 +11,9 @@ use nalgebra::{DMatrix, DVector};
 /// Part of a candidate's derivatives outside the span of the model's below which it is no candidate.
 const APART: f64 = 1e-6;
 
+/// Number of rows that are multiplied at once.
+const ROWS: usize = 1024;
+
 /// Weighted and whitened residuals of all channels.
 pub(super) fn weighted_residuals(problem: &Problem, evaluation: &Evaluation) -> DVector<f64> {
     let each = (problem.predicted(evaluation))
@@ -30,15 +33,22 @@ impl Span {
         evaluation: &Evaluation,
         column: Vec<f64>,
     ) -> Option<(f64, f64)> {
-        let model = Self::of(&weighted_jacobian(problem, evaluation));
+        let model = Self::of(weighted_jacobian(problem, evaluation));
         let rest = model.orthogonal(&weighted_residuals(problem, evaluation));
         model.test(problem, &DVector::from_vec(column), &rest, true)
     }
 
-    pub(super) fn of(jacobian: &DMatrix<f64>) -> Self {
-        Self {
-            basis: jacobian * inverse_root(jacobian),
+    pub(super) fn of(jacobian: DMatrix<f64>) -> Self {
+        let root = inverse_root(&jacobian);
+        // In place, because all samples have a row.
+        let mut basis = jacobian;
+        for first in (0..basis.nrows()).step_by(ROWS) {
+            let mut rows = basis.rows_range_mut(first..basis.nrows().min(first + ROWS));
+            let product = &rows * &root;
+            rows.columns_mut(0, root.ncols()).copy_from(&product);
         }
+        let basis = basis.resize_horizontally(root.ncols(), 0.0);
+        Self { basis }
     }
 
     /// Part of a vector orthogonal to the derivatives of the model.
