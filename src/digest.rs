@@ -2,9 +2,12 @@
 
 use data_encoding::HEXLOWER;
 use sha2::{Digest as _, Sha256};
-use std::fs::File;
+use std::collections::BTreeMap;
+use std::fs::{File, Metadata};
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::SystemTime;
 
 /// Bytes that are read at once.
 const BLOCK: usize = 1 << 16;
@@ -32,5 +35,61 @@ pub fn digest_of_file(path: &Path) -> io::Result<String> {
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) => return Err(error),
         }
+    }
+}
+
+/// Length and time of the last change of a file.
+type State = (u64, Option<SystemTime>);
+
+/// Digests of files, each computed once while the length and the time of the last change of the file remain.
+#[derive(Debug, Default)]
+pub struct FileDigests(Mutex<BTreeMap<PathBuf, (State, String)>>);
+
+impl FileDigests {
+    /// As [`digest_of_file`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn of(&self, path: &Path) -> io::Result<String> {
+        let state = |found: &Metadata| (found.len(), found.modified().ok());
+        let now = state(&path.metadata()?);
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, digest)) = known.get(path).filter(|(before, _)| *before == now) {
+            return Ok(digest.clone());
+        }
+        let digest = digest_of_file(path)?;
+        known.insert(path.to_path_buf(), (now, digest.clone()));
+        Ok(digest)
+    }
+}
+
+/// Models are equal whatever digests are known.
+impl PartialEq for FileDigests {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_changed_file_has_another_digest() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.csv");
+        let digests = FileDigests::default();
+        assert!(digests.of(&path).is_err());
+        for text in ["abc", "abcd", "abc"] {
+            std::fs::write(&path, text).expect("a file");
+            for _ in 0..2 {
+                assert_eq!(
+                    digests.of(&path).expect("a digest"),
+                    digest(text.as_bytes())
+                );
+            }
+        }
+        std::fs::remove_file(&path).expect("a file");
+        assert!(digests.of(&path).is_err());
     }
 }

@@ -18,6 +18,7 @@ use kmcfit_core::internals::assessment::{NoDraws, VerdictLevel};
 use kmcfit_core::internals::solvers::{
     CheckpointStore, Fit, IterationEvent, IterationRecord, Observer, Status, WeightPath,
 };
+use kmcfit_core::internals::threads;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::Instant;
@@ -120,9 +121,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         verbose: arguments.verbose,
         strict: arguments.strict,
     };
-    let heading = Heading::of_model("fit", &file, requested, arguments.checkpoint);
+    let heading = || Heading::of_model("fit", &file, requested, arguments.checkpoint);
     let out = arguments.out.clone().unwrap_or_else(own);
-    fit(&file, &heading, &out, &printed, false)
+    fit(&file, heading, &out, &printed, false)
 }
 
 /// Resumes an unfinished fit.
@@ -133,8 +134,8 @@ pub(super) fn resume(
 ) -> Result<u8, CommandError> {
     let path = heading.inputs.first().cloned().unwrap_or_default();
     let file = ModelFile::read_with_overrides(path, &Override::parse_all(&heading.overrides)?)?;
-    let now = Heading::of_model("fit", &file, heading.requested, heading.checkpoint);
-    fit(&file, &now, place, printed, true)
+    let now = || Heading::of_model("fit", &file, heading.requested, heading.checkpoint);
+    fit(&file, now, place, printed, true)
 }
 
 /// Fits a record of a fleet, and prints the summary of a fit.
@@ -153,17 +154,19 @@ pub(super) fn fit_record_page(
         verbose: false,
         strict: false,
     };
-    fit(file, heading, out, &printed, false)
+    fit(file, || heading.clone(), out, &printed, false)
 }
 
 fn fit(
     file: &ModelFile,
-    heading: &Heading,
+    heading: impl FnOnce() -> Heading,
     out: &Path,
     printed: &Printed,
     is_resumed: bool,
 ) -> Result<u8, CommandError> {
     let mut model = read(file)?;
+    // The digests of the data are known by now.
+    let heading = &heading();
     model.settings.interrupt = Some(interrupt::flag());
     let folder = OutputFolder::prepare(out, fit_claim(&model).inputs(inputs(file)))?;
     if !is_resumed {
@@ -183,7 +186,11 @@ fn fit(
 /// Reads the data of a model for a fit, with a line of progress.
 pub(super) fn read(file: &ModelFile) -> Result<Model, InputError> {
     let _reading = Activity::begin(format!("reading the data of {}", file.path.display()));
-    build(file, BuildMode::Fit)
+    std::thread::scope(|scope| {
+        // Without a free thread they are computed when they are asked for.
+        let _ = threads::spawn_scoped(scope, || file.digest_data());
+        build(file, BuildMode::Fit)
+    })
 }
 
 /// Exit code of a fit: that of its end, or with `--strict` of its verdict where the fit ended well.

@@ -10,10 +10,11 @@ use super::overrides::Override;
 use super::spec::ModelSpec;
 use super::values::Text;
 use super::yaml_errors;
+use crate::digest::FileDigests;
 use crate::error::InputError;
 use crate::formats::has_data_extension;
 use crate::tables::{Table, TableFormat};
-use crate::text_io::read_text;
+use crate::text_io::{LONGEST_TABLE, read_text};
 
 /// Expected contents of a model file, for messages.
 const MODEL_FILE: &str = "a model file (YAML)";
@@ -36,6 +37,8 @@ pub struct ModelFile {
     edited: Option<String>,
     /// Contents of data files by their names in the model, in place of files.
     files: BTreeMap<String, Arc<[u8]>>,
+    /// Digests of the data files.
+    digests: Arc<FileDigests>,
 }
 
 impl ModelFile {
@@ -136,6 +139,24 @@ impl ModelFile {
             .collect()
     }
 
+    /// Computes the digests of all data files that can be read as tables.
+    pub fn digest_data(&self) {
+        for path in self.data_files() {
+            // A file without a digest has none when it is asked for.
+            if path
+                .metadata()
+                .is_ok_and(|found| found.len() <= LONGEST_TABLE)
+            {
+                let _ = self.digests.of(&path);
+            }
+        }
+    }
+
+    /// Digests of the data files.
+    pub fn digests(&self) -> &FileDigests {
+        &self.digests
+    }
+
     /// The content of a data file that stands in memory.
     pub(super) fn in_memory(&self, name: &str) -> Option<&[u8]> {
         self.files.get(name).map(|content| &**content)
@@ -212,6 +233,7 @@ impl ModelFile {
             overrides: Vec::new(),
             edited: None,
             files: BTreeMap::new(),
+            digests: Arc::default(),
         };
         if model.spec.experiments.is_empty() {
             return Err(model

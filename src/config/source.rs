@@ -1,7 +1,7 @@
 //! Sources of a model, for reproducible runs: its text, overrides, and data files with digests.
 
 use super::ModelFile;
-use crate::digest::{digest, digest_of_file};
+use crate::digest::{FileDigests, digest};
 use std::path::Path;
 use std::time::SystemTime;
 
@@ -33,7 +33,7 @@ impl ModelSource {
         let data = file.data_names().into_iter().map(|name| DataFile {
             content: match file.in_memory(&name) {
                 Some(bytes) => Some((bytes.len() as u64, digest(bytes))),
-                None => content(&file.resolve(&name)),
+                None => content(&file.resolve(&name), file.digests()),
             },
             modified: (file.resolve(&name).metadata())
                 .and_then(|m| m.modified())
@@ -48,9 +48,9 @@ impl ModelSource {
     }
 }
 
-fn content(path: &Path) -> Option<(u64, String)> {
+fn content(path: &Path, digests: &FileDigests) -> Option<(u64, String)> {
     let bytes = path.metadata().ok()?.len();
-    Some((bytes, digest_of_file(path).ok()?))
+    Some((bytes, digests.of(path).ok()?))
 }
 
 #[cfg(test)]

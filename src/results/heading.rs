@@ -1,7 +1,7 @@
 //! Heading of a journal, its first line: the command and its inputs with digests.
 
 use crate::config::ModelFile;
-use crate::digest::{digest, digest_of_file};
+use crate::digest::{FileDigests, digest};
 use crate::error::InputError;
 use crate::text_io::LONGEST_TABLE;
 use serde::{Deserialize, Serialize};
@@ -103,19 +103,23 @@ impl Heading {
             sha256: digest(file.text.as_bytes()),
         });
         for path in file.data_files() {
-            self = self.with_file(path);
+            self = self.with_digest(path, file.digests());
         }
         self
     }
 
     /// Adds a file to the sources.
     #[must_use]
-    pub fn with_file(mut self, file: PathBuf) -> Self {
+    pub fn with_file(self, file: PathBuf) -> Self {
+        self.with_digest(file, &FileDigests::default())
+    }
+
+    fn with_digest(mut self, file: PathBuf, digests: &FileDigests) -> Self {
         // The command refuses a longer file; its digest would take half a minute for ten gigabytes.
         let size = file.metadata().ok().map(|found| found.len());
         let sha256 = size
             .filter(|size| *size <= LONGEST_TABLE)
-            .and_then(|_| digest_of_file(&file).ok())
+            .and_then(|_| digests.of(&file).ok())
             .unwrap_or_else(|| "not readable".into());
         self.sources.push(SourceFile { file, sha256 });
         self

@@ -8,6 +8,9 @@ use csv::{ReaderBuilder, StringRecord, Trim};
 use crate::error::InputError;
 use crate::reading_share;
 
+/// Shortest text that is read in halves, bytes: it takes a millisecond.
+const LONG: usize = 1 << 18;
+
 /// A text prepared for the csv crate: runs of blanks replaced by tabs, leading lines removed.
 pub struct CsvText<'a> {
     text: Cow<'a, str>,
@@ -48,6 +51,7 @@ impl<'a> CsvText<'a> {
             quoted: (!is_plain(&self.text)).then(reader),
             counted: 0,
             line: self.first_line,
+            is_displayed: true,
         }
     }
 }
@@ -112,22 +116,55 @@ pub struct TableRows<'a> {
     /// Bytes whose lines are counted, and the line of the next one.
     counted: usize,
     line: usize,
+    /// True if the share that has been read is displayed.
+    is_displayed: bool,
 }
 
-impl TableRows<'_> {
+impl<'a> TableRows<'a> {
+    /// Splits off the later half of the rows that are not read yet; `None` for a short text or one with quotes.
+    pub fn split_off(&mut self) -> Option<TableRows<'a>> {
+        let rest = &self.text.as_bytes()[self.counted.min(self.text.len())..];
+        (self.quoted.is_none() && rest.len() >= LONG).then_some(())?;
+        let is_end = |byte: &u8| *byte == b'\n';
+        let middle = rest.len() / 2;
+        let half = middle + rest[middle..].iter().position(is_end)? + 1;
+        let lines = rest[..half]
+            .iter()
+            .copied()
+            .filter(|byte| is_end(byte))
+            .count();
+        let whole = self.text;
+        self.text = &whole[..self.counted + half];
+        Some(TableRows {
+            path: self.path,
+            text: whole,
+            delimiter: self.delimiter,
+            quoted: None,
+            counted: self.text.len(),
+            line: self.line + lines,
+            is_displayed: false,
+        })
+    }
+
     /// Reads the next row into `record` and returns its line number; `None` at the end.
     pub fn read(&mut self, record: &mut StringRecord) -> Result<Option<usize>, InputError> {
         loop {
             let Some(line) = self.next_line(record)? else {
-                reading_share::set(0, 0);
+                self.display(0, 0);
                 return Ok(None);
             };
-            reading_share::set(self.counted, self.text.len());
+            self.display(self.counted, self.text.len());
             let first = record.get(0).unwrap_or_default();
             let blank = record.len() == 1 && first.is_empty();
             if !blank && !first.starts_with('#') {
                 return Ok(Some(line));
             }
+        }
+    }
+
+    fn display(&self, read: usize, all: usize) {
+        if self.is_displayed {
+            reading_share::set(read, all);
         }
     }
 
@@ -214,6 +251,36 @@ mod tests {
         assert_eq!(rows(plain), rows(&alone));
         let lines: Vec<usize> = rows(plain).iter().map(|row| row.0).collect();
         assert_eq!(lines, [4, 5, 8, 9]);
+    }
+
+    #[test]
+    fn halves_have_the_rows_and_lines_of_the_whole() {
+        let mut text = String::from("t,y\r\n# none\n\n");
+        for i in 0..40_000 {
+            text += &format!("{i},{}{}", 2 * i, ["\n", "\r\n", "\n\n"][i % 3]);
+        }
+        let read = |rows: &mut TableRows| {
+            let (mut record, mut found) = (StringRecord::new(), Vec::new());
+            while let Some(line) = rows.read(&mut record).unwrap() {
+                found.push((line, record.iter().map(str::to_owned).collect::<Vec<_>>()));
+            }
+            found
+        };
+        let source = CsvText::new(&text, 0, ',');
+        let whole = read(&mut source.rows(Path::new("t")));
+        assert_eq!(whole.len(), 40_001);
+        let (mut first, mut record) = (source.rows(Path::new("t")), StringRecord::new());
+        first.read(&mut record).unwrap();
+        let mut second = first.split_off().expect("a long text");
+        let (first, second) = (read(&mut first), read(&mut second));
+        assert!(first.len().abs_diff(second.len()) < 2000);
+        assert_eq!([first, second].concat(), whole[1..]);
+        // Short texts and those with quotes are read as a whole.
+        let short = CsvText::new(&text[..1000], 0, ',');
+        assert!(short.rows(Path::new("t")).split_off().is_none());
+        let quoted = text.replacen("39999", "\"39999\"", 1);
+        let quoted = CsvText::new(&quoted, 0, ',');
+        assert!(quoted.rows(Path::new("t")).split_off().is_none());
     }
 
     #[test]

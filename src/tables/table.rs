@@ -10,11 +10,12 @@ use super::encoding::decode;
 use super::field::{self, Field};
 use super::format::{Detected, TableFormat};
 use super::origin::{ColumnValues, Origin};
-use super::rows::{CsvText, with_newlines};
+use super::rows::{CsvText, TableRows, with_newlines};
 use super::table_memory::TableMemory;
 use crate::error::{InputError, Location};
 use crate::formats;
 use crate::text_io::{LONGEST_TABLE, check_lines, listed, quote, read_bytes, read_bytes_from};
+use kmcfit_core::internals::threads::both;
 
 /// Most columns: each takes some hundred bytes beside its fields.
 const MOST_COLUMNS: usize = 10_000;
@@ -307,6 +308,11 @@ impl Table {
                 format.units_row = Some(line);
             } else if count >= layout.data {
                 self.push(line, &fields, layout, room)?;
+                // The first row of data defines the columns.
+                if let Some(later) = rows.split_off() {
+                    self.push_halves(rows, later, layout, room)?;
+                    break;
+                }
             }
             count += 1;
         }
@@ -321,6 +327,56 @@ impl Table {
                 Ok(())
             }
         }
+    }
+
+    /// Adds the rows of data of both halves of a text, which are read at the same time.
+    fn push_halves(
+        &mut self,
+        first: TableRows,
+        second: TableRows,
+        layout: &Layout,
+        room: TableMemory,
+    ) -> Result<(), InputError> {
+        let mut later = Self {
+            path: self.path.clone(),
+            origin: self.origin.clone(),
+            headers: self.headers.clone(),
+            units: self.units.clone(),
+            columns: vec![ColumnValues::default(); self.columns.len()],
+            lines: Vec::new(),
+        };
+        let (first, second) = both(
+            || self.push_all(first, layout, room),
+            || later.push_all(second, layout, room).map(|()| later),
+        );
+        // The first mistake in the file is reported.
+        first?;
+        let later = second?;
+        self.lines.extend(later.lines);
+        for (column, later) in self.columns.iter_mut().zip(later.columns) {
+            // An unreadable column has no samples after its first mistake.
+            if column.unreadable.is_none() {
+                column.samples.extend(later.samples);
+                column.unreadable = later.unreadable;
+                column.unnumbered = column.unnumbered.take().or(later.unnumbered);
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds all rows as data.
+    fn push_all(
+        &mut self,
+        mut rows: TableRows,
+        layout: &Layout,
+        room: TableMemory,
+    ) -> Result<(), InputError> {
+        let mut fields = StringRecord::new();
+        while let Some(line) = rows.read(&mut fields)? {
+            check_width(&self.path, line, fields.len())?;
+            self.push(line, &fields, layout, room)?;
+        }
+        Ok(())
     }
 
     /// Adds a data row. A field that is not a number makes its column unusable.

@@ -110,11 +110,15 @@ fn on_grid(times: &[f64], residuals: &[f64]) -> (Vec<f64>, f64) {
 /// Median distance of neighbours, refined to the mean of the distances near it, so that rounding of the times does not accumulate.
 fn median_spacing(times: &[f64]) -> Option<f64> {
     let mut spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    spacings.sort_unstable_by(f64::total_cmp);
-    let median = *spacings.get(spacings.len() / 2)?;
+    let middle = spacings.len() / 2;
+    (!spacings.is_empty()).then_some(())?;
+    let median = *spacings.select_nth_unstable_by(middle, f64::total_cmp).1;
     let near = |s: &&f64| (0.5..1.5).contains(&(**s / median));
-    let alike = || spacings.iter().filter(near);
-    let mean = alike().sum::<f64>() / alike().count().max(1) as f64;
+    let (mut sum, mut count) = (0.0, 0);
+    for spacing in spacings.iter().filter(near) {
+        (sum, count) = (sum + spacing, count + 1);
+    }
+    let mean = sum / count.max(1) as f64;
     Some(if mean > 0.0 { mean } else { median })
 }
 

@@ -3,6 +3,9 @@
 //! Samples and predictions are compared in pairs. Pairs with a value that is not finite are missing, and values beyond the end of
 //! the shorter slice are ignored.
 
+use crate::simd::sum;
+use std::ops::Range;
+
 /// NRMSE fit, per cent:
 ///
 /// ```text
@@ -14,6 +17,22 @@
 ///
 /// Source: MathWorks, *System Identification Toolbox*, `compare` and `goodnessOfFit` (NRMSE).
 pub fn fit_percent(observed: &[f64], model: &[f64]) -> f64 {
+    let length = observed.len().min(model.len());
+    let (observed, model) = (&observed[..length], &model[..length]);
+    let mean = sum::total(observed) / length as f64;
+    let missed = sum::squared_distance(observed, model, 1.0);
+    let varied = sum::squared_deviation(observed, mean);
+    // Not for missing values, nor where squares overflow or lose digits.
+    match [missed, varied].iter().all(|s| SQUARES.contains(s)) {
+        true => 100.0 * (1.0 - (missed / varied).sqrt()),
+        false => careful_fit_percent(observed, model),
+    }
+}
+
+/// Sums of squares of which no term overflows, and those that lose digits are negligible.
+const SQUARES: Range<f64> = 1e-270..1e300;
+
+fn careful_fit_percent(observed: &[f64], model: &[f64]) -> f64 {
     let known = || pairs(observed, model);
     let count = known().count();
     if count == 0 {
@@ -105,6 +124,19 @@ mod tests {
         let other = |x: &[f64]| x.iter().map(|x| 1e200 * x - 3e200).collect::<Vec<f64>>();
         let fit = fit_percent(&observed, &model);
         assert!((fit_percent(&other(&observed), &other(&model)) - fit).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_fit_of_many_samples_is_that_of_the_careful_sums() {
+        let observed = crate::diagnostics::noise::white(1, 1003);
+        let model: Vec<f64> = observed.iter().map(|x| 0.9 * x + 0.01).collect();
+        for unit in [1e-160, 1.0, 1e160] {
+            let [observed, model] =
+                [&observed, &model].map(|list| list.iter().map(|x| unit * x).collect::<Vec<f64>>());
+            let fit = fit_percent(&observed, &model);
+            near(fit, careful_fit_percent(&observed, &model));
+            assert!((85.0..95.0).contains(&fit), "{fit}");
+        }
     }
 
     #[test]

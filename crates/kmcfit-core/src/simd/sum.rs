@@ -45,6 +45,16 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sum(a, b, |a, b| a * b)
 }
 
+/// Sum of the values.
+pub(crate) fn total(values: &[f64]) -> f64 {
+    sum(values, values, |a, _| a)
+}
+
+/// Sum of the squared distances from `mean`.
+pub(crate) fn squared_deviation(values: &[f64], mean: f64) -> f64 {
+    sum(values, values, |a, _| (a - mean) * (a - mean))
+}
+
 /// Root mean square; zero without values.
 pub(crate) fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
@@ -130,6 +140,9 @@ mod tests {
             assert_eq!(dot(&a, &b), product, "{count}");
             let squares: f64 = a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum();
             assert_eq!(squared_distance(&a, &b, 2.0), 4.0 * squares, "{count}");
+            assert_eq!(total(&a), a.iter().sum::<f64>(), "{count}");
+            let deviation: f64 = a.iter().map(|a| (a - 1.5) * (a - 1.5)).sum();
+            assert_eq!(squared_deviation(&a, 1.5), deviation, "{count}");
         }
     }
 
