@@ -102,8 +102,8 @@ impl AnalysisJournal {
         name: &str,
         is_right: impl Fn(&T) -> bool,
     ) {
-        let kept = self.done.get(name).cloned();
-        let read = kept.and_then(|kept| serde_json::from_value(kept).ok());
+        let kept = self.done.get(name);
+        let read = kept.and_then(|kept| T::deserialize(kept).ok());
         if !read.as_ref().is_some_and(is_right) {
             self.done.remove(name);
         }
@@ -121,7 +121,7 @@ impl AnalysisJournal {
         whole: impl FnOnce() -> bool,
     ) -> io::Result<Option<T>> {
         if let Some(kept) = self.done.get(name)
-            && let Ok(result) = serde_json::from_value(kept.clone())
+            && let Ok(result) = T::deserialize(kept)
         {
             return Ok(Some(result));
         }
@@ -137,6 +137,6 @@ impl AnalysisJournal {
         self.file.sync()?;
         // The value as read back from JSON; a result with numbers that JSON cannot represent is computed again when the
         // study is resumed.
-        Ok(Some(serde_json::from_value(line.result).unwrap_or(result)))
+        Ok(Some(T::deserialize(&line.result).unwrap_or(result)))
     }
 }

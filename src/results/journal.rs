@@ -11,8 +11,8 @@ use super::system::{self, Writer};
 use super::work_folder::WorkFolder;
 use crate::error::InputError;
 use crate::text_io::{open, read_bytes};
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
@@ -137,7 +137,8 @@ pub(super) fn heading_of(path: &Path) -> Option<Heading> {
     let (file, _) = open(path, "a journal").ok()?;
     let line = first_line(file).ok()?;
     let (json, _) = checked(&line, JournalPosition::default())?;
-    let heading: Heading = serde_json::from_slice(json).ok()?;
+    let value: serde_json::Value = serde_json::from_slice(json).ok()?;
+    let heading = Heading::deserialize(&value).ok()?;
     (!path.is_symlink()).then_some(heading)
 }
 
@@ -237,7 +238,7 @@ impl JournalText {
         let (_, begin) = checked(line, JournalPosition::default())
             .ok_or_else(|| no_journal(path, what).found("a first line with a wrong checksum"))?;
         let heading =
-            serde_json::from_value(value).map_err(|error| no_journal(path, what).found(error))?;
+            Heading::deserialize(&value).map_err(|error| no_journal(path, what).found(error))?;
         Ok(Self {
             bytes: read_bytes(path, what, LONGEST)?,
             heading,

@@ -3,8 +3,6 @@
 use std::fmt;
 use std::path::Path;
 
-use encoding_rs::{UTF_16BE, UTF_16LE, WINDOWS_1252};
-
 use crate::error::InputError;
 
 /// Character encoding of a file.
@@ -34,22 +32,25 @@ impl fmt::Display for Encoding {
 ///
 /// When the bytes are not text: invalid UTF-16, or a zero byte.
 pub fn decode(path: &Path, bytes: Vec<u8>) -> Result<(String, Encoding), InputError> {
-    for (mark, encoding) in [([0xff, 0xfe], UTF_16LE), ([0xfe, 0xff], UTF_16BE)] {
-        if bytes.starts_with(&mark) {
-            let (text, broken) = encoding.decode_with_bom_removal(&bytes);
-            return match broken {
-                true => Err(InputError::file(path, "the file is not text")
-                    .found("a byte order mark of UTF-16, but no UTF-16 text behind it")
-                    .hint("save it as UTF-8")),
-                false => Ok((text.into_owned(), Encoding::Utf16)),
-            };
+    let utf_16 = match bytes.as_slice() {
+        [0xff, 0xfe, units @ ..] => Some(utf_16(units, u16::from_le_bytes)),
+        [0xfe, 0xff, units @ ..] => Some(utf_16(units, u16::from_be_bytes)),
+        _ => None,
+    };
+    match utf_16 {
+        None => {}
+        Some(Some(text)) => return Ok((text, Encoding::Utf16)),
+        Some(None) => {
+            return Err(InputError::file(path, "the file is not text")
+                .found("a byte order mark of UTF-16, but no UTF-16 text behind it")
+                .hint("save it as UTF-8"));
         }
     }
     let (text, encoding) = match String::from_utf8(bytes) {
         Ok(text) => (without_mark(text), Encoding::Utf8),
         Err(error) => {
-            let (text, _) = WINDOWS_1252.decode_without_bom_handling(error.as_bytes());
-            (text.into_owned(), Encoding::Windows1252)
+            let text = error.as_bytes().iter().map(|byte| windows_1252(*byte));
+            (text.collect(), Encoding::Windows1252)
         }
     };
     match text.find('\0') {
@@ -57,6 +58,31 @@ pub fn decode(path: &Path, bytes: Vec<u8>) -> Result<(String, Encoding), InputEr
             .found("the byte 0x00")
             .hint("is it a binary file, or UTF-16 without a byte order mark? Save it as text in UTF-8")),
         None => Ok((text, encoding)),
+    }
+}
+
+/// Text of the 16-bit `units`, without a byte order mark; `None` for an odd number of bytes or a lone surrogate.
+fn utf_16(units: &[u8], unit: fn([u8; 2]) -> u16) -> Option<String> {
+    let (pairs, rest) = units.as_chunks();
+    let characters = char::decode_utf16(pairs.iter().map(|pair| unit(*pair)));
+    rest.is_empty()
+        .then(|| characters.collect::<Result<_, _>>().ok())
+        .flatten()
+}
+
+/// Character of a byte in Windows-1252.
+///
+/// Source: WHATWG Encoding Standard, index windows-1252.
+fn windows_1252(byte: u8) -> char {
+    /// Characters of the bytes 0x80 to 0x9f; those without one are the control characters of Latin-1.
+    const OTHERS: [char; 32] = [
+        '€', '\u{81}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{8d}', 'Ž',
+        '\u{8f}', '\u{90}', '‘', '’', '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{9d}',
+        'ž', 'Ÿ',
+    ];
+    match byte {
+        0x80..=0x9f => OTHERS[usize::from(byte - 0x80)],
+        latin_1 => char::from(latin_1),
     }
 }
 
@@ -91,6 +117,19 @@ mod tests {
         assert_eq!(read(b"\xfe\xff\0m\0/\0s\0\xb2"), (text, Encoding::Utf16));
     }
 
+    /// Prices, quotes and dashes are outside of Latin-1; a character beyond 16 bits has two units.
+    #[test]
+    fn characters_beyond_latin_1() {
+        assert_eq!(
+            read(b"\x80 5 \x96 \x84Gr\xf6\xdfe\x93\x99 \x81\x9f\xff"),
+            ("€ 5 – „Größe“™ \u{81}Ÿÿ".to_owned(), Encoding::Windows1252)
+        );
+        assert_eq!(
+            read(b"\xfe\xff\xd8\x35\xdc\x9f\x03\xa9"),
+            ("𝒟Ω".to_owned(), Encoding::Utf16)
+        );
+    }
+
     #[test]
     fn files_that_are_not_text_are_refused() {
         let message = |bytes: &[u8]| {
@@ -98,6 +137,15 @@ mod tests {
             error.to_string()
         };
         assert!(message(b"t,y\n0,\0").starts_with("t.csv:2:3: the file is not text"));
-        assert!(message(b"\xff\xfe\0\xd8t\0").starts_with("t.csv: the file is not text"));
+        for broken in [
+            &b"\xff\xfe\0\xd8t\0"[..],
+            b"\xff\xfet\0,",
+            b"\xfe\xff\0t\xdc\x9f",
+        ] {
+            assert!(
+                message(broken).starts_with("t.csv: the file is not text"),
+                "{broken:?}"
+            );
+        }
     }
 }
