@@ -178,6 +178,18 @@ impl Rows {
     }
 }
 
+/// Sorts the entries of a row by column and adds those of equal columns, in their order.
+pub(crate) fn merge_columns(entries: &mut Vec<(usize, f64)>) {
+    entries.sort_by_key(|(column, _)| *column);
+    entries.dedup_by(|later, first| {
+        let is_same = later.0 == first.0;
+        if is_same {
+            first.1 += later.1;
+        }
+        is_same
+    });
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -188,6 +200,13 @@ mod tests {
         rows.push([(0, 1.0), (2, -2.0)], 5.0);
         rows.push([(1, 4.0)], 6.0);
         rows
+    }
+
+    #[test]
+    fn equal_columns_are_added() {
+        let mut entries = vec![(3, 1.0), (0, 2.0), (3, -4.0), (1, 0.0)];
+        merge_columns(&mut entries);
+        assert_eq!(entries, [(0, 2.0), (1, 0.0), (3, -3.0)]);
     }
 
     #[test]

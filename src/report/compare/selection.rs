@@ -29,17 +29,21 @@ const HEADERS: [&str; 9] = [
     "zeta (95 % CI)",
 ];
 
+/// Indices of the runs, the best first and those without a likelihood last.
+fn ranked(measures: &[Measures]) -> Vec<usize> {
+    let difference = |i: &usize| measures[*i].bic_difference.unwrap_or(f64::INFINITY);
+    let mut runs: Vec<usize> = (0..measures.len()).collect();
+    runs.sort_by(|a, b| difference(a).total_cmp(&difference(b)));
+    runs
+}
+
 /// The table with a line for each run, the best first; empty where fewer than two runs have a likelihood of the same samples.
 pub(super) fn table(measures: &[Measures]) -> String {
-    let mut runs: Vec<&Measures> = measures
-        .iter()
-        .filter(|m| m.bic_difference.is_some())
-        .collect();
+    let runs = ranked(measures).into_iter().map(|i| &measures[i]);
+    let runs: Vec<&Measures> = runs.filter(|m| m.bic_difference.is_some()).collect();
     if runs.len() < 2 {
         return String::new();
     }
-    let difference = |m: &Measures| m.bic_difference.unwrap_or(f64::INFINITY);
-    runs.sort_by(|a, b| difference(a).total_cmp(&difference(b)));
     let mut rows = vec![HEADERS.map(String::from)];
     rows.extend(runs.into_iter().map(row));
     let width = |j: usize| {
@@ -123,11 +127,10 @@ pub(super) struct ModelTable {
 
 /// The table of models: the best first where they are ranked, else in the given order; columns without a value are omitted.
 pub(super) fn model_table(measures: &[Measures], keeps_order: bool) -> ModelTable {
-    let mut runs: Vec<usize> = (0..measures.len()).collect();
-    let difference = |i: &usize| measures[*i].bic_difference.unwrap_or(f64::INFINITY);
-    if !keeps_order {
-        runs.sort_by(|a, b| difference(a).total_cmp(&difference(b)));
-    }
+    let runs = match keeps_order {
+        true => (0..measures.len()).collect(),
+        false => ranked(measures),
+    };
     let [name, others @ ..] = HEADERS;
     let headings: Vec<&str> = [name, VERDICT]
         .into_iter()

@@ -166,9 +166,10 @@ impl Builder {
     #[must_use]
     pub fn coefficient(mut self, kind: CoefficientKind, spec: CoefficientSpec) -> Self {
         self.coefficients.retain(|(known, _)| *known != kind);
-        self.coefficients.push((kind, spec));
         let place = |kind: CoefficientKind| CoefficientKind::ALL.iter().position(|k| *k == kind);
-        self.coefficients.sort_by_key(|(kind, _)| place(*kind));
+        let is_before = |(known, _): &(CoefficientKind, _)| place(*known) < place(kind);
+        let at = self.coefficients.partition_point(is_before);
+        self.coefficients.insert(at, (kind, spec));
         self
     }
 

@@ -55,7 +55,7 @@ fn map_until<T: Send>(
         done
     };
     let workers = threads.clamp(1, count.clamp(1, MOST_THREADS));
-    let mut results = std::thread::scope(|scope| {
+    let done = std::thread::scope(|scope| {
         let work = || {
             share();
             turn()
@@ -75,8 +75,11 @@ fn map_until<T: Send>(
         }
         done
     });
-    results.sort_by_key(|(index, _)| *index);
-    results.into_iter().map(|(_, result)| result).collect()
+    let mut results: Vec<Option<T>> = done.iter().map(|_| None).collect();
+    for (index, result) in done {
+        results[index] = Some(result);
+    }
+    results.into_iter().flatten().collect()
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::ConstraintError;
 use crate::constraints::{RowGroup, TOLERANCE};
+use crate::rows::merge_columns;
 use std::collections::HashMap;
 
 /// Affine form `sum entries theta + constant`, valid on an interval of time.
@@ -52,7 +53,9 @@ pub(super) fn group(
     for form in forms {
         let limits = bounds(form.time);
         let [lower, upper] = limits.map(|limit| limit - form.constant);
-        let entries = merged(&form.entries);
+        let mut entries = form.entries.clone();
+        merge_columns(&mut entries);
+        entries.retain(|(_, a)| *a != 0.0);
         if entries.is_empty() {
             let slack = TOLERANCE * form.size().max(finite(limits));
             if lower > slack || upper < -slack {
@@ -96,19 +99,4 @@ pub(super) fn group(
 fn finite(limits: [f64; 2]) -> f64 {
     let sizes = limits.iter().map(|b| b.abs()).filter(|b| b.is_finite());
     sizes.fold(0.0, f64::max)
-}
-
-/// Entries sorted by column, with equal columns added and zeros removed.
-fn merged(entries: &[(usize, f64)]) -> Vec<(usize, f64)> {
-    let mut sorted = entries.to_vec();
-    sorted.sort_by_key(|(j, _)| *j);
-    let mut merged: Vec<(usize, f64)> = Vec::with_capacity(sorted.len());
-    for (j, a) in sorted {
-        match merged.last_mut() {
-            Some((last, sum)) if *last == j => *sum += a,
-            _ => merged.push((j, a)),
-        }
-    }
-    merged.retain(|(_, a)| *a != 0.0);
-    merged
 }

@@ -17,7 +17,7 @@ pub use knots::uniform_knots;
 pub use polynomial::{from_physical_powers, physical_powers};
 
 use super::{Design, Gram};
-use crate::rows::Rows;
+use crate::rows::{Rows, merge_columns};
 use crate::system::Grid;
 use crate::system::quadrature::trapezoid_weights;
 use space::{BasisFunctions, local, matrix};
@@ -188,7 +188,7 @@ impl Basis {
         for i in 1..times.len() {
             let before = values.row(i - 1).map(|(j, value)| (j, -value));
             let mut entries: Vec<_> = values.row(i).chain(before).collect();
-            entries.sort_by_key(|(j, _)| *j);
+            merge_columns(&mut entries);
             changes.push(entries, 0.0);
         }
         changes

@@ -8,7 +8,7 @@ use crate::problem::Problem;
 use crate::record::{Channel, Experiment, LONG_RECORD_STEPS};
 use crate::simd::LANES;
 use crate::simd::sum::are_finite;
-use crate::simd::tall_qr::RowBlock;
+use crate::simd::tall_qr::{RowBlock, order_by};
 use crate::simulate::fast::sensitivities::{BaseTrajectory, TILE};
 use nalgebra::DMatrix;
 use observation_rows::JacobianRows;
@@ -79,10 +79,8 @@ impl Problem {
     /// Parameter of each column of the sensitivities, ordered by the first node that it affects; columns cost nothing before
     /// that node.
     pub(crate) fn places(&self) -> Vec<usize> {
-        let first = self.functions.first_nodes();
-        let mut order: Vec<usize> = (0..self.parameters()).collect();
-        order.sort_by_key(|j| first[*j]);
-        order
+        let first = self.functions.first_nodes().into_iter();
+        order_by(&first.map(|node| node as usize).collect::<Vec<_>>())
     }
 
     /// True if the row blocks of [`Problem::each_row_block`] form the complete Jacobian: no sensor parameter is estimated, no

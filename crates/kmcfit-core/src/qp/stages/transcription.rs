@@ -6,6 +6,7 @@ use super::sizes::{Sizes, stage_of, stage_of_cone};
 use super::transitions::{NONE, Transitions};
 use crate::constraints::{Rows, TOLERANCE};
 use crate::qp::Subproblem;
+use crate::simd::tall_qr::order_by;
 
 /// The side of an inequality that a constraint row stands for.
 #[derive(Debug, Clone, Copy)]
@@ -295,8 +296,7 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
             .iter()
             .map(|cone| stage_of_cone(cone, &self.places));
         let stages: Vec<usize> = stages.collect();
-        self.cone_order = (0..sub.cones.len()).collect();
-        self.cone_order.sort_by_key(|k| stages[*k]);
+        self.cone_order = order_by(&stages);
         let mut loose = LooseRows::default();
         self.cone_rows.push(0);
         for k in &self.cone_order {

@@ -3,7 +3,7 @@
 //! Blocks fit into the first-level cache; each is reflected into the triangle of all previous rows. Columns are ordered by their first
 //! nonzero row, so that columns without entries so far cost nothing.
 
-use super::{BLOCK_ROWS, BlockColumn, HIGH, LANES, Row, RowBlock};
+use super::{BLOCK_ROWS, BlockColumn, HIGH, LANES, Row, RowBlock, order_by};
 use crate::simd::{self, Arithmetic, Eight, Kernel};
 use nalgebra::DMatrix;
 
@@ -36,8 +36,7 @@ impl Triangle {
         let height = matrix.nrows();
         let columns: Vec<&[f64]> = matrix.as_slice().chunks_exact(height.max(1)).collect();
         let begins: Vec<usize> = columns.iter().map(|c| begin(c)).collect();
-        let mut order: Vec<usize> = (0..columns.len()).collect();
-        order.sort_by_key(|j| begins[*j]);
+        let order = order_by(&begins);
         let mut triangle = Self::new(order.len());
         let mut block = RowBlock::new(order.len());
         while block.first < height {

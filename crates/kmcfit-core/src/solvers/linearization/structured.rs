@@ -7,6 +7,7 @@ use crate::objective::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
 use crate::qp::{ResponseVariables, StageLayout, Subproblem};
 use crate::record::{Channel, ChannelKind, Experiment, Majorant, Weighting};
+use crate::rows::merge_columns;
 use crate::signal::SecondOrder;
 use crate::simulate::reference::step_jacobians;
 use crate::simulate::{StepJacobian, Trajectory};
@@ -226,14 +227,7 @@ fn whitened(
         for (lag, a) in coefficients.iter().enumerate() {
             out[i].extend(scaled(i - 1 - lag, -a * size));
         }
-        out[i].sort_by_key(|(j, _)| *j);
-        out[i].dedup_by(|later, first| {
-            let is_same = later.0 == first.0;
-            if is_same {
-                first.1 += later.1;
-            }
-            is_same
-        });
+        merge_columns(&mut out[i]);
     });
     out
 }

@@ -288,7 +288,10 @@ impl<'a> ProfileSearch<'a> {
     fn mark(&mut self, side: f64, start: &ProfilePoint) {
         let beyond = |s: &&ProfilePoint| (s.value - start.value) * side >= 0.0;
         let mut points: Vec<ProfilePoint> = self.points.iter().filter(beyond).cloned().collect();
-        points.sort_by(|a, b| (side * a.value).total_cmp(&(side * b.value)));
+        sort(&mut points);
+        if side < 0.0 {
+            points.reverse();
+        }
         let mut seen = start.active.clone();
         for pair in points.windows(2) {
             for constraint in &pair[1].active {
@@ -337,7 +340,7 @@ impl<'a> ProfileSearch<'a> {
             .min_by(|a, b| a.cost.total_cmp(&b.cost))
             .map(|s| s.point.parameters.clone());
         let mut points = self.points;
-        points.sort_by(|a, b| a.value.total_cmp(&b.value));
+        sort(&mut points);
         let [(low, below), (high, above)] = sides;
         let verdict = match [low, high] {
             [Some(_), Some(_)] => Interval::Identified,
@@ -370,4 +373,8 @@ fn extrapolated(first: Option<&ProfilePoint>, second: &ProfilePoint, value: f64)
     let share = (value - second.value) / (second.value - first.value);
     let pairs = here.iter().zip(&first.point.parameters);
     pairs.map(|(b, a)| b + share * (b - a)).collect()
+}
+/// Sorts points by their values.
+fn sort(points: &mut [ProfilePoint]) {
+    points.sort_by(|a, b| a.value.total_cmp(&b.value));
 }
