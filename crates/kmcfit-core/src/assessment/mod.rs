@@ -75,6 +75,21 @@ use crate::solvers::{Fit, Status};
 use crate::threads::both;
 use nalgebra::DMatrix;
 
+/// Number of samples up to which two analyses are computed at once; each takes several arrays of all samples and nodes.
+const AT_ONCE: usize = 2_000_000;
+
+/// Results of both analyses, which are computed at the same time for all but the longest records.
+fn at_once<A, B: Send>(
+    problem: &Problem,
+    one: impl FnOnce() -> A,
+    other: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    match problem.sample_count() <= AT_ONCE {
+        true => both(one, other),
+        false => (one(), other()),
+    }
+}
+
 /// Assessment of a fit of a simulated response.
 #[derive(Debug, Clone)]
 pub struct FitAssessment {
@@ -132,7 +147,7 @@ impl FitAssessment {
             (has_causes && tests_bases).then(at).flatten()
         };
         let ((halved, step_check, statistics, mut plausibility), score_tests) =
-            both(plausibility, score_tests);
+            at_once(problem, plausibility, score_tests);
         if fit.outcome.status == Status::Failed {
             plausibility.fail();
         }
@@ -169,7 +184,8 @@ impl FitAssessment {
             };
             let (theta, evaluation) = (&best.parameters, &best.evaluation);
             let is_coloured = assessment.plausibility.is_coloured;
-            let (bands, test) = both(
+            let (bands, test) = at_once(
+                problem,
                 || Bands::beside(problem, theta, evaluation, halved.ok().flatten(), &settings),
                 || match (tests_bases, is_coloured) {
                     (true, false) => BasisTest::of(problem, theta, evaluation),

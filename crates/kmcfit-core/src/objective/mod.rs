@@ -196,14 +196,11 @@ impl Problem {
         along: &[f64],
     ) -> Vec<Vec<Vec<f64>>> {
         let scalars = self.scalars(along);
-        let nodal_sets: Vec<NodalCoefficients> = (0..self.functions.coefficient_sets().len())
-            .map(|d| self.functions.direction(along, d))
-            .collect();
         let each = self.experiments.iter().enumerate().map(|(e, experiment)| {
             let view = self.view(evaluation, e);
             let change = |estimated: Option<usize>| estimated.map_or(0.0, |i| scalars[i]);
             let direction = SystemTangent {
-                nodal: nodal_sets[experiment.coefficient_set].clone(),
+                nodal: self.functions.direction(along, experiment.coefficient_set),
                 initial: State {
                     displacement: change(experiment.initial_parameters[0]),
                     velocity: change(experiment.initial_parameters[1]),
