@@ -1,4 +1,4 @@
-//! `kmcfit demo`: compares the paper's fit with a constrained one on built-in models and data.
+//! `kmcfit demo`: compares the paper's fit with a constrained one on built-in models and a simulated record.
 
 use super::{CommandError, compare, print, unwritable};
 use crate::report::CsvTable;
@@ -63,7 +63,7 @@ and k(0) = 1 N/m.
 
 ";
 
-/// Compare the paper's fit of its record with a physically constrained fit; models and data are built in.
+/// Compare the paper's fit of its record with a physically constrained fit; models are built in, the record is simulated.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  kmcfit demo --out runs/demo")]
 pub struct Arguments {
