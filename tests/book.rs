@@ -19,6 +19,7 @@ use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::solvers::{FitSettings, Solver, Status, Stopping, fit};
 use kmcfit_core::internals::system::Method;
+use kmcfit_core::internals::threads::{available, map};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
@@ -57,18 +58,20 @@ fn models_are_valid_and_their_gradients_exact() {
         "2000 nodes over 25 s (midpoint), 3 parameters, gauss-newton",
     ];
     assert_eq!(models.len(), expected.len());
-    for (model, expected) in models.iter().zip(expected) {
-        fs::write(clone.path().join("models/shown.yaml"), model.text()).expect("a file");
-        let printed = output(clone.path(), "kmcfit check models/shown.yaml");
-        assert!(printed.contains(expected), "{printed}");
+    map(models.len(), available(), |i| {
+        let name = format!("models/shown-{i}.yaml");
+        fs::write(clone.path().join(&name), models[i].text()).expect("a file");
+        let printed = output(clone.path(), &format!("kmcfit check {name}"));
+        assert!(printed.contains(expected[i]), "{printed}");
         assert!(!printed.contains("no response"), "{printed}");
-        let printed = output(clone.path(), "kmcfit check models/shown.yaml --gradient");
+        let printed = output(clone.path(), &format!("kmcfit check {name} --gradient"));
         let verdict = "the discrete gradient is exact: smallest relative error below 1e-6\n";
         assert!(printed.ends_with(verdict), "{printed}");
-        let printed = output(clone.path(), "kmcfit fit models/shown.yaml");
+        let printed = output(clone.path(), &format!("kmcfit fit {name}"));
         assert!(!printed.contains("warning"), "{printed}");
-        assert!(printed.ends_with("results in runs/shown\n"), "{printed}");
-    }
+        let end = format!("results in runs/shown-{i}\n");
+        assert!(printed.ends_with(&end), "{printed}");
+    });
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod cases;
 
 use assert_cmd::Command;
 use cases::{Case, cases};
+use kmcfit_core::internals::threads::{available, map};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -178,15 +179,17 @@ fn storms() {
         "---|".repeat(5)
     );
     let mut calm = Vec::new();
-    for case in cases() {
-        let ends = METHODS.map(|method| run(&case, method));
+    let cases = cases();
+    let each = |i: usize| METHODS.map(|method| run(&cases[i], method));
+    let ends = map(cases.len(), available(), each);
+    for (case, ends) in cases.iter().zip(ends) {
         for (index, end) in ends.iter().enumerate() {
-            says_little(&case, METHODS[index], end);
+            says_little(case, METHODS[index], end);
             if !calm.is_empty() {
                 same_device(&calm, end, case.name, index);
             }
         }
-        let cells = ends.each_ref().map(|end| verdict(&case, end));
+        let cells = ends.each_ref().map(|end| verdict(case, end));
         table += &format!("| {} | {} |\n", case.name, cells.join(" | "));
         if calm.is_empty() {
             calm = Vec::from(ends);
