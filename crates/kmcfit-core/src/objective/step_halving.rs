@@ -115,7 +115,8 @@ impl Problem {
                 response: &response,
                 scalars: &evaluation.scalars,
             };
-            for (channel, predicted) in part.channels.iter().zip(&mut predictions) {
+            let channels = part.channels.iter().zip(&mut predictions);
+            for (channel, predicted) in channels.filter(|(channel, _)| !channel.is_empty()) {
                 predicted.extend(channel.predict(view));
             }
             state = State {
