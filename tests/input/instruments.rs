@@ -336,3 +336,47 @@ fn long_files_are_read_beyond_the_detected_part() {
     assert_eq!(table.values(0).unwrap()[19_999], 19.999);
     assert_eq!(table.lines()[19_999], 20_002);
 }
+
+/// A long text is read in halves, one with quotes as a whole: both have the same rows, gaps, unusable columns and mistakes.
+#[test]
+fn halves_of_a_long_text() {
+    let text = |changes: &[(usize, &str)]| {
+        let mut text = String::from("t,y,note\n");
+        for i in 0..40_000 {
+            let change = changes.iter().find(|(row, _)| *row == i);
+            match change {
+                Some((_, row)) => text += row,
+                None => text += &format!("{i},{},{}", 0.5 * i as f64, 2 * i),
+            }
+            text.push('\n');
+        }
+        text
+    };
+    let outcome = |text: &str| match Table::parse("t.csv", text.as_bytes()) {
+        Ok(table) => format!("{table:?}"),
+        Err(error) => error.to_string(),
+    };
+    let both = |changes: &[(usize, &str)]| {
+        let text = text(changes);
+        let halves = outcome(&text);
+        assert!(
+            halves == outcome(&text.replacen("t,y", "\"t\",y", 1)),
+            "{changes:?}"
+        );
+        halves
+    };
+    both(&[]);
+    both(&[(7, "7,,14"), (35_000, "35000,NaN,1")]);
+    both(&[(39_000, "39000,1,late")]);
+    both(&[(11, "11,1,early"), (39_000, "39000,x,late")]);
+    let mistake = both(&[(30_000, "30000,1"), (39_000, "39000")]);
+    assert!(
+        mistake.starts_with("t.csv:30002: the row does not fit"),
+        "{mistake}"
+    );
+    let mistake = both(&[(5, "5"), (30_000, "30000,1")]);
+    assert!(
+        mistake.starts_with("t.csv:7: the row does not fit"),
+        "{mistake}"
+    );
+}
