@@ -4,9 +4,9 @@
 //! `w T (w h)^p / C` at the end, with `p = 2`, `C = 6` for the midpoint rule and `p = 4`, `C = 120` for the classical
 //! Runge-Kutta method. A fit determines the phase of `n` samples at the end of a record to about `3 q / sqrt(n)`, with the noise `q`
 //! relative to the root-mean-square response. The first grid has an error of that size, within limits; refinement after the fit
-//! makes it as small as needed. The step is chosen for the frequency below which 90 % of the energy of the records lies, then
-//! shortened so that samples of force and base fall on nodes. For records without a spectrum (too few or equal samples)
-//! the step is the sampling interval.
+//! makes it as small as needed. The step is chosen for the frequency below which 90 % of the energy of the records lies. Samples of
+//! force and base fall on nodes: their interval has the nearest whole number of steps, with a phase error of at most `2^(p/2)` times
+//! the target. For records without a spectrum (too few or equal samples) the step is the sampling interval.
 
 use super::FinerNodes;
 use crate::config::build::experiments::RawRecord;
@@ -46,7 +46,8 @@ pub fn nodes(
     finer: &FinerNodes,
     notes: &mut Vec<Finding>,
 ) -> usize {
-    let mut longest = f64::INFINITY;
+    // Longest steps for the accuracy and for the resolution of all frequencies.
+    let [mut accurate, mut resolved] = [f64::INFINITY; 2];
     let mut fastest = 0.0f64;
     let mut samples = 2;
     for channel in records.iter().flatten().flat_map(|r| &r.channels) {
@@ -59,7 +60,7 @@ pub fn nodes(
             (whole, spectrum, frequency.filter(|f| *f > 0.0))
         else {
             if channel.median_spacing > 0.0 {
-                longest = longest.min(channel.median_spacing);
+                resolved = resolved.min(channel.median_spacing);
             }
             continue;
         };
@@ -68,14 +69,16 @@ pub fn nodes(
         let (order, constant) = error_constant(method);
         let accuracy = accuracy(&whole, &spectrum, lively.len());
         let cycles = (frequency * duration).min(MOST_CYCLES);
-        longest = longest
-            .min((accuracy * constant / (TAU * cycles)).powf(1.0 / order) / omega)
-            .min(1.0 / (STEPS_PER_PERIOD * spectrum.energy_quantile(ALL_ENERGY)));
+        accurate =
+            accurate.min((accuracy * constant / (TAU * cycles)).powf(1.0 / order) / omega);
+        resolved = resolved.min(1.0 / (STEPS_PER_PERIOD * spectrum.energy_quantile(ALL_ENERGY)));
     }
     let shortest = duration / (most.min(MOST_PER_SAMPLE * samples) - 1) as f64;
-    let step = longest.clamp(shortest, duration / 8.0);
+    let nodes_of = |step: f64| (duration / step.clamp(shortest, duration / 8.0)).round() as usize + 1;
     // No step crosses a kink of the force.
-    let nodes = finer.at_least((duration / step).round() as usize + 1);
+    let nodes = finer
+        .nearest(nodes_of(accurate))
+        .max(finer.at_least(nodes_of(resolved)));
     let step = duration / (nodes - 1) as f64;
     let (order, constant) = error_constant(method);
     if fastest == 0.0 {

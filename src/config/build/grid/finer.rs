@@ -39,15 +39,25 @@ impl FinerNodes {
 
     /// Smallest number of nodes from `least` on with the samples of the force on nodes.
     pub fn at_least(&self, least: usize) -> usize {
-        let steps = least.saturating_sub(1) as f64;
-        match self.intervals {
-            None => least,
-            Some(intervals) => {
-                // Rounding of the interval adds no step to each.
-                let each = (steps / intervals * (1.0 - 1e-9)).ceil().max(1.0);
-                (intervals * each).round() as usize + 1
-            }
-        }
+        // Rounding of the interval adds no step to each.
+        self.on_samples(least, |each| (each * (1.0 - 1e-9)).ceil())
+    }
+
+    /// Number of nodes with the samples of the force on nodes whose ratio to `nodes` is nearest to one.
+    pub fn nearest(&self, nodes: usize) -> usize {
+        let nearest = |each: f64| {
+            let fewer = each.floor();
+            fewer + f64::from(each * each > fewer * (fewer + 1.0))
+        };
+        self.on_samples(nodes, nearest)
+    }
+
+    /// Number of nodes with `whole` steps in each interval of the samples of the force, at least one, for those of `nodes` nodes.
+    fn on_samples(&self, nodes: usize, whole: impl Fn(f64) -> f64) -> usize {
+        let steps = nodes.saturating_sub(1) as f64;
+        self.intervals.map_or(nodes, |intervals| {
+            (intervals * whole(steps / intervals).max(1.0)).round() as usize + 1
+        })
     }
 }
 
@@ -78,5 +88,11 @@ mod tests {
             [11, 12, 21, 42].map(|n| forced.at_least(n)),
             [11, 21, 21, 51]
         );
+        // Between one and two steps for each interval the limit is the square root of two.
+        assert_eq!(
+            [2, 11, 15, 16, 25, 26, 42].map(|n| forced.nearest(n)),
+            [11, 11, 11, 21, 21, 31, 41]
+        );
+        assert_eq!(free.nearest(42), 42);
     }
 }
