@@ -5,7 +5,7 @@ use crate::number_format::at_most;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
-use kmcfit_core::internals::signal::median;
+use kmcfit_core::internals::signal::{even_spacing, median};
 use kmcfit_core::internals::solvers::{PathPoint, WeightPath};
 use kmcfit_core::internals::study::PredictedResponse;
 
@@ -35,8 +35,11 @@ fn dots(colour: Colour, count: usize) -> Style {
     Style::new(colour).width(if count > MANY { 2.0 } else { 3.5 })
 }
 
-/// A curve over the times of samples, undefined within each gap.
-fn broken_at_gaps(t: &[f64], y: &[f64]) -> [Vec<f64>; 2] {
+/// A curve over the times of samples, undefined within each gap; `None` without gaps.
+fn broken_at_gaps(t: &[f64], y: &[f64]) -> Option<[Vec<f64>; 2]> {
+    if even_spacing(t).is_some() {
+        return None;
+    }
     let spacings: Vec<f64> = t.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let median = match spacings.is_empty() {
         true => 0.0,
@@ -55,7 +58,7 @@ fn broken_at_gaps(t: &[f64], y: &[f64]) -> [Vec<f64>; 2] {
         values.push(value);
         last = Some(time);
     }
-    [times, values]
+    Some([times, values])
 }
 
 /// A measured channel: quantity, unit, times in s, and samples.
@@ -76,16 +79,27 @@ pub fn observation(channels: &[ChannelSamples]) -> Figure {
 
 /// Samples and prediction of a channel, in the unit of the channel.
 pub fn channel((label, unit): (&str, &str), t: &[f64], observed: &[f64], model: &[f64]) -> Figure {
-    let samples = Mark::points("samples", t, observed, dots(Colour::Grey, t.len()));
     let line = Style::new(Colour::Blue).width(1.4);
-    let [times, response] = broken_at_gaps(t, model);
+    let broken = broken_at_gaps(t, model);
+    let (times, response) = match &broken {
+        Some([times, response]) => (times.as_slice(), response.as_slice()),
+        None => (t, model),
+    };
     Figure::new(
         "channel",
         "Samples and model",
         "Samples of the channel and the fitted response against time.",
     )
     .panel(
-        Panel::of_time(label, unit).marks([samples, Mark::line("model", &times, &response, line)]),
+        // One after the other: each is thinned when it is added.
+        Panel::of_time(label, unit)
+            .mark(Mark::points(
+                "samples",
+                t,
+                observed,
+                dots(Colour::Grey, t.len()),
+            ))
+            .mark(Mark::line("model", times, response, line)),
     )
 }
 

@@ -111,6 +111,7 @@ pub(super) fn estimates_at(
         (function.name(), estimate(values, mean, unit, status))
     });
     let functions: Vec<_> = functions.collect();
+    drop(values);
     let nodal = Ratios::of(nodal);
     let curves = [
         nodal.frequency,

@@ -72,11 +72,19 @@ use crate::identifiability::{
 };
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::{Fit, Status};
-use crate::threads::both;
+use crate::threads::{available, both};
 use nalgebra::DMatrix;
 
-/// Number of samples up to which two analyses are computed at once; each takes several arrays of all samples and nodes.
+/// Number of samples up to which analyses are computed at once; each takes several arrays of all samples and nodes.
 const AT_ONCE: usize = 2_000_000;
+
+/// Number of analyses that are computed at once.
+fn analyses_at_once(problem: &Problem) -> usize {
+    match problem.sample_count() <= AT_ONCE {
+        true => available(),
+        false => 1,
+    }
+}
 
 /// Results of both analyses, which are computed at the same time for all but the longest records.
 fn at_once<A, B: Send>(
@@ -84,9 +92,9 @@ fn at_once<A, B: Send>(
     one: impl FnOnce() -> A,
     other: impl FnOnce() -> B + Send,
 ) -> (A, B) {
-    match problem.sample_count() <= AT_ONCE {
-        true => both(one, other),
-        false => (one(), other()),
+    match analyses_at_once(problem) {
+        1 => (one(), other()),
+        _ => both(one, other),
     }
 }
 

@@ -16,6 +16,8 @@ use crate::record::{Channel, Experiment, Sensor, Weighting};
 use crate::system::{Grid, InputSample};
 use crate::threads::{available, map};
 
+/// Number of samples that are moved at once.
+const BLOCK: usize = 1 << 17;
 /// Share of a step by which the clock of the response is moved for derivatives.
 const SMALL: f64 = 0.01;
 
@@ -141,11 +143,26 @@ fn slopes(
         rate: 0.0,
     };
     let experiment = &problem.experiments[e];
-    let later = on_clock(experiment, channel, &problem.system.grid, clock)?;
-    let later = predict(problem, evaluation, e, &later);
-    let mut slopes: Vec<f64> = (later.iter().zip(predicted))
-        .map(|(later, now)| (later - now) / small)
-        .collect();
+    let grid = &problem.system.grid;
+    let mut slopes = Vec::with_capacity(predicted.len());
+    let mut add = |channel: &Channel, predicted: &[f64]| {
+        let later = on_clock(experiment, channel, grid, clock)?;
+        let later = predict(problem, evaluation, e, &later);
+        let pairs = later.iter().zip(predicted);
+        slopes.extend(pairs.map(|(later, now)| (later - now) / small));
+        Some(())
+    };
+    match channel.filter() {
+        [] => {
+            let first = (0..predicted.len()).step_by(BLOCK);
+            for samples in first.map(|i| i..predicted.len().min(i + BLOCK)) {
+                let part = channel.part(samples.clone(), grid, experiment.nodes)?;
+                // No sample remains of a block at the end of the record with a single one.
+                add(&part, &predicted[samples.clone()]).or((samples.start > 0).then_some(()))?;
+            }
+        }
+        _ => add(channel, predicted)?,
+    }
     // A sample at the end of the record has no later one.
     slopes.resize(predicted.len(), slopes.last().copied()?);
     Some(slopes)
@@ -206,6 +223,7 @@ pub(super) fn on_clock(
         experiment.nodes,
     )?;
     let moved = moved.with_loss(plain.loss()).with_sensor(plain.sensor());
+    let moved = moved.with_origin(at(&plain.origin()));
     let moved = match channel.inputs_at_samples() {
         Some(_) => moved.with_inputs_at_samples(inputs),
         None => moved,

@@ -336,7 +336,7 @@ impl FinerBases {
         let largest = values.iter().fold(0.0f64, |most, x| most.max(x.abs()));
         let times = grid.times();
         let is_constant = given.functions.is_constant(index);
-        let half = |i: usize| function.start[i] + to[i] + function.offset[0];
+        let half = |i: usize| function.start[i] + to[i] + function.fixed_at(0);
         CoarseBasis {
             index,
             function: function.name(),

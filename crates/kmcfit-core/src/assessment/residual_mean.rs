@@ -60,7 +60,7 @@ pub(super) fn mean_warnings(problem: &Problem, evaluation: &Evaluation) -> Vec<F
 /// Mean of samples less predictions, the same over its standard error, and over the standard deviation of the residuals; `None`
 /// where it is not noticeable or may be noise. Outliers are left out.
 fn mean_of(channel: &Channel, predicted: &[f64]) -> Option<[f64; 3]> {
-    let errors: Vec<f64> = (channel.observed().iter().zip(predicted))
+    let mut errors: Vec<f64> = (channel.observed().iter().zip(predicted))
         .map(|(observed, predicted)| observed - predicted)
         .collect();
     let largest = |values: &[f64]| values.iter().fold(0.0f64, |most, x| most.max(x.abs()));
@@ -68,16 +68,20 @@ fn mean_of(channel: &Channel, predicted: &[f64]) -> Option<[f64; 3]> {
         return None;
     }
     let outliers = outlier_indices(&errors);
-    let kept = (0..errors.len()).filter(|i| outliers.binary_search(i).is_err());
-    let errors: Vec<f64> = kept.map(|i| errors[i]).collect();
+    let mut place = 0..;
+    errors.retain(|_| {
+        place
+            .next()
+            .is_some_and(|i| outliers.binary_search(&i).is_err())
+    });
     let count = errors.len();
     if count < FEWEST {
         return None;
     }
     let mean = errors.iter().sum::<f64>() / count as f64;
     let share = mean / standard_deviation(&errors);
-    let centred = errors.iter().map(|e| e - mean);
-    let scores = DMatrix::from_iterator(count, 1, centred);
+    errors.iter_mut().for_each(|e| *e -= mean);
+    let scores = DMatrix::from_vec(count, 1, errors);
     let record = 0..count;
     let covariance = KernelCovariance::of(&scores, std::slice::from_ref(&record), 1.0)?;
     let t = mean * count as f64 / covariance.sum[(0, 0)].max(0.0).sqrt();

@@ -7,7 +7,8 @@ use crate::functions::{ScalarParameter, ScalarValue};
 use crate::objective::state_scales;
 use crate::record::{Channel, ChannelKind, Experiment, Input, Sensor, Weighting, integral_over};
 use crate::signal::{even_spacing, median_spacing};
-use crate::system::{Grid, InputSample, State, TimePoint};
+use crate::system::{Grid, State, TimePoint};
+use std::sync::Arc;
 
 /// Record and settings from which an experiment is built.
 pub(super) struct ExperimentBuilder<'a> {
@@ -217,7 +218,7 @@ impl ExperimentBuilder<'_> {
         input_delay: ScalarValue,
         scalars: &mut Vec<ScalarParameter>,
     ) -> Result<Channel, BuildError> {
-        let (grid, times) = (self.grid, &spec.times);
+        let (grid, times) = (self.grid, &*spec.times);
         // Without sigma the misfit is `integral r^2 dt` by the trapezoid rule (Buchta, Eq. 1), also for unequally spaced times.
         let weighting = match (&spec.weighting, even_spacing(times)) {
             (Some(weighting), _) => weighting.clone(),
@@ -228,9 +229,9 @@ impl ExperimentBuilder<'_> {
             input_delay,
             ..self.sensor(spec, scalars)?
         };
-        let values = spec.values.clone();
+        let (shared, values) = (Arc::clone(&spec.times), Arc::clone(&spec.values));
         let nodes = experiment.nodes;
-        let channel = Channel::new(spec.kind, times.clone(), values, weighting, grid, nodes);
+        let channel = Channel::of_shared(spec.kind, shared, values, weighting, grid, nodes);
         let channel = channel.ok_or_else(|| {
             BuildError::new("grid", "samples lie outside the time span of the grid")
                 .found(format!("samples until {} s", times[times.len() - 1]))
@@ -247,11 +248,7 @@ impl ExperimentBuilder<'_> {
             .with_resolution(spec.resolution);
         let input = &experiment.input;
         if spec.kind == ChannelKind::Acceleration && experiment.excitation.is_some() {
-            let input_at = |t: &f64| InputSample {
-                force: input.force_at(*t),
-                base: input.base_acceleration_at(*t),
-            };
-            channel = channel.with_inputs_at_samples(times.iter().map(input_at).collect());
+            channel = channel.with_shared_inputs(input.accelerating_at(times));
         }
         if let Some(base) = self.base_motion(spec, input)? {
             if sensor.is_delayed() && spec.kind != ChannelKind::Acceleration {

@@ -10,6 +10,7 @@ use crate::record::{
 };
 use crate::signal::{Interpolation, SecondOrder, Signal, median_spacing};
 use crate::system::InputQuantity;
+use std::sync::Arc;
 
 /// A scalar that is known, or estimated together with the coefficient functions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,9 +62,9 @@ pub struct ChannelSpec {
     /// Measured quantity.
     pub kind: ChannelKind,
     /// Times of the samples, s, increasing.
-    pub times: Vec<f64>,
+    pub times: Arc<Vec<f64>>,
     /// Samples in the SI unit of the kind.
-    pub values: Vec<f64>,
+    pub values: Arc<Vec<f64>>,
     /// Weights of the residuals; `None` for `J = integral r^2 dt`.
     pub weighting: Option<Weighting>,
     /// Loss of a residual.
@@ -88,8 +89,8 @@ impl ChannelSpec {
         let end = |time: Option<&f64>| time.copied().unwrap_or_default();
         Self {
             kind,
-            times: times.to_vec(),
-            values: values.to_vec(),
+            times: Arc::new(times.to_vec()),
+            values: Arc::new(values.to_vec()),
             weighting: None,
             loss: Loss::Squares,
             noise: NoiseModel::default(),
@@ -106,7 +107,11 @@ impl ChannelSpec {
         let kind = self.kind.name();
         let columns = || format!("{record}.columns.{kind}");
         let increasing = self.times.windows(2).all(|pair| pair[0] < pair[1]);
-        let finite = self.times.iter().chain(&self.values).all(|x| x.is_finite());
+        let finite = self
+            .times
+            .iter()
+            .chain(self.values.iter())
+            .all(|x| x.is_finite());
         if self.times.len() != self.values.len() {
             let problem = "the numbers of times and samples differ";
             return Err(BuildError::new(columns(), problem)

@@ -60,6 +60,11 @@ impl Design {
         values
     }
 
+    /// Element `i` of `B theta`.
+    pub(crate) fn product_at(&self, theta: &[f64], i: usize) -> f64 {
+        self.row(i).map(|(j, b)| b * theta[j]).sum()
+    }
+
     /// Adds `B theta` to `values`.
     pub fn multiply_add(&self, theta: &[f64], values: &mut [f64]) {
         match self {

@@ -46,7 +46,7 @@ pub struct CoefficientFunction {
     pub basis: Option<Basis>,
     /// Design matrix.
     pub design: Design,
-    /// Fixed part at the nodes, in the unit of the quantity.
+    /// Fixed part at the nodes, in the unit of the quantity; empty if zero.
     pub offset: Arc<Vec<f64>>,
     /// Start of the parameters, in the unit of the quantity.
     pub start: Vec<f64>,
@@ -82,26 +82,24 @@ impl CoefficientFunction {
             "one start per parameter"
         );
         let design = basis.design(grid);
-        Self::with_design(quantity, basis, design, grid.nodes(), start)
+        Self::with_design(quantity, basis, design, start)
     }
 
     /// A nodal function with start `start`.
     pub fn nodal(quantity: CoefficientKind, start: Vec<f64>) -> Self {
-        let nodes = start.len();
-        Self::with_design(quantity, Basis::Nodal, Design::Identity, nodes, start)
+        Self::with_design(quantity, Basis::Nodal, Design::Identity, start)
     }
 
     /// A constant function on `nodes` nodes with start `start`.
     pub fn constant(quantity: CoefficientKind, start: f64, nodes: usize) -> Self {
         let design = Design::Constant { nodes };
-        Self::with_design(quantity, Basis::Constant, design, nodes, vec![start])
+        Self::with_design(quantity, Basis::Constant, design, vec![start])
     }
 
     fn with_design(
         quantity: CoefficientKind,
         basis: Basis,
         design: Design,
-        nodes: usize,
         start: Vec<f64>,
     ) -> Self {
         Self {
@@ -110,7 +108,7 @@ impl CoefficientFunction {
             is_known_part: false,
             prior: None,
             design,
-            offset: Arc::new(vec![0.0; nodes]),
+            offset: Arc::default(),
             start,
             positive_parameters: basis.positive_parameters(),
             basis: Some(basis),
@@ -123,6 +121,12 @@ impl CoefficientFunction {
             prior: Some(prior),
             ..Self::constant(quantity, prior.mean, nodes)
         }
+    }
+
+    /// Fixed part at node `i`, in the unit of the quantity.
+    #[inline]
+    pub fn fixed_at(&self, i: usize) -> f64 {
+        self.offset.get(i).copied().unwrap_or(0.0)
     }
 
     /// Name in reports: kind and, if any, its experiment.
@@ -147,10 +151,12 @@ impl CoefficientFunction {
             let step = (x as usize).min(last - 1);
             (step, x - step as f64)
         };
-        let offset = (0..to.nodes()).map(place).map(|(step, x)| {
-            let [left, right] = [self.offset[step], self.offset[step + 1]];
-            left * (1.0 - x) + right * x
-        });
+        let fixed_at =
+            |(step, x): (usize, f64)| self.fixed_at(step) * (1.0 - x) + self.fixed_at(step + 1) * x;
+        let offset = match self.offset.is_empty() {
+            true => Vec::new(),
+            false => (0..to.nodes()).map(place).map(fixed_at).collect(),
+        };
         let design = match &self.design {
             Design::Empty => Design::Empty,
             Design::Constant { .. } => Design::Constant { nodes: to.nodes() },
@@ -177,7 +183,7 @@ impl CoefficientFunction {
             }
         };
         Self {
-            offset: Arc::new(offset.collect()),
+            offset: Arc::new(offset),
             design,
             ..self.clone()
         }
@@ -192,7 +198,12 @@ impl CoefficientFunction {
     fn flat(&self) -> Option<[f64; 2]> {
         let is_flat = self.offset.windows(2).all(|pair| pair[0] == pair[1]);
         let (_, entry) = self.design.row(0).next()?;
-        (self.design.is_constant() && is_flat).then_some([*self.offset.first()?, entry])
+        (self.design.is_constant() && is_flat).then_some([self.fixed_at(0), entry])
+    }
+
+    /// Value at node `i` for the parameters `theta`.
+    pub(crate) fn value_at(&self, theta: &[f64], i: usize) -> f64 {
+        self.fixed_at(i) + self.design.product_at(theta, i)
     }
 
     /// Computes the nodal values for the parameters `theta`.
@@ -202,7 +213,10 @@ impl CoefficientFunction {
             Design::Identity => values.copy_from_slice(theta),
             Design::Empty => values.copy_from_slice(&self.offset),
             Design::Sparse(_) | Design::Constant { .. } => {
-                values.copy_from_slice(&self.offset);
+                match self.offset.as_slice() {
+                    [] => values.fill(0.0),
+                    offset => values.copy_from_slice(offset),
+                }
                 self.design.multiply_add(theta, values);
             }
         }

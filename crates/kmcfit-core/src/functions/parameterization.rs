@@ -291,6 +291,16 @@ impl Parameterization {
         each.collect()
     }
 
+    /// Values of all functions of the list at some nodes.
+    pub(crate) fn values_at(&self, theta: &[f64], nodes: &[usize]) -> Vec<Vec<f64>> {
+        let each = self.list.iter().zip(&self.ranges).map(|(function, range)| {
+            let theta = &theta[range.clone()];
+            let values = nodes.iter().map(|i| function.value_at(theta, *i));
+            values.collect()
+        });
+        each.collect()
+    }
+
     /// Linear part `B theta` of coefficient set `which`, without fixed parts: its change along a direction.
     pub fn direction(&self, theta: &[f64], which: usize) -> NodalCoefficients {
         let mut nodal = self.empty_nodal();

@@ -192,15 +192,15 @@ impl Bands {
         let linearised: Vec<LinearisedCurve> = (0..problem.functions.ranges().len())
             .map(|f| maker.function(f))
             .collect();
-        let values = problem.functions.values(theta);
+        let values = problem.functions.values_at(theta, &maker.nodes);
         let functions = linearised.iter().enumerate().map(|(f, linear)| {
             let function = problem.functions.get(f);
-            let at_nodes = maker.nodes.iter().map(|i| values[f][*i]).collect();
             let unit = function.quantity.unit();
             let entries = |i: usize, into: &mut Vec<(usize, f64)>| {
                 maker.add_entries(f, maker.nodes[i], 1.0, into);
             };
             let degrees = maker.degrees(&entries);
+            let at_nodes = values[f].clone();
             maker.band(function.name(), unit, at_nodes, linear, (degrees, Some(f)))
         });
         let functions = functions.collect();
@@ -354,10 +354,10 @@ impl Maker<'_> {
             for (z, mut into) in columns.column_iter().zip(out.column_iter_mut()) {
                 let theta = self.directions.to_parameters(z.as_slice());
                 let design = &functions.get(f).design;
-                let values = design.multiply(&theta[range.clone()], functions.nodes());
+                let own = &theta[range.clone()];
                 into.iter_mut()
                     .zip(&self.nodes)
-                    .for_each(|(x, i)| *x = values[*i]);
+                    .for_each(|(x, i)| *x = design.product_at(own, *i));
             }
             out
         };
@@ -520,11 +520,11 @@ impl Maker<'_> {
         Some(most[index.clamp(1, most.len()) - 1])
     }
 
-    /// Ratios of the shared coefficient set, by the delta method.
+    /// Ratios of the shared coefficient set, by the delta method, from the values of the functions at the nodes.
     fn ratios(&self, values: &[Vec<f64>], linearised: &[LinearisedCurve]) -> Vec<Band> {
         let band = |ratio: &RatioOfSet| {
             let functions = ratio.functions();
-            let (ratios, slopes) = ratio.at_nodes(values, &self.nodes);
+            let (ratios, slopes) = ratio.at_nodes(values);
             let linear = combine(linearised, &functions, &slopes);
             let entries = |i: usize, into: &mut Vec<(usize, f64)>| {
                 let slopes = &slopes[i * functions.len()..];

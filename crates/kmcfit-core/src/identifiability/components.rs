@@ -88,9 +88,9 @@ impl Component {
     pub fn known(&self, problem: &Problem) -> Vec<bool> {
         let mut known = vec![false; problem.functions.nodes()];
         for function in self.given(problem) {
-            let is_known = |p: &f64| *p != 0.0 || function.prior.is_some();
-            let values = known.iter_mut().zip(function.offset.iter());
-            values.for_each(|(k, p)| *k |= is_known(p));
+            let is_known = |i: usize| function.fixed_at(i) != 0.0 || function.prior.is_some();
+            let nodes = known.iter_mut().enumerate();
+            nodes.for_each(|(i, known)| *known |= is_known(i));
         }
         known
     }

@@ -66,8 +66,7 @@ pub(crate) fn means_at(
         let places = ratio.functions();
         let mut gradient = vec![0.0; problem.parameters()];
         let (mut value, mut basis_error) = (0.0, 0.0);
-        let nodes: Vec<usize> = (0..shares.len()).collect();
-        let (ratios, slopes) = ratio.at_nodes(&values, &nodes);
+        let (ratios, slopes) = ratio.at_nodes(&values);
         let each = ratios.iter().zip(slopes.chunks_exact(places.len()));
         for ((i, share), (at_node, slopes)) in shares.iter().enumerate().zip(each) {
             value += share * at_node;

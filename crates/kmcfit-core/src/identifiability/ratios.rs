@@ -59,14 +59,15 @@ impl RatioOfSet {
         self.coefficients.iter().flatten().copied().collect()
     }
 
-    /// The ratio at each of the `nodes`, and its slopes in the [`functions`](Self::functions), those of a node after one another; `values`
-    /// are given by function and node.
-    pub fn at_nodes(&self, values: &[Vec<f64>], nodes: &[usize]) -> (Vec<f64>, Vec<f64>) {
-        let (mut ratios, mut all) = (Vec::with_capacity(nodes.len()), Vec::new());
-        for node in nodes {
+    /// The ratio at some nodes, and its slopes in the [`functions`](Self::functions), those of a node after one another; `values` are those
+    /// of each function at these nodes.
+    pub fn at_nodes(&self, values: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
+        let count = values.first().map_or(0, Vec::len);
+        let (mut ratios, mut all) = (Vec::with_capacity(count), Vec::new());
+        for i in 0..count {
             let mut at_node = [0.0; MOST_COEFFICIENTS];
             for (sum, functions) in at_node.iter_mut().zip(&self.coefficients) {
-                *sum = functions.iter().map(|f| values[*f][*node]).sum();
+                *sum = functions.iter().map(|f| values[*f][i]).sum();
             }
             let (value, slopes) = (self.ratio)(at_node);
             ratios.push(value);

@@ -73,10 +73,11 @@ impl Sensitivity {
         let (mut roots, mut residuals) = (Vec::new(), Vec::new());
         let mut has_sigma = Vec::new();
         for (channel, predicted) in problem.predicted(evaluation) {
-            let majorant = channel.majorant(predicted);
+            let mut majorant = channel.majorant(predicted);
             let factor = channel.information_root(predicted);
-            roots.extend(majorant.roots.iter().map(|root| factor * root));
-            residuals.extend(majorant.weighted);
+            (majorant.roots.iter_mut()).for_each(|root| *root *= factor);
+            append(&mut roots, majorant.roots);
+            append(&mut residuals, majorant.weighted);
             has_sigma.extend(std::iter::repeat_n(
                 channel.weighting().is_sigma(),
                 channel.len(),
@@ -126,6 +127,14 @@ impl Sensitivity {
             directions: self.directions.clone(),
             names: self.names.clone(),
         }
+    }
+}
+
+/// Appends values, without a copy of the first ones.
+fn append(all: &mut Vec<f64>, values: Vec<f64>) {
+    match all.is_empty() {
+        true => *all = values,
+        false => all.extend(values),
     }
 }
 

@@ -37,6 +37,9 @@ const WINDOW: f64 = 1.2 * PI;
 /// Smallest number of bandwidths between the last sample and the first one of the next turn of the circle.
 const APART: f64 = 32.0;
 
+/// Longest circle that is always a power of two.
+const LONG_CIRCLE: usize = 1 << 22;
+
 /// Covariance of a sum of scores.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KernelCovariance {
@@ -117,7 +120,7 @@ const ROWS: usize = 4096;
 fn correlated_sum(scores: &DMatrixView<f64>, bandwidth: f64) -> DMatrix<f64> {
     let (count, parameters) = scores.shape();
     let least = (2 * count).max(count + (APART * bandwidth) as usize);
-    let length = least.next_power_of_two();
+    let length = length_of_circle(least);
     let weights = window(length, bandwidth);
     let mut transform = RealTransform::new(length, weights.len());
     // Real and imaginary parts of the scores, times the roots of their weights.
@@ -135,6 +138,18 @@ fn correlated_sum(scores: &DMatrixView<f64>, bandwidth: f64) -> DMatrix<f64> {
         sum += rows.tr_mul(&rows);
     }
     sum
+}
+
+/// Length of the circle for at least `least` samples: a power of two, or for a long record the shortest that is five to eight eighths of
+/// one, because a transform takes several arrays of this length.
+fn length_of_circle(least: usize) -> usize {
+    let whole = least.next_power_of_two();
+    let parts = if whole > LONG_CIRCLE { 5 } else { 8 };
+    let lengths = (parts..8).map(|eighths| whole / 8 * eighths);
+    lengths
+        .chain([whole])
+        .find(|length| *length >= least)
+        .unwrap_or(whole)
 }
 
 /// Roots of the weights `W_f/L` of both signs of a frequency on a circle, up to the end of the spectral window.
@@ -196,13 +211,21 @@ mod tests {
     /// Those of the next turns are at least 32 bandwidths away, where the kernel is below 2.1e-4 and changes its sign.
     #[test]
     fn the_window_is_that_of_the_kernel() {
-        for (length, bandwidth) in [(128, 0.3), (128, 1.7), (256, 4.0), (4096, 50.0)] {
+        for (length, bandwidth) in [(128, 0.3), (128, 1.7), (320, 4.0), (4096, 50.0)] {
             for lag in (0..length / 2).step_by(7) {
                 let found = on_circle(length, bandwidth, lag);
                 let off = (found - kappa(lag as f64 / bandwidth)).abs();
                 assert!(off <= 2.1e-4, "{length} {bandwidth} {lag}: {off}");
             }
         }
+    }
+
+    #[test]
+    fn circles_are_short_and_even() {
+        let long = 1 << 22;
+        let least = [9, long, long + 1, 10_000_000, 13_000_000, 16_000_000];
+        let lengths = [16, long, 5 << 20, 5 << 21, 7 << 21, 1 << 24];
+        assert_eq!(least.map(length_of_circle), lengths);
     }
 
     /// The sum over all pairs with the kernel on the circle, for several bandwidths.

@@ -23,7 +23,10 @@ impl Channel {
         i: usize,
     ) -> [Eight<A>; 2] {
         if let Some(inputs) = self.inputs_at_samples() {
-            return [0, 1].map(|part| lane_reads::eight(arithmetic, &inputs[part], i));
+            return [0, 1].map(|part| match inputs[part].as_slice() {
+                [] => Eight::splat(arithmetic, 0.0),
+                values => lane_reads::eight(arithmetic, values, i),
+            });
         }
         let mut rows = [[0.0; LANES]; 2];
         if excitation.is_some() {

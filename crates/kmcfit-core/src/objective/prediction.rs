@@ -16,7 +16,7 @@ impl Channel {
     /// Position of sample `i` on the grid, that of `t_i - delay`; the first or last node where that is before or after the response.
     pub(crate) fn place(&self, view: SimulatedRecord, i: usize) -> TimePoint {
         match self.sensor().is_delayed() {
-            false => self.places()[i],
+            false => self.nominal_place(i),
             true => self.delayed_place(view, i).0,
         }
     }
@@ -28,7 +28,7 @@ impl Channel {
         let time = self.times()[i] - self.sensor().total_delay(view.scalars);
         let inside = (grid.start()..=end).contains(&time);
         let place = TimePoint::of(grid, time.clamp(grid.start(), end));
-        let place = place.unwrap_or(self.places()[i]);
+        let place = place.unwrap_or(self.nominal_place(i));
         let place = match place.as_node() {
             Some(node) => TimePoint::node(node, nodes),
             None => place,
@@ -233,7 +233,7 @@ impl Channel {
         match self.kind() {
             ChannelKind::Displacement => false,
             ChannelKind::Velocity => {
-                self.sensor().is_delayed() || self.places().iter().any(|p| p.as_node().is_none())
+                self.sensor().is_delayed() || self.places().any(|p| p.as_node().is_none())
             }
             ChannelKind::Acceleration => true,
         }

@@ -1,5 +1,6 @@
 //! One channel of a record: the samples of one sensor.
 
+use super::sample_places::SamplePlaces;
 use super::{ChannelKind, Loss, NoiseEstimate, NoiseModel, Sensor, Weighting};
 use crate::signal::{SecondOrder, zero_phase};
 use crate::system::{Excitation, Grid, InputQuantity, InputSample, TimePoint};
@@ -18,7 +19,7 @@ pub struct Channel {
     times: Arc<Vec<f64>>,
     /// Time from which a drift counts, s.
     origin: f64,
-    places: Arc<Vec<TimePoint>>,
+    places: SamplePlaces,
     observed: Arc<Vec<f64>>,
     /// Samples before the filter; empty without a filter.
     unfiltered: Arc<Vec<f64>>,
@@ -27,36 +28,13 @@ pub struct Channel {
     pub(super) noise_model: NoiseModel,
     pub(super) noise: NoiseEstimate,
     sensor: Sensor,
-    /// Forces (N) and base accelerations (m/s^2) at the samples, if given.
-    inputs_at_samples: Option<Arc<[Vec<f64>; 2]>>,
+    /// Forces (N) and base accelerations (m/s^2) at the samples, if given; empty if zero.
+    inputs_at_samples: Option<[Arc<Vec<f64>>; 2]>,
     /// Added to the response; empty if zero.
     base: Arc<Vec<f64>>,
     filter: Vec<SecondOrder>,
     /// Quantisation step of the samples, in the SI unit of the kind; 0 where unknown.
     resolution: f64,
-    /// True if sample `i` lies on node `i`.
-    on_every_node: bool,
-}
-
-/// Positions of times on the grid; `None` where one is not within the first `nodes` nodes.
-fn places(times: &[f64], grid: &Grid, nodes: usize) -> Option<Vec<TimePoint>> {
-    let place = |t: &f64| {
-        let place = TimePoint::of(grid, *t)?;
-        match place.as_node() {
-            Some(node) => (node < nodes).then(|| TimePoint::node(node, nodes)),
-            None => (place.step + 1 < nodes).then_some(place),
-        }
-    };
-    let mut places = Vec::with_capacity(times.len());
-    for t in times {
-        places.push(place(t)?);
-    }
-    Some(places)
-}
-
-/// True if sample `i` lies on node `i`.
-fn are_all_nodes(places: &[TimePoint]) -> bool {
-    (places.iter().enumerate()).all(|(i, p)| p.as_node() == Some(i))
 }
 
 impl Channel {
@@ -70,15 +48,27 @@ impl Channel {
         grid: &Grid,
         nodes: usize,
     ) -> Option<Self> {
+        let (times, values) = (Arc::new(times), Arc::new(values));
+        Self::of_shared(kind, times, values, weighting, grid, nodes)
+    }
+
+    /// [`Channel::new`] of shared samples.
+    pub(crate) fn of_shared(
+        kind: ChannelKind,
+        times: Arc<Vec<f64>>,
+        values: Arc<Vec<f64>>,
+        weighting: Weighting,
+        grid: &Grid,
+        nodes: usize,
+    ) -> Option<Self> {
         let fits = times.len() == values.len() && !values.is_empty();
-        let places = places(&times, grid, nodes)?;
+        let places = SamplePlaces::of(&times, grid, nodes)?;
         fits.then(|| Self {
             kind,
-            on_every_node: are_all_nodes(&places),
-            places: Arc::new(places),
+            places,
             origin: times[0],
-            times: Arc::new(times),
-            observed: Arc::new(values),
+            times,
+            observed: values,
             unfiltered: Arc::default(),
             weighting,
             loss: Loss::Squares,
@@ -128,7 +118,6 @@ impl Channel {
     #[must_use]
     pub fn with_sensor(mut self, sensor: Sensor) -> Self {
         self.sensor = sensor;
-        self.on_every_node &= !sensor.is_delayed();
         self
     }
 
@@ -150,11 +139,20 @@ impl Channel {
     /// # Panics
     /// If there is not one for each sample.
     #[must_use]
-    pub fn with_inputs_at_samples(mut self, inputs: Vec<InputSample>) -> Self {
+    pub fn with_inputs_at_samples(self, inputs: Vec<InputSample>) -> Self {
         assert_eq!(inputs.len(), self.times.len(), "one for each sample");
         let forces = inputs.iter().map(|input| input.force).collect();
         let bases = inputs.iter().map(|input| input.base).collect();
-        self.inputs_at_samples = Some(Arc::new([forces, bases]));
+        self.with_shared_inputs([Arc::new(forces), Arc::new(bases)])
+    }
+
+    /// [`Channel::with_inputs_at_samples`] of shared forces and base accelerations, which may be empty where they are zero.
+    #[must_use]
+    pub(crate) fn with_shared_inputs(mut self, inputs: [Arc<Vec<f64>>; 2]) -> Self {
+        self.inputs_at_samples = Some(inputs.map(|part| match part.iter().all(|x| *x == 0.0) {
+            true => Arc::default(),
+            false => part,
+        }));
         self
     }
 
@@ -239,8 +237,9 @@ impl Channel {
         assert_eq!(inputs.len(), self.len(), "one for each sample");
         assert_eq!(changes.len(), self.len(), "one for each sample");
         if let Some(parts) = &mut self.inputs_at_samples {
-            let part =
-                &mut Arc::make_mut(parts)[usize::from(quantity == InputQuantity::BaseAcceleration)];
+            let part = &mut parts[usize::from(quantity == InputQuantity::BaseAcceleration)];
+            let part = Arc::make_mut(part);
+            part.resize(self.observed.len(), 0.0);
             part.iter_mut().zip(inputs).for_each(|(a, b)| *a += b);
         }
         let base = Arc::make_mut(&mut self.base);
@@ -278,18 +277,17 @@ impl Channel {
             kind: self.kind,
             times: Arc::new(short(&self.times)),
             origin: self.origin,
-            places: Arc::new(self.places[..count.min(self.len())].to_vec()),
+            places: self.places.first(count),
             observed: Arc::new(short(&self.observed)),
             unfiltered: Arc::new(short(&self.unfiltered)),
             weighting,
             loss: self.loss,
             sensor: self.sensor,
             inputs_at_samples: (self.inputs_at_samples.as_ref())
-                .map(|parts| Arc::new(parts.each_ref().map(|p| short(p)))),
+                .map(|parts| parts.each_ref().map(|p| Arc::new(short(p)))),
             base: Arc::new(short(&self.base)),
             filter: self.filter.clone(),
             resolution: self.resolution,
-            on_every_node: self.on_every_node,
         };
         part.filter_samples();
         part
@@ -303,29 +301,24 @@ impl Channel {
 
     /// Number of samples of [`Channel::within`].
     pub(crate) fn count_within(&self, steps: usize) -> usize {
-        self.places.partition_point(|p| p.step < steps)
+        self.places.count_within(steps)
     }
 
     /// The samples `samples` before the filter, for a response over the first `nodes` nodes of another grid; `None` if one does not lie
     /// on it.
     pub(crate) fn part(&self, samples: Range<usize>, grid: &Grid, nodes: usize) -> Option<Self> {
-        let places = places(&self.times[samples.clone()], grid, nodes)?;
+        let places = SamplePlaces::of(&self.times[samples.clone()], grid, nodes)?;
         let cut = |list: &Arc<Vec<f64>>| match list.len() == samples.len() || list.is_empty() {
             true => Arc::clone(list),
             false => Arc::new(list[samples.clone()].to_vec()),
         };
         let inputs = self.inputs_at_samples.as_ref();
-        let inputs = inputs.map(|inputs| match samples.len() == self.len() {
-            true => Arc::clone(inputs),
-            false => Arc::new(inputs.each_ref().map(|list| list[samples.clone()].to_vec())),
-        });
         Some(Self {
-            on_every_node: are_all_nodes(&places) && !self.sensor.is_delayed(),
-            places: Arc::new(places),
+            places,
             times: cut(&self.times),
             observed: cut(&self.observed),
             base: cut(&self.base),
-            inputs_at_samples: inputs,
+            inputs_at_samples: inputs.map(|inputs| inputs.each_ref().map(cut)),
             unfiltered: Arc::default(),
             filter: Vec::new(),
             ..self.clone()
@@ -343,8 +336,14 @@ impl Channel {
     }
 
     /// Positions of the times of the samples on the grid, without a delay.
-    pub fn places(&self) -> &[TimePoint] {
-        &self.places
+    pub fn places(&self) -> impl ExactSizeIterator<Item = TimePoint> + Clone + '_ {
+        self.places.iter()
+    }
+
+    /// Position of the time of sample `i` on the grid, without a delay.
+    #[inline(always)]
+    pub fn nominal_place(&self, i: usize) -> TimePoint {
+        self.places.get(i)
     }
 
     /// Samples, filtered if the channel has a filter, in the SI unit of the kind.
@@ -386,10 +385,10 @@ impl Channel {
     pub(crate) fn input_at_sample(&self, excitation: Option<&Excitation>, i: usize) -> InputSample {
         match (&self.inputs_at_samples, excitation) {
             (Some(inputs), _) => InputSample {
-                force: inputs[0][i],
-                base: inputs[1][i],
+                force: inputs[0].get(i).copied().unwrap_or(0.0),
+                base: inputs[1].get(i).copied().unwrap_or(0.0),
             },
-            (None, Some(excitation)) => excitation.input_at(self.places[i]),
+            (None, Some(excitation)) => excitation.input_at(self.places.get(i)),
             (None, None) => InputSample::default(),
         }
     }
@@ -403,6 +402,18 @@ impl Channel {
     /// Motion of the base that a sensor of absolute motion adds to sample `i`; zero for other sensors.
     pub fn base_at(&self, i: usize) -> f64 {
         self.base.get(i).copied().unwrap_or(0.0)
+    }
+
+    /// Sets the time from which a drift counts, s.
+    #[must_use]
+    pub(crate) fn with_origin(mut self, origin: f64) -> Self {
+        self.origin = origin;
+        self
+    }
+
+    /// Time from which a drift counts, s.
+    pub(crate) fn origin(&self) -> f64 {
+        self.origin
     }
 
     /// Time since the first sample, s.
@@ -423,18 +434,18 @@ impl Channel {
         let all = || self.places.iter().all(|p| p.as_node().is_some());
         self.kind == ChannelKind::Displacement
             && !self.sensor.is_delayed()
-            && (self.on_every_node || all())
+            && (self.places.are_nodes() || all())
     }
 
     /// True if sample `i` lies on node `i`.
     pub(crate) fn is_on_every_node(&self) -> bool {
-        self.on_every_node
+        self.places.are_nodes() && !self.sensor.is_delayed()
     }
 
-    /// Forces (N) and base accelerations (m/s^2) at the samples, if given.
+    /// Forces (N) and base accelerations (m/s^2) at the samples, if given; empty if zero.
     #[inline(always)]
-    pub(crate) fn inputs_at_samples(&self) -> Option<&[Vec<f64>; 2]> {
-        self.inputs_at_samples.as_deref()
+    pub(crate) fn inputs_at_samples(&self) -> Option<&[Arc<Vec<f64>>; 2]> {
+        self.inputs_at_samples.as_ref()
     }
 
     /// Filtered series of values at the samples.
@@ -444,17 +455,17 @@ impl Channel {
 
     /// Number of nodes between samples, for unfiltered displacements of an ideal sensor at the nodes `0, stride, 2 stride, ...`.
     pub fn stride(&self) -> Option<usize> {
-        if self.is_plain() && self.on_every_node {
+        if self.is_plain() && self.places.are_nodes() {
             return Some(1);
         }
-        if !self.is_plain() || self.places[0].as_node() != Some(0) {
+        if !self.is_plain() || self.places.get(0).as_node() != Some(0) {
             return None;
         }
-        let stride = match self.places.get(1) {
-            Some(place) => place.as_node()?,
-            None => 1,
+        let stride = match self.len() {
+            1 => 1,
+            _ => self.places.get(1).as_node()?,
         };
-        let in_place = |(i, place): (usize, &TimePoint)| place.as_node() == Some(i * stride);
+        let in_place = |(i, place): (usize, TimePoint)| place.as_node() == Some(i * stride);
         (self.places.iter().enumerate().all(in_place)).then_some(stride)
     }
 }

@@ -3,6 +3,7 @@
 use super::ChannelKind;
 use crate::signal::{ExcitationShape, Signal};
 use crate::system::{Excitation, Grid, StageSamples};
+use std::sync::Arc;
 
 /// A force over time.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +56,18 @@ impl Input {
         }
     }
 
+    /// Shares `times` (s) with the signals that have the same.
+    pub fn share_times(&mut self, times: &Arc<Vec<f64>>) {
+        if let Some(Waveform::Samples(signal)) = &mut self.force {
+            signal.share_times(times);
+        }
+        if let Some(BaseMotion::Acceleration(signal) | BaseMotion::Displacement(signal)) =
+            &mut self.base
+        {
+            signal.share_times(times);
+        }
+    }
+
     /// Force at time `t` (s), N.
     pub fn force_at(&self, t: f64) -> f64 {
         match &self.force {
@@ -62,6 +75,28 @@ impl Input {
             Some(Waveform::Samples(signal)) => signal.value(t),
             Some(Waveform::Shape(shape)) => shape.value(t),
         }
+    }
+
+    /// Forces (N) and accelerations of the base (m/s^2) at some times (s); empty without them.
+    pub(crate) fn accelerating_at(&self, times: &[f64]) -> [Arc<Vec<f64>>; 2] {
+        let each = |at: &dyn Fn(f64) -> f64| Arc::new(times.iter().map(|t| at(*t)).collect());
+        let forces = match &self.force {
+            None => Arc::default(),
+            Some(Waveform::Samples(signal)) => {
+                let shared = signal.values_at(times);
+                shared.unwrap_or_else(|| each(&|t| self.force_at(t)))
+            }
+            Some(Waveform::Shape(_)) => each(&|t| self.force_at(t)),
+        };
+        let bases = match &self.base {
+            None => Arc::default(),
+            Some(BaseMotion::Acceleration(signal)) => {
+                let shared = signal.values_at(times);
+                shared.unwrap_or_else(|| each(&|t| self.base_acceleration_at(t)))
+            }
+            Some(BaseMotion::Displacement(_)) => each(&|t| self.base_acceleration_at(t)),
+        };
+        [forces, bases]
     }
 
     /// Acceleration of the base at time `t` (s), m/s^2.

@@ -8,6 +8,7 @@ mod kind;
 mod loss;
 mod misfit;
 mod noise;
+mod sample_places;
 mod sensor;
 mod weighting;
 

@@ -81,6 +81,18 @@ impl Signal {
         &self.values
     }
 
+    /// Values at `times`, where they are the times of the samples: shared, because long records have few arrays of all samples.
+    pub(crate) fn values_at(&self, times: &[f64]) -> Option<Arc<Vec<f64>>> {
+        (*self.times == times).then(|| Arc::clone(&self.values))
+    }
+
+    /// Shares `times` where they are the times of the samples.
+    pub fn share_times(&mut self, times: &Arc<Vec<f64>>) {
+        if self.times == *times {
+            self.times = Arc::clone(times);
+        }
+    }
+
     /// Interpolation between the samples.
     pub fn interpolation(&self) -> Interpolation {
         self.interpolation

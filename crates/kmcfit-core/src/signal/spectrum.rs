@@ -38,7 +38,12 @@ pub struct Spectrum {
 /// The Hann window `w_j = (1 - cos(2π j/n))/2`.
 pub(super) fn hann_window(n: usize) -> Vec<f64> {
     let turns = Turns::new(n, n);
-    (0..n).map(|j| 0.5 - 0.5 * turns.at(j).re).collect()
+    (0..n).map(|j| hann(&turns, j)).collect()
+}
+
+/// `w_j` of [`hann_window`].
+fn hann(turns: &Turns, j: usize) -> f64 {
+    0.5 - 0.5 * turns.at(j).re
 }
 
 impl Spectrum {
@@ -54,9 +59,11 @@ impl Spectrum {
             return None;
         }
         let mean = values.iter().sum::<f64>() / n as f64;
-        let window = hann_window(n);
-        let windowed = window.iter().zip(values).map(|(w, x)| w * (x - mean));
-        let squares: f64 = window.iter().map(|w| w * w).sum();
+        let turns = Turns::new(n, n);
+        let window = |j: usize| hann(&turns, j);
+        let windowed = values.iter().enumerate();
+        let windowed = windowed.map(|(j, x)| window(j) * (x - mean));
+        let squares: f64 = (0..n).map(|j| window(j) * window(j)).sum();
         let count = n / 2 + 1;
         let mut density = Vec::with_capacity(count);
         RealTransform::new(n, count).process(windowed, |k, x| {

@@ -256,8 +256,8 @@ impl Search {
         let Candidate { problem, fit, .. } = of;
         let function = problem.functions.get(self.function);
         let grid = &problem.system.grid;
-        let offset = &function.offset;
-        let free: Vec<f64> = (0..grid.nodes()).map(|i| value(i) - offset[i]).collect();
+        let free = (0..grid.nodes()).map(|i| value(i) - function.fixed_at(i));
+        let free: Vec<f64> = free.collect();
         let own = function.basis.as_ref()?.project(grid, &free)?;
         let mut parameters = fit.best.parameters.clone();
         let range = problem.functions.ranges()[self.function].clone();

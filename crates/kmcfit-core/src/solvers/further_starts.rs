@@ -170,8 +170,8 @@ fn without_outliers(problem: &Problem, theta: &[f64]) -> Option<Vec<f64>> {
         }
         let inside = values
             .iter()
-            .zip(function.offset.iter())
-            .map(|(value, offset)| value.clamp(median / MOVED, median * MOVED) - offset);
+            .enumerate()
+            .map(|(i, value)| value.clamp(median / MOVED, median * MOVED) - function.fixed_at(i));
         let inside: Vec<f64> = inside.collect();
         let basis = function.basis.as_ref();
         if let Some(own) = basis.and_then(|b| b.project(&problem.system.grid, &inside)) {

@@ -133,7 +133,7 @@ impl Problem {
             for i in 0..self.system.grid.nodes() {
                 let row = mass.design.row(i).map(|(j, b)| (range.start + j, b));
                 let time = self.system.grid.time(i);
-                let bounds = [least - mass.offset[i], f64::INFINITY];
+                let bounds = [least - mass.fixed_at(i), f64::INFINITY];
                 group.push(row, bounds, [time, time]);
             }
         }

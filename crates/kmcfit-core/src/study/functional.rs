@@ -92,7 +92,7 @@ impl Linear {
                 list.design
                     .row(node)
                     .for_each(|(j, b)| dense[j] += weight * b);
-                constant += weight * list.offset[node];
+                constant += weight * list.fixed_at(node);
             }
         }
         let entries = dense.into_iter().enumerate().filter(|(_, a)| *a != 0.0);

@@ -20,7 +20,8 @@ impl State {
 pub struct NodalCoefficients {
     /// Mass at the nodes, kg.
     pub mass: Vec<f64>,
-    /// Nodal values of one coefficient function per [`Term`](super::Term), in the system's order.
+    /// Nodal values of one coefficient function per [`Term`](super::Term), in the system's order. The coefficients of the last terms
+    /// are zero in derivatives if there are fewer functions than terms.
     pub coefficients: Vec<Vec<f64>>,
 }
 

@@ -239,8 +239,8 @@ fn correlation_with_estimate(low: &RawChannel, high: &RawChannel) -> Option<f64>
         return None;
     }
     let values = Signal::new(
-        high.times.clone(),
-        high.values.clone(),
+        high.times.to_vec(),
+        high.values.to_vec(),
         Interpolation::Linear,
     )?;
     let around = low.times.windows(3).zip(low.values.windows(3));

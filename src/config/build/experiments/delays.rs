@@ -11,6 +11,7 @@ use crate::number_format::significant;
 use kmcfit_core::internals::builder::ScalarSpec;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
 use kmcfit_core::internals::system::Grid;
+use std::sync::Arc;
 
 /// Default limit of an estimated delay, in samples.
 const LIMIT: f64 = 10.0;
@@ -233,8 +234,8 @@ impl super::RawChannel {
     fn keep(&mut self, kept: &[usize], shift: f64) {
         let dropped = self.times.len() - kept.len();
         let pick = |list: &[f64]| -> Vec<f64> { kept.iter().map(|i| list[*i]).collect() };
-        self.times = kept.iter().map(|i| self.times[*i] - shift).collect();
-        self.values = pick(&self.values);
+        self.times = Arc::new(kept.iter().map(|i| self.times[*i] - shift).collect());
+        self.values = Arc::new(pick(&self.values));
         if let Some(Weighting::Sigmas(sigmas)) = &mut self.weighting {
             *sigmas = pick(sigmas);
         }

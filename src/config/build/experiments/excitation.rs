@@ -11,6 +11,7 @@ use crate::units::Quantity;
 use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
+use std::sync::Arc;
 
 /// Excitation of an experiment, as samples or shapes.
 #[derive(Debug, Default, Clone)]
@@ -22,6 +23,11 @@ impl RawExcitation {
     /// True for a free response.
     pub fn is_empty(&self) -> bool {
         self.input.force.is_none() && self.input.base.is_none()
+    }
+
+    /// Shares the times of a channel, s, with the signals that have the same.
+    pub fn share_times(&mut self, times: &Arc<Vec<f64>>) {
+        self.input.share_times(times);
     }
 
     /// Force and motion of the base.

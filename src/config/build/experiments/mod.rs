@@ -33,6 +33,7 @@ use kmcfit_core::internals::functions::{Prior, ScalarParameter};
 use kmcfit_core::internals::record::{ChannelKind, Experiment, InputErrorKind, Weighting};
 use kmcfit_core::internals::signal::Signal;
 use kmcfit_core::internals::system::{Grid, InputQuantity};
+use std::sync::Arc;
 
 pub(super) use excitation::shape;
 pub(crate) use warning::DataWarning;
@@ -165,6 +166,9 @@ fn read_one(
         channels,
         excitation: excitation::read(file, i, spec, notes)?,
     };
+    if let Some(channel) = record.channels.first() {
+        record.excitation.share_times(&channel.times);
+    }
     let next = file.spec.experiments.get(i + 1);
     if next.is_none_or(|next| next.data != spec.data) {
         notes.close_file();
@@ -297,8 +301,8 @@ fn sample_per_node(raw: &mut RawChannel, grid: &Grid) {
     let plain = raw.kind == ChannelKind::Displacement && raw.filter.is_empty();
     let integral = matches!(raw.weighting, Some(Weighting::Integral { .. }) | None);
     if plain && integral && raw.spacing.is_some() && raw.times.len() != grid.nodes() {
-        raw.values = resample(&raw.values, grid.nodes());
-        raw.times = grid.times();
+        raw.values = Arc::new(resample(&raw.values, grid.nodes()));
+        raw.times = Arc::new(grid.times());
         raw.spacing = Some(grid.step());
         raw.decimated = false;
         raw.weighting = None;

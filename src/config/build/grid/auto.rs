@@ -69,12 +69,12 @@ pub fn nodes(
         let (order, constant) = error_constant(method);
         let accuracy = accuracy(&whole, &spectrum, lively.len());
         let cycles = (frequency * duration).min(MOST_CYCLES);
-        accurate =
-            accurate.min((accuracy * constant / (TAU * cycles)).powf(1.0 / order) / omega);
+        accurate = accurate.min((accuracy * constant / (TAU * cycles)).powf(1.0 / order) / omega);
         resolved = resolved.min(1.0 / (STEPS_PER_PERIOD * spectrum.energy_quantile(ALL_ENERGY)));
     }
     let shortest = duration / (most.min(MOST_PER_SAMPLE * samples) - 1) as f64;
-    let nodes_of = |step: f64| (duration / step.clamp(shortest, duration / 8.0)).round() as usize + 1;
+    let nodes_of =
+        |step: f64| (duration / step.clamp(shortest, duration / 8.0)).round() as usize + 1;
     // No step crosses a kink of the force.
     let nodes = finer
         .nearest(nodes_of(accurate))

@@ -170,7 +170,10 @@ impl All<'_> {
         let rows = rows.map(|basis| basis.rows(self.grid, times, derivative));
         let form = |(i, t): (usize, &f64)| LinearForm {
             entries: rows.as_ref().map_or(Vec::new(), |m| entries(m, i, first)),
-            constant: nodal(self.grid, &function.offset, derivative, *t),
+            constant: match function.offset.as_slice() {
+                [] => 0.0,
+                offset => nodal(self.grid, offset, derivative, *t),
+            },
             time: *t,
             span: [*t, *t],
         };

@@ -30,7 +30,7 @@ fn samples(problem: &Problem) -> impl Iterator<Item = (usize, ChannelKind, TimeP
     let experiments = problem.experiments.iter().enumerate();
     experiments.flat_map(|(e, experiment)| {
         let channels = experiment.channels.iter();
-        channels.flat_map(move |c| c.places().iter().map(move |p| (e, c.kind(), *p)))
+        channels.flat_map(move |c| c.places().map(move |p| (e, c.kind(), p)))
     })
 }
 

@@ -26,9 +26,9 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
                 let known = experiment.initial_parameters == [None; 2]
                     && !channel.sensor().is_estimated()
                     && channel.filter().is_empty();
-                let acts = |p: &&TimePoint| last_acting(problem, channel.kind(), **p).is_some();
+                let acts = |p: &TimePoint| last_acting(problem, channel.kind(), *p).is_some();
                 others += match known {
-                    true => channel.places().iter().filter(acts).count(),
+                    true => channel.places().filter(acts).count(),
                     false => channel.len(),
                 };
                 continue;
@@ -44,7 +44,7 @@ pub(super) fn equations(problem: &Problem) -> (usize, Vec<RankFinding>) {
                     node,
                     f64::to_bits(fraction),
                 );
-                let (_, members) = groups.entry(key).or_insert((*place, Vec::new()));
+                let (_, members) = groups.entry(key).or_insert((place, Vec::new()));
                 if !members.contains(&e) {
                     members.push(e);
                 }

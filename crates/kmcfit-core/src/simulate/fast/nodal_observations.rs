@@ -69,8 +69,10 @@ impl NodalObservations<'_> {
         let mut push = force;
         let [mut by_y, mut by_v] = [zero; 2];
         for (j, term) in terms.iter().enumerate().take(TERMS) {
-            let p = &self.nodal.coefficients[j];
-            let p = lane_reads::eight(arithmetic, p, i);
+            let p = match self.nodal.coefficients.get(j) {
+                Some(p) => lane_reads::eight(arithmetic, p, i),
+                None => zero,
+            };
             let response = term.respond(arithmetic, y, v);
             push = push - p * response.phi;
             out.functions[j + 1] = (response.phi * minus_inverse_mass).row();

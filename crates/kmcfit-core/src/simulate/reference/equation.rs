@@ -27,7 +27,7 @@ pub(crate) struct Partials {
 
 impl<'a> EquationOfMotion<'a> {
     /// # Panics
-    /// If `system` does not fit the grid and the terms, or grid or excitation is shorter than `nodes` nodes.
+    /// If there are functions without a term or of another length than the grid, or grid or excitation is shorter than `nodes` nodes.
     pub fn new(
         system: &'a System,
         nodal: &'a NodalCoefficients,
@@ -35,10 +35,9 @@ impl<'a> EquationOfMotion<'a> {
         nodes: usize,
     ) -> Self {
         let System { grid, terms, .. } = system;
-        assert_eq!(
-            nodal.coefficients.len(),
-            terms.len(),
-            "one function per term"
+        assert!(
+            nodal.coefficients.len() <= terms.len(),
+            "a term for each function"
         );
         assert!(
             nodal.functions().all(|f| f.len() == grid.nodes()),

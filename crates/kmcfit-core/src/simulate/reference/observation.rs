@@ -185,14 +185,9 @@ fn acceleration(
     let mut inertia = input.force / mass;
     let (mut by_y, mut by_v) = (0.0, 0.0);
     let mut by_function = [0.0; FUNCTIONS];
-    for (j, (term, p)) in equation
-        .terms
-        .iter()
-        .zip(&equation.nodal.coefficients)
-        .enumerate()
-        .rev()
-    {
-        let p = blend(p);
+    for (j, term) in equation.terms.iter().enumerate().rev() {
+        let p = equation.nodal.coefficients.get(j);
+        let p = p.map_or(0.0, |p| blend(p));
         let phi = term.phi(y.value, v.value);
         let (phi_y, phi_v) = term.partials(y.value, v.value);
         inertia -= p * phi / mass;

@@ -124,8 +124,8 @@ fn transferred(from: &Problem, theta: &[f64], to: &Problem) -> Vec<f64> {
         }
         let free: Vec<f64> = nodal
             .iter()
-            .zip(function.offset.iter())
-            .map(|(v, o)| v - o)
+            .enumerate()
+            .map(|(i, v)| v - function.fixed_at(i))
             .collect();
         let basis = function.basis.as_ref();
         if let Some(found) = basis.and_then(|b| b.project(&to.system.grid, &free)) {

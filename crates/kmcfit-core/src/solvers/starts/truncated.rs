@@ -85,7 +85,7 @@ fn first_steps(problem: &Problem, steps: usize) -> Option<Problem> {
 
 /// A constant or fixed function over the first nodes.
 fn shorter(function: &CoefficientFunction, nodes: usize) -> Option<CoefficientFunction> {
-    let offset = function.offset[..nodes].to_vec();
+    let offset = function.offset[..nodes.min(function.offset.len())].to_vec();
     let short = match (&function.basis, function.start.as_slice()) {
         (None, []) => CoefficientFunction::fixed(function.quantity, offset),
         (Some(Basis::Constant), [start]) => CoefficientFunction {

@@ -205,11 +205,11 @@ impl Equations {
         let mut program = Subproblem::new(nodes);
         program.elimination_order = (0..nodes as u32).collect();
         for plain in channels {
-            let places = plain.channel.places().iter();
+            let places = plain.channel.places();
             let inside = places.take_while(|place| place.step + 1 < nodes);
             for (i, (place, value)) in inside.zip(&plain.values).enumerate() {
                 let x = place.step as f64 + place.fraction;
-                let first = first_point(*place, nodes);
+                let first = first_point(place, nodes);
                 let weight = 1.0 / plain.noise_at(i);
                 let row = &differences(x, first, step)[plain.order()];
                 let row = row.iter().enumerate().map(|(j, w)| (first + j, weight * w));

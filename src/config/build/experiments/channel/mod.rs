@@ -24,6 +24,7 @@ use kmcfit_core::internals::signal::{even_spacing, median_spacing};
 use kmcfit_core::internals::system::Grid;
 use noise::{loss, noise_model, weighting, with_quantisation};
 use sampling::{band, decimate, nearly_equal};
+use std::sync::Arc;
 
 /// Default name of the column of the displacement, for files without `columns`.
 const DISPLACEMENT_COLUMN: &str = "y_m";
@@ -34,9 +35,9 @@ pub struct RawChannel {
     /// Measured quantity.
     pub kind: ChannelKind,
     /// Times, s.
-    pub times: Vec<f64>,
+    pub times: Arc<Vec<f64>>,
     /// Samples, SI.
-    pub values: Vec<f64>,
+    pub values: Arc<Vec<f64>>,
     /// Sampling interval of equally spaced samples without gaps, s.
     pub spacing: Option<f64>,
     /// First and last time of the rows, missing samples included, s.
@@ -285,8 +286,8 @@ fn read_one(
         span,
         decimated: spec.decimate.is_some_and(|factor| factor.0 > 1),
         median_spacing: median_spacing(&times),
-        times,
-        values,
+        times: Arc::new(times),
+        values: Arc::new(values),
         spacing,
         weighting,
         filter,

@@ -150,12 +150,12 @@ impl Measured {
         let ends = [self.places.first()?, self.places.last()?].map(position);
         let inner = 2..channel.len().checked_sub(2)?;
         let within = |i: &usize| {
-            let x = position(&channel.places()[*i]);
+            let x = position(&channel.nominal_place(*i));
             ends[0] <= x && x <= ends[1]
         };
         let first = inner.clone().find(within)?;
         let count = (first..inner.end).take_while(within).count();
-        let places = channel.places()[first..first + count].to_vec();
+        let places: Vec<TimePoint> = channel.places().skip(first).take(count).collect();
         let [mut y, mut v, mut a] = [(); 3].map(|()| Vec::with_capacity(count));
         let mut i = 0;
         for place in &places {
@@ -239,7 +239,9 @@ impl Measured {
         };
         let kept = |series: Vec<f64>| series[skipped - 1..=series.len() - skipped].to_vec();
         Some(Self {
-            places: channel.places()[skipped..channel.len() - skipped].to_vec(),
+            places: (channel.places().skip(skipped))
+                .take(channel.len() - 2 * skipped)
+                .collect(),
             first: skipped,
             y: kept(response.y),
             v: kept(response.v),
@@ -416,7 +418,7 @@ impl Unsmoothed {
         let state = fine_differences(&grouping.means(channel.observed()), spacing);
         let excitation = experiment.excitation.as_ref();
         let inputs = (0..channel.len()).map(|i| match excitation {
-            Some(excitation) => excitation.input_at(channel.places()[i]),
+            Some(excitation) => excitation.input_at(channel.nominal_place(i)),
             None => InputSample::default(),
         });
         let (force, base): (Vec<f64>, Vec<f64>) = inputs.map(|s| (s.force, s.base)).unzip();
