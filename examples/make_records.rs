@@ -61,7 +61,7 @@ impl Run<'_> {
                 let (a, b) = (grid.time(i), grid.time(i + 1));
                 [f(a), f(0.5 * (a + b)), f(b)]
             };
-            StageSamples::new((0..nodes - 1).map(step).collect())
+            StageSamples::new((0..nodes - 1).map(step))
         };
         let excitation = Excitation {
             force: self.force.map(steps),

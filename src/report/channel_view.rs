@@ -85,7 +85,7 @@ impl ChannelView<'_> {
         let label = (label.as_str(), unit);
         let times = self.channel.times();
         [
-            figures::channel(label, times, &self.observed(), &self.model()),
+            figures::channel(label, times, self.observed(), || self.model()),
             figures::residuals(
                 label,
                 times,

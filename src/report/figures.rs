@@ -78,29 +78,29 @@ pub fn observation(channels: &[ChannelSamples]) -> Figure {
 }
 
 /// Samples and prediction of a channel, in the unit of the channel.
-pub fn channel((label, unit): (&str, &str), t: &[f64], observed: &[f64], model: &[f64]) -> Figure {
+pub fn channel(
+    (label, unit): (&str, &str),
+    t: &[f64],
+    observed: Vec<f64>,
+    model: impl FnOnce() -> Vec<f64>,
+) -> Figure {
+    let dots = dots(Colour::Grey, t.len());
+    // One after the other: each is thinned when it is added.
+    let samples = Mark::points_of("samples", [t.to_vec(), observed], dots);
+    let panel = Panel::of_time(label, unit).mark(samples);
     let line = Style::new(Colour::Blue).width(1.4);
-    let broken = broken_at_gaps(t, model);
+    let model = model();
+    let broken = broken_at_gaps(t, &model);
     let (times, response) = match &broken {
         Some([times, response]) => (times.as_slice(), response.as_slice()),
-        None => (t, model),
+        None => (t, model.as_slice()),
     };
     Figure::new(
         "channel",
         "Samples and model",
         "Samples of the channel and the fitted response against time.",
     )
-    .panel(
-        // One after the other: each is thinned when it is added.
-        Panel::of_time(label, unit)
-            .mark(Mark::points(
-                "samples",
-                t,
-                observed,
-                dots(Colour::Grey, t.len()),
-            ))
-            .mark(Mark::line("model", times, response, line)),
-    )
+    .panel(panel.mark(Mark::line("model", times, response, line)))
 }
 
 /// The residuals of a channel against time with twice their standard deviation `sigma`, where it is one for all; `description` says

@@ -55,7 +55,7 @@ pub(super) fn residual_tests(
         Mark::horizontal("", -diagnostics.band, bound),
         Mark::stems(name, &lags, &diagnostics.autocorrelation, stem),
     ]);
-    let [normal, sorted] = &quantiles;
+    let [normal, _] = &quantiles;
     let ends = [normal.first(), normal.last()].map(|end| end.copied().unwrap_or(f64::NAN));
     let dots = Style::new(Colour::Blue).width(DOT);
     let line = Style::new(Colour::Vermillion).dash(Dash::Dashed);
@@ -65,7 +65,7 @@ pub(super) fn residual_tests(
     )
     .marks([
         Mark::line("normal distribution", &ends, &ends, line),
-        Mark::points(format!("{name} in order"), normal, sorted, dots),
+        Mark::points_of(format!("{name} in order"), quantiles, dots),
     ]);
     Some(
         Figure::new(

@@ -70,7 +70,7 @@ fn random_function(grid: &Grid, seed: u64) -> StageSamples {
     };
     let half = 0.5 * grid.step();
     let step = |i: usize| [0.0, half, 2.0 * half].map(|d| at(grid.time(i) + d));
-    StageSamples::new((0..grid.nodes() - 1).map(step).collect())
+    StageSamples::new((0..grid.nodes() - 1).map(step))
 }
 
 /// Samples of a sensor of `kind` at every node, of a system initially at rest.

@@ -41,7 +41,7 @@ fn motion(
             let inside = b - 1e-9 * (b - a);
             [f(a + 1e-9 * (b - a)), f(0.5 * (a + b)), f(inside)]
         };
-        StageSamples::new((0..nodes - 1).map(step).collect())
+        StageSamples::new((0..nodes - 1).map(step))
     };
     let excitation = Excitation {
         force: Some(steps(force)),

@@ -162,12 +162,16 @@ pub struct Mark {
 
 impl Mark {
     fn new(kind: MarkKind, label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
+        Self::of(kind, label, [x.to_vec(), y.to_vec()], style)
+    }
+
+    fn of(kind: MarkKind, label: impl Into<String>, [x, y]: [Vec<f64>; 2], style: Style) -> Self {
         Self {
             kind,
             label: label.into(),
             style,
-            x: x.to_vec(),
-            y: y.to_vec(),
+            x,
+            y,
             high: Vec::new(),
             is_thinned: false,
         }
@@ -189,6 +193,11 @@ impl Mark {
     /// Dots.
     pub fn points(label: impl Into<String>, x: &[f64], y: &[f64], style: Style) -> Self {
         Self::new(MarkKind::Points, label, x, y, style.dash(Dash::Solid))
+    }
+
+    /// Dots at places that are no longer needed: a long record has few copies of its samples.
+    pub fn points_of(label: impl Into<String>, places: [Vec<f64>; 2], style: Style) -> Self {
+        Self::of(MarkKind::Points, label, places, style.dash(Dash::Solid))
     }
 
     /// Lines from zero to the points.

@@ -76,7 +76,7 @@ impl Component {
             let Some(force) = force_of(experiment) else {
                 continue;
             };
-            for (i, stages) in force.values().iter().enumerate().take(experiment.nodes - 1) {
+            for (i, stages) in force.iter().enumerate().take(experiment.nodes - 1) {
                 forced[i] |= stages[0] != 0.0 || stages[1] != 0.0;
                 forced[i + 1] |= stages[1] != 0.0 || stages[2] != 0.0;
             }

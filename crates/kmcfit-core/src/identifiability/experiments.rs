@@ -292,7 +292,7 @@ fn simulated(problem: &Problem, candidate: &CandidateExperiment) -> Result<Exper
                     nodes - 1
                 ));
             }
-            if !part.values().iter().flatten().all(|x| x.is_finite()) {
+            if !part.iter().flatten().all(f64::is_finite) {
                 return Err("its excitation is not finite".into());
             }
         }

@@ -40,7 +40,7 @@ impl Input {
                 let (left, right) = (grid.time(i), grid.time(i + 1));
                 [at(left), at(0.5 * (left + right)), before(right)]
             };
-            StageSamples::new((0..nodes - 1).map(step).collect())
+            StageSamples::new((0..nodes - 1).map(step))
         };
         Excitation {
             force: self.force.as_ref().map(|force| match force {

@@ -9,48 +9,106 @@ use std::sync::Arc;
 /// A function of time at the left end, the middle and the right end of every step. The value at a right end is the limit from the
 /// left, so a jump at a node belongs to the following step.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StageSamples(Arc<Vec<[f64; 3]>>);
+pub struct StageSamples(Arc<Stages>);
+
+/// Values at the stages of each step; without jumps a right end is the next left end, and the last one follows the left ends.
+#[derive(Debug, Default, PartialEq)]
+struct Stages {
+    left: Vec<f64>,
+    middle: Vec<f64>,
+    /// Empty without jumps.
+    right: Vec<f64>,
+}
 
 impl StageSamples {
     /// Values at the left end, middle and right end of each step.
-    pub fn new(steps: Vec<[f64; 3]>) -> Self {
-        Self(Arc::new(steps))
+    pub fn new(steps: impl IntoIterator<Item = [f64; 3]>) -> Self {
+        let steps = steps.into_iter();
+        let mut stages = Stages::default();
+        let Stages {
+            left,
+            middle,
+            right,
+        } = &mut stages;
+        left.reserve_exact(steps.size_hint().0 + 1);
+        middle.reserve_exact(steps.size_hint().0);
+        let mut end: Option<f64> = None;
+        for [at_left, at_middle, at_right] in steps {
+            let jumps = end.is_some_and(|end| end.to_bits() != at_left.to_bits());
+            if right.is_empty() && jumps {
+                right.extend(left.get(1..).into_iter().flatten().chain(&end));
+            }
+            left.push(at_left);
+            middle.push(at_middle);
+            if !right.is_empty() {
+                right.push(at_right);
+            }
+            end = Some(at_right);
+        }
+        if right.is_empty() {
+            left.extend(end);
+        }
+        Self(Arc::new(stages))
     }
 
     /// The piecewise linear function through `nodes`.
     pub fn linear(nodes: &[f64]) -> Self {
         let step = |w: &[f64]| [w[0], (w[1] + w[0]) * 0.5, w[1]];
-        Self::new(nodes.windows(2).map(step).collect())
+        Self::new(nodes.windows(2).map(step))
     }
 
     /// Number of steps.
     pub fn steps(&self) -> usize {
-        self.0.len()
+        self.0.middle.len()
     }
 
-    /// The values of each step.
-    pub fn values(&self) -> &[[f64; 3]] {
-        &self.0
+    /// Values at the left ends, the middles and the right ends, of all steps; the first list may be longer.
+    #[inline(always)]
+    pub(crate) fn stages(&self) -> [&[f64]; 3] {
+        let Stages {
+            left,
+            middle,
+            right,
+        } = &*self.0;
+        match right.is_empty() {
+            true => [left, middle, left.get(1..).unwrap_or_default()],
+            false => [left, middle, right],
+        }
+    }
+
+    /// Values of step `i`.
+    ///
+    /// # Panics
+    /// If there is no such step.
+    pub fn step(&self, i: usize) -> [f64; 3] {
+        self.stages().map(|values| values[i])
+    }
+
+    /// Values of all steps.
+    pub fn iter(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
+        (0..self.steps()).map(|i| self.step(i))
     }
 
     /// True if zero at all stages.
     pub fn is_zero(&self) -> bool {
-        self.0.iter().flatten().all(|value| *value == 0.0)
+        let mut all = self.stages().into_iter().flatten();
+        all.all(|value| *value == 0.0)
     }
 
     /// Values at the nodes: left values of the steps, and the right value of the last step.
     pub fn at_nodes(&self) -> Vec<f64> {
-        let last = self.0.last().map(|step| step[2]);
-        self.0.iter().map(|step| step[0]).chain(last).collect()
+        let [left, _, right] = self.stages();
+        let last = right.last().copied();
+        left[..self.steps()].iter().copied().chain(last).collect()
     }
 
     #[inline(always)]
     pub(crate) fn at(&self, i: usize, position: StagePosition) -> f64 {
-        self.0[i][match position {
+        self.stages()[match position {
             StagePosition::Left => 0,
             StagePosition::Middle => 1,
             StagePosition::Right => 2,
-        }]
+        }][i]
     }
 }
 
@@ -86,15 +144,14 @@ impl Excitation {
     #[must_use]
     pub fn halved(&self, steps: Range<usize>) -> Self {
         let halves = |part: &StageSamples| {
-            let halves = part.0[steps.clone()]
-                .iter()
-                .flat_map(|&[left, middle, right]| {
-                    [
-                        [left, 0.5 * (left + middle), middle],
-                        [middle, 0.5 * (middle + right), right],
-                    ]
-                });
-            StageSamples::new(halves.collect())
+            let halves = steps.clone().flat_map(|i| {
+                let [left, middle, right] = part.step(i);
+                [
+                    [left, 0.5 * (left + middle), middle],
+                    [middle, 0.5 * (middle + right), right],
+                ]
+            });
+            StageSamples::new(halves)
         };
         Self {
             force: self.force.as_ref().map(halves),
@@ -106,7 +163,7 @@ impl Excitation {
     pub fn input_at(&self, place: TimePoint) -> InputSample {
         let at = |part: &Option<StageSamples>| {
             part.as_ref().map_or(0.0, |p| {
-                let [left, _, right] = p.0[place.step];
+                let [left, _, right] = p.step(place.step);
                 left * (1.0 - place.fraction) + right * place.fraction
             })
         };
@@ -128,9 +185,9 @@ impl Excitation {
         *part = Some(match part {
             None => added,
             Some(part) => {
-                let pairs = part.0.iter().zip(added.0.iter());
-                let step = |(a, b): (&[f64; 3], &[f64; 3])| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
-                StageSamples::new(pairs.map(step).collect())
+                let pairs = part.iter().zip(added.iter());
+                let step = |(a, b): ([f64; 3], [f64; 3])| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+                StageSamples::new(pairs.map(step))
             }
         });
         sum
@@ -198,12 +255,40 @@ mod tests {
             [-2.0, -1.0, 0.0],
             [0.0, 4.0, 8.0],
         ];
-        assert_eq!(force.values(), expected);
+        assert!(force.iter().eq(expected));
         let base = halves.base.unwrap();
         let expected = [[0.5, 0.375, 0.25], [0.25, 0.625, 1.0]];
-        assert_eq!(base.values()[..2], expected);
+        assert!(base.iter().take(2).eq(expected));
         let second = whole.halved(1..2).force.unwrap();
-        assert_eq!(second.values(), &force.values()[2..]);
+        assert!(second.iter().eq(force.iter().skip(2)));
         assert_eq!(Excitation::default().halved(0..0), Excitation::default());
+    }
+
+    #[test]
+    fn stages_are_those_of_each_step() {
+        let smooth = vec![[1.0, 2.0, 3.0], [3.0, 0.5, 4.0], [4.0, -1.0, 5.0]];
+        // Jumps after the first, the second and the last but one step.
+        let mut jumps = vec![smooth.clone(); 2];
+        jumps[0][1][0] = 7.0;
+        jumps[1][2][0] = -0.0;
+        for steps in jumps
+            .into_iter()
+            .chain([smooth, vec![[1.0, 4.0, 3.0]], vec![]])
+        {
+            let samples = StageSamples::new(steps.clone());
+            assert_eq!(samples.steps(), steps.len());
+            assert!(samples.iter().eq(steps.iter().copied()));
+            let nodes = steps.iter().map(|step| step[0]);
+            let nodes: Vec<f64> = nodes.chain(steps.last().map(|step| step[2])).collect();
+            assert_eq!(samples.at_nodes(), nodes);
+            for (i, step) in steps.iter().enumerate() {
+                let positions = [
+                    StagePosition::Left,
+                    StagePosition::Middle,
+                    StagePosition::Right,
+                ];
+                assert_eq!(positions.map(|position| samples.at(i, position)), *step);
+            }
+        }
     }
 }

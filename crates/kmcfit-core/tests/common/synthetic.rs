@@ -52,7 +52,7 @@ impl Truth<'_> {
         let steps = self.system.grid.nodes() - 1;
         let part = |choose: &dyn Fn(&Excitation) -> Option<StageSamples>| {
             let given = self.excitation.and_then(choose);
-            let mut values = given.map_or(Vec::new(), |p| p.values().to_vec());
+            let mut values = given.map_or(Vec::new(), |p| p.iter().collect());
             values.resize(steps, [0.0; 3]);
             values
         };

@@ -41,7 +41,7 @@ fn constants(nodes: usize, values: &[f64]) -> NodalCoefficients {
 fn sampled(grid: &Grid, f: impl Fn(f64) -> f64) -> StageSamples {
     let h = grid.step();
     let step = |i: usize| [0.0, 0.5, 1.0].map(|x| f(grid.time(i) + x * h));
-    StageSamples::new((0..grid.nodes() - 1).map(step).collect())
+    StageSamples::new((0..grid.nodes() - 1).map(step))
 }
 
 fn pushed(force: StageSamples) -> Excitation {
@@ -187,7 +187,7 @@ fn a_force_that_jumps_at_nodes_gives_the_step_response() {
             let system = system(nodes, 8.0, method);
             let (first, last) = ((nodes - 1) / 8, (nodes - 1) / 2);
             let on = |i: usize| [f64::from(u8::from((first..last).contains(&i))); 3];
-            let force = StageSamples::new((0..nodes - 1).map(on).collect());
+            let force = StageSamples::new((0..nodes - 1).map(on));
             let response = system
                 .forward(&constants(nodes, &[M, C, K]), REST, Some(&pushed(force)))
                 .unwrap();

@@ -494,7 +494,7 @@ fn base_excitation_with_sensors_on_the_base_and_in_space() {
     let base_at = |t: &f64| {
         let i = ((t / h).floor() as usize).min(NODES - 2);
         let x = t / h - i as f64;
-        let [left, _, right] = steps.values()[i];
+        let [left, _, right] = steps.step(i);
         left + (right - left) * x
     };
     for fixed_in_space in [false, true] {

@@ -6,7 +6,7 @@ use super::{RankFinding, RankFindingKind};
 use crate::functions::Basis;
 use crate::problem::Problem;
 use crate::record::{ChannelKind, Experiment};
-use crate::system::{Method, TimePoint};
+use crate::system::{Method, StageSamples, TimePoint};
 use std::collections::BTreeMap;
 
 /// Smallest share of an input that is orthogonal to the others, for independent inputs.
@@ -101,6 +101,12 @@ struct Inputs {
     silent: Vec<bool>,
 }
 
+/// Value at stage `s` of step `i`; zero beyond the samples and without them.
+fn at_stage(samples: Option<&StageSamples>, i: usize, s: usize) -> f64 {
+    let samples = samples.filter(|samples| i < samples.steps());
+    samples.map_or(0.0, |samples| samples.step(i)[s])
+}
+
 impl Inputs {
     fn of(problem: &Problem, members: &[usize]) -> Self {
         let records: Vec<&Experiment> = members.iter().map(|e| &problem.experiments[*e]).collect();
@@ -110,13 +116,9 @@ impl Inputs {
         let initially = span.len();
         let steps = problem.system.grid.nodes() - 1;
         let base = |r: &Experiment, i: usize, s: usize| {
-            let base = r.excitation.as_ref().and_then(|e| e.base.as_ref());
-            base.and_then(|b| b.values().get(i)).map_or(0.0, |b| b[s])
+            at_stage(r.excitation.as_ref().and_then(|e| e.base.as_ref()), i, s)
         };
-        let force = |r: &Experiment, i: usize, s: usize| {
-            let force = force_of(r).and_then(|f| f.values().get(i));
-            force.map_or(0.0, |f| f[s])
-        };
+        let force = |r: &Experiment, i: usize, s: usize| at_stage(force_of(r), i, s);
         let mut after = Vec::with_capacity(steps);
         let mut silent = Vec::with_capacity(steps);
         for i in 0..steps {

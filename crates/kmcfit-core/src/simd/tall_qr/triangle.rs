@@ -6,6 +6,7 @@
 use super::{BLOCK_ROWS, BlockColumn, HIGH, LANES, Row, RowBlock, order_by};
 use crate::simd::{self, Arithmetic, Eight, Kernel};
 use nalgebra::DMatrix;
+use std::ops::Range;
 
 /// Number of columns reflected together.
 const WIDE: usize = LANES;
@@ -33,6 +34,16 @@ impl Triangle {
 
     /// Triangle of `A`, the diagonal `roots` of `D`, and `d`; also returns the column of `A` for each column of `R`.
     pub fn of(matrix: &DMatrix<f64>, roots: &[f64], right: &[f64]) -> (Self, Vec<usize>) {
+        Self::of_blocks(matrix, |triangle, block, rows| {
+            triangle.add_weighted(block, &roots[rows.clone()], &right[rows]);
+        })
+    }
+
+    /// Triangle to which `add` adds each block of the rows of a matrix.
+    fn of_blocks(
+        matrix: &DMatrix<f64>,
+        mut add: impl FnMut(&mut Self, &mut RowBlock, Range<usize>),
+    ) -> (Self, Vec<usize>) {
         let height = matrix.nrows();
         let columns: Vec<&[f64]> = matrix.as_slice().chunks_exact(height.max(1)).collect();
         let begins: Vec<usize> = columns.iter().map(|c| begin(c)).collect();
@@ -46,17 +57,17 @@ impl Triangle {
                 let column = &columns[*j][rows.clone()];
                 block.column_mut(place)[..rows.len()].copy_from_slice(column);
             }
-            triangle.add_weighted(&mut block, &roots[rows.clone()], &right[rows.clone()]);
             block.first = rows.end;
+            add(&mut triangle, &mut block, rows);
         }
         (triangle, order)
     }
 
     /// Square matrix `R` with `R^T R = A^T A`: the triangle, its columns in the order of those of `A`.
     pub fn factor(matrix: &DMatrix<f64>) -> DMatrix<f64> {
-        let height = matrix.nrows();
-        let (ones, zeros) = (vec![1.0; height], vec![0.0; height]);
-        let (triangle, order) = Self::of(matrix, &ones, &zeros);
+        let (triangle, order) = Self::of_blocks(matrix, |triangle, block, rows| {
+            triangle.add(block, &[0.0; BLOCK_ROWS][..rows.len()]);
+        });
         let mut factor = DMatrix::zeros(order.len(), order.len());
         for (i, (entries, _)) in triangle.rows().enumerate() {
             entries.for_each(|(place, r)| factor[(i, order[place])] = r);

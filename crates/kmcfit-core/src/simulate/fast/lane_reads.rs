@@ -1,7 +1,7 @@
 //! Reads eight consecutive nodal values, or the stage values of eight consecutive steps, into the SIMD lanes; past the end
 //! of the data the last value is repeated.
 
-use crate::simd::{Arithmetic, Eight, LANES, Row, window};
+use crate::simd::{Arithmetic, Eight, LANES, window};
 use crate::system::StageSamples;
 
 /// Returns the values `i` to `i + 7`; lanes past the end repeat the last value.
@@ -48,38 +48,15 @@ pub(crate) fn is_constant(values: &[f64]) -> bool {
 }
 
 /// Returns force (N) or base acceleration (m/s²) at the left end, middle and right end of steps `i` to `i + 7`; zero if
-/// there is none. Lanes past the end repeat the last step.
+/// there is none. Lanes past the end have a value near it.
 #[inline(always)]
 pub(crate) fn stage_samples<A: Arithmetic>(
     arithmetic: A,
     samples: Option<&StageSamples>,
     i: usize,
 ) -> [Eight<A>; 3] {
-    let Some(steps) = samples.map(StageSamples::values) else {
-        return [Eight::splat(arithmetic, 0.0); 3];
-    };
-    let inside = steps.get(i..).and_then(<[_]>::first_chunk::<LANES>);
-    let [left, middle, right] = match inside {
-        Some(steps) => columns(steps),
-        None => padded_steps(steps, i),
-    };
-    [
-        Eight::load(arithmetic, &left),
-        Eight::load(arithmetic, &middle),
-        Eight::load(arithmetic, &right),
-    ]
-}
-
-#[inline(always)]
-fn columns(steps: &[[f64; 3]; LANES]) -> [Row; 3] {
-    std::array::from_fn(|q| std::array::from_fn(|l| steps[l][q]))
-}
-
-#[cold]
-#[inline(never)]
-fn padded_steps(steps: &[[f64; 3]], i: usize) -> [Row; 3] {
-    match steps.len().checked_sub(1) {
-        Some(last) => columns(&std::array::from_fn(|l| steps[(i + l).min(last)])),
-        None => [[0.0; LANES]; 3],
+    match samples.filter(|samples| samples.steps() > 0) {
+        Some(samples) => (samples.stages()).map(|values| eight(arithmetic, values, i)),
+        None => [Eight::splat(arithmetic, 0.0); 3],
     }
 }

@@ -53,25 +53,11 @@ impl Half {
 
     fn of(problem: &Problem, evaluation: &Evaluation, steps: Range<usize>, columns: usize) -> Self {
         let order = problem.places();
-        let experiment = &problem.experiments[0];
         let mut triangle = Triangle::new(columns);
         let mut residuals = Residuals::with_capacity(BLOCK_ROWS);
         let states = problem.each_row_block_of_part(evaluation, &order, steps, |mut block| {
-            // All rows of a block belong to one channel.
-            let mut first = block.first;
-            let mut of = experiment.channels.iter().zip(&evaluation.predictions[0]);
-            let channel = of.find(|(channel, _)| match first.checked_sub(channel.len()) {
-                Some(rest) => {
-                    first = rest;
-                    false
-                }
-                None => true,
-            });
-            if let Some((channel, predicted)) = channel {
-                residuals.clear();
-                residuals.push(channel, predicted, first..first + block.count);
-                triangle.add_weighted(&mut block, &residuals.roots, &residuals.weighted);
-            }
+            residuals.set_block(problem, evaluation, &block);
+            triangle.add_weighted(&mut block, &residuals.roots, &residuals.weighted);
             block
         });
         Self {

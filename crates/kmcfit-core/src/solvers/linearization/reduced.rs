@@ -6,7 +6,7 @@ use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::qp::Subproblem;
 use crate::simd::LANES;
-use crate::simd::tall_qr::Triangle;
+use crate::simd::tall_qr::{BLOCK_ROWS, Triangle};
 use crate::solvers::timings::{Timings, timed};
 use nalgebra::{DMatrix, DVector};
 use std::time::Duration;
@@ -44,13 +44,13 @@ impl Reduced {
     ) -> Self {
         let clock = Instant::now();
         let order = problem.places();
-        let Residuals { roots, weighted } = Residuals::at(problem, evaluation);
+        let mut residuals = Residuals::with_capacity(BLOCK_ROWS);
         let mut triangle = Triangle::new(order.len());
         let mut reducing = Duration::ZERO;
         problem.each_row_block(evaluation, &order, |mut block| {
-            let rows = block.first..block.first + block.count;
-            let (roots, right) = (&roots[rows.clone()], &weighted[rows]);
-            let mut add = || triangle.add_weighted(&mut block, roots, right);
+            residuals.set_block(problem, evaluation, &block);
+            let Residuals { roots, weighted } = &residuals;
+            let mut add = || triangle.add_weighted(&mut block, roots, weighted);
             match order.len() > NARROW {
                 true => timed(&mut reducing, add),
                 false => add(),

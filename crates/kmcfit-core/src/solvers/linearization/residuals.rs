@@ -3,6 +3,7 @@
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::record::Channel;
+use crate::simd::tall_qr::RowBlock;
 use std::ops::Range;
 
 /// Weighted residuals of the samples of all channels.
@@ -30,9 +31,17 @@ impl Residuals {
         }
     }
 
-    pub fn clear(&mut self) {
+    /// Replaces the residuals by those of a block of rows of the Jacobian, which belong to one channel.
+    pub fn set_block(&mut self, problem: &Problem, evaluation: &Evaluation, block: &RowBlock) {
         self.roots.clear();
         self.weighted.clear();
+        let mut first = block.first;
+        for (channel, predicted) in problem.predicted(evaluation) {
+            match first.checked_sub(channel.len()) {
+                Some(rest) => first = rest,
+                None => return self.push(channel, predicted, first..first + block.count),
+            }
+        }
     }
 
     /// Appends some samples of a channel, all of them for correlated noise.

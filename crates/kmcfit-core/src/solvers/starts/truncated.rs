@@ -105,8 +105,8 @@ fn shorter(function: &CoefficientFunction, nodes: usize) -> Option<CoefficientFu
 
 fn first_steps_of(experiment: &Experiment, steps: usize) -> Experiment {
     let short = |part: &Option<StageSamples>| {
-        let first = |all: &StageSamples| all.values()[..steps.min(all.steps())].to_vec();
-        part.as_ref().map(|all| StageSamples::new(first(all)))
+        let first = |all: &StageSamples| StageSamples::new(all.iter().take(steps));
+        part.as_ref().map(first)
     };
     let excitation = experiment.excitation.as_ref().map(|all| Excitation {
         force: short(&all.force),
