@@ -178,6 +178,14 @@ impl Rows {
     }
 }
 
+/// Appends values, the first ones without a copy.
+pub(crate) fn append(all: &mut Vec<f64>, values: Vec<f64>) {
+    match all.is_empty() {
+        true => *all = values,
+        false => all.extend(values),
+    }
+}
+
 /// Sorts the entries of a row by column and adds those of equal columns, in their order.
 pub(crate) fn merge_columns(entries: &mut Vec<(usize, f64)>) {
     entries.sort_by_key(|(column, _)| *column);

@@ -72,7 +72,7 @@ pub(super) fn input_pulses(
             .axpy(-share, &jacobian.column(first + node), 1.0);
     }
     drop(jacobian);
-    let residuals = model.orthogonal(&weighted_residuals(&extended, &evaluation));
+    let residuals = model.orthogonal(weighted_residuals(&extended, &evaluation));
     let found = pursuit(
         &model,
         by_sample,

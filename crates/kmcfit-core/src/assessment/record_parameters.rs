@@ -13,6 +13,7 @@ use crate::functions::{ScalarParameter, ScalarValue};
 use crate::objective::{Evaluation, SimulatedRecord};
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, Sensor, Weighting};
+use crate::rows::append;
 use crate::system::{Grid, InputSample};
 use crate::threads::{available, map};
 
@@ -63,7 +64,7 @@ pub(super) fn parameters(problem: &Problem) -> Vec<RecordParameter> {
 pub(super) struct RecordColumns {
     /// Derivatives in time of the predictions of each channel of an experiment; `None` where they are not asked for or do not exist.
     slopes: Vec<Option<Vec<Vec<f64>>>>,
-    /// Roots of the weights of each channel.
+    /// Roots of the weights of the samples of each channel, or the one of all.
     roots: Vec<Vec<f64>>,
 }
 
@@ -87,7 +88,10 @@ impl RecordColumns {
         Self {
             slopes: map(experiments, available(), of_clock),
             roots: (problem.predicted(evaluation))
-                .map(|(channel, predicted)| channel.majorant(predicted).roots)
+                .map(|(channel, predicted)| match channel.uniform_weights() {
+                    Some([inner, ends]) if inner == ends => vec![inner.sqrt()],
+                    _ => channel.majorant(predicted).roots,
+                })
                 .collect(),
         }
     }
@@ -101,7 +105,7 @@ impl RecordColumns {
     ) -> Option<Vec<f64>> {
         let predictions = &evaluation.predictions;
         let start = problem.system.grid.start();
-        let mut all = Vec::with_capacity(problem.sample_count());
+        let mut all = Vec::new();
         let mut roots = self.roots.iter();
         for (e, experiment) in problem.experiments.iter().enumerate() {
             for (c, channel) in experiment.channels.iter().enumerate() {
@@ -121,8 +125,11 @@ impl RecordColumns {
                     _ => vec![0.0; channel.len()],
                 };
                 channel.whiten_rows(&mut rows);
-                let pairs = rows.iter().zip(roots.next()?);
-                all.extend(pairs.map(|(row, root)| row * root));
+                match roots.next()?.as_slice() {
+                    [root] => rows.iter_mut().for_each(|row| *row *= root),
+                    roots => (rows.iter_mut().zip(roots)).for_each(|(row, root)| *row *= root),
+                }
+                append(&mut all, rows);
             }
         }
         Some(all)

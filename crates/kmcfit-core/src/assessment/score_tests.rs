@@ -99,7 +99,7 @@ impl<'a> ScoreTests<'a> {
         let first = problem.functions.scalar_range().start;
         let terms = jacobian.columns(first, kinds.len()).into_owned();
         let model = Span::of(jacobian.remove_columns(first, kinds.len()));
-        let rest = model.orthogonal(&weighted_residuals(problem, evaluation));
+        let rest = model.orthogonal(weighted_residuals(problem, evaluation));
         let records = record_parameters::parameters(problem);
         let of_records = RecordColumns::of(problem, evaluation, &records);
         Some(Self {
@@ -127,7 +127,7 @@ impl<'a> ScoreTests<'a> {
         };
         let test = |i: usize| {
             self.model
-                .test(self.problem, &column(i)?, &self.rest, is_modelled)
+                .test(self.problem, column(i)?, &self.rest, is_modelled)
         };
         let count = self.kinds.len() + self.records.len();
         let tests = map(count, analyses_at_once(self.problem), test);

@@ -34,8 +34,8 @@ impl Span {
         column: Vec<f64>,
     ) -> Option<(f64, f64)> {
         let model = Self::of(weighted_jacobian(problem, evaluation));
-        let rest = model.orthogonal(&weighted_residuals(problem, evaluation));
-        model.test(problem, &DVector::from_vec(column), &rest, true)
+        let rest = model.orthogonal(weighted_residuals(problem, evaluation));
+        model.test(problem, DVector::from_vec(column), &rest, true)
     }
 
     pub(super) fn of(jacobian: DMatrix<f64>) -> Self {
@@ -52,10 +52,10 @@ impl Span {
     }
 
     /// Part of a vector orthogonal to the derivatives of the model.
-    pub(super) fn orthogonal(&self, vector: &DVector<f64>) -> DVector<f64> {
-        let mut rest = vector.clone();
-        rest.gemv(-1.0, &self.basis, &self.basis.tr_mul(vector), 1.0);
-        rest
+    pub(super) fn orthogonal(&self, mut vector: DVector<f64>) -> DVector<f64> {
+        let shares = self.basis.tr_mul(&vector);
+        vector.gemv(-1.0, &self.basis, &shares, 1.0);
+        vector
     }
 
     /// Leaves the parts of the columns orthogonal to the derivatives of the model.
@@ -69,26 +69,31 @@ impl Span {
     pub(super) fn test(
         &self,
         problem: &Problem,
-        column: &DVector<f64>,
+        column: DVector<f64>,
         e: &DVector<f64>,
         is_modelled: bool,
     ) -> Option<(f64, f64)> {
-        let z = self.orthogonal(column);
+        let whole = column.norm_squared();
+        let mut z = self.orthogonal(column);
         let square = z.norm_squared();
-        (square > APART * APART * column.norm_squared()).then_some(())?;
+        (square > APART * APART * whole).then_some(())?;
         let value = -z.dot(e) / square;
-        let mut rest = e.clone();
-        rest.axpy(value, &z, 1.0);
         let estimated = (self.basis.ncols() + 1) as f64;
         let is_kernel = |c: &crate::record::Channel| c.noise().scores == ScoreCovariance::Kernel;
         let variance = match !is_modelled || problem.channels().any(is_kernel) {
             true => {
+                let mut rest = e.clone();
+                rest.axpy(value, &z, 1.0);
                 rest.component_mul_assign(&z);
                 let scores = DMatrix::from_vec(rest.len(), 1, rest.data.into());
                 let found = KernelCovariance::of(&scores, &problem.channel_samples(), estimated)?;
                 found.sum[(0, 0)] / (square * square)
             }
-            false => rest.norm_squared() / (rest.len() as f64 - estimated) / square,
+            false => {
+                // The rest, in place of `z`.
+                z.axpy(1.0, e, value);
+                z.norm_squared() / (z.len() as f64 - estimated) / square
+            }
         };
         let error = variance.max(0.0).sqrt();
         (error > 0.0).then(|| (value, value / error))

@@ -3,14 +3,15 @@
 use crate::simd::sum::largest;
 use nalgebra::DMatrix;
 
-/// A matrix whose nonzero entries of a row lie within `span` neighbouring columns. A row takes `4 + 8 span` bytes.
+/// A matrix whose nonzero entries of a row lie within `span` neighbouring columns. A row takes `4 + 8 span` bytes, or
+/// four while all rows have a single entry of one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LocalRows {
     width: usize,
     span: usize,
     /// First column of each row.
     first: Vec<u32>,
-    /// `span` entries of each row, zeros included.
+    /// `span` entries of each row, zeros included; empty while each row has the single entry one.
     values: Vec<f64>,
 }
 
@@ -33,7 +34,9 @@ impl LocalRows {
     /// Reserves capacity for further rows.
     pub fn reserve(&mut self, rows: usize) {
         self.first.reserve_exact(rows);
-        self.values.reserve_exact(rows * self.span);
+        if self.span > 1 {
+            self.values.reserve_exact(rows * self.span);
+        }
     }
 
     /// Appends a row; entries of one column are added.
@@ -44,8 +47,13 @@ impl LocalRows {
         let entries = entries.filter(|(_, value)| *value != 0.0);
         let lowest = entries.clone().map(|(column, _)| column).min();
         let first = lowest.unwrap_or(0).min(self.width - self.span);
+        let begin = self.len() * self.span;
         self.first.push(first as u32);
-        let begin = self.values.len();
+        if self.span == 1 && self.values.is_empty() && entries.clone().eq([(first, 1.0)]) {
+            return;
+        }
+        // Ones that were omitted so far.
+        self.values.resize(begin, 1.0);
         self.values.resize(begin + self.span, 0.0);
         for (column, value) in entries {
             self.values[begin..][..self.span][column - first] += value;
@@ -77,7 +85,10 @@ impl LocalRows {
     /// First column and stored entries of row `i`.
     #[inline(always)]
     fn stored(&self, i: usize) -> (usize, &[f64]) {
-        let values = &self.values[i * self.span..][..self.span];
+        let values = match self.values.is_empty() {
+            true => &[1.0],
+            false => &self.values[i * self.span..][..self.span],
+        };
         (self.first[i] as usize, values)
     }
 
@@ -96,6 +107,10 @@ impl LocalRows {
     /// Calls `act` with the index and the product with `z` of each of the first `count` rows.
     #[inline(always)]
     fn each_product(&self, z: &[f64], count: usize, mut act: impl FnMut(usize, f64)) {
+        if self.values.is_empty() {
+            let rows = self.first.iter().take(count).enumerate();
+            return rows.for_each(|(i, first)| act(i, z[*first as usize]));
+        }
         let rows = self.first.iter().zip(self.values.chunks_exact(self.span));
         for (i, (&first, values)) in rows.take(count).enumerate() {
             let first = first as usize;
@@ -113,7 +128,7 @@ impl LocalRows {
 
     /// Adds the product of each row with `z` to the values, which may be fewer than the rows.
     pub fn multiply_add(&self, z: &[f64], values: &mut [f64]) {
-        if self.width == 1 {
+        if self.width == 1 && !self.values.is_empty() {
             let pairs = values.iter_mut().zip(&self.values);
             pairs.for_each(|(value, a)| *value += a * z[0]);
             return;
@@ -123,7 +138,7 @@ impl LocalRows {
 
     /// Adds the sum of all rows, each multiplied by its value of `y`, to `out`.
     pub fn transpose_multiply_add(&self, y: &[f64], out: &mut [f64]) {
-        if self.width == 1 {
+        if self.width == 1 && !self.values.is_empty() {
             let pairs = self.values.iter().zip(y);
             out[0] = pairs.fold(out[0], |sum, (a, y)| sum + a * y);
             return;
@@ -137,7 +152,7 @@ impl LocalRows {
 
     /// Largest absolute product of a row with `z`.
     pub fn largest(&self, z: &[f64]) -> f64 {
-        if self.width == 1 {
+        if self.width == 1 && !self.values.is_empty() {
             // Rounding preserves the order of magnitudes.
             return (largest(&self.values) * z[0]).abs();
         }
@@ -151,6 +166,7 @@ impl LocalRows {
 
     /// True for a single column with equal entries in all rows.
     pub fn is_constant(&self) -> bool {
+        // Without values all are ones.
         self.width == 1 && self.values.windows(2).all(|pair| pair[0] == pair[1])
     }
 
@@ -214,5 +230,41 @@ mod tests {
         assert!(column([2.0, 2.0]).is_constant());
         assert!(!column([2.0, 3.0]).is_constant());
         assert_eq!(column([2.0, -3.0]).largest(&[-2.0]), 6.0);
+    }
+
+    /// Rows `[1 0]`, `[0 1]`, `[0 1]`, of which the ones are omitted, and the same with `[0.5 0]` behind them.
+    #[test]
+    fn ones_are_products_as_well() {
+        let mut rows = LocalRows::new(2, 1);
+        rows.reserve(4);
+        [0, 1, 1]
+            .into_iter()
+            .for_each(|j| rows.push([(j, 1.0)].into_iter()));
+        assert!(rows.values.is_empty());
+        let check = |rows: &LocalRows, expected: &[(usize, f64)]| {
+            let each = (0..rows.len()).flat_map(|i| rows.row(i));
+            assert!(each.eq(expected.iter().copied()));
+            let (z, y) = ([2.0, -3.0], [1.0, 10.0, 100.0, 1000.0]);
+            let products: Vec<f64> = expected.iter().map(|(j, a)| a * z[*j]).collect();
+            let mut values = vec![0.5; rows.len()];
+            rows.multiply_add(&z, &mut values);
+            assert!(
+                values
+                    .iter()
+                    .eq(products.iter().map(|p| 0.5 + p).collect::<Vec<_>>().iter())
+            );
+            let mut out = [0.0; 2];
+            rows.transpose_multiply_add(&y, &mut out);
+            let mut sums = [0.0; 2];
+            (expected.iter().zip(y)).for_each(|((j, a), y)| sums[*j] += a * y);
+            assert_eq!(out, sums);
+            assert_eq!(rows.largest(&z), 3.0);
+        };
+        check(&rows, &[(0, 1.0), (1, 1.0), (1, 1.0)]);
+        rows.push([(0, 0.5)].into_iter());
+        check(&rows, &[(0, 1.0), (1, 1.0), (1, 1.0), (0, 0.5)]);
+        let mut one = LocalRows::new(1, 1);
+        (0..3).for_each(|_| one.push([(0, 1.0)].into_iter()));
+        assert!(one.is_constant());
     }
 }

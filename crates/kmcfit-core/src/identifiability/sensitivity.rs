@@ -4,6 +4,7 @@ use super::directions::Directions;
 use super::factorisation::Factorisation;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
+use crate::rows::append;
 use nalgebra::DMatrix;
 use std::ops::Range;
 
@@ -127,14 +128,6 @@ impl Sensitivity {
             directions: self.directions.clone(),
             names: self.names.clone(),
         }
-    }
-}
-
-/// Appends values, without a copy of the first ones.
-fn append(all: &mut Vec<f64>, values: Vec<f64>) {
-    match all.is_empty() {
-        true => *all = values,
-        false => all.extend(values),
     }
 }
 

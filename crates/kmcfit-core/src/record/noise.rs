@@ -137,7 +137,7 @@ impl Channel {
 
     /// Quadratic majorant of the misfit at predictions.
     pub fn majorant(&self, predicted: &[f64]) -> Majorant {
-        let (residuals, roots): (Vec<f64>, Vec<f64>) = match self.correlation() {
+        let (mut weighted, roots): (Vec<f64>, Vec<f64>) = match self.correlation() {
             None => {
                 let each = self.residuals(predicted).enumerate();
                 each.map(|(i, r)| (r, self.weight(i, r).sqrt())).unzip()
@@ -147,11 +147,9 @@ impl Channel {
                 each.map(|e| (e, self.loss().weight(e).sqrt())).unzip()
             }
         };
-        let pairs = residuals.iter().zip(&roots);
-        Majorant {
-            weighted: pairs.map(|(r, root)| root * r).collect(),
-            roots,
-        }
+        let pairs = weighted.iter_mut().zip(&roots);
+        pairs.for_each(|(r, root)| *r *= root);
+        Majorant { weighted, roots }
     }
 
     /// Factor of the standard errors' inverse by the loss, beside the roots of [`Channel::majorant`]; 1 for least squares.
