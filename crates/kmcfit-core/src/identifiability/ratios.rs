@@ -64,12 +64,14 @@ impl RatioOfSet {
     pub fn at_nodes(&self, values: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
         let count = values.first().map_or(0, Vec::len);
         let (mut ratios, mut all) = (Vec::with_capacity(count), Vec::new());
-        for i in 0..count {
-            let mut at_node = [0.0; MOST_COEFFICIENTS];
-            for (sum, functions) in at_node.iter_mut().zip(&self.coefficients) {
+        let at_node = |i: usize| {
+            let mut sums = [0.0; MOST_COEFFICIENTS];
+            for (sum, functions) in sums.iter_mut().zip(&self.coefficients) {
                 *sum = functions.iter().map(|f| values[*f][i]).sum();
             }
-            let (value, slopes) = (self.ratio)(at_node);
+            (self.ratio)(sums)
+        };
+        for (value, slopes) in (0..count).map(at_node) {
             ratios.push(value);
             for (functions, slope) in self.coefficients.iter().zip(slopes) {
                 all.extend(functions.iter().map(|_| slope));
