@@ -248,7 +248,7 @@ impl ExperimentBuilder<'_> {
             .with_resolution(spec.resolution);
         let input = &experiment.input;
         if spec.kind == ChannelKind::Acceleration && experiment.excitation.is_some() {
-            channel = channel.with_shared_inputs(input.accelerating_at(times));
+            channel = channel.with_shared_inputs(input.inputs_at(times));
         }
         if let Some(base) = self.base_motion(spec, input)? {
             if sensor.is_delayed() && spec.kind != ChannelKind::Acceleration {

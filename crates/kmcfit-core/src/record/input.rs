@@ -77,26 +77,28 @@ impl Input {
         }
     }
 
-    /// Forces (N) and accelerations of the base (m/s^2) at some times (s); empty without them.
-    pub(crate) fn accelerating_at(&self, times: &[f64]) -> [Arc<Vec<f64>>; 2] {
-        let each = |at: &dyn Fn(f64) -> f64| Arc::new(times.iter().map(|t| at(*t)).collect());
-        let forces = match &self.force {
-            None => Arc::default(),
-            Some(Waveform::Samples(signal)) => {
-                let shared = signal.values_at(times);
-                shared.unwrap_or_else(|| each(&|t| self.force_at(t)))
-            }
-            Some(Waveform::Shape(_)) => each(&|t| self.force_at(t)),
+    /// Forces (N) and accelerations of the base (m/s^2) at some times (s); empty without them, and shared with a signal at the times of its
+    /// samples.
+    pub(crate) fn inputs_at(&self, times: &[f64]) -> [Arc<Vec<f64>>; 2] {
+        let values = |signal: Option<&Signal>, at: &dyn Fn(f64) -> f64| {
+            let shared = signal.and_then(|signal| signal.values_at(times));
+            shared.unwrap_or_else(|| Arc::new(times.iter().map(|t| at(*t)).collect()))
         };
-        let bases = match &self.base {
-            None => Arc::default(),
-            Some(BaseMotion::Acceleration(signal)) => {
-                let shared = signal.values_at(times);
-                shared.unwrap_or_else(|| each(&|t| self.base_acceleration_at(t)))
-            }
-            Some(BaseMotion::Displacement(_)) => each(&|t| self.base_acceleration_at(t)),
-        };
-        [forces, bases]
+        let forces = self.force.as_ref().map(|force| {
+            let signal = match force {
+                Waveform::Samples(signal) => Some(signal),
+                Waveform::Shape(_) => None,
+            };
+            values(signal, &|t| self.force_at(t))
+        });
+        let bases = self.base.as_ref().map(|base| {
+            let signal = match base {
+                BaseMotion::Acceleration(signal) => Some(signal),
+                BaseMotion::Displacement(_) => None,
+            };
+            values(signal, &|t| self.base_acceleration_at(t))
+        });
+        [forces, bases].map(Option::unwrap_or_default)
     }
 
     /// Acceleration of the base at time `t` (s), m/s^2.

@@ -5,7 +5,7 @@
 //! Runge-Kutta method. A fit determines the phase of `n` samples at the end of a record to about `3 q / sqrt(n)`, with the noise `q`
 //! relative to the root-mean-square response. The first grid has an error of that size, within limits; refinement after the fit
 //! makes it as small as needed. The step is chosen for the frequency below which 90 % of the energy of the records lies. Samples of
-//! force and base fall on nodes: their interval has the nearest whole number of steps, with a phase error of at most `2^(p/2)` times
+//! force and base, or equally spaced ones, fall on nodes: their interval has the nearest whole number of steps, with a phase error of at most `2^(p/2)` times
 //! the target. For records without a spectrum (too few or equal samples) the step is the sampling interval.
 
 use super::FinerNodes;
