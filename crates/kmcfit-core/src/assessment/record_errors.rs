@@ -16,6 +16,7 @@ use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::signal::{Spectrum, median_spacing};
 use crate::simd::sum::rms;
+use crate::threads::{available, both, map};
 
 /// Rounds of refits with a corrected clock.
 const ROUNDS: usize = 8;
@@ -258,9 +259,12 @@ fn large_clock(
         .truncated(BEGINNING)
         .with(|parts| without_correlation(&mut parts.experiments));
     let beginning = beginning.ok()?;
-    let both = [theta.to_vec(), problem.start()].into_iter();
-    let both = both.filter_map(|start| Refit::of(beginning.clone(), &start));
-    let beginning = both.min_by(|a, b| a.worst_misfit().total_cmp(&b.worst_misfit()))?;
+    let (own, other) = both(
+        || Refit::of(beginning.clone(), theta),
+        || Refit::of(beginning.clone(), &problem.start()),
+    );
+    let beginning = own.into_iter().chain(other);
+    let beginning = beginning.min_by(|a, b| a.worst_misfit().total_cmp(&b.worst_misfit()))?;
     let beginning = beginning.fit.best.parameters;
     let in_beginning = problem.evaluate(&beginning).ok()?;
     let step = APART * period / duration;
@@ -277,17 +281,14 @@ fn large_clock(
         step,
         delay_of,
     );
-    let rate =
-        rate.and_then(|clock| on_best_clock(problem, &beginning, RecordParameter::Rate(e), clock));
-    if let Some((clock, refit)) = rate
-        && refit.explains(problem, evaluation)
-    {
+    let explains = |found: &(Clock, Refit)| found.1.explains(problem, evaluation);
+    let (rate, late) = both(
+        || on_best_clock(problem, &beginning, RecordParameter::Rate(e), rate?).filter(explains),
+        || on_best_clock(problem, theta, RecordParameter::Delay(e), late?).filter(explains),
+    );
+    if let Some((clock, _)) = rate {
         return Some(difference(problem, e, clock));
     }
-    let explains = |found: &(Clock, Refit)| found.1.explains(problem, evaluation);
-    let late =
-        late.and_then(|clock| on_best_clock(problem, theta, RecordParameter::Delay(e), clock));
-    let late = late.filter(explains);
     let late = late.or_else(|| late_by_refits(problem, e, period).filter(explains));
     late.map(|(clock, _)| delay(problem, e, clock))
 }
@@ -295,15 +296,16 @@ fn large_clock(
 /// The delay up to half a period with the best fit from the start, refined: a poor fit may have parameters that correlate best with another
 /// one.
 fn late_by_refits(problem: &Problem, e: usize, period: f64) -> Option<(Clock, Refit)> {
-    let eighths = (-4..=4).filter(|i| *i != 0).map(f64::from);
-    let clocks = eighths.map(|i| Clock {
-        delay: 0.125 * period * i,
-        rate: 0.0,
-    });
-    let fits = clocks.filter_map(|clock| {
+    let eighths = [-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0];
+    let fits = map(eighths.len(), available(), |i| {
+        let clock = Clock {
+            delay: 0.125 * period * eighths[i],
+            rate: 0.0,
+        };
         let refit = Refit::of(with_clock(problem, e, clock)?, &problem.start())?;
         Some((clock, refit))
     });
+    let fits = fits.into_iter().flatten();
     let (clock, refit) = fits.min_by(|a, b| a.1.worst_misfit().total_cmp(&b.1.worst_misfit()))?;
     let start = &refit.fit.best.parameters;
     on_best_clock(problem, start, RecordParameter::Delay(e), clock)

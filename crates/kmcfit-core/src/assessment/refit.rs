@@ -5,12 +5,16 @@ use crate::objective::{Evaluation, channel_fit_percent, diagnostics};
 use crate::problem::Problem;
 use crate::record::{Experiment, NoiseEstimate};
 use crate::simd::sum::rms;
-use crate::solvers::{Fit, FitSettings, fit_from};
+use crate::solvers::{Fit, FitSettings, Stopping, fit_from};
 
 /// Smallest p-value of the test of whiteness of residuals that a change explains.
 const WHITE: f64 = 1e-3;
 /// Ratio of the residuals with and without an error below which it explains them although they are not white.
 pub(super) const EXPLAINED: f64 = 0.5;
+
+/// Iteration limit of a refit. Refits that explain the residuals converge within a few dozen; others may approach a poor minimum in
+/// thousands of small steps.
+const ITERATIONS: u64 = 100;
 
 /// A fit of a changed problem.
 pub(super) struct Refit {
@@ -20,7 +24,14 @@ pub(super) struct Refit {
 
 impl Refit {
     pub(super) fn of(problem: Problem, start: &[f64]) -> Option<Self> {
-        let fit = fit_from(&problem, start, &FitSettings::default()).ok()?;
+        let settings = FitSettings {
+            stopping: Stopping {
+                iterations: ITERATIONS,
+                ..Stopping::default()
+            },
+            ..FitSettings::default()
+        };
+        let fit = fit_from(&problem, start, &settings).ok()?;
         Some(Self { problem, fit })
     }
 

@@ -48,7 +48,7 @@ impl Residuals {
     pub fn push(&mut self, channel: &Channel, predicted: &[f64], samples: Range<usize>) {
         let Self { roots, weighted } = self;
         if channel.correlation().is_some() {
-            debug_assert_eq!(samples, 0..channel.len(), "whitening needs all samples");
+            assert_eq!(samples, 0..channel.len(), "whitening needs all samples");
             let majorant = channel.majorant(predicted);
             roots.extend(majorant.roots);
             weighted.extend(majorant.weighted);
