@@ -7,6 +7,7 @@
 use kmcfit::config::{BuildMode, ModelFile, Override, build};
 use kmcfit::fitting::{ModelFit, fit_model};
 use kmcfit_core::internals::solvers::{Observer, Status};
+use kmcfit_core::internals::threads::{available, map};
 use serde_json::Value;
 use std::fs;
 use std::path::PathBuf;
@@ -163,7 +164,8 @@ fn certified_problems_are_solved_to_the_stated_digits() {
     let page = include_str!("../docs/certified.md");
     let problems = problems();
     assert!(problems.len() >= FEWEST, "{}", problems.len());
-    for problem in &problems {
+    map(problems.len(), available(), |i| {
+        let problem = &problems[i];
         let name = text(problem, "name");
         let stated = both(problem, &[]);
         let auto = both(problem, &["grid.nodes=auto"]);
@@ -185,5 +187,5 @@ fn certified_problems_are_solved_to_the_stated_digits() {
         );
         println!("{row}");
         assert!(page.contains(&row), "not on the page: {row}");
-    }
+    });
 }

@@ -14,6 +14,7 @@ mod watched;
 
 use growth::Growth;
 use mutate::Mutator;
+use std::process::Command;
 use targets::{TARGETS, Target};
 use watched::Watched;
 
@@ -32,7 +33,24 @@ fn variable(name: &str) -> Option<u64> {
     )
 }
 
-fn hold(index: usize) {
+/// Set for a process that holds one target: memory is counted for the whole process.
+const ALONE: &str = "KMCFIT_FUZZ_ALONE";
+
+/// Holds a target in a process of its own; `test` is the name of this test.
+fn hold(test: &str, index: usize) {
+    if std::env::var_os(ALONE).is_some() {
+        return hold_alone(index);
+    }
+    let program = std::env::current_exe().expect("this program");
+    let mut command = Command::new(program);
+    command.args(["--exact", test, "--nocapture"]);
+    let output = command.env(ALONE, "1").output().expect("a process");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    println!("{}", text(&output.stdout));
+    assert!(output.status.success(), "{}", text(&output.stderr));
+}
+
+fn hold_alone(index: usize) {
     let (name, target): (&str, Target) = TARGETS[index];
     // Memory of the setup is not counted.
     let mut seeds = corpus::seeds(name);
@@ -66,45 +84,45 @@ fn hold(index: usize) {
 
 #[test]
 fn models() {
-    hold(0);
+    hold("models", 0);
 }
 
 #[test]
 fn tables() {
-    hold(1);
+    hold("tables", 1);
 }
 
 #[test]
 fn runs() {
-    hold(2);
+    hold("runs", 2);
 }
 
 #[test]
 fn journals_of_fits() {
-    hold(3);
+    hold("journals_of_fits", 3);
 }
 
 #[test]
 fn journals_of_studies() {
-    hold(4);
+    hold("journals_of_studies", 4);
 }
 
 #[test]
 fn yaml_with_aliases() {
-    hold(5);
+    hold("yaml_with_aliases", 5);
 }
 
 #[test]
 fn overrides() {
-    hold(6);
+    hold("overrides", 6);
 }
 
 #[test]
 fn sequences_of_models() {
-    hold(7);
+    hold("sequences_of_models", 7);
 }
 
 #[test]
 fn binary_files() {
-    hold(8);
+    hold("binary_files", 8);
 }

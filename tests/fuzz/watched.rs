@@ -2,15 +2,12 @@
 
 use crate::targets::{KINDS, Target, Verdict};
 use peak_alloc::PeakAlloc;
+use std::sync::PoisonError;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
-
-/// Lock: memory is counted for the whole process, so only one target runs at a time.
-static ALONE: Mutex<()> = Mutex::new(());
 
 /// Time after which an input counts as hanging; all valid ones take less than a second.
 const HANGS: Duration = Duration::from_secs(60);
@@ -32,12 +29,10 @@ pub struct Watched {
     verdicts: [usize; 2],
     /// Largest memory of one input, bytes.
     most: (usize, String),
-    _alone: MutexGuard<'static, ()>,
 }
 
 impl Watched {
     pub fn new(name: &str, target: Target) -> Self {
-        let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let (inputs, received) = channel::<Vec<u8>>();
         let (told, taken) = channel();
         let run = move || {
@@ -59,7 +54,6 @@ impl Watched {
             name: name.to_owned(),
             verdicts: [0; 2],
             most: (0, String::new()),
-            _alone: alone,
         }
     }
 
@@ -82,7 +76,7 @@ impl Watched {
         }
     }
 
-    /// Number of kinds of messages so far, over all targets.
+    /// Number of kinds of messages so far.
     pub fn kinds(&self) -> usize {
         KINDS.lock().unwrap_or_else(PoisonError::into_inner).len()
     }
