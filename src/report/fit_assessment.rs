@@ -5,7 +5,7 @@ use super::display_units::DisplayUnits;
 use crate::config::{HoldOut, Model};
 use kmcfit_core::internals::assessment::{
     EquationErrorIntervals, EstimateErrors, FitAssessment, LargeCovariance, NoIntervals, POOR,
-    StepCheck, diagnostics,
+    StepCheck, all_diagnostics,
 };
 use kmcfit_core::internals::diagnostics::ResidualDiagnostics;
 use kmcfit_core::internals::identifiability::{Bands, Means};
@@ -40,9 +40,14 @@ impl RunAssessment {
     pub fn of(model: &Model, fit: &Fit) -> Self {
         let is_simulated = model.settings.solver != Solver::EquationError;
         let validation = model.validation.iter();
+        let assessment =
+            is_simulated.then(|| FitAssessment::of(&model.problem, fit, model.tests_bases));
+        let diagnostics = match &assessment {
+            Some(assessment) => assessment.plausibility.residuals.clone(),
+            None => all_diagnostics(&model.problem, &fit.best.evaluation),
+        };
         Self {
-            assessment: is_simulated
-                .then(|| FitAssessment::of(&model.problem, fit, model.tests_bases)),
+            assessment,
             equation: (!is_simulated && model.problem.parameters() > 0)
                 .then(|| EquationErrorIntervals::of(&model.problem, fit)),
             missing_terms: match is_simulated {
@@ -55,7 +60,7 @@ impl RunAssessment {
             validation: validation
                 .map(|out| ValidationRecord::of(model, fit, out))
                 .collect(),
-            diagnostics: of_all(&model.problem, &fit.best.evaluation),
+            diagnostics,
         }
     }
 
@@ -103,16 +108,6 @@ impl RunAssessment {
     }
 }
 
-/// Diagnostics of the residuals of each channel of each experiment.
-fn of_all(problem: &Problem, evaluation: &Evaluation) -> Vec<Vec<ResidualDiagnostics>> {
-    let experiments = problem.experiments.iter().zip(&evaluation.predictions);
-    let each = experiments.map(|(experiment, predictions)| {
-        let channels = experiment.channels.iter().zip(predictions);
-        channels.map(|(channel, predicted)| diagnostics(channel, predicted))
-    });
-    each.map(Iterator::collect).collect()
-}
-
 /// A validation record and its prediction by the fitted system.
 #[derive(Debug, Clone)]
 pub(super) struct ValidationRecord {
@@ -136,7 +131,7 @@ impl ValidationRecord {
         );
         let of_channels = found
             .as_ref()
-            .map(|(problem, evaluation)| of_all(problem, evaluation));
+            .map(|(problem, evaluation)| all_diagnostics(problem, evaluation));
         Self {
             out: out.clone(),
             diagnostics: of_channels.into_iter().flatten().flatten().collect(),

@@ -10,7 +10,7 @@ pub mod assessment {
         LargeCovariance, MOST_WITH_COVARIANCE, ModelTests, NoDraws, NoIntervals, POOR,
         Plausibility, RECOVERY_TOLERANCE, RecordError, ResidualPattern, Roughness, SampleFault,
         StepCheck, TruthErrors, Unidentified, VerdictAssumption, VerdictLevel, VerdictReason,
-        constant_probability, diagnostics, draws, estimates, function_summaries, is_same_truth,
+        all_diagnostics, constant_probability, draws, estimates, function_summaries, is_same_truth,
         outliers, pattern, standard_error, verdict_assumptions, verdict_level, verdict_reasons,
     };
 }

@@ -35,7 +35,7 @@ mod statistics;
 mod step_check;
 mod verdict;
 
-pub use crate::objective::{diagnostics, outliers};
+pub use crate::objective::{all_diagnostics, outliers};
 pub use assumptions::{VerdictAssumption, verdict_assumptions};
 pub use channel::{ResidualPattern, pattern};
 pub use classical::{ClassicalEstimate, ClassicalMethod};

@@ -10,9 +10,9 @@ use super::residual_mean::mean_warnings;
 use super::rivals::AmplitudeRival;
 use super::statistics::{FitStatistics, statistics};
 use super::step_check::{StepCheckOutcome, step_check};
-use crate::diagnostics::rms;
+use crate::diagnostics::{ResidualDiagnostics, rms};
 use crate::functions::CoefficientKind;
-use crate::objective::{Evaluation, channel_fit_percent, diagnostics};
+use crate::objective::{Evaluation, all_diagnostics, channel_fit_percent};
 use crate::problem::Problem;
 use crate::record::{Channel, Loss, ScoreCovariance};
 use crate::signal::median;
@@ -205,6 +205,8 @@ pub struct Plausibility {
     pub is_coloured: bool,
     /// True if the residuals are those of errors of a measured input or of a missing term, which the intervals exclude.
     pub is_disturbed: bool,
+    /// Diagnostics of the residuals of each channel of each experiment.
+    pub residuals: Vec<Vec<ResidualDiagnostics>>,
 }
 
 impl Plausibility {
@@ -221,7 +223,8 @@ impl Plausibility {
             (reports_errors && noise_fits_equally(problem, evaluation))
                 .then_some(Unidentified::Noise)
         });
-        let (coloured, poor) = residuals(problem, evaluation, reports_errors);
+        let residuals = all_diagnostics(problem, evaluation);
+        let (coloured, poor) = judged(problem, &residuals, reports_errors);
         let unexplained = unexplained(statistics)
             .or_else(|| coarse(problem, evaluation, step_check))
             .or_else(|| poor.then_some(FitWarning::PoorFit));
@@ -265,6 +268,7 @@ impl Plausibility {
             errors_hold,
             is_coloured: coloured,
             is_disturbed,
+            residuals,
         }
     }
 
@@ -290,10 +294,13 @@ fn score_covariance(problem: &Problem) -> ScoreCovariance {
 }
 
 /// True if the residuals of a channel are certainly coloured; and if such a channel is also fitted poorly.
-fn residuals(problem: &Problem, evaluation: &Evaluation, reports_errors: bool) -> (bool, bool) {
+fn judged(
+    problem: &Problem,
+    residuals: &[Vec<ResidualDiagnostics>],
+    reports_errors: bool,
+) -> (bool, bool) {
     let (mut coloured, mut poor) = (false, false);
-    for (channel, predicted) in problem.predicted(evaluation) {
-        let found = diagnostics(channel, predicted);
+    for (channel, found) in problem.channels().zip(residuals.iter().flatten()) {
         let is_judged = reports_errors || channel.weighting().sigma(0).is_some();
         let is_coloured = found.whiteness.p_value < CERTAIN && found.fit_percent < ROUNDED;
         if is_judged && (is_coloured || channel.correlation().is_some()) {

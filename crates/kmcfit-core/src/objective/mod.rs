@@ -15,7 +15,7 @@ mod step_halving;
 pub use gradient::{Gradient, GradientKind};
 pub use gradient_check::GradientCheck;
 pub use gradient_error::GradientError;
-pub use residual_diagnostics::{channel_fit_percent, diagnostics, outliers};
+pub use residual_diagnostics::{all_diagnostics, channel_fit_percent, diagnostics, outliers};
 pub use scales::state_scales;
 pub use simulated_record::{RecordTangent, SimulatedRecord};
 pub use step_halving::Refined;

@@ -2,6 +2,8 @@
 
 use crate::diagnostics::{ResidualDiagnostics, ResidualRecord, fit_percent, outlier_indices};
 use crate::noise::Correlation;
+use crate::objective::Evaluation;
+use crate::problem::Problem;
 use crate::record::{Channel, Loss};
 
 /// Diagnostics of a channel's residuals; [`outliers`] count as missing. Autocorrelation and whiteness are those of the
@@ -21,6 +23,19 @@ pub fn diagnostics(channel: &Channel, predicted: &[f64]) -> ResidualDiagnostics 
         model: predicted,
         fitted: channel.correlation().map_or(0, Correlation::order),
     })
+}
+
+/// [`diagnostics`] of each channel of each experiment.
+pub fn all_diagnostics(
+    problem: &Problem,
+    evaluation: &Evaluation,
+) -> Vec<Vec<ResidualDiagnostics>> {
+    let experiments = problem.experiments.iter().zip(&evaluation.predictions);
+    let each = experiments.map(|(experiment, predictions)| {
+        let channels = experiment.channels.iter().zip(predictions);
+        channels.map(|(channel, predicted)| diagnostics(channel, predicted))
+    });
+    each.map(Iterator::collect).collect()
 }
 
 /// Fit of a channel ([`fit_percent`]), per cent; [`outliers`] count as missing.
