@@ -37,7 +37,6 @@ use overrides::Overrides;
 use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 pub use study::study_into;
 
 /// Identify time-varying mass, damping and stiffness of a vibrating system from measured records.
@@ -100,9 +99,12 @@ impl From<InputError> for CommandError {
 }
 
 /// Runs the program on the arguments of the process.
-pub fn main() -> ExitCode {
+///
+/// All output is flushed by then; handlers at the exit would return the memory of long records page by page.
+pub fn main() -> ! {
     crate::memory::restart_with_plain_allocators();
-    ExitCode::from(run(std::env::args_os().collect()))
+    let code = run(std::env::args_os().collect());
+    signal_hook::low_level::exit(code.into())
 }
 
 /// Runs the program on arguments, the first of which is its name; returns its exit code.

@@ -83,7 +83,7 @@ fn styled(text: &str) {
 /// Prints help and version to standard output, usage errors to standard error. Returns the exit code.
 pub fn print_usage(error: &clap::Error) -> u8 {
     let is_mistake = error.use_stderr();
-    match error.print() {
+    match error.print().and_then(|()| io::stdout().flush()) {
         Err(unwritable) if !is_mistake && unwritable.kind() != io::ErrorKind::BrokenPipe => {
             BAD_INPUT
         }
