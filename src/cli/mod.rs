@@ -98,9 +98,9 @@ impl From<InputError> for CommandError {
     }
 }
 
-/// Runs the program on the arguments of the process.
+/// Runs the program on the arguments of the process, which ends with its exit code.
 ///
-/// All output is flushed by then; handlers at the exit would return the memory of long records page by page.
+/// All output is flushed by then. The process ends without its exit handlers, which would return the memory of long records page by page.
 pub fn main() -> ! {
     crate::memory::restart_with_plain_allocators();
     let code = run(std::env::args_os().collect());

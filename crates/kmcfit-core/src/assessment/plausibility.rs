@@ -224,7 +224,7 @@ impl Plausibility {
                 .then_some(Unidentified::Noise)
         });
         let residuals = all_diagnostics(problem, evaluation);
-        let (coloured, poor) = judged(problem, &residuals, reports_errors);
+        let (coloured, poor) = coloured_and_poor(problem, &residuals, reports_errors);
         let unexplained = unexplained(statistics)
             .or_else(|| coarse(problem, evaluation, step_check))
             .or_else(|| poor.then_some(FitWarning::PoorFit));
@@ -294,7 +294,7 @@ fn score_covariance(problem: &Problem) -> ScoreCovariance {
 }
 
 /// True if the residuals of a channel are certainly coloured; and if such a channel is also fitted poorly.
-fn judged(
+fn coloured_and_poor(
     problem: &Problem,
     residuals: &[Vec<ResidualDiagnostics>],
     reports_errors: bool,

@@ -11,12 +11,13 @@ use super::record_parameters::{
 };
 use super::refit::{Refit, without_correlation, worst_fit};
 use super::span::Span;
+use super::{analyses_at_once, at_once};
 use crate::functions::CoefficientKind;
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::signal::{Spectrum, median_spacing};
 use crate::simd::sum::rms;
-use crate::threads::{available, both, map};
+use crate::threads::map;
 
 /// Rounds of refits with a corrected clock.
 const ROUNDS: usize = 8;
@@ -259,7 +260,8 @@ fn large_clock(
         .truncated(BEGINNING)
         .with(|parts| without_correlation(&mut parts.experiments));
     let beginning = beginning.ok()?;
-    let (own, other) = both(
+    let (own, other) = at_once(
+        problem,
         || Refit::of(beginning.clone(), theta),
         || Refit::of(beginning.clone(), &problem.start()),
     );
@@ -281,34 +283,38 @@ fn large_clock(
         step,
         delay_of,
     );
-    let explains = |found: &(Clock, Refit)| found.1.explains(problem, evaluation);
-    let (rate, late) = both(
-        || on_best_clock(problem, &beginning, RecordParameter::Rate(e), rate?).filter(explains),
-        || on_best_clock(problem, theta, RecordParameter::Delay(e), late?).filter(explains),
+    // A refit takes several arrays of all samples, and is not kept.
+    let explaining = |(clock, refit): (Clock, Refit)| {
+        let explains = refit.explains(problem, evaluation);
+        explains.then_some(clock)
+    };
+    let (rate, late) = at_once(
+        problem,
+        || on_best_clock(problem, &beginning, RecordParameter::Rate(e), rate?).and_then(explaining),
+        || on_best_clock(problem, theta, RecordParameter::Delay(e), late?).and_then(explaining),
     );
-    if let Some((clock, _)) = rate {
+    if let Some(clock) = rate {
         return Some(difference(problem, e, clock));
     }
-    let late = late.or_else(|| late_by_refits(problem, e, period).filter(explains));
-    late.map(|(clock, _)| delay(problem, e, clock))
+    let late = late.or_else(|| late_by_refits(problem, e, period).and_then(explaining));
+    late.map(|clock| delay(problem, e, clock))
 }
 
 /// The delay up to half a period with the best fit from the start, refined: a poor fit may have parameters that correlate best with another
 /// one.
 fn late_by_refits(problem: &Problem, e: usize, period: f64) -> Option<(Clock, Refit)> {
     let eighths = [-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0];
-    let fits = map(eighths.len(), available(), |i| {
+    let fits = map(eighths.len(), analyses_at_once(problem), |i| {
         let clock = Clock {
             delay: 0.125 * period * eighths[i],
             rate: 0.0,
         };
         let refit = Refit::of(with_clock(problem, e, clock)?, &problem.start())?;
-        Some((clock, refit))
+        Some((refit.worst_misfit(), clock, refit.fit.best.parameters))
     });
     let fits = fits.into_iter().flatten();
-    let (clock, refit) = fits.min_by(|a, b| a.1.worst_misfit().total_cmp(&b.1.worst_misfit()))?;
-    let start = &refit.fit.best.parameters;
-    on_best_clock(problem, start, RecordParameter::Delay(e), clock)
+    let (_, clock, start) = fits.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    on_best_clock(problem, &start, RecordParameter::Delay(e), clock)
 }
 
 /// The clock other than that of the record, up to `most` in steps, with the largest correlation of samples and predictions.
