@@ -2,14 +2,18 @@
 
 use crate::constraints::{ConeGroup, Constraints, RowGroup};
 use crate::functions::{CoefficientKind, Parameterization, Penalty, TotalVariation};
-use crate::record::{Channel, Experiment, Weighting};
+use crate::record::{Channel, Experiment, Measurements, Weighting};
 use crate::rows::Rows;
 use crate::system::System;
 use std::ops::{Deref, Range};
+use std::sync::{Arc, OnceLock};
 use thiserror::Error;
 
 /// Number of parameters up to which Jacobians use one tangent solve each, and covariances and bands are computed with every fit.
 pub const FEW_PARAMETERS: usize = 64;
+
+/// Number of samples up to which measured states are kept with their problem: a tenth of a gigabyte.
+const MOST_KEPT: usize = 1_000_000;
 
 /// Parts of a problem, checked for consistency by [`Problem::new`] and [`Problem::with`].
 #[derive(Debug, Clone)]
@@ -45,7 +49,11 @@ pub struct Jumps {
 
 /// A consistent problem; its parts are read-only.
 #[derive(Debug, Clone)]
-pub struct Problem(ProblemParts);
+pub struct Problem {
+    parts: ProblemParts,
+    /// Measured states for the scalars they were estimated with, shared with copies whose records are the same.
+    measurements: Arc<OnceLock<(Vec<f64>, Arc<Measurements>)>>,
+}
 
 /// Inconsistency of the parts of a problem.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -94,7 +102,7 @@ impl Deref for Problem {
     type Target = ProblemParts;
 
     fn deref(&self) -> &ProblemParts {
-        &self.0
+        &self.parts
     }
 }
 
@@ -200,7 +208,10 @@ impl Problem {
             jumps: Vec::new(),
             friction_is_ideal: false,
         };
-        parts.check().map(|()| Self(parts))
+        parts.check().map(|()| Self {
+            parts,
+            measurements: Arc::default(),
+        })
     }
 
     /// Changes the parts of the problem.
@@ -208,13 +219,13 @@ impl Problem {
     /// # Errors
     /// A [`ProblemError`] if the changed parts are inconsistent.
     pub fn with(mut self, change: impl FnOnce(&mut ProblemParts)) -> Result<Self, ProblemError> {
-        change(&mut self.0);
-        self.0.check().map(|()| self)
+        change(self.parts_mut());
+        self.parts.check().map(|()| self)
     }
 
     /// Lets the intervals include the error of the width of Coulomb friction.
     pub fn idealise_friction(&mut self) {
-        self.0.friction_is_ideal = true;
+        self.parts.friction_is_ideal = true;
     }
 
     /// Adds constraints; groups with a penalty weight are soft.
@@ -223,8 +234,8 @@ impl Problem {
     /// A [`ProblemError`] if a parameter index is out of range; then no constraint is added.
     pub fn constrain(&mut self, mut rows: Constraints) -> Result<(), ProblemError> {
         self.check_rows(rows.groups.iter(), &rows.cones)?;
-        self.0.soft.extend(rows.take_soft());
-        self.0.constraints.extend(rows);
+        self.parts.soft.extend(rows.take_soft());
+        self.parts.constraints.extend(rows);
         Ok(())
     }
 
@@ -234,7 +245,7 @@ impl Problem {
     /// A [`ProblemError`] if the function index is out of range, or the number of parameters is wrong.
     pub fn penalize(&mut self, penalty: Penalty) -> Result<(), ProblemError> {
         self.check_penalty(penalty.function, &penalty.rows)?;
-        self.0.penalties.push(penalty);
+        self.parts.penalties.push(penalty);
         Ok(())
     }
 
@@ -244,13 +255,38 @@ impl Problem {
     /// As [`Problem::penalize`].
     pub fn penalize_variation(&mut self, variation: TotalVariation) -> Result<(), ProblemError> {
         self.check_penalty(variation.function, &variation.rows)?;
-        self.0.variations.push(variation);
+        self.parts.variations.push(variation);
         Ok(())
     }
 
     /// Mutable parts, for changes that keep them consistent.
     pub(crate) fn parts_mut(&mut self) -> &mut ProblemParts {
-        &mut self.0
+        self.measurements = Arc::default();
+        &mut self.parts
+    }
+
+    /// Measured states of the records for the sensor parameters `scalars`: those of an earlier call, or as `estimate` finds them.
+    ///
+    /// # Errors
+    /// Those of `estimate`.
+    pub(crate) fn measurements<E>(
+        &self,
+        scalars: &[f64],
+        estimate: impl FnOnce() -> Result<Measurements, E>,
+    ) -> Result<Arc<Measurements>, E> {
+        if let Some((of, known)) = self.measurements.get()
+            && of == scalars
+        {
+            return Ok(Arc::clone(known));
+        }
+        let found = Arc::new(estimate()?);
+        if self.sample_count() <= MOST_KEPT {
+            // Another thread may have been first, with the same numbers or other scalars.
+            let _ = self
+                .measurements
+                .set((scalars.to_vec(), Arc::clone(&found)));
+        }
+        Ok(found)
     }
 
     /// Number of parameters of functions and scalars.
@@ -281,7 +317,7 @@ impl Problem {
     /// # Panics
     /// If `theta` has another number of parameters.
     pub fn start_from(&mut self, theta: &[f64]) {
-        self.0.functions.set_start(theta);
+        self.parts.functions.set_start(theta);
     }
 
     /// Scalars of the parameters `theta`.
@@ -321,7 +357,7 @@ impl Problem {
     pub fn truncated(&self, share: f64) -> Self {
         let mut part = self.clone();
         let grid = &self.system.grid;
-        for experiment in &mut part.0.experiments {
+        for experiment in &mut part.parts_mut().experiments {
             let length = (experiment.nodes - 1) as f64 * grid.step();
             let end = grid.start() + share * length;
             for channel in &mut experiment.channels {
@@ -343,5 +379,49 @@ impl Problem {
         let one =
             |e: &Experiment| e.nodes == nodes && e.channels.len() == 1 && fits(&e.channels[0]);
         self.experiments.iter().all(one)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{Builder, CoefficientSpec, Record};
+
+    /// One estimate serves a problem, and its copies until a part of theirs is changed.
+    #[test]
+    fn measured_states_are_estimated_once() {
+        let times: Vec<f64> = (0..20).map(|i| 0.1 * f64::from(i)).collect();
+        let samples: Vec<f64> = times.iter().map(|t| t.cos()).collect();
+        let record = Record::new("decay").displacement(&times, &samples);
+        let parts = [
+            CoefficientSpec::fixed(1.0),
+            CoefficientSpec::fixed(0.1),
+            CoefficientSpec::constant(2.0),
+        ];
+        let built = Builder::new(parts).record(record).build();
+        let problem = built.expect("a problem");
+        let mut count = 0;
+        let mut estimated = |problem: &Problem, scalars: &[f64]| {
+            let before = count;
+            let estimate = || {
+                count += 1;
+                Ok::<_, ()>(Measurements {
+                    experiments: Vec::new(),
+                })
+            };
+            problem.measurements(scalars, estimate).expect("states");
+            count - before
+        };
+        assert_eq!(estimated(&problem, &[]), 1);
+        assert_eq!(estimated(&problem, &[]), 0);
+        assert_eq!(estimated(&problem, &[1.0]), 1);
+        let mut copy = problem.clone();
+        copy.start_from(&[3.0, 1.0, 0.0]);
+        assert_eq!(estimated(&copy, &[]), 0);
+        copy.parts_mut().experiments[0].initial.displacement = 0.5;
+        assert_eq!(estimated(&copy, &[]), 1);
+        assert_eq!(estimated(&problem, &[]), 0);
+        let changed = problem.with(|parts| parts.friction_is_ideal = true);
+        assert_eq!(estimated(&changed.expect("consistent"), &[]), 1);
     }
 }

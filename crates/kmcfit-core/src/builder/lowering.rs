@@ -9,6 +9,7 @@ use crate::problem::Problem;
 use crate::signal::even_spacing;
 use crate::solvers::{Measurements, estimate_states};
 use crate::system::{Grid, System, Term};
+use std::sync::Arc;
 
 /// Largest number of nodes, a safeguard against mistyped numbers.
 const MOST_NODES: usize = 100_000_000;
@@ -59,7 +60,7 @@ impl Builder {
         let problem = Problem::new(system, functions.with_scalars(scalars), experiments);
         let mut problem = problem.map_err(|why| BuildError::new("functions", why.to_string()))?;
         let measured = self.measurements(&problem, &mut notices)?;
-        let weight_search = self.add_penalties(&mut problem, measured.as_ref(), &mut notices)?;
+        let weight_search = self.add_penalties(&mut problem, measured.as_deref(), &mut notices)?;
         let mut rows = Vec::new();
         let starts = problem.functions.values(&problem.start());
         for (entry, start) in self.entries().iter().zip(&starts) {
@@ -203,7 +204,7 @@ impl Builder {
         &self,
         problem: &Problem,
         notices: &mut Vec<BuildNotice>,
-    ) -> Result<Option<Measurements>, BuildError> {
+    ) -> Result<Option<Arc<Measurements>>, BuildError> {
         if !self.is_equation_error() || self.is_simulation {
             return Ok(None);
         }

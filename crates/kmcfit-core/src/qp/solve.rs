@@ -178,8 +178,14 @@ impl Subproblem {
         if kkt.is_solution() {
             return self.solution(ConicStatus::Solved, Some((zero, kkt)), 0);
         }
-        let mut best: Option<(PrimalDual, Kkt)> = None;
         let mut normalised = None;
+        if let Some((point, kkt)) = self.minimum_from_zero() {
+            let normalised = normalised.get_or_insert_with(|| ScaledProgram::new(self));
+            if normalised.resolves(&point.z) {
+                return self.solution(ConicStatus::Solved, Some((point, kkt)), 0);
+            }
+        }
+        let mut best: Option<(PrimalDual, Kkt)> = None;
         for (attempts, attempt) in (1..).zip(ATTEMPTS) {
             let settings = Settings {
                 regularisation: attempt.regularisation,

@@ -44,6 +44,7 @@ mod weight_choice;
 mod weight_path;
 mod weight_rules;
 
+pub use crate::record::Measurements;
 pub use active_set::{ActiveGroup, active_constraints};
 pub use checkpoint::{
     CheckpointStore, CheckpointUnit, ExactF64s, IterationEvent, Observer, SolverState,
@@ -62,8 +63,8 @@ pub(crate) use linearization::{
 };
 pub(crate) use methods::equation_error::TESTED_TERMS;
 pub use methods::equation_error::{
-    EquationBalance, EquationForm, EquationPart, EquationShare, Measurements, MissingTerm,
-    NoEquationRows, equation_balance, equation_error, equation_rows, missing_terms,
+    EquationBalance, EquationForm, EquationPart, EquationShare, MissingTerm, NoEquationRows,
+    equation_balance, equation_error, equation_rows, missing_terms,
 };
 pub use no_response::no_response;
 pub use noise_estimation::{fit_with_noise, fit_with_noise_watched};

@@ -9,7 +9,7 @@ mod uniform;
 pub(super) use band_limited::PassBand;
 pub(super) use spline::kinematics as by_spline;
 use uniform::Grouping;
-pub(super) use uniform::{Differences, fine_differences, smooth};
+pub(super) use uniform::{fine_differences, smooth};
 
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment, Weighting};

@@ -1,7 +1,7 @@
 //! State estimation from displacements at equally spaced nodes: smoothing, then fourth-order differences.
 
 use super::{Kinematics, noise_of};
-use crate::record::Channel;
+use crate::record::{Channel, Differences};
 use crate::simd::sum::rms;
 use crate::system::State;
 
@@ -72,17 +72,6 @@ impl Grouping {
             .map(|group| group.iter().sum::<f64>() / self.group as f64)
             .collect()
     }
-}
-
-/// A series and its derivatives at all values but two at each end.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Differences {
-    /// The series.
-    pub y: Vec<f64>,
-    /// First derivative.
-    pub v: Vec<f64>,
-    /// Second derivative.
-    pub a: Vec<f64>,
 }
 
 /// Fourth-order differences of values that are `spacing` apart.

@@ -1,10 +1,10 @@
 //! The residual of the equation of motion beside each of its forces.
 
 use super::equation::{EquationForm, Equations};
-use super::measured::Measurements;
 use super::nodal;
 use crate::functions::CoefficientKind;
 use crate::problem::Problem;
+use crate::record::Measurements;
 use crate::simd::sum::rms;
 use serde::{Deserialize, Serialize};
 

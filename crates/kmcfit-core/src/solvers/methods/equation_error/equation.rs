@@ -7,14 +7,15 @@
 //! [`FEW_PARAMETERS`]; a function with one value per node needs equations that are local in time, and has the pointwise form.
 
 use super::bumps::{Bumps, noise_gain};
-use super::measured::{Measured, Measurements, blend};
 use super::nodal;
+use super::response::blend;
 use super::restored::restored;
 use super::robust::ResidualLoss;
 use crate::functions::{Basis, CoefficientFunction};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::qp::Subproblem;
 use crate::record::{ChannelKind, Experiment};
+use crate::record::{Measured, Measurements};
 use crate::simd::sum::rms;
 use crate::solvers::state_estimation::{noise_of, unsensed};
 use crate::system::{NodalCoefficients, Term, TimePoint};

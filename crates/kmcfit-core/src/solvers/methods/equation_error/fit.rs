@@ -1,12 +1,12 @@
 //! Equation-error method: minimises the residual of the equation of motion, one convex problem.
 
 use super::equation::{Equation, EquationForm, Equations};
-use super::measured::Measurements;
 use super::{Accuracy, ConvexMinimum, minimise};
 use crate::host::Instant;
 use crate::objective::{Evaluation, Gradient};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, StageLayout, Subproblem};
+use crate::record::Measurements;
 use crate::solvers::fit::Fit;
 use crate::solvers::history::{IterationRecord, ratio};
 use crate::solvers::iterate::Iterate;

@@ -11,7 +11,10 @@ mod bumps;
 mod equation;
 mod fit;
 mod measured;
+mod measurements;
 mod missing_terms;
+mod outliers;
+mod response;
 mod restored;
 mod robust;
 mod rows;
@@ -20,7 +23,6 @@ pub use balance::{EquationBalance, EquationPart, EquationShare, equation_balance
 pub use equation::EquationForm;
 pub(crate) use fit::at as equation_error_at;
 pub(in crate::solvers) use fit::fit;
-pub use measured::Measurements;
 pub(crate) use missing_terms::TESTED_TERMS;
 pub use missing_terms::{MissingTerm, missing_terms};
 pub use rows::{NoEquationRows, equation_rows};
@@ -28,14 +30,13 @@ pub use rows::{NoEquationRows, equation_rows};
 use crate::constraints::{Constraints, RowGroup, TOLERANCE};
 use crate::problem::Problem;
 use crate::qp::{ConicStatus, Kkt, StageLayout, Subproblem};
-use crate::record::Experiment;
+use crate::record::{Experiment, Measured, Measurements};
 use crate::solvers::linearization::{add_penalties, add_variations};
 use crate::solvers::state_estimation::Kinematics;
 use crate::solvers::timings::{Timings, timed};
 use crate::system::quadrature::trapezoid_weights;
 use crate::system::{NodalCoefficients, Term};
 use equation::Equation;
-use measured::Measured;
 
 /// Weight of the proximal term towards the start, relative to the equation error; it determines the directions that the
 /// equation leaves undetermined.

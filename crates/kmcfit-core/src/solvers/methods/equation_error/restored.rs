@@ -12,8 +12,9 @@
 //! such form, it passes frequencies up to three times that of the acceleration, `rms(y'')/rms(y')`, and is applied to the smoothed state. As `1 - S` removes slow errors of the integrals, errors of the parameters and of the
 //! force enter at high frequencies only.
 
-use super::measured::{Measured, blend};
+use super::response::blend;
 use crate::problem::Problem;
+use crate::record::Measured;
 use crate::simd::sum::rms;
 use crate::solvers::state_estimation::smooth;
 use crate::system::NodalCoefficients;

@@ -1,12 +1,13 @@
 //! The equation of motion as rows in the parameters, for the covariance of the estimates.
 
 use super::equation::Equations;
-use super::measured::Measurements;
 use super::scale_row;
 use crate::identifiability::EquationRows;
 use crate::problem::Problem;
 use crate::qp::Subproblem;
+use crate::record::Measurements;
 use nalgebra::DMatrix;
+use std::sync::Arc;
 
 /// Largest work of a covariance, rows x parameters^2: some seconds, and memory for 120,000 rows of 64 parameters.
 const MOST_WORK: f64 = 5e8;
@@ -73,7 +74,7 @@ pub fn equation_rows(problem: &Problem, theta: &[f64]) -> Result<EquationRows, N
 pub(super) fn measurements_at(
     problem: &Problem,
     theta: &[f64],
-) -> Result<Measurements, NoEquationRows> {
+) -> Result<Arc<Measurements>, NoEquationRows> {
     let scale = scale_row(problem, &problem.constraints, theta);
     if scale.is_some() && !has_constant_mass(problem) {
         return Err(NoEquationRows::ScaleOverTime);
