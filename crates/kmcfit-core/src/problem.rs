@@ -12,7 +12,8 @@ use thiserror::Error;
 /// Number of parameters up to which Jacobians use one tangent solve each, and covariances and bands are computed with every fit.
 pub const FEW_PARAMETERS: usize = 64;
 
-/// Number of samples up to which measured states are kept with their problem: a tenth of a gigabyte.
+/// Number of nodes and samples up to which measured states are kept with their problem: at most thirteen numbers for each, a tenth of a
+/// gigabyte.
 const MOST_KEPT: usize = 1_000_000;
 
 /// Parts of a problem, checked for consistency by [`Problem::new`] and [`Problem::with`].
@@ -280,7 +281,8 @@ impl Problem {
             return Ok(Arc::clone(known));
         }
         let found = Arc::new(estimate()?);
-        if self.sample_count() <= MOST_KEPT {
+        let nodes: usize = self.experiments.iter().map(|e| e.nodes).sum();
+        if nodes + self.sample_count() <= MOST_KEPT {
             // Another thread may have been first, with the same numbers or other scalars.
             let _ = self
                 .measurements

@@ -128,6 +128,8 @@ impl Subproblem {
 
     /// [`Subproblem::solve`] with at most `iterations` iterations per attempt; with zero iterations the program is stalled.
     ///
+    /// In few variables the minimum is first looked for on the rows that are active at zero, without the interior-point solver.
+    ///
     /// The status of the interior-point solver is not used: its point is polished on its active set and accepted by its residuals, its proof of
     /// infeasibility is checked. A rejected result is followed by an attempt with other settings.
     pub fn solve_within(&self, iterations: u32) -> Solution {

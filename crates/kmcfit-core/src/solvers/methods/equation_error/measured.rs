@@ -18,6 +18,7 @@ const MOST_LEFT_OUT: usize = 4;
 /// Difference of two spacings, relative to them, up to which they count as equal: times on a grid have rounding errors, gaps a
 /// spacing or more.
 pub(super) const SAME_SPACING: f64 = 1e-3;
+
 impl Measured {
     /// Estimates the state from the channels of an experiment, for the sensor parameters `scalars`.
     ///
