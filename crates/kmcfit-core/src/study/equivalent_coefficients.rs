@@ -15,14 +15,15 @@
 //! s.t. c v + k y = f - m a at every node,   k >= k_min,   c >= c_min (if stated)
 //! ```
 //!
-//! Both functions are unknowns, so nothing is divided by a small `y`. `C` and `K` are the damping and stiffness whose
+//! The pairs that satisfy the equation of motion at a node form a line in the plane of `c` and `k`. The unknown is the place along
+//! each line, so nothing is divided by a small `y`; where the response is at rest (`y = v = 0`), `c` is the target. `C` and `K` are the damping and stiffness whose
 //! forces have the size of the inertia force. The pair satisfies the continuous equation of motion; a second-order stepper
 //! reproduces the response with an error proportional to the square of its step.
 
 use super::refit::positive_rms;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::qp::{ConicStatus, Subproblem};
+use crate::qp::{ConicStatus, StageLayout, Subproblem};
 use crate::system::quadrature::trapezoid_weights;
 use crate::system::{Grid, NodalCoefficients};
 
@@ -127,51 +128,105 @@ pub fn equivalent_coefficients(
     let over = |f: &[f64]| inertia / positive_rms(f);
     let [large_c, large_k] = [over(&response.velocity), over(&response.displacement)];
 
-    // Unknowns: c/C at the nodes, then k/K.
-    let mut sub = Subproblem::new(2 * n);
+    let lines: Option<Vec<NodeLine>> = (0..n)
+        .map(|i| {
+            let forces = [
+                large_c * response.velocity[i] / inertia,
+                large_k * response.displacement[i] / inertia,
+            ];
+            NodeLine::new(forces, needed[i] / inertia, options.damping[i] / large_c)
+        })
+        .collect();
+    let lines = lines.ok_or(ConicStatus::Infeasible)?;
+
+    // Unknowns: the place along the line of each node, which leaves no equalities.
+    let mut sub = Subproblem::new(n);
+    sub.elimination_order = (0..n as u32).collect();
+    sub.layout = Some(StageLayout {
+        nodes: n,
+        histories: std::iter::once(0..n).collect(),
+        ..StageLayout::default()
+    });
+    // Residual `sum a x_q - target` of component `q` at some nodes.
+    let mut residual = |q: usize, terms: &[(usize, f64)], target: f64| {
+        let known: f64 = terms.iter().map(|(i, a)| a * lines[*i].point[q]).sum();
+        let entries = terms.iter().map(|(i, a)| (*i, a * lines[*i].direction[q]));
+        sub.residuals.push(entries, target - known);
+    };
     let weights = trapezoid_weights(n, step);
     for (i, w) in weights.iter().enumerate() {
         let root = (w / duration).sqrt();
-        sub.residuals
-            .push([(i, root)], root * options.damping[i] / large_c);
+        residual(0, &[(i, root)], root * options.damping[i] / large_c);
     }
     let slope = (options.smoothness[0] * duration / step).sqrt();
     for i in 0..n - 1 {
-        sub.residuals.push([(i, -slope), (i + 1, slope)], 0.0);
+        residual(0, &[(i, -slope), (i + 1, slope)], 0.0);
     }
     let bend = (options.smoothness[1] * (duration / step).powi(3)).sqrt();
-    for i in n + 1..2 * n - 1 {
-        sub.residuals
-            .push([(i - 1, bend), (i, -2.0 * bend), (i + 1, bend)], 0.0);
+    for i in 1..n - 1 {
+        residual(1, &[(i - 1, bend), (i, -2.0 * bend), (i + 1, bend)], 0.0);
     }
-    for (i, needed) in needed.iter().enumerate() {
-        let row = [
-            (i, large_c * response.velocity[i] / inertia),
-            (n + i, large_k * response.displacement[i] / inertia),
-        ];
-        sub.equalities.push(row, needed / inertia);
-        sub.bound(
-            [(n + i, 1.0)],
-            options.least_stiffness / large_k,
-            f64::INFINITY,
-        );
-        if let Some(least) = options.least_damping {
-            sub.bound([(i, 1.0)], least / large_c, f64::INFINITY);
-        }
+    let least_damping = options.least_damping.unwrap_or(f64::NEG_INFINITY);
+    let least = [least_damping / large_c, options.least_stiffness / large_k];
+    for (i, line) in lines.iter().enumerate() {
+        let [lower, upper] = line.interval(least).ok_or(ConicStatus::Infeasible)?;
+        sub.bound([(i, 1.0)], lower, upper);
     }
     let solution = sub.solve();
-    match solution.status {
-        status if status.is_point() => {
-            let scaled = |part: &[f64], size: f64| part.iter().map(|x| x * size).collect();
-            Ok(NodalCoefficients {
-                mass: mass.to_vec(),
-                coefficients: vec![
-                    scaled(&solution.z[..n], large_c),
-                    scaled(&solution.z[n..], large_k),
-                ],
-            })
+    if !solution.status.is_point() {
+        return Err(solution.status);
+    }
+    let component = |q: usize, size: f64| {
+        let places = lines.iter().zip(&solution.z);
+        places.map(|(line, t)| line.at(*t)[q] * size).collect()
+    };
+    Ok(NodalCoefficients {
+        mass: mass.to_vec(),
+        coefficients: vec![component(0, large_c), component(1, large_k)],
+    })
+}
+
+/// The pairs `x = (c/C, k/K)` that satisfy the equation of motion at a node: `x = point + t direction`, with a unit `direction`.
+struct NodeLine {
+    point: [f64; 2],
+    direction: [f64; 2],
+}
+
+impl NodeLine {
+    /// Solutions of `forces . x = needed`; where the response is at rest, those with the target damping. `None` if there are none.
+    fn new(forces: [f64; 2], needed: f64, target: f64) -> Option<Self> {
+        let size = forces[0].hypot(forces[1]);
+        if size == 0.0 {
+            return (needed == 0.0).then_some(Self {
+                point: [target, 0.0],
+                direction: [0.0, 1.0],
+            });
         }
-        status => Err(status),
+        let normal = forces.map(|f| f / size);
+        Some(Self {
+            point: normal.map(|x| x * (needed / size)),
+            direction: [-normal[1], normal[0]],
+        })
+    }
+
+    /// The pair at `t`.
+    fn at(&self, t: f64) -> [f64; 2] {
+        [0, 1].map(|q| self.point[q] + t * self.direction[q])
+    }
+
+    /// Interval of `t` in which each component is at least `least`; `None` if it is empty.
+    fn interval(&self, least: [f64; 2]) -> Option<[f64; 2]> {
+        let [mut lower, mut upper] = [f64::NEG_INFINITY, f64::INFINITY];
+        for (q, least) in least.into_iter().enumerate() {
+            let missing = least - self.point[q];
+            match self.direction[q] {
+                slope if slope > 0.0 => lower = lower.max(missing / slope),
+                slope if slope < 0.0 => upper = upper.min(missing / slope),
+                _ if missing > 0.0 => return None,
+                _ => {}
+            }
+        }
+        (lower <= upper).then_some([lower, upper])
     }
 }
 
