@@ -354,7 +354,8 @@ impl Problem {
         self.channels().map(silence).sum()
     }
 
-    /// The problem with the samples of the first `share` of each record's time.
+    /// The problem with the samples of the first `share` of each record's time, and the response up to the last of them. With delays or
+    /// errors of the input the response is that of the whole record.
     #[must_use]
     pub fn truncated(&self, share: f64) -> Self {
         let mut part = self.clone();
@@ -366,6 +367,15 @@ impl Problem {
                 let count = channel.times().partition_point(|t| *t <= end);
                 *channel = channel.first(count.max(2));
             }
+            let is_delayed = |c: &Channel| c.sensor().is_delayed();
+            if experiment.input_error.is_some() || experiment.channels.iter().any(is_delayed) {
+                continue;
+            }
+            let places = experiment.channels.iter().flat_map(Channel::places);
+            // Three nodes at least, for the curvature of a response.
+            let steps = places.map(|place| place.step + 1).fold(2, usize::max);
+            experiment.nodes = experiment.nodes.min(steps + 1);
+            experiment.excitation = (experiment.excitation.as_ref()).map(|all| all.first(steps));
         }
         part
     }

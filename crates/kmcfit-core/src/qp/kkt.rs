@@ -16,7 +16,7 @@ pub(super) const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// The first three are shares of the cost: their sum bounds the difference of the point's cost from the minimum, if the minimum is within the
 /// natural size of each variable. The reference `S` is half of the larger of the cost at the point and at zero, with a lower bound set by the
 /// rounding error of the residuals. The natural size `X_j` of a variable is the larger of `|z_j|` and the change that costs `S` by its residuals
-/// and its proximal term, `sqrt(2 S / (|F_j|^2 + d_j))`; without either, the change that matches the other terms of a row.
+/// and its proximal term, `sqrt(2 S / (|F_j|^2 + d_j))`; without either, the change that matches the other terms of a row or of an absolute value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kkt {
     /// Stationarity `sqrt(sum_j (r_j X_j)^2) / S` of the gradient `r` of the Lagrangian: the predicted decrease for
@@ -53,6 +53,11 @@ impl Kkt {
     pub fn is_solution(&self) -> bool {
         // False for NaN.
         self.cost() <= Self::COST && self.feasibility <= Self::VIOLATION
+    }
+
+    /// True for a solution within the tolerance of constraints, which needs no polish.
+    pub(super) fn is_near(&self) -> bool {
+        self.is_solution() && self.feasibility <= TOLERANCE
     }
 
     /// True for the residuals of a solution of reduced accuracy.
@@ -158,29 +163,18 @@ impl Subproblem {
     /// Change of each variable that equals the other terms or the bounds of a row, the smallest over the rows; infinite without rows.
     fn joined_sizes(&self, z: &[f64]) -> Vec<f64> {
         let mut joined = vec![f64::INFINITY; self.variables];
-        let mut join = |rows: &Rows, i: usize, bound: f64| {
-            let all = terms(rows, i, z);
-            for (j, a) in rows.row(i).filter(|(_, a)| *a != 0.0) {
-                let others = bound.max(all - (a * z[j]).abs());
-                if others > 0.0 {
-                    joined[j] = joined[j].min(others / a.abs());
-                }
-            }
-        };
         for (i, right) in self.equalities.right().iter().enumerate() {
-            join(&self.equalities, i, right.abs());
+            join(&self.equalities, i, right.abs(), z, &mut joined);
         }
         for (i, lower) in self.inequalities.right().iter().enumerate() {
-            join(
-                &self.inequalities,
-                i,
-                finite(*lower).max(finite(self.upper[i])),
-            );
+            let bound = finite(*lower).max(finite(self.upper[i]));
+            join(&self.inequalities, i, bound, z, &mut joined);
         }
         joined
     }
 
-    /// Natural sizes `max(|z_j|, sqrt(2 scale / (|F_j|^2 + d_j)))`; for variables without curvature those by [`Subproblem::joined_sizes`].
+    /// Natural sizes `max(|z_j|, sqrt(2 scale / (|F_j|^2 + d_j)))`; for variables without curvature those by [`Subproblem::joined_sizes`], or
+    /// in the same way by the absolute values.
     fn natural_scales(&self, z: &[f64], joined: &[f64], scale: f64) -> Vec<f64> {
         let mut curvature = self.proximal.clone();
         for i in 0..self.residuals.len() {
@@ -188,15 +182,19 @@ impl Subproblem {
                 .row(i)
                 .for_each(|(j, a)| curvature[j] += a * a);
         }
-        let size = |((z, c), joined): ((&f64, f64), &f64)| {
-            let own = match c > 0.0 {
-                true => (2.0 * scale / c).sqrt(),
-                false if joined.is_finite() => *joined,
-                false => 0.0,
+        let mut by_absolute = vec![f64::INFINITY; self.variables];
+        for (i, right) in self.absolute.right().iter().enumerate() {
+            join(&self.absolute, i, right.abs(), z, &mut by_absolute);
+        }
+        let size = |(j, z): (usize, &f64)| {
+            let flat = [joined[j], by_absolute[j]];
+            let own = match curvature[j] > 0.0 {
+                true => (2.0 * scale / curvature[j]).sqrt(),
+                false => flat.into_iter().find(|x| x.is_finite()).unwrap_or(0.0),
             };
             z.abs().max(own)
         };
-        z.iter().zip(curvature).zip(joined).map(size).collect()
+        z.iter().enumerate().map(size).collect()
     }
 
     fn add_rows(&self, candidate: &PrimalDual, natural: &[f64], sums: &mut RowResiduals) {
@@ -244,6 +242,17 @@ impl Subproblem {
             let products = std::iter::once(bound).chain(parts).zip(multipliers);
             let inner: f64 = products.map(|(s, c)| s * c).sum();
             sums.complementarity += inner.abs();
+        }
+    }
+}
+
+/// Reduces the sizes `joined` of the variables of row `i` to the changes that equal its other terms at `z` or its bound.
+fn join(rows: &Rows, i: usize, bound: f64, z: &[f64], joined: &mut [f64]) {
+    let all = terms(rows, i, z);
+    for (j, a) in rows.row(i).filter(|(_, a)| *a != 0.0) {
+        let others = bound.max(all - (a * z[j]).abs());
+        if others > 0.0 {
+            joined[j] = joined[j].min(others / a.abs());
         }
     }
 }

@@ -8,6 +8,7 @@ mod chain;
 mod clarabel;
 mod contradiction;
 mod dot2;
+mod dual_active_set;
 mod few_variables;
 mod kkt;
 mod ldl;

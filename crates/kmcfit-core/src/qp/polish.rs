@@ -5,7 +5,7 @@
 //! the wrong sign and violated rows then correct the active set.
 
 use super::{Kkt, PrimalDual, Subproblem};
-use crate::constraints::{Rows, TOLERANCE};
+use crate::constraints::Rows;
 
 /// Largest number of corrections of the active set: after two, few of hundreds of rows change, and cycling sets do not end.
 const ROUNDS: usize = 12;
@@ -37,11 +37,6 @@ struct ActiveSet {
     absolute: Vec<Held>,
 }
 
-/// True for a solution within the tolerance of constraints, which needs no polish.
-fn is_near(kkt: &Kkt) -> bool {
-    kkt.is_solution() && kkt.feasibility <= TOLERANCE
-}
-
 impl Subproblem {
     /// True if [`Subproblem::polish`] applies: without cones, whose boundary is curved.
     pub fn can_be_polished(&self) -> bool {
@@ -62,7 +57,7 @@ impl Subproblem {
         most_in_vain: usize,
     ) -> (PrimalDual, Kkt) {
         let kkt = self.kkt(&from);
-        if is_near(&kkt) || !self.can_be_polished() || !from.is_finite() {
+        if kkt.is_near() || !self.can_be_polished() || !from.is_finite() {
             return (from, kkt);
         }
         let set = self.active_set(&from);
@@ -79,7 +74,7 @@ impl Subproblem {
         let kkt = self.kkt(&zero);
         let set = self.active_set_at_zero();
         let found = self.corrected_minimum(set, (zero, kkt), ROUNDS_FROM_ZERO, ROUNDS_FROM_ZERO);
-        is_near(&found.1).then_some(found)
+        found.1.is_near().then_some(found)
     }
 
     /// Best of `best` and the minima under `set` and the active sets that follow from it.
@@ -102,12 +97,12 @@ impl Subproblem {
             };
             let kkt = self.kkt(&next);
             // The first point within the limits ends the search, even if its multipliers are less accurate.
-            let is_better = is_near(&kkt) || kkt.is_better_than(&best.1);
+            let is_better = kkt.is_near() || kkt.is_better_than(&best.1);
             if is_better {
                 best = (next.clone(), kkt);
             }
             in_vain = if is_better { 0 } else { in_vain + 1 };
-            if is_near(&kkt) || in_vain > most_in_vain {
+            if kkt.is_near() || in_vain > most_in_vain {
                 break;
             }
             let corrected = self.corrected(&set, &next);
@@ -326,6 +321,7 @@ fn held_multipliers(set: &ActiveSet, at: &PrimalDual) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::constraints::TOLERANCE;
     use crate::qp::ConicStatus;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;

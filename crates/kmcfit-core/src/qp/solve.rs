@@ -128,7 +128,7 @@ impl Subproblem {
 
     /// [`Subproblem::solve`] with at most `iterations` iterations per attempt; with zero iterations the program is stalled.
     ///
-    /// In few variables the minimum is first looked for on the rows that are active at zero, without the interior-point solver.
+    /// In few variables the minimum is first looked for by active sets, without the interior-point solver.
     ///
     /// The status of the interior-point solver is not used: its point is polished on its active set and accepted by its residuals, its proof of
     /// infeasibility is checked. A rejected result is followed by an attempt with other settings.
@@ -181,7 +181,8 @@ impl Subproblem {
             return self.solution(ConicStatus::Solved, Some((zero, kkt)), 0);
         }
         let mut normalised = None;
-        if let Some((point, kkt)) = self.minimum_from_zero() {
+        let few = self.minimum_in_few_variables();
+        if let Some((point, kkt)) = few.or_else(|| self.minimum_from_zero()) {
             let normalised = normalised.get_or_insert_with(|| ScaledProgram::new(self));
             if normalised.resolves(&point.z) {
                 return self.solution(ConicStatus::Solved, Some((point, kkt)), 0);

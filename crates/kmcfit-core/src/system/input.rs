@@ -139,6 +139,16 @@ impl Excitation {
         zero(&self.force) && zero(&self.base)
     }
 
+    /// Excitation of the first `steps` steps.
+    #[must_use]
+    pub fn first(&self, steps: usize) -> Self {
+        let short = |part: &StageSamples| StageSamples::new(part.iter().take(steps));
+        Self {
+            force: self.force.as_ref().map(short),
+            base: self.base.as_ref().map(short),
+        }
+    }
+
     /// Excitation of the steps `steps` on steps of half the length: old stages become ends of new steps, with linear interpolation
     /// between them.
     #[must_use]

@@ -104,7 +104,7 @@ impl Subproblem {
     }
 
     /// Gradient of the Lagrangian of half the cost without the equalities.
-    fn gradient(&self, point: &PrimalDual) -> Vec<f64> {
+    pub(super) fn gradient(&self, point: &PrimalDual) -> Vec<f64> {
         let mut gradient = vec![CompensatedSum::default(); self.variables];
         for ((sum, d), z) in gradient.iter_mut().zip(&self.proximal).zip(&point.z) {
             sum.add_product(*d, *z);

@@ -14,7 +14,7 @@ use crate::solvers::fit::Fit;
 use crate::solvers::settings::FitSettings;
 use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::timings::{Timings, timed};
-use crate::system::{Excitation, Grid, StageSamples, System};
+use crate::system::{Grid, System};
 use crate::threads;
 use std::sync::Arc;
 use std::time::Duration;
@@ -104,20 +104,12 @@ fn shorter(function: &CoefficientFunction, nodes: usize) -> Option<CoefficientFu
 }
 
 fn first_steps_of(experiment: &Experiment, steps: usize) -> Experiment {
-    let short = |part: &Option<StageSamples>| {
-        let first = |all: &StageSamples| StageSamples::new(all.iter().take(steps));
-        part.as_ref().map(first)
-    };
-    let excitation = experiment.excitation.as_ref().map(|all| Excitation {
-        force: short(&all.force),
-        base: short(&all.base),
-    });
     let channels = experiment.channels.iter();
     Experiment {
         name: experiment.name.clone(),
         initial: experiment.initial,
         initial_parameters: experiment.initial_parameters,
-        excitation,
+        excitation: (experiment.excitation.as_ref()).map(|all| all.first(steps)),
         input: Input::default(),
         input_error: None,
         nodes: experiment.nodes.min(steps + 1),

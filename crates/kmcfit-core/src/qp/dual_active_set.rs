@@ -1,0 +1,354 @@
+//! Least squares in few variables under linear inequalities, by the dual active-set method (Goldfarb and Idnani, Mathematical
+//! Programming 27, 1983).
+//!
+//! With the cost as a triangle, `|R x - b|^2`, the variables `w = R x - b` make the program the search for the shortest `w` under the rows
+//! `n_i' w >= h_i`, `n_i = R^-T g_i`: rows of very different size lose no digits, and residuals of the optimality conditions are shares of the
+//! cost.
+
+use super::few_variables::{INDEPENDENT, Reduced};
+use super::kkt::ROUNDING;
+use super::{Kkt, PrimalDual, Subproblem};
+use nalgebra::{DMatrix, DVector};
+
+/// Share of its length below which the rest of a row depends on the active ones.
+const DEPENDENT: f64 = 1e-12;
+/// Largest number of changes of the active set for each variable and row; about one is usual for each active row.
+const CHANGES: usize = 4;
+
+/// An active row `n' w >= h`.
+struct ActiveRow {
+    row: usize,
+    /// 1 at the upper bound, -1 at the lower one.
+    sign: f64,
+    normal: DVector<f64>,
+    multiplier: f64,
+}
+
+/// The active rows, with an orthonormal basis `Q` of their normals `Q T`.
+struct ActiveRows {
+    rows: Vec<ActiveRow>,
+    basis: Vec<DVector<f64>>,
+    /// Columns of `T`.
+    triangle: Vec<Vec<f64>>,
+}
+
+impl ActiveRows {
+    /// Components of `x` along the basis, and the rest; orthogonalised twice, which suffices to machine precision.
+    fn split(&self, x: &DVector<f64>) -> (Vec<f64>, DVector<f64>) {
+        let mut rest = x.clone();
+        let mut along = vec![0.0; self.basis.len()];
+        for _ in 0..2 {
+            for (sum, q) in along.iter_mut().zip(&self.basis) {
+                let part = q.dot(&rest);
+                *sum += part;
+                rest.axpy(-part, q, 1.0);
+            }
+        }
+        (along, rest)
+    }
+
+    /// `T^-1 x`.
+    fn solve(&self, x: &[f64]) -> Vec<f64> {
+        let mut solution = x.to_vec();
+        for j in (0..x.len()).rev() {
+            let column = &self.triangle[j];
+            solution[j] /= column[j];
+            for i in 0..j {
+                solution[i] -= column[i] * solution[j];
+            }
+        }
+        solution
+    }
+
+    /// `T^-T x`.
+    fn solve_transposed(&self, x: &[f64]) -> Vec<f64> {
+        let mut solution = Vec::with_capacity(x.len());
+        for (column, x) in self.triangle.iter().zip(x) {
+            let known: f64 = column.iter().zip(&solution).map(|(t, s)| t * s).sum();
+            solution.push((x - known) / column[solution.len()]);
+        }
+        solution
+    }
+
+    /// Adds a row; false, and nothing is changed, if it depends on the others.
+    fn push(&mut self, row: ActiveRow) -> bool {
+        let (mut along, rest) = self.split(&row.normal);
+        let length = rest.norm();
+        if length <= DEPENDENT * row.normal.norm() {
+            return false;
+        }
+        along.push(length);
+        self.basis.push(rest / length);
+        self.triangle.push(along);
+        self.rows.push(row);
+        true
+    }
+
+    fn remove(&mut self, place: usize) {
+        let later: Vec<ActiveRow> = self.rows.drain(place..).skip(1).collect();
+        self.basis.truncate(place);
+        self.triangle.truncate(place);
+        // Fewer rows are less dependent.
+        later.into_iter().for_each(|row| {
+            self.push(row);
+        });
+    }
+}
+
+/// The program in `w`.
+struct LeastDistance<'a> {
+    sub: &'a Subproblem,
+    reduced: Reduced,
+    triangle: DMatrix<f64>,
+    /// Place of each variable among the free ones.
+    places: Vec<Option<usize>>,
+}
+
+impl Subproblem {
+    /// Minimum in few variables under linear inequalities; `None` for programs of another form, where the minimum without inequalities is
+    /// not unique, where no point is feasible, and where the point does not satisfy the limits of a solution.
+    pub(super) fn minimum_in_few_variables(&self) -> Option<(PrimalDual, Kkt)> {
+        let has_form = self.absolute.is_empty() && self.cones.is_empty();
+        has_form.then_some(())?;
+        let reduced = Reduced::new(self, self.residuals.right())?;
+        let free = reduced.free.len();
+        // Without a solution the columns are dependent.
+        let unbounded = reduced.triangle.solve(INDEPENDENT)?;
+        let mut triangle = DMatrix::zeros(free, free);
+        for (i, (entries, _)) in reduced.triangle.rows().enumerate() {
+            entries.for_each(|(j, r)| triangle[(i, j)] = r);
+        }
+        let mut places = vec![None; self.variables];
+        for (place, j) in reduced.free.iter().enumerate() {
+            places[*j] = Some(place);
+        }
+        let program = LeastDistance {
+            sub: self,
+            reduced,
+            triangle,
+            places,
+        };
+        program.minimise(unbounded)
+    }
+}
+
+impl LeastDistance<'_> {
+    fn minimise(&self, unbounded: Vec<f64>) -> Option<(PrimalDual, Kkt)> {
+        let unbounded = DVector::from_vec(unbounded);
+        let mut active = ActiveRows {
+            rows: Vec::new(),
+            basis: Vec::new(),
+            triangle: Vec::new(),
+        };
+        let mut w = DVector::zeros(unbounded.len());
+        let mut z = self.variables(&unbounded);
+        let most = CHANGES * (unbounded.len() + self.sub.inequalities.len());
+        let mut changes = 0;
+        while let Some((row, sign)) = self.most_violated(&z, &active) {
+            let normal = self.normal(row, sign)?;
+            let mut entering = ActiveRow {
+                row,
+                sign,
+                normal,
+                multiplier: 0.0,
+            };
+            loop {
+                changes += 1;
+                (changes <= most).then_some(())?;
+                let (along, rest) = active.split(&entering.normal);
+                let fall = active.solve(&along);
+                let length = rest.norm();
+                let full = match length > DEPENDENT * entering.normal.norm() {
+                    true => self.missing(row, sign, &z) / (length * length),
+                    false => f64::INFINITY,
+                };
+                let ratios = active.rows.iter().zip(&fall).enumerate();
+                let blocking = ratios
+                    .filter(|(_, (_, fall))| **fall > 0.0)
+                    .map(|(place, (row, fall))| (place, row.multiplier / fall))
+                    .min_by(|(_, a), (_, b)| a.total_cmp(b));
+                let step = blocking.map_or(full, |(_, most)| most.min(full));
+                // No step reaches the row: no point is feasible.
+                step.is_finite().then_some(())?;
+                for (row, fall) in active.rows.iter_mut().zip(&fall) {
+                    row.multiplier = (row.multiplier - step * fall).max(0.0);
+                }
+                entering.multiplier += step;
+                if full.is_finite() {
+                    w.axpy(step, &rest, 1.0);
+                    z = self.variables(&(&unbounded + self.inverse(&w)?));
+                }
+                match blocking {
+                    Some((place, most)) if most < full => active.remove(place),
+                    _ => {
+                        active.push(entering).then_some(())?;
+                        break;
+                    }
+                }
+            }
+        }
+        self.refined(&unbounded, active)
+    }
+
+    /// The minimum on the active rows, anew and without the errors of the steps to them.
+    fn refined(&self, unbounded: &DVector<f64>, active: ActiveRows) -> Option<(PrimalDual, Kkt)> {
+        let z = self.variables(unbounded);
+        let missing = active.rows.iter();
+        let missing: Vec<f64> = missing
+            .map(|row| self.missing(row.row, row.sign, &z))
+            .collect();
+        let along = active.solve_transposed(&missing);
+        let mut w = DVector::zeros(unbounded.len());
+        for (part, q) in along.iter().zip(&active.basis) {
+            w.axpy(*part, q, 1.0);
+        }
+        let multipliers = active.solve(&along);
+        let mut point = PrimalDual::zero(self.sub);
+        point.z = self.variables(&(unbounded + self.inverse(&w)?));
+        self.sub.clip(&mut point.z);
+        // The minimum of the Lagrangian is a lower bound: half the cost exceeds the minimum by no more than this.
+        let mut excess = self.distance(&point.z);
+        for (row, multiplier) in active.rows.iter().zip(multipliers) {
+            let multiplier = multiplier.max(0.0);
+            point.inequalities[row.row] = row.sign * multiplier;
+            excess.axpy(-multiplier, &row.normal, 1.0);
+        }
+        let gradient = self.sub.gradient(&point);
+        for i in 0..self.sub.equalities.len() {
+            let (j, a) = self.sub.equalities.row(i).find(|(_, a)| *a != 0.0)?;
+            point.equalities[i] = -gradient[j] / a;
+        }
+        point.is_finite().then_some(())?;
+        let kkt = self
+            .sub
+            .kkt_with_decrease(&point, 0.5 * excess.norm_squared());
+        kkt.is_near().then_some((point, kkt))
+    }
+
+    /// All variables, with the free ones at `x`.
+    fn variables(&self, x: &DVector<f64>) -> Vec<f64> {
+        let mut z = self.reduced.z.clone();
+        for (j, x) in self.reduced.free.iter().zip(x.iter()) {
+            z[*j] = *x;
+        }
+        z
+    }
+
+    /// `R^-1 w`.
+    fn inverse(&self, w: &DVector<f64>) -> Option<DVector<f64>> {
+        self.triangle.solve_upper_triangular(w)
+    }
+
+    /// `R x - b` of the free variables.
+    fn distance(&self, z: &[f64]) -> DVector<f64> {
+        let free = self.reduced.free.iter();
+        let x = DVector::from_iterator(self.reduced.free.len(), free.map(|j| z[*j]));
+        let mut distance = &self.triangle * x;
+        for (i, (_, b)) in self.reduced.triangle.rows().enumerate() {
+            distance[i] -= b;
+        }
+        distance
+    }
+
+    /// `R^-T g` of a row, pointing to where it is satisfied.
+    fn normal(&self, row: usize, sign: f64) -> Option<DVector<f64>> {
+        let mut g = DVector::zeros(self.reduced.free.len());
+        for (j, a) in self.sub.inequalities.row(row) {
+            if let Some(place) = self.places[j] {
+                g[place] -= sign * a;
+            }
+        }
+        self.triangle.tr_solve_upper_triangular(&g)
+    }
+
+    /// By how much a row exceeds its bound.
+    fn missing(&self, row: usize, sign: f64, z: &[f64]) -> f64 {
+        let bound = match sign > 0.0 {
+            true => self.sub.upper[row],
+            false => self.sub.inequalities.right()[row],
+        };
+        let entries = self.sub.inequalities.row(row);
+        sign * (entries.map(|(j, a)| a * z[j]).sum::<f64>() - bound)
+    }
+
+    /// The row, and the sign of its side, that is violated most as a share of its terms, beyond their rounding.
+    fn most_violated(&self, z: &[f64], active: &ActiveRows) -> Option<(usize, f64)> {
+        let rows = &self.sub.inequalities;
+        let mut worst = (ROUNDING, None);
+        for (i, upper) in self.sub.upper.iter().enumerate() {
+            let (mut value, mut terms) = (0.0, 0.0f64);
+            for (j, a) in rows.row(i) {
+                value += a * z[j];
+                terms += (a * z[j]).abs();
+            }
+            let lower = rows.right()[i];
+            for (sign, bound) in [(1.0, *upper), (-1.0, lower)] {
+                let share = sign * (value - bound) / terms.max(bound.abs());
+                if share > worst.0 && !active.rows.iter().any(|row| row.row == i) {
+                    worst = (share, Some((i, sign)));
+                }
+            }
+        }
+        worst.1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `1e20 (z_1 + z_2 - 1)^2 + (z_1 - 3)^2` with `z_1 <= 2` and `z_2 >= -5`: at (2, -1), with the multiplier 1. The gradient there is the
+    /// rounding error of the large row.
+    #[test]
+    fn rows_of_very_different_size() {
+        let mut sub = Subproblem::new(2);
+        sub.elimination_order = vec![0, 0];
+        sub.residuals.push([(0, 1e10), (1, 1e10)], 1e10);
+        sub.residuals.push([(0, 1.0)], 3.0);
+        sub.bound([(0, 1.0)], f64::NEG_INFINITY, 2.0);
+        sub.bound([(1, 1.0)], -5.0, f64::INFINITY);
+        let (point, kkt) = sub.minimum_in_few_variables().expect("a minimum");
+        let errors = [
+            point.z[0] - 2.0,
+            point.z[1] + 1.0,
+            point.inequalities[0] - 1.0,
+        ];
+        assert!(
+            errors.iter().all(|error| error.abs() < 1e-14),
+            "{point:?} {kkt:?}"
+        );
+        assert_eq!(point.inequalities[1], 0.0);
+    }
+
+    /// The point of a triangle nearest to (3, 2): the row that is violated most first is not active at the end.
+    #[test]
+    fn a_row_leaves_the_active_set() {
+        let mut sub = Subproblem::new(2);
+        sub.elimination_order = vec![0, 0];
+        sub.residuals.push([(0, 1.0)], 3.0);
+        sub.residuals.push([(1, 1.0)], 2.0);
+        sub.bound([(0, 1.0), (1, 3.0)], f64::NEG_INFINITY, 4.0);
+        sub.bound([(0, 1.0), (1, 0.1)], f64::NEG_INFINITY, 2.5);
+        sub.bound([(1, 1.0)], 0.0, f64::INFINITY);
+        sub.bound([(0, 1.0), (1, 5.0)], f64::NEG_INFINITY, 5.0);
+        let solution = sub.solve();
+        assert_eq!(solution.attempts, 0);
+        sub.elimination_order.clear();
+        let expected = sub.solve();
+        assert!(expected.attempts > 0);
+        for (a, b) in solution.z.iter().zip(&expected.z) {
+            assert!((a - b).abs() < 1e-7, "{solution:?} {expected:?}");
+        }
+    }
+
+    /// `z <= 0` and `z >= 1`: no point is feasible.
+    #[test]
+    fn contradictions_have_no_minimum() {
+        let mut sub = Subproblem::new(1);
+        sub.elimination_order = vec![0];
+        sub.residuals.push([(0, 1.0)], 3.0);
+        sub.bound([(0, 1.0)], f64::NEG_INFINITY, 0.0);
+        sub.bound([(0, 1.0)], 1.0, f64::INFINITY);
+        assert!(sub.minimum_in_few_variables().is_none());
+    }
+}
