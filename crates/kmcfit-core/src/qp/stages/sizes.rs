@@ -38,13 +38,13 @@ impl Sizes {
         ] {
             for i in 0..rows.len() {
                 let stage = stage_of(rows, i, &places);
-                rows.row(i).for_each(|(j, _)| reach(stage, j));
+                nonzero(rows, i).for_each(|j| reach(stage, j));
             }
         }
         for cone in &sub.cones {
             let stage = stage_of_cone(cone, &places);
-            let rows = (0..cone.rows.len()).flat_map(|i| cone.rows.row(i));
-            rows.for_each(|(j, _)| reach(stage, j));
+            let rows = (0..cone.rows.len()).flat_map(|i| nonzero(&cone.rows, i));
+            rows.for_each(|j| reach(stage, j));
         }
         if orders.iter().any(|order| *order > HIGHEST_ORDER) {
             return None;
@@ -60,10 +60,15 @@ impl Sizes {
     }
 }
 
+/// The variables of row `i` with a coefficient other than zero.
+fn nonzero(rows: &Rows, i: usize) -> impl Iterator<Item = usize> + '_ {
+    let entries = rows.row(i).filter(|(_, a)| *a != 0.0);
+    entries.map(|(j, _)| j)
+}
+
 /// The first node at which a variable of row `i` acts: constants act at all, and come into play only where there is nothing else.
 pub(super) fn stage_of(rows: &Rows, i: usize, places: &[Place]) -> usize {
-    let entries = rows.row(i).filter(|(_, a)| *a != 0.0);
-    let nodes = entries.filter_map(|(j, _)| match places[j] {
+    let nodes = nonzero(rows, i).filter_map(|j| match places[j] {
         Place::Constant(_) => None,
         place => Some(place.node()),
     });
@@ -73,7 +78,7 @@ pub(super) fn stage_of(rows: &Rows, i: usize, places: &[Place]) -> usize {
 /// The first node at which a variable of a cone acts.
 pub(super) fn stage_of_cone(cone: &Cone, places: &[Place]) -> usize {
     let rows = 0..cone.rows.len();
-    let occupied = rows.filter(|i| cone.rows.row(*i).any(|(_, a)| a != 0.0));
+    let occupied = rows.filter(|i| nonzero(&cone.rows, *i).next().is_some());
     let stages = occupied.map(|i| stage_of(&cone.rows, i, places));
     stages.min().unwrap_or(0)
 }

@@ -178,6 +178,10 @@ impl<const X: usize, const W: usize> StageProgram<X, W> {
 
     /// Adds `a` times a variable in the coordinates of stage `i`; the constant that comes with it.
     fn add_entry(&self, i: usize, variable: usize, a: f64, xi: &mut [f64; W]) -> Option<f64> {
+        // The stage of a row is that of its first coefficient other than zero.
+        if a == 0.0 {
+            return Some(0.0);
+        }
         match self.places[variable] {
             Place::Constant(c) => xi[self.constants + c] += a,
             Place::Response(component, node) if node == i => xi[component] += a,

@@ -36,11 +36,15 @@ fn force(grid: &Grid) -> Excitation {
 
 /// The true response at `nodes` nodes, by the fourth-order rule on a grid 32 times as fine.
 fn response(nodes: usize) -> TargetResponse {
+    response_from(INITIAL, nodes)
+}
+
+fn response_from(initial: State, nodes: usize) -> TargetResponse {
     let fine = system(32 * (nodes - 1) + 1, Method::Rk4);
     let nodal = truth(&fine.grid);
     let excitation = force(&fine.grid);
     let forces = excitation.force.as_ref().unwrap().at_nodes();
-    let moved = fine.forward(&nodal, INITIAL, Some(&excitation)).unwrap();
+    let moved = fine.forward(&nodal, initial, Some(&excitation)).unwrap();
     let pick = |f: &[f64]| -> Vec<f64> { f.iter().step_by(32).copied().collect() };
     let (y, v) = (&moved.displacement, &moved.velocity);
     let acceleration: Vec<f64> = (0..y.len())
@@ -157,4 +161,53 @@ fn impossible_responses_are_infeasible() {
     println!("{negative} {:?}", found.as_ref().err());
     assert!(negative);
     assert_eq!(found, Err(ConicStatus::Infeasible));
+}
+
+/// At a turning point the equation of motion is free of the damping, at a zero crossing of the stiffness.
+#[test]
+fn responses_from_turning_points_and_zero_crossings_have_equivalent_systems() {
+    for [displacement, velocity] in [[3.3, 0.0], [0.0, 1.0]] {
+        let initial = State {
+            displacement,
+            velocity,
+        };
+        let response = response_from(initial, 801);
+        let mass: Vec<f64> = response
+            .grid
+            .times()
+            .iter()
+            .map(|t| 1.0 + 0.02 * t)
+            .collect();
+        let options = EquivalentOptions::near(vec![0.1; 801], 0.05);
+        let nodal = equivalent_coefficients(&mass, &response, &options).unwrap();
+        let excitation = Excitation::force_at_nodes(&response.force);
+        let system = system(801, Method::Midpoint);
+        let moved = system.forward(&nodal, initial, Some(&excitation)).unwrap();
+        let pairs = moved.displacement.iter().zip(&response.displacement);
+        let error = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+        // The error of the midpoint rule, as with random masses.
+        assert!(error < 1e-2, "{initial:?}: {error}");
+    }
+}
+
+/// At rest, a force that the mass alone balances determines neither damping nor stiffness; another force has no equivalent system.
+#[test]
+fn at_rest_the_damping_is_the_target() {
+    let mut response = response(401);
+    response.displacement[0] = 0.0;
+    response.velocity[0] = 0.0;
+    let options = EquivalentOptions::near(vec![0.1; 401], 0.05);
+    let mass = vec![1.5; 401];
+    assert_eq!(
+        equivalent_coefficients(&mass, &response, &options),
+        Err(ConicStatus::Infeasible)
+    );
+    response.acceleration[0] = response.force[0] / mass[0];
+    let nodal = equivalent_coefficients(&mass, &response, &options).unwrap();
+    assert!((nodal.coefficients[0][0] - 0.1).abs() < 1e-15);
+    assert!(
+        nodal.coefficients[1]
+            .iter()
+            .all(|k| *k >= 0.05 * (1.0 - 1e-9))
+    );
 }
