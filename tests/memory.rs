@@ -139,9 +139,9 @@ fn small_models_are_fitted_or_refused() {
         &["completions", "bash"],
     ];
     let mut done = 0;
-    for limit in LIMITS {
-        for arguments in commands {
-            let (free, _) = bench.run(None, arguments);
+    for arguments in commands {
+        let (free, _) = bench.run(None, arguments);
+        for limit in LIMITS {
             let _ = fs::remove_file(bench.path("new.yaml"));
             let (code, said) = bench.run(Some(limit), arguments);
             let _ = fs::remove_file(bench.path("new.yaml"));

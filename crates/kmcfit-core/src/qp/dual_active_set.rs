@@ -8,54 +8,24 @@
 use super::few_variables::{INDEPENDENT, Reduced};
 use super::kkt::ROUNDING;
 use super::{Kkt, PrimalDual, Subproblem};
-use nalgebra::{DMatrix, DVector};
 
 /// Share of its length below which the rest of a row depends on the active ones.
 const DEPENDENT: f64 = 1e-12;
-/// Largest number of changes of the active set for each variable and row; about one is usual for each active row.
+/// Largest number of changes of the active set for each variable and row.
 const CHANGES: usize = 4;
 
-/// An active row `n' w >= h`.
-struct ActiveRow {
-    row: usize,
-    /// 1 at the upper bound, -1 at the lower one.
-    sign: f64,
-    normal: DVector<f64>,
-    multiplier: f64,
-}
+/// An upper triangular matrix, by columns.
+#[derive(Default)]
+struct UpperTriangle(Vec<Vec<f64>>);
 
-/// The active rows, with an orthonormal basis `Q` of their normals `Q T`.
-struct ActiveRows {
-    rows: Vec<ActiveRow>,
-    basis: Vec<DVector<f64>>,
-    /// Columns of `T`.
-    triangle: Vec<Vec<f64>>,
-}
-
-impl ActiveRows {
-    /// Components of `x` along the basis, and the rest; orthogonalised twice, which suffices to machine precision.
-    fn split(&self, x: &DVector<f64>) -> (Vec<f64>, DVector<f64>) {
-        let mut rest = x.clone();
-        let mut along = vec![0.0; self.basis.len()];
-        for _ in 0..2 {
-            for (sum, q) in along.iter_mut().zip(&self.basis) {
-                let part = q.dot(&rest);
-                *sum += part;
-                rest.axpy(-part, q, 1.0);
-            }
-        }
-        (along, rest)
-    }
-
+impl UpperTriangle {
     /// `T^-1 x`.
     fn solve(&self, x: &[f64]) -> Vec<f64> {
         let mut solution = x.to_vec();
-        for j in (0..x.len()).rev() {
-            let column = &self.triangle[j];
+        for (j, column) in self.0.iter().enumerate().rev() {
             solution[j] /= column[j];
-            for i in 0..j {
-                solution[i] -= column[i] * solution[j];
-            }
+            let last = solution[j];
+            add_multiple(-last, &column[..j], &mut solution[..j]);
         }
         solution
     }
@@ -63,23 +33,68 @@ impl ActiveRows {
     /// `T^-T x`.
     fn solve_transposed(&self, x: &[f64]) -> Vec<f64> {
         let mut solution = Vec::with_capacity(x.len());
-        for (column, x) in self.triangle.iter().zip(x) {
-            let known: f64 = column.iter().zip(&solution).map(|(t, s)| t * s).sum();
-            solution.push((x - known) / column[solution.len()]);
+        for (j, column) in self.0.iter().enumerate() {
+            solution.push((x[j] - dot(&column[..j], &solution)) / column[j]);
         }
         solution
+    }
+}
+
+fn norm(x: &[f64]) -> f64 {
+    dot(x, x).sqrt()
+}
+
+fn dot(x: &[f64], y: &[f64]) -> f64 {
+    x.iter().zip(y).map(|(x, y)| x * y).sum()
+}
+
+/// `y + a x` in place of `y`.
+fn add_multiple(a: f64, x: &[f64], y: &mut [f64]) {
+    y.iter_mut().zip(x).for_each(|(y, x)| *y += a * x);
+}
+
+/// An active row `n' w >= h`.
+struct ActiveRow {
+    row: usize,
+    /// 1 at the upper bound, -1 at the lower one.
+    sign: f64,
+    normal: Vec<f64>,
+    multiplier: f64,
+}
+
+/// The active rows, with an orthonormal basis `Q` of their normals `Q T`.
+#[derive(Default)]
+struct ActiveRows {
+    rows: Vec<ActiveRow>,
+    basis: Vec<Vec<f64>>,
+    triangle: UpperTriangle,
+}
+
+impl ActiveRows {
+    /// Components of `x` along the basis, and the rest; orthogonalised twice, which suffices to machine precision.
+    fn split(&self, x: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let mut rest = x.to_vec();
+        let mut along = vec![0.0; self.basis.len()];
+        for _ in 0..2 {
+            for (sum, q) in along.iter_mut().zip(&self.basis) {
+                let part = dot(q, &rest);
+                *sum += part;
+                add_multiple(-part, q, &mut rest);
+            }
+        }
+        (along, rest)
     }
 
     /// Adds a row; false, and nothing is changed, if it depends on the others.
     fn push(&mut self, row: ActiveRow) -> bool {
         let (mut along, rest) = self.split(&row.normal);
-        let length = rest.norm();
-        if length <= DEPENDENT * row.normal.norm() {
+        let length = norm(&rest);
+        if length <= DEPENDENT * norm(&row.normal) {
             return false;
         }
         along.push(length);
-        self.basis.push(rest / length);
-        self.triangle.push(along);
+        self.basis.push(rest.iter().map(|x| x / length).collect());
+        self.triangle.0.push(along);
         self.rows.push(row);
         true
     }
@@ -87,7 +102,7 @@ impl ActiveRows {
     fn remove(&mut self, place: usize) {
         let later: Vec<ActiveRow> = self.rows.drain(place..).skip(1).collect();
         self.basis.truncate(place);
-        self.triangle.truncate(place);
+        self.triangle.0.truncate(place);
         // Fewer rows are less dependent.
         later.into_iter().for_each(|row| {
             self.push(row);
@@ -99,7 +114,7 @@ impl ActiveRows {
 struct LeastDistance<'a> {
     sub: &'a Subproblem,
     reduced: Reduced,
-    triangle: DMatrix<f64>,
+    triangle: UpperTriangle,
     /// Place of each variable among the free ones.
     places: Vec<Option<usize>>,
 }
@@ -114,9 +129,10 @@ impl Subproblem {
         let free = reduced.free.len();
         // Without a solution the columns are dependent.
         let unbounded = reduced.triangle.solve(INDEPENDENT)?;
-        let mut triangle = DMatrix::zeros(free, free);
+        let columns = (1..=free).map(|size| vec![0.0; size]);
+        let mut triangle = UpperTriangle(columns.collect());
         for (i, (entries, _)) in reduced.triangle.rows().enumerate() {
-            entries.for_each(|(j, r)| triangle[(i, j)] = r);
+            entries.for_each(|(j, r)| triangle.0[j][i] = r);
         }
         let mut places = vec![None; self.variables];
         for (place, j) in reduced.free.iter().enumerate() {
@@ -128,37 +144,31 @@ impl Subproblem {
             triangle,
             places,
         };
-        program.minimise(unbounded)
+        program.minimise(&unbounded)
     }
 }
 
 impl LeastDistance<'_> {
-    fn minimise(&self, unbounded: Vec<f64>) -> Option<(PrimalDual, Kkt)> {
-        let unbounded = DVector::from_vec(unbounded);
-        let mut active = ActiveRows {
-            rows: Vec::new(),
-            basis: Vec::new(),
-            triangle: Vec::new(),
-        };
-        let mut w = DVector::zeros(unbounded.len());
-        let mut z = self.variables(&unbounded);
+    fn minimise(&self, unbounded: &[f64]) -> Option<(PrimalDual, Kkt)> {
+        let mut active = ActiveRows::default();
+        let mut w = vec![0.0; unbounded.len()];
+        let mut z = self.variables(unbounded, &w);
         let most = CHANGES * (unbounded.len() + self.sub.inequalities.len());
         let mut changes = 0;
         while let Some((row, sign)) = self.most_violated(&z, &active) {
-            let normal = self.normal(row, sign)?;
             let mut entering = ActiveRow {
                 row,
                 sign,
-                normal,
+                normal: self.normal(row, sign),
                 multiplier: 0.0,
             };
             loop {
                 changes += 1;
                 (changes <= most).then_some(())?;
                 let (along, rest) = active.split(&entering.normal);
-                let fall = active.solve(&along);
-                let length = rest.norm();
-                let full = match length > DEPENDENT * entering.normal.norm() {
+                let fall = active.triangle.solve(&along);
+                let length = norm(&rest);
+                let full = match length > DEPENDENT * norm(&entering.normal) {
                     true => self.missing(row, sign, &z) / (length * length),
                     false => f64::INFINITY,
                 };
@@ -175,8 +185,8 @@ impl LeastDistance<'_> {
                 }
                 entering.multiplier += step;
                 if full.is_finite() {
-                    w.axpy(step, &rest, 1.0);
-                    z = self.variables(&(&unbounded + self.inverse(&w)?));
+                    add_multiple(step, &rest, &mut w);
+                    z = self.variables(unbounded, &w);
                 }
                 match blocking {
                     Some((place, most)) if most < full => active.remove(place),
@@ -187,31 +197,31 @@ impl LeastDistance<'_> {
                 }
             }
         }
-        self.refined(&unbounded, active)
+        self.refined(unbounded, &active)
     }
 
     /// The minimum on the active rows, anew and without the errors of the steps to them.
-    fn refined(&self, unbounded: &DVector<f64>, active: ActiveRows) -> Option<(PrimalDual, Kkt)> {
-        let z = self.variables(unbounded);
+    fn refined(&self, unbounded: &[f64], active: &ActiveRows) -> Option<(PrimalDual, Kkt)> {
+        let mut w = vec![0.0; unbounded.len()];
+        let z = self.variables(unbounded, &w);
         let missing = active.rows.iter();
         let missing: Vec<f64> = missing
             .map(|row| self.missing(row.row, row.sign, &z))
             .collect();
-        let along = active.solve_transposed(&missing);
-        let mut w = DVector::zeros(unbounded.len());
+        let along = active.triangle.solve_transposed(&missing);
         for (part, q) in along.iter().zip(&active.basis) {
-            w.axpy(*part, q, 1.0);
+            add_multiple(*part, q, &mut w);
         }
-        let multipliers = active.solve(&along);
+        let multipliers = active.triangle.solve(&along);
         let mut point = PrimalDual::zero(self.sub);
-        point.z = self.variables(&(unbounded + self.inverse(&w)?));
+        point.z = self.variables(unbounded, &w);
         self.sub.clip(&mut point.z);
         // The minimum of the Lagrangian is a lower bound: half the cost exceeds the minimum by no more than this.
         let mut excess = self.distance(&point.z);
         for (row, multiplier) in active.rows.iter().zip(multipliers) {
             let multiplier = multiplier.max(0.0);
             point.inequalities[row.row] = row.sign * multiplier;
-            excess.axpy(-multiplier, &row.normal, 1.0);
+            add_multiple(-multiplier, &row.normal, &mut excess);
         }
         let gradient = self.sub.gradient(&point);
         for i in 0..self.sub.equalities.len() {
@@ -221,44 +231,37 @@ impl LeastDistance<'_> {
         point.is_finite().then_some(())?;
         let kkt = self
             .sub
-            .kkt_with_decrease(&point, 0.5 * excess.norm_squared());
+            .kkt_with_decrease(&point, 0.5 * dot(&excess, &excess));
         kkt.is_near().then_some((point, kkt))
     }
 
-    /// All variables, with the free ones at `x`.
-    fn variables(&self, x: &DVector<f64>) -> Vec<f64> {
+    /// All variables at `w`; the free ones are `unbounded` at zero.
+    fn variables(&self, unbounded: &[f64], w: &[f64]) -> Vec<f64> {
         let mut z = self.reduced.z.clone();
-        for (j, x) in self.reduced.free.iter().zip(x.iter()) {
-            z[*j] = *x;
+        let moved = unbounded.iter().zip(self.triangle.solve(w));
+        for (j, (x, change)) in self.reduced.free.iter().zip(moved) {
+            z[*j] = x + change;
         }
         z
     }
 
-    /// `R^-1 w`.
-    fn inverse(&self, w: &DVector<f64>) -> Option<DVector<f64>> {
-        self.triangle.solve_upper_triangular(w)
-    }
-
     /// `R x - b` of the free variables.
-    fn distance(&self, z: &[f64]) -> DVector<f64> {
-        let free = self.reduced.free.iter();
-        let x = DVector::from_iterator(self.reduced.free.len(), free.map(|j| z[*j]));
-        let mut distance = &self.triangle * x;
-        for (i, (_, b)) in self.reduced.triangle.rows().enumerate() {
-            distance[i] -= b;
-        }
-        distance
+    fn distance(&self, z: &[f64]) -> Vec<f64> {
+        let free = &self.reduced.free;
+        let rows = self.reduced.triangle.rows();
+        rows.map(|(entries, b)| entries.map(|(j, r)| r * z[free[j]]).sum::<f64>() - b)
+            .collect()
     }
 
     /// `R^-T g` of a row, pointing to where it is satisfied.
-    fn normal(&self, row: usize, sign: f64) -> Option<DVector<f64>> {
-        let mut g = DVector::zeros(self.reduced.free.len());
+    fn normal(&self, row: usize, sign: f64) -> Vec<f64> {
+        let mut g = vec![0.0; self.reduced.free.len()];
         for (j, a) in self.sub.inequalities.row(row) {
             if let Some(place) = self.places[j] {
                 g[place] -= sign * a;
             }
         }
-        self.triangle.tr_solve_upper_triangular(&g)
+        self.triangle.solve_transposed(&g)
     }
 
     /// By how much a row exceeds its bound.

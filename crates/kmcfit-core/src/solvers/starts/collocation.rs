@@ -163,7 +163,7 @@ fn solve(sub: &Subproblem) -> Option<Vec<f64>> {
     {
         return Some(z);
     }
-    let solution = sub.solve();
+    let solution = sub.solve_for_step();
     solution.status.is_point().then_some(solution.z)
 }
 
