@@ -3,6 +3,10 @@
 //!
 //! The limit is that on the address space (`ulimit -v`), which the system enforces on the process alone.
 
+#[path = "common/program.rs"]
+mod program;
+
+use program::program;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -68,7 +72,7 @@ impl Bench {
             None => "exec \"$0\" \"$@\"".into(),
         };
         let output = command
-            .args(["-c", &shell, env!("CARGO_BIN_EXE_kmcfit")])
+            .args(["-c", &shell, &program()])
             .args(arguments)
             .current_dir(self.0.path())
             .stdin(Stdio::null())

@@ -122,6 +122,7 @@ LONG = {
 def test_ctrl_c_ends_a_fit_at_its_best_point(kind):
     code = (
         "import os, signal, threading, warnings, numpy, kmcfit as km\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # Ignored in what a shell starts in the background.
         "threading.Timer(0.7, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
         "with warnings.catch_warnings(record=True) as caught:\n"
         "    warnings.simplefilter('always')\n"

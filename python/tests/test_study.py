@@ -156,6 +156,7 @@ def test_ctrl_c_ends_a_study_after_the_finished_analyses():
     code = (
         "import os, signal, threading, warnings, kmcfit as km\n"
         f"fit = km.fit_model({str(MODELS / 'linear-mass.yaml')!r})\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # Ignored in what a shell starts in the background.
         "threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
         "with warnings.catch_warnings(record=True) as caught:\n"
         "    warnings.simplefilter('always')\n"

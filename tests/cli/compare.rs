@@ -1,5 +1,6 @@
 //! `kmcfit compare`: table, figures and page of several runs.
 
+use crate::program::program;
 use crate::workbench::{Workbench, column};
 use insta::assert_snapshot;
 use roxmltree::{Document, Node, ParsingOptions};
@@ -558,7 +559,7 @@ fn interrupt() {
     let endless = "{method: steepest-descent, stop: {iterations: 100000000}}";
     bench.write("endless.yaml", &model("Endless", 200, FREE, endless));
     let arguments = ["compare", "constants.yaml", "endless.yaml", "twice.yaml"];
-    let child = std::process::Command::new(env!("CARGO_BIN_EXE_kmcfit"))
+    let child = std::process::Command::new(program())
         .args(arguments)
         .current_dir(bench.path(""))
         .stdout(Stdio::piped())

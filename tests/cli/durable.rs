@@ -1,5 +1,6 @@
 //! Crash safety: runs that are killed or interrupted, full disks, folders in use, and files in the way of results.
 
+use crate::program::program;
 use crate::workbench::{MODEL, Workbench};
 use serde_json::Value;
 use std::process::{Child, Command, Stdio};
@@ -29,7 +30,7 @@ fn paper(iterations: u64) -> Workbench {
 }
 
 fn started(bench: &Workbench, arguments: &[&str]) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_kmcfit"))
+    Command::new(program())
         .args(arguments)
         .current_dir(bench.path(""))
         .stdout(Stdio::null())
@@ -356,7 +357,7 @@ fn a_disk_that_is_full() {
     let bench = paper(5);
     bench.run_to(0, &["fit", "models/paper.yaml", "--out", "run"]);
     let before = bench.contents();
-    let program = env!("CARGO_BIN_EXE_kmcfit");
+    let program = program();
     let line = |out: &str| {
         // The limit is on blocks of 512 or 1024 bytes; the tables are longer than both.
         format!("ulimit -f 60; exec '{program}' fit models/paper-lbfgs.yaml --out {out}")

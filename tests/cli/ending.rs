@@ -1,5 +1,6 @@
 //! Ends of runs: exit codes, statuses and results.
 
+use crate::program::program;
 use crate::workbench::{MODEL, Workbench, column};
 use serde_json::Value;
 use std::process::{Command, Stdio};
@@ -68,7 +69,7 @@ fn time_limit() {
 #[cfg(unix)]
 fn interrupt() {
     let bench = paper_until("{iterations: 100000000}");
-    let child = Command::new(env!("CARGO_BIN_EXE_kmcfit"))
+    let child = Command::new(program())
         .args(["fit", "models/paper.yaml"])
         .current_dir(bench.path(""))
         .stdout(Stdio::piped())

@@ -1,5 +1,6 @@
 //! `kmcfit fleet`: one model on many records.
 
+use crate::program::program;
 use crate::workbench::Workbench;
 use insta::assert_snapshot;
 use serde_json::Value;
@@ -251,7 +252,7 @@ fn killed_fleets_go_on() {
         .and_then(|n| n.parse().ok())
         .unwrap_or(4u64);
     for moment in 0..kills {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_kmcfit"))
+        let mut child = Command::new(program())
             .current_dir(bench.path(""))
             .args(arguments)
             .stdout(Stdio::null())
@@ -292,7 +293,7 @@ fn a_partial_line_is_removed() {
 #[test]
 fn a_full_disk_loses_nothing() {
     let bench = bench(6);
-    let program = env!("CARGO_BIN_EXE_kmcfit");
+    let program = program();
     let fleet = format!("'{program}' fleet model.yaml 'records/*.csv' --out fleet --threads 1");
     // Blocks of 512 or 1024 bytes: room for some rows, whose curves are longer than they are.
     let limited = Command::new("sh")

@@ -1,5 +1,6 @@
 //! `kmcfit init`: options, several records, units and the known scale.
 
+use crate::program::program;
 use crate::workbench::Workbench;
 use insta::assert_snapshot;
 use rand::{RngExt, SeedableRng};
@@ -387,7 +388,7 @@ fn questions_on_a_terminal() {
     let bench = Workbench::empty();
     bench.write("ring.csv", &decay("t_s,y", 1.0, 1000.0));
     // `script` runs a command on a terminal of its own.
-    let command = format!("{} init ring.csv", env!("CARGO_BIN_EXE_kmcfit"));
+    let command = format!("{} init ring.csv", program());
     let output = assert_cmd::Command::new("script")
         .current_dir(bench.path(""))
         .args(["-qec", &command, "/dev/null"])

@@ -20,6 +20,8 @@ mod models;
 mod new_user;
 mod oscillator;
 mod predict;
+#[path = "../common/program.rs"]
+mod program;
 mod reading_back;
 mod regressions;
 mod report;

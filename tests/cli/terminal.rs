@@ -1,6 +1,7 @@
 //! Output on a terminal: the plot of the summary and the progress, by `script`, which runs a command on a terminal of its own.
 #![cfg(target_os = "linux")]
 
+use crate::program::program;
 use crate::workbench::Workbench;
 use std::io::{Read, Write};
 use std::process::{Command, Stdio};
@@ -46,7 +47,7 @@ fn bench() -> Workbench {
 
 /// What a terminal receives from a command, with variables of the environment.
 fn on_terminal(bench: &Workbench, arguments: &str, variables: &[(&str, &str)]) -> String {
-    let command = format!("{} {arguments}", env!("CARGO_BIN_EXE_kmcfit"));
+    let command = format!("{} {arguments}", program());
     let output = assert_cmd::Command::new("script")
         .current_dir(bench.path(""))
         .env("TERM", "xterm")
@@ -110,10 +111,7 @@ fn a_study_shows_its_progress_and_keeps_what_is_done() {
     let bench = bench();
     let study = "study: {seed: 1, bootstrap: 40000}\n";
     bench.write("model.yaml", &(bench.read("model.yaml") + study));
-    let command = format!(
-        "{} study model.yaml --out study",
-        env!("CARGO_BIN_EXE_kmcfit")
-    );
+    let command = format!("{} study model.yaml --out study", program());
     let mut child = Command::new("script")
         .current_dir(bench.path(""))
         .env("TERM", "xterm")

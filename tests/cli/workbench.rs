@@ -1,5 +1,6 @@
 //! A temporary folder in which tests run the program.
 
+use crate::program::program;
 use assert_cmd::Command;
 use std::collections::BTreeMap;
 use std::fs;
@@ -99,7 +100,7 @@ impl Workbench {
 
     /// The program, started in the folder.
     pub fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_kmcfit"));
+        let mut command = Command::new(program());
         command.current_dir(self.folder.path()).args(arguments);
         command
     }

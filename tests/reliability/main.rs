@@ -4,6 +4,8 @@
 mod faults;
 mod journals;
 mod outputs;
+#[path = "../common/program.rs"]
+mod program;
 mod random_folders;
 mod signals;
 mod streams;

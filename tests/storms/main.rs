@@ -180,9 +180,11 @@ fn storms() {
     );
     let mut calm = Vec::new();
     let cases = cases();
-    let each = |i: usize| METHODS.map(|method| run(&cases[i], method));
-    let ends = map(cases.len(), available(), each);
-    for (case, ends) in cases.iter().zip(ends) {
+    let count = METHODS.len();
+    let each = |i: usize| run(&cases[i / count], METHODS[i % count]);
+    let mut ends = map(cases.len() * count, available(), each).into_iter();
+    for case in &cases {
+        let ends = METHODS.map(|_| ends.next().expect("a fit of each"));
         for (index, end) in ends.iter().enumerate() {
             says_little(case, METHODS[index], end);
             if !calm.is_empty() {

@@ -1,4 +1,4 @@
-//! A fit of the linear mass decay, arrays in, arrays out: for WebAssembly, and natively for comparison.
+//! The fit of `models/linear-mass.yaml`, arrays in, arrays out.
 
 use kmcfit_core::{Builder, CoefficientSpec, Method, Record};
 use std::cell::RefCell;
@@ -10,7 +10,7 @@ thread_local! {
 
 /// Mass at both ends (kg) and damping (N s/m) of a free decay from 3.3 m and 1 m/s, with a stiffness of 1 N/m: a mass linear
 /// in time, a constant damping. `None` where the fit does not converge.
-pub fn estimates(times: &[f64], displacement: &[f64]) -> Option<[f64; 3]> {
+fn estimates(times: &[f64], displacement: &[f64]) -> Option<[f64; 3]> {
     let system = [
         CoefficientSpec::polynomial(&[2.0, 0.0]).min(0.05),
         CoefficientSpec::constant(1.0),
