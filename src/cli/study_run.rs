@@ -16,6 +16,7 @@ use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{CheckpointStore, Status};
 use kmcfit_core::internals::study::extremes::is_within_rounding;
+use kmcfit_core::internals::threads::interruptible;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::io::{self, IsTerminal};
@@ -262,7 +263,8 @@ impl StudyRun<'_> {
         );
         let activity = Activity::begin(stage);
         progress::forget_jobs();
-        let found = self.journal.analysis(name, compute, whole)?;
+        let work = || interruptible(&flag, compute);
+        let found = self.journal.analysis(name, work, whole)?;
         drop(activity);
         if found.is_none() {
             let done = progress::jobs().map(|[done, all]| format!(" after {done} of {all} jobs"));

@@ -128,5 +128,5 @@ pub mod system {
     };
 }
 pub mod threads {
-    pub use crate::threads::{available, both, map, share, sharing, spawn_scoped};
+    pub use crate::threads::{available, both, interruptible, map, share, sharing, spawn_scoped};
 }

@@ -7,7 +7,7 @@
 
 mod parallel;
 
-pub use parallel::{map, map_with_progress};
+pub use parallel::{interruptible, map, map_with_progress};
 
 use crate::host;
 use std::cell::Cell;

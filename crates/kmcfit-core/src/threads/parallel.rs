@@ -2,13 +2,29 @@
 
 use super::{share, sharing, spawn_scoped};
 use crate::host;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::cell::RefCell;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Largest number of threads, which bounds the memory of their stacks.
 const MOST_THREADS: usize = 256;
 
-/// [`map`], with the number of finished jobs to the progress of the host. Once the host asks to end, no further job is started: the
-/// results are those of the first jobs, all of them where there was no such request.
+thread_local! {
+    /// The flag of the innermost [`interruptible`] work of this thread.
+    static INTERRUPT: RefCell<Option<Arc<AtomicBool>>> = const { RefCell::new(None) };
+}
+
+/// Does `work`; once `flag` is set, each [`map_with_progress`] that it calls on this thread starts no further job.
+pub fn interruptible<T>(flag: &Arc<AtomicBool>, work: impl FnOnce() -> T) -> T {
+    let outer = INTERRUPT.replace(Some(Arc::clone(flag)));
+    let result = work();
+    INTERRUPT.set(outer);
+    result
+}
+
+/// [`map`], with the number of finished jobs to the progress of the host. Once the host asks to end, or the flag of
+/// [`interruptible`] work is set, no further job is started: the results are those of the first jobs, all of them where there was
+/// no such request.
 ///
 /// # Panics
 /// If a job does.
@@ -23,7 +39,12 @@ pub fn map_with_progress<T: Send>(
         host::progress(finished.fetch_add(1, Ordering::Relaxed) + 1, count);
         result
     };
-    map_until(count, threads, job, host::is_interrupted)
+    let flag = INTERRUPT.with_borrow(Clone::clone);
+    let is_set = || {
+        flag.as_ref()
+            .is_some_and(|flag| flag.load(Ordering::Relaxed))
+    };
+    map_until(count, threads, job, || host::is_interrupted() || is_set())
 }
 
 /// Computes `work(0), work(1), ...` on up to `threads` threads and returns the results in order. Each job depends on its
@@ -85,7 +106,6 @@ fn map_until<T: Send>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::atomic::AtomicBool;
 
     /// The request comes within the fifth job: of 1000 jobs those that had begun on the three threads have results, without a gap.
     #[test]
@@ -100,5 +120,18 @@ mod tests {
         assert!(found.iter().copied().eq(0..found.len()));
         assert!(map_until(1000, 3, job, || true).is_empty());
         assert_eq!(map(7, 3, |index| index), [0, 1, 2, 3, 4, 5, 6]);
+    }
+
+    /// The flag ends the jobs of the interruptible work alone, and not those that follow it.
+    #[test]
+    fn a_flag_ends_interruptible_work() {
+        let flag = Arc::new(AtomicBool::new(false));
+        let job = |index: usize| {
+            flag.fetch_or(index >= 4, Ordering::SeqCst);
+            index
+        };
+        let found = interruptible(&flag, || map_with_progress(1000, 3, job));
+        assert!((5..=7).contains(&found.len()), "{}", found.len());
+        assert_eq!(map_with_progress(1000, 3, job).len(), 1000);
     }
 }
