@@ -160,17 +160,26 @@ pub(crate) fn binary_size(bytes: u64) -> String {
     format!("{} {name}", bytes.div_ceil(unit))
 }
 
+/// Number of line ends.
+pub fn line_ends(text: &[u8]) -> usize {
+    memchr::memchr_iter(b'\n', text).count()
+}
+
 /// Refuses a table with a line longer than `LONGEST_LINE`.
 ///
 /// # Errors
 ///
 /// At the first such line.
 pub fn check_lines(path: &Path, text: &str) -> Result<(), InputError> {
-    let mut lines = text.split('\n');
-    let Some(index) = lines.position(|line| line.len() > LONGEST_LINE) else {
-        return Ok(());
-    };
-    Err(long_line(path, index + 1))
+    let ends = memchr::memchr_iter(b'\n', text.as_bytes()).chain([text.len()]);
+    let mut from = 0;
+    for (index, end) in ends.enumerate() {
+        if end - from > LONGEST_LINE {
+            return Err(long_line(path, index + 1));
+        }
+        from = end + 1;
+    }
+    Ok(())
 }
 
 fn long_line(path: &Path, line: usize) -> InputError {

@@ -59,7 +59,7 @@ impl CsvTable {
 /// Longest number with its comma, bytes.
 const DIGITS: usize = 21;
 
-/// Range of numbers that Ryu writes without an exponent although they are shorter with one.
+/// Range of numbers that `zmij` writes without an exponent although they are shorter with one.
 const LONG: Range<f64> = 1e15..1e16;
 
 /// Appends the shortest decimal that parses to the same number, with an exponent if that is shorter.
@@ -71,9 +71,13 @@ fn push_number(text: &mut String, value: f64) {
         text.push_str(&format!("{value:e}"));
         return;
     }
-    let mut buffer = ryu::Buffer::new();
+    let mut buffer = zmij::Buffer::new();
     let digits = buffer.format_finite(value);
-    text.push_str(digits.strip_suffix(".0").unwrap_or(digits));
+    let digits = digits.strip_suffix(".0").unwrap_or(digits);
+    match digits.split_once("e+") {
+        Some((digits, exponent)) => text.extend([digits, "e", exponent]),
+        None => text.push_str(digits),
+    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use super::tables::FUNCTION_ROWS;
 use crate::units::Unit;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::solvers::IterationRecord;
-use kmcfit_core::internals::threads::both;
+use kmcfit_core::internals::threads::{available, both, map};
 
 /// Figures of all channels with their titles.
 #[derive(Debug, Clone)]
@@ -26,6 +26,13 @@ impl ChannelFigures {
     fn with_spectra(self, spectra: Vec<Figure>) -> Self {
         Self { spectra, ..self }
     }
+}
+
+/// What is computed before a report is written.
+enum ReportPart {
+    Document(Box<ResultDocument>),
+    Figures(ChannelFigures),
+    Spectra(Vec<Figure>),
 }
 
 impl FittedModel<'_> {
@@ -88,11 +95,21 @@ impl FittedModel<'_> {
     /// Figures of all channels with their titles.
     pub(super) fn each_channel(&self, of: fn(&Self, usize, usize) -> Vec<Figure>) -> Vec<Figure> {
         let channels = self.channels().into_iter();
-        let figures = channels.flat_map(|(e, c)| {
-            let titled = move |figure| self.titled(figure, e, c);
-            of(self, e, c).into_iter().map(titled)
-        });
-        figures.collect()
+        channels
+            .flat_map(|channel| self.of_channel(channel, of))
+            .collect()
+    }
+
+    /// Figures of a channel with their titles.
+    fn of_channel(
+        &self,
+        (experiment, channel): (usize, usize),
+        of: fn(&Self, usize, usize) -> Vec<Figure>,
+    ) -> Vec<Figure> {
+        let figures = of(self, experiment, channel).into_iter();
+        figures
+            .map(|figure| self.titled(figure, experiment, channel))
+            .collect()
     }
 
     /// The figures that both page and files have, drawn once.
@@ -109,12 +126,25 @@ impl FittedModel<'_> {
         if !self.requested.figures {
             return self.document();
         }
-        let ((document, others), spectra) = both(
-            || (self.document(), self.fits_and_tests()),
-            || self.each_channel(Self::channel_spectra),
-        );
-        self.drawn.get_or_init(|| others.with_spectra(spectra));
-        document
+        let channels = self.channels();
+        // The longest first.
+        let part = |i: usize| match i.checked_sub(channels.len()) {
+            None => ReportPart::Spectra(self.of_channel(channels[i], Self::channel_spectra)),
+            Some(0) => ReportPart::Document(Box::new(self.document())),
+            Some(_) => ReportPart::Figures(self.fits_and_tests()),
+        };
+        let (mut spectra, mut figures, mut document) = (Vec::new(), None, None);
+        for part in map(channels.len() + 2, available(), part) {
+            match part {
+                ReportPart::Spectra(of_channel) => spectra.extend(of_channel),
+                ReportPart::Document(found) => document = Some(*found),
+                ReportPart::Figures(found) => figures = Some(found),
+            }
+        }
+        if let Some(figures) = figures {
+            self.drawn.get_or_init(|| figures.with_spectra(spectra));
+        }
+        document.unwrap_or_else(|| self.document())
     }
 
     fn fits_and_tests(&self) -> ChannelFigures {

@@ -130,27 +130,17 @@ pub(super) fn spectrum(pair: &SeriesPair, mark: Option<f64>) -> Option<Figure> {
         .collect();
     let measured = Spectrum::of(pair.measured, pair.spacing)?;
     let frequencies: Vec<f64> = measured.frequencies().skip(1).collect();
-    let line = |label: &str, values: &[f64], style: Style| {
-        let density = Spectrum::of(values, pair.spacing)?;
-        Some(Mark::line(
-            label,
-            &frequencies,
-            density.density().get(1..)?,
-            style,
-        ))
+    let line = |label: &str, spectrum: Option<&Spectrum>, style: Style| {
+        let density = spectrum?.density().get(1..)?;
+        Some(Mark::line(label, &frequencies, density, style))
     };
+    let of = |values: &[f64]| Spectrum::of(values, pair.spacing);
+    let grey = Style::new(Colour::Grey).width(1.2);
+    let vermillion = Style::new(Colour::Vermillion).width(0.8);
     let marks = [
-        line(
-            "measured",
-            pair.measured,
-            Style::new(Colour::Grey).width(1.2),
-        ),
-        line("model", pair.model, Style::new(Colour::Blue)),
-        line(
-            "residuals",
-            &residuals,
-            Style::new(Colour::Vermillion).width(0.8),
-        ),
+        line("measured", Some(&measured), grey),
+        line("model", of(pair.model).as_ref(), Style::new(Colour::Blue)),
+        line("residuals", of(&residuals).as_ref(), vermillion),
     ];
     // A model without noise falls far below the samples.
     let y = within(

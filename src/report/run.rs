@@ -26,9 +26,9 @@ use kmcfit_core::internals::solvers::{
     ActiveGroup, Attempt, Fit, PathPoint, Solver, Status, WeightPath, active_constraints, timed,
 };
 use kmcfit_core::internals::system::{Excitation, Term};
-use kmcfit_core::internals::threads::both;
+use kmcfit_core::internals::threads::{available, both, map};
 use std::io;
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 /// The page.
@@ -103,12 +103,21 @@ impl FittedModel<'_> {
             self.write_tables(stage, document, &mut writing)?;
             return Ok(writing);
         }
-        let own = || {
-            self.write_tables(stage, document, &mut writing)?;
-            io::Result::Ok(self.svg_figures(FigureWidth::Double))
+        // The longest first; the tables alone need the stage.
+        let tables = Mutex::new((&mut *stage, &mut writing));
+        let part = |i: usize| match i {
+            0 => {
+                let mut tables = tables.lock().unwrap_or_else(PoisonError::into_inner);
+                let (stage, writing) = &mut *tables;
+                self.write_tables(stage, document, writing)
+                    .map(|()| Vec::new())
+            }
+            1 => Ok(vec![(PAGE.to_owned(), self.page(document))]),
+            _ => Ok(self.svg_figures(FigureWidth::Double)),
         };
-        let (figures, page) = both(own, || self.page(document));
-        for (name, text) in figures?.into_iter().chain([(PAGE.to_owned(), page)]) {
+        let parts = map(3, available(), part).into_iter();
+        let texts = parts.collect::<io::Result<Vec<_>>>()?;
+        for (name, text) in texts.into_iter().rev().flatten() {
             timed(&mut writing, || stage.write(&name, text.as_bytes()))?;
         }
         Ok(writing)

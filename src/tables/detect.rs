@@ -4,6 +4,7 @@
 //! numbers raise the score, text lowers it. The highest score wins; among equal scores, the more common pair.
 
 use std::path::Path;
+use std::rc::Rc;
 
 use csv::StringRecord;
 
@@ -36,8 +37,13 @@ pub fn detect(path: &Path, text: &str, format: &TableFormat) -> Layout {
     let sample = beginning(text);
     let records = |delimiter| records(path, sample, format, delimiter);
     let (mut best, mut single): (Option<DialectCandidate>, Option<DialectCandidate>) = (None, None);
+    let mut split: (Option<char>, Rc<[StringRecord]>) = (None, Rc::new([]));
     for (delimiter, decimal) in signs(format) {
-        let Some(candidate) = DialectCandidate::new(records(delimiter), delimiter, decimal) else {
+        if split.0 != Some(delimiter) {
+            split = (Some(delimiter), records(delimiter).into());
+        }
+        let of_delimiter = Rc::clone(&split.1);
+        let Some(candidate) = DialectCandidate::new(of_delimiter, delimiter, decimal) else {
             continue;
         };
         let guessed_comma =
@@ -138,14 +144,14 @@ fn without_numbers(
 struct DialectCandidate {
     delimiter: char,
     decimal: char,
-    records: Vec<StringRecord>,
+    records: Rc<[StringRecord]>,
     width: usize,
     score: f64,
 }
 
 impl DialectCandidate {
     /// `None` where there is no number.
-    fn new(records: Vec<StringRecord>, delimiter: char, decimal: char) -> Option<Self> {
+    fn new(records: Rc<[StringRecord]>, delimiter: char, decimal: char) -> Option<Self> {
         let counts: Vec<(usize, FieldCounts)> = records
             .iter()
             .map(|record| (record.len(), FieldCounts::of(record, decimal)))

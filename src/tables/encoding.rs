@@ -53,7 +53,7 @@ pub fn decode(path: &Path, bytes: Vec<u8>) -> Result<(String, Encoding), InputEr
             (text.collect(), Encoding::Windows1252)
         }
     };
-    match text.find('\0') {
+    match memchr::memchr(0, text.as_bytes()) {
         Some(at) => Err(InputError::after(path, &text[..at], "the file is not text")
             .found("the byte 0x00")
             .hint("is it a binary file, or UTF-16 without a byte order mark? Save it as text in UTF-8")),

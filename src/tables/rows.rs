@@ -7,6 +7,7 @@ use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::error::InputError;
 use crate::reading_share;
+use crate::text_io::line_ends;
 
 /// Shortest text that is read in halves, bytes: it takes a millisecond.
 const LONG: usize = 1 << 18;
@@ -47,7 +48,7 @@ impl<'a> CsvText<'a> {
         TableRows {
             path,
             text: &self.text,
-            delimiter: char::from(self.delimiter),
+            delimiter: self.delimiter,
             quoted: (!is_plain(&self.text)).then(reader),
             counted: 0,
             line: self.first_line,
@@ -59,13 +60,14 @@ impl<'a> CsvText<'a> {
 /// True for a text whose lines are its rows: without quotes, and with line ends `\n` or `\r\n` only.
 fn is_plain(text: &str) -> bool {
     let bytes = text.as_bytes();
-    let mut returns = text.match_indices('\r');
-    !text.contains('"') && returns.all(|(at, _)| bytes.get(at + 1) == Some(&b'\n'))
+    let mut returns = memchr::memchr_iter(b'\r', bytes);
+    memchr::memchr(b'"', bytes).is_none() && returns.all(|at| bytes.get(at + 1) == Some(&b'\n'))
 }
 
 /// Replaces line ends `\r` by `\n`: for the csv crate a comment ends at `\n` only.
 pub fn with_newlines(text: String) -> String {
-    match text.contains('\r') && !text.contains('\n') {
+    let has = |byte| memchr::memchr(byte, text.as_bytes()).is_some();
+    match has(b'\r') && !has(b'\n') {
         true => text.replace('\r', "\n"),
         false => text,
     }
@@ -110,7 +112,8 @@ fn runs_to_tabs(text: &str) -> String {
 pub struct TableRows<'a> {
     path: &'a Path,
     text: &'a str,
-    delimiter: char,
+    /// ASCII.
+    delimiter: u8,
     /// Reads a text with quotes or other line ends.
     quoted: Option<csv::Reader<&'a [u8]>>,
     /// Bytes whose lines are counted, and the line of the next one.
@@ -125,14 +128,9 @@ impl<'a> TableRows<'a> {
     pub fn split_off(&mut self) -> Option<TableRows<'a>> {
         let rest = &self.text.as_bytes()[self.counted.min(self.text.len())..];
         (self.quoted.is_none() && rest.len() >= LONG).then_some(())?;
-        let is_end = |byte: &u8| *byte == b'\n';
         let middle = rest.len() / 2;
-        let half = middle + rest[middle..].iter().position(is_end)? + 1;
-        let lines = rest[..half]
-            .iter()
-            .copied()
-            .filter(|byte| is_end(byte))
-            .count();
+        let half = middle + memchr::memchr(b'\n', &rest[middle..])? + 1;
+        let lines = line_ends(&rest[..half]);
         let whole = self.text;
         self.text = &whole[..self.counted + half];
         Some(TableRows {
@@ -183,13 +181,18 @@ impl<'a> TableRows<'a> {
             .get(self.counted..)
             .filter(|rest| !rest.is_empty())
         {
-            let end = rest.find('\n').unwrap_or(rest.len());
+            let end = memchr::memchr(b'\n', rest.as_bytes()).unwrap_or(rest.len());
             let (text, line) = (rest[..end].trim_end_matches('\r'), self.line);
             self.counted += end + 1;
             self.line += 1;
             if !text.is_empty() && !text.starts_with('#') {
                 record.clear();
-                (text.split(self.delimiter)).for_each(|field| record.push_field(field.trim()));
+                let mut from = 0;
+                for to in memchr::memchr_iter(self.delimiter, text.as_bytes()) {
+                    record.push_field(text[from..to].trim());
+                    from = to + 1;
+                }
+                record.push_field(text[from..].trim());
                 return Ok(Some(line));
             }
         }

@@ -2,6 +2,7 @@
 
 use crate::error::InputError;
 use crate::memory;
+use crate::text_io::line_ends;
 use std::path::Path;
 
 /// Numbers stored for each row beside its fields: its line, the times and samples of the record made from the table, and those of the
@@ -20,10 +21,9 @@ pub struct TableMemory<'a> {
 impl<'a> TableMemory<'a> {
     /// Bounds for a text; messages name `path`.
     pub fn of(path: &'a Path, text: &str) -> Self {
-        let ends = text.bytes().filter(|byte| *byte == b'\n');
         Self {
             path,
-            lines: 1 + ends.count(),
+            lines: 1 + line_ends(text.as_bytes()),
             bytes: text.len(),
         }
     }

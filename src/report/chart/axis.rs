@@ -6,7 +6,7 @@ use crate::report::text;
 use serde::{Serialize, Serializer};
 
 /// Magnitudes beyond this leave gaps, so that no difference of two values overflows.
-const LARGEST: f64 = 1e300;
+pub(super) const LARGEST: f64 = 1e300;
 /// Magnitudes below this count as zero on linear axes, so that no step loses its digits.
 const SMALLEST: f64 = 1e-290;
 /// Spans below this share of the magnitude are rounding errors and are drawn as a constant.

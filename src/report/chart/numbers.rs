@@ -50,9 +50,42 @@ fn digits(values: &[f64]) -> Vec<Option<f64>> {
         true => DIGITS + common.ceil().clamp(0.0, 10.0) as i32,
         false => DIGITS,
     };
-    let round = |v: f64| format!("{v:.*e}", digits as usize - 1).parse().unwrap_or(v);
-    let open = |v: &f64| v.is_finite().then(|| round(*v));
+    let open = |v: &f64| v.is_finite().then(|| rounded_to(*v, digits));
     values.iter().map(open).collect()
+}
+
+/// The number nearest to the decimal of this many significant digits.
+fn rounded_to(value: f64, digits: i32) -> f64 {
+    let in_text = || {
+        let text = format!("{value:.*e}", digits as usize - 1);
+        text.parse().unwrap_or(value)
+    };
+    quickly_rounded(value, digits).unwrap_or_else(in_text)
+}
+
+/// [`rounded_to`] by one product and one quotient with powers of ten that are exact numbers; `None` where their rounding could decide.
+fn quickly_rounded(value: f64, digits: i32) -> Option<f64> {
+    /// Largest power of ten that is an exact number.
+    const EXACT: i32 = 22;
+    /// Most digits of a whole number that is exact.
+    const WHOLE: i32 = 15;
+    if value == 0.0 {
+        return Some(value);
+    }
+    let places = digits - 1 - value.abs().log10().floor() as i32;
+    let is_exact = digits <= WHOLE && places.abs() <= EXACT;
+    let power = is_exact.then(|| 10f64.powi(places.abs()))?;
+    let scaled = match places < 0 {
+        true => value / power,
+        false => value * power,
+    };
+    let range = 10f64.powi(digits - 1)..10f64.powi(digits);
+    let from_half = ((scaled - scaled.trunc()).abs() - 0.5).abs();
+    (range.contains(&scaled.abs()) && from_half > scaled.abs() * f64::EPSILON).then_some(())?;
+    Some(match places < 0 {
+        true => scaled.round() * power,
+        false => scaled.round() / power,
+    })
 }
 
 #[cfg(test)]
@@ -69,6 +102,37 @@ mod tests {
         assert_eq!(near, [Some(1000.000123457), Some(1000.000987654)]);
         assert_eq!(digits(&[2.0; 3]), [Some(2.0); 3]);
         assert_eq!(digits(&[]), []);
+    }
+
+    /// Those of the decimals that the standard library writes and reads.
+    #[test]
+    fn quickly_rounded_numbers_are_those_of_their_decimals() {
+        let (mut bits, mut quick) = (1u64, 0);
+        for i in 0..60_000 {
+            // A full-period generator of Knuth's.
+            bits = bits
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            let share = (bits >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+            let near_half = f64::from(i) + 0.5 + f64::from(i % 5 - 2) * 1e-9;
+            for value in [
+                f64::from_bits(bits),
+                share * 10f64.powi(i % 40 - 20),
+                near_half,
+                near_half * 1e-5,
+            ] {
+                for digits in [6, 9, 16] {
+                    let text = format!("{value:.*e}", digits as usize - 1);
+                    let expected: f64 = text.parse().unwrap();
+                    let found = value.is_finite().then(|| quickly_rounded(value, digits));
+                    if let Some(found) = found.flatten() {
+                        quick += 1;
+                        assert_eq!(found.to_bits(), expected.to_bits(), "{value:e} {digits}");
+                    }
+                }
+            }
+        }
+        assert!(quick > 300_000, "{quick}");
     }
 
     #[test]

@@ -119,10 +119,17 @@ fn units(pixels: f64) -> i32 {
 }
 
 fn places(points: &[Point]) -> String {
-    let places = points
-        .iter()
-        .map(|(x, y)| format!("{},{}", units(*x), units(*y)));
-    places.collect::<Vec<_>>().join(" ")
+    let mut places = String::new();
+    let mut digits = itoa::Buffer::new();
+    for (x, y) in points {
+        if !places.is_empty() {
+            places.push(' ');
+        }
+        places += digits.format(units(*x));
+        places.push(',');
+        places += digits.format(units(*y));
+    }
+    places
 }
 
 fn hex(ink: &Ink) -> String {

@@ -1,6 +1,6 @@
 //! Thinning of curves, which bounds the size of pages of long records without visible change.
 
-use super::axis::{Scale, even, extent};
+use super::axis::{LARGEST, Scale, even, extent};
 use super::plot_mark::{Mark, MarkKind};
 
 /// Detail of the curves of a page.
@@ -94,19 +94,30 @@ fn columns(
     columns: f64,
 ) -> Vec<usize> {
     let (low, high) = extent(scale, x).unwrap_or((0.0, 1.0));
-    let column = |i: usize| (columns * (even(scale, x[i]) - low) / (high - low)).floor();
+    let column = |x: f64| (columns * (even(scale, x) - low) / (high - low)).floor();
+    let bound = |column: f64| {
+        let place = low + column / columns * (high - low);
+        match scale {
+            Scale::Linear => place,
+            Scale::Log => 10f64.powf(place),
+        }
+    };
     let mut kept = Vec::new();
     let mut first = 0;
     while first < count {
-        let here = column(first);
-        let alike = |i: &usize| column(*i).total_cmp(&here).is_eq();
-        let end = (first + 1..count).take_while(alike).last().unwrap_or(first) + 1;
+        let here = column(x[first]);
+        let inside = match here.is_nan() {
+            true => f64::NEG_INFINITY..f64::INFINITY,
+            false => bound(here)..bound(here + 1.0),
+        };
+        let next = x[first + 1..count].iter().position(|x| !inside.contains(x));
+        let end = next.map_or(count, |next| first + 1 + next);
         let mut few = vec![first, end - 1];
         for (y, scale) in ys {
             let mut ends: Option<[(usize, f64); 2]> = None;
             let mut gap = None;
             for (i, y) in y.iter().enumerate().take(end).skip(first) {
-                let place = even(*scale, *y);
+                let place = drawable(*scale, *y);
                 if place.is_nan() {
                     gap = gap.or(Some(i));
                 }
@@ -131,19 +142,30 @@ fn columns(
     kept
 }
 
+/// A value that can be drawn, else NaN: in the order of its places on the scale.
+fn drawable(scale: Scale, value: f64) -> f64 {
+    match scale {
+        Scale::Linear if value.abs() <= LARGEST => value,
+        Scale::Log if value > 0.0 && value <= LARGEST => value,
+        _ => f64::NAN,
+    }
+}
+
 /// The ends of the straight segments of a curve: all points between them are within [`STRAIGHT`] of the segments.
 fn corners(x: (&[f64], Scale), y: (&[f64], Scale), points: &[usize]) -> Vec<usize> {
     let Some((low, high)) = extent(y.1, y.0) else {
         return points.to_vec();
     };
     let room = STRAIGHT * (high - low);
-    let at = |i: usize| (even(x.1, x.0[i]), even(y.1, y.0[i]));
-    let mut kept: Vec<usize> = points.first().into_iter().copied().collect();
+    let at = |i: &usize| (even(x.1, x.0[*i]), even(y.1, y.0[*i]));
+    let places: Vec<(f64, f64)> = points.iter().map(at).collect();
+    // Positions in `points`.
+    let mut kept = vec![0];
     let mut slopes = (f64::NEG_INFINITY, f64::INFINITY);
-    for pair in points.windows(2) {
-        let (before, now) = (pair[0], pair[1]);
+    for now in 1..points.len() {
+        let before = now - 1;
         let from = |anchor: usize| {
-            let ((x0, y0), (x1, y1)) = (at(anchor), at(now));
+            let ((x0, y0), (x1, y1)) = (places[anchor], places[now]);
             let run = x1 - x0;
             (
                 (y1 - y0) / run,
@@ -167,9 +189,12 @@ fn corners(x: (&[f64], Scale), y: (&[f64], Scale), points: &[usize]) -> Vec<usiz
             slopes = (f64::NEG_INFINITY, f64::INFINITY);
         }
     }
-    kept.extend(points.last());
+    kept.push(points.len().saturating_sub(1));
     kept.dedup();
-    kept
+    kept.iter()
+        .filter_map(|i| points.get(*i))
+        .copied()
+        .collect()
 }
 
 #[cfg(test)]

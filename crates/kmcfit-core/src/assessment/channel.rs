@@ -71,15 +71,15 @@ pub fn pattern(channel: &Channel, predicted: &[f64]) -> Option<ResidualPattern> 
 fn tone(channel: &Channel, residuals: &[f64]) -> Option<ResidualPattern> {
     channel.weighting().sigma(0)?;
     let spacing = even_spacing(channel.times())?;
-    let [own, samples] = [residuals, channel.observed()].map(|x| Spectrum::of(x, spacing));
-    let (own, beside) = (own?, samples?.dominant());
+    let own = Spectrum::of(residuals, spacing)?;
     let [low, high] = own.band(HALF);
     let frequency = own.dominant();
-    let is_narrow = high - low <= NARROW * frequency.max(own.resolution());
+    (high - low <= NARROW * frequency.max(own.resolution())).then_some(())?;
+    let beside = Spectrum::of(channel.observed(), spacing)?.dominant();
     let is_other = (frequency - beside).abs() > APART * beside;
     let is_multiple = [2.0, 3.0]
         .iter()
         .any(|n| (frequency - n * beside).abs() <= MULTIPLE * frequency);
-    (is_narrow && is_other && !is_multiple && beside > 0.0 && frequency > 0.0)
+    (is_other && !is_multiple && beside > 0.0 && frequency > 0.0)
         .then_some(ResidualPattern::Tone { frequency, beside })
 }

@@ -215,11 +215,13 @@ pub(super) fn on_clock(
         .zip(plain.observed().iter().copied());
     let (times, values): (Vec<f64>, Vec<f64>) =
         samples.filter(|(t, _)| (start..=end).contains(t)).unzip();
-    let inputs = times.iter().map(|t| InputSample {
-        force: experiment.input.force_at(*t),
-        base: experiment.input.base_acceleration_at(*t),
+    let inputs = channel.inputs_at_samples().map(|_| {
+        let input_at = |t: &f64| InputSample {
+            force: experiment.input.force_at(*t),
+            base: experiment.input.base_acceleration_at(*t),
+        };
+        times.iter().map(input_at).collect::<Vec<_>>()
     });
-    let inputs: Vec<InputSample> = inputs.collect();
     let weighting = plain.weighting().clone();
     let moved = Channel::new(
         plain.kind(),
@@ -231,8 +233,8 @@ pub(super) fn on_clock(
     )?;
     let moved = moved.with_loss(plain.loss()).with_sensor(plain.sensor());
     let moved = moved.with_origin(at(&plain.origin()));
-    let moved = match channel.inputs_at_samples() {
-        Some(_) => moved.with_inputs_at_samples(inputs),
+    let moved = match inputs {
+        Some(inputs) => moved.with_inputs_at_samples(inputs),
         None => moved,
     };
     Some(match channel.filter() {

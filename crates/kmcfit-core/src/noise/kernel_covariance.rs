@@ -123,6 +123,9 @@ fn correlated_sum(scores: &DMatrixView<f64>, bandwidth: f64) -> DMatrix<f64> {
     let length = length_of_circle(least);
     let weights = window(length, bandwidth);
     let mut transform = RealTransform::new(length, weights.len());
+    if parameters == 1 {
+        return weighted_square(scores.iter().copied(), &mut transform, &weights);
+    }
     // Real and imaginary parts of the scores, times the roots of their weights.
     let mut parts = DMatrix::zeros(2 * weights.len(), parameters);
     for (score, mut part) in scores.column_iter().zip(parts.column_iter_mut()) {
@@ -137,6 +140,29 @@ fn correlated_sum(scores: &DMatrixView<f64>, bandwidth: f64) -> DMatrix<f64> {
         let rows = parts.rows(first, ROWS.min(parts.nrows() - first));
         sum += rows.tr_mul(&rows);
     }
+    sum
+}
+
+/// The sum for a single score, which needs a block of its transform at a time.
+fn weighted_square(
+    score: impl Iterator<Item = f64>,
+    transform: &mut RealTransform,
+    weights: &[f64],
+) -> DMatrix<f64> {
+    let mut sum = DMatrix::zeros(1, 1);
+    let mut block = Vec::with_capacity(ROWS);
+    let mut add = |block: &mut Vec<f64>| {
+        let rows = DMatrixView::from_slice(block, block.len(), 1);
+        sum += rows.tr_mul(&rows);
+        block.clear();
+    };
+    transform.process(score, |k, x| {
+        block.extend([weights[k] * x.re, weights[k] * x.im]);
+        if block.len() == ROWS {
+            add(&mut block);
+        }
+    });
+    add(&mut block);
     sum
 }
 
@@ -157,10 +183,11 @@ fn window(length: usize, bandwidth: f64) -> Vec<f64> {
     let end = WINDOW / bandwidth;
     let half = length / 2;
     let last = ((end / TAU * length as f64) as usize).min(half);
-    let turns = (end / TAU).ceil() as i64;
+    // Those of other turns are zero at all frequencies from zero to half a turn.
+    let turns = -((0.5 + end / TAU) as i64)..=(end / TAU) as i64;
     let weight = |k: usize| {
         let frequency = TAU * k as f64 / length as f64;
-        let each = (-turns..=turns).map(|m| {
+        let each = turns.clone().map(|m| {
             let place = (frequency + TAU * m as f64) / end;
             (1.0 - place * place).max(0.0)
         });

@@ -1,7 +1,7 @@
 //! Inputs as functions of time, from which excitations on any grid are sampled.
 
 use super::ChannelKind;
-use crate::signal::{ExcitationShape, Signal};
+use crate::signal::{ExcitationShape, Interpolation, Signal};
 use crate::system::{Excitation, Grid, StageSamples};
 use std::sync::Arc;
 
@@ -42,13 +42,26 @@ impl Input {
             };
             StageSamples::new((0..nodes - 1).map(step))
         };
+        let interpolated = |signal: &Signal| {
+            if signal.interpolation() == Interpolation::Hold {
+                return sample(&|t| signal.value(t), &|t| signal.value_before(t));
+            }
+            // Without jumps a step begins with the value with which the last one ended.
+            let mut end = signal.value(grid.time(0));
+            let step = |i: usize| {
+                let (left, right) = (grid.time(i), grid.time(i + 1));
+                let begin = std::mem::replace(&mut end, signal.value(right));
+                [begin, signal.value(0.5 * (left + right)), end]
+            };
+            StageSamples::new((0..nodes - 1).map(step))
+        };
         Excitation {
             force: self.force.as_ref().map(|force| match force {
-                Waveform::Samples(s) => sample(&|t| s.value(t), &|t| s.value_before(t)),
+                Waveform::Samples(s) => interpolated(s),
                 Waveform::Shape(s) => sample(&|t| s.value(t), &|t| s.value_before(t)),
             }),
             base: self.base.as_ref().map(|base| match base {
-                BaseMotion::Acceleration(s) => sample(&|t| s.value(t), &|t| s.value_before(t)),
+                BaseMotion::Acceleration(s) => interpolated(s),
                 BaseMotion::Displacement(s) => {
                     sample(&|t| s.second_derivative(t), &|t| s.second_derivative(t))
                 }

@@ -2,22 +2,24 @@
 
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlannerScalar};
-use std::cell::RefCell;
 use std::f64::consts::TAU;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 /// Longest transform whose plan is kept: its factors take about as much memory as the series.
 const MOST_KEPT: usize = 1 << 20;
 
-thread_local! {
-    static PLANNER: RefCell<FftPlannerScalar<f64>> = RefCell::new(FftPlannerScalar::new());
-}
+/// One for all threads, most of which end after a few transforms.
+static PLANNER: LazyLock<Mutex<FftPlannerScalar<f64>>> =
+    LazyLock::new(|| Mutex::new(FftPlannerScalar::new()));
 
 /// The transform `X_k = sum_j x_j exp(-2 pi i j k / n)` of series of `length` values. It does not depend on the instruction set of the
 /// processor.
 pub(crate) fn forward_transform(length: usize) -> Arc<dyn Fft<f64>> {
     match length <= MOST_KEPT {
-        true => PLANNER.with_borrow_mut(|planner| planner.plan_fft_forward(length)),
+        true => {
+            let mut planner = PLANNER.lock().unwrap_or_else(PoisonError::into_inner);
+            planner.plan_fft_forward(length)
+        }
         false => FftPlannerScalar::new().plan_fft_forward(length),
     }
 }

@@ -89,6 +89,8 @@ impl CrossSpectra {
         let transform = forward_transform(length);
         let window = hann_window(length);
         let mut sums = vec![(0.0, 0.0, Complex::default()); half];
+        let mut both = Vec::with_capacity(length);
+        let mut scratch = vec![Complex::default(); transform.get_inplace_scratch_len()];
         for s in 0..SEGMENTS {
             let part = s * half..s * half + length;
             let [x, y] = [force, response].map(|series| &series[part.clone()]);
@@ -96,9 +98,9 @@ impl CrossSpectra {
             let [mean_x, mean_y] = [x, y].map(mean);
             // Two real series by one complex transform.
             let pairs = window.iter().zip(x.iter().zip(y));
-            let both = pairs.map(|(w, (x, y))| *w * Complex::new(x - mean_x, y - mean_y));
-            let mut both: Vec<Complex<f64>> = both.collect();
-            transform.process(&mut both);
+            both.clear();
+            both.extend(pairs.map(|(w, (x, y))| *w * Complex::new(x - mean_x, y - mean_y)));
+            transform.process_with_scratch(&mut both, &mut scratch);
             for (k, (xx, yy, xy)) in sums.iter_mut().enumerate().skip(1) {
                 let [x, y] = of_pair(&both, k);
                 *xx += x.norm_sqr();

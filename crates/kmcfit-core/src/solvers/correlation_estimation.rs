@@ -11,6 +11,7 @@ use crate::objective::diagnostics;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, NoiseEstimate, NoiseModel, ScoreCovariance, Weighting};
 use crate::simd::sum::rms;
+use crate::threads::{available, map};
 
 /// Smallest number of samples per parameter for which an order is chosen and whiteness judged: with fewer, the correlation of residuals
 /// differs from that of the noise. At 10 per parameter intervals of 95 % under white noise cover 91 % with a chosen order, 95 % without
@@ -24,6 +25,8 @@ const BEYOND_SIGMA: f64 = 3.0;
 /// Largest growth of the residuals, root mean square, by a correlation. Least squares absorbs narrowband noise at the resonance,
 /// up to half of it; a correlation that stands for a missing term can leave residuals several times as large.
 const GROWTH: f64 = 2.0;
+/// Number of samples up to which one thread takes less time than the start of a second.
+const FEW_SAMPLES: usize = 10_000;
 
 /// True if the method of the fit converges to a minimum of the misfit of a simulated response.
 pub(super) fn is_likelihood(settings: &FitSettings) -> bool {
@@ -57,13 +60,11 @@ fn is_long(problem: &Problem) -> bool {
 /// The problem with correlations estimated from the residuals of `found`; with `is_frozen`, orders stay as they are. `None` where
 /// all noise is white and was so before.
 pub(super) fn correlated(problem: &Problem, found: &Fit, is_frozen: bool) -> Option<Problem> {
-    let channels = problem.predicted(&found.best.evaluation);
-    let estimated: Vec<Option<Correlation>> = channels
-        .map(|(channel, predicted)| match asks(problem, channel) {
-            true => estimate(channel, predicted, is_frozen),
-            false => None,
-        })
-        .collect();
+    let of_channel = |channel: &Channel, predicted: &[f64]| match asks(problem, channel) {
+        true => estimate(channel, predicted, is_frozen),
+        false => None,
+    };
+    let estimated = of_channels(problem, found, of_channel);
     if is_white(problem) && estimated.iter().all(Option::is_none) {
         return None;
     }
@@ -78,6 +79,24 @@ pub(super) fn correlated(problem: &Problem, found: &Fit, is_frozen: bool) -> Opt
         *channel = channel.clone().with_noise(noise);
     }
     Some(next)
+}
+
+/// Results of `work` for all channels with their predictions.
+fn of_channels<T: Send>(
+    problem: &Problem,
+    found: &Fit,
+    work: impl Fn(&Channel, &[f64]) -> T + Sync,
+) -> Vec<T> {
+    let channels: Vec<_> = problem.predicted(&found.best.evaluation).collect();
+    let of_channel = |i: usize| {
+        let (channel, predicted) = channels[i];
+        work(channel, predicted)
+    };
+    let threads = match problem.sample_count() > FEW_SAMPLES {
+        true => available(),
+        false => 1,
+    };
+    map(channels.len(), threads, of_channel)
 }
 
 /// True if the noise of all channels is uncorrelated.
@@ -137,9 +156,9 @@ pub(super) fn mark_misspecified(problem: &mut Problem, found: &Fit) {
     if !(1..=FEW_PARAMETERS).contains(&problem.parameters()) || !is_long(problem) {
         return;
     }
-    let marks: Vec<bool> = (problem.predicted(&found.best.evaluation))
-        .map(|(channel, predicted)| misspecification(channel, predicted).is_some())
-        .collect();
+    let is_marked =
+        |channel: &Channel, predicted: &[f64]| misspecification(channel, predicted).is_some();
+    let marks = of_channels(problem, found, is_marked);
     let experiments = problem.parts_mut().experiments.iter_mut();
     let channels = experiments.flat_map(|e| &mut e.channels);
     for (channel, _) in channels.zip(marks).filter(|(_, is_marked)| *is_marked) {

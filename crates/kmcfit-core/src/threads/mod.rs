@@ -12,7 +12,7 @@ pub use parallel::{interruptible, map, map_with_progress};
 use crate::host;
 use std::cell::Cell;
 use std::io;
-use std::sync::{LazyLock, Mutex, PoisonError};
+use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, Scope, ScopedJoinHandle};
 
 thread_local! {
@@ -65,21 +65,48 @@ pub fn both<A, B: Send>(own: impl FnOnce() -> A, other: impl FnOnce() -> B + Sen
         return (own(), other());
     }
     // Taken by the second thread, or by this one without a second thread.
-    let other = Mutex::new(Some(other));
-    let take = || other.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let (other, of_other) = (Mutex::new(Some(other)), Mutex::new(None));
+    let do_other = || {
+        let taken = lock(&other).take();
+        if let Some(other) = taken {
+            let found = other();
+            *lock(&of_other) = Some(found);
+        }
+    };
+    let (mut own, mut of_own) = (Some(own), None);
+    beside(1, &do_other, &mut || of_own = own.take().map(|own| own()));
+    do_other();
+    let of_other = lock(&of_other).take();
+    (of_own.expect("done once"), of_other.expect("done once"))
+}
+
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Does `own` on this thread and `other` on each of up to `count` further threads, as many as start, which share the processors. One
+/// function for all types, because a start of threads is several kilobytes of program.
+///
+/// # Panics
+/// If one of them panics.
+fn beside(count: usize, other: &(dyn Fn() + Sync), own: &mut dyn FnMut()) {
     std::thread::scope(|scope| {
-        let second = spawn_scoped(scope, || {
+        let other = || {
             share();
-            take().map(|other| other())
-        });
-        let own = sharing(own);
-        let found = match second.map(ScopedJoinHandle::join) {
-            Ok(Ok(found)) => found,
-            Ok(Err(panic)) => std::panic::resume_unwind(panic),
-            Err(_) => take().map(|other| other()),
+            other();
         };
-        (own, found.expect("taken once"))
-    })
+        let others = (0..count).map_while(|_| spawn_scoped(scope, other).ok());
+        let others: Vec<ScopedJoinHandle<()>> = others.collect();
+        match others.is_empty() {
+            true => own(),
+            false => sharing(own),
+        }
+        for thread in others {
+            if let Err(panic) = thread.join() {
+                std::panic::resume_unwind(panic);
+            }
+        }
+    });
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
 //! Independent jobs on several threads.
 
-use super::{share, sharing, spawn_scoped};
+use super::{beside, lock};
 use crate::host;
 use std::cell::RefCell;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Largest number of threads, which bounds the memory of their stacks.
 const MOST_THREADS: usize = 256;
@@ -64,42 +64,25 @@ fn map_until<T: Send>(
     is_ended: impl Fn() -> bool + Sync,
 ) -> Vec<T> {
     let next = AtomicUsize::new(0);
+    let results: Mutex<Vec<Option<T>>> = Mutex::default();
     let turn = || {
-        let mut done = Vec::new();
         while !is_ended() {
             let index = next.fetch_add(1, Ordering::Relaxed);
             if index >= count {
                 break;
             }
-            done.push((index, work(index)));
+            let result = work(index);
+            let mut results = lock(&results);
+            if results.len() <= index {
+                results.resize_with(index + 1, || None);
+            }
+            results[index] = Some(result);
         }
-        done
     };
     let workers = threads.clamp(1, count.clamp(1, MOST_THREADS));
-    let done = std::thread::scope(|scope| {
-        let work = || {
-            share();
-            turn()
-        };
-        // Remaining threads do the jobs of a thread that the operating system refuses.
-        let others = (1..workers).map_while(|_| spawn_scoped(scope, work).ok());
-        let others: Vec<_> = others.collect();
-        let mut done = match others.is_empty() {
-            true => turn(),
-            false => sharing(turn),
-        };
-        for handle in others {
-            match handle.join() {
-                Ok(more) => done.extend(more),
-                Err(panic) => std::panic::resume_unwind(panic),
-            }
-        }
-        done
-    });
-    let mut results: Vec<Option<T>> = done.iter().map(|_| None).collect();
-    for (index, result) in done {
-        results[index] = Some(result);
-    }
+    // Remaining threads do the jobs of a thread that the operating system refuses.
+    beside(workers - 1, &turn, &mut || turn());
+    let results = results.into_inner().unwrap_or_else(PoisonError::into_inner);
     results.into_iter().flatten().collect()
 }
 

@@ -7,6 +7,7 @@ use crate::config::ModelFile;
 use crate::config::spec::{ExperimentSpec, FaultName};
 use kmcfit_core::internals::signal::{cut_off, dropouts, median, quantisation, spikes};
 use kmcfit_core::internals::system::round_time;
+use kmcfit_core::internals::threads::both;
 
 /// Spacing, in median spacings, above which samples are missing.
 const GAP: f64 = 1.5;
@@ -16,6 +17,8 @@ const REGULAR: f64 = 0.8;
 const FINE: f64 = 1.0 / 4096.0;
 /// Share of the distance of a spike that the input must have elsewhere, as its root mean square: a single pulse of an impact has less.
 const SUSTAINED: f64 = 0.05;
+/// Number of samples up to which one thread takes less time than the start of a second.
+const FEW_SAMPLES: usize = 10_000;
 
 /// A column with its place in the model.
 pub struct Column<'a> {
@@ -152,19 +155,21 @@ impl Column<'_> {
 
     /// The faulty samples of each kind.
     fn faulty(&self, times: &[f64], values: &[f64], step: f64) -> Vec<Faulty> {
-        let mut rows = dropouts(values, step);
+        let levels = || (dropouts(values, step), cut_off(values, step));
+        let ((mut rows, mut limits), mut single) = match values.len() > FEW_SAMPLES {
+            true => both(levels, || spikes(times, values)),
+            false => (levels(), spikes(times, values)),
+        };
         if self.is_input {
             // A force that ends stays at a constant value.
             rows.retain(|row| row.end < values.len());
         }
-        let mut limits = cut_off(values, step);
         // A sine has its peak value once in a period.
         limits.retain(|level| values.windows(2).any(|pair| pair == [*level; 2]));
         let cut = (0..values.len()).filter(|i| limits.contains(&values[*i]));
         let cut: Vec<usize> = cut.collect();
         rows.retain(|row| cut.binary_search(&row.start).is_err());
         let held: Vec<usize> = rows.into_iter().flatten().collect();
-        let mut single = spikes(times, values);
         single.retain(|i| cut.binary_search(i).is_err() && !is_beside(&held, *i));
         if self.is_input && !is_sustained(values, &single) {
             single.clear();

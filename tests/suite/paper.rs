@@ -1,7 +1,6 @@
 //! The paper's run: each published and each recomputed number.
 
-mod common;
-
+use crate::common;
 use kmcfit::report::predict;
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, Initial, Solver, Status, Stopping, fit};

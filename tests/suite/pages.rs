@@ -1,10 +1,8 @@
 //! The tutorial and the page on the choice of methods show the output of their commands.
 #![cfg(unix)]
 
-mod common;
-
-use common::pages::{Tour, blocks_in, page};
-use common::repository;
+use crate::common::pages::{Tour, blocks_in, page};
+use crate::common::repository;
 use std::fs;
 
 #[test]

@@ -2,19 +2,17 @@
 //! page on the choice of methods are tested in `pages.rs`.
 #![cfg(unix)]
 
-mod common;
-
 /// The program of the page on the library, compiled here; a test compares the two texts.
 mod library {
-    include!("../examples/library.rs");
+    include!("../../examples/library.rs");
 
     pub fn run() {
         main().expect("the example ends well");
     }
 }
 
-use common::pages::{Tour, blocks_in, fresh_clone, output, page};
-use common::repository;
+use crate::common::pages::{Tour, blocks_in, fresh_clone, output, page};
+use crate::common::{paper_problem, repository};
 use kmcfit::config::{BuildMode, ModelFile, build};
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::solvers::{FitSettings, Solver, Status, Stopping, fit};
@@ -214,7 +212,7 @@ fn the_optimum_does_not_predict() {
 /// On half as many nodes the paper's run ends at another point.
 #[test]
 fn the_paper_s_run_depends_on_rounding() {
-    let problem = common::paper_problem(1000, [2.0, 1.0, 1.0]);
+    let problem = paper_problem(1000, [2.0, 1.0, 1.0]);
     let settings = FitSettings {
         solver: Solver::SteepestDescent,
         initial: kmcfit_core::internals::solvers::Initial::Functions,

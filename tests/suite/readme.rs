@@ -1,10 +1,8 @@
 //! The README shows the output of its commands.
 #![cfg(unix)]
 
-mod common;
-
-use common::pages::{Tour, blocks, blocks_in, fresh_clone, output, page};
-use common::repository;
+use crate::common::pages::{Tour, blocks, blocks_in, fresh_clone, output, page};
+use crate::common::repository;
 use std::fs;
 
 fn readme() -> String {

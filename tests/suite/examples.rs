@@ -3,19 +3,19 @@
 #[allow(dead_code)]
 mod programs {
     pub mod accelerometer {
-        include!("../examples/accelerometer.rs");
+        include!("../../examples/accelerometer.rs");
     }
     pub mod free_decay {
-        include!("../examples/free_decay.rs");
+        include!("../../examples/free_decay.rs");
     }
     pub mod load_a_run {
-        include!("../examples/load_a_run.rs");
+        include!("../../examples/load_a_run.rs");
     }
     pub mod prior_information {
-        include!("../examples/prior_information.rs");
+        include!("../../examples/prior_information.rs");
     }
     pub mod structural_rank {
-        include!("../examples/structural_rank.rs");
+        include!("../../examples/structural_rank.rs");
     }
 }
 

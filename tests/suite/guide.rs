@@ -1,12 +1,10 @@
 //! The pages of `docs/` in the documentation of the crate, with equations as MathML and links between its pages, and the reference
 //! of the keys, `docs/keys.md`, from the documentation of the keys in the source.
-//! `KMCFIT_GUIDE=write cargo test --test guide` writes `src/guide/` and `docs/keys.md`.
+//! `KMCFIT_GUIDE=write cargo test --test suite guide::` writes `src/guide/` and `docs/keys.md`.
 #![cfg(unix)]
 
-mod common;
-
-use common::pages::page;
-use common::repository;
+use crate::common::pages::page;
+use crate::common::repository;
 use kmcfit::config::key_documentation::{Found, KeyDoc, KeyGroup, MODEL, SEQUENCE, ValueType, all};
 use pulldown_latex::config::DisplayMode;
 use pulldown_latex::{Parser, RenderConfig, Storage, push_mathml};
@@ -35,7 +33,7 @@ fn is_current(kept: &str, made: &str) {
     }
     assert!(
         fs::read_to_string(repository(kept)).is_ok_and(|kept| kept == made),
-        "{kept} is out of date: KMCFIT_GUIDE=write cargo test --test guide"
+        "{kept} is out of date: KMCFIT_GUIDE=write cargo test --test suite guide::"
     );
 }
 

@@ -161,7 +161,7 @@ fn shown(digits: f64) -> String {
 
 #[test]
 fn certified_problems_are_solved_to_the_stated_digits() {
-    let page = include_str!("../docs/certified.md");
+    let page = include_str!("../../docs/certified.md");
     let problems = problems();
     assert!(problems.len() >= FEWEST, "{}", problems.len());
     map(problems.len(), available(), |i| {
