@@ -1,5 +1,5 @@
 //! The list of all messages: every error that a test asserts, and every variant of warnings, findings, suggestions and
-//! outcomes. `tests/snapshots/kmcfit__message_list_tests__messages.snap` is this list; it is read as a whole when a message changes.
+//! outcomes. `tests/snapshots/messages.snap` is this list; it is read as a whole when a message changes.
 
 use crate::config::{DataAction, DataFact, DataWarning, GapPlace};
 use crate::report::findings;
@@ -152,7 +152,7 @@ fn messages() {
     section(&mut list, "Further findings, with placeholders", formats);
     let mut settings = insta::Settings::clone_current();
     settings.set_snapshot_path("../tests/snapshots");
-    settings.set_prepend_module_to_snapshot(true);
+    settings.set_prepend_module_to_snapshot(false);
     settings.bind(|| insta::assert_snapshot!("messages", list));
 }
 
@@ -231,7 +231,7 @@ fn section(list: &mut String, title: &str, messages: impl IntoIterator<Item = St
 
 /// True for the list of this module.
 fn is_list(file: &Path) -> bool {
-    file.ends_with("kmcfit__message_list_tests__messages.snap")
+    file.ends_with("messages.snap")
 }
 
 fn read(file: &Path) -> String {
@@ -239,7 +239,9 @@ fn read(file: &Path) -> String {
 }
 
 fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+    let mut folders = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
+    let root = folders.find(|folder| folder.join("models").is_dir());
+    root.expect("the repository").to_path_buf()
 }
 
 /// Files with code or snapshots below a folder, sorted.
@@ -264,7 +266,7 @@ fn sources(folder: &str) -> Vec<PathBuf> {
 fn asserted_errors() -> Vec<String> {
     let mut found = BTreeSet::new();
     for file in sources("tests") {
-        if file.ends_with("kmcfit__message_list_tests__messages.snap") {
+        if file.ends_with("messages.snap") {
             continue;
         }
         let text = fs::read_to_string(root().join(&file)).expect("a source");
