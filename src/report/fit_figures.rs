@@ -9,7 +9,7 @@ use super::tables::FUNCTION_ROWS;
 use crate::units::Unit;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::solvers::IterationRecord;
-use kmcfit_core::internals::threads::{available, both, map};
+use kmcfit_core::internals::threads::{analyses_at_once, both, map};
 
 /// Figures of all channels with their titles.
 #[derive(Debug, Clone)]
@@ -134,7 +134,8 @@ impl FittedModel<'_> {
             Some(_) => ReportPart::Figures(self.fits_and_tests()),
         };
         let (mut spectra, mut figures, mut document) = (Vec::new(), None, None);
-        for part in map(channels.len() + 2, available(), part) {
+        let threads = analyses_at_once(self.model.problem.sample_count());
+        for part in map(channels.len() + 2, threads, part) {
             match part {
                 ReportPart::Spectra(of_channel) => spectra.extend(of_channel),
                 ReportPart::Document(found) => document = Some(*found),

@@ -26,7 +26,7 @@ use kmcfit_core::internals::solvers::{
     ActiveGroup, Attempt, Fit, PathPoint, Solver, Status, WeightPath, active_constraints, timed,
 };
 use kmcfit_core::internals::system::{Excitation, Term};
-use kmcfit_core::internals::threads::{available, both, map};
+use kmcfit_core::internals::threads::{analyses_at_once, both, map};
 use std::io;
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
@@ -115,7 +115,8 @@ impl FittedModel<'_> {
             1 => Ok(vec![(PAGE.to_owned(), self.page(document))]),
             _ => Ok(self.svg_figures(FigureWidth::Double)),
         };
-        let parts = map(3, available(), part).into_iter();
+        let threads = analyses_at_once(self.model.problem.sample_count());
+        let parts = map(3, threads, part).into_iter();
         let texts = parts.collect::<io::Result<Vec<_>>>()?;
         for (name, text) in texts.into_iter().rev().flatten() {
             timed(&mut writing, || stage.write(&name, text.as_bytes()))?;

@@ -128,5 +128,8 @@ pub mod system {
     };
 }
 pub mod threads {
-    pub use crate::threads::{available, both, interruptible, map, share, sharing, spawn_scoped};
+    pub use crate::threads::{
+        analyses_at_once, available, available_for, both, interruptible, map, share, sharing,
+        spawn_scoped,
+    };
 }

@@ -106,9 +106,10 @@ fn columns(
     let mut first = 0;
     while first < count {
         let here = column(x[first]);
-        let inside = match here.is_nan() {
-            true => f64::NEG_INFINITY..f64::INFINITY,
-            false => bound(here)..bound(here + 1.0),
+        // A point that cannot be drawn has no column.
+        let inside = match low < high {
+            true => bound(here)..bound(here + 1.0),
+            false => f64::NEG_INFINITY..f64::INFINITY,
         };
         let next = x[first + 1..count].iter().position(|x| !inside.contains(x));
         let end = next.map_or(count, |next| first + 1 + next);
@@ -255,6 +256,29 @@ mod tests {
         );
         let kept = kept((&x, LINEAR), &[(&y, LINEAR)], false, Detail::FULL);
         assert_eq!(kept.0, [0, 8999]);
+    }
+
+    /// On a scale of frequencies each octave has its columns, with the peak of each; a frequency of zero has none.
+    #[test]
+    fn columns_of_logarithmic_scales_are_equally_wide_on_them() {
+        let x: Vec<f64> = (0..40_000).map(f64::from).collect();
+        let mut y = vec![1.0; 40_000];
+        (y[300], y[30_000]) = (50.0, 1e-6);
+        let log = Scale::Log;
+        let (points, thinned) = kept((&x, log), &[(&y, log)], false, Detail::FULL);
+        assert!(thinned && points.is_sorted());
+        assert!(
+            [0, 1, 300, 30_000, 39_999]
+                .iter()
+                .all(|i| points.contains(i))
+        );
+        // 700 columns of log10(39,999) = 4.602: 152 in each decade, of each the first and the last point.
+        let above = |from: usize| {
+            let decade = from..10 * from;
+            points.iter().filter(|i| decade.contains(*i)).count()
+        };
+        let decades = [300, 3000].map(above);
+        assert!(decades.iter().all(|n| n.abs_diff(304) <= 8), "{decades:?}");
     }
 
     #[test]

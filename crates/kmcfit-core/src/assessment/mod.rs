@@ -72,19 +72,8 @@ use crate::identifiability::{
 };
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::{Fit, Status};
-use crate::threads::{available, both};
+use crate::threads::{analyses_at_once, both};
 use nalgebra::DMatrix;
-
-/// Number of samples up to which analyses are computed at once; each takes several arrays of all samples and nodes.
-const AT_ONCE: usize = 2_000_000;
-
-/// Number of analyses that are computed at once.
-fn analyses_at_once(problem: &Problem) -> usize {
-    match problem.sample_count() <= AT_ONCE {
-        true => available(),
-        false => 1,
-    }
-}
 
 /// Results of both analyses, which are computed at the same time for all but the longest records.
 fn at_once<A, B: Send>(
@@ -92,7 +81,7 @@ fn at_once<A, B: Send>(
     one: impl FnOnce() -> A,
     other: impl FnOnce() -> B + Send,
 ) -> (A, B) {
-    match analyses_at_once(problem) {
+    match analyses_at_once(problem.sample_count()) {
         1 => (one(), other()),
         _ => both(one, other),
     }

@@ -4,6 +4,7 @@
 //! Small errors are further candidates of the [score tests](super::score_tests); large ones are found by a search from which a refit starts. An
 //! error is named where a refit with it explains the residuals.
 
+use super::at_once;
 use super::plausibility::POOR;
 use super::record_error::RecordError;
 use super::record_parameters::{
@@ -11,13 +12,12 @@ use super::record_parameters::{
 };
 use super::refit::{Refit, without_correlation, worst_fit};
 use super::span::Span;
-use super::{analyses_at_once, at_once};
 use crate::functions::CoefficientKind;
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::signal::{Spectrum, median_spacing};
 use crate::simd::sum::rms;
-use crate::threads::map;
+use crate::threads::{analyses_at_once, map};
 
 /// Rounds of refits with a corrected clock.
 const ROUNDS: usize = 8;
@@ -304,14 +304,18 @@ fn large_clock(
 /// one.
 fn late_by_refits(problem: &Problem, e: usize, period: f64) -> Option<(Clock, Refit)> {
     let eighths = [-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0];
-    let fits = map(eighths.len(), analyses_at_once(problem), |i| {
-        let clock = Clock {
-            delay: 0.125 * period * eighths[i],
-            rate: 0.0,
-        };
-        let refit = Refit::of(with_clock(problem, e, clock)?, &problem.start())?;
-        Some((refit.worst_misfit(), clock, refit.fit.best.parameters))
-    });
+    let fits = map(
+        eighths.len(),
+        analyses_at_once(problem.sample_count()),
+        |i| {
+            let clock = Clock {
+                delay: 0.125 * period * eighths[i],
+                rate: 0.0,
+            };
+            let refit = Refit::of(with_clock(problem, e, clock)?, &problem.start())?;
+            Some((refit.worst_misfit(), clock, refit.fit.best.parameters))
+        },
+    );
     let fits = fits.into_iter().flatten();
     let (_, clock, start) = fits.min_by(|a, b| a.0.total_cmp(&b.0))?;
     on_best_clock(problem, &start, RecordParameter::Delay(e), clock)

@@ -12,6 +12,7 @@
 //! is the estimate after one step of Gauss and Newton from the fit (Rao 1948). A term with a large `t` is missing if a refit with it leaves white
 //! residuals, or the smallest of all refits and at most half of those before; so are a delay, a difference of clocks and a gain, with their [own derivatives](super::record_parameters). Where the noise model does not describe the residuals the standard error is that of the [kernel covariance](KernelCovariance) of the scores `z_i e_i`.
 
+use super::FitWarning;
 use super::extension::extended;
 use super::model_tests::{Extension, ExtensionTest};
 use super::record_errors::small_error;
@@ -19,7 +20,6 @@ use super::record_parameters::{self, RecordColumns, RecordParameter};
 use super::refinement::applies;
 use super::refit::{EXPLAINED, Refit, without_correlation, worst_fit, worst_misfit};
 use super::span::{Span, weighted_residuals};
-use super::{FitWarning, analyses_at_once};
 use crate::functions::{CoefficientFunction, CoefficientKind};
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
@@ -27,7 +27,7 @@ use crate::simd::sum::rms;
 use crate::simulate::Trajectory;
 use crate::solvers::{MissingTerm, TESTED_TERMS, weighted_jacobian};
 use crate::system::Term;
-use crate::threads::map;
+use crate::threads::{analyses_at_once, map};
 use nalgebra::{DMatrix, DVector};
 
 /// Width of the sign of the velocity in the candidate for Coulomb friction, relative to the root mean square of the velocity.
@@ -130,7 +130,7 @@ impl<'a> ScoreTests<'a> {
                 .test(self.problem, column(i)?, &self.rest, is_modelled)
         };
         let count = self.kinds.len() + self.records.len();
-        let tests = map(count, analyses_at_once(self.problem), test);
+        let tests = map(count, analyses_at_once(self.problem.sample_count()), test);
         let terms = self.kinds.iter();
         let terms = terms.map(|(kind, term)| Candidate::Term(*kind, *term));
         let records = self.records.iter().copied().map(Candidate::Record);

@@ -11,7 +11,7 @@ use crate::objective::diagnostics;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, NoiseEstimate, NoiseModel, ScoreCovariance, Weighting};
 use crate::simd::sum::rms;
-use crate::threads::{available, map};
+use crate::threads::{available_for, map};
 
 /// Smallest number of samples per parameter for which an order is chosen and whiteness judged: with fewer, the correlation of residuals
 /// differs from that of the noise. At 10 per parameter intervals of 95 % under white noise cover 91 % with a chosen order, 95 % without
@@ -25,8 +25,6 @@ const BEYOND_SIGMA: f64 = 3.0;
 /// Largest growth of the residuals, root mean square, by a correlation. Least squares absorbs narrowband noise at the resonance,
 /// up to half of it; a correlation that stands for a missing term can leave residuals several times as large.
 const GROWTH: f64 = 2.0;
-/// Number of samples up to which one thread takes less time than the start of a second.
-const FEW_SAMPLES: usize = 10_000;
 
 /// True if the method of the fit converges to a minimum of the misfit of a simulated response.
 pub(super) fn is_likelihood(settings: &FitSettings) -> bool {
@@ -92,10 +90,7 @@ fn of_channels<T: Send>(
         let (channel, predicted) = channels[i];
         work(channel, predicted)
     };
-    let threads = match problem.sample_count() > FEW_SAMPLES {
-        true => available(),
-        false => 1,
-    };
+    let threads = available_for(problem.sample_count());
     map(channels.len(), threads, of_channel)
 }
 

@@ -31,6 +31,19 @@ pub fn available() -> usize {
     if SHARES.get() { 1 } else { *THREADS }
 }
 
+/// [`available`] for work that takes some nanoseconds for each of `samples` samples: 1 where it takes less time than the start of a thread.
+pub fn available_for(samples: usize) -> usize {
+    const FEW: usize = 10_000;
+    if samples <= FEW { 1 } else { available() }
+}
+
+/// Number of analyses of a record that are computed at once: [`available`], or 1 above two million samples, because each takes several
+/// arrays of all samples and nodes.
+pub fn analyses_at_once(samples: usize) -> usize {
+    const MOST: usize = 2_000_000;
+    if samples <= MOST { available() } else { 1 }
+}
+
 /// Marks this thread as one that shares the processors.
 pub fn share() {
     SHARES.set(true);

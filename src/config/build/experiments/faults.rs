@@ -7,7 +7,7 @@ use crate::config::ModelFile;
 use crate::config::spec::{ExperimentSpec, FaultName};
 use kmcfit_core::internals::signal::{cut_off, dropouts, median, quantisation, spikes};
 use kmcfit_core::internals::system::round_time;
-use kmcfit_core::internals::threads::both;
+use kmcfit_core::internals::threads::{available_for, both};
 
 /// Spacing, in median spacings, above which samples are missing.
 const GAP: f64 = 1.5;
@@ -17,8 +17,6 @@ const REGULAR: f64 = 0.8;
 const FINE: f64 = 1.0 / 4096.0;
 /// Share of the distance of a spike that the input must have elsewhere, as its root mean square: a single pulse of an impact has less.
 const SUSTAINED: f64 = 0.05;
-/// Number of samples up to which one thread takes less time than the start of a second.
-const FEW_SAMPLES: usize = 10_000;
 
 /// A column with its place in the model.
 pub struct Column<'a> {
@@ -156,9 +154,9 @@ impl Column<'_> {
     /// The faulty samples of each kind.
     fn faulty(&self, times: &[f64], values: &[f64], step: f64) -> Vec<Faulty> {
         let levels = || (dropouts(values, step), cut_off(values, step));
-        let ((mut rows, mut limits), mut single) = match values.len() > FEW_SAMPLES {
-            true => both(levels, || spikes(times, values)),
-            false => (levels(), spikes(times, values)),
+        let ((mut rows, mut limits), mut single) = match available_for(values.len()) {
+            1 => (levels(), spikes(times, values)),
+            _ => both(levels, || spikes(times, values)),
         };
         if self.is_input {
             // A force that ends stays at a constant value.
