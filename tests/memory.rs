@@ -6,15 +6,20 @@
 #[path = "common/program.rs"]
 mod program;
 
-use program::program;
+use program::{is_long, program};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use tempfile::TempDir;
 
-/// Address space in kB.
+/// Address space in kB: every second one in the short run.
 const LIMITS: [u64; 6] = [200_000, 300_000, 500_000, 1_000_000, 2_000_000, 4_000_000];
+
+fn limits() -> Vec<u64> {
+    let stride = if is_long() { 1 } else { 2 };
+    LIMITS.into_iter().step_by(stride).collect()
+}
 
 const MODEL: &str = "format: 1
 experiments: [{data: DATA, initial: {displacement: 1, velocity: 0}}]
@@ -145,7 +150,7 @@ fn small_models_are_fitted_or_refused() {
     let mut done = 0;
     for arguments in commands {
         let (free, _) = bench.run(None, arguments);
-        for limit in LIMITS {
+        for limit in limits() {
             let _ = fs::remove_file(bench.path("new.yaml"));
             let (code, said) = bench.run(Some(limit), arguments);
             let _ = fs::remove_file(bench.path("new.yaml"));
@@ -157,7 +162,7 @@ fn small_models_are_fitted_or_refused() {
         }
     }
     // Rejecting every command would be wrong: nearly all of them fit into the smallest limit.
-    let all = LIMITS.len() * commands.len();
+    let all = limits().len() * commands.len();
     assert!(done * 10 >= all * 9, "{done} of {all}");
 }
 
@@ -199,7 +204,7 @@ fn large_models_are_refused_and_the_older_run_stays_whole() {
             "run",
         ],
     ];
-    for limit in LIMITS {
+    for limit in limits() {
         for arguments in commands {
             let (code, said) = bench.run(Some(limit), arguments);
             assert_refused(code, &said, &format!("{limit} kB: {arguments:?}"));
@@ -267,7 +272,7 @@ fn long_records_are_read_or_refused() {
     bench.write("long.csv", &format!("t_s,y_m\n{text}"));
     bench.model("long", "long.csv", "nodes: 21");
     let (mut read, mut refused) = (0, 0);
-    for limit in LIMITS {
+    for limit in limits() {
         for arguments in [
             &["check", "long.yaml"][..],
             &["init", "long.csv", "--out", "new.yaml"][..],
@@ -305,7 +310,7 @@ fn long_runs_are_read_or_refused() {
         bench.write(name, &format!("{header}\n{}", row.repeat(nodes)));
     }
     let (mut read, mut refused) = (0, 0);
-    for limit in LIMITS {
+    for limit in limits() {
         let (code, said) = bench.run(Some(limit), &["predict", "run", "--initial", "1,0"]);
         match code {
             0 | 3 => read += 1,

@@ -19,7 +19,7 @@ use targets::{TARGETS, Target};
 use watched::Watched;
 
 /// Default number of mutations of each target, which take a few seconds.
-const MUTATIONS: [usize; 9] = [12_000, 6000, 6000, 2000, 500, 6000, 6000, 6000, 60_000];
+const MUTATIONS: [usize; 9] = [6000, 3000, 3000, 1000, 500, 3000, 3000, 3000, 30_000];
 
 /// Default seed of the mutations, which makes failures reproducible.
 const SEED: u64 = 1;

@@ -5,6 +5,7 @@
 //! `KMCFIT_SEED` draws other folders, `KMCFIT_CASES` more of them.
 
 use crate::faults::few;
+use crate::program::is_long;
 use crate::tree::{Entry, Tree, copy, settled, tree, whole_run};
 use crate::workbench::{MODEL, Workbench};
 use rand::{RngExt, SeedableRng};
@@ -164,9 +165,9 @@ fn own(bench: &Workbench, before: &Tree) -> Vec<String> {
 fn files_of_the_user_stay_and_runs_are_whole() {
     let templates = templates();
     let seed = variable("KMCFIT_SEED", 4711);
-    let is_long = std::env::var_os("KMCFIT_LONG").is_some();
+    let is_long = is_long();
     let (mut refused, mut done) = (0, 0);
-    for number in 0..variable("KMCFIT_CASES", 150) {
+    for number in 0..variable("KMCFIT_CASES", 100) {
         let mut random = ChaCha8Rng::seed_from_u64(seed.wrapping_add(number));
         let bench = Workbench::in_memory();
         copy(&templates.path(""), &bench.path(""));

@@ -152,7 +152,7 @@ fn the_beginning_of_a_long_record() {
     let (_, model) = model("duffing", &long);
     let (_, fit) = run(&model, None, u64::MAX);
     assert_eq!(fit.attempts[0].start.name(), "beginning of the record");
-    again_and_again("duffing", &long, 1);
+    again_and_again("duffing", &long, 4);
 }
 
 #[test]

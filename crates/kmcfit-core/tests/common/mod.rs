@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod closed_form;
+pub mod counts;
 pub mod forced;
 pub mod properties;
 pub mod reference;

@@ -4,6 +4,7 @@
 //! The responses are closed forms: a force `sum_j a_j sin(w_j t + p_j)` gives `sum_j a_j |H_j| sin(w_j t + p_j + arg H_j)` with
 //! `H = 1/(k - m w^2 + i c w)`.
 
+use crate::common::counts::{least_held, seeds};
 use crate::common::synthetic::with_noise;
 use kmcfit_core::internals::assessment::{EquationErrorIntervals, NoIntervals};
 use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
@@ -231,19 +232,13 @@ fn coverage(seeds: std::ops::Range<u64>) -> [[usize; 3]; 2] {
     held
 }
 
-/// With a coverage of 95 % fewer than 33 of 40 have a probability of 1e-4.
 #[test]
 fn intervals_hold_under_coloured_errors_of_varying_size() {
-    let [kernel, plain] = coverage(0..40);
+    let count = seeds(40, 200);
+    let [kernel, plain] = coverage(0..count);
     println!("kernel {kernel:?}, ordinary least squares {plain:?}");
-    assert!(kernel.iter().all(|held| *held >= 33), "{kernel:?}");
-}
-
-/// Counts of 200 seeds.
-#[test]
-#[ignore = "long: 200 seeds"]
-fn coverage_of_200_seeds() {
-    let [kernel, plain] = coverage(0..200);
-    println!("kernel {kernel:?}, ordinary least squares {plain:?}");
-    assert!(kernel.iter().all(|held| *held >= 178), "{kernel:?}");
+    assert!(
+        kernel.iter().all(|held| *held >= least_held(count)),
+        "{kernel:?}"
+    );
 }

@@ -1,6 +1,7 @@
 //! The equation error in the weak form: a driven cart with Coulomb friction at several sampling rates and noise levels, robust losses,
 //! and filtered channels. Data by an independent integrator. Seeds are 0, 1, 2, ...
 
+use crate::common::counts::seeds;
 use crate::common::forced::{response, rms, white};
 use kmcfit_core::internals::assessment::EquationErrorIntervals;
 use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
@@ -194,10 +195,12 @@ fn coverage(seeds: Range<u64>, cart: impl Fn(u64) -> Cart) -> Coverage {
     all
 }
 
-/// The truth lies within the 95 % intervals in at least 17 of 20 seeds, and the mass is right to 1 %, at 250 Hz and at 1 kHz.
+/// The truth lies within the 95 % intervals in all seeds but three at most, and the mass is right to 1 %, at 250 Hz and at 1 kHz. With a
+/// coverage of 95 % more than three of 20 miss with a probability of 2 %, of 8 with one of 0.04 %.
 fn check_rates(stiffness: f64, has_accelerometer: bool) {
+    let count = seeds(8, 20);
     for rate in [1000, 250] {
-        let found = coverage(0..20, |seed| Cart {
+        let found = coverage(0..count, |seed| Cart {
             seed,
             rate,
             noise: 0.01,
@@ -209,7 +212,7 @@ fn check_rates(stiffness: f64, has_accelerometer: bool) {
             "{case}: held {:?}, bias {:.5?}, largest {:.5?}",
             found.held, found.bias, found.largest
         );
-        let is_covered = found.held.iter().all(|held| *held >= 17);
+        let is_covered = found.held.iter().all(|held| held + 3 >= count as usize);
         assert!(is_covered, "{case}: {:?}", found.held);
         assert!(found.largest[0] < 0.01, "{case}: {:?}", found.largest);
     }

@@ -2,6 +2,7 @@
 //! solution.
 
 use crate::common;
+use crate::common::counts::seeds;
 
 use kmcfit_core::internals::constraints::RowGroup;
 use kmcfit_core::internals::functions::basis::uniform_knots;
@@ -15,7 +16,6 @@ use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, System};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-const STARTS: u64 = 20;
 const NODES: usize = 61;
 const ITERATIONS: u64 = 400;
 
@@ -149,6 +149,7 @@ fn reaches(basis: &Basis, solver: Solver, constrained: bool, seed: u64) -> bool 
 #[test]
 fn the_share_of_starts_that_reach_the_answer_does_not_fall() {
     let grid = common::system(NODES, Method::Rk4).grid;
+    // Least numbers of 20 starts.
     let lbfgs = Solver::Lbfgs { memory: 20 };
     // Gauss-Newton takes the curvature of the cost into account. The others have the gradient alone,
     // and with one value per node the penalty on the curvature of m is up to (pi/dt)^4 times stiffer
@@ -164,19 +165,21 @@ fn the_share_of_starts_that_reach_the_answer_does_not_fall() {
         (lbfgs, false, [20; 6]),
         (Solver::SteepestDescent, false, [2, 20, 20, 20, 20, 16]),
     ];
-    println!("starts of {STARTS} that reach the answer");
+    let starts = seeds(10, 20);
+    println!("starts of {starts} that reach the answer");
     let mut short = Vec::new();
     for (solver, constrained, least) in table {
         let under = if constrained { "constrained" } else { "free" };
         for (basis, least) in bases(&grid).iter().zip(least) {
             let reached = |seed: &u64| reaches(basis, solver, constrained, *seed);
-            let count = (1..=STARTS).filter(reached).count() as u64;
+            let count = (1..=starts).filter(reached).count() as u64;
             let words = format!(
                 "{:18} {under:11} {:18} {count:2}",
                 solver.name(),
                 basis.name()
             );
             println!("{words}");
+            let least = least * starts / 20;
             if count < least {
                 short.push(format!("{words}, at least {least}"));
             }

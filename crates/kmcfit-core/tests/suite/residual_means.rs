@@ -1,6 +1,7 @@
 //! Means of residuals: oscillators of 1 Hz under a broadband force, with white and with correlated noise of 5 %, displacements and
 //! accelerations by an independent integrator, with and without an offset of the sensor. Seeds are 0, 1, 2, ...
 
+use crate::common::counts::seeds;
 use crate::common::forced::{broadband, response, rms, white};
 use kmcfit_core::internals::assessment::{FitAssessment, FitWarning};
 use kmcfit_core::internals::builder::{
@@ -107,7 +108,8 @@ fn no_mean_is_named_where_there_is_no_offset() {
 /// errors.
 #[test]
 fn an_offset_is_named_and_its_estimate_removes_the_mean() {
-    for seed in 0..20 {
+    // Twelve are all combinations of kind, damping, noise and sign.
+    for seed in 0..seeds(12, 20) {
         let case = Case::new(seed, true);
         let (before, fit, warnings) = case.fitted(false);
         let [

@@ -1,6 +1,7 @@
 //! Missing force terms by score tests, estimates with their intervals, and the verdict: forced oscillators of 1 Hz with a damping ratio of
 //! 0.03, 50 cycles, 2 % noise; data by an independent integrator. Seeds are 0, 1, 2, ...
 
+use crate::common::counts::seeds;
 use crate::common::forced::{broadband, response, rms, white};
 use kmcfit_core::internals::assessment::{
     EstimateStatus, FitAssessment, FitWarning, VerdictLevel, VerdictReason, estimates,
@@ -93,11 +94,15 @@ fn missing_terms_are_named() {
     ];
     for kind in kinds {
         for share in [0.005, 0.03] {
-            let found: Vec<_> = (0..20)
+            let cases = seeds(6, 20);
+            let found: Vec<_> = (0..cases)
                 .map(|seed| named(seed, Some((kind, share))))
                 .collect();
             let right = found.iter().filter(|(term, _)| *term == Some(kind)).count();
-            assert!(right >= 19, "{kind:?} {share}: {found:?}");
+            assert!(
+                20 * right >= 19 * found.len(),
+                "{kind:?} {share}: {found:?}"
+            );
             let adequate = |(_, level): &&(_, VerdictLevel)| *level == VerdictLevel::Adequate;
             assert_eq!(found.iter().filter(adequate).count(), 0, "{kind:?}");
         }

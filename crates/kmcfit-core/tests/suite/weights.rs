@@ -1,6 +1,7 @@
 //! Choice of the penalty weight from noisy samples.
 
 use crate::common;
+use crate::common::counts::seeds;
 
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Penalty, Ratios, WeightRule,
@@ -90,10 +91,10 @@ fn the_discrepancy_principle_recovers_the_paper_s_system_from_noise() {
     paper_system_with_noise(2000, true, 1..=2);
 }
 
-/// Half the samples and no bounds: no program is solved, so twenty seeds take seconds each.
+/// Half the samples and no bounds: no program is solved.
 #[test]
-fn the_discrepancy_principle_recovers_the_system_without_bounds_for_twenty_seeds() {
-    paper_system_with_noise(1000, false, 1..=20);
+fn the_discrepancy_principle_recovers_the_system_without_bounds() {
+    paper_system_with_noise(1000, false, 1..=seeds(6, 20));
 }
 
 /// m = 1 - 0.25 (1 - cos(pi t/T)) has curvature, so the penalty does not favour it.
@@ -138,22 +139,23 @@ fn ratios_to_the_best(nodes: usize, order_of_mass: usize, seeds: u64) -> Vec<[f6
     each.collect()
 }
 
-fn within_twice(ratios: &[[f64; 3]], rule: WeightRule) -> usize {
+/// True if the error of a rule is at most twice the smallest for this share of the seeds.
+fn within_twice(ratios: &[[f64; 3]], rule: WeightRule, share: f64) -> bool {
     let which = WeightRule::OF_PATHS
         .iter()
         .position(|r| *r == rule)
         .unwrap();
     let count = ratios.iter().filter(|r| r[which] <= 2.0).count();
     println!("{}: {count} of {}", rule.name(), ratios.len());
-    count
+    count >= (share * ratios.len() as f64) as usize
 }
 
 /// With a penalty on the slope of a sloping mass the error of each rule is at most twice the smallest.
 #[test]
 fn every_rule_comes_near_the_best_weight_under_a_penalty_on_slopes() {
-    let ratios = ratios_to_the_best(500, 1, 20);
+    let ratios = ratios_to_the_best(500, 1, seeds(8, 20));
     for rule in WeightRule::OF_PATHS {
-        assert!(within_twice(&ratios, rule) >= 15, "{}", rule.name());
+        assert!(within_twice(&ratios, rule, 0.75), "{}", rule.name());
     }
 }
 
@@ -164,8 +166,8 @@ fn every_rule_comes_near_the_best_weight_under_a_penalty_on_slopes() {
 /// error; the corner of the L-curve lies at the same weights. Their counts are what they reach.
 #[test]
 fn cross_validation_comes_near_the_best_weight_under_a_penalty_on_curvature() {
-    let ratios = ratios_to_the_best(1000, 2, 20);
-    assert!(within_twice(&ratios, WeightRule::Gcv) >= 18);
-    assert!(within_twice(&ratios, WeightRule::Discrepancy) >= 8);
-    assert!(within_twice(&ratios, WeightRule::LCurve) >= 8);
+    let ratios = ratios_to_the_best(1000, 2, seeds(8, 20));
+    assert!(within_twice(&ratios, WeightRule::Gcv, 0.9));
+    assert!(within_twice(&ratios, WeightRule::Discrepancy, 0.4));
+    assert!(within_twice(&ratios, WeightRule::LCurve, 0.4));
 }
