@@ -20,12 +20,12 @@ use super::work_folder::{EXCHANGE, WorkFolder, is_marked};
 use crate::digest::digest;
 use crate::error::InputError;
 use crate::text_io::read_text;
-use kmcfit_core::internals::threads;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::thread::JoinHandle;
 
 /// Names in a working folder: new files, replaced files, and the plan.
 const NEW: &str = "new";
@@ -42,11 +42,12 @@ const AT_ONCE: usize = 16;
 pub struct Stage<'a> {
     folder: &'a Path,
     claim: &'a Claim,
+    /// Ends before the working folder is removed.
+    syncs: Syncs,
     work: WorkFolder,
     /// Names of the files, in the order of addition.
     names: Vec<String>,
     records: BTreeMap<String, FileRecord>,
-    unsynced: Vec<File>,
 }
 
 impl<'a> Stage<'a> {
@@ -54,10 +55,10 @@ impl<'a> Stage<'a> {
         Ok(Self {
             folder,
             claim,
+            syncs: Syncs::default(),
             work: WorkFolder::create_in(folder)?,
             names: Vec::new(),
             records: BTreeMap::new(),
-            unsynced: Vec::new(),
         })
     }
 
@@ -79,29 +80,8 @@ impl<'a> Stage<'a> {
         system::create_folders(folder_of(&path))?;
         let file = system::create_new(&path)?;
         system::write_all(&file, contents)?;
-        self.unsynced.push(file);
         self.names.push(name.to_owned());
-        match self.unsynced.len() < AT_ONCE {
-            true => Ok(()),
-            false => self.sync(),
-        }
-    }
-
-    /// Makes the files durable that were added since the last call.
-    fn sync(&mut self) -> io::Result<()> {
-        let files = std::mem::take(&mut self.unsynced);
-        std::thread::scope(|scope| {
-            let syncs = files.iter().map(|file| {
-                // Without a free thread the file is synchronised here.
-                threads::spawn_scoped(scope, || system::sync(file)).map_err(|_| system::sync(file))
-            });
-            let syncs: Vec<_> = syncs.collect();
-            syncs.into_iter().try_for_each(|sync| match sync {
-                Ok(thread) => (thread.join())
-                    .unwrap_or_else(|_| Err(io::Error::other("a file was not made durable"))),
-                Err(done) => done,
-            })
-        })
+        self.syncs.begin(file)
     }
 
     /// Moves the files into the output folder in the order of addition, moves those of an older run of the same command
@@ -115,7 +95,7 @@ impl<'a> Stage<'a> {
         let before = Manifest::read(self.folder).map_err(refused)?;
         let manifest = Manifest::new(self.claim.command, self.records.clone());
         self.add(MANIFEST, manifest.text().as_bytes())?;
-        self.sync()?;
+        self.syncs.finish()?;
         let plan = self.plan(before.as_ref(), &manifest)?;
         let text = serde_json::to_string(&plan).map_err(io::Error::other)?;
         let file = system::create_new(&self.work.path().join(PLAN))?;
@@ -163,6 +143,43 @@ impl<'a> Stage<'a> {
         let remove = old.filter(|(name, _)| !manifest.files.contains_key(*name));
         let remove = remove.map(|(name, record)| (name.clone(), record.clone()));
         Ok(Plan::new(put, remove.collect()))
+    }
+}
+
+/// Files that are made durable while further ones are prepared, in the order of addition.
+#[derive(Debug, Default)]
+struct Syncs(VecDeque<JoinHandle<io::Result<()>>>);
+
+impl Syncs {
+    fn begin(&mut self, file: File) -> io::Result<()> {
+        if self.0.len() >= AT_ONCE {
+            self.finish_oldest()?;
+        }
+        self.0.extend(system::begin_sync(file)?);
+        Ok(())
+    }
+
+    fn finish_oldest(&mut self) -> io::Result<()> {
+        let Some(thread) = self.0.pop_front() else {
+            return Ok(());
+        };
+        let panicked = |_| Err(io::Error::other("a file was not made durable"));
+        thread.join().unwrap_or_else(panicked)
+    }
+
+    fn finish(&mut self) -> io::Result<()> {
+        while !self.0.is_empty() {
+            self.finish_oldest()?;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Syncs {
+    fn drop(&mut self) {
+        while !self.0.is_empty() {
+            let _ = self.finish_oldest();
+        }
     }
 }
 

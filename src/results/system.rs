@@ -8,6 +8,8 @@ use crate::faults::{self, Operation};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::Path;
+use std::sync::Arc;
+use std::thread::{Builder, JoinHandle};
 
 /// Creates a file for appending; fails if the file or a link of this name exists.
 pub fn create_new(path: &Path) -> io::Result<File> {
@@ -56,6 +58,18 @@ impl Write for Writer<'_> {
 pub fn sync(file: &File) -> io::Result<()> {
     faults::check(Operation::Sync)?;
     file.sync_data()
+}
+
+/// Begins to make the contents of a file durable on a thread of its own; without a free thread it is done here.
+pub fn begin_sync(file: File) -> io::Result<Option<JoinHandle<io::Result<()>>>> {
+    let file = Arc::new(file);
+    let other = Arc::clone(&file);
+    let thread =
+        faults::check(Operation::Spawn).and_then(|()| Builder::new().spawn(move || sync(&other)));
+    match thread {
+        Ok(thread) => Ok(Some(thread)),
+        Err(_) => sync(&file).map(|()| None),
+    }
 }
 
 /// Makes the names in a folder durable, if the system supports it. Refusals are ignored, because the names exist
