@@ -20,7 +20,6 @@ use kmcfit_core::internals::solvers::{
 };
 use kmcfit_core::internals::threads;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 use std::time::Instant;
 
 /// Fit a model to its records; write results, tables, figures and a report.
@@ -324,7 +323,7 @@ pub(super) fn fit_into(
         weights: path.as_ref(),
         requested,
         display: DisplayUnits::default(),
-        drawn: OnceLock::new(),
+        computed: Default::default(),
     };
     let mut document = run.document_and_figures();
     let draws = run.draws();

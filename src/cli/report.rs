@@ -11,7 +11,6 @@ use crate::results::{Manifest, OutputFolder, RequestedFiles};
 use crate::text_io::quote;
 use std::io;
 use std::path::PathBuf;
-use std::sync::OnceLock;
 
 /// Write the page and the figures of a finished run again, without a fit.
 #[derive(Debug, clap::Args)]
@@ -48,7 +47,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         run_assessment: &run_assessment,
         requested: RequestedFiles::figures(),
         display,
-        drawn: OnceLock::new(),
+        computed: Default::default(),
     };
     // A stored map of estimates has the order of its names, the answer that of importance. Records have the units for display.
     let shown = fitted.document();

@@ -11,7 +11,6 @@ use kmcfit_core::internals::functions::CoefficientFunction;
 use kmcfit_core::internals::solvers::{Fit, WeightPath};
 use kmcfit_core::internals::study::predict;
 use kmcfit_core::internals::system::State;
-use std::sync::OnceLock;
 
 /// A coefficient over the record.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,7 +64,7 @@ impl CompletedFit {
             run_assessment: &self.assessment,
             requested,
             display: DisplayUnits::default(),
-            drawn: OnceLock::new(),
+            computed: Default::default(),
         }
     }
 

@@ -41,14 +41,23 @@ impl CsvTable {
         // One reservation avoids repeated reallocation of a growing text.
         text.reserve(DIGITS * rows * self.columns.len());
         text.push('\n');
+        // Bits and place of the number before in each column: constant functions repeat theirs.
+        let mut before = vec![(f64::NAN.to_bits(), 0..0); self.columns.len()];
         for row in 0..rows {
-            for (j, column) in self.columns.iter().enumerate() {
+            for (j, (column, (bits, place))) in self.columns.iter().zip(&mut before).enumerate() {
                 if j > 0 {
                     text.push(',');
                 }
-                if let Some(value) = column.get(row) {
-                    push_number(&mut text, *value);
+                let Some(&value) = column.get(row) else {
+                    continue;
+                };
+                if value.to_bits() == *bits {
+                    text.extend_from_within(place.clone());
+                    continue;
                 }
+                let start = text.len();
+                push_number(&mut text, value);
+                (*bits, *place) = (value.to_bits(), start..text.len());
             }
             text.push('\n');
         }
@@ -73,10 +82,14 @@ fn push_number(text: &mut String, value: f64) {
     }
     let mut buffer = zmij::Buffer::new();
     let digits = buffer.format_finite(value);
-    let digits = digits.strip_suffix(".0").unwrap_or(digits);
-    match digits.split_once("e+") {
+    // Large numbers alone have an exponent with a sign that is left out.
+    let large = value.abs() >= LONG.end;
+    match large.then(|| digits.split_once("e+")).flatten() {
         Some((digits, exponent)) => text.extend([digits, "e", exponent]),
-        None => text.push_str(digits),
+        None => text.push_str(match digits.as_bytes() {
+            [.., b'.', b'0'] => &digits[..digits.len() - 2],
+            _ => digits,
+        }),
     }
 }
 
@@ -133,6 +146,19 @@ mod tests {
                 assert_eq!(text.parse::<f64>().map(f64::to_bits), Ok(value.to_bits()));
             }
         }
+    }
+
+    /// Numbers that repeat the one before, in columns of different length.
+    #[test]
+    fn repeated_numbers_have_their_digits_in_each_row() {
+        let text = CsvTable::new()
+            .column("a", vec![0.1, 0.1, f64::NAN, 0.1, -0.0, 0.0])
+            .column("b", vec![2.5e22, 2.5e22, 2.5e22])
+            .to_csv();
+        assert_eq!(
+            text,
+            "a,b\n0.1,2.5e22\n0.1,2.5e22\n,2.5e22\n0.1,\n-0,\n0,\n"
+        );
     }
 
     #[test]

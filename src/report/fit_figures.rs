@@ -12,7 +12,7 @@ use kmcfit_core::internals::solvers::IterationRecord;
 use kmcfit_core::internals::threads::{analyses_at_once, both, map};
 
 /// Figures of all channels with their titles.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct ChannelFigures {
     /// Samples with the prediction, and residuals, of each channel, without its title.
     fits: Vec<[Figure; 2]>,
@@ -22,16 +22,11 @@ pub struct ChannelFigures {
     pub tests: Vec<Figure>,
 }
 
-impl ChannelFigures {
-    fn with_spectra(self, spectra: Vec<Figure>) -> Self {
-        Self { spectra, ..self }
-    }
-}
-
 /// What is computed before a report is written.
 enum ReportPart {
     Document(Box<ResultDocument>),
-    Figures(ChannelFigures),
+    Fits(Vec<[Figure; 2]>),
+    Tests(Vec<Figure>),
     Spectra(Vec<Figure>),
 }
 
@@ -114,10 +109,15 @@ impl FittedModel<'_> {
 
     /// The figures that both page and files have, drawn once.
     pub(super) fn drawn_channels(&self) -> &ChannelFigures {
-        self.drawn.get_or_init(|| {
+        self.computed.figures.get_or_init(|| {
+            let tests = || self.each_channel(Self::channel_tests);
             let spectra = || self.each_channel(Self::channel_spectra);
-            let (others, spectra) = both(|| self.fits_and_tests(), spectra);
-            others.with_spectra(spectra)
+            let ((fits, tests), spectra) = both(|| (self.fits(), tests()), spectra);
+            ChannelFigures {
+                fits,
+                spectra,
+                tests,
+            }
         })
     }
 
@@ -131,31 +131,29 @@ impl FittedModel<'_> {
         let part = |i: usize| match i.checked_sub(channels.len()) {
             None => ReportPart::Spectra(self.of_channel(channels[i], Self::channel_spectra)),
             Some(0) => ReportPart::Document(Box::new(self.document())),
-            Some(_) => ReportPart::Figures(self.fits_and_tests()),
+            Some(1) => ReportPart::Tests(self.each_channel(Self::channel_tests)),
+            Some(_) => ReportPart::Fits(self.fits()),
         };
-        let (mut spectra, mut figures, mut document) = (Vec::new(), None, None);
+        let mut figures = ChannelFigures::default();
+        let mut document = None;
         let threads = analyses_at_once(self.model.problem.sample_count());
-        for part in map(channels.len() + 2, threads, part) {
+        for part in map(channels.len() + 3, threads, part) {
             match part {
-                ReportPart::Spectra(of_channel) => spectra.extend(of_channel),
+                ReportPart::Spectra(of_channel) => figures.spectra.extend(of_channel),
                 ReportPart::Document(found) => document = Some(*found),
-                ReportPart::Figures(found) => figures = Some(found),
+                ReportPart::Tests(found) => figures.tests = found,
+                ReportPart::Fits(found) => figures.fits = found,
             }
         }
-        if let Some(figures) = figures {
-            self.drawn.get_or_init(|| figures.with_spectra(spectra));
-        }
+        self.computed.figures.get_or_init(|| figures);
         document.unwrap_or_else(|| self.document())
     }
 
-    fn fits_and_tests(&self) -> ChannelFigures {
+    /// Samples with the prediction, and residuals, of each channel, without its title.
+    fn fits(&self) -> Vec<[Figure; 2]> {
         let channels = self.channels().into_iter();
         let fits = channels.map(|(e, c)| self.channel_view(e, c).figures());
-        ChannelFigures {
-            fits: fits.collect(),
-            spectra: Vec::new(),
-            tests: self.each_channel(Self::channel_tests),
-        }
+        fits.collect()
     }
 
     /// Spectra of a channel, and its frequency response where one input acts.

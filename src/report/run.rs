@@ -20,6 +20,7 @@ use super::timings::{OverheadTimings, TimingsSummary};
 use super::{FigureWidth, render_at};
 use crate::config::{ChannelNote, Model};
 use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, RequestedFiles, Stage};
+use kmcfit_core::internals::assessment::Estimate;
 use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, WeightRule};
 use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::solvers::{
@@ -59,8 +60,17 @@ pub struct FittedModel<'a> {
     pub requested: RequestedFiles,
     /// Units of page and figures.
     pub display: DisplayUnits,
+    /// What several parts of a report use.
+    pub computed: Computed,
+}
+
+/// What several parts of a report use, each computed where it is first needed.
+#[derive(Debug, Clone, Default)]
+pub struct Computed {
     /// Figures that both page and files have.
-    pub drawn: OnceLock<ChannelFigures>,
+    pub(super) figures: OnceLock<ChannelFigures>,
+    /// Estimates with the names of the core.
+    pub(super) estimates: OnceLock<Vec<(String, Estimate)>>,
 }
 
 impl Model {

@@ -57,8 +57,8 @@ impl FittedModel<'_> {
         let mut table = CsvTable::new()
             .column("chain", vec![0.0; number])
             .column("draw", numbers);
-        for (i, (name, estimate)) in self.all_estimates().into_iter().enumerate() {
-            let Some(name) = self.stated_name(&name) else {
+        for (i, (name, estimate)) in self.all_estimates().iter().enumerate() {
+            let Some(name) = self.stated_name(name) else {
                 continue;
             };
             let column = named_column(&name, self.is_rotation());

@@ -19,7 +19,6 @@ use kmcfit_core::internals::assessment::{
 use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::solvers::{EquationBalance, Fit, Status};
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
 
 impl FittedModel<'_> {
     /// Verdict on a fit of a model.
@@ -32,7 +31,7 @@ impl FittedModel<'_> {
             weights: None,
             run_assessment: &RunAssessment::of(model, fit),
             requested: RequestedFiles::default(),
-            drawn: OnceLock::new(),
+            computed: Default::default(),
         };
         fitted.verdict()
     }
@@ -221,7 +220,7 @@ impl FittedModel<'_> {
 
     /// Estimates of the fit, with an unknown mass as ratios to it; none where it failed.
     pub(super) fn estimates(&self) -> Estimates {
-        let all = self.all_estimates().into_iter();
+        let all = self.all_estimates().iter().cloned();
         let stated = all.filter_map(|(name, mut estimate)| {
             if self.model.has_unknown_mass && estimate.status == EstimateStatus::OnlyAsRatio {
                 estimate.status = EstimateStatus::Estimated;
@@ -240,7 +239,11 @@ impl FittedModel<'_> {
     }
 
     /// Estimates of the fit with the names of the core.
-    pub(super) fn all_estimates(&self) -> Vec<(String, Estimate)> {
+    pub(super) fn all_estimates(&self) -> &[(String, Estimate)] {
+        (self.computed.estimates).get_or_init(|| self.compute_estimates())
+    }
+
+    fn compute_estimates(&self) -> Vec<(String, Estimate)> {
         let status = self.fit.outcome.status;
         if matches!(status, Status::Failed | Status::Infeasible) {
             return Vec::new();

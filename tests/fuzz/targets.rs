@@ -157,7 +157,7 @@ fn finish(workshop: &Workshop) {
         run_assessment: &run_assessment,
         requested: heading.requested,
         display: DisplayUnits::default(),
-        drawn: Default::default(),
+        computed: Default::default(),
     };
     let folder = OutputFolder::prepare(&workshop.path("run"), fit_claim(model)).expect("a folder");
     let mut stage = folder.stage().expect("room");

@@ -100,11 +100,28 @@ pub(super) fn even(scale: Scale, value: f64) -> f64 {
 
 /// The smallest range that contains all drawable values, if any.
 pub(super) fn extent(scale: Scale, values: &[f64]) -> Option<Range> {
-    let drawable = values
-        .iter()
-        .map(|&v| even(scale, v))
-        .filter(|v| !v.is_nan());
-    drawable.fold(None, |range, v| Some(union(range, (v, v))))
+    // Of the values, because logarithms take most of the time and have the same order.
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for value in values {
+        let value = drawable(scale, *value);
+        // False for NaN.
+        if value < low {
+            low = value;
+        }
+        if value > high {
+            high = value;
+        }
+    }
+    (low <= high).then(|| (even(scale, low), even(scale, high)))
+}
+
+/// A value that can be drawn, else NaN: in the order of its places on the scale.
+pub(super) fn drawable(scale: Scale, value: f64) -> f64 {
+    match scale {
+        Scale::Linear if value.abs() <= LARGEST => value,
+        Scale::Log if value > 0.0 && value <= LARGEST => value,
+        _ => f64::NAN,
+    }
 }
 
 /// The smallest range that contains both.

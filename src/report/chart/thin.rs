@@ -1,6 +1,6 @@
 //! Thinning of curves, which bounds the size of pages of long records without visible change.
 
-use super::axis::{LARGEST, Scale, even, extent};
+use super::axis::{Scale, drawable, even, extent};
 use super::plot_mark::{Mark, MarkKind};
 
 /// Detail of the curves of a page.
@@ -141,15 +141,6 @@ fn columns(
         first = end;
     }
     kept
-}
-
-/// A value that can be drawn, else NaN: in the order of its places on the scale.
-fn drawable(scale: Scale, value: f64) -> f64 {
-    match scale {
-        Scale::Linear if value.abs() <= LARGEST => value,
-        Scale::Log if value > 0.0 && value <= LARGEST => value,
-        _ => f64::NAN,
-    }
 }
 
 /// The ends of the straight segments of a curve: all points between them are within [`STRAIGHT`] of the segments.

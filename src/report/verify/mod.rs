@@ -31,7 +31,6 @@ pub use rebuild::rebuilt_fit;
 use rebuild::{Rebuilt, rebuilt};
 use serde::Serialize;
 use serde_json::Value;
-use std::sync::OnceLock;
 
 /// Cost beside that of the start that is rounding.
 const EXACT: f64 = 1e-13;
@@ -115,7 +114,7 @@ impl Verification {
                 tables: run.document.model.steps_per_row == 1,
                 ..RequestedFiles::default()
             },
-            drawn: OnceLock::new(),
+            computed: Default::default(),
         };
         let again = Again {
             run,

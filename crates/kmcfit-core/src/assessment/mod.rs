@@ -296,7 +296,7 @@ fn causes(
             };
             let found = match small.or_else(large).or_else(pulses) {
                 Some(cause) => vec![cause],
-                None => second_modes(problem, evaluation),
+                None => second_modes(problem, evaluation, &plausibility.residuals),
             };
             (found, tests)
         }

@@ -12,7 +12,7 @@
 //! noise by the Bayesian information criterion, their residuals are white or much smaller, and their frequencies are apart.
 
 use super::FitWarning;
-use crate::diagnostics::SIGNIFICANCE;
+use crate::diagnostics::{ResidualDiagnostics, SIGNIFICANCE};
 use crate::functions::Ratios;
 use crate::objective::{Evaluation, diagnostics};
 use crate::problem::{FEW_PARAMETERS, Problem};
@@ -51,8 +51,13 @@ const SMALL: f64 = 1e-4;
 /// Natural frequency (Hz) and damping ratio.
 type Mode = [f64; 2];
 
-/// Warnings about second modes where the coefficients are constant, at most one for each experiment.
-pub(super) fn second_modes(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
+/// Warnings about second modes where the coefficients are constant, at most one for each experiment, given the diagnostics of the residuals
+/// of each channel of each experiment.
+pub(super) fn second_modes(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    residuals: &[Vec<ResidualDiagnostics>],
+) -> Vec<FitWarning> {
     // A coefficient that varies spreads one mode over a band.
     let functions = &problem.functions;
     let is_constant = |values: &[f64]| values.iter().all(|v| *v == values[0]);
@@ -65,7 +70,7 @@ pub(super) fn second_modes(problem: &Problem, evaluation: &Evaluation) -> Vec<Fi
         return Vec::new();
     }
     let each = (0..problem.experiments.len()).filter_map(|e| {
-        let frequencies = second_mode(problem, evaluation, e)?;
+        let frequencies = second_mode(problem, evaluation, e, residuals[e].first()?)?;
         Some(FitWarning::SecondMode {
             experiment: problem.experiments[e].name.clone(),
             frequencies,
@@ -74,13 +79,18 @@ pub(super) fn second_modes(problem: &Problem, evaluation: &Evaluation) -> Vec<Fi
     each.collect()
 }
 
-/// Frequencies of two modes in the first channel of an experiment, the stronger first.
-fn second_mode(problem: &Problem, evaluation: &Evaluation, e: usize) -> Option<[f64; 2]> {
+/// Frequencies of two modes in the first channel of an experiment, the stronger first; `of_residuals` are the diagnostics of its residuals.
+fn second_mode(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    e: usize,
+    of_residuals: &ResidualDiagnostics,
+) -> Option<[f64; 2]> {
     let experiment = &problem.experiments[e];
     let channel = experiment.channels.first()?;
     let predicted = evaluation.predictions[e].first()?;
-    let is_suspect = channel.correlation().is_some()
-        || diagnostics(channel, predicted).whiteness.p_value < SIGNIFICANCE;
+    let is_suspect =
+        channel.correlation().is_some() || of_residuals.whiteness.p_value < SIGNIFICANCE;
     let is_possible = channel.filter().is_empty() && channel.base().is_empty() && is_suspect;
     let spacing = even_spacing(channel.times()).filter(|_| is_possible)?;
     let record = Samples::of(experiment, channel, spacing)?;

@@ -177,7 +177,9 @@ impl ExperimentBuilder<'_> {
     ) -> Result<(State, [Option<usize>; 2]), BuildError> {
         let channels = &self.record.channels;
         let lowest = channels.iter().min_by_key(|c| c.kind);
-        let scales = lowest.map_or([1.0; 2], |c| {
+        let initial = &self.record.initial;
+        let are_known = initial.iter().all(|s| matches!(s, ScalarSpec::Known(_)));
+        let scales = lowest.filter(|_| !are_known).map_or([1.0; 2], |c| {
             state_scales(c.kind, &c.values, median_spacing(&c.times))
         });
         let displacement = lowest.filter(|c| c.kind == ChannelKind::Displacement);
@@ -194,7 +196,7 @@ impl ExperimentBuilder<'_> {
                 start: starts[q],
                 scale: scales[q],
             };
-            match scalar.value(self.record.initial[q], scalars)? {
+            match scalar.value(initial[q], scalars)? {
                 ScalarValue::Known(number) => state[q] = number,
                 ScalarValue::Estimated(index) => {
                     estimated[q] = Some(index);

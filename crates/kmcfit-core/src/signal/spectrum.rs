@@ -60,16 +60,20 @@ impl Spectrum {
         }
         let mean = values.iter().sum::<f64>() / n as f64;
         let turns = Turns::new(n, n);
-        let window = |j: usize| hann(&turns, j);
+        let mut squares = 0.0;
         let windowed = values.iter().enumerate();
-        let windowed = windowed.map(|(j, x)| window(j) * (x - mean));
-        let squares: f64 = (0..n).map(|j| window(j) * window(j)).sum();
+        let windowed = windowed.map(|(j, x)| {
+            let weight = hann(&turns, j);
+            squares += weight * weight;
+            weight * (x - mean)
+        });
         let count = n / 2 + 1;
         let mut density = Vec::with_capacity(count);
         RealTransform::new(n, count).process(windowed, |k, x| {
             let sides = if k == 0 || 2 * k == n { 1.0 } else { 2.0 };
-            density.push(sides * spacing * x.norm_sqr() / squares);
+            density.push(sides * spacing * x.norm_sqr());
         });
+        density.iter_mut().for_each(|d| *d /= squares);
         let whole: f64 = density.iter().sum();
         (whole > 0.0 && whole.is_finite()).then(|| Self {
             resolution: 1.0 / (n as f64 * spacing),
