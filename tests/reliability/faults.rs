@@ -290,6 +290,7 @@ fn check(case: &Case, mode: Mode, over_an_older_run: bool) {
         }
         number += stride;
     }
+    // The shortest commands have few operations, of which the short run takes a quarter.
     let least = if is_long() { 5 } else { 2 };
     assert!(tried >= least, "{:?}: {tried} faults", case.arguments);
     println!("{:?}: {tried} faults", case.arguments);
