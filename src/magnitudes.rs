@@ -54,7 +54,7 @@ impl Magnitude {
     pub fn of(quantity: Quantity, unit: Unit, values: &[f64]) -> Option<Self> {
         let values: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
         let last = values.len().checked_sub(1)?;
-        let level = median(&values);
+        let level = median(&*values);
         let mut away: Vec<f64> = values.iter().map(|x| (x - level).abs()).collect();
         let place = (WITHIN * last as f64) as usize;
         let amplitude = *away.select_nth_unstable_by(place, f64::total_cmp).1;
@@ -235,9 +235,8 @@ fn reading(
         .map(|(_, reading)| reading)
 }
 
-/// Frequency (Hz) of a narrow line of samples `spacing` seconds apart that is mains hum if the times are read in another unit, with that unit.
-pub fn mains_hum(values: &[f64], spacing: f64, time: Unit) -> Option<(f64, Unit)> {
-    let spectrum = Spectrum::of(values, spacing)?;
+/// Frequency (Hz) of a narrow line of a spectrum that is mains hum if the times are read in another unit, with that unit.
+pub fn mains_hum(spectrum: &Spectrum, time: Unit) -> Option<(f64, Unit)> {
     let (density, resolution) = (spectrum.density(), spectrum.resolution());
     let units = others(Quantity::Time, time).filter(|unit| unit.factor() < time.factor());
     let mut lines =
@@ -256,7 +255,7 @@ pub fn mains_hum(values: &[f64], spacing: f64, time: Unit) -> Option<(f64, Unit)
         let sides = (k.saturating_sub(outer)..k.saturating_sub(inner)).chain(k + inner..k + outer);
         let around: Vec<f64> = sides.filter_map(|k| density.get(k).copied()).collect();
         let is_long = frequency / resolution >= LINE_PERIODS;
-        is_long && !around.is_empty() && peak > LINE * median(&around)
+        is_long && !around.is_empty() && peak > LINE * median(around)
     })
 }
 
@@ -354,20 +353,21 @@ mod tests {
     #[test]
     fn mains_hum_shows_milliseconds() {
         let seconds = unit(Quantity::Time, "s");
+        let of = |values: &[f64]| Spectrum::of(values, 1.0).expect("it varies");
         let noise =
             |i: usize| f64::from((i as u32).wrapping_mul(2_654_435_761) >> 16) / 65536.0 - 0.5;
         let hum: Vec<f64> = (0..8000)
             .map(|i| noise(i) + (TAU * 0.05 * i as f64).sin())
             .collect();
         assert_eq!(
-            mains_hum(&hum, 1.0, seconds),
+            mains_hum(&of(&hum), seconds),
             Some((0.05, unit(Quantity::Time, "ms")))
         );
         let decay =
             |i: usize| (-0.01 * TAU * 0.05 * i as f64).exp() * (TAU * 0.05 * i as f64).sin();
         let decay: Vec<f64> = (0..8000).map(|i| 0.02 * noise(i) + decay(i)).collect();
-        assert_eq!(mains_hum(&decay, 1.0, seconds), None);
-        assert_eq!(mains_hum(&hum, 1.0, unit(Quantity::Time, "µs")), None);
+        assert_eq!(mains_hum(&of(&decay), seconds), None);
+        assert_eq!(mains_hum(&of(&hum), unit(Quantity::Time, "µs")), None);
     }
 
     #[test]

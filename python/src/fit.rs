@@ -211,7 +211,7 @@ impl RawFit {
         let run = done.fitted(requested);
         let mut document = run.document();
         document.timings = self.document.timings.clone();
-        let mut stage = output.stage().map_err(full)?;
+        let stage = output.stage().map_err(full)?;
         if placed.is_some() {
             stage
                 .write(MODEL, self.file.effective_text())
@@ -220,7 +220,7 @@ impl RawFit {
                 stage.write(name, content).map_err(full)?;
             }
         }
-        run.write(&mut stage, &document).map_err(full)?;
+        run.write(&stage, &document).map_err(full)?;
         if let Some(Ok(table)) = run.draws() {
             stage.write(DRAWS, table.to_csv()).map_err(full)?;
         }

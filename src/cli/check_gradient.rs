@@ -115,7 +115,7 @@ fn report_result(curves: &[GradientCheck]) -> u8 {
 
 fn write(folder: &OutputFolder, curves: &[GradientCheck]) -> std::io::Result<()> {
     let [table_name, figure_name] = FILES;
-    let mut stage = folder.stage()?;
+    let stage = folder.stage()?;
     stage.write(figure_name, render(&figures::gradient_error(curves)))?;
     let steps = curves.iter().flat_map(|curve| curve.step.iter().copied());
     let mut steps: Vec<f64> = steps.collect();

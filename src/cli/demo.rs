@@ -79,7 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let tables = tables()?;
     let results = compare::prepare(&folder, "results")?;
     let write = || {
-        let mut stage = folder.stage()?;
+        let stage = folder.stage()?;
         for (name, text) in MODELS {
             stage.write(name, text)?;
         }

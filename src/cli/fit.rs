@@ -301,7 +301,7 @@ pub(super) fn fit_into(
         Ok(found) => found,
         Err(reason) => {
             let document = FailureDocument::new(&model.title, &reason);
-            let mut stage = folder.stage().map_err(full)?;
+            let stage = folder.stage().map_err(full)?;
             stage.write(RESULT, json(&document)).map_err(full)?;
             stage.commit().map_err(full)?;
             FitJournal::clear(folder.path()).map_err(full)?;
@@ -327,9 +327,9 @@ pub(super) fn fit_into(
     };
     let mut document = run.document_and_figures();
     let draws = run.draws();
-    let mut stage = folder.stage().map_err(full)?;
+    let stage = folder.stage().map_err(full)?;
     activity.stage(progress.named_stage("writing the results"));
-    let writing = run.write(&mut stage, &document).map_err(full)?;
+    let writing = run.write(&stage, &document).map_err(full)?;
     drop(activity);
     match draws {
         Some(Ok(table)) => stage.write(DRAWS, table.to_csv()).map_err(full)?,

@@ -198,7 +198,7 @@ fn write(
 }
 
 fn write_files(folder: &OutputFolder, table: &CsvTable, figure: &Figure) -> std::io::Result<()> {
-    let mut stage = folder.stage()?;
+    let stage = folder.stage()?;
     let [table_name, figure_name] = FILES;
     stage.write(table_name, table.to_csv())?;
     stage.write(figure_name, render(figure))?;

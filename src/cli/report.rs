@@ -91,7 +91,7 @@ fn write(folder: &OutputFolder, kept: &[String], drawings: &[(String, String)]) 
     let is_of_search = |name: &str| OF_THE_SEARCH.iter().any(|start| name.starts_with(start));
     let is_kept = |name: &String| is_of_search(name) && kept.contains(name);
     let drawn = || drawings.iter().filter(|(name, _)| !is_kept(name));
-    let mut stage = folder.stage()?;
+    let stage = folder.stage()?;
     for name in kept {
         // A figure that is not drawn any more is one in another unit.
         let is_stale = name.starts_with("figures/") && !is_of_search(name);

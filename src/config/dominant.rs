@@ -75,7 +75,7 @@ pub(super) fn remove_outliers(pairs: &mut Vec<(f64, f64)>) -> Option<(usize, f64
         return None;
     }
     let values = values_of(pairs);
-    let level = median(&values);
+    let level = median(&*values);
     let away: Vec<f64> = values.iter().map(|value| value - level).collect();
     let mut far = outlier_indices(&away);
     if far.is_empty() {

@@ -43,7 +43,7 @@ fn broken_at_gaps(t: &[f64], y: &[f64]) -> Option<[Vec<f64>; 2]> {
     let spacings: Vec<f64> = t.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let median = match spacings.is_empty() {
         true => 0.0,
-        false => median(&spacings),
+        false => median(spacings),
     };
     let (mut times, mut values) = (Vec::new(), Vec::new());
     let mut last: Option<f64> = None;

@@ -9,46 +9,89 @@ use super::tables::FUNCTION_ROWS;
 use crate::units::Unit;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::solvers::IterationRecord;
-use kmcfit_core::internals::threads::{analyses_at_once, both, map};
+use kmcfit_core::internals::threads::{analyses_at_once, map};
 
-/// Figures of all channels with their titles.
+/// Figures that both page and files have, drawn once.
 #[derive(Debug, Clone, Default)]
-pub struct ChannelFigures {
-    /// Samples with the prediction, and residuals, of each channel, without its title.
-    fits: Vec<[Figure; 2]>,
+pub struct DrawnFigures {
+    /// Those of each channel against time, without their titles.
+    pub(super) channels: Vec<ChannelFigures>,
     /// Spectra, and frequency responses where one input acts.
     pub spectra: Vec<Figure>,
     /// Tests of the residuals.
     pub tests: Vec<Figure>,
+    /// Coefficient functions.
+    pub functions: Option<Figure>,
+    /// Their ratios.
+    pub ratios: Option<Figure>,
+    /// Inputs of each driven experiment.
+    pub inputs: Vec<Figure>,
+    /// Validation records with their predictions and residuals.
+    pub validation: Vec<Figure>,
+}
+
+/// Figures of a channel against time.
+#[derive(Debug, Clone)]
+pub(super) struct ChannelFigures {
+    /// Samples alone.
+    pub record: Figure,
+    /// Samples with the prediction.
+    pub samples: Figure,
+    /// Residuals.
+    pub residuals: Figure,
+    /// Samples with the responses during the fit, of displacements at nodes in SI units.
+    pub response: Option<Figure>,
 }
 
 /// What is computed before a report is written.
 enum ReportPart {
-    Document(Box<ResultDocument>),
-    Fits(Vec<[Figure; 2]>),
-    Tests(Vec<Figure>),
     Spectra(Vec<Figure>),
+    Document(Box<ResultDocument>),
+    Tests(Vec<Figure>),
+    Channels(Vec<ChannelFigures>),
+    Functions([Figure; 2]),
+    Inputs(Vec<Figure>),
+    Validation(Vec<Figure>),
+}
+
+/// Computation of a [`ReportPart`].
+#[derive(Clone, Copy)]
+enum ReportJob {
+    /// Of an experiment and a channel.
+    Spectra((usize, usize)),
+    Document,
+    Tests,
+    Channels,
+    Functions,
+    Inputs,
+    Validation,
 }
 
 impl FittedModel<'_> {
     /// The figures of a fit.
     pub fn figures(&self) -> Vec<Figure> {
         let mut figures: Vec<Figure> = self.weights.map(figures::weight_path).into_iter().collect();
-        figures.extend([
-            self.convergence(),
-            self.functions_figure(),
-            self.ratios_figure(),
-        ]);
-        let drawn = self.drawn_channels();
-        for ((experiment, channel), fit) in self.channels().into_iter().zip(&drawn.fits) {
-            let mut list = self.channel_figures(experiment, channel, fit);
-            let suffix = self.suffix(experiment, channel);
-            list.iter_mut().for_each(|figure| figure.name += &suffix);
-            figures.extend(list);
+        let drawn = self.drawn();
+        figures.push(self.convergence());
+        figures.extend(drawn.functions.iter().chain(&drawn.ratios).cloned());
+        for ((experiment, channel), of_channel) in self.channels().into_iter().zip(&drawn.channels)
+        {
+            let beside = of_channel.response.as_ref();
+            let beside = beside.unwrap_or(&of_channel.samples);
+            let list = [&of_channel.record, beside, &of_channel.residuals];
+            figures.extend(list.map(|figure| {
+                let mut figure = figure.clone();
+                figure.name += &self.suffix(experiment, channel);
+                figure
+            }));
         }
-        figures.extend(drawn.spectra.iter().chain(&drawn.tests).cloned());
-        figures.extend(self.input_figures());
-        figures.extend(self.validation_figures());
+        let others = [
+            &drawn.spectra,
+            &drawn.tests,
+            &drawn.inputs,
+            &drawn.validation,
+        ];
+        figures.extend(others.into_iter().flatten().cloned());
         figures
     }
 
@@ -87,14 +130,6 @@ impl FittedModel<'_> {
         }
     }
 
-    /// Figures of all channels with their titles.
-    pub(super) fn each_channel(&self, of: fn(&Self, usize, usize) -> Vec<Figure>) -> Vec<Figure> {
-        let channels = self.channels().into_iter();
-        channels
-            .flat_map(|channel| self.of_channel(channel, of))
-            .collect()
-    }
-
     /// Figures of a channel with their titles.
     fn of_channel(
         &self,
@@ -108,52 +143,69 @@ impl FittedModel<'_> {
     }
 
     /// The figures that both page and files have, drawn once.
-    pub(super) fn drawn_channels(&self) -> &ChannelFigures {
-        self.computed.figures.get_or_init(|| {
-            let tests = || self.each_channel(Self::channel_tests);
-            let spectra = || self.each_channel(Self::channel_spectra);
-            let ((fits, tests), spectra) = both(|| (self.fits(), tests()), spectra);
-            ChannelFigures {
-                fits,
-                spectra,
-                tests,
-            }
-        })
+    pub(super) fn drawn(&self) -> &DrawnFigures {
+        self.computed.figures.get_or_init(|| self.draw(false).1)
     }
 
-    /// The result document, beside which the figures of the channels are drawn if figures are requested.
+    /// The result document, beside which the figures are drawn if figures are requested.
     pub fn document_and_figures(&self) -> ResultDocument {
         if !self.requested.figures {
             return self.document();
         }
-        let channels = self.channels();
-        // The longest first.
-        let part = |i: usize| match i.checked_sub(channels.len()) {
-            None => ReportPart::Spectra(self.of_channel(channels[i], Self::channel_spectra)),
-            Some(0) => ReportPart::Document(Box::new(self.document())),
-            Some(1) => ReportPart::Tests(self.each_channel(Self::channel_tests)),
-            Some(_) => ReportPart::Fits(self.fits()),
-        };
-        let mut figures = ChannelFigures::default();
-        let mut document = None;
-        let threads = analyses_at_once(self.model.problem.sample_count());
-        for part in map(channels.len() + 3, threads, part) {
-            match part {
-                ReportPart::Spectra(of_channel) => figures.spectra.extend(of_channel),
-                ReportPart::Document(found) => document = Some(*found),
-                ReportPart::Tests(found) => figures.tests = found,
-                ReportPart::Fits(found) => figures.fits = found,
-            }
-        }
+        let (document, figures) = self.draw(true);
         self.computed.figures.get_or_init(|| figures);
         document.unwrap_or_else(|| self.document())
     }
 
-    /// Samples with the prediction, and residuals, of each channel, without its title.
-    fn fits(&self) -> Vec<[Figure; 2]> {
-        let channels = self.channels().into_iter();
-        let fits = channels.map(|(e, c)| self.channel_view(e, c).figures());
-        fits.collect()
+    /// The figures that both page and files have, and the document if it is wanted.
+    fn draw(&self, is_document_wanted: bool) -> (Option<ResultDocument>, DrawnFigures) {
+        let channels = self.channels();
+        // The longest first.
+        let mut jobs: Vec<ReportJob> = channels.iter().copied().map(ReportJob::Spectra).collect();
+        jobs.extend(is_document_wanted.then_some(ReportJob::Document));
+        jobs.extend([
+            ReportJob::Tests,
+            ReportJob::Channels,
+            ReportJob::Functions,
+            ReportJob::Inputs,
+            ReportJob::Validation,
+        ]);
+        let part = |i: usize| match jobs[i] {
+            ReportJob::Spectra(channel) => {
+                ReportPart::Spectra(self.of_channel(channel, Self::channel_spectra))
+            }
+            ReportJob::Document => ReportPart::Document(Box::new(self.document())),
+            ReportJob::Tests => {
+                let tests = |channel: &_| self.of_channel(*channel, Self::channel_tests);
+                ReportPart::Tests(channels.iter().flat_map(tests).collect())
+            }
+            ReportJob::Channels => {
+                let figures = channels.iter().map(|(e, c)| self.channel_figures(*e, *c));
+                ReportPart::Channels(figures.collect())
+            }
+            ReportJob::Functions => {
+                ReportPart::Functions([self.functions_figure(), self.ratios_figure()])
+            }
+            ReportJob::Inputs => ReportPart::Inputs(self.input_figures()),
+            ReportJob::Validation => ReportPart::Validation(self.validation_figures()),
+        };
+        let mut figures = DrawnFigures::default();
+        let mut document = None;
+        let threads = analyses_at_once(self.model.problem.sample_count());
+        for part in map(jobs.len(), threads, part) {
+            match part {
+                ReportPart::Spectra(of_channel) => figures.spectra.extend(of_channel),
+                ReportPart::Document(found) => document = Some(*found),
+                ReportPart::Tests(found) => figures.tests = found,
+                ReportPart::Channels(found) => figures.channels = found,
+                ReportPart::Functions([functions, ratios]) => {
+                    (figures.functions, figures.ratios) = (Some(functions), Some(ratios));
+                }
+                ReportPart::Inputs(found) => figures.inputs = found,
+                ReportPart::Validation(found) => figures.validation = found,
+            }
+        }
+        (document, figures)
     }
 
     /// Spectra of a channel, and its frequency response where one input acts.
@@ -175,10 +227,10 @@ impl FittedModel<'_> {
 
     /// Samples and residuals of all channels against time.
     pub(super) fn channel_fits(&self) -> Vec<Figure> {
-        let channels = self.channels().into_iter().zip(&self.drawn_channels().fits);
-        let figures = channels.flat_map(|((e, c), fit)| {
-            let titled = move |figure: &Figure| self.titled(figure.clone(), e, c);
-            fit.iter().map(titled)
+        let channels = self.channels().into_iter().zip(&self.drawn().channels);
+        let figures = channels.flat_map(|((e, c), of_channel)| {
+            let fit = [&of_channel.samples, &of_channel.residuals];
+            fit.map(|figure| self.titled(figure.clone(), e, c))
         });
         figures.collect()
     }
@@ -192,11 +244,10 @@ impl FittedModel<'_> {
         };
         let scale = |unit: Option<Unit>| unit.map_or(1.0, |unit| unit.factor());
         let force_unit = self.display.of_force();
-        let force = |t: &f64| input.force_at(*t) / scale(force_unit);
-        let force = input.force.as_ref().map(|_| InputSeries {
+        let force = input.forces_at(times).map(|forces| InputSeries {
             label: "force",
             unit: force_unit.map_or(units[0], |unit| unit.symbol()),
-            samples: times.iter().map(force).collect(),
+            samples: forces.iter().map(|f| f / scale(force_unit)).collect(),
         });
         let motion = |label, kind, unit| {
             let shown = self.display.of_channel(kind);
@@ -217,7 +268,7 @@ impl FittedModel<'_> {
     }
 
     /// The inputs of each driven experiment at the samples of its first channel.
-    pub(super) fn input_figures(&self) -> Vec<Figure> {
+    fn input_figures(&self) -> Vec<Figure> {
         let channels = self
             .channels()
             .into_iter()
@@ -239,26 +290,23 @@ impl FittedModel<'_> {
         figures.collect()
     }
 
-    /// The figures of one channel: samples, samples with the response, residuals.
-    fn channel_figures(
-        &self,
-        experiment: usize,
-        index: usize,
-        [beside, residuals]: &[Figure; 2],
-    ) -> [Figure; 3] {
-        let view = self.channel_view(experiment, index);
-        let channel = view.channel;
-        let beside = match channel.stride() {
-            Some(_) if view.factor() == 1.0 => {
-                self.response(experiment, channel.times(), channel.observed())
-            }
-            _ => beside.clone(),
-        };
-        [view.observation(), beside, residuals.clone()]
+    /// Figures of a channel against time.
+    fn channel_figures(&self, experiment: usize, channel: usize) -> ChannelFigures {
+        let view = self.channel_view(experiment, channel);
+        let [samples, residuals] = view.figures();
+        // The response is in SI units; a page has one unit for a quantity.
+        let is_at_nodes = view.channel.stride().is_some() && view.factor() == 1.0;
+        ChannelFigures {
+            record: view.observation(),
+            samples,
+            residuals,
+            response: is_at_nodes
+                .then(|| self.response(experiment, view.channel.times(), view.channel.observed())),
+        }
     }
 
     /// Validation records with their predictions and residuals.
-    pub(super) fn validation_figures(&self) -> Vec<Figure> {
+    fn validation_figures(&self) -> Vec<Figure> {
         let mut figures = Vec::new();
         for (i, held) in self.run_assessment.validation.iter().enumerate() {
             for view in held.channels(self.display) {
@@ -286,7 +334,7 @@ impl FittedModel<'_> {
         )
     }
 
-    pub(super) fn response(&self, experiment: usize, times: &[f64], observed: &[f64]) -> Figure {
+    fn response(&self, experiment: usize, times: &[f64], observed: &[f64]) -> Figure {
         let grid_times = self.model.problem.system.grid.times();
         let nodes = self.model.problem.experiments[experiment].nodes;
         let grid_times = &grid_times[..nodes];
@@ -305,7 +353,7 @@ impl FittedModel<'_> {
     }
 
     /// The functions, at the nodes that their table has.
-    pub(super) fn functions_figure(&self) -> Figure {
+    fn functions_figure(&self) -> Figure {
         let problem = &self.model.problem;
         let rows = |values: &[f64]| self.rows(values, FUNCTION_ROWS);
         let starts = problem.functions.values(&problem.start());
@@ -330,7 +378,7 @@ impl FittedModel<'_> {
     }
 
     /// The ratios, at the nodes that their table has.
-    pub(super) fn ratios_figure(&self) -> Figure {
+    fn ratios_figure(&self) -> Figure {
         let found = self.ratio_rows(&self.fit.best.evaluation.nodal);
         let truth = self
             .model

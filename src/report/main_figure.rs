@@ -11,20 +11,22 @@ const ROUNDING: f64 = 1e-9;
 impl FittedModel<'_> {
     /// The figure of the first screen; `None` without a varying coefficient and without samples.
     pub(super) fn main_figure(&self, document: &ResultDocument) -> Option<Figure> {
-        let first = self.channels().first().copied();
-        let functions = self.named_functions().into_iter();
-        let panels = functions.zip(self.functions_figure().panels);
-        let panels = panels.filter(|((function, _), _)| document.is_determined(&function.name()));
-        let scored = panels.filter_map(|(_, panel)| Some((variation(&panel)?, panel)));
+        let drawn = self.drawn();
+        let first = drawn.channels.first();
+        let panels = drawn.functions.iter().flat_map(|figure| &figure.panels);
+        let panels = self.model.problem.functions.iter().zip(panels);
+        let panels = panels.filter(|(function, _)| document.is_determined(&function.name()));
+        let scored = panels.filter_map(|(_, panel)| Some((variation(panel)?, panel)));
         let most = scored.max_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((_, mut panel)) = most else {
-            let (experiment, channel) = first?;
-            let [figure, _] = self.channel_view(experiment, channel).figures();
+        let Some((_, panel)) = most else {
+            let (experiment, channel) = self.channels().first().copied()?;
+            let figure = first?.samples.clone();
             return Some(Figure {
                 name: "main".into(),
                 ..self.titled(figure, experiment, channel)
             });
         };
+        let mut panel = panel.clone();
         panel.marks.retain(|mark| mark.label != "start");
         let title = format!("{} over the record", panel.y.label);
         let figure = Figure::new(
@@ -32,8 +34,8 @@ impl FittedModel<'_> {
             title,
             "The coefficient that varies most relative to its interval; below, the record.",
         );
-        let below = first.map(|(experiment, channel)| {
-            let mut figure = self.channel_view(experiment, channel).observation();
+        let below = first.map(|of_channel| {
+            let mut figure = of_channel.record.clone();
             for mark in figure.panels.iter_mut().flat_map(|panel| &mut panel.marks) {
                 mark.style.colour = Colour::Grey;
             }

@@ -1,6 +1,7 @@
 //! Output of a fit: the result document, tables, figures and the page.
 
 use super::channel_view::ChannelView;
+use super::chart::Figure;
 use super::cost::{CostKind, cost_definition};
 use super::display_units::DisplayUnits;
 use super::document::{
@@ -9,7 +10,7 @@ use super::document::{
     PenaltySummary, Prediction, ResultDocument, SlackSummary, WeightSummary,
 };
 use super::fit_assessment::RunAssessment;
-use super::fit_figures::ChannelFigures;
+use super::fit_figures::DrawnFigures;
 use super::fit_quality;
 use super::npy::npy;
 use super::page::fit_page;
@@ -30,7 +31,7 @@ use kmcfit_core::internals::system::{Excitation, Term};
 use kmcfit_core::internals::threads::{analyses_at_once, both, map};
 use std::io;
 use std::sync::{Mutex, OnceLock, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// The page.
 const PAGE: &str = "report.html";
@@ -68,7 +69,7 @@ pub struct FittedModel<'a> {
 #[derive(Debug, Clone, Default)]
 pub struct Computed {
     /// Figures that both page and files have.
-    pub(super) figures: OnceLock<ChannelFigures>,
+    pub(super) figures: OnceLock<DrawnFigures>,
     /// Estimates with the names of the core.
     pub(super) estimates: OnceLock<Vec<(String, Estimate)>>,
 }
@@ -103,44 +104,48 @@ impl Model {
 
 impl FittedModel<'_> {
     /// Writes tables and, if requested, figures and the page of `document`, but not the result document itself. Returns
-    /// the time taken to write them.
+    /// the time taken to write them: the share that this has in the time of the threads, of the time until all have ended.
     ///
     /// # Errors
     /// Errors of the file system.
-    pub fn write(&self, stage: &mut Stage, document: &ResultDocument) -> io::Result<Duration> {
-        let mut writing = Duration::ZERO;
-        if !self.requested.figures {
-            self.write_tables(stage, document, &mut writing)?;
-            return Ok(writing);
-        }
-        // The longest first; the tables alone need the stage.
-        let tables = Mutex::new((&mut *stage, &mut writing));
-        let part = |i: usize| match i {
-            0 => {
-                let mut tables = tables.lock().unwrap_or_else(PoisonError::into_inner);
-                let (stage, writing) = &mut *tables;
-                self.write_tables(stage, document, writing)
-                    .map(|()| Vec::new())
+    pub fn write(&self, stage: &Stage, document: &ResultDocument) -> io::Result<Duration> {
+        let (writing, all) = (Mutex::default(), Mutex::default());
+        let write = |name: &str, bytes: &[u8]| timed_in(&writing, || stage.write(name, bytes));
+        let figures = match self.requested.figures {
+            true => self.figures(),
+            false => Vec::new(),
+        };
+        // The longest first.
+        let part = |i: usize| match i.checked_sub(2) {
+            Some(i) => {
+                let (name, text) = svg(&figures[i], FigureWidth::Double);
+                write(&name, text.as_bytes())
             }
-            1 => Ok(vec![(PAGE.to_owned(), self.page(document))]),
-            _ => Ok(self.svg_figures(FigureWidth::Double)),
+            None if i == 0 => self.write_tables(document, &write),
+            None => write(PAGE, self.page(document).as_bytes()),
+        };
+        let parts = match self.requested.figures {
+            true => 2 + figures.len(),
+            false => 1,
         };
         let threads = analyses_at_once(self.model.problem.sample_count());
-        let parts = map(3, threads, part).into_iter();
-        let texts = parts.collect::<io::Result<Vec<_>>>()?;
-        for (name, text) in texts.into_iter().rev().flatten() {
-            timed(&mut writing, || stage.write(&name, text.as_bytes()))?;
-        }
-        Ok(writing)
+        let clock = Instant::now();
+        let results = map(parts, threads, |i| timed_in(&all, || part(i))).into_iter();
+        results.collect::<io::Result<()>>()?;
+        let [writing, all] = [writing, all].map(|of| {
+            let taken: Duration = of.into_inner().unwrap_or_else(PoisonError::into_inner);
+            taken.as_secs_f64()
+        });
+        Ok(clock
+            .elapsed()
+            .mul_f64(writing / all.max(writing).max(f64::MIN_POSITIVE)))
     }
 
     fn write_tables(
         &self,
-        stage: &mut Stage,
         document: &ResultDocument,
-        writing: &mut Duration,
+        write: &impl Fn(&str, &[u8]) -> io::Result<()>,
     ) -> io::Result<()> {
-        let mut write = |name: &str, bytes: &[u8]| timed(writing, || stage.write(name, bytes));
         if self.model.problem.parameters() <= MOST_PARAMETERS {
             write(
                 "parameters.json",
@@ -164,15 +169,11 @@ impl FittedModel<'_> {
 
     /// Figures and page of `document`, each with the name of its file.
     pub fn drawings(&self, document: &ResultDocument, width: FigureWidth) -> Vec<(String, String)> {
-        let (mut all, page) = both(|| self.svg_figures(width), || self.page(document));
+        let figures = self.figures();
+        let all = || figures.iter().map(|figure| svg(figure, width)).collect();
+        let (mut all, page): (Vec<_>, _) = both(all, || self.page(document));
         all.push((PAGE.to_owned(), page));
         all
-    }
-
-    fn svg_figures(&self, width: FigureWidth) -> Vec<(String, String)> {
-        let figures = self.figures().into_iter();
-        let figures = figures.map(|f| (format!("figures/{}.svg", f.name), render_at(&f, width)));
-        figures.collect()
     }
 
     /// The HTML page of the run: one file without external resources.
@@ -450,6 +451,20 @@ impl FittedModel<'_> {
     pub(super) fn note(&self, experiment: usize, channel: usize) -> Option<&ChannelNote> {
         self.model.notes.get(experiment)?.get(channel)
     }
+}
+
+/// Does `work` and adds its time to that of other threads.
+fn timed_in<T>(of_threads: &Mutex<Duration>, work: impl FnOnce() -> T) -> T {
+    let mut taken = Duration::ZERO;
+    let found = timed(&mut taken, work);
+    *of_threads.lock().unwrap_or_else(PoisonError::into_inner) += taken;
+    found
+}
+
+/// A figure as a file: its name and its text.
+fn svg(figure: &Figure, width: FigureWidth) -> (String, String) {
+    let name = format!("figures/{}.svg", figure.name);
+    (name, render_at(figure, width))
 }
 
 fn driven_by(excitation: Option<&Excitation>) -> Vec<String> {

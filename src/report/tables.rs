@@ -11,16 +11,42 @@ use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 use kmcfit_core::internals::solvers::IterationRecord;
 use kmcfit_core::internals::system::NodalCoefficients;
 
-/// Most rows of the functions where a curve through them has the values in between.
-pub(super) const FUNCTION_ROWS: usize = 4000;
-/// Most rows of the trajectories and of the samples of a channel: what spreadsheets open at once.
-pub(super) const TRAJECTORY_ROWS: usize = 50_000;
+/// Most rows of a table over time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MostRows {
+    /// Without thinning.
+    whole: usize,
+    /// Of a thinned table.
+    thinned: usize,
+}
+
+impl MostRows {
+    /// Values from one row to the next of a table of so many values.
+    fn values_per_row(self, count: usize) -> usize {
+        match count.saturating_sub(1) {
+            steps if steps > self.whole => steps.div_ceil(self.thinned),
+            _ => 1,
+        }
+    }
+}
+
+/// Rows of the functions, where a curve through them has the values in between.
+pub(super) const FUNCTION_ROWS: MostRows = MostRows {
+    whole: 4000,
+    thinned: 4000,
+};
+/// Rows of the trajectories and of the samples of a channel. Tables that spreadsheets open are not thinned; thinned ones have several rows for
+/// each pixel of a plot.
+pub(super) const TRAJECTORY_ROWS: MostRows = MostRows {
+    whole: 50_000,
+    thinned: 20_000,
+};
 /// Seed of the draws.
 const DRAWS_SEED: u64 = 1;
 
 impl FittedModel<'_> {
     /// Steps between the rows of a table of at most so many rows: 1 where all rows are requested or the functions have many parameters.
-    pub(super) fn steps_per_row(&self, most: usize) -> usize {
+    pub(super) fn steps_per_row(&self, most: MostRows) -> usize {
         self.values_per_row(self.model.problem.system.grid.nodes(), most)
     }
 
@@ -29,16 +55,16 @@ impl FittedModel<'_> {
         self.values_per_row(samples, TRAJECTORY_ROWS)
     }
 
-    fn values_per_row(&self, count: usize, most: usize) -> usize {
+    fn values_per_row(&self, count: usize, most: MostRows) -> usize {
         let few = self.model.problem.functions.parameters() <= FEW_PARAMETERS;
-        match count.saturating_sub(1).div_ceil(most) {
-            steps if few && !self.requested.tables => steps.max(1),
-            _ => 1,
+        match few && !self.requested.tables {
+            true => most.values_per_row(count),
+            false => 1,
         }
     }
 
     /// The values of every node with a row in a table of at most so many rows: one in so many steps, and the last one.
-    pub(super) fn rows(&self, values: &[f64], most: usize) -> Vec<f64> {
+    pub(super) fn rows(&self, values: &[f64], most: MostRows) -> Vec<f64> {
         every(values, self.steps_per_row(most))
     }
 
@@ -216,4 +242,20 @@ fn every(values: &[f64], steps: usize) -> Vec<f64> {
     };
     let places = (0..last).step_by(steps).chain([last]);
     places.map(|place| values[place]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// After the first row 50,000 further ones are not thinned; of 65,000 samples 16,250 are left, of a million 20,000.
+    #[test]
+    fn long_tables_are_thinned() {
+        let counts = [0, 1, 2, 50_001, 50_002, 65_000, 1_000_001];
+        let of_samples = counts.map(|count| TRAJECTORY_ROWS.values_per_row(count));
+        assert_eq!(of_samples, [1, 1, 1, 1, 3, 4, 50]);
+        let counts = [4000, 4001, 4002, 65_000];
+        let of_nodes = counts.map(|count| FUNCTION_ROWS.values_per_row(count));
+        assert_eq!(of_nodes, [1, 1, 2, 17]);
+    }
 }

@@ -25,6 +25,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
 /// Names in a working folder: new files, replaced files, and the plan.
@@ -45,9 +46,7 @@ pub struct Stage<'a> {
     /// Ends before the working folder is removed.
     syncs: Syncs,
     work: WorkFolder,
-    /// Names of the files, in the order of addition.
-    names: Vec<String>,
-    records: BTreeMap<String, FileRecord>,
+    records: Mutex<BTreeMap<String, FileRecord>>,
 }
 
 impl<'a> Stage<'a> {
@@ -57,43 +56,42 @@ impl<'a> Stage<'a> {
             claim,
             syncs: Syncs::default(),
             work: WorkFolder::create_in(folder)?,
-            names: Vec::new(),
-            records: BTreeMap::new(),
+            records: Mutex::default(),
         })
     }
 
-    /// Adds a file, which appears with the others on commit.
+    /// Adds a file, which appears with the others on commit. Several threads may add files at once.
     ///
     /// # Errors
     /// Errors of the file system.
-    pub fn write(&mut self, name: &str, contents: impl AsRef<[u8]>) -> io::Result<()> {
+    pub fn write(&self, name: &str, contents: impl AsRef<[u8]>) -> io::Result<()> {
         let contents = contents.as_ref();
         debug_assert!(self.claim.covers(name), "{name} was not claimed");
         self.add(name, contents)?;
-        self.records
-            .insert(name.to_owned(), FileRecord::of(contents));
+        let record = FileRecord::of(contents);
+        lock(&self.records).insert(name.to_owned(), record);
         Ok(())
     }
 
-    fn add(&mut self, name: &str, contents: &[u8]) -> io::Result<()> {
+    fn add(&self, name: &str, contents: &[u8]) -> io::Result<()> {
         let path = self.work.path().join(NEW).join(name);
         system::create_folders(folder_of(&path))?;
         let file = system::create_new(&path)?;
         system::write_all(&file, contents)?;
-        self.names.push(name.to_owned());
         self.syncs.begin(file)
     }
 
-    /// Moves the files into the output folder in the order of addition, moves those of an older run of the same command
-    /// aside, and writes the manifest.
+    /// Moves the files into the output folder in the order of their names, the result document and the manifest last, and those of an older
+    /// run of the same command aside.
     ///
     /// # Errors
     /// Errors of the file system, or a file in the way that kmcfit did not write. The older files are then in place, or
     /// the error names the folder of the new ones.
-    pub fn commit(mut self) -> io::Result<()> {
+    pub fn commit(self) -> io::Result<()> {
         let refused = |error: InputError| io::Error::other(error.to_string());
         let before = Manifest::read(self.folder).map_err(refused)?;
-        let manifest = Manifest::new(self.claim.command, self.records.clone());
+        let records = std::mem::take(&mut *lock(&self.records));
+        let manifest = Manifest::new(self.claim.command, records);
         self.add(MANIFEST, manifest.text().as_bytes())?;
         self.syncs.finish()?;
         let plan = self.plan(before.as_ref(), &manifest)?;
@@ -113,10 +111,16 @@ impl<'a> Stage<'a> {
 
     /// The plan of the exchange, checked against the files in the folder.
     fn plan(&self, before: Option<&Manifest>, manifest: &Manifest) -> io::Result<Plan> {
+        let own = (
+            MANIFEST.to_owned(),
+            FileRecord::of(manifest.text().as_bytes()),
+        );
+        let results = manifest.files.iter();
+        let results = results.map(|(name, record)| (name.clone(), record.clone()));
         let mut put = Vec::new();
-        for name in &self.names {
-            let path = self.folder.join(name);
-            let known = before.and_then(|before| before.files.get(name));
+        for (name, record) in results.chain([own]) {
+            let path = self.folder.join(&name);
+            let known = before.and_then(|before| before.files.get(&name));
             let known = match name == MANIFEST {
                 // The manifest was read and verified.
                 true if before.is_some() => Some(FileRecord::of(&std::fs::read(&path)?)),
@@ -130,10 +134,9 @@ impl<'a> Stage<'a> {
             if !is_free {
                 return Err(in_the_way(&path));
             }
-            let record = self.records.get(name).cloned();
             put.push(Put {
-                name: name.clone(),
-                record: record.unwrap_or_else(|| FileRecord::of(manifest.text().as_bytes())),
+                name,
+                record,
                 replaces: known.filter(|_| state == Some(FileState::Unchanged)),
             });
         }
@@ -146,40 +149,44 @@ impl<'a> Stage<'a> {
     }
 }
 
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Files that are made durable while further ones are prepared, in the order of addition.
 #[derive(Debug, Default)]
-struct Syncs(VecDeque<JoinHandle<io::Result<()>>>);
+struct Syncs(Mutex<VecDeque<JoinHandle<io::Result<()>>>>);
 
 impl Syncs {
-    fn begin(&mut self, file: File) -> io::Result<()> {
-        if self.0.len() >= AT_ONCE {
-            self.finish_oldest()?;
+    fn begin(&self, file: File) -> io::Result<()> {
+        let mut oldest = None;
+        {
+            let mut all = lock(&self.0);
+            if all.len() >= AT_ONCE {
+                oldest = all.pop_front();
+            }
         }
-        self.0.extend(system::begin_sync(file)?);
+        oldest.map_or(Ok(()), finish_one)?;
+        let begun = system::begin_sync(file)?;
+        lock(&self.0).extend(begun);
         Ok(())
     }
 
-    fn finish_oldest(&mut self) -> io::Result<()> {
-        let Some(thread) = self.0.pop_front() else {
-            return Ok(());
-        };
-        let panicked = |_| Err(io::Error::other("a file was not made durable"));
-        thread.join().unwrap_or_else(panicked)
+    fn finish(&self) -> io::Result<()> {
+        let all = std::mem::take(&mut *lock(&self.0));
+        let results: Vec<io::Result<()>> = all.into_iter().map(finish_one).collect();
+        results.into_iter().collect()
     }
+}
 
-    fn finish(&mut self) -> io::Result<()> {
-        while !self.0.is_empty() {
-            self.finish_oldest()?;
-        }
-        Ok(())
-    }
+fn finish_one(thread: JoinHandle<io::Result<()>>) -> io::Result<()> {
+    let panicked = |_| Err(io::Error::other("a file was not made durable"));
+    thread.join().unwrap_or_else(panicked)
 }
 
 impl Drop for Syncs {
     fn drop(&mut self) {
-        while !self.0.is_empty() {
-            let _ = self.finish_oldest();
-        }
+        let _ = self.finish();
     }
 }
 

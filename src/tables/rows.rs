@@ -57,6 +57,14 @@ impl<'a> CsvText<'a> {
     }
 }
 
+/// [`str::trim`], faster for the usual field without blanks.
+fn trimmed(field: &str) -> &str {
+    match field.as_bytes() {
+        [first, .., last] if first.is_ascii_graphic() && last.is_ascii_graphic() => field,
+        _ => field.trim(),
+    }
+}
+
 /// True for a text whose lines are its rows: without quotes, and with line ends `\n` or `\r\n` only.
 fn is_plain(text: &str) -> bool {
     let bytes = text.as_bytes();
@@ -189,10 +197,10 @@ impl<'a> TableRows<'a> {
                 record.clear();
                 let mut from = 0;
                 for to in memchr::memchr_iter(self.delimiter, text.as_bytes()) {
-                    record.push_field(text[from..to].trim());
+                    record.push_field(trimmed(&text[from..to]));
                     from = to + 1;
                 }
-                record.push_field(text[from..].trim());
+                record.push_field(trimmed(&text[from..]));
                 return Ok(Some(line));
             }
         }

@@ -71,7 +71,7 @@ pub fn equally_spaced_at(table: &Table, index: usize) -> Result<f64, InputError>
         );
     };
     let spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let expected = median(&spacings);
+    let expected = median(&*spacings);
     let off = |spacing: &f64| (spacing - expected).abs() > SPACING_TOLERANCE * expected;
     match spacings.iter().position(off) {
         None => in_place(table, column, times, (last - first) / intervals as f64),

@@ -160,11 +160,9 @@ fn finish(workshop: &Workshop) {
         computed: Default::default(),
     };
     let folder = OutputFolder::prepare(&workshop.path("run"), fit_claim(model)).expect("a folder");
-    let mut stage = folder.stage().expect("room");
+    let stage = folder.stage().expect("room");
     let document = finished.document();
-    finished
-        .write(&mut stage, &document)
-        .expect("a run is written");
+    finished.write(&stage, &document).expect("a run is written");
     stage.write(RESULT, json(&document)).expect("room");
     stage.commit().expect("a run");
 }

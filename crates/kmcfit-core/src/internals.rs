@@ -83,10 +83,10 @@ pub mod record {
 }
 pub mod signal {
     pub use crate::signal::{
-        ExcitationShape, Interpolation, Mobility, SecondOrder, Signal, Spectrum, SweepLaw,
-        band_pass, clipped, cut_off, decimate, decimation_filter, driven_oscillator, dropouts,
-        even_spacing, high_pass, low_pass, median, median_spacing, onset, quantisation, spikes,
-        two_forced_modes, two_modes,
+        ExcitationShape, Extremes, Interpolation, Mobility, SecondOrder, Signal, Spectrum,
+        SweepLaw, band_pass, clipped, cut_off, decimate, decimation_filter, driven_oscillator,
+        dropouts, even_spacing, high_pass, low_pass, median, median_spacing, onset, quantisation,
+        spikes, two_forced_modes, two_modes,
     };
 }
 pub mod simd {

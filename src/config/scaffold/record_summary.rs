@@ -64,7 +64,7 @@ impl RecordSummary {
         };
         let mut pairs = moving(table, &times, in_si(table, column)?)?;
         let spacings: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
-        let spacing = median(&spacings);
+        let spacing = median(&*spacings);
         let drives = [Role::Force, Role::BaseAcceleration, Role::BaseDisplacement];
         let input = drives.into_iter().find_map(channel);
         let input = input.map(|c| in_si(table, c)).transpose()?;

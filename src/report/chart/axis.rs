@@ -3,7 +3,9 @@
 //! Ranges are in the coordinate in which the axis is uniform: the value itself, or its decimal logarithm.
 
 use crate::report::text;
+use kmcfit_core::internals::signal::Extremes;
 use serde::{Serialize, Serializer};
+use std::ops::RangeInclusive;
 
 /// Magnitudes beyond this leave gaps, so that no difference of two values overflows.
 pub(super) const LARGEST: f64 = 1e300;
@@ -101,26 +103,16 @@ pub(super) fn even(scale: Scale, value: f64) -> f64 {
 /// The smallest range that contains all drawable values, if any.
 pub(super) fn extent(scale: Scale, values: &[f64]) -> Option<Range> {
     // Of the values, because logarithms take most of the time and have the same order.
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for value in values {
-        let value = drawable(scale, *value);
-        // False for NaN.
-        if value < low {
-            low = value;
-        }
-        if value > high {
-            high = value;
-        }
-    }
+    let Extremes { low, high, .. } = Extremes::of(values, drawable(scale));
     (low <= high).then(|| (even(scale, low), even(scale, high)))
 }
 
-/// A value that can be drawn, else NaN: in the order of its places on the scale.
-pub(super) fn drawable(scale: Scale, value: f64) -> f64 {
+/// Values that can be drawn: those with a place in the uniform coordinate.
+pub(super) fn drawable(scale: Scale) -> RangeInclusive<f64> {
     match scale {
-        Scale::Linear if value.abs() <= LARGEST => value,
-        Scale::Log if value > 0.0 && value <= LARGEST => value,
-        _ => f64::NAN,
+        Scale::Linear => -LARGEST..=LARGEST,
+        // From the smallest number above zero.
+        Scale::Log => f64::from_bits(1)..=LARGEST,
     }
 }
 

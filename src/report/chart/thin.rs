@@ -2,6 +2,7 @@
 
 use super::axis::{Scale, drawable, even, extent};
 use super::plot_mark::{Mark, MarkKind};
+use kmcfit_core::internals::signal::Extremes;
 
 /// Detail of the curves of a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,6 +103,8 @@ fn columns(
             Scale::Log => 10f64.powf(place),
         }
     };
+    let x = &x[..count];
+    let is_ascending = x.is_sorted();
     let mut kept = Vec::new();
     let mut first = 0;
     while first < count {
@@ -111,29 +114,18 @@ fn columns(
             true => bound(here)..bound(here + 1.0),
             false => f64::NEG_INFINITY..f64::INFINITY,
         };
-        let next = x[first + 1..count].iter().position(|x| !inside.contains(x));
-        let end = next.map_or(count, |next| first + 1 + next);
+        let after = &x[first + 1..];
+        let next = match is_ascending && after.first().is_some_and(|x| inside.contains(x)) {
+            true => after.partition_point(|x| *x < inside.end),
+            false => {
+                let next = after.iter().position(|x| !inside.contains(x));
+                next.unwrap_or(after.len())
+            }
+        };
+        let end = first + 1 + next;
         let mut few = vec![first, end - 1];
         for (y, scale) in ys {
-            let mut ends: Option<[(usize, f64); 2]> = None;
-            let mut gap = None;
-            for (i, y) in y.iter().enumerate().take(end).skip(first) {
-                let place = drawable(*scale, *y);
-                if place.is_nan() {
-                    gap = gap.or(Some(i));
-                }
-                if !place.is_finite() {
-                    continue;
-                }
-                let [least, most] = ends.get_or_insert([(i, place); 2]);
-                if place < least.1 {
-                    *least = (i, place);
-                }
-                if place >= most.1 {
-                    *most = (i, place);
-                }
-            }
-            few.extend(ends.into_iter().flatten().map(|(i, _)| i).chain(gap));
+            few.extend(peaks(*scale, &y[first..end]).map(|i| first + i));
         }
         few.sort_unstable();
         few.dedup();
@@ -141,6 +133,18 @@ fn columns(
         first = end;
     }
     kept
+}
+
+/// Indices of the first of the lowest and of the last of the highest drawable values, and of the first one that cannot be drawn.
+fn peaks(scale: Scale, y: &[f64]) -> impl Iterator<Item = usize> {
+    let drawable = drawable(scale);
+    let found = Extremes::of(y, drawable.clone());
+    let lowest = y.iter().position(|y| *y == found.low);
+    let highest = y.iter().rposition(|y| *y == found.high);
+    let ends = [lowest, highest].into_iter();
+    let ends = ends.filter(move |_| found.low <= found.high);
+    let gap = (!found.are_all_within).then(|| y.iter().position(|y| !drawable.contains(y)));
+    ends.chain([gap.flatten()]).flatten()
 }
 
 /// The ends of the straight segments of a curve: all points between them are within [`STRAIGHT`] of the segments.

@@ -173,7 +173,7 @@ impl Comparison {
     /// # Errors
     /// An error of the file system.
     pub fn write(&self, folder: &OutputFolder) -> io::Result<()> {
-        let mut stage = folder.stage()?;
+        let stage = folder.stage()?;
         for figure in figures::all(self) {
             stage.write(&format!("figures/{}.svg", figure.name), render(&figure))?;
         }

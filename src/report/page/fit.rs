@@ -28,6 +28,7 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
 
 fn page_of(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
     let figures = |drawn: &[Figure]| figures(drawn, detail);
+    let drawn = run.drawn();
     let sections: Vec<Section> = vec![
         (
             "fit",
@@ -39,13 +40,9 @@ fn page_of(run: &FittedModel, document: &ResultDocument, detail: Detail) -> Stri
             "Coefficients",
             coefficients(run, document, detail),
         ),
-        ("input", "Input", figures(&run.input_figures())),
-        ("spectra", "Spectra", figures(&run.drawn_channels().spectra)),
-        (
-            "tests",
-            "Residual tests",
-            figures(&run.drawn_channels().tests),
-        ),
+        ("input", "Input", figures(&drawn.inputs)),
+        ("spectra", "Spectra", figures(&drawn.spectra)),
+        ("tests", "Residual tests", figures(&drawn.tests)),
         ("checks", "Checks of step and terms", checks(document)),
         (
             "validation",
@@ -93,7 +90,8 @@ fn fit_and_residuals(run: &FittedModel, document: &ResultDocument, detail: Detai
 
 /// Table of all coefficients, and figures of those that vary.
 fn coefficients(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
-    let mut ratios = run.ratios_figure();
+    let drawn = run.drawn();
+    let mut ratios = drawn.ratios.clone();
     // Ratios to a damping of zero to machine precision are rounding errors.
     if document
         .functions
@@ -101,12 +99,13 @@ fn coefficients(run: &FittedModel, document: &ResultDocument, detail: Detail) ->
         .is_some_and(|f| f.negligible)
     {
         let of_damping = ["c/m", "damping ratio ζ"];
-        ratios
-            .panels
-            .retain(|panel| !of_damping.contains(&panel.y.label.as_str()));
+        if let Some(figure) = &mut ratios {
+            let panels = &mut figure.panels;
+            panels.retain(|panel| !of_damping.contains(&panel.y.label.as_str()));
+        }
     }
-    let varying = [run.functions_figure(), ratios].map(Figure::varying);
-    let varying: Vec<Figure> = varying.into_iter().flatten().collect();
+    let both = drawn.functions.clone().into_iter().chain(ratios);
+    let varying: Vec<Figure> = both.filter_map(Figure::varying).collect();
     overview::functions(document)
         + &overview::ratios_of_records(run)
         + &figures_without(START, &varying, detail)
@@ -133,15 +132,10 @@ fn solver(run: &FittedModel, document: &ResultDocument, detail: Detail) -> Strin
     if run.fit.history.len() > 1 {
         drawn.push(run.convergence());
     }
-    for (i, experiment) in run.model.problem.experiments.iter().enumerate() {
-        let channel = experiment.channels.first().filter(|c| c.stride().is_some());
-        // The response is in SI units; the page has one unit for a quantity.
-        let is_si = run.channel_view(i, 0).factor() == 1.0;
-        let Some(channel) = channel.filter(|_| is_si && !run.fit.snapshots.is_empty()) else {
-            continue;
-        };
-        let response = run.response(i, channel.times(), channel.observed());
-        drawn.push(run.titled(response, i, 0));
+    for ((i, channel), of_channel) in run.channels().into_iter().zip(&run.drawn().channels) {
+        let response = of_channel.response.as_ref().filter(|_| channel == 0);
+        let response = response.filter(|_| !run.fit.snapshots.is_empty());
+        drawn.extend(response.map(|figure| run.titled(figure.clone(), i, 0)));
     }
     let work = overview::state(document)
         + &paragraph(&overview::work(document))

@@ -20,7 +20,7 @@ pub(super) fn validation(run: &FittedModel, document: &ResultDocument, detail: D
     let records: Vec<String> = document.validation.iter().map(record).collect();
     paragraph(&format!("{result}. {basis}"))
         + &list(&records)
-        + &figures(&run.validation_figures(), detail)
+        + &figures(&run.drawn().validation, detail)
 }
 
 /// A record with its own parameters.

@@ -63,7 +63,7 @@ impl StudyDocument {
     /// # Errors
     /// An error of the file system.
     pub fn write(&self, folder: &OutputFolder, model: &Model) -> io::Result<()> {
-        let mut stage = folder.stage()?;
+        let stage = folder.stage()?;
         for figure in figures::all(self) {
             stage.write(&format!("figures/{}.svg", figure.name), render(&figure))?;
         }

@@ -80,7 +80,7 @@ fn coherent_share(channel: &Channel, predicted: &[f64], input: &Signal) -> Optio
     is_judged.then_some(())?;
     let innovations = DVector::from_vec(channel.majorant(predicted).weighted);
     let innovations = innovations.rows(LAGS, count);
-    let at_samples: Vec<f64> = times.iter().map(|t| input.value(*t)).collect();
+    let at_samples = input.values_at(times);
     let mean = at_samples.iter().sum::<f64>() / at_samples.len() as f64;
     let about_mean = at_samples.iter().map(|u| u - mean);
     let input = DVector::from_iterator(at_samples.len(), about_mean);

@@ -450,7 +450,7 @@ fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
     let pairs = nodal.mass.iter().zip(&nodal.coefficients[place]);
     let squares: Vec<f64> = pairs.map(|(m, k)| (k / m).max(0.0)).collect();
     // Median over time, because k/m may be arbitrary at the ends of a record.
-    let frequency = median(&squares).sqrt() / TAU;
+    let frequency = median(squares).sqrt() / TAU;
     (frequency * spacing > PERIODS_PER_SAMPLE).then(|| FitWarning::Aliased {
         per_period: 1.0 / (frequency * spacing),
         frequency,

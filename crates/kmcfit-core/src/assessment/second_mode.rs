@@ -99,7 +99,7 @@ fn second_mode(
     let before = mean_square(&innovations[..count]);
     let residuals: Vec<f64> = channel.residuals(predicted).take(count).collect();
     let nodal = evaluation.nodal_of(experiment.coefficient_set);
-    let frequency = median(&Ratios::of(nodal).frequency);
+    let frequency = median(Ratios::of(nodal).frequency);
     let starts = record.starts(frequency, &residuals)?;
     let found = map(starts.len(), available(), |i| record.search(starts[i]));
     let found = found.into_iter().flatten();

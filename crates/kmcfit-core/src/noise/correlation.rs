@@ -55,7 +55,7 @@ pub fn uninterrupted_runs(times: &[f64]) -> Option<Vec<Range<usize>>> {
     if spacings.is_empty() {
         return Some(std::iter::once(0..times.len()).collect());
     }
-    let usual = median(&spacings);
+    let usual = median(&*spacings);
     let mut runs = Vec::new();
     let mut first = 0;
     for (i, spacing) in spacings.into_iter().enumerate() {

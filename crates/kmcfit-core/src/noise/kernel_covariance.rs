@@ -26,7 +26,8 @@
 //! The kernel continues on the other side of the circle, where it is below `2e-4`: `L >= max(2 N, N + 32 b)`.
 
 use crate::signal::RealTransform;
-use nalgebra::{DMatrix, DMatrixView};
+use crate::threads::{analyses_at_once, available_for, both};
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut};
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
@@ -122,24 +123,43 @@ fn correlated_sum(scores: &DMatrixView<f64>, bandwidth: f64) -> DMatrix<f64> {
     let least = (2 * count).max(count + (APART * bandwidth) as usize);
     let length = length_of_circle(least);
     let weights = window(length, bandwidth);
-    let mut transform = RealTransform::new(length, weights.len());
+    let transform = || RealTransform::new(length, weights.len());
     if parameters == 1 {
-        return weighted_square(scores.iter().copied(), &mut transform, &weights);
+        return weighted_square(scores.iter().copied(), &mut transform(), &weights);
     }
     // Real and imaginary parts of the scores, times the roots of their weights.
     let mut parts = DMatrix::zeros(2 * weights.len(), parameters);
-    for (score, mut part) in scores.column_iter().zip(parts.column_iter_mut()) {
-        let into = part.as_mut_slice();
-        transform.process(score.iter().copied(), |k, x| {
-            into[2 * k] = weights[k] * x.re;
-            into[2 * k + 1] = weights[k] * x.im;
-        });
+    let transformed = |scores: &DMatrixView<f64>, mut parts: DMatrixViewMut<f64>| {
+        let mut transform = transform();
+        for (score, mut part) in scores.column_iter().zip(parts.column_iter_mut()) {
+            let into = part.as_mut_slice();
+            transform.process(score.iter().copied(), |k, x| {
+                into[2 * k] = weights[k] * x.re;
+                into[2 * k + 1] = weights[k] * x.im;
+            });
+        }
+    };
+    match analyses_at_once(count).min(available_for(count)) {
+        1 => transformed(scores, parts.as_view_mut()),
+        _ => {
+            let half = parameters.div_ceil(2);
+            let (first, second) = parts.columns_range_pair_mut(..half, half..);
+            both(
+                || transformed(&scores.columns_range(..half), first),
+                || transformed(&scores.columns_range(half..), second),
+            );
+        }
     }
     let mut sum = DMatrix::zeros(parameters, parameters);
     for first in (0..parts.nrows()).step_by(ROWS) {
         let rows = parts.rows(first, ROWS.min(parts.nrows() - first));
-        sum += rows.tr_mul(&rows);
+        for a in 0..parameters {
+            for b in 0..=a {
+                sum[(a, b)] += rows.column(a).dot(&rows.column(b));
+            }
+        }
     }
+    sum.fill_upper_triangle_with_lower_triangle();
     sum
 }
 
@@ -201,6 +221,7 @@ fn window(length: usize, bandwidth: f64) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::diagnostics::noise::{auto_regression, white};
+    use crate::threads::given;
 
     /// Three scores of different correlation and size, in records of 40, 1 and 23 samples.
     fn scores() -> (DMatrix<f64>, Vec<Range<usize>>) {
@@ -333,6 +354,22 @@ mod tests {
                 (mean / expected - 1.0).abs() < within,
                 "{rho}: {mean} {expected}"
             );
+        }
+    }
+
+    /// The sum is that of one thread to the last bit, for an even and an odd number of scores.
+    #[test]
+    fn the_sum_does_not_depend_on_the_number_of_threads() {
+        let values: Vec<f64> = (0..4)
+            .flat_map(|seed| auto_regression(seed, 12_000, 0.6))
+            .collect();
+        for parameters in [2, 3] {
+            let scores =
+                DMatrix::from_column_slice(12_000, parameters, &values[..12_000 * parameters]);
+            let whole = 0..12_000;
+            let sum = || kernel_sum(&scores, std::slice::from_ref(&whole), 9.0);
+            let [one, two] = [1, 2].map(|threads| given(threads, sum));
+            assert!(one == two && one.trace() > 0.0);
         }
     }
 

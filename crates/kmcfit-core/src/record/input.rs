@@ -93,25 +93,22 @@ impl Input {
     /// Forces (N) and accelerations of the base (m/s^2) at some times (s); empty without them, and shared with a signal at the times of its
     /// samples.
     pub(crate) fn inputs_at(&self, times: &[f64]) -> [Arc<Vec<f64>>; 2] {
-        let values = |signal: Option<&Signal>, at: &dyn Fn(f64) -> f64| {
-            let shared = signal.and_then(|signal| signal.values_at(times));
-            shared.unwrap_or_else(|| Arc::new(times.iter().map(|t| at(*t)).collect()))
-        };
-        let forces = self.force.as_ref().map(|force| {
-            let signal = match force {
-                Waveform::Samples(signal) => Some(signal),
-                Waveform::Shape(_) => None,
-            };
-            values(signal, &|t| self.force_at(t))
+        let bases = self.base.as_ref().map(|base| match base {
+            BaseMotion::Acceleration(signal) => signal.values_at(times),
+            BaseMotion::Displacement(_) => {
+                let accelerations = times.iter().map(|t| self.base_acceleration_at(*t));
+                Arc::new(accelerations.collect())
+            }
         });
-        let bases = self.base.as_ref().map(|base| {
-            let signal = match base {
-                BaseMotion::Acceleration(signal) => Some(signal),
-                BaseMotion::Displacement(_) => None,
-            };
-            values(signal, &|t| self.base_acceleration_at(t))
-        });
-        [forces, bases].map(Option::unwrap_or_default)
+        [self.forces_at(times), bases].map(Option::unwrap_or_default)
+    }
+
+    /// Forces (N) at some times (s), shared with a signal at the times of its samples; `None` without a force.
+    pub fn forces_at(&self, times: &[f64]) -> Option<Arc<Vec<f64>>> {
+        Some(match self.force.as_ref()? {
+            Waveform::Samples(signal) => signal.values_at(times),
+            Waveform::Shape(shape) => Arc::new(times.iter().map(|t| shape.value(*t)).collect()),
+        })
     }
 
     /// Acceleration of the base at time `t` (s), m/s^2.

@@ -111,7 +111,7 @@ pub fn spikes(times: &[f64], values: &[f64]) -> Vec<usize> {
     }
     let deviation = |part: &[f64]| {
         let sizes: Vec<f64> = part.iter().map(|d| d.abs()).collect();
-        MEDIAN_TO_SIGMA * median(&sizes)
+        MEDIAN_TO_SIGMA * median(sizes)
     };
     let of_all = deviation(&distances);
     let is_spike = |i: &usize| {

@@ -118,7 +118,7 @@ impl CrossSpectra {
     fn least_drive(&self) -> f64 {
         let drive: Vec<f64> = self.sums.iter().skip(1).map(|(xx, ..)| *xx).collect();
         let mean = drive.iter().sum::<f64>() / drive.len() as f64;
-        (DRIVEN * median(&drive)).max(DRIVEN_OF_MEAN * mean)
+        (DRIVEN * median(drive)).max(DRIVEN_OF_MEAN * mean)
     }
 }
 

@@ -28,6 +28,8 @@ pub struct Signal {
     times: Arc<Vec<f64>>,
     values: Arc<Vec<f64>>,
     interpolation: Interpolation,
+    /// Mean number of samples per second, for the search of a time.
+    rate: f64,
     /// Second derivatives at the samples; empty unless cubic.
     curvatures: Arc<Vec<f64>>,
 }
@@ -50,7 +52,9 @@ impl Signal {
             _ => Vec::new(),
         };
         let bent = curvatures.iter().all(|bend| bend.is_finite());
+        let duration = times[times.len() - 1] - times[0];
         bent.then_some(Self {
+            rate: (times.len() - 1) as f64 / duration.max(f64::MIN_POSITIVE),
             times: Arc::new(times),
             values: Arc::new(values),
             interpolation,
@@ -81,9 +85,12 @@ impl Signal {
         &self.values
     }
 
-    /// Values at `times`, where they are the times of the samples: shared, because long records have few arrays of all samples.
-    pub(crate) fn values_at(&self, times: &[f64]) -> Option<Arc<Vec<f64>>> {
-        (*self.times == times).then(|| Arc::clone(&self.values))
+    /// Values at some times (s); at the times of the samples shared, because long records have few arrays of all samples.
+    pub(crate) fn values_at(&self, times: &[f64]) -> Arc<Vec<f64>> {
+        match *self.times == times {
+            true => Arc::clone(&self.values),
+            false => Arc::new(times.iter().map(|t| self.value(*t)).collect()),
+        }
     }
 
     /// Shares `times` where they are the times of the samples.
@@ -197,8 +204,7 @@ impl Signal {
     fn cell(&self, t: f64) -> Option<usize> {
         let last = self.times.len().checked_sub(2)?;
         // For equally spaced samples the index is known except for rounding.
-        let span = self.times[last + 1] - self.times[0];
-        let guess = ((t - self.times[0]) / span * (last + 1) as f64) as usize;
+        let guess = ((t - self.times[0]) * self.rate) as usize;
         for cell in [guess, guess.saturating_sub(1), guess + 1] {
             if cell <= last && self.times[cell] <= t && t < self.times[cell + 1] {
                 return Some(cell);

@@ -11,6 +11,7 @@
 
 mod clipping;
 mod decimate;
+mod extremes;
 mod faults;
 mod filter;
 mod fourier;
@@ -25,6 +26,7 @@ mod spline;
 
 pub use clipping::{clipped, cut_off};
 pub use decimate::{decimate, decimation_filter};
+pub use extremes::Extremes;
 pub use faults::{dropouts, quantisation, spikes};
 pub use filter::{SecondOrder, band_pass, high_pass, low_pass, zero_phase, zero_phase_transpose};
 pub(crate) use fourier::RealTransform;

@@ -20,12 +20,12 @@ pub fn even_spacing(times: &[f64]) -> Option<f64> {
 /// If there are fewer than two times.
 pub fn median_spacing(times: &[f64]) -> f64 {
     let spacings: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
-    median(&spacings)
+    median(spacings)
 }
 
-/// Median of a nonempty list of values.
-pub fn median(values: &[f64]) -> f64 {
-    let mut values = values.to_vec();
+/// Median of a nonempty list of values. A `Vec` is reordered in place, a slice copied.
+pub fn median(values: impl Into<Vec<f64>>) -> f64 {
+    let mut values = values.into();
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -145,7 +145,7 @@ impl Spectrum {
     /// assert!(spectrum.without_noise().energy_quantile(0.999) < 1.2 * frequency);
     /// ```
     pub fn without_noise(&self) -> Self {
-        let floor = median(&self.density) / std::f64::consts::LN_2;
+        let floor = median(&*self.density) / std::f64::consts::LN_2;
         let kept = |density: &f64| {
             if *density > ABOVE_NOISE * floor {
                 *density

@@ -163,7 +163,7 @@ fn without_outliers(problem: &Problem, theta: &[f64]) -> Option<Vec<f64>> {
             function.quantity,
             CoefficientKind::Mass | CoefficientKind::Stiffness
         );
-        let median = median(&values);
+        let median = median(&*values);
         let range = median / OUTLYING..=median * OUTLYING;
         if !is_wanted || median <= 0.0 || values.iter().all(|value| range.contains(value)) {
             continue;

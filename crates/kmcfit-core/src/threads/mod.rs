@@ -12,23 +12,42 @@ pub use parallel::{interruptible, map, map_with_progress};
 use crate::host;
 use std::cell::Cell;
 use std::io;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, Scope, ScopedJoinHandle};
 
 thread_local! {
-    static SHARES: Cell<bool> = const { Cell::new(false) };
+    /// Number of threads for the work of this thread where it is given; else it follows from the processors.
+    static GIVEN: Cell<Option<usize>> = const { Cell::new(None) };
+    /// True if this thread is counted in [`BUSY`].
+    static IS_COUNTED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// True if a second thread has a processor: there are at least two, and this thread does not share them with others.
+static PROCESSORS: LazyLock<usize> =
+    LazyLock::new(|| std::thread::available_parallelism().map_or(1, usize::from));
+
+/// Number of threads in parallel work, without those that wait for others. Threads that only write or watch are not counted.
+static BUSY: AtomicUsize = AtomicUsize::new(0);
+
+/// True if a processor is free and this thread may use it.
 pub fn spare() -> bool {
     available() > 1
 }
 
-/// Number of threads that have a processor each: 1 for a thread that shares them with others.
+/// Number of threads that have a processor each, this one included: as many as processors are free, but at most two for work within other
+/// parallel work, whose memory adds up; 1 for a thread that shares the processors.
 pub fn available() -> usize {
-    static THREADS: LazyLock<usize> =
-        LazyLock::new(|| std::thread::available_parallelism().map_or(1, usize::from));
-    if SHARES.get() { 1 } else { *THREADS }
+    let busy = BUSY.load(Ordering::Relaxed);
+    GIVEN
+        .get()
+        .unwrap_or_else(|| threads_on(*PROCESSORS, busy, IS_COUNTED.get()))
+}
+
+/// [`available`] of a thread beside `busy` threads, itself one of them if it is counted.
+fn threads_on(processors: usize, busy: usize, is_counted: bool) -> usize {
+    let others = busy.saturating_sub(usize::from(is_counted));
+    let threads = processors.saturating_sub(others).max(1);
+    if is_counted { threads.min(2) } else { threads }
 }
 
 /// [`available`] for work that takes some nanoseconds for each of `samples` samples: 1 where it takes less time than the start of a thread.
@@ -46,7 +65,7 @@ pub fn analyses_at_once(samples: usize) -> usize {
 
 /// Marks this thread as one that shares the processors.
 pub fn share() {
-    SHARES.set(true);
+    GIVEN.set(Some(1));
 }
 
 /// Starts a scoped thread.
@@ -63,9 +82,14 @@ pub fn spawn_scoped<'scope, T: Send + 'scope>(
 
 /// Does `work` with this thread marked as sharing the processors.
 pub fn sharing<T>(work: impl FnOnce() -> T) -> T {
-    let before = SHARES.replace(true);
+    given(1, work)
+}
+
+/// Does `work` with this number of threads for each parallel work of this thread, whatever processors are free.
+pub fn given<T>(threads: usize, work: impl FnOnce() -> T) -> T {
+    let before = GIVEN.replace(Some(threads));
     let result = work();
-    SHARES.set(before);
+    GIVEN.set(before);
     result
 }
 
@@ -97,23 +121,77 @@ fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Does `own` on this thread and `other` on each of up to `count` further threads, as many as start, which share the processors. One
-/// function for all types, because a start of threads is several kilobytes of program.
+/// A thread that is counted in [`BUSY`].
+struct Counted;
+
+impl Counted {
+    fn new() -> Self {
+        BUSY.fetch_add(1, Ordering::Relaxed);
+        Self
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        BUSY.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// Parallel work of this thread, which is counted until its end; not a second time within other parallel work.
+struct ParallelWork(Option<Counted>);
+
+impl ParallelWork {
+    fn begin() -> Self {
+        Self((!IS_COUNTED.replace(true)).then(Counted::new))
+    }
+}
+
+impl Drop for ParallelWork {
+    fn drop(&mut self) {
+        IS_COUNTED.set(self.0.is_none());
+    }
+}
+
+/// A wait of this thread for others, during which it is not counted.
+struct Waiting;
+
+impl Waiting {
+    fn begin() -> Self {
+        BUSY.fetch_sub(1, Ordering::Relaxed);
+        Self
+    }
+}
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        BUSY.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// Does `own` on this thread and `other` on each of up to `count` further threads, as many as start. One function for all types, because a
+/// start of threads is several kilobytes of program.
 ///
 /// # Panics
 /// If one of them panics.
 fn beside(count: usize, other: &(dyn Fn() + Sync), own: &mut dyn FnMut()) {
+    if count == 0 {
+        return own();
+    }
+    let _work = ParallelWork::begin();
     std::thread::scope(|scope| {
-        let other = || {
-            share();
-            other();
-        };
-        let others = (0..count).map_while(|_| spawn_scoped(scope, other).ok());
+        let others = (0..count).map_while(|_| {
+            // Before it starts, so that work of this thread does not take its processor.
+            let counted = Counted::new();
+            let work = move || {
+                let _counted = counted;
+                IS_COUNTED.set(true);
+                other();
+            };
+            spawn_scoped(scope, work).ok()
+        });
         let others: Vec<ScopedJoinHandle<()>> = others.collect();
-        match others.is_empty() {
-            true => own(),
-            false => sharing(own),
-        }
+        own();
+        let _waiting = Waiting::begin();
         for thread in others {
             if let Err(panic) = thread.join() {
                 std::panic::resume_unwind(panic);
@@ -132,6 +210,36 @@ mod tests {
             assert_eq!([own, other], [1, 2]);
         }
         assert!(std::panic::catch_unwind(|| both(|| 1, || panic!("the second"))).is_err());
+    }
+
+    /// A thread outside parallel work has the free processors; one within it at most one more, and none where all are busy.
+    #[test]
+    fn threads_have_the_processors_that_are_free() {
+        let outside = [0, 1, 3, 4, 9].map(|busy| threads_on(4, busy, false));
+        assert_eq!(outside, [4, 3, 1, 1, 1]);
+        let within = [1, 2, 3, 4, 9].map(|busy| threads_on(4, busy, true));
+        assert_eq!(within, [2, 2, 2, 1, 1]);
+        assert_eq!([false, true].map(|within| threads_on(1, 1, within)), [1, 1]);
+        assert_eq!(given(7, available), 7);
+    }
+
+    #[test]
+    fn threads_are_counted_within_parallel_work_only() {
+        let counted = || IS_COUNTED.get();
+        for threads in [2, 3] {
+            let within = || map(2, threads, |_| counted());
+            assert_eq!(within(), [true, true]);
+            assert!(!counted());
+            assert_eq!(map(1, threads, |_| counted()), [false]);
+        }
+        let nested = || given(2, || both(counted, counted));
+        assert_eq!(
+            given(2, || both(nested, nested)),
+            ((true, true), (true, true))
+        );
+        let panics = || given(2, || both(|| panic!("the first"), || ()));
+        assert!(std::panic::catch_unwind(panics).is_err() && !counted());
+        GIVEN.set(None);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Independent jobs on several threads.
 
-use super::{beside, lock};
+use super::{beside, lock, sharing};
 use crate::host;
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -35,7 +35,11 @@ pub fn map_with_progress<T: Send>(
 ) -> Vec<T> {
     let finished = AtomicUsize::new(0);
     let job = |index| {
-        let result = work(index);
+        // The number of threads may be that for which there is memory.
+        let result = match threads {
+            0 | 1 => work(index),
+            _ => sharing(|| work(index)),
+        };
         host::progress(finished.fetch_add(1, Ordering::Relaxed) + 1, count);
         result
     };

@@ -13,6 +13,8 @@ use crate::tables::{
     ColumnName, Duplicates, RepeatedTimes, SAMPLE_RATES, Table, TableFormat, repeated_times,
 };
 use crate::units::{Quantity, Unit};
+use std::borrow::Cow;
+use std::ops::Range;
 use std::rc::Rc;
 
 /// Default name of the column of times.
@@ -36,6 +38,39 @@ pub struct ColumnSamples {
     pub label: String,
     /// Detected format of the file, as text.
     pub format: String,
+}
+
+/// The rows of a column that have a number, in order; `None` where all have.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PresentRows(Option<Vec<usize>>);
+
+impl PresentRows {
+    pub fn of(values: &[f64]) -> Self {
+        let is_present = |row: &usize| !values[*row].is_nan();
+        let has_gaps = values.iter().any(|value| value.is_nan());
+        Self(has_gaps.then(|| (0..values.len()).filter(is_present).collect()))
+    }
+
+    /// The row of the sample `i` of those present.
+    pub fn row(&self, i: usize) -> usize {
+        self.0.as_ref().map_or(i, |rows| rows[i])
+    }
+
+    /// These rows of a column; a column that keeps all of them is not copied.
+    pub fn pick<'a>(&self, column: &'a [f64]) -> Cow<'a, [f64]> {
+        match &self.0 {
+            None => Cow::Borrowed(column),
+            Some(rows) => rows.iter().map(|row| column[*row]).collect(),
+        }
+    }
+
+    /// These rows of a column that is no longer needed.
+    pub fn picked(&self, column: Vec<f64>) -> Vec<f64> {
+        match &self.0 {
+            None => column,
+            Some(rows) => rows.iter().map(|row| column[*row]).collect(),
+        }
+    }
 }
 
 /// A requested column, with its keys in the model file.
@@ -121,14 +156,18 @@ pub fn read(
     repeats(file, spec, wanted.experiment, table, &times, notes);
     let inside = inside(file, &experiment, spec, &times.values)?;
     let duplicates = spec.duplicates.unwrap_or_default();
-    let values = times.repeated.merged(values, duplicates);
-    let beside = beside.map(|b| times.repeated.merged(b, duplicates));
+    let samples = |column| {
+        let merged = times.repeated.merged(column, duplicates);
+        let inside = merged[inside.clone()].iter();
+        inside.map(|value| factor * value).collect()
+    };
+    let (values, beside) = (samples(values), beside.map(samples));
     let zero = spec.time_zero.map_or(0.0, |t| t.0);
     Ok(ColumnSamples {
-        times: inside.iter().map(|&r| times.values[r] - zero).collect(),
-        values: inside.iter().map(|&r| factor * values[r]).collect(),
-        beside: beside.map(|b| inside.iter().map(|&r| factor * b[r]).collect()),
         outside: times.values.len() - inside.len(),
+        times: times.values[inside].iter().map(|t| t - zero).collect(),
+        values,
+        beside,
         unit: unit.unit,
         time_unit: times.unit,
         label,
@@ -218,16 +257,16 @@ impl<'a> Source<'a> {
     }
 }
 
-/// The rows in the window.
+/// The rows in the window, of increasing times.
 fn inside(
     file: &ModelFile,
     experiment: &str,
     spec: &ExperimentSpec,
     times: &[f64],
-) -> Result<Vec<usize>, InputError> {
+) -> Result<Range<usize>, InputError> {
     let [from, to] = window(file, experiment, spec)?;
-    let is_inside = |r: &usize| (from..=to).contains(&times[*r]);
-    let inside: Vec<usize> = (0..times.len()).filter(is_inside).collect();
+    let first = times.partition_point(|t| *t < from);
+    let inside = first..times.partition_point(|t| *t <= to);
     match inside.is_empty() {
         false => Ok(inside),
         true => Err(file

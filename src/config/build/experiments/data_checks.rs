@@ -18,6 +18,7 @@ use kmcfit_core::internals::signal::{
 };
 use kmcfit_core::internals::system::round_time;
 use kmcfit_core::internals::threads::both;
+use std::cell::OnceCell;
 use std::f64::consts::{PI, TAU};
 
 /// Factors between units that a ratio between channels, or between a sample and the given state, suggests.
@@ -56,10 +57,11 @@ const FEWEST_IN_A_PERIOD: f64 = 4.0;
 pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord) -> Vec<Finding> {
     let name = file.experiment_name(i);
     let of_units = || {
-        let mut warnings = unit_factors(spec, record);
-        warnings.extend(magnitudes(record));
+        let spectra = ChannelSpectra::of(record);
+        let mut warnings = unit_factors(spec, record, &spectra);
+        warnings.extend(magnitudes(record, &spectra));
         warnings.extend(implied_mass(file, record));
-        warnings.extend(opposite_signs(spec, record));
+        warnings.extend(opposite_signs(spec, record, &spectra));
         warnings
     };
     let of_motion = || {
@@ -80,8 +82,29 @@ pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord)
         .collect()
 }
 
+/// Spectra of the channels of a record, each computed where it is first needed.
+struct ChannelSpectra<'a>(Vec<(&'a RawChannel, OnceCell<Option<Spectrum>>)>);
+
+impl<'a> ChannelSpectra<'a> {
+    fn of(record: &'a RawRecord) -> Self {
+        let channels = record.channels.iter();
+        Self(channels.map(|channel| (channel, OnceCell::new())).collect())
+    }
+
+    /// `None` for too few samples.
+    fn at(&self, kind: ChannelKind) -> Option<&Spectrum> {
+        let (channel, spectrum) = self.0.iter().find(|(channel, _)| channel.kind == kind)?;
+        let of_channel = || Spectrum::of(&channel.values, channel.median_spacing);
+        spectrum.get_or_init(of_channel).as_ref()
+    }
+}
+
 /// Channels of one response, or a sample and the given state, that disagree by a [`SUSPICIOUS`] factor.
-fn unit_factors(spec: &ExperimentSpec, record: &RawRecord) -> Vec<DataWarning> {
+fn unit_factors(
+    spec: &ExperimentSpec,
+    record: &RawRecord,
+    spectra: &ChannelSpectra,
+) -> Vec<DataWarning> {
     let mut found = Vec::new();
     let mut add = |ratio: f64, quantity: String| {
         if let Some(factor) = factor_near(ratio, record) {
@@ -109,7 +132,7 @@ fn unit_factors(spec: &ExperimentSpec, record: &RawRecord) -> Vec<DataWarning> {
         let [Some(low), Some(high)] = pair.map(first) else {
             continue;
         };
-        let Some(spectrum) = Spectrum::of(&low.values, low.median_spacing) else {
+        let Some(spectrum) = spectra.at(low.kind) else {
             continue;
         };
         let omega = TAU * spectrum.dominant();
@@ -139,7 +162,7 @@ fn factor_near(ratio: f64, record: &RawRecord) -> Option<&'static str> {
 }
 
 /// Magnitudes outside the range of mechanical vibrations, and mains hum at a frequency that it has in another unit of time.
-fn magnitudes(record: &RawRecord) -> Vec<DataWarning> {
+fn magnitudes(record: &RawRecord, spectra: &ChannelSpectra) -> Vec<DataWarning> {
     let Some(first) = record.channels.first() else {
         return Vec::new();
     };
@@ -165,7 +188,7 @@ fn magnitudes(record: &RawRecord) -> Vec<DataWarning> {
     }
     let hum = first
         .time_unit
-        .and_then(|unit| mains_hum(&first.values, first.median_spacing, unit));
+        .and_then(|unit| mains_hum(spectra.at(first.kind)?, unit));
     let hum = hum.map(|(frequency, unit)| DataWarning::MainsHum {
         channel: first.kind.name(),
         frequency,
@@ -181,10 +204,9 @@ fn implied_mass(file: &ModelFile, record: &RawRecord) -> Option<DataWarning> {
         KnownValue::Map(map) => map.value?.0,
         KnownValue::Unknown => return None,
     };
-    let force = record.force()?;
     let channel = record.channels.first()?;
     let spacing = channel.spacing?;
-    let force: Vec<f64> = channel.times.iter().map(|t| force.value(*t)).collect();
+    let force = record.excitation.forces_at(&channel.times)?;
     let [implied, ..] = driven_oscillator(&force, &channel.values, spacing, channel.kind as i32)?;
     let ratio = implied / stated;
     Some(DataWarning::SuspiciousMass {
@@ -196,14 +218,19 @@ fn implied_mass(file: &ModelFile, record: &RawRecord) -> Option<DataWarning> {
 }
 
 /// Pairs of channels of one response with opposite signs.
-fn opposite_signs(spec: &ExperimentSpec, record: &RawRecord) -> Vec<DataWarning> {
+fn opposite_signs(
+    spec: &ExperimentSpec,
+    record: &RawRecord,
+    spectra: &ChannelSpectra,
+) -> Vec<DataWarning> {
     let channels = &record.channels;
     let pairs = (channels.iter().enumerate())
         .flat_map(|(place, high)| channels[..place].iter().map(move |low| (low, high)));
     let opposite = pairs.filter(|(low, high)| {
         let gains = gain_sign(spec, low.kind).zip(gain_sign(spec, high.kind));
         gains.is_some_and(|(one, other)| {
-            one * other * correlation_with_estimate(low, high).unwrap_or_default() < -OPPOSITE
+            let correlation = correlation_with_estimate(low, high, spectra);
+            one * other * correlation.unwrap_or_default() < -OPPOSITE
         })
     });
     let warnings = opposite.map(|(low, high)| DataWarning::OppositeSign {
@@ -230,8 +257,12 @@ fn gain_sign(spec: &ExperimentSpec, kind: ChannelKind) -> Option<f64> {
 
 /// Correlation of the samples of `high` with their estimate from `low`: its slope, or for an acceleration and a
 /// displacement the negative displacement, as for a harmonic response. `None` for too few periods or samples.
-fn correlation_with_estimate(low: &RawChannel, high: &RawChannel) -> Option<f64> {
-    let frequency = Spectrum::of(&high.values, high.median_spacing)?.dominant();
+fn correlation_with_estimate(
+    low: &RawChannel,
+    high: &RawChannel,
+    spectra: &ChannelSpectra,
+) -> Option<f64> {
+    let frequency = spectra.at(high.kind)?.dominant();
     let duration = high.times[high.times.len() - 1] - high.times[0];
     if frequency * duration < FEWEST_PERIODS
         || frequency * low.median_spacing * FEWEST_IN_A_PERIOD > 1.0
@@ -268,8 +299,7 @@ fn modes(spec: &ExperimentSpec, record: &RawRecord) -> Option<DataWarning> {
         if !has_input(spec, record) {
             return two_modes(&c.values, c.median_spacing);
         }
-        let force = record.excitation.force()?;
-        let force: Vec<f64> = c.times.iter().map(|t| force.value(*t)).collect();
+        let force = record.excitation.forces_at(&c.times)?;
         two_forced_modes(&force, &c.values, c.median_spacing, c.kind as i32)
     };
     let each = record.channels.iter().filter(|c| c.spacing.is_some());
@@ -310,7 +340,7 @@ fn outliers(spec: &ExperimentSpec, channel: &RawChannel) -> Option<DataWarning> 
     if !channel.is_squared() {
         return None;
     }
-    let level = median(&channel.values);
+    let level = median(channel.values.as_slice());
     let away: Vec<f64> = channel.values.iter().map(|value| value - level).collect();
     let far = outlier_indices(&away);
     let first = *far.first()?;

@@ -51,6 +51,12 @@ impl RawExcitation {
         }
     }
 
+    /// Forces (N) at some times (s), if measured and if no other input acts.
+    pub fn forces_at(&self, times: &[f64]) -> Option<Arc<Vec<f64>>> {
+        self.force()?;
+        self.input.forces_at(times)
+    }
+
     /// Sampling interval of equally spaced samples, s.
     pub fn spacing(&self) -> Option<f64> {
         let force = match &self.input.force {

@@ -1,6 +1,6 @@
 //! Faults of the samples of a column, found before the fit: gaps, dropouts, spikes, saturation and quantisation.
 
-use super::column_samples::ColumnSamples;
+use super::column_samples::{ColumnSamples, PresentRows};
 use super::data_facts::{DataAction, DataFact, GapPlace, MOST_PLACES, RecordNotes};
 use super::warning::DataWarning;
 use crate::config::ModelFile;
@@ -46,17 +46,14 @@ impl Column<'_> {
         step: Option<f64>,
         notes: &mut RecordNotes,
     ) -> Vec<(usize, String)> {
-        let present: Vec<usize> = (0..source.values.len())
-            .filter(|i| !source.values[*i].is_nan())
-            .collect();
-        let values: Vec<f64> = present.iter().map(|i| source.values[*i]).collect();
-        let times: Vec<f64> = present.iter().map(|i| source.times[*i]).collect();
+        let rows = PresentRows::of(&source.values);
+        let [times, values] = [&source.times, &source.values].map(|column| rows.pick(column));
         if times.len() < 2 {
             return Vec::new();
         }
         self.gaps(&times, notes);
         let step = step.unwrap_or(0.0);
-        let mut excluded = Vec::new();
+        let (mut excluded, mut emptied) = (Vec::new(), Vec::new());
         for Faulty { fault, samples } in self.faulty(&times, &values, step) {
             let excludes = self.excludes(fault);
             let action = if excludes {
@@ -70,15 +67,16 @@ impl Column<'_> {
             let fact = self.fact(fault, &samples, &times, action, level, unit);
             notes.state(&self.experiment_name(), &fact);
             if excludes {
-                samples
-                    .iter()
-                    .for_each(|i| source.values[present[*i]] = f64::NAN);
+                emptied.extend(samples.iter().map(|i| rows.row(*i)));
                 excluded.push((samples.len(), fault.reason().to_owned()));
             } else {
                 let is_robust = self.is_robust && fault == FaultName::Spikes;
                 let warning = (!is_robust).then(|| self.warning(&fact)).flatten();
                 notes.warnings.extend(warning.map(|w| self.placed(&w)));
             }
+        }
+        for row in emptied {
+            source.values[row] = f64::NAN;
         }
         excluded
     }
@@ -108,7 +106,7 @@ impl Column<'_> {
     /// Gaps of otherwise regular times.
     fn gaps(&self, times: &[f64], notes: &mut RecordNotes) {
         let spacings: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
-        let usual = median(&spacings);
+        let usual = median(&*spacings);
         let regular = spacings
             .iter()
             .filter(|s| (*s - usual).abs() <= 0.1 * usual);
@@ -282,8 +280,7 @@ fn is_sustained(values: &[f64], spikes: &[usize]) -> bool {
 
 /// Quantisation step of the samples, SI.
 pub fn quantisation_step(values: &[f64]) -> Option<f64> {
-    let present: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
-    quantisation(&present)
+    quantisation(&PresentRows::of(values).pick(values))
 }
 
 /// True for a quantisation step that is worth stating.

@@ -202,7 +202,7 @@ fn a_reused_jacobian_that_fails_is_recomputed() {
 fn a_long_record_has_the_same_result_on_two_threads() {
     let problem = long_problem(None);
     let alone = threads::sharing(|| fitted(&problem));
-    let together = fitted(&problem);
+    let together = threads::given(2, || fitted(&problem));
     assert!(together.history == alone.history && !together.history.is_empty());
     assert_eq!(together.counts, alone.counts);
     assert_eq!(together.best.parameters, alone.best.parameters);
@@ -225,7 +225,7 @@ fn a_long_record_is_fitted_by_the_continuous_gradient() {
     };
     settings.stopping.iterations = 3;
     let run = || fit(&problem, &problem.start(), &settings, &mut |_| {}).expect("a motion");
-    let (alone, together) = (threads::sharing(run), run());
+    let (alone, together) = (threads::sharing(run), threads::given(2, run));
     assert!(together.history == alone.history && !together.history.is_empty());
     assert_eq!(together.counts, alone.counts);
 }

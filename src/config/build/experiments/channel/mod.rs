@@ -3,7 +3,7 @@
 mod noise;
 mod sampling;
 
-use super::column_samples::{self, ColumnRequest};
+use super::column_samples::{self, ColumnRequest, ColumnSamples, PresentRows};
 use super::data_facts::{DataFact, RecordNotes};
 use super::faults::{Column, is_coarse, quantisation_step};
 use super::warning::DataWarning;
@@ -250,20 +250,18 @@ fn read_one(
         decimate(file, &key, factor.0, &mut source, &mut ignored)?;
     }
     let span = [source.times[0], source.times[source.times.len() - 1]];
-    let present = present(
-        file,
-        &format!("{key}.columns.{}", kind.name()),
-        kind,
-        &source,
-    )?;
+    let present = PresentRows::of(&source.values);
+    let samples = present.pick(&source.values);
+    let column = format!("{key}.columns.{}", kind.name());
+    refuse_too_little(file, &column, kind, &source, &samples)?;
     if missing > 0 {
         ignored.push((missing, "missing".to_owned()));
     }
     ignored.extend(excluded);
-    let missing = source.values.len() - present.len();
-    let pick = |column: &[f64]| -> Vec<f64> { present.iter().map(|&r| column[r]).collect() };
-    let (times, values) = (pick(&source.times), pick(&source.values));
-    let sigmas = source.beside.as_deref().map(pick);
+    let missing = source.values.len() - samples.len();
+    let sigmas = source.beside.take().map(|b| present.picked(b));
+    let [times, values] = [&mut source.times, &mut source.values]
+        .map(|column| present.picked(std::mem::take(column)));
     let spacing = even_spacing(&times);
     if spacing.is_none() && missing == 0 && nearly_equal(&times) {
         notes.warnings.push(DataWarning::NearlyEqualTimes.at(&key));
@@ -301,36 +299,35 @@ fn read_one(
     })
 }
 
-/// The rows without a missing sample. Refuses too few of them, and samples that are all equal.
-fn present(
+/// Refuses too few samples, and samples that are all equal; `samples` are those of `source` that are not missing.
+fn refuse_too_little(
     file: &ModelFile,
     column: &str,
     kind: ChannelKind,
-    source: &column_samples::ColumnSamples,
-) -> Result<Vec<usize>, InputError> {
-    let rows = 0..source.values.len();
-    let present: Vec<usize> = rows.filter(|&r| !source.values[r].is_nan()).collect();
-    let found = match present.len() {
-        0 => {
+    source: &ColumnSamples,
+    samples: &[f64],
+) -> Result<(), InputError> {
+    let found = match samples {
+        [] => {
             let (missing, label) = (source.values.len(), &source.label);
             return Err(file
                 .error_at(column, "all samples are missing")
                 .found(format!("{missing} rows without a number in `{label}`"))
                 .expected("at least one sample"));
         }
-        1 => "1 sample".to_owned(),
-        count if count < Grid::FEWEST_NODES => format!("{count} samples"),
-        count => {
-            let first = source.values[present[0]];
-            if present.iter().any(|&r| source.values[r] != first) {
-                return Ok(present);
+        [_] => "1 sample".to_owned(),
+        few if few.len() < Grid::FEWEST_NODES => format!("{} samples", few.len()),
+        [first, ..] => {
+            if samples.iter().any(|sample| sample != first) {
+                return Ok(());
             }
             let unit = kind.unit_of(source.unit.is_angular());
             return Err(file
                 .error_at(column, "all samples are equal")
                 .found(format!(
-                    "{count} samples, all {} {unit}",
-                    significant(first, 6)
+                    "{} samples, all {} {unit}",
+                    samples.len(),
+                    significant(*first, 6)
                 ))
                 .expected("a record of a moving system"));
         }

@@ -34,7 +34,7 @@ fn cleaned(samples: &[f64]) -> Vec<f64> {
         })
         .collect();
     let distances = samples.iter().zip(&medians).map(|(y, m)| (y - m).abs());
-    let limit = OUTLYING * MAD_TO_SIGMA * median(&distances.collect::<Vec<f64>>());
+    let limit = OUTLYING * MAD_TO_SIGMA * median(distances.collect::<Vec<f64>>());
     let pairs = samples.iter().zip(&medians);
     pairs
         .map(|(y, m)| if (y - m).abs() > limit { *m } else { *y })

@@ -44,7 +44,7 @@ impl ResidualLoss {
     pub fn scaled_by(self, residuals: &[f64]) -> Self {
         let sizes: Vec<f64> = residuals.iter().map(|e| e.abs()).collect();
         let scale = match self.is_robust() && !sizes.is_empty() {
-            true => MAD_TO_SIGMA * median(&sizes),
+            true => MAD_TO_SIGMA * median(sizes),
             false => 0.0,
         };
         Self { scale, ..self }
