@@ -104,7 +104,7 @@ impl Model {
 
 impl FittedModel<'_> {
     /// Writes tables and, if requested, figures and the page of `document`, but not the result document itself. Returns
-    /// the time taken to write them: the share that this has in the time of the threads, of the time until all have ended.
+    /// the elapsed time multiplied by the share of writing in the working time of the threads.
     ///
     /// # Errors
     /// Errors of the file system.

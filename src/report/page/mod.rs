@@ -132,7 +132,7 @@ fn figure(figure: &Figure, off: &[&str], detail: Detail) -> String {
     let end = if is_sentence { "" } else { "." };
     let thinned = match drawn.thinned {
         true => format!(
-            "{end} Long series are thinned for display: every peak is kept; all values are in the tables."
+            "{end} Long series are thinned for display: every peak is kept; kmcfit fit --tables writes all values to the tables."
         ),
         false => String::new(),
     };
