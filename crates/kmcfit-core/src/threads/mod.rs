@@ -88,10 +88,17 @@ pub fn sharing<T>(work: impl FnOnce() -> T) -> T {
 
 /// Does `work` with this number of threads for each parallel work of this thread, whatever processors are free.
 pub fn given<T>(threads: usize, work: impl FnOnce() -> T) -> T {
-    let before = GIVEN.replace(Some(threads));
-    let result = work();
-    GIVEN.set(before);
-    result
+    /// Restores the number, after a panic too, which a fleet or Python may catch.
+    struct Restored(Option<usize>);
+
+    impl Drop for Restored {
+        fn drop(&mut self) {
+            GIVEN.set(self.0);
+        }
+    }
+
+    let _restored = Restored(GIVEN.replace(Some(threads)));
+    work()
 }
 
 /// Results of `own` and `other`; `other` is computed on a second thread where a processor is free and the thread starts.
@@ -240,7 +247,7 @@ mod tests {
         );
         let panics = || given(2, || both(|| panic!("the first"), || ()));
         assert!(std::panic::catch_unwind(panics).is_err() && !counted());
-        GIVEN.set(None);
+        assert_eq!(GIVEN.get(), None);
     }
 
     #[test]
