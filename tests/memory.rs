@@ -216,6 +216,13 @@ fn large_models_are_refused_and_the_older_run_stays_whole() {
     assert!(before == after, "a file was changed");
 }
 
+/// The largest number of nodes that a refusal names.
+fn most_nodes(refusal: &str) -> usize {
+    let rest = refusal.split("at most ").nth(1);
+    let number = rest.and_then(|rest| rest.split(' ').next());
+    (number.and_then(|text| text.parse().ok())).expect("a number of nodes")
+}
+
 /// The largest grid that is accepted is fitted to its end.
 #[test]
 fn what_is_accepted_fits() {
@@ -245,18 +252,19 @@ fn what_is_accepted_fits() {
             ];
             bench.run(Some(limit), &arguments)
         };
-        let (code, said) = fit("5000000");
+        let (mut code, mut said) = fit("5000000");
         assert_refused(code, &said, method);
-        let most = said
-            .split("at most ")
-            .nth(1)
-            .and_then(|rest| rest.split(' ').next());
-        let most: usize = most
-            .and_then(|text| text.parse().ok())
-            .expect("a number of nodes");
-        // The address space in use varies slightly from start to start.
-        let (code, said) = fit(&(most - most / 50).to_string());
-        assert!([0, 3].contains(&code), "{method} on {most} nodes: {said}");
+        // The address space in use when a grid is checked varies by 2.2 % of this limit from start to start, by stacks of threads that have
+        // just ended: 2 % below the grid named by one start may be refused by the next, whose grid is then below.
+        for _ in 0..2 {
+            let most = most_nodes(&said);
+            (code, said) = fit(&(most - most / 50).to_string());
+            if code != 2 {
+                break;
+            }
+            assert_refused(code, &said, method);
+        }
+        assert!([0, 3].contains(&code), "{method}: {said}");
     }
 }
 
