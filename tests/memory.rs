@@ -254,8 +254,8 @@ fn what_is_accepted_fits() {
         };
         let (mut code, mut said) = fit("5000000");
         assert_refused(code, &said, method);
-        // The address space in use when a grid is checked varies by 2.2 % of this limit from start to start, by stacks of threads that have
-        // just ended: 2 % below the grid named by one start may be refused by the next, whose grid is then below.
+        // The address space in use when a grid is checked varies by 2.2 % of this limit from start to start, by what threads that have
+        // just ended leave mapped, half of it stacks: 2 % below the grid named by one start may be refused by the next, whose grid is then below.
         for _ in 0..2 {
             let most = most_nodes(&said);
             (code, said) = fit(&(most - most / 50).to_string());
