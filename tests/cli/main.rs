@@ -13,6 +13,7 @@ mod ending;
 mod faulty_records;
 mod fleet;
 mod formats;
+mod golden;
 mod init;
 mod known_parts;
 mod measured_input;
