@@ -14,8 +14,18 @@ row. Violations are printed and counted too.
 
 import re
 import sys
+import tempfile
 from collections import defaultdict
 from pathlib import Path
+
+# Cycles that stand until their part is rebuilt; one that has gone is an error too, so that it cannot come back.
+ALLOWED = {
+    "crate::formats: hdf5, mat5, recognise, refused",
+    "crate::report: fit_figures, page, run, tables",
+    "crate::assessment: input_correlation, input_disturbance, plausibility, residual_mean",
+    "crate::qp: chain, few_variables, primal_dual, stages, subproblem",
+    "crate::record: channel, noise",
+}
 
 MAP = Path(__file__).resolve().parent.parent / "docs" / "architecture.md"
 
@@ -30,7 +40,7 @@ def without_noise(text):
 
 
 def leaves(tree, prefix=()):
-    """The paths of a use tree such as a::{b, c::{self, d}}."""
+    """The paths of a use tree such as a::{b, c::{self, d}}, each with the name that it has in the importing module."""
     tree = tree.strip()
     depth, start, parts = 0, 0, []
     for i, c in enumerate(tree):
@@ -45,8 +55,9 @@ def leaves(tree, prefix=()):
             head = tuple(h for h in head.replace(" ", "").split("::") if h)
             yield from leaves(inner.rsplit("}", 1)[0], prefix + head)
         else:
-            part = re.sub(r"\s+as\s+\w+$", "", part).replace(" ", "")
-            yield prefix + tuple(p for p in part.split("::") if p and p != "self")
+            part, _, alias = re.sub(r"\s+", " ", part).partition(" as ")
+            path = prefix + tuple(p for p in part.replace(" ", "").split("::") if p and p != "self")
+            yield path, alias.strip() or path[-1]
 
 
 def module_of(path, root):
@@ -68,22 +79,61 @@ def resolve(path, module):
     return None
 
 
-def imports(root):
-    """(importing module, imported module, file) for every import inside the crate."""
-    files = {}
+def sources(root):
+    """The text of each module without tests, comments and strings, and its file."""
+    found = {}
     for path in sorted(root.rglob("*.rs")):
-        if path.name in ("tests.rs", "main.rs") or "tests" in path.parts:
-            continue
-        files[module_of(path, root)] = path
+        if path.name not in ("tests.rs", "main.rs") and "tests" not in path.parts:
+            found[module_of(path, root)] = (without_noise(path.read_text()), path)
+    return found
+
+
+def absolute(path, module, files):
+    """As `resolve`; a path that begins with a child of the module leads there."""
+    found = resolve(path, module)
+    return module + path if found is None and module + path[:1] in files else found
+
+
+def exports(files):
+    """What each module offers from others: (module, name) to a path; the name `*` for all that a path has."""
+    found = defaultdict(list)
+    for module, (text, _) in files.items():
+        for tree in re.findall(r"\bpub(?:\([^)]*\))?\s+use\s+([^;]+);", text):
+            for path, name in leaves(tree):
+                target = absolute(path, module, files)
+                if target:
+                    found[module, name].append(target)
+    return found
+
+
+def followed(target, files, offered, seen=()):
+    """The module that defines what a path names, behind all re-exports."""
+    module = target
+    while module and module not in files:
+        module = module[:-1]
+    rest = target[len(module) :]
+    if rest and target not in seen:
+        for path in offered.get((module, rest[0]), []):
+            return followed(path + rest[1:], files, offered, (*seen, target))
+        for path in offered.get((module, "*"), []):
+            inner = path[:-1]
+            text = files.get(inner, ("",))[0]
+            if re.search(r"\b(?:fn|struct|enum|trait|type|const|static|mod)\s+" + rest[0] + r"\b", text):
+                return inner
+    return module
+
+
+def imports(root):
+    """(importing module, imported module, file) for every import inside the crate, through re-exports too."""
+    files = sources(root)
+    offered = exports(files)
     found = []
-    for module, path in files.items():
-        text = without_noise(path.read_text())
-        written = [p for use in re.findall(r"\buse\s+([^;]+);", text) for p in leaves(use)]
+    for module, (text, path) in files.items():
+        written = [p for use in re.findall(r"\buse\s+([^;]+);", text) for p, _ in leaves(use)]
         inline = re.sub(r"\buse\s+[^;]+;", "", text)
         written += [tuple(p.split("::")) for p in re.findall(r"\b((?:crate|super)(?:::\w+)+)", inline)]
-        for target in (resolve(p, module) for p in written):
-            while target and target not in files:
-                target = target[:-1]
+        for target in (absolute(p, module, files) for p in written):
+            target = followed(target, files, offered) if target else None
             if target and target != module:
                 found.append((module, target, path))
     return found
@@ -146,36 +196,65 @@ def violations(root, rows):
     return sorted(found)
 
 
+def found_cycles(root):
+    """Folder, imports between its modules, and the modules of each cycle."""
+    levels = defaultdict(lambda: defaultdict(lambda: defaultdict(set)))
+    for source, target, path in imports(root):
+        shared = 0
+        while source[shared : shared + 1] == target[shared : shared + 1] and shared < min(len(source), len(target)):
+            shared += 1
+        if shared < len(source) and shared < len(target):
+            levels[source[:shared]][source[shared]][target[shared]].add(str(path))
+    found = []
+    for folder, edges in sorted(levels.items()):
+        graph = defaultdict(set, {a: set(bs) for a, bs in edges.items()})
+        for bs in list(graph.values()):
+            for b in bs:
+                graph.setdefault(b, set())
+        found += [(folder, edges, cycle) for cycle in cycles(graph)]
+    return found
+
+
 def main(roots):
-    count, wrong = 0, []
+    self_test()
+    count, wrong, allowed = 0, [], set(ALLOWED)
     rows = rows_of_map(MAP.read_text(encoding="utf-8"))
     for root in map(Path, roots):
         wrong += violations(root, rows)
-        levels = defaultdict(lambda: defaultdict(lambda: defaultdict(set)))
-        for source, target, path in imports(root):
-            shared = 0
-            while source[shared : shared + 1] == target[shared : shared + 1] and shared < min(len(source), len(target)):
-                shared += 1
-            if shared < len(source) and shared < len(target):
-                a, b = source[shared], target[shared]
-                levels[source[:shared]][a][b].add(str(path))
-        for folder, edges in sorted(levels.items()):
-            graph = defaultdict(set, {a: set(bs) for a, bs in edges.items()})
-            for bs in list(graph.values()):
-                for b in bs:
-                    graph.setdefault(b, set())
-            for cycle in cycles(graph):
-                count += 1
-                name = "::".join(("crate",) + folder)
-                print(f"{root}: cycle in {name}: {', '.join(cycle)}")
-                for a in cycle:
-                    for b in sorted(set(edges.get(a, {})) & set(cycle)):
-                        files = sorted(edges[a][b])
-                        more = f" and {len(files) - 2} more" if len(files) > 2 else ""
-                        print(f"    {a} -> {b}   ({', '.join(files[:2])}{more})")
+        for folder, edges, cycle in found_cycles(root):
+            name = "::".join(("crate",) + folder) + ": " + ", ".join(cycle)
+            if name in allowed:
+                allowed.remove(name)
+                continue
+            count += 1
+            print(f"{root}: cycle in {name}")
+            for a in cycle:
+                for b in sorted(set(edges.get(a, {})) & set(cycle)):
+                    files = sorted(edges[a][b])
+                    more = f" and {len(files) - 2} more" if len(files) > 2 else ""
+                    print(f"    {a} -> {b}   ({', '.join(files[:2])}{more})")
+    wrong += [f"the allowed cycle in {name} has gone: strike it" for name in sorted(allowed)]
     print(*wrong, sep="\n", end="\n" if wrong else "")
     print(f"{count} cycles; {len(wrong)} imports or modules against the map")
     return 1 if count or wrong else 0
+
+
+def self_test():
+    """Small trees with each kind of cycle, and one without."""
+    trees = {
+        "direct": ({"a.rs": "use crate::b::B;", "b.rs": "use crate::a::A;"}, True),
+        "re-export": ({"m/mod.rs": "mod a;\nmod b;\npub use a::A;", "m/a.rs": "use super::b::B;", "m/b.rs": "use super::A;"}, True),
+        "renamed": ({"m/mod.rs": "mod a;\nmod b;\npub(crate) use a::A as C;", "m/a.rs": "use super::b;", "m/b.rs": "use crate::m::C;"}, True),
+        "glob": ({"m/mod.rs": "mod a;\nmod b;\npub use a::*;", "m/a.rs": "use super::b;\npub struct A;", "m/b.rs": "use super::A;"}, True),
+        "three": ({"a.rs": "use crate::b;", "b.rs": "use crate::c::{self, C};", "c.rs": "fn f() { crate::a::g() }"}, True),
+        "none": ({"m/mod.rs": "mod a;\nmod b;\npub use a::A;", "m/a.rs": "", "m/b.rs": "use super::A;"}, False),
+    }
+    for name, (files, expected) in trees.items():
+        with tempfile.TemporaryDirectory() as folder:
+            for path, text in {"lib.rs": "", **files}.items():
+                (Path(folder) / path).parent.mkdir(exist_ok=True)
+                (Path(folder) / path).write_text(text)
+            assert bool(found_cycles(Path(folder))) == expected, name
 
 
 if __name__ == "__main__":

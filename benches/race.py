@@ -981,7 +981,7 @@ def machine(load):
 
 def markdown(rows, about, repetitions, drawn):
     heads = ["row", "what", "peer", "kmcfit", "ratio", "target", ""]
-    lines = ["# Results of the race", "", "Made by `python3 benches/race.py`; see [`NOTES.md`](NOTES.md).", ""]
+    lines = ["# Results of the race", "", "Made by `python3 benches/race.py`, but for the last section.", ""]
     lines += ["| | |", "|---|---|", *(f"| {name} | {value} |" for name, value in about), ""]
     lines += [f"Medians of up to {repetitions} rounds in which kmcfit and its peer take turns; before each of its fits the same one is run and not measured.", ""]
     lines += ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
@@ -989,14 +989,26 @@ def markdown(rows, about, repetitions, drawn):
         cells = row.cells()
         cells[-1] = f"**{cells[-1]}**" if row.verdict != "met" else cells[-1]
         lines.append("| " + " | ".join(cells) + " |")
-    lines += ["", "## Row by row", ""]
+    if drawn:
+        lines += ["", "## Scaling", "", *(f"![{path.stem.replace('-', ' ')}](figures/{path.name})" for path in drawn)]
+    return "\n".join(lines) + "\n"
+
+
+def details(rows):
+    """The notes of each row."""
+    lines = ["# Row by row", ""]
     for row in rows:
         notes = [f"skipped: {row.skipped}"] if row.skipped else row.notes
         lines.append(f"{ROWS.index(row.name) + 1}. `{row.name}`")
         lines += [f"   - {note}" for note in notes]
-    if drawn:
-        lines += ["", "## Scaling", "", *(f"![{path.stem.replace('-', ' ')}](figures/{path.name})" for path in drawn)]
     return "\n".join(lines) + "\n"
+
+
+def write_results(path, text):
+    """Writes the results; the last section of those that are there, which is written by hand, stays."""
+    before = path.read_text(encoding="utf-8") if path.exists() else ""
+    _, heading, rest = before.partition("\n## Whole commands\n")
+    path.write_text(text + heading + rest, encoding="utf-8")
 
 
 def load_average():
@@ -1044,13 +1056,15 @@ def main():
     out = options.out or (ROOT / "benches" if whole else WORK)
     out.mkdir(parents=True, exist_ok=True)
     text = markdown(rows, machine(load), repetitions, [])
-    (out / "RESULTS.md").write_text(text, encoding="utf-8")
+    write_results(out / "RESULTS.md", text)
+    WORK.mkdir(parents=True, exist_ok=True)
+    (WORK / "rows.md").write_text(details(rows), encoding="utf-8")
     if not options.no_figures:
         print("\nfigures …", flush=True)
         try:
             drawn = draw(race, chosen, out / "figures")
             text = markdown(rows, machine(load), repetitions, drawn)
-            (out / "RESULTS.md").write_text(text, encoding="utf-8")
+            write_results(out / "RESULTS.md", text)
         except (Skip, OSError, ValueError, KeyError) as reason:
             print(f"  no figures: {reason}", flush=True)
     print("\n" + text)

@@ -1,8 +1,8 @@
 // A shaken mass with an accelerometer and a force gauge: mass, damping and stiffness with standard errors.
 
 use kmcfit::tables::Table;
+use kmcfit_core::Bands;
 use kmcfit_core::Interpolation;
-use kmcfit_core::{BandSettings, Bands};
 use kmcfit_core::{Builder, CoefficientSpec, Record};
 use std::error::Error;
 
@@ -27,8 +27,7 @@ pub fn found() -> Result<[[f64; 2]; 3], Box<dyn Error>> {
     println!("{}: {}", fit.outcome.status.name(), fit.outcome.reason);
 
     let best = &fit.best;
-    let settings = BandSettings::default();
-    let bands = Bands::at(&problem, &best.parameters, &best.evaluation, &settings);
+    let bands = Bands::at(&problem, &best.parameters, &best.evaluation);
     Ok([0, 1, 2].map(|j| {
         let band = &bands.functions[j];
         [band.values[0], band.standard_error[0]]

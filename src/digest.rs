@@ -1,70 +1,100 @@
-//! SHA-256 digests of files, used to recognise files written by kmcfit and changed inputs.
+//! SHA-256 digests of files, by which a run knows what it read and kmcfit the files that it wrote.
 
+use crate::error::InputError;
+use crate::text_io::{changing, read_bytes, state};
 use data_encoding::HEXLOWER;
 use sha2::{Digest as _, Sha256};
 use std::collections::BTreeMap;
-use std::fs::{File, Metadata};
+use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
-
-/// Bytes that are read at once.
-const BLOCK: usize = 1 << 16;
 
 /// The SHA-256 digest of some bytes: 64 hexadecimal digits, as `sha256sum` prints them.
 pub fn digest(bytes: &[u8]) -> String {
     HEXLOWER.encode(&Sha256::digest(bytes))
 }
 
-/// The digest of a file's contents, read block by block.
+/// The digest of a file's contents.
 ///
 /// # Errors
-/// If the path is no file that can be read. The contents of a pipe can be read once only, so they have no digest.
+/// If the path is no file that can be read.
 pub fn digest_of_file(path: &Path) -> io::Result<String> {
     if !path.metadata()?.is_file() {
         return Err(io::Error::other("not a file"));
     }
-    let mut file = File::open(path)?;
     let mut hasher = Sha256::new();
-    let mut block = vec![0; BLOCK];
+    let (mut file, mut block) = (File::open(path)?, vec![0; 1 << 16]);
     loop {
         match file.read(&mut block) {
-            Ok(0) => return Ok(HEXLOWER.encode(&hasher.finalize())),
+            Ok(0) => break,
             Ok(count) => hasher.update(&block[..count]),
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) => return Err(error),
         }
     }
+    Ok(HEXLOWER.encode(&hasher.finalize()))
 }
 
-/// Length and time of the last change of a file.
-type State = (u64, Option<SystemTime>);
+/// A file as it was read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReadFile {
+    /// Length, bytes.
+    pub bytes: u64,
+    /// Its digest.
+    pub sha256: String,
+    state: Option<(u64, Option<SystemTime>)>,
+}
 
-/// Digests of files, each computed once while the length and the time of the last change of the file remain.
+/// The files that were read, each with the digest of the bytes that were used.
 #[derive(Debug, Default)]
-pub struct FileDigests(Mutex<BTreeMap<PathBuf, (State, String)>>);
+pub struct ReadFiles(Mutex<BTreeMap<PathBuf, ReadFile>>);
 
-impl FileDigests {
-    /// As [`digest_of_file`].
+impl ReadFiles {
+    /// Reads a file of at most `limit` bytes; `what` it should be is named in errors.
     ///
     /// # Errors
-    /// As there.
-    pub fn of(&self, path: &Path) -> io::Result<String> {
-        let state = |found: &Metadata| (found.len(), found.modified().ok());
-        let now = state(&path.metadata()?);
-        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, digest)) = known.get(path).filter(|(before, _)| *before == now) {
-            return Ok(digest.clone());
+    /// If it cannot be read or is longer, and if the file is not the one that was read before.
+    pub fn read(&self, path: &Path, what: &str, limit: u64) -> Result<Vec<u8>, InputError> {
+        let state = state(path);
+        let bytes = read_bytes(path, what, limit)?;
+        let found = ReadFile {
+            bytes: bytes.len() as u64,
+            sha256: digest(&bytes),
+            state,
+        };
+        let mut files = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match files.insert(path.to_path_buf(), found.clone()) {
+            Some(before) if before.sha256 != found.sha256 => Err(changing(path)),
+            _ => Ok(bytes),
         }
-        let digest = digest_of_file(path)?;
-        known.insert(path.to_path_buf(), (now, digest.clone()));
-        Ok(digest)
+    }
+
+    /// A file, if it was read.
+    pub fn of(&self, path: &Path) -> Option<ReadFile> {
+        let files = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        files.get(path).cloned()
+    }
+
+    /// Refuses files that have changed since they were read, as one that is still being copied.
+    ///
+    /// # Errors
+    /// The first such file.
+    pub fn check(&self) -> Result<(), InputError> {
+        let files = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_changed = |(path, file): &(&PathBuf, &ReadFile)| {
+            file.state.is_some() && state(path) != file.state
+        };
+        match files.iter().find(is_changed) {
+            Some((path, _)) => Err(changing(path)),
+            None => Ok(()),
+        }
     }
 }
 
-/// Models are equal whatever digests are known.
-impl PartialEq for FileDigests {
+/// Models are equal whatever was read.
+impl PartialEq for ReadFiles {
     fn eq(&self, _: &Self) -> bool {
         true
     }
@@ -74,22 +104,29 @@ impl PartialEq for FileDigests {
 mod tests {
     use super::*;
 
+    /// The test vector of FIPS 180-2 for `abc`.
+    const ABC: &str = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+
     #[test]
-    fn a_changed_file_has_another_digest() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("a.csv");
-        let digests = FileDigests::default();
-        assert!(digests.of(&path).is_err());
-        for text in ["abc", "abcd", "abc"] {
-            std::fs::write(&path, text).expect("a file");
-            for _ in 0..2 {
-                assert_eq!(
-                    digests.of(&path).expect("a digest"),
-                    digest(text.as_bytes())
-                );
-            }
-        }
-        std::fs::remove_file(&path).expect("a file");
-        assert!(digests.of(&path).is_err());
+    fn digests_of_bytes_and_files_agree() {
+        assert_eq!(digest(b"abc"), ABC);
+        let place = tempfile::tempdir().expect("a folder");
+        let path = place.path().join("a.txt");
+        std::fs::write(&path, "abc").expect("written");
+        assert_eq!(digest_of_file(&path).expect("a digest"), ABC);
+        assert!(digest_of_file(place.path()).is_err());
+    }
+
+    #[test]
+    fn a_file_that_grows_is_refused() {
+        let place = tempfile::tempdir().expect("a folder");
+        let path = place.path().join("a.csv");
+        std::fs::write(&path, "abc").expect("written");
+        let files = ReadFiles::default();
+        files.read(&path, "a table", 100).expect("read");
+        assert_eq!(files.of(&path).expect("read").sha256, ABC);
+        assert_eq!(files.check(), Ok(()));
+        std::fs::write(&path, "abcd").expect("written");
+        assert!(files.check().is_err() && files.read(&path, "a table", 100).is_err());
     }
 }

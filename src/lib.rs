@@ -3,15 +3,13 @@
 //!
 //! [`guide`] is the user guide: tutorial, choice of methods, theory.
 //!
-#![cfg_attr(doc, doc = include_str!("guide/equations.md"))]
-//!
 //! # Modules, in the order in which data flow
 //!
 //! 1. [`config`] reads a model file, and through [`tables`] its tables, and builds a problem of [`kmcfit_core`]
 //!    from it; errors in the input are an [`mod@error`]; [`units`] has units and their factors to SI.
 //! 2. [`fitting`] fits the problem.
 //! 3. [`report`] writes tables, figures, pages and the result document, loads them back ([`Run::open`]), and compares
-//!    runs; [`results`] makes output folders, journals and files crash-safe.
+//!    runs; [`results`] makes folders of runs, which appear whole or not at all.
 //! 4. [`fleet`] fits one model to many records, with a row of results for each.
 //! 5. [`cli`] is one file per command.
 // All output passes `cli::output`, all changes of files `results`, all thread starts `threads` of the core.
@@ -25,7 +23,6 @@ pub mod config;
 pub mod digest;
 pub mod error;
 mod escape;
-mod faults;
 pub mod finding;
 pub mod fitting;
 pub mod fleet;
@@ -33,10 +30,7 @@ pub mod formats;
 pub mod guide;
 mod magnitudes;
 mod memory;
-#[cfg(test)]
-mod message_list_tests;
 mod number_format;
-mod reading_share;
 pub mod report;
 pub mod results;
 mod source_snippet;

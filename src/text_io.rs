@@ -4,6 +4,7 @@ use std::ffi::OsStr;
 use std::fs::{self, File, Metadata};
 use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::Path;
+use std::time::SystemTime;
 
 use crate::error::InputError;
 use crate::memory;
@@ -70,6 +71,7 @@ pub fn read_text_within(
 /// When the file does not exist, is a folder, a device or a pipe of another process, cannot be read, is longer than
 /// `limit`, or does not fit into memory.
 pub fn read_bytes(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>, InputError> {
+    let before = state(path);
     let (file, length) = open(path, what)?;
     // A file that is too long is not read at all; sparse files can be longer than the disk.
     if length > limit {
@@ -82,7 +84,25 @@ pub fn read_bytes(path: &Path, what: &str, limit: u64) -> Result<Vec<u8>, InputE
     let mut bytes = Vec::new();
     // A failed reservation is reported by the read.
     let _ = bytes.try_reserve_exact(usize::try_from(length).unwrap_or(0));
-    read_into(bytes, path, file, limit).map_err(|error| error.expected_if_none(what))
+    let bytes =
+        read_into(bytes, path, file, limit).map_err(|error| error.expected_if_none(what))?;
+    match before.is_some() && state(path) != before {
+        true => Err(changing(path)),
+        false => Ok(bytes),
+    }
+}
+
+/// Length and time of the last change of a file; `None` for one that has none, such as a pipe.
+pub fn state(path: &Path) -> Option<(u64, Option<SystemTime>)> {
+    let found = path.metadata().ok().filter(Metadata::is_file)?;
+    Some((found.len(), found.modified().ok()))
+}
+
+/// The error of a file that changes while it is used.
+pub fn changing(path: &Path) -> InputError {
+    InputError::file(path, "this file changed while it was read")
+        .expected("a file that is complete")
+        .hint("wait until it is written or copied, then run the command again")
 }
 
 /// Opens a file and returns its length; `what` describes it in messages.

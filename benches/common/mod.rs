@@ -116,7 +116,6 @@ pub fn many_starts(model: &Model, starts: usize, threads: usize) -> Multistart {
         starts,
         seed: 1,
         threads,
-        attempts: false,
         settings: model.settings.clone(),
     }
 }

@@ -2,11 +2,13 @@
 
 use crate::errors::{Failure, caught, guarded};
 use crate::source::RawModel;
-use kmcfit::config::{Model, ModelFile};
+use kmcfit::config::ModelFile;
 use kmcfit::fitting::fit_or_no_response;
 use kmcfit::report::document::ResultDocument;
-use kmcfit::report::{CompletedFit, DRAWS, OverheadTimings, TimingsSummary, fit_claim, json};
-use kmcfit::results::{OutputFolder, RESULT, RequestedFiles};
+use kmcfit::report::{
+    CompletedFit, MODEL, OverheadTimings, RequestedFiles, TimingsSummary, json,
+};
+use kmcfit::results::OutputFolder;
 use kmcfit_core::internals::solvers::{IterationRecord, Observer, Status};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
@@ -17,8 +19,6 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread::{Builder, scope};
 use std::time::{Duration, Instant};
 
-/// Name of the file for a model of arrays in the folder of its run.
-const MODEL: &str = "model.yaml";
 /// Time between two looks for Ctrl-C.
 const POLL: Duration = Duration::from_millis(20);
 /// Stack of the thread of a fit, bytes: that of the program's main thread on Linux.
@@ -181,26 +181,12 @@ impl RawFit {
     /// Writes the run; a model in memory with its files beside the results.
     fn write(&self, folder: &Path, requested: RequestedFiles) -> Result<(), Failure> {
         let in_memory: Vec<(String, Arc<[u8]>)> = self.file.files_in_memory();
-        let placed = match !in_memory.is_empty() {
-            true => Some(CompletedFit {
-                model: Model {
-                    file: folder.join(MODEL),
-                    ..self.done.model.clone()
-                },
-                ..self.done.clone()
-            }),
-            false => None,
+        let inputs = self.file.data_files().into_iter();
+        let inputs: Vec<PathBuf> = match in_memory.is_empty() {
+            true => inputs.chain([self.file.path.clone()]).collect(),
+            false => Vec::new(),
         };
-        let done = placed.as_ref().unwrap_or(&self.done);
-        let mut claim = fit_claim(&done.model);
-        if placed.is_some() {
-            let names = in_memory.iter().map(|(name, _)| name.clone());
-            claim = claim.files(names.chain([MODEL.to_owned()]));
-        } else {
-            let inputs = self.file.data_files().into_iter();
-            claim = claim.inputs(inputs.chain([self.file.path.clone()]));
-        }
-        let output = OutputFolder::prepare(folder, claim)?;
+        let output = OutputFolder::prepare(folder, "fit", inputs)?;
         let full = |error| {
             Failure::Input(
                 kmcfit::error::InputError::file(folder, "the results cannot be written")
@@ -208,24 +194,24 @@ impl RawFit {
                     .expected("a writable folder"),
             )
         };
-        let run = done.fitted(requested);
+        let run = self.done.fitted(requested);
         let mut document = run.document();
         document.timings = self.document.timings.clone();
-        let stage = output.stage().map_err(full)?;
-        if placed.is_some() {
-            stage
-                .write(MODEL, self.file.effective_text())
-                .map_err(full)?;
-            for (name, content) in &in_memory {
-                stage.write(name, content).map_err(full)?;
-            }
+        let text = match in_memory.is_empty() {
+            true => &self.file.text,
+            false => self.file.effective_text(),
+        };
+        output.write(MODEL, text).map_err(full)?;
+        match in_memory.is_empty() {
+            true => document.model.folder = output.path_to(None, self.file.path.parent()),
+            false => document.model.file = folder.join(MODEL).display().to_string(),
         }
-        run.write(&stage, &document).map_err(full)?;
-        if let Some(Ok(table)) = run.draws() {
-            stage.write(DRAWS, table.to_csv()).map_err(full)?;
+        for (name, content) in &in_memory {
+            output.write(name, content).map_err(full)?;
         }
-        stage.write(RESULT, json(&document)).map_err(full)?;
-        stage.commit().map_err(full)
+        run.write(&|name, bytes| output.write(name, bytes), &document)
+            .map_err(full)?;
+        output.commit(&document).map_err(full)
     }
 }
 
@@ -253,12 +239,10 @@ impl RawFit {
         folder: PathBuf,
         figures: bool,
         tables: bool,
-        draws: usize,
     ) -> PyResult<()> {
         let requested = RequestedFiles {
             figures,
             tables,
-            draws,
         };
         guarded(py, || self.write(&folder, requested))
     }

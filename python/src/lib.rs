@@ -29,7 +29,7 @@ mod _kmcfit {
     #[pymodule_export]
     use crate::fit::{RawFit, fit};
     #[pymodule_export]
-    use crate::fleet::{RawFleet, RawJournal, fleet_rows, record_list};
+    use crate::fleet::{RawFleet, RawFolder, record_list};
     #[pymodule_export]
     use crate::problem::Problem;
     #[pymodule_export]

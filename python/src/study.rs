@@ -5,9 +5,7 @@ use crate::fit::{RawFit, ended, watched};
 use kmcfit::Run;
 use kmcfit::cli::{CommandError, study_into};
 use kmcfit::config::{ModelFile, Override};
-use kmcfit::report::rebuilt_fit;
 use kmcfit::report::study::{StudiedFit, StudyDocument};
-use kmcfit_core::internals::solvers::Status;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -44,25 +42,18 @@ pub fn study(
     })
 }
 
-/// Studies the fit of a finished run; `model` is its model file.
+/// Studies the model of a finished run.
 #[pyfunction]
 pub fn study_run(
     py: Python<'_>,
     run: PathBuf,
-    model: PathBuf,
     folder: PathBuf,
     overrides: Vec<String>,
     threads: Option<usize>,
 ) -> PyResult<Studied> {
     self::run(py, move |flag| {
-        let mut run = Run::open(&run)?;
-        run.document.model.file = model.display().to_string();
-        let fitted = Override::parse_all(&run.document.model.overrides)?;
-        let file = ModelFile::read_with_overrides(&model, &fitted)?;
-        let is_at_end = run.document.outcome.status == Status::Converged;
-        let finished = is_at_end.then(|| rebuilt_fit(&run).ok()).flatten();
-        let finished = finished.map(|(model, fit)| StudiedFit::of(&model, &fit));
-        studied(file, &overrides, &folder, threads, finished, flag)
+        let file = Run::open(&run)?.model_file()?;
+        studied(file, &overrides, &folder, threads, None, flag)
     })
 }
 

@@ -33,7 +33,6 @@ def test_a_study_has_typed_results(study, line):
     # Damping, two of the stiffness, initial state, offset: more directions than the stiffness has, all identified.
     assert sensitivity.rank == sensitivity.combinations == len(line.parameters)
     assert len(sensitivity.singular_values) == sensitivity.combinations and np.all(np.diff(sensitivity.singular_values) <= 0)
-    assert sensitivity.best[0].functions["stiffness"].shape == sensitivity.times.shape
     assert study.classification["stiffness"] == "identified"
     # A nearly quadratic cost: the profile has the interval of the covariance.
     profile = next(iter(study.profiles.values()))
@@ -121,7 +120,7 @@ def test_pages_in_notebooks_are_the_first_screen(line, study, data, tmp_path):
     for shown in (line, km.open(tmp_path / "run"), study, selection):
         page = shown._repr_html_()
         elements = Elements(page).seen
-        assert {"h1", "table", "svg"} <= set(elements) and elements.count("svg") >= 1
+        assert {"h1", "table"} <= set(elements)
         assert "script" not in elements and "id" not in re.findall(r"<figure[^>]*\b(id)=", page)
         # Every rule of the style is within the element.
         style = page.split("<style>")[1].split("</style>")[0]

@@ -29,9 +29,6 @@ pub struct Arguments {
         requires = "gradient"
     )]
     nodes: Vec<usize>,
-    /// Folder for the table and the figure of the errors of the gradient.
-    #[arg(long, requires = "gradient")]
-    out: Option<PathBuf>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
@@ -42,7 +39,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let model = read(&file)?;
     announce(&model);
     if arguments.gradient && model.problem.functions.parameters() > 0 {
-        return check_gradient::run(&file, &model, &arguments.nodes, arguments.out.as_deref());
+        return check_gradient::run(&file, &model, &arguments.nodes);
     }
     let activity = Activity::begin("computing the sensitivities");
     let text = overview(&model);

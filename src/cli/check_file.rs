@@ -6,6 +6,7 @@ use crate::config::{rate, recognised};
 use crate::error::InputError;
 use crate::number_format::significant;
 use crate::report::shell_quoted;
+use crate::report::text::aligned;
 use crate::tables::{Table, TableFormat};
 use std::path::Path;
 
@@ -18,12 +19,17 @@ pub(super) fn run(path: &Path) -> Result<u8, InputError> {
     let tables = Table::read_all(path, &TableFormat::default())?;
     drop(reading);
     let mut text = format!("{}: {}\n", path.display(), format_of(&tables));
-    let mut rows =
-        vec![["column", "name", "quantity", "unit", "samples", "rate"].map(str::to_owned)];
+    let mut rows = vec![
+        ["column", "name", "quantity", "unit", "samples", "rate"]
+            .map(str::to_owned)
+            .to_vec(),
+    ];
     for table in &tables {
         rows.extend((0..table.width()).map(|index| row(table, index)));
     }
-    text += &aligned(&rows);
+    for line in aligned(&rows).lines() {
+        text += &format!("  {line}\n");
+    }
     for other in tables.first().map_or(&[][..], Table::unusable) {
         text += &format!("not usable: `{}`, {}\n", other.name, other.content);
         if let Some(hint) = &other.hint {
@@ -43,7 +49,7 @@ fn format_of(tables: &[Table]) -> String {
 }
 
 /// Number, name, quantity, unit, number of samples and sampling rate of a column.
-fn row(table: &Table, index: usize) -> [String; 6] {
+fn row(table: &Table, index: usize) -> Vec<String> {
     // A single number is no record.
     let known = recognised(table, index).filter(|_| table.rows() > 1);
     let unit = match (known, table.unit(index)) {
@@ -65,7 +71,7 @@ fn row(table: &Table, index: usize) -> [String; 6] {
     let rate = rate(table)
         .filter(|_| table.rows() > 1)
         .map(|(_, rate)| format!("{} Hz", significant(rate, 6)));
-    [
+    vec![
         table
             .number(index)
             .map_or("-".to_owned(), |n| n.to_string()),
@@ -75,21 +81,4 @@ fn row(table: &Table, index: usize) -> [String; 6] {
         samples,
         rate.unwrap_or_else(|| "-".to_owned()),
     ]
-}
-
-/// Rows in columns of equal width, indented.
-fn aligned(rows: &[[String; 6]]) -> String {
-    let width = |column: usize| {
-        let widths = rows.iter().map(|row| row[column].chars().count());
-        widths.max().unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..6).map(width).collect();
-    let mut text = String::new();
-    for row in rows {
-        let cells = row.iter().zip(&widths);
-        let cells = cells.map(|(cell, width)| format!("{cell:<width$}"));
-        let line = cells.collect::<Vec<_>>().join("  ");
-        text += &format!("  {}\n", line.trim_end());
-    }
-    text
 }

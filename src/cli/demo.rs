@@ -1,10 +1,17 @@
-//! `kmcfit demo`: compares the paper's fit with a constrained one on built-in models and a simulated record.
+//! `kmcfit demo`: the paper's record, fitted without constraints and with physical ones, side by side.
 
-use super::{CommandError, compare, print, unwritable};
-use crate::report::CsvTable;
-use crate::results::{Claim, OutputFolder};
+use super::compare::{Entry, compared, exit_code_of};
+use super::{CommandError, print, unwritable};
+use crate::config::ModelFile;
+use crate::error::InputError;
+use crate::number_format::significant;
+use crate::report::compare::{Comparison, Measures};
+use crate::report::document::{Verdict, level_in_words};
+use crate::report::{CsvTable, Run};
+use crate::results::OutputFolder;
 use kmcfit_core::internals::system::{Grid, Method, NodalCoefficients, State, System, Term};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Models of the demonstration, by path in its folder.
 const MODELS: [(&str, &str); 2] = [
@@ -55,15 +62,15 @@ fn tables() -> Result<[String; 2], CommandError> {
     Ok([record.to_csv(), truth.to_csv()])
 }
 
-/// Introduction, printed before the comparison.
-const BEFORE: &str = "\
-Record: displacement of a free response; the mass halves within 25 s, no damping, k = 1 N/m.
-Two fits: the paper's, by the misfit alone, and a physical one, in which m, c and k are positive and smooth
-and k(0) = 1 N/m.
-
+/// Introduction, printed above the results.
+const INTRODUCTION: &str = "\
+Record: displacement of a free response over 25 s, 2000 samples without noise. In the system that was simulated
+the mass falls from 1 to 0.5 kg, k = 1 N/m, and there is no damping. Two fits of m, c and k at every sample:
+  paper     by the misfit alone, as in the paper
+  physical  m, c and k positive and smooth, k(0) = 1 N/m
 ";
 
-/// Compare the paper's fit of its record with a physically constrained fit; models are built in, the record is simulated.
+/// Fit the paper's record without constraints and with physical ones, side by side; needs no files.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  kmcfit demo --out runs/demo")]
 pub struct Arguments {
@@ -74,27 +81,117 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let out = &arguments.out;
-    let names = MODELS.iter().map(|(name, _)| *name).chain(DATA);
-    let folder = OutputFolder::prepare(out, Claim::new("demo").files(names))?;
-    let tables = tables()?;
-    let results = compare::prepare(&folder, "results")?;
-    let write = || {
-        let stage = folder.stage()?;
-        for (name, text) in MODELS {
-            stage.write(name, text)?;
-        }
-        for (name, text) in DATA.iter().zip(&tables) {
-            stage.write(name, text)?;
-        }
-        stage.commit()
+    let folder = OutputFolder::prepare(out, "demo", [])?;
+    let tables = DATA.into_iter().zip(tables()?);
+    let models = MODELS
+        .into_iter()
+        .map(|(name, text)| (name, text.to_owned()));
+    let files: Vec<(&str, String)> = models.chain(tables).collect();
+    let full = |error| unwritable(out, &error);
+    for (name, text) in &files {
+        folder.write(name, text).map_err(full)?;
+    }
+    // The paths in the models lead from their folder to the data.
+    let data = files
+        .iter()
+        .map(|(name, text)| (format!("../{name}"), Arc::from(text.as_bytes())));
+    let data: Vec<(String, Arc<[u8]>)> = data.collect();
+    let entry = |(name, text): (&str, &str)| {
+        let path = out.join(name);
+        let stem = super::stem(&path);
+        let file = ModelFile::parse(path, text)?.with_files(data.clone());
+        Ok((stem, Entry::of_model(file)?))
     };
-    write().map_err(|error| unwritable(out, &error))?;
-    let models = MODELS.map(|(name, _)| out.join(name));
-    print(BEFORE);
-    let code = compare::run_in(&results, &models)?;
+    let entries = MODELS
+        .into_iter()
+        .map(entry)
+        .collect::<Result<Vec<_>, InputError>>()?;
+    let title = "The paper's record, fitted twice";
+    let comparison = compared(entries, &folder, "results/", Some(title))?;
+    folder.commit(&comparison.document()).map_err(full)?;
+    print(INTRODUCTION);
+    print(&screen(&comparison));
     let place = out.display();
     print(&format!(
-        "Models {place}/models; edit one and fit it with `kmcfit fit {place}/models/physical.yaml`\n"
+        "\nPage   {place}/results/compare.html\n\
+         Next   edit {place}/models/physical.yaml and run `kmcfit fit {place}/models/physical.yaml`\n"
     ));
-    Ok(code)
+    Ok(exit_code_of(&comparison))
 }
+
+/// The verdicts and a table of numbers beside those of the true system.
+fn screen(comparison: &Comparison) -> String {
+    let runs = comparison.runs();
+    let mut text = String::from("\n");
+    for run in runs {
+        let verdict = run.finished.document.verdict.as_ref();
+        let verdict = verdict.map_or_else(String::new, first_reason);
+        text += &format!("{:<9} {verdict}\n", run.name);
+    }
+    let names = runs.iter().map(|run| run.name.clone());
+    let mut rows = vec![row("", "true", names)];
+    for (label, truth, of) in QUANTITIES {
+        let numbers = runs.iter().zip(comparison.measures());
+        let numbers = numbers.map(|(run, measures)| match of(&run.finished, measures) {
+            None => "–".to_owned(),
+            Some(x) if x != 0.0 && x.abs() < EXACT => format!("< {EXACT:e}"),
+            Some(x) => significant(x, 3),
+        });
+        rows.push(row(label, truth, numbers));
+    }
+    text + "\n" + &rows.concat()
+}
+
+fn first_reason(verdict: &Verdict) -> String {
+    let reason = verdict.reasons.first().map_or(&verdict.passed, |r| &r.text);
+    let reason = reason.split([';', ':']).next().unwrap_or_default();
+    format!("{}: {reason}", level_in_words(verdict.level))
+}
+
+fn row(label: &str, truth: &str, numbers: impl Iterator<Item = String>) -> String {
+    let numbers: String = numbers.map(|number| format!("{number:>12}")).collect();
+    format!("{label:<38}{truth:>6}{numbers}\n")
+}
+
+/// Numbers below this are rounding errors.
+const EXACT: f64 = 1e-6;
+
+/// A row of the table: quantity with its unit, that of the true system, and that of a fit.
+type Quantity = (
+    &'static str,
+    &'static str,
+    fn(&Run, &Measures) -> Option<f64>,
+);
+
+const QUANTITIES: [Quantity; 8] = [
+    ("fit of the displacement (%)", "100", |_, m| m.worst_fit),
+    ("mass at 0 s (kg)", "1", |run, _| {
+        run.coefficients.mass.first().copied()
+    }),
+    ("mass at 25 s (kg)", "0.5", |run, _| {
+        run.coefficients.mass.last().copied()
+    }),
+    ("smallest damping (N s/m)", "0", |run, _| {
+        run.coefficients.coefficients[0]
+            .iter()
+            .copied()
+            .reduce(f64::min)
+    }),
+    ("largest damping (N s/m)", "0", |run, _| {
+        run.coefficients.coefficients[0]
+            .iter()
+            .copied()
+            .reduce(f64::max)
+    }),
+    ("largest error of k/m (%)", "", |_, m| {
+        Some(100.0 * m.errors?.k_over_m_relative)
+    }),
+    ("largest error of the mass (%)", "", |_, m| {
+        Some(100.0 * m.errors?.mass_relative)
+    }),
+    ("error from y = -3.3 m, v = 1 m/s (%)", "", |run, _| {
+        let mut all = run.document.predictions.iter();
+        let prediction = all.find(|p| p.displacement == -3.3)?;
+        Some(100.0 * prediction.cost? / prediction.energy?)
+    }),
+];

@@ -1,8 +1,6 @@
-//! Services of the process for the numerics: clock, memory limit, thread starts, progress, interruption, choice of SIMD arithmetic.
+//! Services of the process for the numerics: clock, progress, interruption, choice of SIMD arithmetic.
 
 use crate::error::InputError;
-use crate::faults::{self, Operation};
-use crate::memory;
 use crate::spelling::did_you_mean;
 use kmcfit_core::internals::host::{self, Host};
 use kmcfit_core::internals::simd::{LIMIT, arithmetics, check_limit};
@@ -16,8 +14,6 @@ static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 pub fn provide_host() {
     host::set_host(Host {
         clock: || START.elapsed(),
-        has_memory: |bytes| memory::check(bytes).is_ok(),
-        may_start_thread: || faults::check(Operation::Spawn),
         progress: super::progress::show_jobs,
         is_interrupted: super::interrupt::is_asked,
     });

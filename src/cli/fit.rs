@@ -4,31 +4,33 @@ use super::progress::{Activity, Progress};
 use super::{
     CommandError, Overrides, announce, exit_code, inputs, interrupt, print, say, stem, unwritable,
 };
-use crate::config::{BuildMode, Model, ModelFile, Override, build};
+use crate::config::{BuildMode, Model, ModelFile, Source, Statements, build, is_record, scaffold};
 use crate::error::InputError;
 use crate::fitting::fit_or_no_response;
 use crate::report::document::{FailureDocument, ResultDocument};
 use crate::report::{
-    DRAWS, DisplayUnits, FittedModel, OverheadTimings, RunAssessment, TimingsSummary, charts,
-    fit_claim, json, model_predictions, summary, summary_plot,
+    FittedModel, MODEL, OverheadTimings, RequestedFiles, RunAssessment, TimingsSummary, json,
+    model_predictions, summary, summary_plot,
 };
-use crate::results::{FitJournal, Heading, OutputFolder, RESULT, RequestedFiles};
+use crate::results::{OutputFolder, RESULT};
 use console::Term;
-use kmcfit_core::internals::assessment::{NoDraws, VerdictLevel};
+use kmcfit_core::internals::assessment::VerdictLevel;
 use kmcfit_core::internals::solvers::{
-    CheckpointStore, Fit, IterationEvent, IterationRecord, Observer, Status, WeightPath,
+    Fit, IterationEvent, IterationRecord, Observer, Status, WeightPath,
 };
-use kmcfit_core::internals::threads;
+use serde::Serialize;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Fit a model to its records; write results, tables, figures and a report.
+/// Fit a model to its records, or constants to a record; write results, tables, figures and a report.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  kmcfit fit model.yaml --out runs/first --set fit.stop.iterations=50"
 )]
 pub struct Arguments {
-    /// Model file (YAML).
+    /// Model file (YAML), or a record, for which the model of `kmcfit init` is fitted.
+    #[arg(value_name = "MODEL|RECORD")]
     model: PathBuf,
     /// Folder for the results [default: runs/NAME].
     #[arg(long)]
@@ -44,12 +46,6 @@ pub struct Arguments {
     /// Write a row for every node into the tables over time.
     #[arg(long)]
     tables: bool,
-    /// Write so many draws from the distribution of the estimates to draws.csv.
-    #[arg(long, value_name = "NUMBER")]
-    draws: Option<usize>,
-    /// Print the computing times.
-    #[arg(long)]
-    timings: bool,
     /// Print all findings, the fit of each channel and the work of the solver.
     #[arg(long, conflicts_with = "json")]
     verbose: bool,
@@ -58,34 +54,25 @@ pub struct Arguments {
     strict: bool,
     #[command(flatten)]
     plots: PlotOptions,
-    /// Shortest time between checkpoints for `resume` [default: 1 s, longer if they take over 2 % of the time].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
-    checkpoint: Option<f64>,
 }
 
 /// Options for plots in the terminal.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(super) struct PlotOptions {
-    /// Plot record, fit and functions in the terminal.
-    #[arg(long, conflicts_with = "json")]
-    plot: bool,
     /// Leave out the plot of the coefficient that varies.
-    #[arg(long, conflicts_with_all = ["json", "plot"])]
+    #[arg(long, conflicts_with = "json")]
     no_plot: bool,
 }
 
 /// Exit codes of the verdicts with `--strict`.
 const CHECK: u8 = 4;
 const INADEQUATE: u8 = 5;
-/// Most draws: a table of some hundred megabytes.
-const MOST_DRAWS: usize = 1_000_000;
 /// Width of a chart without a terminal, columns.
 const PIPED: usize = 80;
 
 /// Options of the final output.
 pub(super) struct Printed {
     pub json: bool,
-    pub timings: bool,
     pub plots: PlotOptions,
     pub verbose: bool,
     /// True where the verdict determines the exit code.
@@ -93,103 +80,55 @@ pub(super) struct Printed {
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
-    if let Some(seconds) = arguments.checkpoint.filter(|s| !(0.0..=1e9).contains(s)) {
-        return Err(InputError::argument("--checkpoint", "invalid time")
-            .found(seconds)
-            .expected("seconds, 0 or greater (0: after every iteration)")
-            .into());
-    }
-    let draws = arguments.draws;
-    if let Some(number) = draws.filter(|number| !(1..=MOST_DRAWS).contains(number)) {
-        return Err(InputError::argument("--draws", "invalid number of draws")
-            .found(number)
-            .expected(format!("1 to {MOST_DRAWS}"))
-            .into());
-    }
     let requested = RequestedFiles {
         figures: !arguments.no_report,
         tables: arguments.tables,
-        draws: draws.unwrap_or(0),
     };
-    let file = arguments.set.read(&arguments.model)?;
+    let file = match is_record(&arguments.model) {
+        true => model_of_record(&arguments.model)?.with_overrides(&arguments.set.parse()?)?,
+        false => arguments.set.read(&arguments.model)?,
+    };
     let own = || Path::new("runs").join(stem(&arguments.model));
     let printed = Printed {
         json: arguments.json,
-        timings: arguments.timings,
         plots: arguments.plots,
         verbose: arguments.verbose,
         strict: arguments.strict,
     };
-    let heading = || Heading::of_model("fit", &file, requested, arguments.checkpoint);
     let out = arguments.out.clone().unwrap_or_else(own);
-    fit(&file, heading, &out, &printed, false)
-}
-
-/// Resumes an unfinished fit.
-pub(super) fn resume(
-    place: &Path,
-    heading: &Heading,
-    printed: &Printed,
-) -> Result<u8, CommandError> {
-    let path = heading.inputs.first().cloned().unwrap_or_default();
-    let file = ModelFile::read_with_overrides(path, &Override::parse_all(&heading.overrides)?)?;
-    let now = || Heading::of_model("fit", &file, heading.requested, heading.checkpoint);
-    fit(&file, now, place, printed, true)
-}
-
-/// Fits a record of a fleet, and prints the summary of a fit.
-pub(super) fn fit_record_page(
-    file: &ModelFile,
-    heading: &Heading,
-    out: &Path,
-) -> Result<u8, CommandError> {
-    let printed = Printed {
-        json: false,
-        timings: false,
-        plots: PlotOptions {
-            plot: false,
-            no_plot: false,
-        },
-        verbose: false,
-        strict: false,
-    };
-    fit(file, || heading.clone(), out, &printed, false)
-}
-
-fn fit(
-    file: &ModelFile,
-    heading: impl FnOnce() -> Heading,
-    out: &Path,
-    printed: &Printed,
-    is_resumed: bool,
-) -> Result<u8, CommandError> {
-    let mut model = read(file)?;
-    // The digests of the data are known by now.
-    let heading = &heading();
+    let mut model = read(&file)?;
     model.settings.interrupt = Some(interrupt::flag());
-    let folder = OutputFolder::prepare(out, fit_claim(&model).inputs(inputs(file)))?;
-    if !is_resumed {
-        note_discarded(&folder, heading)?;
-    }
-    let journal = open_journal(&folder, heading, is_resumed)?;
+    let folder = OutputFolder::prepare(&out, "fit", inputs(&file))?;
     announce(&model);
-    let progress = Progress::new(&model.settings.stopping);
-    let (document, status) = fit_into(&folder, &model, &progress, heading.requested, journal)?;
-    print_results(&document, folder.path(), printed);
-    if status == Status::Interrupted {
-        interrupt::say_resumable(folder.path(), "fit");
-    }
-    Ok(code(&document, printed))
+    let progress = Progress::new("");
+    let run = RunPlace {
+        folder: &folder,
+        inside: None,
+    };
+    let (document, _) = fit_into(run, &file, &model, &progress, requested)?;
+    print_results(&document, &out, &printed);
+    Ok(code(&document, &printed))
+}
+
+/// The model that `kmcfit init` writes for a record.
+fn model_of_record(path: &Path) -> Result<ModelFile, InputError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let source = Source {
+        path: path.to_path_buf(),
+        name: name.into_owned(),
+    };
+    let found = scaffold(&[source], &Statements::default())?;
+    say(
+        "note",
+        "constants are fitted, as `kmcfit init` writes them; model.yaml in the folder of the results has the model",
+    );
+    ModelFile::parse(path.with_extension("yaml"), found.text)
 }
 
 /// Reads the data of a model for a fit, with a line of progress.
 pub(super) fn read(file: &ModelFile) -> Result<Model, InputError> {
     let _reading = Activity::begin(format!("reading the data of {}", file.path.display()));
-    std::thread::scope(|scope| {
-        // Without a free thread they are computed when they are asked for.
-        let _ = threads::spawn_scoped(scope, || file.digest_data());
-        build(file, BuildMode::Fit)
-    })
+    build(file, BuildMode::Fit)
 }
 
 /// Exit code of a fit: that of its end, or with `--strict` of its verdict where the fit ended well.
@@ -203,62 +142,21 @@ pub(super) fn code(document: &ResultDocument, printed: &Printed) -> u8 {
     }
 }
 
-/// Notes that unfinished work of the same command on the same inputs is discarded.
-///
-/// # Errors
-/// If the folder holds unfinished work on other inputs.
-pub(super) fn note_discarded(folder: &OutputFolder, heading: &Heading) -> Result<(), InputError> {
-    if folder.discards(heading)? {
-        say(
-            "note",
-            format!(
-                "Discarding the unfinished {} in this folder and starting over; use `kmcfit resume` to continue one.",
-                match heading.command.as_str() {
-                    "compare" => "comparison",
-                    command => command,
-                }
-            ),
-        );
-    }
-    Ok(())
-}
-
-/// Opens the journal of a fit: a new one, or to resume an older one, which is refused if an input has changed.
-pub(super) fn open_journal(
-    folder: &OutputFolder,
-    heading: &Heading,
-    is_resumed: bool,
-) -> Result<FitJournal, InputError> {
-    match is_resumed {
-        true => FitJournal::resume(folder.path(), heading),
-        false => FitJournal::begin(folder.path(), heading)
-            .map_err(|error| unwritable(folder.path(), &error)),
-    }
-}
-
 /// Prints the results of a fit.
 pub(super) fn print_results(document: &ResultDocument, folder: &Path, printed: &Printed) {
     if printed.json {
-        return print(&json(document));
+        let path = folder.join(RESULT);
+        let text = std::fs::read_to_string(path).unwrap_or_else(|_| json(document));
+        return print(&text);
     }
     let width = || {
         let size = Term::stdout().size_checked();
         size.map_or(PIPED, |(_, columns)| columns.into())
     };
-    // A table that cannot be read is an error of `--plot` only.
-    let is_small = !printed.plots.plot && !printed.plots.no_plot && draws_small_plots();
+    let is_small = !printed.plots.no_plot && draws_small_plots();
     let small = is_small.then(|| summary_plot(folder, document, width()).ok());
     let small = small.flatten().flatten();
     print(&summary(document, printed.verbose, small.as_deref()));
-    if printed.plots.plot {
-        match charts(folder, document, width()) {
-            Ok(text) => print(&text),
-            Err(error) => say("warning", format!("no plot: {error}")),
-        }
-    }
-    if printed.timings {
-        print(&format!("\n{}\n", document.timings.text()));
-    }
     print(&format!("results in {}\n", folder.display()));
 }
 
@@ -280,34 +178,58 @@ fn is_utf8(variable: impl Fn(&str) -> Option<String>) -> bool {
     locale.map_or(cfg!(windows), is_of_utf8)
 }
 
-/// Fits a model and writes all files of the run. An older run in the folder stays unchanged until the new one is complete.
+/// Where the files of a run are written: into a folder of its own, or `inside` that of another command.
+#[derive(Clone, Copy)]
+pub(super) struct RunPlace<'a> {
+    pub folder: &'a OutputFolder,
+    pub inside: Option<&'a str>,
+}
+
+impl RunPlace<'_> {
+    fn write(&self, name: &str, contents: &[u8]) -> io::Result<()> {
+        match self.inside {
+            Some(inside) => self.folder.write(&format!("{inside}/{name}"), contents),
+            None => self.folder.write(name, contents),
+        }
+    }
+
+    /// Where the files stand until the run takes its place.
+    pub fn path(&self) -> PathBuf {
+        self.folder.staged(self.inside.unwrap_or_default())
+    }
+
+    /// Ends the run with its document.
+    fn end(&self, document: &impl Serialize) -> io::Result<()> {
+        match self.inside {
+            Some(inside) => self.folder.write_document(inside, RESULT, document),
+            None => self.folder.commit(document),
+        }
+    }
+}
+
+/// Fits a model and writes all files of the run.
+///
+/// # Errors
+/// If no starting point has a response, a data file has changed since it was read, or a file cannot be written.
 pub(super) fn fit_into(
-    folder: &OutputFolder,
+    run: RunPlace,
+    file: &ModelFile,
     model: &Model,
     progress: &Progress,
     requested: RequestedFiles,
-    mut journal: FitJournal,
 ) -> Result<(ResultDocument, Status), CommandError> {
     let clock = Instant::now();
-    let full = |error| unwritable(folder.path(), &error);
-    let result = search(model, progress, Some(&mut journal));
-    if let Some(trouble) = journal.trouble() {
-        say(
-            "warning",
-            format!("the journal of the fit could not be written: {trouble}"),
-        );
-    }
-    let (model, path, found) = match result {
+    let full = |error| unwritable(run.folder.shown(), &error);
+    run.write(MODEL, file.text.as_bytes()).map_err(full)?;
+    let (model, path, found) = match search(model, progress) {
         Ok(found) => found,
         Err(reason) => {
-            let document = FailureDocument::new(&model.title, &reason);
-            let stage = folder.stage().map_err(full)?;
-            stage.write(RESULT, json(&document)).map_err(full)?;
-            stage.commit().map_err(full)?;
-            FitJournal::clear(folder.path()).map_err(full)?;
+            run.end(&FailureDocument::new(&model.title, &reason))
+                .map_err(full)?;
             return Err(CommandError::Numerical(reason));
         }
     };
+    file.read_files().check()?;
     let model = &model;
     let activity = Activity::begin(progress.named_stage("assessing the fit"));
     let analysis = Instant::now();
@@ -315,61 +237,38 @@ pub(super) fn fit_into(
     let run_assessment = RunAssessment::of(model, &found);
     let analysis = analysis.elapsed();
     let report = Instant::now();
-    let run = FittedModel {
+    let fitted = FittedModel {
         run_assessment: &run_assessment,
         model,
         fit: &found,
         predictions: &predictions,
         weights: path.as_ref(),
         requested,
-        display: DisplayUnits::default(),
         computed: Default::default(),
     };
-    let mut document = run.document_and_figures();
-    let draws = run.draws();
-    let stage = folder.stage().map_err(full)?;
+    let mut document = fitted.document_and_figures();
+    document.model.folder = run.folder.path_to(run.inside, file.path.parent());
     activity.stage(progress.named_stage("writing the results"));
-    let writing = run.write(&stage, &document).map_err(full)?;
+    let writing = fitted
+        .write(&|name, bytes| run.write(name, bytes), &document)
+        .map_err(full)?;
     drop(activity);
-    match draws {
-        Some(Ok(table)) => stage.write(DRAWS, table.to_csv()).map_err(full)?,
-        Some(Err(reason)) => say("warning", no_draws(reason)),
-        None => {}
-    }
     let before = &model.preparation;
     let overhead = OverheadTimings {
         io: before.reading + writing,
         analysis,
         report: report.elapsed().saturating_sub(writing),
     };
-    // The time of a resumed fit includes its earlier parts.
     let total = (before.total + clock.elapsed()).max(overhead.sum() + found.elapsed);
     document.timings = TimingsSummary::new(&found, &overhead, total);
-    stage.write(RESULT, json(&document)).map_err(full)?;
-    stage.commit().map_err(full)?;
-    let status = found.outcome.status;
-    if status != Status::Interrupted {
-        FitJournal::clear(folder.path()).map_err(full)?;
-    }
-    Ok((document, status))
-}
-
-/// The reason for a run without draws.
-fn no_draws(reason: NoDraws) -> String {
-    match reason {
-        NoDraws::NoCovariance => {
-            "no draws: the estimates have no covariance, or more than 64 parameters"
-        }
-        NoDraws::Constraints => "no draws: fewer than one in a thousand satisfies the constraints",
-    }
-    .to_owned()
+    run.end(&document).map_err(full)?;
+    Ok((document, found.outcome.status))
 }
 
 /// Runs the fit. Also returns the model as fitted, with the path of weights if a rule chose one.
 pub(super) fn search(
     model: &Model,
     progress: &Progress,
-    store: Option<&mut dyn CheckpointStore>,
 ) -> Result<(Model, Option<WeightPath>, Fit), String> {
     let (mut ignore, mut show) = (
         |_: &IterationRecord| {},
@@ -378,9 +277,6 @@ pub(super) fn search(
     let mut watch = Observer::new(&mut ignore);
     if progress.is_visible() {
         watch = watch.with_events(&mut show);
-    }
-    if let Some(store) = store {
-        watch = watch.with_checkpoints(store);
     }
     let result = fit_or_no_response(model, &mut watch);
     progress.clear();

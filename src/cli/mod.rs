@@ -5,7 +5,6 @@ mod check;
 mod check_file;
 mod check_gradient;
 mod compare;
-mod compared_names;
 mod demo;
 mod environment;
 mod explain;
@@ -17,8 +16,7 @@ mod output;
 mod overrides;
 mod predict;
 mod progress;
-mod report;
-mod resume;
+mod retired;
 mod schema;
 mod shell;
 mod simulate;
@@ -28,6 +26,7 @@ mod verify;
 
 use crate::config::{Model, ModelFile};
 use crate::error::InputError;
+use crate::report::Run;
 use clap::{CommandFactory, Parser, Subcommand};
 use environment::check_arithmetic;
 pub use environment::provide_host;
@@ -61,15 +60,12 @@ enum Command {
     Predict(predict::Arguments),
     Compare(compare::Arguments),
     Verify(verify::Arguments),
-    Report(report::Arguments),
     Study(study::Arguments),
-    Resume(resume::Arguments),
     Init(init::Arguments),
     Explain(explain::Arguments),
     Schema(schema::Arguments),
     Demo(demo::Arguments),
     Completions(shell::Completions),
-    Man(shell::Manual),
 }
 
 /// Converged or completed.
@@ -102,7 +98,6 @@ impl From<InputError> for CommandError {
 ///
 /// All output is flushed by then. The process ends without its exit handlers, which would return the memory of long records page by page.
 pub fn main() -> ! {
-    crate::memory::restart_with_plain_allocators();
     let code = run(std::env::args_os().collect());
     signal_hook::low_level::exit(code.into())
 }
@@ -118,7 +113,9 @@ pub fn run(mut words: Vec<OsString>) -> u8 {
         Ok(arguments) => arguments,
         Err(error) => {
             let command = words.get(1).and_then(|word| word.to_str());
-            return match arguments::input_error(&error, &Arguments::command(), command) {
+            return match retired::error(&words)
+                .or_else(|| arguments::input_error(&error, &Arguments::command(), command))
+            {
                 Some(error) => {
                     complain(&error);
                     BAD_INPUT
@@ -128,7 +125,7 @@ pub fn run(mut words: Vec<OsString>) -> u8 {
         }
     };
     provide_host();
-    if let Err(error) = check_arithmetic().and_then(|()| crate::memory::check_base()) {
+    if let Err(error) = check_arithmetic() {
         complain(&error);
         return BAD_INPUT;
     }
@@ -140,15 +137,12 @@ pub fn run(mut words: Vec<OsString>) -> u8 {
         Command::Predict(arguments) => predict::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
-        Command::Report(arguments) => report::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
-        Command::Resume(arguments) => resume::run(&arguments),
         Command::Init(arguments) => init::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Schema(arguments) => schema::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Completions(arguments) => shell::completions(&arguments),
-        Command::Man(arguments) => shell::manual(&arguments),
     };
     let code = match result {
         Ok(code) => code,
@@ -171,6 +165,23 @@ pub fn run(mut words: Vec<OsString>) -> u8 {
 fn announce(model: &Model) {
     (model.automatic.iter()).for_each(|note| say("note", note));
     (model.warnings.iter()).for_each(|warning| say("warning", warning));
+}
+
+/// Notes the files that have changed since the fit of a run.
+fn note_changes(run: &Run) {
+    for (path, is_model) in run.changed_files() {
+        let what = match (path.exists(), is_model) {
+            // The run has the model, which may be that of a record.
+            (false, true) => continue,
+            (false, false) => "is missing, and was read by the fit",
+            (true, true) => "has changed since the fit: the model in the run is used",
+            (true, false) => "has changed since the fit",
+        };
+        say(
+            "note",
+            format!("{}: {} {what}", run.folder.display(), path.display()),
+        );
+    }
 }
 
 fn exit_code(status: Status) -> u8 {
@@ -202,7 +213,11 @@ fn inputs(file: &ModelFile) -> Vec<PathBuf> {
 
 /// A failure to write as an error of the output folder.
 fn unwritable(path: &Path, error: &io::Error) -> InputError {
+    let found = match path.ancestors().skip(1).find(|above| above.is_file()) {
+        Some(file) => format!("{} is a file, not a folder", file.display()),
+        None => error.to_string(),
+    };
     InputError::argument("--out", "the results cannot be written")
-        .found(format!("{}: {error}", path.display()))
+        .found(format!("{}: {found}", path.display()))
         .expected("a writable folder")
 }

@@ -7,7 +7,6 @@
 use super::{BAD_INPUT, OK};
 use crate::error::InputError;
 use crate::escape::harmless;
-use crate::faults::{self, Operation};
 use crate::source_snippet::Excerpt;
 use console::style;
 use std::fmt::Display;
@@ -24,7 +23,6 @@ pub fn has_failed() -> bool {
 /// Prints results.
 pub fn print(text: &str) {
     let write = || {
-        faults::check(Operation::Write)?;
         let mut out = io::stdout().lock();
         out.write_all(harmless(text).as_bytes())?;
         out.flush()
@@ -73,11 +71,9 @@ pub fn complain(error: &InputError) {
 
 /// Writes escaped lines, which may be coloured. A failure is ignored: it cannot be reported.
 fn styled(text: &str) {
-    if faults::check(Operation::Write).is_ok() {
-        let _ = io::stderr()
-            .lock()
-            .write_all(format!("{text}\n").as_bytes());
-    }
+    let _ = io::stderr()
+        .lock()
+        .write_all(format!("{text}\n").as_bytes());
 }
 
 /// Prints help and version to standard output, usage errors to standard error. Returns the exit code.

@@ -9,9 +9,10 @@ use crate::report::{
     CsvTable, Figure, ForcedPredictions, PredictedResponse, Run, figures, json, predict,
     prediction_table, render,
 };
-use crate::results::{Claim, OutputFolder};
+use crate::results::OutputFolder;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::system::State;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Predict the response of an identified system to another force, motion of the base or initial state.
@@ -50,9 +51,6 @@ pub struct Arguments {
 /// Stage shown while responses are computed.
 const PREDICTING: &str = "predicting";
 
-/// The files in the output folder.
-const FILES: [&str; 2] = ["predictions.csv", "figures/predictions.svg"];
-
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let states: Vec<State> = arguments
         .initial
@@ -62,11 +60,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let reading = Activity::begin(format!("reading {}", arguments.run.display()));
     let run = open(&arguments.run)?;
     drop(reading);
+    super::note_changes(&run);
     let files = || arguments.force.iter().chain(&arguments.base).cloned();
     let prepare = || {
         let out = arguments.out.as_deref();
-        let claim = || Claim::new("predict").files(FILES).inputs(files());
-        out.map(|out| OutputFolder::prepare(out, claim()))
+        out.map(|out| OutputFolder::prepare(out, "predict", files()))
             .transpose()
     };
     if files().next().is_some() {
@@ -94,7 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
             "m"
         };
         write(&folder, &run.system.grid.times(), &responses, unit)
-            .map_err(|error| unwritable(folder.path(), &error))?;
+            .map_err(|error| unwritable(folder.shown(), &error))?;
     }
     let summaries: Vec<_> = responses.into_iter().map(|m| m.summary).collect();
     match arguments.json {
@@ -150,8 +148,13 @@ fn forced(
     let folder = prepare()?;
     let predictions = found.map_err(CommandError::Numerical)?;
     if let Some(folder) = folder {
-        write_files(&folder, &predictions.csv(), &predictions.figure())
-            .map_err(|error| unwritable(folder.path(), &error))?;
+        write_files(
+            &folder,
+            &predictions.csv(),
+            &predictions.figure(),
+            &predictions.summaries(),
+        )
+        .map_err(|error| unwritable(folder.shown(), &error))?;
     }
     match arguments.json {
         true => print(&json(&predictions.summaries())),
@@ -194,13 +197,22 @@ fn write(
             );
         }
     }
-    write_files(folder, &table, &figures::predictions(times, responses))
+    let summaries: Vec<_> = responses.iter().map(|r| r.summary.clone()).collect();
+    write_files(
+        folder,
+        &table,
+        &figures::predictions(times, responses),
+        &summaries,
+    )
 }
 
-fn write_files(folder: &OutputFolder, table: &CsvTable, figure: &Figure) -> std::io::Result<()> {
-    let stage = folder.stage()?;
-    let [table_name, figure_name] = FILES;
-    stage.write(table_name, table.to_csv())?;
-    stage.write(figure_name, render(figure))?;
-    stage.commit()
+fn write_files(
+    folder: &OutputFolder,
+    table: &CsvTable,
+    figure: &Figure,
+    summaries: &impl Serialize,
+) -> std::io::Result<()> {
+    folder.write("predictions.csv", table.to_csv())?;
+    folder.write("figures/predictions.svg", render(figure))?;
+    folder.commit(&serde_json::json!({"format": 1, "predictions": summaries}))
 }

@@ -12,7 +12,8 @@ use kmcfit_core::internals::record::Experiment;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
+use serde_json::Value;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -71,11 +72,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
             .expected("an experiment with an initial state in numbers")
             .into());
     }
-    let mut coefficients = problem.functions.empty_nodal();
-    let start = problem.start();
-    problem
-        .functions
-        .nodal_into(&start, experiment.coefficient_set, &mut coefficients);
+    let (functions, start) = (&problem.functions, problem.start());
+    let mut coefficients = functions.empty_nodal();
+    functions.nodal_into(&start, experiment.coefficient_set, &mut coefficients);
     let simulating = Activity::begin("simulating");
     let response = problem
         .system
@@ -87,7 +86,11 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         .map_err(|breakdown| CommandError::Numerical(format!("no response: {breakdown}")))?;
     let mut samples = response.displacement;
     if let Some(noise) = &noise {
-        noise.add_to(&mut samples);
+        let mut random = ChaCha8Rng::seed_from_u64(noise.seed);
+        for y in &mut samples {
+            let z: f64 = StandardNormal.sample(&mut random);
+            *y += noise.sigma * z;
+        }
     }
     let table = CsvTable::new()
         .column("t_s", problem.system.grid.times())
@@ -114,7 +117,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
             }
         }
         Some(path) => {
-            write(path, &table, &record).map_err(|error| unwritable(path, &error))?;
+            // The provenance first, so that samples with noise never exist without their seed.
+            let files = [(&*record_path(path), &*json(&record)), (path, &table)];
+            write_together(&files).map_err(|error| unwritable(path, &error))?;
         }
     }
     Ok(OK)
@@ -140,44 +145,34 @@ fn check_place(out: &Path, file: &ModelFile) -> Result<(), InputError> {
         return Err(unwritable(out, &error));
     }
     let beside = record_path(out);
-    let is_taken = |path: &Path| path.symlink_metadata().is_ok();
-    match is_taken(out) || is_taken(&beside) {
-        true if !is_own(out, &beside) => Err(InputError::argument(
+    let taken = [out, &beside]
+        .into_iter()
+        .find(|path| path.symlink_metadata().is_ok());
+    match taken.filter(|_| !is_own(out, &beside)) {
+        Some(taken) => Err(InputError::argument(
             "--out",
             "the file exists, and is not an unchanged output of `kmcfit simulate`",
         )
-        .found(match is_taken(out) {
-            true => out.display().to_string(),
-            false => beside.display().to_string(),
-        })
+        .found(taken.display())
         .expected("a new file, or an unchanged output of this command with its OUT.json")),
-        _ => Ok(()),
+        None => Ok(()),
     }
 }
 
-/// True if this command wrote the table and its provenance file, which has the digest of the table; the table may be
-/// missing.
+/// True if this command wrote the table and its provenance file, which has the digest of the table; the table may be missing.
 fn is_own(out: &Path, beside: &Path) -> bool {
-    #[derive(Deserialize)]
-    struct PriorProvenance {
-        made_by: String,
-        sha256: String,
-    }
-    let is_file = |path: &Path| path.symlink_metadata().is_ok_and(|m| m.is_file());
-    let is_missing = out.symlink_metadata().is_err();
     let known = read_text(
         beside,
         "the record of simulated measurements",
         LONGEST_RECORD,
     )
     .ok();
-    let known: Option<PriorProvenance> = known.and_then(|text| serde_json::from_str(&text).ok());
-    let has_digest = |sha256: &str| digest_of_file(out).is_ok_and(|found| found == sha256);
-    is_file(beside)
-        && known.is_some_and(|known| {
-            let is_own = is_missing || is_file(out) && has_digest(&known.sha256);
-            known.made_by == MADE_BY && is_own
-        })
+    let known: Option<Value> = known.and_then(|text| serde_json::from_str(&text).ok());
+    known.is_some_and(|known| {
+        let is_same = |found: String| known["sha256"] == *found;
+        known["made_by"] == MADE_BY
+            && (out.symlink_metadata().is_err() || digest_of_file(out).is_ok_and(is_same))
+    })
 }
 
 /// Longest provenance file that is read, bytes; one has some hundred bytes besides its paths and values.
@@ -218,21 +213,6 @@ struct Noise {
     sigma: f64,
     seed: u64,
     generator: &'static str,
-}
-
-impl Noise {
-    fn add_to(&self, samples: &mut [f64]) {
-        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        for y in samples {
-            let z: f64 = StandardNormal.sample(&mut random);
-            *y += self.sigma * z;
-        }
-    }
-}
-
-/// Writes the provenance file, then the samples, so that samples with noise never exist without their seed.
-fn write(path: &Path, table: &str, record: &Provenance) -> io::Result<()> {
-    write_together(&[(&record_path(path), &json(record)), (path, table)])
 }
 
 fn noise(arguments: &Arguments) -> Result<Option<Noise>, InputError> {

@@ -4,18 +4,13 @@ use super::compare::run_sequence;
 use super::fit::read;
 use super::study_run::StudyTask;
 use super::{
-    CommandError, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, say,
-    stem,
+    CommandError, NOT_CONVERGED, Overrides, announce, exit_code, inputs, interrupt, print, stem,
 };
-use crate::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
+use crate::config::{BuildMode, Model, ModelFile, Sequence, build};
 use crate::error::InputError;
 use crate::report::study::{StudiedFit, StudyDocument};
-use crate::report::{Run, json, rebuilt_fit};
-use crate::results::{
-    AnalysisJournal, CHECKPOINT, FIT_JOURNAL, Heading, OutputFolder, RESULT, STUDY_JOURNAL,
-};
-use crate::text_io::quote;
-use kmcfit_core::internals::solvers::Status;
+use crate::report::{Run, json};
+use crate::results::OutputFolder;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -47,57 +42,24 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         .unwrap_or_else(|| PathBuf::from("runs").join(format!("{}-study", stem(&arguments.model))));
     if arguments.model.is_dir() {
         let run = Run::open(&arguments.model)?;
-        let mut overrides = Override::parse_all(&run.document.model.overrides)?;
-        let further = arguments.set.parse()?;
-        // Other values give another fit.
-        let finished = further.is_empty().then(|| finished_fit(&run)).flatten();
-        overrides.extend(further);
-        let model = Path::new(&run.document.model.file);
-        if !model.exists() {
-            let result = arguments.model.join(RESULT);
-            return Err(InputError::file(result, "the model file of this run was not found")
-                .key("model.file")
-                .found(format!("{}, relative to the current folder", quote(&run.document.model.file)))
-                .expected("the model file that was fitted")
-                .hint("run this command in the folder in which the fit was started, or give the model file")
-                .into());
-        }
-        let file = ModelFile::read_with_overrides(model, &overrides)?;
-        return run_in(&file, &out, arguments.json, threads, finished, false);
+        let file = run.model_file()?;
+        super::note_changes(&run);
+        let file = file.with_overrides(&arguments.set.parse()?)?;
+        return run_in(&file, &out, arguments.json, threads);
     }
     match Sequence::read(&arguments.model)? {
         Some(sequence) => {
             arguments.set.refuse("a sequence")?;
-            run_sequence(&arguments.model, &sequence, &out, arguments.json, false)
+            run_sequence(&arguments.model, &sequence, &out, arguments.json)
         }
         None => {
             let file = arguments.set.read(&arguments.model)?;
-            run_in(&file, &out, arguments.json, threads, None, false)
+            run_in(&file, &out, arguments.json, threads)
         }
     }
 }
 
-/// Resumes an unfinished study or sequence.
-pub(super) fn resume(
-    folder: &Path,
-    as_json: bool,
-    asked: Option<usize>,
-) -> Result<u8, CommandError> {
-    let threads = threads(asked)?;
-    let Heading {
-        inputs, overrides, ..
-    } = AnalysisJournal::heading(folder, STUDY_JOURNAL)?;
-    let model = inputs.into_iter().next().unwrap_or_default();
-    match Sequence::read(&model)? {
-        Some(sequence) => run_sequence(&model, &sequence, folder, as_json, true),
-        None => {
-            let file = ModelFile::read_with_overrides(&model, &Override::parse_all(&overrides)?)?;
-            run_in(&file, folder, as_json, threads, None, true)
-        }
-    }
-}
-
-fn threads(asked: Option<usize>) -> Result<usize, InputError> {
+pub(super) fn threads(asked: Option<usize>) -> Result<usize, InputError> {
     match asked {
         Some(0) => Err(
             InputError::argument("--threads", "invalid number of threads")
@@ -109,34 +71,15 @@ fn threads(asked: Option<usize>) -> Result<usize, InputError> {
     }
 }
 
-fn run_in(
-    file: &ModelFile,
-    out: &Path,
-    as_json: bool,
-    threads: usize,
-    finished: Option<StudiedFit>,
-    is_resumed: bool,
-) -> Result<u8, CommandError> {
+fn run_in(file: &ModelFile, out: &Path, as_json: bool, threads: usize) -> Result<u8, CommandError> {
     let model = checked(file, read(file)?)?;
     announce(&model);
-    let folder = prepare(file, out)?;
-    let plan = StudyTask {
-        file,
-        model,
-        threads,
-        finished,
-        is_resumed,
-        flag: interrupt::flag(),
-    };
-    let document = plan.run(&folder)?;
+    let document = studied(out, (file, model), threads, None, interrupt::flag())?;
     match as_json {
         true => print(&json(&document)),
         false => {
             print(&document.text());
-            print(&format!(
-                "\nPage   {}\n",
-                folder.path().join("study.html").display()
-            ));
+            print(&format!("\nPage   {}\n", out.join("study.html").display()));
         }
     }
     Ok(match (document.is_complete(), &document.fit) {
@@ -144,14 +87,6 @@ fn run_in(
         (true, Some(fit)) => exit_code(fit.status),
         (true, None) => NOT_CONVERGED,
     })
-}
-
-/// Prepares the folder of a study.
-fn prepare(file: &ModelFile, out: &Path) -> Result<OutputFolder, InputError> {
-    let claim = StudyDocument::claim()
-        .journals(&[STUDY_JOURNAL, FIT_JOURNAL, CHECKPOINT])
-        .inputs(inputs(file));
-    OutputFolder::prepare(out, claim)
 }
 
 /// Studies a model and writes the results into a folder, without output on the terminal; starts from the fit `finished`, or fits first.
@@ -168,35 +103,29 @@ pub fn study_into(
 ) -> Result<StudyDocument, CommandError> {
     let threads = self::threads(threads)?;
     let model = checked(file, build(file, BuildMode::Fit)?)?;
-    let folder = prepare(file, out)?;
-    let plan = StudyTask {
+    studied(out, (file, model), threads, finished, flag)
+}
+
+fn studied(
+    out: &Path,
+    (file, model): (&ModelFile, Model),
+    threads: usize,
+    finished: Option<StudiedFit>,
+    flag: Arc<AtomicBool>,
+) -> Result<StudyDocument, CommandError> {
+    let folder = OutputFolder::prepare(out, "study", inputs(file))?;
+    let task = StudyTask {
         file,
         model,
         threads,
         finished,
-        is_resumed: false,
         flag,
     };
-    plan.run(&folder)
+    task.run(&folder)
 }
 
-/// A model that can be studied, within the memory.
+/// The model, if its fit simulates a response and has parameters.
 fn checked(file: &ModelFile, model: Model) -> Result<Model, InputError> {
-    can_be_studied(file, &model)?;
-    model.check_study_memory()?;
-    Ok(model)
-}
-
-/// The fit of a finished run; `None` where it cannot be rebuilt, is not at its end, or has no parameters: then the model is fitted again.
-fn finished_fit(run: &Run) -> Option<StudiedFit> {
-    let is_at_end = run.document.outcome.status == Status::Converged;
-    let (model, fit) = is_at_end.then(|| rebuilt_fit(run).ok()).flatten()?;
-    say("note", "starting from the fit of this run");
-    Some(StudiedFit::of(&model, &fit))
-}
-
-/// Checks that the fit simulates a response and has parameters.
-fn can_be_studied(file: &ModelFile, model: &Model) -> Result<(), InputError> {
     use kmcfit_core::internals::solvers::Solver;
     match model.settings.solver {
         Solver::EquationError => Err(file
@@ -209,6 +138,6 @@ fn can_be_studied(file: &ModelFile, model: &Model) -> Result<(), InputError> {
         _ if model.problem.parameters() == 0 => Err(file
             .error_at("functions", "nothing to study: every function is fixed")
             .expected("at least one function with a basis")),
-        _ => Ok(()),
+        _ => Ok(model),
     }
 }

@@ -1,26 +1,18 @@
-//! The analyses of a study in their order, each from the journal or computed.
+//! The analyses of a study in their order.
 
-use super::compare::open_analyses;
 use super::fit::search;
-use super::output::message;
-use super::progress::{self, Activity, Progress};
+use super::progress::{Activity, Progress};
 use super::{CommandError, unwritable};
 use crate::config::{Model, ModelFile};
 use crate::report::study::{
     self, AnalysisFailure, COMPLETE, Optimum, StudiedFit, StudyDocument, structural_rank,
 };
-use crate::results::{
-    AnalysisJournal, FitJournal, Heading, OutputFolder, RequestedFiles, STUDY_JOURNAL,
-};
+use crate::results::OutputFolder;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::solvers::{CheckpointStore, Status};
+use kmcfit_core::internals::solvers::Status;
 use kmcfit_core::internals::study::extremes::is_within_rounding;
 use kmcfit_core::internals::threads::interruptible;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
-use std::io::{self, IsTerminal};
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -35,37 +27,17 @@ fn on_grid_of(model: &Arc<Model>, fit: &StudiedFit) -> Option<Arc<Model>> {
         true => Model::clone(model),
         false => model.on_nodes(fit.nodes)?,
     };
-    found.check_study_memory().ok()?;
     if let Some(width) = fit.friction_width {
         found = found.with_friction_width(width);
     }
     (found.problem.system.grid.nodes() == fit.nodes).then(|| Arc::new(found))
 }
 
-/// The journal of the fit within a study. A resumed study without one starts its fit over.
-fn fit_journal(folder: &Path, heading: &Heading, is_resumed: bool) -> Option<FitJournal> {
-    let before = is_resumed.then(|| FitJournal::resume(folder, heading));
-    match before {
-        Some(Ok(journal)) => Some(journal),
-        _ => FitJournal::begin(folder, heading).ok(),
-    }
-}
-
 /// Reason for which a study ends early.
 enum StudyError {
     Interrupted,
-    Disk(io::Error),
     Numerical(String),
 }
-
-impl From<io::Error> for StudyError {
-    fn from(error: io::Error) -> Self {
-        StudyError::Disk(error)
-    }
-}
-
-/// Most findings of a part that are shown before the end.
-const FIRST_FINDINGS: usize = 3;
 
 /// A study that is to be run.
 pub(super) struct StudyTask<'a> {
@@ -75,7 +47,6 @@ pub(super) struct StudyTask<'a> {
     pub threads: usize,
     /// The fit, if the model was fitted before.
     pub finished: Option<StudiedFit>,
-    pub is_resumed: bool,
     /// Ends the study.
     pub flag: Arc<AtomicBool>,
 }
@@ -85,8 +56,6 @@ impl StudyTask<'_> {
     pub fn run(self, folder: &OutputFolder) -> Result<StudyDocument, CommandError> {
         let mut model = self.model;
         model.settings.interrupt = Some(Arc::clone(&self.flag));
-        let heading = Heading::of_model("study", self.file, RequestedFiles::figures(), None);
-        let journal = open_analyses(folder, STUDY_JOURNAL, &heading, self.is_resumed)?;
         let document = StudyDocument {
             format: 1,
             title: model.title.clone(),
@@ -97,15 +66,10 @@ impl StudyTask<'_> {
             structural_rank: structural_rank(&model.problem),
             ..StudyDocument::default()
         };
-        show_findings(&document, "structural-rank");
-        let threads = model.threads_within_memory(self.threads);
+        let threads = self.threads;
         let mut work = StudyRun {
             model: Arc::new(model),
-            folder: folder.path(),
-            heading: Heading::of_model("study", self.file, RequestedFiles::default(), None),
-            is_resumed: self.is_resumed,
             finished: self.finished,
-            journal,
             flag: self.flag,
             threads,
             begun: 1,
@@ -114,41 +78,25 @@ impl StudyTask<'_> {
         let done = match work.run() {
             Ok(()) => true,
             Err(StudyError::Interrupted) => false,
-            Err(StudyError::Disk(error)) => return Err(unwritable(folder.path(), &error).into()),
             Err(StudyError::Numerical(reason)) => return Err(CommandError::Numerical(reason)),
         };
         let mut document = work.document;
         if done {
             document.status = COMPLETE.into();
         }
-        let written = document
-            .write(folder, &work.model)
-            .and_then(|()| work.journal.finish_if(done));
-        written.map_err(|error| unwritable(folder.path(), &error))?;
+        self.file.read_files().check()?;
+        let written = document.write(folder, &work.model);
+        written.map_err(|error| unwritable(folder.shown(), &error))?;
         Ok(document)
     }
 }
 
-/// The first findings of a part of a study while the others are computed, on standard error where that is a terminal.
-fn show_findings(document: &StudyDocument, part: &str) {
-    if io::stderr().is_terminal() {
-        let findings = document.findings().into_iter();
-        let own = findings.filter(|(of, _)| *of == part).take(FIRST_FINDINGS);
-        own.for_each(|(of, sentence)| message(&format!("{of}: {sentence}")));
-    }
-}
-
 /// A running study.
-struct StudyRun<'a> {
+struct StudyRun {
     /// The model; after the fit on the grid of the fit.
     model: Arc<Model>,
-    folder: &'a Path,
-    /// Heading of the journal of the fit.
-    heading: Heading,
-    is_resumed: bool,
     /// The fit of a finished run.
     finished: Option<StudiedFit>,
-    journal: AnalysisJournal,
     flag: Arc<AtomicBool>,
     threads: usize,
     /// Number of analyses begun, the fit included.
@@ -156,7 +104,7 @@ struct StudyRun<'a> {
     document: StudyDocument,
 }
 
-impl StudyRun<'_> {
+impl StudyRun {
     /// All analyses, up to an interrupt.
     fn run(&mut self) -> Result<(), StudyError> {
         let (problem, theta, evaluation) = self.fit()?;
@@ -175,10 +123,8 @@ impl StudyRun<'_> {
         let model = Arc::clone(&self.model);
         let plan = &model.study;
         self.document.sensitivity = Some(self.analysis("sensitivity", || study::sensitivity(at))?);
-        show_findings(&self.document, "sensitivity");
         let bands = || study::bands(at, &model);
         self.document.bands = Some(self.analysis("bands", bands)?);
-        show_findings(&self.document, "bands");
         for target in &plan.profiles {
             let Some(of) = study::linear(at.problem, target) else {
                 continue;
@@ -198,27 +144,13 @@ impl StudyRun<'_> {
         Ok(())
     }
 
-    /// Further fits: from random starting points, with constant functions, of resampled records.
+    /// Further fits, from random starting points.
     fn further_fits(&mut self, at: Optimum) -> Result<(), StudyError> {
         let (model, threads) = (Arc::clone(&self.model), self.threads);
         let plan = &model.study;
         if plan.starts > 0 {
             let starts = || study::starts(&model, at, threads);
             self.document.multistart = Some(self.analysis("starts", starts)?);
-        }
-        if plan.constancy_test {
-            let test = || study::constancy_test(at, plan, threads);
-            let found = self.analysis("constancy test", test)?;
-            let found = self.or_fail("constancy test", found);
-            self.document.constancy_test = found.unwrap_or_default();
-        }
-        if plan.replicates > 0 {
-            let found = self.analysis("bootstrap", || study::refits(at, plan, threads))?;
-            let mut found = self.or_fail("bootstrap", found).unwrap_or_default();
-            for interval in &mut found {
-                interval.unit = model.converted_unit(&interval.unit).to_owned();
-            }
-            self.document.bootstrap = found;
         }
         Ok(())
     }
@@ -244,12 +176,8 @@ impl StudyRun<'_> {
         Ok(())
     }
 
-    /// Result of one analysis, from the journal or computed. The result of an interrupted analysis is discarded.
-    fn analysis<T: Serialize + DeserializeOwned>(
-        &mut self,
-        name: &str,
-        compute: impl FnOnce() -> T,
-    ) -> Result<T, StudyError> {
+    /// Result of one analysis. The result of an interrupted analysis is discarded.
+    fn analysis<T>(&mut self, name: &str, compute: impl FnOnce() -> T) -> Result<T, StudyError> {
         let flag = Arc::clone(&self.flag);
         let whole = || !flag.load(Ordering::Relaxed);
         if !whole() {
@@ -262,19 +190,13 @@ impl StudyRun<'_> {
             self.model.study.analyses()
         );
         let activity = Activity::begin(stage);
-        progress::forget_jobs();
-        let work = || interruptible(&flag, compute);
-        let found = self.journal.analysis(name, work, whole)?;
+        let found = interruptible(&flag, compute);
         drop(activity);
-        if found.is_none() {
-            let done = progress::jobs().map(|[done, all]| format!(" after {done} of {all} jobs"));
-            let reason = format!(
-                "interrupted{}; none of its results is used, and `kmcfit resume` begins it again",
-                done.unwrap_or_default()
-            );
-            self.fail(name, &reason);
+        if !whole() {
+            self.fail(name, "interrupted; none of its results is used");
+            return Err(StudyError::Interrupted);
         }
-        found.ok_or(StudyError::Interrupted)
+        Ok(found)
     }
 
     /// The result of an analysis; its failure is noted in the document.
@@ -289,47 +211,25 @@ impl StudyRun<'_> {
         });
     }
 
-    /// The fit, from the journal or computed.
+    /// The fit.
     fn fit(&mut self) -> Result<(Problem, Vec<f64>, Evaluation), StudyError> {
         let model = Arc::clone(&self.model);
         let shown = format!("study 1/{}: fit", model.study.analyses());
-        let progress = Progress::new(&model.settings.stopping).named(&shown);
-        let (folder, heading, is_resumed) = (self.folder, &self.heading, self.is_resumed);
-        let flag = Arc::clone(&self.flag);
-        let finished = self.finished.take();
-        let mut interrupted = None;
-        let compute = || {
-            if let Some(finished) = finished {
-                return Ok(finished);
+        let progress = Progress::new(&shown);
+        let fit = match self.finished.take() {
+            Some(finished) => finished,
+            None => {
+                let (fitted, _, found) =
+                    search(&model, &progress).map_err(StudyError::Numerical)?;
+                StudiedFit::of(&fitted, &found)
             }
-            let mut journal = fit_journal(folder, heading, is_resumed);
-            let journal = journal.as_mut().map(|j| j as &mut dyn CheckpointStore);
-            let (fitted, _, found) = search(&model, &progress, journal)?;
-            let fit = StudiedFit::of(&fitted, &found);
-            interrupted = Some(fit.clone());
-            Ok::<_, String>(fit)
         };
-        let whole = || !flag.load(Ordering::Relaxed);
-        let is_right = |kept: &Result<StudiedFit, String>| match kept {
-            Ok(fit) => on_grid_of(&model, fit).is_some_and(|model| fit.is_of(&model.problem)),
-            Err(_) => true,
-        };
-        self.journal.forget_unless("fit", is_right);
-        let fitted = self.journal.analysis("fit", compute, whole)?;
-        let Some(fitted) = fitted else {
-            // The document has the best point; the journal of the fit has its checkpoint.
-            self.document.fit = interrupted;
-            return Err(StudyError::Interrupted);
-        };
-        let fit = fitted.map_err(StudyError::Numerical)?;
-        FitJournal::clear(folder)?;
         let interrupted = fit.status == Status::Interrupted;
         let model = on_grid_of(&model, &fit);
         let model = model.ok_or_else(|| {
             StudyError::Numerical("the grid of the fit does not fit into memory".into())
         })?;
         let problem = fit.problem(&model.problem);
-        self.threads = model.threads_within_memory(self.threads);
         self.model = model;
         let theta = fit.parameters.clone();
         self.document.fit = Some(fit);

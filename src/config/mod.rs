@@ -18,6 +18,7 @@ mod model_file;
 mod new_record;
 mod overrides;
 mod reader;
+mod retired;
 mod scaffold;
 mod sequence;
 mod source;
@@ -28,17 +29,13 @@ mod yaml_errors;
 
 pub(crate) use build::DataWarning;
 pub use build::{
-    AutomaticGrid, BuildMode, Candidate, ChannelNote, Equivalent, HoldOut, Model, Preparation,
-    StudyPlan, StudyTarget, WeightSearch, build,
+    AutomaticGrid, BuildMode, ChannelNote, HoldOut, Model, Preparation, StudyPlan, StudyTarget,
+    WeightSearch, build,
 };
-#[cfg(test)]
-pub(crate) use build::{DataAction, DataFact, GapPlace};
-pub use model_file::ModelFile;
+pub use model_file::{ModelFile, is_record};
 pub use new_record::{MeasuredChannel, NewRecord};
 pub use overrides::Override;
-pub use scaffold::{
-    Question, Role, Scaffold, Source, Statements, questions, rate, recognised, scaffold,
-};
+pub use scaffold::{Role, Scaffold, Source, Statements, rate, recognised, scaffold};
 pub use sequence::Sequence;
 pub use source::{DataFile, ModelSource};
 pub use values::{Number, NumberOrColumn, Text};

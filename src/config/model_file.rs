@@ -10,10 +10,10 @@ use super::overrides::Override;
 use super::spec::ModelSpec;
 use super::values::Text;
 use super::yaml_errors;
-use crate::digest::FileDigests;
+use crate::digest::ReadFiles;
 use crate::error::InputError;
 use crate::formats::has_data_extension;
-use crate::tables::{Table, TableFormat};
+use crate::tables::{TABLE, Table, TableFormat};
 use crate::text_io::{LONGEST_TABLE, read_text};
 
 /// Expected contents of a model file, for messages.
@@ -37,8 +37,15 @@ pub struct ModelFile {
     edited: Option<String>,
     /// Contents of data files by their names in the model, in place of files.
     files: BTreeMap<String, Arc<[u8]>>,
-    /// Digests of the data files.
-    digests: Arc<FileDigests>,
+    /// The data files that were read.
+    read: Arc<ReadFiles>,
+}
+
+/// True for a file of measurements by its name, unless it has the keys of a model.
+pub fn is_record(path: &Path) -> bool {
+    let has_keys = |text: &str| text.lines().any(|line| line.starts_with("format:"));
+    let text = || read_text(path, MODEL_FILE, LONGEST_MODEL);
+    path.is_file() && has_data_extension(path) && !text().is_ok_and(|text| has_keys(&text))
 }
 
 impl ModelFile {
@@ -51,19 +58,14 @@ impl ModelFile {
     pub fn read(path: impl AsRef<Path>) -> Result<Self, InputError> {
         let path = path.as_ref();
         check_path(path)?;
-        let has_keys = |text: &str| text.lines().any(|line| line.starts_with("format:"));
-        let text = read_text(path, MODEL_FILE, LONGEST_MODEL);
-        let is_record = path.is_file()
-            && has_data_extension(path)
-            && !text.as_ref().is_ok_and(|text| has_keys(text));
-        match is_record {
+        match is_record(path) {
             true => Err(InputError::file(path, "a record in place of a model file")
                 .expected(MODEL_FILE)
                 .hint(format!(
-                    "`kmcfit init {}` writes a model file for the record",
-                    path.display()
+                    "`kmcfit init {record}` writes a model file for the record, `kmcfit fit {record}` fits it",
+                    record = path.display()
                 ))),
-            false => Self::parse(path, text?),
+            false => Self::parse(path, read_text(path, MODEL_FILE, LONGEST_MODEL)?),
         }
     }
 
@@ -139,22 +141,9 @@ impl ModelFile {
             .collect()
     }
 
-    /// Computes the digests of all data files that can be read as tables.
-    pub fn digest_data(&self) {
-        for path in self.data_files() {
-            // A file without a digest has none when it is asked for.
-            if path
-                .metadata()
-                .is_ok_and(|found| found.len() <= LONGEST_TABLE)
-            {
-                let _ = self.digests.of(&path);
-            }
-        }
-    }
-
-    /// Digests of the data files.
-    pub fn digests(&self) -> &FileDigests {
-        &self.digests
+    /// The data files that were read.
+    pub fn read_files(&self) -> &ReadFiles {
+        &self.read
     }
 
     /// The content of a data file that stands in memory.
@@ -174,7 +163,11 @@ impl ModelFile {
     ) -> Result<Vec<Table>, InputError> {
         match self.in_memory(name) {
             Some(content) => Table::parse_all(name, content, format),
-            None => Table::read_all(self.resolve(name), format),
+            None => {
+                let path = self.resolve(name);
+                let bytes = self.read.read(&path, TABLE, LONGEST_TABLE)?;
+                Table::from_bytes(&path, bytes, format)
+            }
         }
     }
 
@@ -233,7 +226,7 @@ impl ModelFile {
             overrides: Vec::new(),
             edited: None,
             files: BTreeMap::new(),
-            digests: Arc::default(),
+            read: Arc::default(),
         };
         if model.spec.experiments.is_empty() {
             return Err(model

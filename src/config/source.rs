@@ -1,9 +1,8 @@
 //! Sources of a model, for reproducible runs: its text, overrides, and data files with digests.
 
 use super::ModelFile;
-use crate::digest::{FileDigests, digest};
-use std::path::Path;
-use std::time::SystemTime;
+use crate::digest::digest;
+use serde::{Deserialize, Serialize};
 
 /// Text, overrides and data files of a model.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -16,29 +15,31 @@ pub struct ModelSource {
     pub data: Vec<DataFile>,
 }
 
-/// A data file with its digest at the time when the model was built.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A data file with the digest of the bytes that were read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DataFile {
     /// Path as in the model file, relative to its folder.
     pub name: String,
-    /// Size in bytes and SHA-256 in hexadecimal digits; `None` for a file that can no longer be read.
-    pub content: Option<(u64, String)>,
-    /// Time of its last change, where the file system has it.
-    pub modified: Option<SystemTime>,
+    /// Size in bytes.
+    pub bytes: u64,
+    /// SHA-256 in hexadecimal digits.
+    pub sha256: String,
 }
 
 impl ModelSource {
-    /// The text of a model file, and the files behind its keys `data`.
+    /// The text of a model file, and the files behind its keys `data` that were read.
     pub fn of(file: &ModelFile) -> Self {
-        let data = file.data_names().into_iter().map(|name| DataFile {
-            content: match file.in_memory(&name) {
-                Some(bytes) => Some((bytes.len() as u64, digest(bytes))),
-                None => content(&file.resolve(&name), file.digests()),
-            },
-            modified: (file.resolve(&name).metadata())
-                .and_then(|m| m.modified())
-                .ok(),
-            name,
+        let data = file.data_names().into_iter().filter_map(|name| {
+            let path = file.resolve(&name);
+            let (bytes, sha256) = match file.in_memory(&name) {
+                Some(bytes) => (bytes.len() as u64, digest(bytes)),
+                None => (file.read_files().of(&path)).map(|read| (read.bytes, read.sha256))?,
+            };
+            Some(DataFile {
+                bytes,
+                sha256,
+                name,
+            })
         });
         Self {
             text: file.text.clone(),
@@ -48,41 +49,11 @@ impl ModelSource {
     }
 }
 
-fn content(path: &Path, digests: &FileDigests) -> Option<(u64, String)> {
-    let bytes = path.metadata().ok()?.len();
-    Some((bytes, digests.of(path).ok()?))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::config::{BuildMode, Model, build};
     use std::sync::Arc;
-
-    #[test]
-    fn every_data_file_is_named_once() {
-        let folder = tempfile::tempdir().expect("a folder");
-        std::fs::write(folder.path().join("a.csv"), "abc").expect("a file");
-        let text = "format: 1
-experiments:
-  - {data: a.csv, columns: {force: {data: b.csv, column: f}}, initial: {displacement: 1, velocity: 0}}
-  - {data: a.csv, initial: {displacement: 1, velocity: 0}}
-functions: {mass: {fixed: 1}, damping: {fixed: {data: b.csv, column: c}}, stiffness: {fixed: 1}}
-fit: {initial: data}
-";
-        let file = ModelFile::parse(folder.path().join("model.yaml"), text).expect("a model");
-        let source = ModelSource::of(&file);
-        assert_eq!(source.text, text);
-        let digest = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
-        let expected = [("a.csv", Some((3, digest.to_string()))), ("b.csv", None)];
-        let found: Vec<_> = (source.data.into_iter())
-            .map(|file| (file.name, file.content))
-            .collect();
-        assert_eq!(
-            found,
-            expected.map(|(name, content)| (name.to_string(), content))
-        );
-    }
 
     #[test]
     fn a_file_in_memory_is_that_of_the_disk() {
@@ -114,7 +85,7 @@ functions: {mass: {fixed: 1}, damping: {basis: constant, start: 0.1}, stiffness:
                 .source
                 .data
                 .into_iter()
-                .map(|file| file.content)
+                .map(|file| (file.name, file.sha256))
                 .collect()
         };
         assert_eq!(contents(memory), contents(disk));

@@ -45,7 +45,7 @@ keys! {
         /// Initial states for which the free response is predicted.
         predict: Option<Vec<StateSpec>>, example "[{displacement: -3.3, velocity: 1.0}]", default "none";
         /// Analyses of `kmcfit study`.
-        study: Option<StudySpec>, example "{starts: 20, constancy_test: true}";
+        study: Option<StudySpec>, example "{starts: 20, seed: 1}";
     }
 }
 

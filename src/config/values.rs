@@ -308,10 +308,6 @@ choice! {
     pub enum WeightRule {
         /// Discrepancy principle: the largest weight whose residuals agree with the noise.
         Discrepancy = "discrepancy",
-        /// L-curve: the corner of misfit against roughness.
-        LCurve = "l-curve",
-        /// Generalised cross-validation.
-        Gcv = "gcv",
         /// Restricted maximum likelihood of noise and smoothness; each penalty has its own weight.
         RestrictedLikelihood = "reml",
         /// Weight at which the function resolves changes within one dominant period of the response.

@@ -6,6 +6,7 @@ use super::input_limits::Checked;
 use super::key_positions::place;
 use super::key_positions::{self, Position, key_path, locate};
 use super::reader::{Mistake, Report, Value, ValueVisitor};
+use super::retired::successor;
 use super::syntax;
 use crate::error::InputError;
 use crate::spelling::did_you_mean;
@@ -81,9 +82,15 @@ impl YamlError<'_> {
                 found,
                 expected,
                 hint,
-            } => InputError {
-                hint,
-                ..self.here(problem).found(found).expected(expected)
+            } => match successor(self.key, found.trim_matches('`')) {
+                Some(successor) => {
+                    let error = self.here("this choice was removed").found(found);
+                    error.expected(expected).hint(successor)
+                }
+                None => InputError {
+                    hint,
+                    ..self.here(problem).found(found).expected(expected)
+                },
             },
         }
     }
@@ -97,6 +104,10 @@ impl YamlError<'_> {
     }
 
     fn unknown_key(&self, key: &str, known: &[&str]) -> InputError {
+        if let Some(successor) = successor(&format!("{}.{key}", self.key), "") {
+            let error = self.here("this key was removed").found(quote(key));
+            return error.hint(successor);
+        }
         let error = self
             .here("unknown key")
             .found(quote(key))

@@ -1,155 +1,170 @@
-//! The fit of one record.
+//! The fit of one record of a fleet.
 
-use super::model::FleetModel;
 use super::records::Record;
-use super::row::{Curve, Row};
-use crate::config::{BuildMode, Model, build};
+use crate::config::{BuildMode, ModelFile, build};
+use crate::digest::digest;
 use crate::error::InputError;
 use crate::finding::Finding;
 use crate::fitting::fit_or_no_response;
-use crate::report::CompletedFit;
-use crate::results::RequestedFiles;
+use crate::report::document::Estimates;
+use crate::report::{CompletedFit, RequestedFiles};
+use crate::text_io::{LONGEST_TABLE, read_bytes};
+use kmcfit_core::internals::assessment::VerdictLevel;
 use kmcfit_core::internals::solvers::{IterationRecord, Observer, Status};
+use serde::{Deserialize, Serialize};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
 
-/// Points of a curve.
-const POINTS: usize = 101;
-/// Beginning of the error of a row that a time limit ended.
-pub const TIME_LIMIT: &str = "time limit";
-
-/// What ends a fit.
-#[derive(Debug, Clone, Default)]
-pub struct Limits {
-    /// Set where the fit is to end.
-    pub interrupt: Arc<AtomicBool>,
-    /// Longest time of a record.
-    pub time: Option<Duration>,
+/// Result of the fit of one record: a line of `rows.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// The record: its path as given.
+    pub record: String,
+    /// SHA-256 digest of its content and of the values that its table states for it; empty for a record that could not be read.
+    #[serde(default)]
+    pub sha256: String,
+    /// Estimates, as in the result document of a fit; empty where there is an error.
+    pub estimates: Estimates,
+    /// Verdict; none where there is an error.
+    pub verdict: Option<VerdictLevel>,
+    /// Reasons of the verdict, then warnings.
+    pub warnings: Vec<String>,
+    /// Time of reading and fit, s.
+    pub seconds: f64,
+    /// Why the record has no estimates.
+    pub error: Option<String>,
 }
 
-/// The result of a record.
-#[derive(Debug, Clone)]
-pub struct Fitted {
-    /// Its row.
-    pub row: Row,
-    /// The coefficients that vary.
-    pub curves: Vec<Curve>,
-    /// Estimated parameters of the functions; `None` without a fit.
-    pub parameters: Option<Vec<f64>>,
-}
-
-/// Fits a record, from the parameters `from` of the functions where they are as many; `None` if `limits.interrupt` was set before the time
-/// limit. Every failure, a panic included, is the error of the row.
-pub fn fit_record(
-    model: &FleetModel,
-    record: &Record,
-    content: Option<Arc<[u8]>>,
-    from: Option<&[f64]>,
-    limits: &Limits,
-) -> Option<Fitted> {
-    let clock = Instant::now();
-    // The fit shares no state with others that a panic could leave half changed.
-    let result = catch_unwind(AssertUnwindSafe(|| {
-        fitted(model, record, content, from, limits)
-    }));
-    let elapsed = clock.elapsed();
-    let seconds = (elapsed.as_secs_f64() * 1e6).round() / 1e6;
-    let failed = |error: String| Fitted {
-        row: Row::failed(&record.name, seconds, error),
-        curves: Vec::new(),
-        parameters: None,
-    };
-    if let Some(limit) = limits.time.filter(|limit| elapsed > *limit) {
-        let text = format!(
-            "{TIME_LIMIT}: the record took more than {} s",
-            limit.as_secs_f64()
-        );
-        return Some(failed(text));
-    }
-    match result {
-        Ok(Ok(_) | Err(_)) if limits.interrupt.load(Ordering::Relaxed) => None,
-        Ok(Ok(mut found)) => {
-            found.row.seconds = seconds;
-            Some(found)
+impl Row {
+    /// The row of a record without estimates.
+    pub fn failed(record: &str, sha256: String, error: impl Into<String>) -> Self {
+        Self {
+            record: record.to_owned(),
+            sha256,
+            estimates: Estimates(Vec::new()),
+            verdict: None,
+            warnings: Vec::new(),
+            seconds: 0.0,
+            error: Some(error.into()),
         }
-        Ok(Err(error)) => Some(failed(error)),
-        Err(_) => Some(failed("internal error: the fit panicked".to_owned())),
     }
 }
 
+/// A model with one experiment, whose data are those of each record in turn.
+#[derive(Debug, Clone)]
+pub struct FleetModel {
+    /// The model file.
+    pub file: ModelFile,
+}
+
+impl FleetModel {
+    /// # Errors
+    /// If the model has several experiments, or one without `data`.
+    pub fn new(file: ModelFile) -> Result<Self, InputError> {
+        let experiments = &file.spec.experiments;
+        if experiments.len() > 1 {
+            return Err(file
+                .error_at("experiments[1]", "the model of a fleet has one experiment")
+                .found(format!("{} experiments", experiments.len()))
+                .expected("one experiment, whose `data` each record replaces"));
+        }
+        match experiments.first().is_some_and(|e| e.data.is_some()) {
+            true => Ok(Self { file }),
+            false => Err(file
+                .error_at("experiments[0].data", "the experiment has no data")
+                .expected("`data: FILE`, in whose place each record is read")),
+        }
+    }
+}
+
+/// The content of a record and the digest of it and of its own values.
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn content_of(record: &Record) -> Result<(Arc<[u8]>, String), InputError> {
+    let content: Arc<[u8]> = match &record.content {
+        Some(content) => Arc::clone(content),
+        None => read_bytes(&record.path, "a record", LONGEST_TABLE)?.into(),
+    };
+    let values: String = record
+        .overrides
+        .iter()
+        .map(|change| format!("{change}\n"))
+        .collect();
+    let sha256 = match values.is_empty() {
+        true => digest(&content),
+        false => digest(format!("{} {values}", digest(&content)).as_bytes()),
+    };
+    Ok((content, sha256))
+}
+
+/// Fits a record; `None` where `interrupt` ended it. Every failure, a panic included, is the error of the row.
+pub fn fit_record(model: &FleetModel, record: &Record, interrupt: &Arc<AtomicBool>) -> Option<Row> {
+    let clock = Instant::now();
+    let (content, sha256) = match content_of(record) {
+        Ok(found) => found,
+        Err(error) => return Some(Row::failed(&record.name, String::new(), error.to_string())),
+    };
+    // The fit shares no state with others that a panic could leave half changed.
+    let fit = || fitted(model, record, content, interrupt);
+    let mut row = match catch_unwind(AssertUnwindSafe(fit)) {
+        Ok(Ok(row)) => row?,
+        Ok(Err(error)) => Row::failed(&record.name, String::new(), error),
+        Err(_) => Row::failed(
+            &record.name,
+            String::new(),
+            "internal error: the fit panicked",
+        ),
+    };
+    row.sha256 = sha256;
+    row.seconds = (clock.elapsed().as_secs_f64() * 1e6).round() / 1e6;
+    Some(row)
+}
+
+/// The row of a record without digest and time; `None` where the fit was interrupted.
 fn fitted(
     fleet: &FleetModel,
     record: &Record,
-    content: Option<Arc<[u8]>>,
-    from: Option<&[f64]>,
-    limits: &Limits,
-) -> Result<Fitted, String> {
+    content: Arc<[u8]>,
+    interrupt: &Arc<AtomicBool>,
+) -> Result<Option<Row>, String> {
     let text = |error: InputError| error.to_string();
-    let file = fleet.with_record(record, content).map_err(text)?;
-    let mut model = build(&file, BuildMode::Fit).map_err(text)?;
-    model.settings.interrupt = Some(Arc::clone(&limits.interrupt));
-    let own = model.settings.stopping.limit;
-    model.settings.stopping.limit = own.into_iter().chain(limits.time).min();
-    start_from(&mut model, from);
+    let file = fleet.file.clone();
+    let file = file.with_overrides(&record.overrides).map_err(text)?;
+    let name = record.path.to_string_lossy();
+    // The name of a file in memory states its format; that of another one is shown in messages.
+    let name = if record.content.is_some() {
+        &*name
+    } else {
+        &record.name
+    };
+    let mut model = build(&file.with_record(name, content), BuildMode::Fit).map_err(text)?;
+    model.settings.interrupt = Some(Arc::clone(interrupt));
     let mut ignore = |_: &IterationRecord| {};
     let found = fit_or_no_response(&model, &mut Observer::new(&mut ignore))
         .map_err(|breakdown| format!("the start cannot be evaluated: {breakdown}"))?;
     if found.fit.outcome.status == Status::Interrupted {
-        return Err("interrupted".to_owned());
+        return Ok(None);
     }
-    let done = CompletedFit::of(found);
-    let document = done.fitted(RequestedFiles::default()).document();
+    let document = CompletedFit::of(found);
+    let document = document.fitted(RequestedFiles::default()).document();
+    let reasons = document.verdict.iter().flat_map(|verdict| &verdict.reasons);
     let mut warnings = Vec::new();
-    if let Some(verdict) = &document.verdict {
-        warnings.extend(Finding::texts(&verdict.reasons));
-    }
-    for warning in Finding::texts(&document.warnings) {
-        if !warnings.contains(&warning) {
-            warnings.push(warning);
+    for finding in reasons.chain(&document.warnings) {
+        let Finding { text, .. } = finding;
+        if !warnings.contains(text) {
+            warnings.push(text.clone());
         }
     }
-    let functions = done.model.problem.functions.scalar_range().start;
-    Ok(Fitted {
-        row: Row {
-            record: record.name.clone(),
-            estimates: document.estimates,
-            verdict: document.verdict.map(|verdict| verdict.level),
-            warnings,
-            seconds: 0.0,
-            error: None,
-        },
-        curves: curves(&done, &record.name),
-        parameters: done
-            .fit
-            .best
-            .parameters
-            .get(..functions)
-            .map(<[f64]>::to_vec),
-    })
-}
-
-/// Starts the functions at other estimates of as many parameters.
-fn start_from(model: &mut Model, from: Option<&[f64]>) {
-    let mut start = model.problem.start();
-    let functions = model.problem.functions.scalar_range().start;
-    if let Some(from) = from.filter(|from| from.len() == functions) {
-        start[..functions].copy_from_slice(from);
-        model.problem.start_from(&start);
-    }
-}
-
-/// The coefficients that vary, at equal distances.
-fn curves(done: &CompletedFit, record: &str) -> Vec<Curve> {
-    let all = done.curves(POINTS).into_iter();
-    let all = all.map(|curve| Curve {
-        record: record.to_owned(),
-        function: curve.name,
-        t: curve.t,
-        value: curve.value,
-        low: curve.low,
-        high: curve.high,
-    });
-    all.collect()
+    Ok(Some(Row {
+        record: record.name.clone(),
+        sha256: String::new(),
+        estimates: document.estimates,
+        verdict: document.verdict.map(|verdict| verdict.level),
+        warnings,
+        seconds: 0.0,
+        error: None,
+    }))
 }

@@ -1,364 +1,262 @@
-//! The folder of a fleet: which model on which records.
+//! The folder of a fleet: its model, and the rows so far.
 
-use super::journal::journals;
-use super::model::FleetModel;
+use super::fit::{FleetModel, Row, content_of};
 use super::records::{Record, RecordList};
-use crate::config::Override;
 use crate::digest::digest;
 use crate::error::InputError;
-use crate::results::{MANIFEST, complete_lines, write_together};
-use crate::text_io::{quote, read_text};
+use crate::results::{RowFile, write_together};
+use crate::text_io::{LONGEST_TABLE, quote, read_bytes, read_text};
 use serde::{Deserialize, Serialize};
+use std::collections::{HashMap, HashSet};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Identity of the fleet.
+/// What the folder belongs to.
 const IDENTITY: &str = "fleet.json";
-/// Its records.
-const RECORDS: &str = "records.jsonl";
-/// Files of a fleet without which a folder that has one of them is none of a fleet.
-const OWN_FILES: [&str; 4] = [
-    "fleet.html",
-    "rows.parquet",
-    "curves.parquet",
-    "summary.json",
-];
+/// The rows.
+const ROWS: &str = "rows.jsonl";
+/// All files of a fleet: a folder with others is refused.
+const FILES: [&str; 4] = [IDENTITY, ROWS, "rows.csv", "fleet.html"];
 /// Version of the format.
 const FORMAT: u32 = 1;
 /// Longest identity, bytes.
 const LONGEST: u64 = 1 << 24;
 
-/// Identity of a fleet: rows of the same identity belong together.
+/// The model of a fleet. Only rows of the same model and version belong together.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FleetIdentity {
-    /// Version of the format.
-    pub format: u32,
+    format: u32,
     /// Version of kmcfit.
     pub version: String,
     /// Model file, as given.
     pub model: PathBuf,
-    /// SHA-256 digest of the model with its overrides.
-    pub model_sha256: String,
     /// Overrides (`--set`).
-    #[serde(default)]
     pub overrides: Vec<String>,
-    /// Number of records.
-    pub records: usize,
-    /// SHA-256 digest of the list of records.
-    pub records_sha256: String,
-    /// True where a fit starts from the estimates of the record before.
-    pub warm_start: bool,
-    /// Column of the table over which the page shows the estimates, where one was chosen.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub trend: Option<String>,
+    /// SHA-256 digests of the model with its overrides, and of the files that it reads beside the records.
+    pub sha256: Vec<(PathBuf, String)>,
 }
 
 impl FleetIdentity {
-    /// File name of the model.
-    pub fn model_name(&self) -> String {
-        let name = self.model.file_name().unwrap_or_default();
-        name.to_string_lossy().into_owned()
-    }
-
-    /// Identity of a model on records.
-    pub fn of(model: &FleetModel, list: &RecordList, warm_start: bool) -> Self {
-        Self {
+    fn of(model: &FleetModel) -> Result<Self, InputError> {
+        let file = &model.file;
+        let own = (file.path.clone(), digest(file.effective_text().as_bytes()));
+        let record = file.spec.experiments.first().and_then(|e| e.data.as_ref());
+        let record = record.map(|name| file.resolve(&name.0));
+        let others = file
+            .data_files()
+            .into_iter()
+            .filter(|path| Some(path) != record.as_ref());
+        let others = others.map(|path| {
+            let bytes = read_bytes(&path, "a data file", LONGEST_TABLE)?;
+            Ok((path, digest(&bytes)))
+        });
+        let sha256 = std::iter::once(Ok(own))
+            .chain(others)
+            .collect::<Result<_, InputError>>()?;
+        Ok(Self {
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION").into(),
-            model: std::path::absolute(&model.file.path)
-                .unwrap_or_else(|_| model.file.path.clone()),
-            model_sha256: digest(model.file.effective_text().as_bytes()),
-            overrides: model.file.override_texts(),
-            records: list.records.len(),
-            records_sha256: list.digest(),
-            warm_start,
-            trend: None,
-        }
+            model: file.path.clone(),
+            overrides: file.override_texts(),
+            sha256,
+        })
     }
 }
 
-/// A record in the file of records.
-#[derive(Serialize, Deserialize)]
-struct RecordLine {
-    record: String,
-    path: PathBuf,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    overrides: Vec<String>,
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    system: String,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    columns: Vec<String>,
-}
-
-/// The folder of a fleet.
-#[derive(Debug, Clone)]
+/// The folder of a fleet, locked against other processes until drop.
+#[derive(Debug)]
 pub struct FleetFolder {
-    /// Path.
+    /// Its path.
     pub path: PathBuf,
-    /// Identity.
+    /// Its model.
     pub identity: FleetIdentity,
+    file: RowFile,
+    rows: HashMap<String, Row>,
 }
 
 impl FleetFolder {
-    /// Creates the folder of a fleet, or opens that of the same fleet.
+    /// Creates the folder of a fleet, or opens it to go on after its rows.
     ///
     /// # Errors
-    /// If the folder belongs to another fleet or command, or cannot be written to.
-    pub fn prepare(
-        path: &Path,
-        model: &FleetModel,
-        list: &RecordList,
-        warm_start: bool,
-    ) -> Result<Self, InputError> {
-        let own = FleetIdentity::of(model, list, warm_start);
-        if let Some(found) = Self::existing(path)? {
-            found.check(&own)?;
-            return Ok(found);
+    /// If the folder belongs to another model or holds other files, or another process works in it.
+    pub fn open(path: &Path, model: &FleetModel) -> Result<Self, InputError> {
+        let identity = FleetIdentity::of(model)?;
+        if path.exists() {
+            check(path, &identity)?;
         }
-        Self::written(path, own, list)
-    }
-
-    /// The folder with this column as the axis of its page, if one is given.
-    ///
-    /// # Errors
-    /// If the folder cannot be written to.
-    pub fn with_trend(mut self, trend: Option<&str>) -> Result<Self, InputError> {
-        if trend.is_some() && self.identity.trend.as_deref() != trend {
-            self.identity.trend = trend.map(str::to_owned);
-            write_identity(&self.path, &self.identity)?;
-        }
-        Ok(self)
-    }
-
-    /// Refuses a model that has changed since the fleet began.
-    ///
-    /// # Errors
-    /// With what has changed.
-    pub fn check_model(&self, effective_text: &str) -> Result<(), InputError> {
-        self.check(&FleetIdentity {
-            model_sha256: digest(effective_text.as_bytes()),
-            version: env!("CARGO_PKG_VERSION").into(),
-            ..self.identity.clone()
-        })
-    }
-
-    /// As [`FleetFolder::prepare`], for records that become known one after another: their list is that of [`FleetFolder::complete`].
-    ///
-    /// # Errors
-    /// If the folder belongs to another model or command, or cannot be written to.
-    pub fn begin(path: &Path, model: &FleetModel, warm_start: bool) -> Result<Self, InputError> {
-        let list = RecordList::default();
-        let own = FleetIdentity::of(model, &list, warm_start);
-        if let Some(found) = Self::existing(path)? {
-            found.check(&FleetIdentity {
-                records_sha256: found.identity.records_sha256.clone(),
-                ..own
-            })?;
-            return Ok(found);
-        }
-        Self::written(path, own, &list)
-    }
-
-    /// The folder of [`FleetFolder::begin`] with the list of its records.
-    ///
-    /// # Errors
-    /// If an earlier list has other records, or the folder cannot be written to.
-    pub fn complete(self, list: &RecordList) -> Result<Self, InputError> {
-        let own = FleetIdentity {
-            records: list.records.len(),
-            records_sha256: list.digest(),
-            ..self.identity.clone()
+        let mut rows = HashMap::new();
+        let file = path.join(ROWS);
+        let text = serde_json::to_string_pretty(&identity).unwrap_or_default() + "\n";
+        let written = match path.join(IDENTITY).exists() {
+            true => Ok(()),
+            false => write_together(&[(&path.join(IDENTITY), &text)]),
         };
-        match self.identity.records {
-            0 => Self::written(&self.path, own, list),
-            _ => self.check(&own).map(|()| self),
-        }
-    }
-
-    /// The fleet of a folder that is there; `None` for a folder that may become that of a fleet.
-    fn existing(path: &Path) -> Result<Option<Self>, InputError> {
-        if path.join(IDENTITY).exists() {
-            return Self::open(path).map(Some);
-        }
-        if path.join(MANIFEST).exists() {
-            return Err(
-                InputError::file(path, "the folder holds a run of another command")
-                    .found(MANIFEST)
-                    .expected("a folder of its own for the fleet"),
-            );
-        }
-        if path.is_dir() && !journals(path)?.is_empty() {
-            return Err(
-                InputError::file(path, "the folder holds rows of an unknown fleet")
-                    .found(format!("rows without {IDENTITY}"))
-                    .expected("a folder of its own for the fleet"),
-            );
-        }
-        if let Some(foreign) = OWN_FILES.iter().find(|name| path.join(name).exists()) {
-            return Err(InputError::file(
-                path,
-                "the folder holds a file that the fleet would replace",
-            )
-            .found(*foreign)
-            .expected("a folder of its own for the fleet"));
-        }
-        Ok(None)
-    }
-
-    fn written(
-        path: &Path,
-        identity: FleetIdentity,
-        list: &RecordList,
-    ) -> Result<Self, InputError> {
-        let lines = std::iter::once(Ok(json_line(&list.columns))).chain(list.records.iter().map(
-            |record| {
-                Ok::<_, InputError>(json_line(&RecordLine {
-                    record: record.name.clone(),
-                    path: match record.is_in_memory() {
-                        true => record.path.clone(),
-                        false => absolute(&record.path)?,
-                    },
-                    overrides: record.overrides.iter().map(Override::to_string).collect(),
-                    system: record.system.clone(),
-                    columns: record.columns.clone(),
-                }))
-            },
-        ));
-        let lines: String = lines.collect::<Result<_, _>>()?;
-        // The identity comes last: a folder with it has its records.
-        write_file(path, RECORDS, &lines)?;
-        write_identity(path, &identity)?;
-        Ok(Self {
-            path: path.to_path_buf(),
-            identity,
-        })
-    }
-
-    /// Opens the folder of a fleet.
-    ///
-    /// # Errors
-    /// If it is none.
-    pub fn open(path: &Path) -> Result<Self, InputError> {
-        let file = path.join(IDENTITY);
-        if !file.exists() {
-            return Err(InputError::file(path, "this is not the folder of a fleet")
-                .found(format!("no {IDENTITY}"))
-                .expected("the folder of `kmcfit fleet --out`"));
-        }
-        let text = read_text(&file, "the identity of a fleet", LONGEST)?;
-        let identity = serde_json::from_str(&text).map_err(|error| {
-            InputError::file(&file, "the identity of the fleet is damaged").found(error)
+        let opened = written.and_then(|()| {
+            RowFile::open(&file, |line| {
+                let row: Row = serde_json::from_str(line)?;
+                rows.insert(row.record.clone(), row);
+                Ok(())
+            })
+        });
+        let file = opened.map_err(|error| match error.kind() {
+            io::ErrorKind::WouldBlock => {
+                InputError::file(&file, "another process works on this fleet")
+                    .expected("one process for each fleet")
+                    .hint("wait for it, or give another folder with --out")
+            }
+            io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
+                InputError::file(&file, "this is not a row of a fleet of this version")
+                    .found(&error)
+                    .expected("a folder of its own for the fleet")
+            }
+            _ => unusable(&file, &error),
         })?;
         Ok(Self {
             path: path.to_path_buf(),
             identity,
+            file,
+            rows,
         })
     }
 
-    /// Error where the folder belongs to another fleet, which names what differs.
-    fn check(&self, own: &FleetIdentity) -> Result<(), InputError> {
-        let there = &self.identity;
-        let other = |problem: &str, found: String, expected: String| {
-            Err(InputError::file(&self.path, problem)
-                .found(found)
-                .expected(expected)
-                .hint("give another folder with --out"))
-        };
-        if there.model_sha256 != own.model_sha256 {
-            let problem = match there.model == own.model {
-                true => "the model has changed since this fleet began",
-                false => "the folder belongs to a fleet of another model",
-            };
-            return other(problem, quote(&there.model_name()), "the same model".into());
+    /// The row of a record; the last one where it was fitted again.
+    pub fn row(&self, record: &str) -> Option<&Row> {
+        self.rows.get(record)
+    }
+
+    /// Checks that a record is the one of its row, if it has one with estimates.
+    ///
+    /// # Errors
+    /// Names the record.
+    pub fn check_record(&self, record: &Record) -> Result<(), InputError> {
+        // A record that could not be read has no digest, and may be there now.
+        let row = self.row(&record.name).filter(|row| row.error.is_none());
+        let is_same =
+            row.is_none_or(|row| content_of(record).is_ok_and(|(_, now)| now == row.sha256));
+        match is_same {
+            true => Ok(()),
+            false => Err(InputError::file(
+                &record.path,
+                "this record has changed since its row was written",
+            )
+            .expected("the records of the rows that are there")
+            .hint(format!(
+                "fit the records again in another folder than {}",
+                self.path.display()
+            ))),
         }
-        if there.records_sha256 != own.records_sha256 {
-            return other(
-                "the folder belongs to a fleet of other records",
-                format!("{} records", there.records),
-                format!(
-                    "the same records in the same order, of which {} are given",
-                    own.records
-                ),
-            );
+    }
+
+    /// Checks that all rows are those of records of the list.
+    ///
+    /// # Errors
+    /// Names the first other one.
+    pub fn check_names(&self, list: &RecordList) -> Result<(), InputError> {
+        let names: HashSet<&str> = list
+            .records
+            .iter()
+            .map(|record| record.name.as_str())
+            .collect();
+        let others = self
+            .rows
+            .keys()
+            .filter(|name| !names.contains(name.as_str()));
+        match others.min() {
+            None => Ok(()),
+            Some(other) => Err(InputError::file(
+                &self.path,
+                "the folder holds rows of other records",
+            )
+            .found(quote(other))
+            .expected("the records with which the fleet was begun, or a folder of its own")),
         }
-        if there.warm_start != own.warm_start {
-            let word = |is: bool| {
-                if is {
-                    "with --warm-start"
-                } else {
-                    "without --warm-start"
-                }
-            };
-            return other(
-                "the fleet began with another option",
-                word(there.warm_start).into(),
-                word(there.warm_start).into(),
-            );
-        }
-        if there.version != own.version {
-            return other(
-                "the fleet began with another version of kmcfit",
-                there.version.clone(),
-                own.version.clone(),
-            );
-        }
+    }
+
+    /// Appends a row.
+    ///
+    /// # Errors
+    /// Errors of the file system; the rows before are kept.
+    pub fn append(&mut self, row: Row) -> Result<(), InputError> {
+        let line = serde_json::to_string(&row).map_err(io::Error::other);
+        let appended = line.and_then(|line| self.file.append(format!("{line}\n").as_bytes()));
+        appended.map_err(|error| unusable(&self.path.join(ROWS), &error))?;
+        self.rows.insert(row.record.clone(), row);
         Ok(())
     }
 
-    /// The records of the fleet.
+    /// Writes table and page.
     ///
     /// # Errors
-    /// If their file cannot be read.
-    pub fn records(&self) -> Result<RecordList, InputError> {
-        let file = self.path.join(RECORDS);
-        let mut list = RecordList::default();
-        let mut is_first = true;
-        let read = complete_lines(&file, |_, line| {
-            if std::mem::take(&mut is_first) {
-                list.columns = serde_json::from_str(line)?;
-                return Ok(());
-            }
-            let line: RecordLine = serde_json::from_str(line)?;
-            list.records.push(Record {
-                name: line.record,
-                path: line.path,
-                overrides: Override::parse_all(&line.overrides).map_err(io::Error::other)?,
-                system: line.system,
-                columns: line.columns,
-            });
-            Ok(())
-        });
-        read.map_err(|error| {
-            InputError::file(&file, "the list of records cannot be read").found(error)
-        })?;
-        match list.records.len() == self.identity.records {
-            true => Ok(list),
-            false => Err(InputError::file(&file, "the list of records is damaged")
-                .found(format!("{} records", list.records.len()))
-                .expected(format!("{}", self.identity.records))),
-        }
+    /// Errors of the file system.
+    pub fn write(&self, table: &str, page: &str) -> Result<(), InputError> {
+        let [.., table_name, page_name] = FILES.map(|name| self.path.join(name));
+        let files = [(table_name.as_path(), table), (page_name.as_path(), page)];
+        let written = self.file.sync().and_then(|()| write_together(&files));
+        written.map_err(|error| unusable(&self.path, &error))
     }
 }
 
-fn write_identity(path: &Path, identity: &FleetIdentity) -> Result<(), InputError> {
-    write_file(path, IDENTITY, &json_line(identity))
-}
-
-fn write_file(path: &Path, name: &str, text: &str) -> Result<(), InputError> {
-    let file = path.join(name);
-    write_together(&[(&file, text)]).map_err(|error| {
-        InputError::file(path, "the folder of the fleet cannot be written to")
+/// Refuses a folder of another fleet or with other files.
+fn check(path: &Path, identity: &FleetIdentity) -> Result<(), InputError> {
+    let entries = std::fs::read_dir(path).map_err(|error| unusable(path, &error))?;
+    for entry in entries.flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if !FILES.contains(&name.as_str()) && !name.starts_with(".kmcfit-") {
+            return Err(
+                InputError::file(path.join(name), "this file is not one of a fleet")
+                    .expected("a folder of its own for the fleet")
+                    .hint("move it away, or give another folder with --out"),
+            );
+        }
+    }
+    let file = path.join(IDENTITY);
+    if !file.exists() {
+        return match path.join(ROWS).exists() {
+            true => Err(
+                InputError::file(path, "the folder holds rows of an unknown fleet")
+                    .found(format!("{ROWS} without {IDENTITY}"))
+                    .expected("a folder of its own for the fleet"),
+            ),
+            false => Ok(()),
+        };
+    }
+    let text = read_text(&file, "the identity of a fleet", LONGEST)?;
+    let known: FleetIdentity = serde_json::from_str(&text).map_err(|error| {
+        InputError::file(&file, "this is not the identity of a fleet of this version")
             .found(error)
-            .expected("a folder that can be written to")
-    })
+            .expected("a folder of its own for the fleet")
+    })?;
+    let other = |found: String| {
+        InputError::file(path, "the folder belongs to another fleet")
+            .found(found)
+            .expected("the model with which the fleet was begun, or a folder of its own")
+    };
+    if known.version != identity.version {
+        return Err(other(format!("rows of kmcfit {}", known.version)));
+    }
+    if known.overrides != identity.overrides {
+        return Err(other(format!(
+            "values {}",
+            quote(&known.overrides.join(", "))
+        )));
+    }
+    match known
+        .sha256
+        .iter()
+        .zip(&identity.sha256)
+        .find(|(a, b)| a.1 != b.1)
+    {
+        Some((_, (file, _))) => Err(other(format!("{}, which has changed", file.display()))),
+        None if known.sha256.len() != identity.sha256.len() => {
+            Err(other(known.model.display().to_string()))
+        }
+        None => Ok(()),
+    }
 }
 
-fn json_line(value: &impl Serialize) -> String {
-    // Maps with string keys and lists are always written.
-    serde_json::to_string(value).unwrap_or_default() + "\n"
-}
-
-fn absolute(path: &Path) -> Result<PathBuf, InputError> {
-    std::path::absolute(path)
-        .map_err(|error| InputError::file(path, "the path of the record is invalid").found(error))
+fn unusable(path: &Path, error: &io::Error) -> InputError {
+    InputError::file(path, "the fleet cannot be read or written to")
+        .found(error)
+        .expected("room for the rows, in a folder that can be written to")
+        .hint("the same command goes on after the rows that are written")
 }

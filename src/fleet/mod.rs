@@ -1,36 +1,20 @@
 //! Fleets: one model fitted to many records.
 //!
-//! Every record takes the place of the data of the model's only experiment. Its result is a [`Row`], which is appended to the journal of
-//! a shard; the coefficients that vary are [`Curve`]s in a second file. [`collect`] joins the shards.
+//! Every record takes the place of the data of the model's only experiment. Its result is a [`Row`], which is appended to `rows.jsonl` in
+//! the folder of the fleet; the same command goes on after the rows that are there. A table and a page follow when all have their rows.
 
-mod collect;
-mod figures;
 mod fit;
 mod folder;
-mod index;
-mod journal;
-mod model;
-mod page;
-mod parquet;
 mod records;
-mod row;
+mod report;
 mod run;
-mod shard;
 mod statistics;
-mod summary;
 mod trend;
 
-pub use collect::{Collected, collect};
-pub use fit::{Fitted, Limits, fit_record};
-pub use folder::{FleetFolder, FleetIdentity};
-pub use index::RowIndex;
-pub use journal::Journal;
-pub use model::FleetModel;
-pub use page::{fleet_page, page_folder};
+pub use fit::{FleetModel, Row, fit_record};
+pub use folder::FleetFolder;
 pub use records::{Record, RecordList};
-pub use row::{Curve, Row};
-pub use run::{Progress, RunOptions, RunSummary, run};
-pub use shard::Shard;
-pub use statistics::{Distribution, Outlier, Statistics};
-pub use summary::fleet_summary;
+pub use report::finish;
+pub use run::run;
+
 pub use trend::Trend;

@@ -3,7 +3,6 @@
 use rand::SeedableRng;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
-use serde::Serialize;
 
 /// Modified z-score from which a value is an outlier (Iglewicz and Hoaglin 1993).
 const OUTLYING: f64 = 3.5;
@@ -23,34 +22,26 @@ const NORMAL: f64 = 1.96;
 const DEVIATION: f64 = 1.4826;
 
 /// Distribution of an estimate.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Distribution {
     /// Name of the estimate, as in a row.
     pub name: String,
     /// Unit; empty if dimensionless.
     pub unit: String,
-    /// Number of values.
-    pub count: usize,
     /// Median.
     pub median: f64,
-    /// First and third quartile.
-    pub quartiles: [f64; 2],
     /// Percentiles 2.5 and 97.5.
     pub central95: [f64; 2],
     /// Smallest and largest value.
     pub range: [f64; 2],
     /// Trend over the axis of the fleet; none with fewer than 8 records on it.
     pub trend: Option<LinearTrend>,
-    /// Standard deviation about that line of a normal distribution with the same median absolute deviation.
-    pub deviation: f64,
     /// Number of outliers.
     pub outliers: usize,
     /// Values in the order of the records; NaN where a record has none.
-    #[serde(skip)]
     pub values: Vec<f64>,
     /// Distances from the line, in standard deviations; 0 with fewer than 8 values, and where all lie on it. Of a record without a place on the axis, and without a
     /// trend, from the median of all values, in their deviation from it.
-    #[serde(skip)]
     pub scores: Vec<f64>,
 }
 
@@ -62,46 +53,27 @@ impl Distribution {
         let (first, last) = (*sorted.first()?, *sorted.last()?);
         let median = quantile(&sorted, 0.5);
         let trend = LinearTrend::of(axis, &values);
-        let of_line = |(i, y): (usize, &f64)| match (&trend, axis.get(i)) {
+        let from_line = |(i, y): (usize, &f64)| match (&trend, axis.get(i)) {
             (Some(trend), Some(x)) => y - trend.value - trend.slope * (x - trend.at),
-            _ => f64::NAN,
+            _ => y - median,
         };
-        let residuals: Vec<f64> = values.iter().enumerate().map(of_line).collect();
-        let from_median: Vec<f64> = values.iter().map(|y| y - median).collect();
-        let spread = deviation_of(&from_median);
-        let deviation = match trend {
-            Some(_) => deviation_of(&residuals),
-            None => spread,
+        let residuals: Vec<f64> = values.iter().enumerate().map(from_line).collect();
+        let deviation = deviation_of(&residuals);
+        // The deviation of few values is uncertain: of three normal ones a quarter has an outlier. A record without a place is none.
+        let is_judged = sorted.len() >= FEWEST && deviation > ROUNDING * median.abs();
+        let score = |residual: &f64| match is_judged && residual.is_finite() {
+            true => residual / deviation,
+            false => 0.0,
         };
-        let score = |(residual, alone): (&f64, &f64)| {
-            let (distance, deviation) = match residual.is_finite() {
-                true => (*residual, deviation),
-                false => (*alone, spread),
-            };
-            match deviation > ROUNDING * median.abs() {
-                true => distance / deviation,
-                false => 0.0,
-            }
-        };
-        // The deviation of few values is uncertain: of three normal ones a quarter has an outlier.
-        let scores: Vec<f64> = match sorted.len() < FEWEST {
-            true => vec![0.0; values.len()],
-            false => residuals.iter().zip(&from_median).map(score).collect(),
-        };
+        let scores: Vec<f64> = residuals.iter().map(score).collect();
         Some(Self {
             name,
             unit,
-            count: sorted.len(),
             median,
-            quartiles: [0.25, 0.75].map(|share| quantile(&sorted, share)),
             central95: [0.025, 0.975].map(|share| quantile(&sorted, share)),
             range: [first, last],
             trend,
-            deviation,
-            outliers: match sorted.len() < FEWEST {
-                true => 0,
-                false => scores.iter().filter(|score| score.abs() > OUTLYING).count(),
-            },
+            outliers: scores.iter().filter(|score| score.abs() > OUTLYING).count(),
             values,
             scores,
         })
@@ -135,7 +107,7 @@ fn median_of(mut values: Vec<f64>) -> f64 {
 }
 
 /// A straight line through an estimate over the axis of a fleet.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearTrend {
     /// Change for a unit of the axis: the median slope of all pairs of records (Theil 1950).
     pub slope: f64,
@@ -145,8 +117,6 @@ pub struct LinearTrend {
     pub at: f64,
     /// Value of the line there.
     pub value: f64,
-    /// Number of records on the axis.
-    pub records: usize,
 }
 
 impl LinearTrend {
@@ -182,7 +152,6 @@ impl LinearTrend {
             slope95: limits.map(|share| quantile(&slopes, share)),
             at,
             value: median_of(moved.collect()),
-            records: points.len(),
         })
     }
 }
@@ -195,72 +164,18 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
 }
 
-/// An estimate of a record that stands out.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Outlier {
-    /// Index of the record.
-    #[serde(skip)]
-    pub index: usize,
-    /// The record.
-    pub record: String,
-    /// Name of the estimate that lies farthest from its trend.
-    pub estimate: String,
-    /// Its value.
-    pub value: f64,
-    /// Its distance from the trend in standard deviations.
-    pub score: f64,
-}
-
-/// Statistics of a fleet.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Statistics {
-    /// Records.
-    pub records: usize,
-    /// Records without a row.
-    pub missing: usize,
-    /// Rows with the verdicts Adequate, Check and Inadequate.
-    pub verdicts: [usize; 3],
-    /// First reasons of the verdicts other than Adequate, each with its number of rows, the most frequent first.
-    pub reasons: Vec<(String, usize)>,
-    /// Rows with an error.
-    pub errors: usize,
-    /// Of these, rows that a time limit ended.
-    pub time_limits: usize,
-    /// Distribution of each estimate.
-    pub distributions: Vec<Distribution>,
-    /// Records that stand out, the farthest first.
-    pub outliers: Vec<Outlier>,
-    /// Sum of the times of the records, s.
-    pub seconds: f64,
-}
-
-impl Statistics {
-    /// The records with an outlying estimate, each once, the farthest first.
-    pub fn find_outliers(
-        distributions: &[Distribution],
-        names: &dyn Fn(usize) -> String,
-    ) -> Vec<Outlier> {
-        let count = distributions.first().map_or(0, |d| d.values.len());
-        let farthest = |index: usize| {
-            let scores = distributions.iter().map(|d| (d, d.scores[index]));
-            let scores = scores.filter(|(_, score)| score.abs() > OUTLYING);
-            scores.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
-        };
-        let mut found: Vec<Outlier> = (0..count)
-            .filter_map(|index| {
-                let (distribution, score) = farthest(index)?;
-                Some(Outlier {
-                    index,
-                    record: names(index),
-                    estimate: distribution.name.clone(),
-                    value: distribution.values[index],
-                    score,
-                })
-            })
-            .collect();
-        found.sort_by(|a, b| b.score.abs().total_cmp(&a.score.abs()));
-        found
-    }
+/// The records with an outlying estimate, each once with the estimate that lies farthest: index of the record, its distribution and the
+/// distance in standard deviations, the farthest record first.
+pub fn outliers(distributions: &[Distribution]) -> Vec<(usize, &Distribution, f64)> {
+    let count = distributions.first().map_or(0, |d| d.values.len());
+    let farthest = |index: usize| {
+        let scores = distributions.iter().map(|d| (index, d, d.scores[index]));
+        let scores = scores.filter(|(.., score)| score.abs() > OUTLYING);
+        scores.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))
+    };
+    let mut found: Vec<_> = (0..count).filter_map(farthest).collect();
+    found.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
+    found
 }
 
 #[cfg(test)]
@@ -277,16 +192,16 @@ mod tests {
         let mut values: Vec<f64> = (1..=101).map(f64::from).collect();
         values.push(f64::NAN);
         let found = of(values.clone(), &[]).expect("values");
-        assert_eq!((found.count, found.median), (101, 51.0));
-        assert_eq!(found.quartiles, [26.0, 76.0]);
-        assert_eq!(found.deviation, 25.0 * DEVIATION);
+        assert_eq!(found.median, 51.0);
         assert_eq!(found.outliers, 0);
         values[7] = 51.0 + 4.0 * 26.0 * DEVIATION;
         let found = of(values, &[]).expect("values");
         assert_eq!(found.outliers, 1);
-        let outliers = Statistics::find_outliers(&[found], &|i| i.to_string());
-        assert_eq!(outliers[0].record, "7");
-        assert!((3.5..4.5).contains(&outliers[0].score));
+        let found = [found];
+        let [(7, _, score)] = outliers(&found)[..] else {
+            panic!("one outlier");
+        };
+        assert!((3.5..4.5).contains(&score));
     }
 
     /// On a line of slope -2 with errors of 0.1, a value that is no extreme stands out by its distance from the line.
@@ -329,46 +244,6 @@ mod tests {
             .count();
         // Three standard deviations of 400 trials are 13.
         assert!((367..=393).contains(&count), "{count}");
-    }
-
-    /// A record whose place on the axis is unknown is judged by the distribution of all values.
-    #[test]
-    fn a_record_without_a_place_is_no_outlier_of_the_trend() {
-        let mut axis: Vec<f64> = (0..40).map(f64::from).collect();
-        let value = |x: &f64| 10.0 - 2.0 * x + 0.1 * (x * 2.4).sin();
-        let mut values: Vec<f64> = axis.iter().map(value).collect();
-        axis[3] = f64::NAN;
-        let found = of(values.clone(), &axis).expect("values");
-        assert_eq!(
-            (found.outliers, found.trend.map(|t| t.records)),
-            (0, Some(39))
-        );
-        values[3] = 1e4;
-        assert_eq!(of(values, &axis).expect("values").outliers, 1);
-        assert_eq!(
-            of(vec![1.0, 2.0, 3.0], &[1.0, 2.0, 3.0])
-                .expect("values")
-                .trend,
-            None
-        );
-    }
-
-    /// Of more records than are paired a random part is used: every third one would be all of one of three sensors that take turns.
-    #[test]
-    fn sensors_that_take_turns_are_all_used() {
-        let axis: Vec<f64> = (0..2004).map(f64::from).collect();
-        let value = |(i, x): (usize, &f64)| if i % 3 == 0 { -1e-3 * x } else { 1e-3 * x };
-        let values: Vec<f64> = axis.iter().enumerate().map(value).collect();
-        let trend = LinearTrend::of(&axis, &values).expect("a trend");
-        assert!(trend.slope > 3e-4, "{trend:?}");
-    }
-
-    /// Half of the values at one point, as at a bound, leave the others to be judged.
-    #[test]
-    fn values_at_a_bound_hide_no_outlier() {
-        let mut values = vec![1.0; 20];
-        values[3] = 2.0;
-        assert_eq!(of(values, &[]).expect("values").outliers, 1);
     }
 
     #[test]

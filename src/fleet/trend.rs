@@ -1,6 +1,9 @@
 //! The axis along which the estimates of a fleet are shown.
 
 use super::records::RecordList;
+use crate::error::InputError;
+use crate::spelling::nearest;
+use crate::text_io::{one_of, quote};
 
 /// Days of a year.
 const YEAR: f64 = 365.25;
@@ -38,6 +41,27 @@ impl Trend {
                 unit: String::new(),
                 values: (1..=list.records.len()).map(|i| i as f64).collect(),
             })
+        })
+    }
+
+    /// [`Trend::of`] for the column that an argument names.
+    ///
+    /// # Errors
+    /// If there is no such column, or it holds neither numbers nor dates.
+    pub fn named(list: &RecordList, wanted: Option<&str>) -> Result<Self, InputError> {
+        let name = wanted.unwrap_or_default();
+        let known = || list.columns.iter().map(String::as_str);
+        Self::of(list, wanted).ok_or_else(|| match known().any(|column| column == name) {
+            true => InputError::argument("--trend", "the column holds neither numbers nor dates")
+                .found(quote(name))
+                .expected("a column of which at least half of the cells are numbers, or dates such as 2026-03-02"),
+            false => InputError::argument("--trend", "no such column")
+                .found(quote(name))
+                .expected(match list.columns.is_empty() {
+                    true => "a table of records with further columns".to_owned(),
+                    false => one_of(known()),
+                })
+                .hint_if(nearest(name, known()).map(|near| format!("did you mean `{near}`?"))),
         })
     }
 

@@ -1,25 +1,22 @@
 //! An array of numbers with two dimensions, as channels.
 
+use super::Channels;
 use super::budget::Budget;
-use super::number::{ByteOrder, NumberType};
-use super::{Channels, Sampling};
 use crate::error::InputError;
 
 /// A matrix of numbers.
 pub(super) struct Array<'a> {
-    /// Exactly rows x columns numbers.
-    pub bytes: &'a [u8],
-    pub kind: NumberType,
-    pub order: ByteOrder,
     pub rows: usize,
     pub columns: usize,
     /// True if the numbers of a column are adjacent (Fortran, MATLAB), false for those of a row (C).
     pub column_major: bool,
+    /// The number at a place of the file's order.
+    pub value: &'a dyn Fn(usize) -> f64,
 }
 
 impl Array<'_> {
     /// Adds one channel for each column or, in an array with more columns than rows, for each row: the longer dimension is time.
-    /// Several are named `name.1`, `name.2`, ...
+    /// Several are named `name.1`, `name.2`, ...; a single unit holds for all of them.
     ///
     /// # Errors
     /// When they exceed the budget.
@@ -27,7 +24,7 @@ impl Array<'_> {
         &self,
         channels: &mut Channels,
         name: &str,
-        sampling: Option<Sampling>,
+        units: &[String],
         budget: &mut Budget,
     ) -> Result<(), InputError> {
         let in_rows = self.columns > self.rows;
@@ -39,8 +36,11 @@ impl Array<'_> {
             channels.refuse(name, "an empty array", None);
             return Ok(());
         }
-        let size = self.kind.size();
-        let is_adjacent = self.column_major != in_rows;
+        // Places of the first samples of the channels, and of the samples of one.
+        let (first, step) = match self.column_major != in_rows {
+            true => (samples, 1),
+            false => (1, count),
+        };
         for i in 0..count {
             let name = match count {
                 1 => name.to_owned(),
@@ -48,21 +48,13 @@ impl Array<'_> {
             };
             budget.name(&name)?;
             let mut values = budget.list(samples)?;
-            match is_adjacent {
-                true => {
-                    let begin = i * samples * size;
-                    let own = self.bytes.get(begin..begin + samples * size);
-                    values.extend(
-                        self.kind
-                            .values(own.unwrap_or_default(), self.order, 0, size),
-                    );
-                }
-                false => {
-                    let (offset, stride) = (i * size, count * size);
-                    values.extend(self.kind.values(self.bytes, self.order, offset, stride));
-                }
-            }
-            channels.push(&name, None, sampling, values);
+            values.extend((0..samples).map(|k| (self.value)(i * first + k * step)));
+            let unit = match units {
+                [one] => Some(one),
+                several if several.len() == count => several.get(i),
+                _ => None,
+            };
+            channels.push(&name, unit.cloned(), None, values);
         }
         Ok(())
     }

@@ -1,10 +1,9 @@
 //! Limits on what a file may expand to.
 
+use std::io::Read as _;
 use std::path::Path;
 
-use miniz_oxide::inflate::{
-    TINFLStatus, decompress_to_vec_with_limit, decompress_to_vec_zlib_with_limit,
-};
+use flate2::bufread::ZlibDecoder;
 
 use crate::error::InputError;
 use crate::memory;
@@ -26,13 +25,6 @@ pub(super) struct Budget<'a> {
     values: u64,
     inflated: u64,
     names: usize,
-}
-
-/// Kind of a compressed stream.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stream {
-    Deflate,
-    Zlib,
 }
 
 impl<'a> Budget<'a> {
@@ -109,65 +101,44 @@ impl<'a> Budget<'a> {
         }
     }
 
-    /// Decompresses the data of `what`; `stated` is the length that the file states.
+    /// Decompresses the data of `what` by zlib.
     ///
     /// # Errors
-    /// When the data are damaged, expand to more than the file may or to another length than stated.
-    pub fn inflate(
-        &mut self,
-        bytes: &[u8],
-        stream: Stream,
-        stated: Option<u64>,
-        what: &str,
-    ) -> Result<Vec<u8>, InputError> {
-        if stated.is_some_and(|stated| stated > self.inflated) {
-            return Err(self.too_much(format!(
-                "{what}, which expands to {} bytes",
-                stated.unwrap_or(0)
-            )));
-        }
-        let most = stated.unwrap_or(self.inflated);
+    /// When the data are damaged, or expand to more than the file may.
+    pub fn inflate(&mut self, bytes: &[u8], what: &str) -> Result<Vec<u8>, InputError> {
+        let most = self.inflated;
         // Doubling takes up to three times the length.
-        memory::check_file(
-            self.path,
-            stated.unwrap_or(bytes.len() as u64).saturating_mul(3),
-        )?;
-        let limit = usize::try_from(most).unwrap_or(usize::MAX);
-        let result = match stream {
-            Stream::Deflate => decompress_to_vec_with_limit(bytes, limit),
-            Stream::Zlib => decompress_to_vec_zlib_with_limit(bytes, limit),
-        };
-        let inflated = result.map_err(|error| match (error.status, stated) {
-            (TINFLStatus::HasMoreOutput, None) => {
-                self.too_much(format!("{what}, which expands to more than {most} bytes"))
-            }
-            (TINFLStatus::HasMoreOutput, Some(stated)) => self
-                .damaged(what)
-                .found(format!("more than the {stated} bytes that the file states")),
-            _ => self.damaged(what).found("data that cannot be decompressed"),
+        memory::check_file(self.path, (bytes.len() as u64).saturating_mul(3))?;
+        let mut inflated = Vec::new();
+        ZlibDecoder::new(bytes)
+            .take(most.saturating_add(1))
+            .read_to_end(&mut inflated)
+            .map_err(|_| self.damaged(what).found("data that cannot be decompressed"))?;
+        self.inflated = most.checked_sub(inflated.len() as u64).ok_or_else(|| {
+            self.too_much(format!("{what}, which expands to more than {most} bytes"))
         })?;
-        if let Some(stated) = stated.filter(|stated| *stated != inflated.len() as u64) {
-            return Err(self
-                .damaged(what)
-                .found(format!("{} bytes", inflated.len()))
-                .expected(format!("{stated} bytes, as the file states")));
-        }
-        self.inflated = self.inflated.saturating_sub(inflated.len() as u64);
         Ok(inflated)
     }
 
-    /// A buffer of `length` zeros for decompressed data of `what`.
+    /// Counts `length` bytes that `what` expands to.
     ///
     /// # Errors
-    /// When the file expands to more than it may, or the buffer does not fit into memory.
-    pub fn buffer(&mut self, length: usize, what: &str) -> Result<Vec<u8>, InputError> {
+    /// When the file expands to more than it may, or they do not fit into memory.
+    pub fn expand(&mut self, length: usize, what: &str) -> Result<(), InputError> {
         let error = || self.too_much(format!("{what}, which expands to {length} bytes"));
-        let left = self.inflated.checked_sub(length as u64).ok_or_else(error)?;
-        memory::check_file(self.path, length as u64)?;
+        self.inflated = self.inflated.checked_sub(length as u64).ok_or_else(error)?;
+        memory::check_file(self.path, length as u64)
+    }
+
+    /// An empty buffer with capacity for `length` decompressed bytes of `what`.
+    ///
+    /// # Errors
+    /// As [`expand`](Self::expand).
+    pub fn buffer(&mut self, length: usize, what: &str) -> Result<Vec<u8>, InputError> {
+        self.expand(length, what)?;
         let mut buffer = Vec::new();
-        buffer.try_reserve_exact(length).map_err(|_| error())?;
-        buffer.resize(length, 0);
-        self.inflated = left;
+        let reserved = buffer.try_reserve_exact(length);
+        reserved.map_err(|_| self.too_much(format!("{what}, which expands to {length} bytes")))?;
         Ok(buffer)
     }
 

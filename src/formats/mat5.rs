@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use super::array::Array;
-use super::budget::{Budget, Stream};
+use super::budget::Budget;
 use super::bytes::Bytes;
 use super::number::{ByteOrder, NumberType};
 use super::{Channels, mat_class, refused};
@@ -50,10 +50,7 @@ pub(super) fn read<'a>(
         let (kind, mut data) = element(&mut file, "a variable")?;
         match kind {
             COMPRESSED => {
-                let inflated =
-                    reader
-                        .budget
-                        .inflate(data.rest(), Stream::Zlib, None, "a variable")?;
+                let inflated = reader.budget.inflate(data.rest(), "a variable")?;
                 let mut inflated = Bytes::new(path, &inflated, order);
                 let (kind, mut data) = element(&mut inflated, "a variable")?;
                 if kind == MATRIX {
@@ -194,14 +191,12 @@ impl Reader<'_, '_> {
             return Err(error.expected(format!("{stated} bytes")));
         }
         let array = Array {
-            bytes: data.rest(),
-            kind,
-            order: data.order,
             rows: rows as usize,
             columns: columns as usize,
             column_major: true,
+            value: &|i| kind.value_at(data.rest(), data.order, i),
         };
-        array.add_to(&mut self.channels, name, None, self.budget)
+        array.add_to(&mut self.channels, name, &[], self.budget)
     }
 
     /// Elements of a cell or of a struct: `name.1`, `name.2`, ...

@@ -7,13 +7,12 @@ mod array;
 mod budget;
 mod bytes;
 mod hdf5;
-mod mat4;
+mod hdf5_guards;
+mod hdf5_number;
 mod mat5;
 mod mat_class;
 mod npy;
 mod number;
-#[cfg(feature = "parquet")]
-mod parquet;
 mod python_literal;
 mod recognise;
 mod refused;
@@ -103,11 +102,8 @@ pub fn read(path: &Path, bytes: &[u8], format: Format) -> Result<Channels, Input
         Format::Npz => zip::read(path, bytes, &mut budget),
         Format::Wav => wav::read(path, bytes, &mut budget),
         Format::Uff => uff::read(path, bytes, &mut budget),
-        Format::Mat4 => mat4::read(path, bytes, &mut budget),
         Format::Mat5 => mat5::read(path, bytes, &mut budget),
         Format::Mat73 | Format::Hdf5 => hdf5::read(path, bytes, format, &mut budget),
-        #[cfg(feature = "parquet")]
-        Format::Parquet => parquet::read(path, bytes, &mut budget),
         Format::Tdms => tdms::read(path, bytes, &mut budget),
         other => Err(refused::whole(path, other)),
     }?;

@@ -65,15 +65,14 @@ pub(super) fn add(
         Literal::Text(descr) => match number(&descr) {
             Ok((kind, order)) => {
                 let length = count.saturating_mul(kind.size() as u64);
+                let data = bytes.take(length, &what)?;
                 let array = Array {
-                    bytes: bytes.take(length, &what)?,
-                    kind,
-                    order,
                     rows: rows as usize,
                     columns: columns as usize,
                     column_major: header.is_fortran,
+                    value: &|i| kind.value_at(data, order, i),
                 };
-                array.add_to(channels, name, None, budget)
+                array.add_to(channels, name, &[], budget)
             }
             Err((content, hint)) => {
                 channels.refuse(name, content, hint);
@@ -100,11 +99,11 @@ fn header(path: &Path, bytes: &mut Bytes, what: &str) -> Result<Header, InputErr
     if !start.starts_with(MAGIC) {
         return Err(invalid(path, what, "no magic of NumPy"));
     }
-    let length = match start.get(6) {
-        Some(1) => u64::from(bytes.u16(what)?),
-        Some(2 | 3) => u64::from(bytes.u32(what)?),
-        version => {
-            let version = version.copied().unwrap_or_default();
+    let version = start.get(6).copied().unwrap_or_default();
+    let length = match version {
+        1 => u64::from(bytes.u16(what)?),
+        2 | 3 => u64::from(bytes.u32(what)?),
+        _ => {
             return Err(invalid(
                 path,
                 what,
@@ -112,7 +111,12 @@ fn header(path: &Path, bytes: &mut Bytes, what: &str) -> Result<Header, InputErr
             ));
         }
     };
-    let text = String::from_utf8_lossy(bytes.take(length, what)?);
+    let text = bytes.take(length, what)?;
+    let text = match version {
+        3 => String::from_utf8_lossy(text).into_owned(),
+        // Latin-1.
+        _ => text.iter().map(|byte| char::from(*byte)).collect(),
+    };
     parse_header(&text)
         .ok_or_else(|| invalid(path, what, &format!("the header {}", quote(text.trim()))))
 }
@@ -211,7 +215,10 @@ fn structured(
             );
             return Ok(());
         };
-        used.push((field, descr, stride));
+        // Padding has no name.
+        if !field.is_empty() {
+            used.push((field, descr, stride));
+        }
         stride += size;
     }
     let stride = stride as usize;
@@ -235,11 +242,11 @@ fn structured(
     Ok(())
 }
 
-/// Bytes of a field of type `<f8`, `|S12` or `<U5`; `None` for objects and others.
+/// Bytes of a field of type `<f8`, `|S12`, `<U5` or `|V4`; `None` for objects and others.
 fn size_of_type(descr: &str) -> Option<u64> {
     let digits = descr.trim_start_matches(|c: char| !c.is_ascii_digit());
     let size: u64 = digits.parse().ok().filter(|size| *size <= 1 << 20)?;
-    match descr.contains('O') || descr.contains('V') {
+    match descr.contains('O') {
         true => None,
         // A letter takes four bytes.
         false => Some(size * if descr.contains('U') { 4 } else { 1 }),

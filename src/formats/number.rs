@@ -58,6 +58,12 @@ impl NumberType {
         }
     }
 
+    /// Number i of adjacent ones.
+    pub fn value_at(self, bytes: &[u8], order: ByteOrder, i: usize) -> f64 {
+        let own = bytes.get(i.saturating_mul(self.size())..);
+        self.value(own.unwrap_or_default(), order)
+    }
+
     /// The numbers of whole records of `stride` bytes, each at `offset` in its record.
     pub fn values(
         self,

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use super::{hdf5, mat4, mat5, npy, tdms, uff};
+use super::{hdf5, mat5, npy, tdms, uff};
 use crate::error::InputError;
 
 /// Format of a binary file.
@@ -17,7 +17,7 @@ pub enum Format {
     Wav,
     /// Universal file.
     Uff,
-    /// MATLAB, version 4.
+    /// MATLAB, version 4; refused.
     Mat4,
     /// MATLAB, versions 5 to 7.
     Mat5,
@@ -29,7 +29,7 @@ pub enum Format {
     TdmsIndex,
     /// HDF5.
     Hdf5,
-    /// Apache Parquet; refused without the feature `parquet`.
+    /// Apache Parquet; refused.
     Parquet,
     /// Compressed by gzip; refused.
     Gzip,
@@ -61,7 +61,7 @@ impl fmt::Display for Format {
 }
 
 /// Extensions of binary files, in lower case, and the formats that they stand for.
-const EXTENSIONS: [(&str, &[Format]); 10] = [
+const EXTENSIONS: [(&str, &[Format]); 11] = [
     ("npy", &[Format::Npy]),
     ("npz", &[Format::Npz]),
     ("wav", &[Format::Wav]),
@@ -72,15 +72,16 @@ const EXTENSIONS: [(&str, &[Format]); 10] = [
         &[Format::Mat5, Format::Mat4, Format::Mat73, Format::Hdf5],
     ),
     ("h5", &[Format::Hdf5, Format::Mat73]),
+    ("nc", &[Format::Hdf5]),
     ("hdf5", &[Format::Hdf5, Format::Mat73]),
     ("tdms", &[Format::Tdms]),
     ("parquet", &[Format::Parquet]),
 ];
 
 /// Extensions of text tables and of binary files, in lower case.
-pub const DATA_EXTENSIONS: [&str; 15] = [
+pub const DATA_EXTENSIONS: [&str; 16] = [
     "csv", "tsv", "txt", "dat", "asc", "npy", "npz", "wav", "uff", "unv", "mat", "h5", "hdf5",
-    "tdms", "parquet",
+    "nc", "tdms", "parquet",
 ];
 
 fn extension(path: &Path) -> Option<String> {
@@ -101,7 +102,7 @@ pub fn recognise(path: &Path, bytes: &[u8]) -> Result<Option<Format>, InputError
     let stated = EXTENSIONS.iter().find(|(own, _)| *own == extension);
     let mut found = by_content(bytes);
     // Version 4 of MATLAB has no magic; text does not begin with its zeros.
-    if found.is_none() && extension == "mat" && mat4::begins_so(bytes) {
+    if found.is_none() && extension == "mat" && begins_as_mat4(bytes) {
         found = Some(Format::Mat4);
     }
     let Some((_, formats)) = stated else {
@@ -126,6 +127,16 @@ pub fn recognise(path: &Path, bytes: &[u8]) -> Result<Option<Format>, InputError
             })
             .hint("if it is a text table, rename it to .txt"),
     })
+}
+
+/// True for the type of a first matrix of version 4: 1000 M + 10 P + T with M the byte order, P the precision and T the kind.
+fn begins_as_mat4(bytes: &[u8]) -> bool {
+    let Some(Ok(first)) = bytes.get(..4).map(<[u8; 4]>::try_from) else {
+        return false;
+    };
+    let is_type =
+        |code: u32, order: u32| code / 1000 == order && code % 1000 / 10 <= 5 && code % 10 <= 2;
+    is_type(u32::from_le_bytes(first), 0) || is_type(u32::from_be_bytes(first), 1)
 }
 
 /// The first bytes, as `50 4b 03 04`.
@@ -155,7 +166,8 @@ fn by_content(bytes: &[u8]) -> Option<Format> {
         return Some(*format);
     }
     let form = bytes.get(8..12);
-    if form == Some(b"WAVE") && (bytes.starts_with(b"RIFF") || bytes.starts_with(b"RF64")) {
+    let kinds: [&[u8]; 3] = [b"RIFF", b"RIFX", b"RF64"];
+    if form == Some(b"WAVE") && kinds.iter().any(|kind| bytes.starts_with(kind)) {
         return Some(Format::Wav);
     }
     // Programs other than MATLAB write another text before version and byte order.

@@ -13,8 +13,9 @@ const EXPECTED: &str = "a text table, or a file of NumPy, MATLAB, HDF5, LabVIEW 
 pub(super) fn whole(path: &Path, format: Format) -> InputError {
     let hint = match format {
         Format::Parquet => {
-            "compile kmcfit with `--features parquet`, or in Python: `pandas.read_parquet(file).to_csv('record.csv', index=False)`"
+            "export it as CSV from pandas: `pandas.read_parquet(file).to_csv('record.csv', index=False)`"
         }
+        Format::Mat4 => "save it with `save('record.mat', '-v7')` in MATLAB",
         Format::TdmsIndex => "read the file with the ending .tdms beside it",
         Format::Gzip => "decompress it: `gunzip FILE`",
         Format::Pickle => {

@@ -1,4 +1,5 @@
-//! Sound files: WAV with samples as integers or floating-point numbers, and its variant of 64 bits (RF64).
+//! Sound files: WAV with samples as integers or floating-point numbers, and its variants of 64 bits (RF64) and of the other byte order
+//! (RIFX).
 //!
 //! Integers are divided by their full scale, so that samples are fractions from -1 to 1. References: Microsoft,
 //! "Multiple Channel Audio Data and WAVE Files"; EBU Tech 3306 for RF64.
@@ -15,8 +16,8 @@ use crate::error::InputError;
 const INTEGER: u16 = 1;
 const FLOAT: u16 = 3;
 const EXTENSIBLE: u16 = 0xfffe;
-/// A length that stands in the chunk `ds64`.
-const IN_DS64: u32 = u32::MAX;
+/// A length that stands in the chunk `ds64`, or nowhere.
+const NOT_HERE: u32 = u32::MAX;
 
 /// Form of the samples.
 struct Encoding {
@@ -27,7 +28,11 @@ struct Encoding {
 }
 
 pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Channels, InputError> {
-    let mut file = Bytes::new(path, bytes, ByteOrder::Little);
+    let order = match bytes.starts_with(b"RIFX") {
+        true => ByteOrder::Big,
+        false => ByteOrder::Little,
+    };
+    let mut file = Bytes::new(path, bytes, order);
     file.take(12, "the header")?;
     let (mut encoding, mut long) = (None, None);
     while file.left() >= 8 {
@@ -44,12 +49,14 @@ pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Cha
                 long = Some(chunk.u64("the chunk `ds64`")?);
             }
             b"data" => {
+                // Programs that write into a pipe state no length.
                 let size = match (size, long) {
-                    (IN_DS64, Some(long)) => long,
+                    (NOT_HERE, long) => long.unwrap_or(file.left() as u64),
                     _ => u64::from(size),
                 };
                 let Some(encoding) = encoding else { break };
-                return samples(path, &encoding, file.take(size, "the samples")?, budget);
+                let data = file.take(size, "the samples")?;
+                return samples(path, &encoding, data, order, budget);
             }
             _ => {
                 file.take(
@@ -87,6 +94,7 @@ fn samples(
     path: &Path,
     encoding: &Encoding,
     bytes: &[u8],
+    order: ByteOrder,
     budget: &mut Budget,
 ) -> Result<Channels, InputError> {
     let kind = match (encoding.code, encoding.bits) {
@@ -121,7 +129,7 @@ fn samples(
         let name = format!("channel {}", i + 1);
         budget.name(&name)?;
         let mut values = budget.list(bytes.len() / stride)?;
-        let numbers = kind.values(bytes, ByteOrder::Little, i * kind.size(), stride);
+        let numbers = kind.values(bytes, order, i * kind.size(), stride);
         values.extend(numbers.map(|x| (x - zero) / full_scale));
         match values.is_empty() {
             true => found.refuse(&name, "no samples", None),

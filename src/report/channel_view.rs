@@ -20,16 +20,12 @@ pub(super) struct ChannelView<'a> {
     pub predicted: &'a [f64],
     pub note: Option<&'a ChannelNote>,
     pub diagnostics: &'a ResidualDiagnostics,
-    /// Unit for display; `None` for that of the file.
-    pub display: Option<Unit>,
 }
 
 impl ChannelView<'_> {
-    /// Unit for display, or of the file. Samples of uncalibrated channels keep theirs.
+    /// Unit of the file.
     fn shown(&self) -> Option<Unit> {
-        let own = self.note.map(|note| note.unit);
-        let is_arbitrary = own.is_some_and(|unit| unit.is_arbitrary());
-        self.display.filter(|_| !is_arbitrary).or(own)
+        self.note.map(|note| note.unit)
     }
 
     /// Factor from the unit shown to SI.
@@ -73,12 +69,6 @@ impl ChannelView<'_> {
         format!("{} {}", kind.name(), kind.symbol())
     }
 
-    /// Figure of the samples.
-    pub fn observation(&self) -> Figure {
-        let (label, unit) = (self.label(), self.unit());
-        figures::observation(&[(&label, unit, self.channel.times(), &self.observed())])
-    }
-
     /// Figures of the samples with the prediction, and of the residuals.
     pub fn figures(&self) -> [Figure; 2] {
         let (label, unit) = (self.label(), self.unit());
@@ -105,14 +95,13 @@ impl ChannelView<'_> {
         }
     }
 
-    /// Figure of the tests of the residuals, or of the innovations of correlated noise; `None` for fewer than three.
+    /// Figure of the test of the residuals, or of the innovations of correlated noise.
     pub fn residual_tests(&self) -> Option<Figure> {
         let name = match self.channel.correlation() {
             None => "residuals",
             Some(_) => "innovations",
         };
-        let residuals = self.channel.innovations(self.predicted);
-        record_figures::residual_tests(name, &residuals, self.diagnostics, &self.whiteness())
+        record_figures::residual_tests(name, self.diagnostics, &self.whiteness())
     }
 
     /// Figures of the spectra, and of the frequency response to an only input at the samples, with the undamped natural frequency

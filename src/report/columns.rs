@@ -61,15 +61,6 @@ pub(super) fn named_column(name: &str, is_rotation: bool) -> Option<String> {
     Some(column_of_part(column, part.is_some(), owner))
 }
 
-/// Header of a parameter by its name and unit: `initial_velocity_of_hammer_m_per_s`.
-pub(super) fn parameter_column(name: &str, unit: &str) -> String {
-    let unit = unit.replace('^', "").replace('/', " per ");
-    let words = format!("{name} {}", if unit == "1" { "" } else { &unit });
-    let words = words.split(|c: char| c.is_whitespace() || matches!(c, ',' | '"'));
-    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
-    words.join("_")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,12 +87,5 @@ mod tests {
             Some("damping_ratio")
         );
         assert_eq!(named_column("friction", false), None);
-    }
-
-    #[test]
-    fn parameters_have_their_unit_in_the_column() {
-        let column = parameter_column("initial velocity of run 1", "m/s");
-        assert_eq!(column, "initial_velocity_of_run_1_m_per_s");
-        assert_eq!(parameter_column("gain of force", "1"), "gain_of_force");
     }
 }

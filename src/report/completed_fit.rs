@@ -1,12 +1,10 @@
 //! A fit with its assessment, all that documents and files of a run are made from.
 
-use super::display_units::DisplayUnits;
 use super::document::{Prediction, ResultDocument};
 use super::fit_assessment::RunAssessment;
-use super::run::{FittedModel, json};
+use super::run::{FittedModel, RequestedFiles, json};
 use crate::config::Model;
 use crate::fitting::ModelFit;
-use crate::results::RequestedFiles;
 use kmcfit_core::internals::functions::CoefficientFunction;
 use kmcfit_core::internals::solvers::{Fit, WeightPath};
 use kmcfit_core::internals::study::predict;
@@ -63,7 +61,6 @@ impl CompletedFit {
             weights: self.weights.as_ref(),
             run_assessment: &self.assessment,
             requested,
-            display: DisplayUnits::default(),
             computed: Default::default(),
         }
     }

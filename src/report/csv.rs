@@ -24,16 +24,6 @@ impl CsvTable {
         self
     }
 
-    /// Names of the columns.
-    pub(super) fn headers(&self) -> &[String] {
-        &self.headers
-    }
-
-    /// Values of the columns.
-    pub(super) fn columns(&self) -> &[Vec<f64>] {
-        &self.columns
-    }
-
     /// The text of the file. Fields of values that are not finite are empty.
     pub fn to_csv(&self) -> String {
         let rows = self.columns.iter().map(Vec::len).max().unwrap_or(0);

@@ -4,7 +4,6 @@ use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
 use crate::number_format::at_most;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::functions::WeightRule;
-use kmcfit_core::internals::objective::{GradientCheck, GradientKind};
 use kmcfit_core::internals::signal::{even_spacing, median};
 use kmcfit_core::internals::solvers::{PathPoint, WeightPath};
 use kmcfit_core::internals::study::PredictedResponse;
@@ -59,22 +58,6 @@ fn broken_at_gaps(t: &[f64], y: &[f64]) -> Option<[Vec<f64>; 2]> {
         last = Some(time);
     }
     Some([times, values])
-}
-
-/// A measured channel: quantity, unit, times in s, and samples.
-pub type ChannelSamples<'a> = (&'a str, &'a str, &'a [f64], &'a [f64]);
-
-/// The record, one panel for each channel.
-pub fn observation(channels: &[ChannelSamples]) -> Figure {
-    Figure::new(
-        "observation",
-        "Record",
-        "The measured channels against time, one panel for each.",
-    )
-    .panels(channels.iter().map(|(label, unit, t, y)| {
-        let mark = Mark::points("", t, y, dots(Colour::Blue, t.len()));
-        Panel::of_time(*label, *unit).mark(mark)
-    }))
 }
 
 /// Samples and prediction of a channel, in the unit of the channel.
@@ -234,7 +217,11 @@ impl<'a> FunctionCurve<'a> {
         if is_visible || half_width == 0.0 {
             return label.into();
         }
-        let percent = at_most(100.0 * half_width / range.0.abs().max(range.1.abs()), 2);
+        let share = half_width / range.0.abs().max(range.1.abs());
+        if !share.is_finite() {
+            return label.into();
+        }
+        let percent = at_most(100.0 * share, 2);
         let symbol = self.name.split(' ').next_back().unwrap_or_default();
         format!("{label}, at most ±{percent} % of max {symbol}")
     }
@@ -275,38 +262,6 @@ pub fn functions(panels: impl IntoIterator<Item = Panel>) -> Figure {
         "Estimated coefficients against time, one panel for each.",
     )
     .panels(panels)
-}
-
-/// The error of the gradient against the step, a panel for each adjoint and a line for each grid.
-pub fn gradient_error(curves: &[GradientCheck]) -> Figure {
-    let mut kinds: Vec<GradientKind> = Vec::new();
-    let mut nodes: Vec<usize> = curves.iter().map(|curve| curve.nodes).collect();
-    nodes.sort_unstable();
-    nodes.dedup();
-    for curve in curves {
-        if !kinds.contains(&curve.kind) {
-            kinds.push(curve.kind);
-        }
-    }
-    // A grid looks the same in all panels.
-    let panel = |kind: &GradientKind| {
-        let curves = curves.iter().filter(|curve| curve.kind == *kind);
-        let lines = curves.map(|curve| {
-            let index = nodes.iter().position(|&n| n == curve.nodes).unwrap_or(0);
-            let label = format!("N = {}", curve.nodes);
-            Mark::line(label, &curve.step, &curve.error, Style::nth(index))
-        });
-        Panel::new(Axis::log("step a", ""), Axis::log("relative error", ""))
-            .title(format!("{} adjoint", kind.name()))
-            .marks(lines)
-    };
-    Figure::new(
-        "gradient_error",
-        "Error of the gradient",
-        "Relative error of the gradient against the step of the difference that tests it.",
-    )
-    .columns(kinds.len())
-    .panels(kinds.iter().map(panel))
 }
 
 /// The ratios of the coefficient functions against the times `t` in s, and the true ones if known; a ratio without
@@ -374,14 +329,10 @@ pub fn weight_path(path: &WeightPath) -> Figure {
         let values: Vec<f64> = path.points.iter().map(part).collect();
         let style = Style::new(colour).width(1.8);
         let dashes = [Dash::Dashed, Dash::Dotted, Dash::DashDot];
-        let picks = WeightRule::OF_PATHS.iter().zip(path.picks).zip(dashes);
+        let picks = WeightPath::RULES.iter().zip(path.picks).zip(dashes);
         let picks = picks.enumerate().filter_map(|(i, ((rule, pick), dash))| {
             let style = Style::nth(i + 1).dash(dash);
-            Some(Mark::vertical(
-                rule.name(),
-                path.points[pick?].weight,
-                style,
-            ))
+            Some(Mark::vertical(*rule, path.points[pick?].weight, style))
         });
         // Only total variation has a criterion on its path, and its rule alone.
         let is_bic = path.points.iter().any(|p| p.bic.is_some());
@@ -406,7 +357,6 @@ pub fn weight_path(path: &WeightPath) -> Figure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::chart::svg;
 
     /// A band of half-width 0.02 N/m on a stiffness from 4 to 5 N/m is 2 % of that range and visible; one of 0.005 N/m is not.
     #[test]
@@ -422,15 +372,5 @@ mod tests {
         };
         assert_eq!(label(0.02), "95 % band");
         assert_eq!(label(0.005), "95 % band, at most ±0.1 % of max k");
-    }
-
-    /// A single iteration is drawn as dots, of three times the width of the lines in radius.
-    #[test]
-    fn a_single_iteration_shows() {
-        let one = svg::render(&convergence(&[1.0], &[1e-3], &[1e-4]));
-        let two = svg::render(&convergence(&[1.0, 2.0], &[1e-3, 1e-4], &[1e-4, 1e-6]));
-        for radius in ["r=\"66\"", "r=\"27\""] {
-            assert!(one.contains(radius) && !two.contains(radius), "{radius}");
-        }
     }
 }

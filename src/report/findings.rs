@@ -3,8 +3,8 @@
 use crate::finding::Finding;
 use crate::number_format::{resolved, significant, times_in_words};
 use kmcfit_core::internals::assessment::{
-    ClassicalEstimate, ClassicalMethod, CoarseBasis, FitWarning, GapAssessment, GapStatus,
-    NoIntervals, RecordError, Unidentified,
+    ClassicalEstimate, ClassicalMethod, CoarseBasis, FitWarning, GapAssessment, NoIntervals,
+    RecordError, Unidentified,
 };
 use kmcfit_core::internals::identifiability::{
     Classification, FunctionClassification, RankFinding, span_words,
@@ -354,34 +354,14 @@ fn p_in_words(p: f64) -> String {
 
 fn gap_in_words(gap: &GapAssessment) -> String {
     let [from, to] = gap.span.map(|time| significant(time, 4));
-    let cycles = match (gap.ci95, gap.other_counts) {
-        (Some([low, high]), 0) => format!(
-            "{} cycles (95 % CI {} to {})",
-            significant(gap.cycles, 4),
-            significant(low, 4),
-            significant(high, 4)
-        ),
-        (Some([low, high]), _) => format!(
-            "{} to {} cycles, several numbers of cycles fit",
-            significant(low, 4),
-            significant(high, 4)
-        ),
-        (None, _) => format!("{} cycles", significant(gap.cycles, 4)),
-    };
-    let functions: Vec<String> = (gap.functions.iter())
-        .map(|f| {
-            let status = match f.status {
-                GapStatus::Identified => "is identified in it",
-                GapStatus::CarriedByBasis => "is determined by its basis in it",
-                GapStatus::CarriedByPenalty => "is determined by its penalty in it",
-                GapStatus::NotIdentified => "is not identified in it",
-            };
-            format!("; the {} {status}", f.function)
-        })
-        .collect();
+    let functions = gap.functions.iter().map(|f| match f.is_identified {
+        true => format!("; the {} is identified in it", f.function),
+        false => format!("; the {} is not identified in it", f.function),
+    });
+    let functions: String = functions.collect();
     format!(
-        "the records have a gap from {from} to {to} s, with {cycles}{}",
-        functions.concat()
+        "the records have a gap from {from} to {to} s, with {} cycles, or another whole number more or less{functions}",
+        significant(gap.cycles, 4)
     )
 }
 
@@ -433,14 +413,6 @@ pub fn of_starts(finding: &multistart::MultistartFinding, starts: usize) -> Find
             let finding = finding.with("ended", ended).with("starts", starts);
             finding.with("different", different).with("lowest", lowest)
         }
-        Starts::Connected(true) => Finding::new(
-            "connected_minima",
-            "the two lowest minima are connected by a path of nearly constant cost: the solution is not unique",
-        ),
-        Starts::Connected(false) => Finding::new(
-            "separate_minima",
-            "the cost rises between the two lowest minima, on the straight path and along the scaling ambiguity",
-        ),
         Starts::Lower { cost, fit } => {
             let text = format!(
                 "a starting point led to a lower J than the fit: {cost:.6e} instead of {fit:.6e}"

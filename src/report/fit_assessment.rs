@@ -1,7 +1,6 @@
 //! Assessment of a fit and of the validation records: statistics, step-size check, bands, predictions.
 
 use super::channel_view::ChannelView;
-use super::display_units::DisplayUnits;
 use crate::config::{HoldOut, Model};
 use kmcfit_core::internals::assessment::{
     EquationErrorIntervals, EstimateErrors, FitAssessment, LargeCovariance, NoIntervals, POOR,
@@ -141,14 +140,14 @@ impl ValidationRecord {
 
     /// Its name and the fit of its worst channel, per cent, if the fitted system does not predict it.
     pub fn poor(&self) -> Option<(&str, f64)> {
-        let channels = self.channels(DisplayUnits::default());
+        let channels = self.channels();
         let fits = channels.iter().map(|c| c.diagnostics.fit_percent);
         let worst = fits.reduce(f64::min).filter(|worst| *worst < POOR)?;
         Some((&self.out.experiment.name, worst))
     }
 
     /// Its channels in units for display; empty without a response.
-    pub fn channels(&self, display: DisplayUnits) -> Vec<ChannelView<'_>> {
+    pub fn channels(&self) -> Vec<ChannelView<'_>> {
         let Ok((problem, evaluation)) = &self.found else {
             return Vec::new();
         };
@@ -160,7 +159,6 @@ impl ValidationRecord {
                 predicted,
                 note: self.out.notes.get(i),
                 diagnostics,
-                display: display.of_channel(channel.kind()),
             })
             .collect()
     }

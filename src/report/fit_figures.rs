@@ -6,13 +6,12 @@ use super::document::ResultDocument;
 use super::figures::{self, FunctionCurve};
 use super::record_figures::{self, InputSeries};
 use super::tables::FUNCTION_ROWS;
-use crate::units::Unit;
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::solvers::IterationRecord;
-use kmcfit_core::internals::threads::{analyses_at_once, map};
+use kmcfit_core::internals::threads::{analyses_at_once, both, map};
 
 /// Figures that both page and files have, drawn once.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct DrawnFigures {
     /// Those of each channel against time, without their titles.
     pub(super) channels: Vec<ChannelFigures>,
@@ -21,9 +20,9 @@ pub struct DrawnFigures {
     /// Tests of the residuals.
     pub tests: Vec<Figure>,
     /// Coefficient functions.
-    pub functions: Option<Figure>,
+    pub functions: Figure,
     /// Their ratios.
-    pub ratios: Option<Figure>,
+    pub ratios: Figure,
     /// Inputs of each driven experiment.
     pub inputs: Vec<Figure>,
     /// Validation records with their predictions and residuals.
@@ -33,8 +32,6 @@ pub struct DrawnFigures {
 /// Figures of a channel against time.
 #[derive(Debug, Clone)]
 pub(super) struct ChannelFigures {
-    /// Samples alone.
-    pub record: Figure,
     /// Samples with the prediction.
     pub samples: Figure,
     /// Residuals.
@@ -43,42 +40,18 @@ pub(super) struct ChannelFigures {
     pub response: Option<Figure>,
 }
 
-/// What is computed before a report is written.
-enum ReportPart {
-    Spectra(Vec<Figure>),
-    Document(Box<ResultDocument>),
-    Tests(Vec<Figure>),
-    Channels(Vec<ChannelFigures>),
-    Functions([Figure; 2]),
-    Inputs(Vec<Figure>),
-    Validation(Vec<Figure>),
-}
-
-/// Computation of a [`ReportPart`].
-#[derive(Clone, Copy)]
-enum ReportJob {
-    /// Of an experiment and a channel.
-    Spectra((usize, usize)),
-    Document,
-    Tests,
-    Channels,
-    Functions,
-    Inputs,
-    Validation,
-}
-
 impl FittedModel<'_> {
     /// The figures of a fit.
     pub fn figures(&self) -> Vec<Figure> {
         let mut figures: Vec<Figure> = self.weights.map(figures::weight_path).into_iter().collect();
         let drawn = self.drawn();
         figures.push(self.convergence());
-        figures.extend(drawn.functions.iter().chain(&drawn.ratios).cloned());
+        figures.extend([&drawn.functions, &drawn.ratios].map(Figure::clone));
         for ((experiment, channel), of_channel) in self.channels().into_iter().zip(&drawn.channels)
         {
             let beside = of_channel.response.as_ref();
             let beside = beside.unwrap_or(&of_channel.samples);
-            let list = [&of_channel.record, beside, &of_channel.residuals];
+            let list = [beside, &of_channel.residuals];
             figures.extend(list.map(|figure| {
                 let mut figure = figure.clone();
                 figure.name += &self.suffix(experiment, channel);
@@ -144,68 +117,34 @@ impl FittedModel<'_> {
 
     /// The figures that both page and files have, drawn once.
     pub(super) fn drawn(&self) -> &DrawnFigures {
-        self.computed.figures.get_or_init(|| self.draw(false).1)
+        self.computed.figures.get_or_init(|| self.draw())
     }
 
     /// The result document, beside which the figures are drawn if figures are requested.
     pub fn document_and_figures(&self) -> ResultDocument {
-        if !self.requested.figures {
-            return self.document();
+        match self.requested.figures {
+            true => both(|| self.document(), || self.drawn()).0,
+            false => self.document(),
         }
-        let (document, figures) = self.draw(true);
-        self.computed.figures.get_or_init(|| figures);
-        document.unwrap_or_else(|| self.document())
     }
 
-    /// The figures that both page and files have, and the document if it is wanted.
-    fn draw(&self, is_document_wanted: bool) -> (Option<ResultDocument>, DrawnFigures) {
+    fn draw(&self) -> DrawnFigures {
         let channels = self.channels();
-        // The longest first.
-        let mut jobs: Vec<ReportJob> = channels.iter().copied().map(ReportJob::Spectra).collect();
-        jobs.extend(is_document_wanted.then_some(ReportJob::Document));
-        jobs.extend([
-            ReportJob::Tests,
-            ReportJob::Channels,
-            ReportJob::Functions,
-            ReportJob::Inputs,
-            ReportJob::Validation,
-        ]);
-        let part = |i: usize| match jobs[i] {
-            ReportJob::Spectra(channel) => {
-                ReportPart::Spectra(self.of_channel(channel, Self::channel_spectra))
-            }
-            ReportJob::Document => ReportPart::Document(Box::new(self.document())),
-            ReportJob::Tests => {
-                let tests = |channel: &_| self.of_channel(*channel, Self::channel_tests);
-                ReportPart::Tests(channels.iter().flat_map(tests).collect())
-            }
-            ReportJob::Channels => {
-                let figures = channels.iter().map(|(e, c)| self.channel_figures(*e, *c));
-                ReportPart::Channels(figures.collect())
-            }
-            ReportJob::Functions => {
-                ReportPart::Functions([self.functions_figure(), self.ratios_figure()])
-            }
-            ReportJob::Inputs => ReportPart::Inputs(self.input_figures()),
-            ReportJob::Validation => ReportPart::Validation(self.validation_figures()),
-        };
-        let mut figures = DrawnFigures::default();
-        let mut document = None;
         let threads = analyses_at_once(self.model.problem.sample_count());
-        for part in map(jobs.len(), threads, part) {
-            match part {
-                ReportPart::Spectra(of_channel) => figures.spectra.extend(of_channel),
-                ReportPart::Document(found) => document = Some(*found),
-                ReportPart::Tests(found) => figures.tests = found,
-                ReportPart::Channels(found) => figures.channels = found,
-                ReportPart::Functions([functions, ratios]) => {
-                    (figures.functions, figures.ratios) = (Some(functions), Some(ratios));
-                }
-                ReportPart::Inputs(found) => figures.inputs = found,
-                ReportPart::Validation(found) => figures.validation = found,
-            }
+        let spectra = map(channels.len(), threads, |i| {
+            self.of_channel(channels[i], Self::channel_spectra)
+        });
+        let tests = |channel: &_| self.of_channel(*channel, Self::channel_tests);
+        let figures = channels.iter().map(|(e, c)| self.channel_figures(*e, *c));
+        DrawnFigures {
+            channels: figures.collect(),
+            spectra: spectra.into_iter().flatten().collect(),
+            tests: channels.iter().flat_map(tests).collect(),
+            functions: self.functions_figure(),
+            ratios: self.ratios_figure(),
+            inputs: self.input_figures(),
+            validation: self.validation_figures(),
         }
-        (document, figures)
     }
 
     /// Spectra of a channel, and its frequency response where one input acts.
@@ -242,21 +181,17 @@ impl FittedModel<'_> {
             true => ["N m", "rad", "rad/s²"],
             false => ["N", "m", "m/s²"],
         };
-        let scale = |unit: Option<Unit>| unit.map_or(1.0, |unit| unit.factor());
-        let force_unit = self.display.of_force();
         let force = input.forces_at(times).map(|forces| InputSeries {
             label: "force",
-            unit: force_unit.map_or(units[0], |unit| unit.symbol()),
-            samples: forces.iter().map(|f| f / scale(force_unit)).collect(),
+            unit: units[0],
+            samples: forces.to_vec(),
         });
         let motion = |label, kind, unit| {
-            let shown = self.display.of_channel(kind);
-            let at = |t: &f64| Some(input.base_motion_at(kind, *t)? / scale(shown));
-            let samples = times.iter().map(at);
+            let samples = times.iter().map(|t| input.base_motion_at(kind, *t));
             let samples = samples.collect::<Option<Vec<f64>>>()?;
             Some(InputSeries {
                 label,
-                unit: shown.map_or(unit, |unit| unit.symbol()),
+                unit,
                 samples,
             })
         };
@@ -297,7 +232,6 @@ impl FittedModel<'_> {
         // The response is in SI units; a page has one unit for a quantity.
         let is_at_nodes = view.channel.stride().is_some() && view.factor() == 1.0;
         ChannelFigures {
-            record: view.observation(),
             samples,
             residuals,
             response: is_at_nodes
@@ -309,7 +243,7 @@ impl FittedModel<'_> {
     fn validation_figures(&self) -> Vec<Figure> {
         let mut figures = Vec::new();
         for (i, held) in self.run_assessment.validation.iter().enumerate() {
-            for view in held.channels(self.display) {
+            for view in held.channels() {
                 let kind = view.channel.kind().name();
                 for mut figure in view.figures() {
                     figure.name += &format!("-validation-{}-{kind}", i + 1);

@@ -1,7 +1,6 @@
 //! Fit quality in the result document: channels, nuisance parameters, validation records.
 
 use super::channel_view::{ChannelView, whiteness};
-use super::display_units::DisplayUnits;
 use super::document::{
     ChannelSummary, IgnoredSummary, NoiseSummary, NuisanceParameter, ValidationSummary,
 };
@@ -94,8 +93,8 @@ pub fn scalars(
 }
 
 /// Summary of a validation record.
-pub(super) fn validation(held: &ValidationRecord, display: DisplayUnits) -> ValidationSummary {
-    let channels = held.channels(display);
+pub(super) fn validation(held: &ValidationRecord) -> ValidationSummary {
+    let channels = held.channels();
     let summaries = channels.iter().map(|view| channel(view, 1));
     let mut summary = ValidationSummary {
         name: held.out.experiment.name.clone(),

@@ -2,7 +2,7 @@
 //! with the fitted response.
 
 use super::FittedModel;
-use super::chart::{Colour, Figure, Panel};
+use super::chart::{Figure, Panel};
 use super::document::ResultDocument;
 
 /// Variations below this share of the largest value are rounding errors.
@@ -13,7 +13,7 @@ impl FittedModel<'_> {
     pub(super) fn main_figure(&self, document: &ResultDocument) -> Option<Figure> {
         let drawn = self.drawn();
         let first = drawn.channels.first();
-        let panels = drawn.functions.iter().flat_map(|figure| &figure.panels);
+        let panels = drawn.functions.panels.iter();
         let panels = self.model.problem.functions.iter().zip(panels);
         let panels = panels.filter(|(function, _)| document.is_determined(&function.name()));
         let scored = panels.filter_map(|(_, panel)| Some((variation(panel)?, panel)));
@@ -35,11 +35,11 @@ impl FittedModel<'_> {
             "The coefficient that varies most relative to its interval; below, the record.",
         );
         let below = first.map(|of_channel| {
-            let mut figure = of_channel.record.clone();
-            for mark in figure.panels.iter_mut().flat_map(|panel| &mut panel.marks) {
-                mark.style.colour = Colour::Grey;
+            let mut panels = of_channel.samples.panels.clone();
+            for panel in &mut panels {
+                panel.marks.retain(|mark| mark.label == "samples");
             }
-            figure.panels
+            panels
         });
         Some(figure.panel(panel).panels(below.into_iter().flatten()))
     }
@@ -69,7 +69,7 @@ pub(super) fn variation(panel: &Panel) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::chart::{Mark, Style};
+    use crate::report::chart::{Colour, Mark, Style};
 
     fn panel(y: &[f64], half_width: f64) -> Panel {
         let t: Vec<f64> = (0..y.len()).map(|i| i as f64).collect();

@@ -24,7 +24,6 @@ pub mod compare;
 mod completed_fit;
 mod cost;
 mod csv;
-mod display_units;
 pub mod document;
 mod equation;
 mod extent;
@@ -55,30 +54,23 @@ mod terminal;
 pub(crate) mod text;
 mod timings;
 mod verdict;
-mod verify;
 
 pub(crate) use answer::quantity;
 pub use answer::{AnswerRow, answer};
-pub use chart::{
-    Axis, Colour, Dash, Figure, FigureWidth, Mark, Panel, Scale, Style, render, render_at,
-};
+pub use chart::{Axis, Colour, Dash, Figure, Mark, Panel, Scale, Style, render};
 pub use compare::Comparison;
 pub use completed_fit::{CoefficientCurve, CompletedFit, model_predictions};
 pub use cost::{CostKind, cost_definition};
 pub use csv::CsvTable;
-pub use display_units::DisplayUnits;
 pub use fit_assessment::RunAssessment;
 pub use kmcfit_core::internals::study::{PredictedResponse, predict};
 pub use overview::overview;
 pub(crate) use page::shell_quoted;
 pub use prediction::{ForcedPredictions, ForcedSummary, Score};
 pub use result_table::ResultTable;
-pub use run::{DRAWS, FittedModel, fit_claim, json};
+pub use run::{FittedModel, MODEL, RequestedFiles, json};
 pub use run_reader::Run;
 pub(crate) use summary::count;
 pub use summary::{prediction_table, summary};
-pub use terminal::{charts, summary_plot};
+pub use terminal::summary_plot;
 pub use timings::{OverheadTimings, PartSummary, TimingsSummary};
-#[cfg(test)]
-pub(crate) use verdict::{assumption, reason_in_words};
-pub use verify::{Check, Difference, Verification, rebuilt_fit};

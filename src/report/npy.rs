@@ -1,9 +1,6 @@
 //! Matrices of 64-bit numbers in NumPy's format `.npy`, version 1.0.
 
-use crate::error::InputError;
-use crate::text_io::quote;
 use nalgebra::DMatrix;
-use std::path::Path;
 
 const MAGIC: &[u8] = b"\x93NUMPY\x01\x00";
 /// Header and magic have a multiple of this length.
@@ -27,55 +24,17 @@ pub(super) fn npy(matrix: &DMatrix<f64>) -> Vec<u8> {
     bytes
 }
 
-/// Reads a matrix of this size as [`npy`] writes it.
-///
-/// # Errors
-/// If the file is missing or not such a matrix.
-pub(super) fn read_npy(
-    path: &Path,
-    rows: usize,
-    columns: usize,
-) -> Result<DMatrix<f64>, InputError> {
-    let expected = format!("a matrix of {rows} x {columns} numbers, as written by `kmcfit fit`");
-    let bytes = std::fs::read(path).map_err(|error| {
-        InputError::file(path, "cannot be read")
-            .found(error)
-            .expected(&expected)
-    })?;
-    let header = header(rows, columns);
-    let numbers = bytes.strip_prefix(header.as_slice());
-    let numbers = numbers.filter(|numbers| numbers.len() == 8 * rows * columns);
-    let numbers = numbers.ok_or_else(|| {
-        let start = String::from_utf8_lossy(&bytes[..bytes.len().min(ALIGNMENT)]);
-        InputError::file(path, "the matrix is damaged")
-            .found(format!(
-                "{} bytes that start with {}",
-                bytes.len(),
-                quote(&start)
-            ))
-            .expected(&expected)
-    })?;
-    let values = numbers.chunks_exact(8).map(|chunk| {
-        let mut eight = [0; 8];
-        eight.copy_from_slice(chunk);
-        f64::from_le_bytes(eight)
-    });
-    Ok(DMatrix::from_iterator(rows, columns, values))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn a_matrix_is_read_as_it_was_written() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("matrix.npy");
         let matrix = DMatrix::from_fn(3, 2, |i, j| 1.0 / (1.0 + i as f64) - j as f64);
-        std::fs::write(&path, npy(&matrix)).unwrap();
-        assert_eq!(read_npy(&path, 3, 2).unwrap(), matrix);
-        assert_eq!(npy(&matrix).len(), 128 + 48);
-        let error = read_npy(&path, 2, 3).unwrap_err().to_string();
-        assert!(error.contains("a matrix of 2 x 3 numbers"), "{error}");
+        let bytes = npy(&matrix);
+        assert_eq!(bytes.len(), 128 + 48);
+        let numbers = bytes[128..].chunks_exact(8);
+        let numbers = numbers.map(|eight| f64::from_le_bytes(eight.try_into().unwrap()));
+        assert_eq!(DMatrix::from_iterator(3, 2, numbers), matrix);
     }
 }

@@ -9,9 +9,8 @@ use kmcfit_core::internals::assessment::{LargeCovariance, MOST_WITH_COVARIANCE};
 use kmcfit_core::internals::diagnostics::student_half_width;
 use kmcfit_core::internals::functions::{Basis, CoefficientFunction};
 use kmcfit_core::internals::identifiability::{CovarianceKind, MeanOverRecord, Means};
-use kmcfit_core::internals::noise::{Autoregression, Correlation, CorrelationLaw};
+use kmcfit_core::internals::noise::{Correlation, CorrelationLaw};
 use kmcfit_core::internals::record::{Channel, NoiseEstimate, ScoreCovariance};
-use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -40,9 +39,6 @@ pub struct ParametersDocument {
     /// File with the covariance of 65 to 1000 parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance_file: Option<String>,
-    /// Variances of more than 1000 parameters.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub variances: Vec<f64>,
     /// Kind of the covariance: `information`, `penalised`, `bayesian` or `kernel`.
     pub covariance_kind: Option<CovarianceKind>,
     /// Start (s), length (s) and number of nodes of the time grid.
@@ -50,9 +46,6 @@ pub struct ParametersDocument {
     pub functions: Vec<FunctionBasis>,
     /// For each estimate of `result.json` with an interval, and each initial state and sensor parameter, what its half-width is made of.
     estimates: BTreeMap<String, EstimateError>,
-    /// Covariance of these estimates with more than 1000 parameters, in their order.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    estimate_covariance: Vec<Vec<f64>>,
     /// Noise of each channel.
     pub noise: Vec<ChannelNoise>,
 }
@@ -88,7 +81,7 @@ pub struct FunctionBasis {
 }
 
 /// The half-width of a 95 % interval is `quantile sqrt(g^T C g + basis_error^2)` with the gradient `g` and the covariance `C`; with more than
-/// 1000 parameters `g^T C g` is on the diagonal of `estimate_covariance`.
+/// 1000 parameters neither is listed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct EstimateError {
     /// Derivatives of the estimate in the parameters; none with more than 1000 of them.
@@ -123,28 +116,6 @@ pub struct ChannelNoise {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
 fn is_model(scores: &ScoreCovariance) -> bool {
     *scores == ScoreCovariance::Model
-}
-
-impl ChannelNoise {
-    /// Correlation of samples at `times`.
-    pub fn law(&self, times: &[f64]) -> Option<Correlation> {
-        let stored = self.correlation.as_ref()?;
-        let law = match stored.correlation_time {
-            Some(time) => CorrelationLaw::Exponential { time },
-            None => {
-                let partial = self.partial_autocorrelations.clone();
-                CorrelationLaw::Autoregressive(Autoregression::new(partial)?)
-            }
-        };
-        Correlation::new(law, times)
-    }
-
-    /// Covariance of the noise parameters; without rows where the noise counts as known.
-    pub fn covariance(&self) -> DMatrix<f64> {
-        let n = self.noise_covariance.len();
-        let entry = |i: usize, j: usize| self.noise_covariance[i].get(j).copied().unwrap_or(0.0);
-        DMatrix::from_fn(n, n, entry)
-    }
 }
 
 impl ParametersDocument {
@@ -235,17 +206,12 @@ impl FittedModel<'_> {
             covariance_file: large
                 .filter(|large| large.covariance.is_some())
                 .map(|_| COVARIANCE.to_owned()),
-            variances: match large {
-                Some(large) if large.covariance.is_none() => large.variances.clone(),
-                _ => Vec::new(),
-            },
             covariance_kind: kind.or(large.map(|large| large.kind)),
             grid: GridSummary {
                 start: grid.start(),
                 duration: grid.duration(),
                 nodes: grid.nodes(),
             },
-            estimate_covariance: self.estimate_covariance(&estimates),
             estimates,
             names,
             units,
@@ -274,15 +240,8 @@ impl FittedModel<'_> {
     }
 
     /// Mean of the estimate with this name.
-    fn mean<'a>(&self, means: &Means<'a>, name: &str) -> Option<&'a MeanOverRecord> {
-        let index = self.mean_index(means, name)?;
-        let ratios = means.ratios.iter().map(|(_, mean)| *mean);
-        means.functions.iter().copied().chain(ratios).nth(index)
-    }
-
-    /// Its place among the means of functions, then of ratios.
-    fn mean_index(&self, means: &Means, name: &str) -> Option<usize> {
-        let band = match name {
+    fn mean<'a>(&self, means: &'a Means, name: &str) -> Option<&'a MeanOverRecord> {
+        let ratio = match name {
             "natural_frequency" => "natural frequency",
             "damping_ratio" => "damping ratio",
             "k_over_m" => "k/m",
@@ -290,47 +249,16 @@ impl FittedModel<'_> {
             _ => {
                 let function = ratios::function_of(name);
                 let mut functions = self.model.problem.functions.iter();
-                return functions.position(|f| f.name() == function);
+                let place = functions.position(|f| f.name() == function)?;
+                return means.functions.get(place).copied();
             }
         };
-        let place = means.ratios.iter().position(|(ratio, _)| *ratio == band)?;
-        Some(means.functions.len() + place)
-    }
-
-    /// Covariance of the estimates of more than 1000 parameters.
-    fn estimate_covariance(&self, errors: &BTreeMap<String, EstimateError>) -> Vec<Vec<f64>> {
-        let large = self.large_covariance().filter(|c| c.covariance.is_none());
-        let Some(large) = large else {
-            return Vec::new();
-        };
-        let means = large.means();
-        let places = errors
-            .keys()
-            .filter_map(|name| self.mean_index(&means, name));
-        let places: Vec<usize> = places.collect();
-        let row = |i: &usize| {
-            let entry = |j: &usize| large.covariance_of_means[(*i, *j)];
-            places.iter().map(entry).collect()
-        };
-        places.iter().map(row).collect()
+        means.ratio(ratio)
     }
 
     /// Covariance of more than 64 parameters.
     pub(super) fn large_covariance(&self) -> Option<&LargeCovariance> {
         self.run_assessment.large_covariance()
-    }
-
-    /// Entries of the factor of the normal matrix: row, variable, value, and the variance of the row's error, 1 or 0.
-    pub(super) fn factor(&self) -> Option<DMatrix<f64>> {
-        let factor = self.large_covariance()?.factor.as_ref()?;
-        let entries: Vec<f64> = factor
-            .entries()
-            .flat_map(|e| {
-                let variance = f64::from(u8::from(!e.is_exact));
-                [e.row as f64, e.variable as f64, e.value, variance]
-            })
-            .collect();
-        Some(DMatrix::from_vec(4, entries.len() / 4, entries))
     }
 
     fn estimate_errors(

@@ -4,10 +4,7 @@ use super::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
 use super::text::count;
 use kmcfit_core::internals::diagnostics::{ResidualDiagnostics, SIGNIFICANCE};
 use kmcfit_core::internals::signal::{Mobility, Spectrum};
-use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Diameter of the dots of a quantile plot, pixels.
-const DOT: f64 = 2.5;
 /// Coherence below which a measured frequency response is noise and does not widen its axis.
 const COHERENT: f64 = 0.5;
 /// Order of the derivative with which [`Mobility`] is the ratio of the response to the input itself.
@@ -32,17 +29,15 @@ pub(super) struct InputSeries {
     pub samples: Vec<f64>,
 }
 
-/// Autocorrelation of the residuals with the bounds that 95 % of the lags of white noise keep, and the quantiles of the residuals
-/// relative to their standard deviation against those of the normal distribution. `name` is `residuals` or `innovations`, `result` that
+/// Autocorrelation of the residuals with the bounds that 95 % of the lags of white noise keep; `None` for residuals without one. `name` is `residuals` or `innovations`, `result` that
 /// of the test of autocorrelation.
 pub(super) fn residual_tests(
     name: &str,
-    residuals: &[f64],
     diagnostics: &ResidualDiagnostics,
     result: &str,
 ) -> Option<Figure> {
-    let quantiles = normal_quantiles(residuals)?;
     let lags = 0..diagnostics.autocorrelation.len();
+    (lags.len() > 1).then_some(())?;
     let lags: Vec<f64> = lags.map(|lag| lag as f64 * diagnostics.step).collect();
     let bound = Style::new(Colour::Grey).dash(Dash::Dashed);
     let stem = Style::new(Colour::Blue);
@@ -55,57 +50,18 @@ pub(super) fn residual_tests(
         Mark::horizontal("", -diagnostics.band, bound),
         Mark::stems(name, &lags, &diagnostics.autocorrelation, stem),
     ]);
-    let [normal, _] = &quantiles;
-    let ends = [normal.first(), normal.last()].map(|end| end.copied().unwrap_or(f64::NAN));
-    let dots = Style::new(Colour::Blue).width(DOT);
-    let line = Style::new(Colour::Vermillion).dash(Dash::Dashed);
-    let quantile = Panel::new(
-        Axis::linear("quantile of the normal distribution", ""),
-        Axis::linear(format!("quantile of the {name}"), ""),
-    )
-    .marks([
-        Mark::line("normal distribution", &ends, &ends, line),
-        Mark::points_of(format!("{name} in order"), quantiles, dots),
-    ]);
     Some(
         Figure::new(
             "residual_tests",
             "Residual tests",
             format!(
-                "Left: autocorrelation of the {name}; without any, 95 % of the lags are within the bounds. Ljung-Box test of {}, \
-                 significance level {SIGNIFICANCE}: {result}. Right: the {name}, divided by their standard deviation, in order \
-                 of size against the quantiles of the normal distribution.",
+                "Autocorrelation of the {name}; without any, 95 % of the lags are within the bounds. Ljung-Box test of {}, significance level \
+                 {SIGNIFICANCE}: {result}.",
                 count(diagnostics.autocorrelation.len().saturating_sub(1), "lag"),
             ),
         )
-        .columns(2)
-        .panels([correlation, quantile]),
+        .panel(correlation),
     )
-}
-
-/// Quantiles `(i - 1/2)/n` of the standard normal distribution, and the finite residuals in order, less their mean and relative to
-/// their standard deviation; `None` for fewer than three, and for equal ones.
-fn normal_quantiles(residuals: &[f64]) -> Option<[Vec<f64>; 2]> {
-    let mut sorted: Vec<f64> = residuals
-        .iter()
-        .copied()
-        .filter(|r| r.is_finite())
-        .collect();
-    let count = sorted.len() as f64;
-    if sorted.len() < 3 {
-        return None;
-    }
-    let mean = sorted.iter().sum::<f64>() / count;
-    let variance = sorted.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    let deviation = variance.sqrt();
-    if !(deviation > 0.0 && deviation.is_finite()) {
-        return None;
-    }
-    sorted.sort_by(f64::total_cmp);
-    sorted.iter_mut().for_each(|r| *r = (*r - mean) / deviation);
-    let law = Normal::standard();
-    let normal = (0..sorted.len()).map(|i| law.inverse_cdf((i as f64 + 0.5) / count));
-    Some([normal.collect(), sorted])
 }
 
 /// A line at the undamped natural frequency, where it is on the axis.
@@ -305,27 +261,6 @@ mod tests {
         (0..count)
             .map(|_| StandardNormal.sample(&mut random))
             .collect()
-    }
-
-    /// Quantiles of the normal distribution stay on the line whatever their mean and scale: half of the distribution function by the error
-    /// function of another library, and the largest of 999 at 3.29 standard deviations.
-    #[test]
-    fn normal_quantiles_are_those_of_the_distribution() {
-        let count = 999;
-        let [normal, sorted] =
-            normal_quantiles(&(0..count).map(f64::from).collect::<Vec<_>>()).expect("they vary");
-        for (i, z) in normal.iter().enumerate() {
-            let share = 0.5 * libm::erfc(-z / std::f64::consts::SQRT_2);
-            assert!(
-                (share - (i as f64 + 0.5) / f64::from(count)).abs() < 1e-9,
-                "{i}: {z}"
-            );
-        }
-        assert!(normal[499].abs() < 1e-12 && (normal[998] - 3.29).abs() < 0.01);
-        // Uniform numbers end at the square root of three.
-        assert!((sorted[998] - 3f64.sqrt()).abs() < 0.01, "{}", sorted[998]);
-        assert!(normal_quantiles(&[1.0, f64::NAN, 2.0]).is_none());
-        assert!(normal_quantiles(&[1.0; 5]).is_none());
     }
 
     /// The response is half the force with noise of 5 %: the frequency response is 0.5, the coherence `1/(1 + 0.1^2)`, that of the residuals

@@ -1,9 +1,8 @@
 //! Output of a fit: the result document, tables, figures and the page.
 
 use super::channel_view::ChannelView;
-use super::chart::Figure;
+use super::chart::{Figure, render};
 use super::cost::{CostKind, cost_definition};
-use super::display_units::DisplayUnits;
 use super::document::{
     ActiveSummary, AttemptSummary, ChannelSummary, ConstraintSummary, CostSummary, CountsSummary,
     ExperimentSummary, FORMAT, GradientSummary, ModelSummary, OutcomeSummary, PathPointSummary,
@@ -18,9 +17,7 @@ use super::ratios;
 use super::suggestions::suggestions;
 use super::tables::{FUNCTION_ROWS, TRAJECTORY_ROWS};
 use super::timings::{OverheadTimings, TimingsSummary};
-use super::{FigureWidth, render_at};
 use crate::config::{ChannelNote, Model};
-use crate::results::{CHECKPOINT, Claim, FIT_JOURNAL, RESULT, RequestedFiles, Stage};
 use kmcfit_core::internals::assessment::Estimate;
 use kmcfit_core::internals::functions::{CoefficientFunction, CoefficientKind, WeightRule};
 use kmcfit_core::internals::identifiability::Bands;
@@ -28,19 +25,17 @@ use kmcfit_core::internals::solvers::{
     ActiveGroup, Attempt, Fit, PathPoint, Solver, Status, WeightPath, active_constraints, timed,
 };
 use kmcfit_core::internals::system::{Excitation, Term};
-use kmcfit_core::internals::threads::{analyses_at_once, both, map};
+use kmcfit_core::internals::threads::{analyses_at_once, map};
 use std::io;
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The page.
 const PAGE: &str = "report.html";
-/// Draws from the distribution of the estimates.
-pub const DRAWS: &str = "draws.csv";
+/// The model file, as it was read.
+pub const MODEL: &str = "model.yaml";
 /// Covariance of more than 64 parameters.
 pub(super) const COVARIANCE: &str = "covariance.npy";
-/// Factor of the normal matrix of many parameters.
-const FACTOR: &str = "factor.npy";
 /// Most parameters of `parameters.json`: the values of more stand in `functions.csv`.
 const MOST_PARAMETERS: usize = 10_000;
 
@@ -59,8 +54,6 @@ pub struct FittedModel<'a> {
     pub run_assessment: &'a RunAssessment,
     /// Files that are written on request.
     pub requested: RequestedFiles,
-    /// Units of page and figures.
-    pub display: DisplayUnits,
     /// What several parts of a report use.
     pub computed: Computed,
 }
@@ -108,9 +101,13 @@ impl FittedModel<'_> {
     ///
     /// # Errors
     /// Errors of the file system.
-    pub fn write(&self, stage: &Stage, document: &ResultDocument) -> io::Result<Duration> {
+    pub fn write(
+        &self,
+        into: &(dyn Fn(&str, &[u8]) -> io::Result<()> + Sync),
+        document: &ResultDocument,
+    ) -> io::Result<Duration> {
         let (writing, all) = (Mutex::default(), Mutex::default());
-        let write = |name: &str, bytes: &[u8]| timed_in(&writing, || stage.write(name, bytes));
+        let write = |name: &str, bytes: &[u8]| timed_in(&writing, || into(name, bytes));
         let figures = match self.requested.figures {
             true => self.figures(),
             false => Vec::new(),
@@ -118,7 +115,7 @@ impl FittedModel<'_> {
         // The longest first.
         let part = |i: usize| match i.checked_sub(2) {
             Some(i) => {
-                let (name, text) = svg(&figures[i], FigureWidth::Double);
+                let (name, text) = svg(&figures[i]);
                 write(&name, text.as_bytes())
             }
             None if i == 0 => self.write_tables(document, &write),
@@ -155,9 +152,6 @@ impl FittedModel<'_> {
         if let Some(covariance) = self.large_covariance().and_then(|c| c.covariance.as_ref()) {
             write(COVARIANCE, &npy(covariance))?;
         }
-        if let Some(factor) = self.factor().filter(|_| self.requested.tables) {
-            write(FACTOR, &npy(&factor))?;
-        }
         write("history.csv", self.history().to_csv().as_bytes())?;
         write("functions.csv", self.functions_table().to_csv().as_bytes())?;
         write("trajectory.csv", self.trajectories().to_csv().as_bytes())?;
@@ -165,15 +159,6 @@ impl FittedModel<'_> {
             write(&name, table.to_csv().as_bytes())?;
         }
         Ok(())
-    }
-
-    /// Figures and page of `document`, each with the name of its file.
-    pub fn drawings(&self, document: &ResultDocument, width: FigureWidth) -> Vec<(String, String)> {
-        let figures = self.figures();
-        let all = || figures.iter().map(|figure| svg(figure, width)).collect();
-        let (mut all, page): (Vec<_>, _) = both(all, || self.page(document));
-        all.push((PAGE.to_owned(), page));
-        all
     }
 
     /// The HTML page of the run: one file without external resources.
@@ -193,6 +178,7 @@ impl FittedModel<'_> {
             estimates: self.estimates(),
             classical: (self.run_assessment.assessment.as_ref()).and_then(|a| a.classical.clone()),
             model: self.model_summary(),
+            sources: model.source.data.clone(),
             outcome: OutcomeSummary {
                 status: fit.outcome.status,
                 reason: fit.outcome.reason.to_string(),
@@ -230,7 +216,7 @@ impl FittedModel<'_> {
                 .run_assessment
                 .validation
                 .iter()
-                .map(|record| fit_quality::validation(record, self.display))
+                .map(fit_quality::validation)
                 .collect(),
             nuisance_parameters: match self.is_simulated() {
                 true => {
@@ -280,6 +266,7 @@ impl FittedModel<'_> {
         let grid = &problem.system.grid;
         ModelSummary {
             file: self.model.file.display().to_string(),
+            folder: Default::default(),
             overrides: self.model.source.overrides.clone(),
             nodes: grid.nodes(),
             steps_per_row: self.steps_per_row(FUNCTION_ROWS),
@@ -342,10 +329,9 @@ impl FittedModel<'_> {
     fn weight_summary(&self) -> Option<WeightSummary> {
         let path = self.weights?;
         let rule = self.model.weight_rule.as_ref()?.rule;
-        let picks = WeightRule::OF_PATHS
-            .iter()
-            .zip(path.picks)
-            .filter_map(|(rule, pick)| Some((rule.name().to_string(), path.points[pick?].weight)));
+        let picks = WeightPath::RULES.iter().zip(path.picks);
+        let picks =
+            picks.filter_map(|(rule, pick)| Some(((*rule).to_owned(), path.points[pick?].weight)));
         let bic = (rule == WeightRule::Bic).then(|| (rule.name().to_owned(), path.chosen_weight()));
         let point = |p: &PathPoint| PathPointSummary {
             weight: p.weight,
@@ -442,9 +428,6 @@ impl FittedModel<'_> {
             predicted: &self.fit.best.evaluation.predictions[experiment][channel],
             note: self.note(experiment, channel),
             diagnostics: &self.run_assessment.diagnostics[experiment][channel],
-            display: self
-                .display
-                .of_channel(self.model.problem.experiments[experiment].channels[channel].kind()),
         }
     }
 
@@ -462,9 +445,9 @@ fn timed_in<T>(of_threads: &Mutex<Duration>, work: impl FnOnce() -> T) -> T {
 }
 
 /// A figure as a file: its name and its text.
-fn svg(figure: &Figure, width: FigureWidth) -> (String, String) {
+fn svg(figure: &Figure) -> (String, String) {
     let name = format!("figures/{}.svg", figure.name);
-    (name, render_at(figure, width))
+    (name, render(figure))
 }
 
 fn driven_by(excitation: Option<&Excitation>) -> Vec<String> {
@@ -495,39 +478,23 @@ fn attempt_summary(attempt: &Attempt) -> AttemptSummary {
     }
 }
 
-/// The files that a fit of a model writes.
-pub fn fit_claim(model: &Model) -> Claim {
-    const FIGURES: [&str; 12] = [
-        "observation",
-        "channel",
-        "residuals",
-        "residual_tests",
-        "spectra",
-        "frequency_response",
-        "input",
-        "convergence",
-        "motion",
-        "functions",
-        "ratios",
-        "weights",
-    ];
-    let records = 1..=model.problem.experiments.len();
-    let samples = records.map(|number| number.to_string());
-    Claim::new("fit")
-        .files([
-            RESULT,
-            "parameters.json",
-            COVARIANCE,
-            FACTOR,
-            "history.csv",
-            "functions.csv",
-            "trajectory.csv",
-            DRAWS,
-            PAGE,
-        ])
-        .family("channels", "csv", samples.chain(["validation".to_owned()]))
-        .family("figures", "svg", FIGURES)
-        .journals(&[FIT_JOURNAL, CHECKPOINT])
+/// Files of a fit that are written on request.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct RequestedFiles {
+    /// Figures and the page.
+    pub figures: bool,
+    /// One row per node in the tables over time.
+    pub tables: bool,
+}
+
+impl RequestedFiles {
+    /// Figures and the page only.
+    pub fn figures() -> Self {
+        Self {
+            figures: true,
+            ..Self::default()
+        }
+    }
 }
 
 /// Formatted JSON with a final newline. Numbers that JSON cannot represent become `null`.

@@ -3,10 +3,13 @@
 use super::columns::{interval_columns, named_column};
 use super::document::{FORMAT, ResultDocument};
 use super::result_table::ResultTable;
+use super::run::MODEL;
+use crate::config::{ModelFile, Override};
+use crate::digest::digest_of_file;
 use crate::error::InputError;
 use crate::memory;
 use crate::results;
-use crate::text_io::{JSON, read_text_within};
+use crate::text_io::{JSON, read_text, read_text_within};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::solvers::IterationRecord;
 use kmcfit_core::internals::system::{Method, NodalCoefficients, System, Term};
@@ -72,7 +75,7 @@ impl Run {
             return Err(InputError::file(folder, "no such folder")
                 .expected("the folder of a finished run, as written by `kmcfit fit`"));
         }
-        results::complete(folder)?;
+        let _lock = results::read_lock(folder);
         let value = value(folder)?;
         let document = document(folder, &value)?;
         let (system, quantities) = system(folder, &document)?;
@@ -100,6 +103,67 @@ impl Run {
             functions,
             trajectory,
         })
+    }
+
+    /// The files of the fit that have changed since or are missing, each with whether it is the model file, which the run holds.
+    pub fn changed_files(&self) -> Vec<(PathBuf, bool)> {
+        let model = self.model_path();
+        let folder = model.parent().unwrap_or(&model).to_path_buf();
+        let is_same =
+            |path: &Path, sha256: &str| digest_of_file(path).is_ok_and(|found| found == sha256);
+        let data = self.document.sources.iter();
+        let data = data.map(|file| (folder.join(&file.name), file.sha256.as_str()));
+        let mut changed: Vec<(PathBuf, bool)> = data
+            .filter(|(path, sha256)| !is_same(path, sha256))
+            .map(|(path, _)| (path, false))
+            .collect();
+        let own = digest_of_file(&self.folder.join(MODEL)).unwrap_or_default();
+        if !is_same(&model, &own) {
+            changed.push((model, true));
+        }
+        changed
+    }
+
+    /// Path of the model file: as given, where that leads to it from the current folder.
+    fn model_path(&self) -> PathBuf {
+        let given = Path::new(&self.document.model.file);
+        let name = given.file_name().unwrap_or_default();
+        let moved = self.folder.join(&self.document.model.folder).join(name);
+        let is_here = given
+            .canonicalize()
+            .is_ok_and(|here| moved.canonicalize().is_ok_and(|moved| moved == here));
+        // A copy of a run elsewhere still names the model.
+        match is_here || !moved.exists() && given.exists() {
+            true => given.to_path_buf(),
+            false => moved,
+        }
+    }
+
+    /// The model that was fitted, with its overrides, from the run's own copy.
+    ///
+    /// # Errors
+    /// If a data file has changed since the fit or is missing; the error names it.
+    pub fn model_file(&self) -> Result<ModelFile, InputError> {
+        if let Some((path, _)) = self
+            .changed_files()
+            .into_iter()
+            .find(|(_, is_model)| !is_model)
+        {
+            let problem = match path.exists() {
+                true => "this file has changed since the fit",
+                false => "this file of the fit is missing",
+            };
+            return Err(InputError::file(path, problem)
+                .expected(format!("the data of {}", self.folder.display()))
+                .hint("restore the file, or fit the model again"));
+        }
+        let text = read_text(
+            &self.folder.join(MODEL),
+            "the model of a run",
+            LONGEST_DOCUMENT,
+        )?;
+        let overrides = Override::parse_all(&self.document.model.overrides)?;
+        ModelFile::parse(self.model_path(), text)?.with_overrides(&overrides)
     }
 
     /// Lower and upper end of the 95 % band of a function or ratio at the nodes, by its name (`mass`, `k/m`, `damping
@@ -181,7 +245,14 @@ fn value(folder: &Path) -> Result<Value, InputError> {
                 .expected(FORMAT.to_string()),
         );
     }
-    Ok(value)
+    match value.get("files") {
+        Some(_) => Ok(value),
+        None => Err(
+            InputError::file(&path, "the run of an earlier version of kmcfit")
+                .found("no list of its files")
+                .expected("a run of this version: fit the model again"),
+        ),
+    }
 }
 
 fn document(folder: &Path, value: &Value) -> Result<ResultDocument, InputError> {

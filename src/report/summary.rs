@@ -13,9 +13,13 @@ use super::suggestions;
 pub(crate) use super::text::count;
 use crate::finding::Finding;
 use crate::number_format::{at_most, resolved, significant};
+use kmcfit_core::internals::assessment::ClassicalEstimate;
 use kmcfit_core::internals::functions::WeightRule;
 use kmcfit_core::internals::identifiability::ClassificationKind;
 use std::fmt::Write;
+
+/// Width of the interval of a classical frequency, relative to it, beyond which it is not shown.
+const UNSHARP: f64 = 0.2;
 
 /// The summary of a fit: verdict, estimates, fit of the samples, advice; `verbose` adds the solver, each channel, all findings and the
 /// constraints. `plot` stands below the estimates.
@@ -175,7 +179,13 @@ fn fit(document: &ResultDocument) -> Vec<String> {
     if let Some(result) = validation(document) {
         text += &format!("; {result}");
     }
-    let classical = document.classical.as_ref().map(findings::classical);
+    // An interval as wide as that says nothing.
+    let is_sharp = |c: &&ClassicalEstimate| {
+        let [low, high] = c.frequency_interval;
+        !c.agrees || high - low <= UNSHARP * c.frequency
+    };
+    let classical = document.classical.as_ref().filter(is_sharp);
+    let classical = classical.map(findings::classical);
     std::iter::once(text).chain(classical).collect()
 }
 

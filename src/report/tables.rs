@@ -1,11 +1,8 @@
 //! The tables of a fit.
 
 use super::FittedModel;
-use super::columns::{
-    function_column, interval_columns, named_column, parameter_column, quantity_column,
-};
+use super::columns::{function_column, interval_columns, named_column, quantity_column};
 use super::csv::CsvTable;
-use kmcfit_core::internals::assessment::{NoDraws, draws};
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 use kmcfit_core::internals::solvers::IterationRecord;
@@ -41,8 +38,6 @@ pub(super) const TRAJECTORY_ROWS: MostRows = MostRows {
     whole: 50_000,
     thinned: 20_000,
 };
-/// Seed of the draws.
-const DRAWS_SEED: u64 = 1;
 
 impl FittedModel<'_> {
     /// Steps between the rows of a table of at most so many rows: 1 where all rows are requested or the functions have many parameters.
@@ -66,39 +61,6 @@ impl FittedModel<'_> {
     /// The values of every node with a row in a table of at most so many rows: one in so many steps, and the last one.
     pub(super) fn rows(&self, values: &[f64], most: MostRows) -> Vec<f64> {
         every(values, self.steps_per_row(most))
-    }
-
-    /// Draws from the distribution of the estimates, one row each: estimates, then initial states and sensor parameters; `None` where
-    /// none are requested.
-    pub fn draws(&self) -> Option<Result<CsvTable, NoDraws>> {
-        let number = Some(self.requested.draws).filter(|number| *number > 0)?;
-        Some(self.draws_table(number))
-    }
-
-    fn draws_table(&self, number: usize) -> Result<CsvTable, NoDraws> {
-        let problem = &self.model.problem;
-        let bands = self.bands().ok_or(NoDraws::NoCovariance)?;
-        let draws = draws(problem, self.fit, bands, number, DRAWS_SEED)?;
-        let numbers = (0..number).map(|i| i as f64).collect();
-        let mut table = CsvTable::new()
-            .column("chain", vec![0.0; number])
-            .column("draw", numbers);
-        for (i, (name, estimate)) in self.all_estimates().iter().enumerate() {
-            let Some(name) = self.stated_name(name) else {
-                continue;
-            };
-            let column = named_column(&name, self.is_rotation());
-            let column = column.unwrap_or_else(|| parameter_column(&name, &estimate.unit));
-            let values = draws.iter().map(|draw| draw.estimates[i].1.value).collect();
-            table = table.column(column, values);
-        }
-        let scalars = problem.functions.scalars().iter();
-        for (scalar, j) in scalars.zip(problem.functions.scalar_range()) {
-            let column = parameter_column(&scalar.name, &scalar.unit);
-            let values = draws.iter().map(|draw| draw.parameters[j]).collect();
-            table = table.column(column, values);
-        }
-        Ok(table)
     }
 
     /// Iterations of the attempts by their number in `attempts` of the result document, then those of the search with the result as attempt 0.
@@ -225,7 +187,7 @@ impl FittedModel<'_> {
         });
         let validation = self.run_assessment.validation.iter().enumerate();
         let validation = validation.flat_map(|(i, out)| {
-            out.channels(self.display).into_iter().map(move |view| {
+            out.channels().into_iter().map(move |view| {
                 let kind = view.channel.kind().name();
                 let name = format!("channels/validation-{}-{kind}.csv", i + 1);
                 (name, view.table(<[f64]>::to_vec))

@@ -1,73 +1,21 @@
-//! Text charts for the terminal: samples with the fitted response, and the coefficient functions; and the small plot of the summary.
+//! The chart of the summary in a terminal: the estimated coefficient that varies most relative to its interval.
 
 use super::columns::{interval_columns, named_column};
 use super::document::ResultDocument;
 use super::result_table::ResultTable;
 use crate::error::InputError;
 use crate::number_format::significant;
-use kmcfit_core::internals::functions::CoefficientKind;
 use std::path::Path;
 
 /// Columns for the numbers beside a chart.
 const MARGIN: usize = 10;
-/// Rows of a chart of samples, and of a function.
-const TALL: usize = 10;
-const LOW: usize = 5;
-/// Narrowest and widest chart, in columns.
-const WIDTHS: [usize; 2] = [40, 160];
-/// Rows of the plot of the summary, and its widest width in columns.
-const SMALL: usize = 6;
-const WIDEST_SMALL: usize = 72;
+/// Rows of the chart, and its narrowest and widest width in columns.
+const ROWS: usize = 6;
+const WIDTHS: [usize; 2] = [40, 72];
 /// Largest extent of a band beyond the estimate, relative to its range, that the plot of the summary includes.
 const WIDE_BAND: f64 = 1.5;
 /// Variations below this share of the largest value are rounding errors.
 const ROUNDING: f64 = 1e-9;
-
-/// The charts of a finished run in a folder, `width` columns wide.
-///
-/// # Errors
-/// When a table of the run cannot be read.
-pub fn charts(
-    folder: &Path,
-    document: &ResultDocument,
-    width: usize,
-) -> Result<String, InputError> {
-    let width = width.clamp(WIDTHS[0], WIDTHS[1]);
-    let mut text = String::new();
-    for (e, experiment) in document.experiments.iter().enumerate() {
-        for channel in &experiment.channels {
-            let name = format!("channels/{}-{}.csv", e + 1, channel.kind);
-            let table = ResultTable::read(&folder.join(name))?;
-            let title = format!(
-                "{}: {} in {} (line: fit, o: samples)",
-                experiment.name, channel.kind, channel.unit
-            );
-            let times = table.required("t_s")?;
-            let mut chart = Chart::new(width, TALL, &times);
-            chart.scale(&[&table.required("measured")?, &table.required("predicted")?]);
-            chart.line(&times, &table.required("predicted")?);
-            chart.points(&times, &table.required("measured")?);
-            text += &format!("\n{title}\n{}", chart.text());
-        }
-    }
-    let table = ResultTable::read(&folder.join("functions.csv"))?;
-    let times = table.required("t_s")?;
-    for (name, function) in document.terms() {
-        let Some(quantity) = CoefficientKind::ALL.into_iter().find(|q| q.name() == name) else {
-            continue;
-        };
-        let values =
-            (table.column(quantity.column())).or_else(|| table.column(quantity.angular_column()));
-        let Some(values) = values else {
-            continue;
-        };
-        let mut chart = Chart::new(width, LOW, &times);
-        chart.scale(&[&values]);
-        chart.line(&times, &values);
-        text += &format!("\n{name} in {}\n{}", function.unit, chart.text());
-    }
-    Ok(text)
-}
 
 /// A coefficient over time: name, unit, estimate and 95 % band.
 struct Curve {
@@ -116,7 +64,7 @@ impl Curve {
                 significant(half, 2)
             )
         });
-        let mut chart = Chart::new(width, SMALL, times);
+        let mut chart = Chart::new(width, times);
         chart.values = self.extent();
         if let Some([low, high]) = &self.band {
             chart.shade(times, low, high);
@@ -154,39 +102,29 @@ pub fn summary_plot(
     let curves = names.filter_map(|(name, _)| curve(name));
     let scored = curves.filter_map(|curve| Some((curve.variation()?, curve)));
     let most = scored.max_by(|a, b| a.0.total_cmp(&b.0));
-    let width = width.clamp(WIDTHS[0], WIDEST_SMALL);
+    let width = width.clamp(WIDTHS[0], WIDTHS[1]);
     Ok(most.map(|(_, curve)| curve.plot(&times, width)))
 }
 
 /// A chart in Braille: two dots across and four down in each character.
 struct Chart {
     width: usize,
-    height: usize,
     dots: Vec<u8>,
-    marks: Vec<bool>,
     shades: Vec<bool>,
     times: [f64; 2],
     values: [f64; 2],
 }
 
 impl Chart {
-    fn new(width: usize, height: usize, times: &[f64]) -> Self {
+    fn new(width: usize, times: &[f64]) -> Self {
         let width = width - MARGIN - 2;
         Self {
             width,
-            height,
-            dots: vec![0; width * height],
-            marks: vec![false; width * height],
-            shades: vec![false; width * height],
+            dots: vec![0; width * ROWS],
+            shades: vec![false; width * ROWS],
             times: range(times),
             values: [0.0, 1.0],
         }
-    }
-
-    fn scale(&mut self, series: &[&[f64]]) {
-        let ranges = series.iter().map(|values| range(values));
-        let both = ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
-        self.values = both.unwrap_or([0.0, 1.0]);
     }
 
     /// The dot of a point, from the upper left.
@@ -200,8 +138,8 @@ impl Chart {
             (share.is_finite()).then(|| (share * last).round().clamp(0.0, last) as usize)
         };
         let across = place(t, self.times, 2 * self.width)?;
-        let up = place(y, self.values, 4 * self.height)?;
-        Some([across, 4 * self.height - 1 - up])
+        let up = place(y, self.values, 4 * ROWS)?;
+        Some([across, 4 * ROWS - 1 - up])
     }
 
     fn line(&mut self, times: &[f64], values: &[f64]) {
@@ -230,15 +168,6 @@ impl Chart {
         self.dots[y / 4 * self.width + x / 2] |= BITS[y % 4][x % 2];
     }
 
-    /// Adds points; the line overdraws them.
-    fn points(&mut self, times: &[f64], values: &[f64]) {
-        for (t, y) in times.iter().zip(values) {
-            if let Some([x, y]) = self.dot(*t, *y) {
-                self.marks[y / 4 * self.width + x / 2] = true;
-            }
-        }
-    }
-
     /// Shades the characters whose middle is between two curves at their time.
     fn shade(&mut self, times: &[f64], low: &[f64], high: &[f64]) {
         let [first, last] = self.times;
@@ -251,8 +180,8 @@ impl Chart {
             let (Some(low), Some(high)) = (low.get(row), high.get(row)) else {
                 continue;
             };
-            for line in 0..self.height {
-                let share = 1.0 - (line as f64 + 0.5) / self.height as f64;
+            for line in 0..ROWS {
+                let share = 1.0 - (line as f64 + 0.5) / ROWS as f64;
                 let y = bottom + share * (top - bottom);
                 self.shades[line * self.width + column] = (*low..=*high).contains(&y);
             }
@@ -261,23 +190,17 @@ impl Chart {
 
     fn text(&self) -> String {
         let mut text = String::new();
-        for row in 0..self.height {
+        for row in 0..ROWS {
             let label = match row {
-                // A constant is drawn in the middle.
-                _ if self.values[0] == self.values[1] => match row == self.height / 2 {
-                    true => number(self.values[0]),
-                    false => String::new(),
-                },
                 0 => number(self.values[1]),
-                _ if row + 1 == self.height => number(self.values[0]),
+                _ if row + 1 == ROWS => number(self.values[0]),
                 _ => String::new(),
             };
             let cells = row * self.width..(row + 1) * self.width;
-            let cell = |i: usize| match (self.dots[i], self.marks[i], self.shades[i]) {
-                (0, true, _) => 'o',
-                (0, false, true) => '░',
-                (0, false, false) => ' ',
-                (dots, ..) => char::from_u32(0x2800 + u32::from(dots)).unwrap_or(' '),
+            let cell = |i: usize| match (self.dots[i], self.shades[i]) {
+                (0, true) => '░',
+                (0, false) => ' ',
+                (dots, _) => char::from_u32(0x2800 + u32::from(dots)).unwrap_or(' '),
             };
             let line: String = cells.map(cell).collect();
             text += &format!("{label:>MARGIN$} │{}\n", line.trim_end());
@@ -313,47 +236,6 @@ mod tests {
     use super::*;
     use insta::assert_snapshot;
 
-    #[test]
-    fn a_wave_with_outlying_samples_is_drawn() {
-        let times: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.05).collect();
-        let model: Vec<f64> = times.iter().map(|t| 3.0 * t.sin()).collect();
-        let mut samples = model.clone();
-        samples[100] = 2.5;
-        samples[50] = f64::NAN;
-        let mut chart = Chart::new(60, 6, &times);
-        chart.scale(&[&model, &samples]);
-        chart.line(&times, &model);
-        chart.points(&times, &samples);
-        assert_snapshot!(chart.text(), @"
-         3 │    ⡠⠔⠋⠉⠉⠓⢦⡀            o         ⡠⠖⠊⠉⠉⠒⠦⣀
-           │  ⡴⠊       ⠈⠢⡀                 ⢀⡴⠋       ⠈⠣⡀
-           │⡠⠊           ⠈⠢⡀              ⣠⠎           ⠈⢦⡀
-           │⠁              ⠙⢆           ⢀⠜⠁              ⠙⢄
-           │                ⠈⠳⣄       ⢀⠔⠁                  ⠑
-        -3 │                   ⠑⠦⣄⣀⣀⡤⠖⠉
-           0                                          9.95 s
-        ");
-    }
-
-    #[test]
-    fn constants_and_nothing_have_a_chart() {
-        let mut chart = Chart::new(40, 5, &[0.0, 25.0]);
-        chart.scale(&[&[2.0, 2.0]]);
-        chart.line(&[0.0, 25.0], &[2.0, 2.0]);
-        assert_snapshot!(chart.text(), @"
-           │
-           │
-         2 │⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒
-           │
-           │
-           0                        25 s
-        ");
-        let mut empty = Chart::new(40, 5, &[]);
-        empty.scale(&[&[f64::NAN]]);
-        empty.line(&[f64::NAN], &[f64::NAN]);
-        assert!(empty.text().lines().count() == 6);
-    }
-
     /// A falling line with a band of half-width 3 in a range of 20: the band takes a row above and below; a constant has no variation.
     #[test]
     fn the_band_of_the_small_plot_is_shaded() {
@@ -384,6 +266,6 @@ mod tests {
         assert_eq!(curve.variation(), None);
         // Without times there is nothing to draw.
         curve.values.clear();
-        assert!(curve.plot(&[], 40).lines().count() == SMALL + 2);
+        assert!(curve.plot(&[], 40).lines().count() == ROWS + 2);
     }
 }

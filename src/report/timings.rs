@@ -3,7 +3,6 @@
 use kmcfit_core::internals::simulate::arithmetic;
 use kmcfit_core::internals::solvers::Fit;
 use serde::{Deserialize, Serialize};
-use std::fmt::Write;
 use std::time::Duration;
 
 /// Wall-clock time of a run by activity. The parts do not overlap, and their sum is the total.
@@ -24,7 +23,7 @@ pub struct TimingsSummary {
     pub linear_algebra: PartSummary,
     /// Starting points from the samples, with their subproblems.
     pub start: PartSummary,
-    /// Reading of data, and writing of checkpoints and results except `result.json`.
+    /// Reading of data, and writing of results except `result.json`.
     pub io: PartSummary,
     /// Assessment: errors and bands, statistics, step-size check, validation records, predictions.
     #[serde(default)]
@@ -89,78 +88,11 @@ impl TimingsSummary {
             qp: counted(times.qp, counts.qp),
             linear_algebra: part(times.linear_algebra),
             start: part(times.start),
-            io: part(overhead.io + times.checkpoints),
+            io: part(overhead.io),
             analysis: part(overhead.analysis),
             report: part(overhead.report),
             other: part(total.saturating_sub(times.sum() + overhead.sum())),
             total: part(total),
         }
-    }
-
-    /// All parts with their names, in order, the total last.
-    pub fn parts(&self) -> [(&'static str, PartSummary); 11] {
-        [
-            ("forward", self.forward),
-            ("adjoint", self.adjoint),
-            ("tangent", self.tangent),
-            ("QP", self.qp),
-            ("linear algebra", self.linear_algebra),
-            ("start", self.start),
-            ("I/O", self.io),
-            ("analysis", self.analysis),
-            ("report", self.report),
-            ("other", self.other),
-            ("total", self.total),
-        ]
-    }
-
-    /// As a table.
-    pub fn text(&self) -> String {
-        let mut text = format!("{:<14} {:>10} {:>7} {:>9}\n", "time", "s", "%", "count");
-        for (name, part) in self.parts() {
-            let share = 100.0 * part.seconds / self.total.seconds.max(f64::MIN_POSITIVE);
-            let count = part.count.map_or(String::new(), |n| format!(" {n:>9}"));
-            // Writing to a String cannot fail.
-            let _ = writeln!(
-                text,
-                "{name:<14} {:>10.4} {share:>7.1}{count}",
-                part.seconds
-            );
-        }
-        let _ = writeln!(text, "arithmetic: {}", self.arithmetic);
-        text
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn parts_without_a_count_leave_the_column_empty() {
-        let part = |seconds, count| PartSummary { seconds, count };
-        let timings = TimingsSummary {
-            arithmetic: "scalar".into(),
-            forward: part(1.5, Some(50_001)),
-            adjoint: part(0.25, Some(1001)),
-            other: part(0.25, None),
-            total: part(2.0, None),
-            ..TimingsSummary::default()
-        };
-        insta::assert_snapshot!(timings.text(), @"
-        time                    s       %     count
-        forward            1.5000    75.0     50001
-        adjoint            0.2500    12.5      1001
-        tangent            0.0000     0.0
-        QP                 0.0000     0.0
-        linear algebra     0.0000     0.0
-        start              0.0000     0.0
-        I/O                0.0000     0.0
-        analysis           0.0000     0.0
-        report             0.0000     0.0
-        other              0.2500    12.5
-        total              2.0000   100.0
-        arithmetic: scalar
-        ");
     }
 }

@@ -6,12 +6,12 @@ use super::model_assumptions::{assumed_units, unknown_mass};
 use super::ratios;
 use super::rivals::{rival_in_words, term_in_words};
 use super::run::FittedModel;
+use super::run::RequestedFiles;
 use super::suggestions::percent;
 use super::text::and_list;
 use crate::config::{DataWarning, Model};
 use crate::finding::Finding;
 use crate::number_format::{significant, times_in_words};
-use crate::results::RequestedFiles;
 use kmcfit_core::internals::assessment::{
     Estimate, EstimateStatus, Implausible, SampleFault, VerdictAssumption, VerdictLevel,
     VerdictReason, estimates, verdict_assumptions, verdict_level, verdict_reasons,
@@ -24,7 +24,6 @@ impl FittedModel<'_> {
     /// Verdict on a fit of a model.
     pub(super) fn verdict_of(model: &Model, fit: &Fit) -> Verdict {
         let fitted = FittedModel {
-            display: Default::default(),
             model,
             fit,
             predictions: &[],

@@ -1,328 +1,523 @@
-//! Output folders: checked and locked before the work of a command begins, written atomically at its end.
+//! Folders of results. The files of a run are written into a folder beside its place, which takes the place in one step: a reader, and
+//! whoever kills the process, finds the whole old run or the whole new one.
+//!
+//! The document of a run, such as `result.json`, lists its files with their digests. A folder that holds other or edited files is refused
+//! before the work begins, so nothing of the user's is replaced.
 
-use super::analysis_journal;
-use super::claim::Claim;
-use super::exchange::{self, Stage};
-use super::heading::Heading;
-use super::journal;
-use super::lock::Lock;
-use super::manifest::{FileState, MANIFEST, Manifest};
-use super::system;
-use super::work_folder::{self, WorkFolder};
+use crate::digest::{digest, digest_of_file};
 use crate::error::InputError;
-use std::collections::BTreeSet;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs::{self, File};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use tempfile::TempDir;
 
-/// A folder for the results of one command, locked against other runs until drop.
-///
-/// The folder may hold files of the user, which are not changed, and the results of an older run of the same command,
-/// which the new results replace ([`Stage::commit`]).
-#[derive(Debug)]
-pub struct OutputFolder {
-    path: PathBuf,
-    claim: Claim,
-    /// True if this run created it.
-    is_new: bool,
-    _lock: Option<Lock>,
+/// Name of the result document of a fit.
+pub const RESULT: &str = "result.json";
+
+/// The document of each command: a folder with one of them belongs to that command.
+const DOCUMENTS: [(&str, &str); 6] = [
+    ("fit", RESULT),
+    ("study", "study.json"),
+    ("compare", "compare.json"),
+    ("predict", "predictions.json"),
+    ("demo", "demo.json"),
+    ("fleet", "fleet.json"),
+];
+/// Beginning of the names of folders beside a run.
+const PREFIX: &str = ".kmcfit-";
+
+/// Digests of the files of a run, by their paths relative to its folder, with `/` as separator.
+type Digests = BTreeMap<String, String>;
+
+/// The part of a document that lists the files.
+#[derive(Deserialize)]
+struct Listing {
+    files: Digests,
 }
 
-impl Drop for OutputFolder {
-    /// Removes a folder that this run created and left empty.
-    fn drop(&mut self) {
-        if self.is_new {
-            // The system refuses to remove a folder with contents.
-            let _ = system::remove_folder(&self.path);
-        }
-    }
+/// A document with the files of its run.
+#[derive(Serialize)]
+struct Listed<'a, T> {
+    #[serde(flatten)]
+    document: &'a T,
+    files: &'a Digests,
+}
+
+/// The folder of a run that is being made.
+#[derive(Debug)]
+pub struct OutputFolder {
+    shown: PathBuf,
+    path: PathBuf,
+    command: &'static str,
+    inputs: Vec<PathBuf>,
+    /// Folder beside the place, in which the files are written.
+    staging: TempDir,
+    files: Mutex<Digests>,
+    /// Held while the process lives: a later run removes folders that no process holds.
+    _lock: Option<File>,
 }
 
 impl OutputFolder {
-    /// Creates the folder if necessary, locks it, completes an interrupted exchange, and checks that the files of
-    /// `claim` can be written.
+    /// Checks that `command` may write its results to `path`, without a change there; `inputs` are files that it reads.
     ///
     /// # Errors
-    /// If the folder cannot be created or written to, another run uses it, it holds the results of another command, or
-    /// a file that the claim covers is an input, was not written by kmcfit or was changed since. The error names
-    /// the file, and nothing in the folder has changed.
-    pub fn prepare(path: &Path, claim: Claim) -> Result<Self, InputError> {
-        let refuse = |problem: &str, folder: &Path, error: &io::Error| {
-            InputError::argument("--out", problem)
-                .found(format!("{}: {error}", folder.display()))
-                .expected("a folder that can be written to")
+    /// If nothing can be written beside the folder, or it holds files that are not those of an earlier run of the same command, changed
+    /// ones among them. The error names the file.
+    pub fn prepare(
+        path: &Path,
+        command: &'static str,
+        inputs: impl IntoIterator<Item = PathBuf>,
+    ) -> Result<Self, InputError> {
+        let shown = path.to_path_buf();
+        let path = place(path)?;
+        // `place` accepts paths with a parent.
+        let parent = path.parent().unwrap_or(&path);
+        remove_leftovers(parent);
+        complete(&path);
+        let inputs: Vec<PathBuf> = inputs.into_iter().collect();
+        check(&path, &shown, command, &inputs, true)?;
+        let mut builder = tempfile::Builder::new();
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
+        let staging = builder.prefix(PREFIX).tempdir_in(parent);
+        let staging = staging.map_err(|error| unwritable(parent, &error))?;
+        Ok(Self {
+            shown,
+            command,
+            inputs,
+            // Shared, so that runs inside it can be read.
+            _lock: locked(staging.path(), File::lock_shared),
+            staging,
+            path,
+            files: Mutex::default(),
+        })
+    }
+
+    /// Its path, as given.
+    pub fn shown(&self) -> &Path {
+        &self.shown
+    }
+
+    /// The path from the folder, or from one `inside` it, to a `target` that exists, so that the two can be moved together.
+    pub fn path_to(&self, inside: Option<&str>, target: Option<&Path>) -> PathBuf {
+        let target = match target {
+            Some(target) if !target.as_os_str().is_empty() => target,
+            _ => Path::new("."),
         };
-        let is_new = !path.exists();
-        system::create_folders(path).map_err(|e| {
-            let error = refuse("the output folder cannot be created", existing(path), &e);
-            match e.kind() {
-                // The text names the file in the way.
-                io::ErrorKind::Other => error.found(e),
-                // Error of virtual file systems such as /proc.
-                io::ErrorKind::NotFound => {
-                    error.found(format!("{} takes no new folders", existing(path).display()))
-                }
-                _ => error,
-            }
-        })?;
-        let lock = Lock::take(path).map_err(|_| taken(path))?;
-        exchange::complete_locked(path)?;
-        work_folder::remove_leftovers(path);
-        let manifest = Manifest::read(path)?;
-        let folder = Self {
-            path: path.to_path_buf(),
-            claim,
-            is_new,
-            _lock: lock,
-        };
-        folder.check_command(manifest.as_ref())?;
-        folder.check_inputs(manifest.as_ref())?;
-        folder.check_places(manifest.as_ref())?;
-        folder.check_journals()?;
-        for folder in folder.folders(manifest.as_ref()) {
-            work_folder::remove_leftovers(&folder);
-            WorkFolder::create_in(&folder)
-                .map_err(|e| refuse("a folder for results cannot be written to", &folder, &e))?;
-        }
-        Ok(folder)
+        let from = inside.map_or_else(|| self.path.clone(), |inside| self.path.join(inside));
+        target
+            .canonicalize()
+            .map_or_else(|_| target.to_path_buf(), |target| relative(&from, &target))
     }
 
-    /// [`OutputFolder::prepare`] for a folder inside this one. A symbolic link is refused, because it could lead out of
-    /// the folder.
-    ///
-    /// # Errors
-    /// As for [`OutputFolder::prepare`].
-    pub fn prepare_inside(&self, name: &str, claim: Claim) -> Result<Self, InputError> {
-        let path = self.path.join(name);
-        match path.is_symlink() {
-            true => Err(a_link(&path)),
-            false => Self::prepare(&path, claim),
-        }
+    /// Names of the files written so far.
+    pub fn files(&self) -> Vec<String> {
+        let files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
+        files.keys().cloned().collect()
     }
 
-    /// Its path.
-    pub fn path(&self) -> &Path {
-        &self.path
+    /// Where a folder inside this one is written, until the run takes its place.
+    pub fn staged(&self, inside: &str) -> PathBuf {
+        self.staging.path().join(inside)
     }
 
-    /// Existing folders that results are written into.
-    fn folders(&self, manifest: Option<&Manifest>) -> BTreeSet<PathBuf> {
-        let old = manifest
-            .into_iter()
-            .flat_map(|manifest| manifest.files.keys());
-        let names = self.claim.fixed().chain(old.map(String::as_str));
-        let parents = names.filter_map(|name| Path::new(name).parent());
-        let families = self
-            .claim
-            .families
-            .iter()
-            .map(|family| Path::new(family.folder));
-        let folders = parents.chain(families).map(|name| self.path.join(name));
-        let folders = folders.chain([self.path.clone()]);
-        folders.filter(|folder| folder.is_dir()).collect()
-    }
-
-    /// True if starting the work of `heading` discards unfinished work of the same command on the same inputs.
-    ///
-    /// # Errors
-    /// If the unfinished work has other inputs; it is kept.
-    pub fn discards(&self, heading: &Heading) -> Result<bool, InputError> {
-        let mut is_discarded = false;
-        for name in journal::NAMES {
-            let path = self.path.join(name);
-            let Some(before) = journal::heading_of(&path) else {
-                continue;
-            };
-            // The journals of studies and comparisons are kept beside their results.
-            if analysis_journal::is_finished(&path) {
-                continue;
-            }
-            if !heading.has_inputs_of(&before) {
-                return Err(self.unfinished(&path, &before));
-            }
-            is_discarded = true;
-        }
-        Ok(is_discarded)
-    }
-
-    fn unfinished(&self, journal: &Path, before: &Heading) -> InputError {
-        InputError::file(journal, "this folder holds unfinished work")
-            .found(format!("the journal of `kmcfit {}`", before.text_of_command()))
-            .expected("a folder without it")
-            .hint(format!(
-                "finish it with `kmcfit resume {}`, give another folder with --out, or remove the journal to discard \
-                 the work",
-                self.path.display()
-            ))
-    }
-
-    /// Begins to write results.
+    /// Writes a file of the run.
     ///
     /// # Errors
     /// Errors of the file system.
-    pub fn stage(&self) -> io::Result<Stage<'_>> {
-        Stage::begin(&self.path, &self.claim)
+    pub fn write(&self, name: &str, contents: impl AsRef<[u8]>) -> io::Result<()> {
+        let path = self.staging.path().join(name);
+        fs::create_dir_all(path.parent().unwrap_or(&path))?;
+        fs::write(path, contents.as_ref())?;
+        let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
+        files.insert(name.to_owned(), digest(contents.as_ref()));
+        Ok(())
     }
 
-    /// Refuses a folder with the results of another command.
-    fn check_command(&self, manifest: Option<&Manifest>) -> Result<(), InputError> {
-        match manifest {
-            Some(manifest) if manifest.command != self.claim.command => Err(InputError::argument(
-                "--out",
-                "this folder holds the results of another command",
-            )
-            .found(format!(
-                "{}: results of `kmcfit {}`",
-                self.path.display(),
-                manifest.command
-            ))
-            .expected(format!(
-                "a new folder, or one with results of `kmcfit {}`",
-                self.claim.command
-            ))),
-            _ => Ok(()),
-        }
+    /// Writes the document of a run in a folder `inside` this one, which lists the files written there so far.
+    ///
+    /// # Errors
+    /// Errors of the file system.
+    pub fn write_document(
+        &self,
+        inside: &str,
+        name: &str,
+        document: &impl Serialize,
+    ) -> io::Result<()> {
+        let prefix = format!("{inside}/");
+        let all = self
+            .files
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone();
+        let own = all.into_iter();
+        let own =
+            own.filter_map(|(file, digest)| Some((file.strip_prefix(&prefix)?.to_owned(), digest)));
+        self.write(
+            &format!("{prefix}{name}"),
+            listed(document, &own.collect())?,
+        )
     }
 
-    /// True if the command may write or remove a file of this relative path.
-    fn is_claimed(&self, name: &str, manifest: Option<&Manifest>) -> bool {
-        self.claim.covers(name)
-            || name == MANIFEST
-            || self.claim.journals.contains(&name)
-            || manifest.is_some_and(|manifest| manifest.files.contains_key(name))
+    /// Writes the document of the run and puts the folder into its place, in exchange for the run before.
+    ///
+    /// # Errors
+    /// Errors of the file system, and files of the user that came into the folder in the meantime; the run before is then unchanged.
+    pub fn commit(&self, document: &impl Serialize) -> io::Result<()> {
+        let files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
+        let text = listed(document, &files)?;
+        fs::write(self.staging.path().join(document_of(self.command)), text)?;
+        let parent = self.path.parent().unwrap_or(&self.path);
+        let _lock = locked(parent, File::lock);
+        check(&self.path, &self.shown, self.command, &self.inputs, false)
+            .map_err(io::Error::other)?;
+        exchange(self.staging.path(), &self.path)
     }
+}
 
-    /// Refuses to replace an input.
-    fn check_inputs(&self, manifest: Option<&Manifest>) -> Result<(), InputError> {
-        let Ok(folder) = self.path.canonicalize() else {
-            return Ok(());
+/// The path from one absolute path to another.
+fn relative(from: &Path, to: &Path) -> PathBuf {
+    let [from, to] = [from, to].map(|path| path.components().collect::<Vec<_>>());
+    let common = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+    let up = std::iter::repeat_n(Component::ParentDir, from.len() - common);
+    up.chain(to[common..].iter().copied()).collect()
+}
+
+fn listed(document: &impl Serialize, files: &Digests) -> io::Result<String> {
+    let mut text = serde_json::to_string_pretty(&Listed { document, files })?;
+    text.push('\n');
+    Ok(text)
+}
+
+/// Name of the document of a command.
+fn document_of(command: &str) -> &'static str {
+    let found = DOCUMENTS.iter().find(|(name, _)| *name == command);
+    found.map_or(RESULT, |(_, document)| document)
+}
+
+/// A lock against the exchange of the run at `path`, until it is dropped; `None` where the system has no locks. An exchange that was killed
+/// is completed.
+pub fn read_lock(path: &Path) -> Option<File> {
+    let path = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    complete(&path);
+    locked(path.parent()?, File::lock_shared)
+}
+
+fn locked(folder: &Path, lock: fn(&File) -> io::Result<()>) -> Option<File> {
+    let file = File::open(folder).ok()?;
+    lock(&file).ok().map(|()| file)
+}
+
+/// What a path in place of a folder is.
+fn no_folder(path: &Path) -> String {
+    let is = match path.is_file() {
+        true => "is a file, not a folder",
+        false => "leads to no folder",
+    };
+    format!("{} {is}", path.display())
+}
+
+/// The absolute path of a folder for results, whose parent exists then.
+fn place(path: &Path) -> Result<PathBuf, InputError> {
+    let refused = |problem: &str| InputError::argument("--out", problem).found(path.display());
+    if path.exists() {
+        let found = path
+            .canonicalize()
+            .map_err(|error| unwritable(path, &error))?;
+        let is_around_us = std::env::current_dir().is_ok_and(|here| here.starts_with(&found));
+        return match () {
+            () if !found.is_dir() => Err(refused("the output folder cannot be created")
+                .found(no_folder(path))
+                .expected("a folder, or a new path")),
+            () if is_around_us => Err(refused("the results take the place of their folder as a whole, and the current folder is in this one")
+                .expected("a folder inside it, such as `--out runs/first`")),
+            () if is_mount_point(&found) => Err(refused("the results take the place of their folder as a whole, and this one is a mount point")
+                .expected("a folder inside it")),
+            () => Ok(found),
         };
-        for input in &self.claim.inputs {
-            let Ok(path) = input.canonicalize() else {
-                continue;
+    }
+    let Some(name) = path.file_name() else {
+        return Err(refused("the output folder has no name")
+            .expected("a path that ends with the name of a folder"));
+    };
+    let parent = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let is_no_folder = |above: &&Path| above.symlink_metadata().is_ok() && !above.is_dir();
+    if let Some(other) = path.ancestors().find(is_no_folder) {
+        return Err(refused("the output folder cannot be created")
+            .found(no_folder(other))
+            .expected("a folder that can be written to"));
+    }
+    let created = fs::create_dir_all(parent).and_then(|()| parent.canonicalize());
+    let parent = created.map_err(|error| unwritable(parent, &error))?;
+    Ok(parent.join(name))
+}
+
+#[cfg(unix)]
+fn is_mount_point(path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let device = |path: &Path| path.metadata().map(|found| found.dev()).ok();
+    path.parent()
+        .is_some_and(|parent| device(parent) != device(path))
+}
+
+#[cfg(not(unix))]
+fn is_mount_point(_: &Path) -> bool {
+    false
+}
+
+/// Refuses a folder that holds anything but the files of an earlier run of the command, with `is_thorough` unchanged ones.
+fn check(
+    path: &Path,
+    shown: &Path,
+    command: &str,
+    inputs: &[PathBuf],
+    is_thorough: bool,
+) -> Result<(), InputError> {
+    if !path.is_dir() {
+        return Ok(());
+    }
+    let files = files_in(path).map_err(|error| unwritable(shown, &error))?;
+    let other = |name: &str, problem: &str| {
+        InputError::file(shown.join(name), problem)
+            .expected("an output folder without it")
+            .hint("move it away, or give another folder with --out")
+    };
+    let mut inputs = inputs.iter().filter_map(|input| input.canonicalize().ok());
+    if let Some(input) = inputs.find(|input| input.starts_with(path)) {
+        return Err(
+            InputError::file(input, "this input would be replaced by the results")
+                .found(format!("--out {}", shown.display()))
+                .expected("another output folder, or another place for the input"),
+        );
+    }
+    let own = document_of(command);
+    let found = DOCUMENTS
+        .iter()
+        .find(|(_, document)| path.join(document).is_file());
+    if let Some((owner, _)) = found.filter(|(_, document)| *document != own) {
+        return Err(InputError::argument(
+            "--out",
+            "this folder holds the results of another command",
+        )
+        .found(format!("{}: results of `kmcfit {owner}`", shown.display()))
+        .expected(format!(
+            "a new folder, or one with results of `kmcfit {command}`"
+        )));
+    }
+    let text = fs::read(path.join(own)).unwrap_or_default();
+    let listing = serde_json::from_slice::<Listing>(&text).ok();
+    let is_run = listing.is_some();
+    let known = listing.map(|listing| listing.files).unwrap_or_default();
+    for name in files {
+        let is_document = name == own && is_run;
+        match known.get(&name) {
+            _ if is_document => {}
+            None => {
+                return Err(other(
+                    &name,
+                    "this file is not one of an earlier run, and would be removed",
+                ));
+            }
+            Some(before) => {
+                let is_changed =
+                    is_thorough && digest_of_file(&path.join(&name)).ok().as_ref() != Some(before);
+                if is_changed {
+                    return Err(other(
+                        &name,
+                        "this file was changed since kmcfit wrote it, and would be replaced",
+                    ));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The files of a folder and of the folders in it, links as what they are.
+fn files_in(folder: &Path) -> io::Result<Vec<String>> {
+    let mut found = Vec::new();
+    let mut open = vec![String::new()];
+    while let Some(inside) = open.pop() {
+        for entry in fs::read_dir(folder.join(&inside))? {
+            let entry = entry?;
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let name = if inside.is_empty() {
+                name
+            } else {
+                format!("{inside}/{name}")
             };
-            let Ok(inside) = path.strip_prefix(&folder) else {
-                continue;
-            };
-            let parts = inside.components().map(|c| c.as_os_str().to_string_lossy());
-            let name = parts.collect::<Vec<_>>().join("/");
-            if self.is_claimed(&name, manifest) {
-                return Err(
-                    InputError::file(input, "this input would be replaced by a result")
-                        .found(format!("--out {}", self.path.display()))
-                        .expected("another output folder, or another place for the input"),
-                );
+            match entry.file_type()?.is_dir() {
+                true => open.push(name),
+                false => found.push(name),
             }
-        }
-        Ok(())
-    }
-
-    /// Refuses to replace a file that kmcfit did not write.
-    fn check_places(&self, manifest: Option<&Manifest>) -> Result<(), InputError> {
-        if let Some(manifest) = manifest {
-            for (name, record) in &manifest.files {
-                let path = self.path.join(name);
-                self.check_parent(name)?;
-                if let FileState::Other(problem) = record.state(&path) {
-                    let problem = format!("{problem}, and would be replaced");
-                    return Err(InputError::file(&path, problem)
-                        .expected("the file as it was written, or none")
-                        .hint("move it away, or give another folder with --out"));
-                }
-            }
-        }
-        let is_own =
-            |name: &str| manifest.is_some_and(|manifest| manifest.files.contains_key(name));
-        for name in self.claim.fixed().filter(|name| !is_own(name)) {
-            self.check_parent(name)?;
-            self.check_missing(name)?;
-        }
-        for family in &self.claim.families {
-            self.check_parent(&format!("{}/", family.folder))?;
-            let entries = std::fs::read_dir(self.path.join(family.folder));
-            for entry in entries.into_iter().flatten().flatten() {
-                let file_name = entry.file_name();
-                let name = format!("{}/{}", family.folder, file_name.to_string_lossy());
-                if family.covers(&file_name.to_string_lossy()) && !is_own(&name) {
-                    return Err(unknown(&self.path.join(name)));
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Refuses a relative path whose parents are not folders.
-    fn check_parent(&self, name: &str) -> Result<(), InputError> {
-        for (end, _) in name.match_indices('/') {
-            let folder = self.path.join(&name[..end]);
-            if folder.is_symlink() {
-                return Err(a_link(&folder));
-            }
-            if folder.exists() && !folder.is_dir() {
-                return Err(
-                    InputError::file(&folder, "this is a file; results need a folder")
-                        .expected("a folder, or nothing")
-                        .hint("move it away, or give another folder with --out"),
-                );
-            }
-        }
-        Ok(())
-    }
-
-    fn check_missing(&self, name: &str) -> Result<(), InputError> {
-        let path = self.path.join(name);
-        match path.symlink_metadata() {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-            _ => Err(unknown(&path)),
         }
     }
+    found.sort();
+    Ok(found)
+}
 
-    /// Refuses to replace a file that is not a journal of the same command.
-    fn check_journals(&self) -> Result<(), InputError> {
-        for name in journal::NAMES {
-            let path = self.path.join(name);
-            match journal::heading_of(&path) {
-                Some(before) if before.command != self.claim.command => {
-                    return Err(self.unfinished(&path, &before));
-                }
-                None if self.claim.journals.contains(&name) => self.check_missing(name)?,
-                _ => {}
-            }
+/// Puts the folder `new` into the place of `path`, if possible in one step; where the system has none, the run before is moved aside first.
+fn exchange(new: &Path, path: &Path) -> io::Result<()> {
+    if !path.exists() {
+        return fs::rename(new, path);
+    }
+    #[cfg(target_os = "linux")]
+    {
+        use rustix::fs::{CWD, RenameFlags, renameat_with};
+        if renameat_with(CWD, new, CWD, path, RenameFlags::EXCHANGE).is_ok() {
+            return Ok(());
         }
-        Ok(())
+    }
+    let aside = aside(path);
+    fs::rename(path, &aside)?;
+    match fs::rename(new, path) {
+        Ok(()) => fs::remove_dir_all(aside),
+        Err(error) => fs::rename(aside, path).and(Err(error)),
     }
 }
 
-/// The folder itself, or the nearest one above it that exists.
-fn existing(folder: &Path) -> &Path {
-    let mut above = folder.ancestors();
-    let above = above.find(|above| above.exists()).unwrap_or(folder);
-    match above.as_os_str().is_empty() {
-        true => Path::new("."),
-        false => above,
+/// Place of the run before during an exchange of two steps.
+fn aside(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{PREFIX}before-{name}"))
+}
+
+/// Completes an exchange of two steps that was killed: the run before returns where there is no new one, else it is removed.
+fn complete(path: &Path) {
+    let aside = aside(path);
+    if aside.is_dir() {
+        let _lock = path.parent().and_then(|parent| locked(parent, File::lock));
+        let _ = match path.exists() {
+            true => fs::remove_dir_all(aside),
+            false => fs::rename(aside, path),
+        };
     }
 }
 
-fn taken(path: &Path) -> InputError {
-    InputError::argument("--out", "another run is writing to this folder")
-        .found(path.display())
-        .expected("a folder of its own for each run")
-        .hint("wait for the other run, or give another folder with --out")
+/// Removes the folders of runs that were killed: those of our names that no process holds.
+fn remove_leftovers(parent: &Path) {
+    for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let is_ours = name
+            .strip_prefix(PREFIX)
+            .is_some_and(|rest| !rest.contains('-'));
+        if is_ours
+            && let Ok(folder) = File::open(entry.path())
+            && folder.metadata().is_ok_and(|found| found.is_dir())
+            && folder.try_lock().is_ok()
+        {
+            // What cannot be removed now is found again by the next run.
+            let _ = fs::remove_dir_all(entry.path());
+        }
+    }
 }
 
-fn a_link(path: &Path) -> InputError {
-    InputError::file(
-        path,
-        "this is a symbolic link: results would be written elsewhere",
-    )
-    .expected("a folder, or nothing")
-    .hint("remove the link, or give another folder with --out")
+fn unwritable(path: &Path, error: &io::Error) -> InputError {
+    InputError::argument("--out", "the output folder cannot be written to")
+        .found(format!("{}: {error}", path.display()))
+        .expected("a folder that can be written to")
 }
 
-fn unknown(path: &Path) -> InputError {
-    InputError::file(
-        path,
-        "this file was not written by kmcfit, and would be replaced",
-    )
-    .expected("an output folder without it")
-    .hint("move it away, or give another folder with --out")
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn run(path: &Path, command: &'static str, files: &[(&str, &str)]) -> Result<(), String> {
+        let folder = OutputFolder::prepare(path, command, []).map_err(|e| e.to_string())?;
+        for (name, text) in files {
+            folder.write(name, text).expect("written");
+        }
+        folder
+            .commit(&json!({"format": 1}))
+            .map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn a_run_replaces_the_one_before_and_leaves_nothing_beside() {
+        let place = tempfile::tempdir().expect("a folder");
+        let path = place.path().join("runs/a");
+        run(&path, "fit", &[("a.csv", "1"), ("figures/b.svg", "2")]).expect("new");
+        run(&path, "fit", &[("a.csv", "3")]).expect("again");
+        assert_eq!(files_in(&path).expect("files"), ["a.csv", RESULT]);
+        assert_eq!(fs::read_to_string(path.join("a.csv")).expect("text"), "3");
+        assert_eq!(
+            fs::read_dir(place.path().join("runs"))
+                .expect("a folder")
+                .count(),
+            1
+        );
+    }
+
+    #[test]
+    fn files_of_others_and_changed_ones_are_kept() {
+        let place = tempfile::tempdir().expect("a folder");
+        let path = place.path().join("a");
+        run(&path, "fit", &[("a.csv", "1")]).expect("new");
+        assert!(
+            run(&path, "study", &[])
+                .expect_err("refused")
+                .contains("another command")
+        );
+        for (name, text, problem) in [
+            ("notes.txt", "mine", "not one of"),
+            ("a.csv", "2", "changed"),
+        ] {
+            fs::write(path.join(name), text).expect("written");
+            assert!(
+                run(&path, "fit", &[])
+                    .expect_err("refused")
+                    .contains(problem)
+            );
+            assert_eq!(fs::read_to_string(path.join(name)).expect("text"), text);
+            fs::remove_file(path.join(name)).expect("removed");
+        }
+        // A file that comes while the command works.
+        let folder = OutputFolder::prepare(&path, "fit", []).expect("a folder");
+        fs::write(path.join("late.txt"), "mine").expect("written");
+        assert!(folder.commit(&json!({})).is_err());
+        assert_eq!(
+            fs::read_to_string(path.join("late.txt")).expect("text"),
+            "mine"
+        );
+    }
+
+    #[test]
+    fn the_folder_of_a_killed_run_is_removed_and_that_of_a_living_one_stays() {
+        let place = tempfile::tempdir().expect("a folder");
+        let living = OutputFolder::prepare(&place.path().join("a"), "fit", []).expect("a folder");
+        fs::create_dir(place.path().join(".kmcfit-dead")).expect("a folder");
+        fs::create_dir(place.path().join("kmcfit-notes")).expect("a folder");
+        run(&place.path().join("b"), "fit", &[]).expect("a run");
+        assert!(living.staging.path().exists() && place.path().join("kmcfit-notes").exists());
+        assert!(!place.path().join(".kmcfit-dead").exists());
+    }
+
+    #[test]
+    fn paths_lead_from_one_folder_to_another() {
+        let of = |from, to| {
+            relative(Path::new(from), Path::new(to))
+                .display()
+                .to_string()
+        };
+        assert_eq!(of("/a/runs/b", "/a/models"), "../../models");
+        assert_eq!(of("/a", "/a/b"), "b");
+        assert_eq!(of("/a/b", "/a/b"), "");
+    }
+
+    #[test]
+    fn an_exchange_of_two_steps_is_completed() {
+        let place = tempfile::tempdir().expect("a folder");
+        let path = place.path().join("a");
+        run(&path, "fit", &[("a.csv", "1")]).expect("new");
+        fs::rename(&path, aside(&path)).expect("moved");
+        drop(read_lock(&path));
+        assert!(path.join("a.csv").exists() && !aside(&path).exists());
+    }
 }

@@ -1,8 +1,7 @@
 //! Append-only files of lines, one process each.
 
-use super::system;
-use std::fs::{File, TryLockError};
-use std::io::{self, BufRead, BufReader};
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{self, BufRead, BufReader, Write};
 use std::path::Path;
 
 /// A file of lines, each of which is complete: a line that a killed process left unfinished is removed, as is one that cannot be written
@@ -25,10 +24,7 @@ impl RowFile {
                 "a symbolic link, which may lead elsewhere",
             ));
         }
-        let file = match path.exists() {
-            true => system::open_to_append(path)?,
-            false => system::create_new(path)?,
-        };
+        let file = OpenOptions::new().append(true).create(true).open(path)?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => return Err(io::ErrorKind::WouldBlock.into()),
             // A file system without locks.
@@ -36,7 +32,7 @@ impl RowFile {
         }
         let length = complete_lines(path, |_, line| each(line))?;
         if file.metadata()?.len() > length {
-            system::truncate(&file, length)?;
+            file.set_len(length)?;
         }
         Ok(Self { file, length })
     }
@@ -46,9 +42,9 @@ impl RowFile {
     /// # Errors
     /// Errors of the file system; the file then ends with the line before.
     pub fn append(&mut self, line: &[u8]) -> io::Result<()> {
-        if let Err(error) = system::write_all(&self.file, line) {
+        if let Err(error) = (&self.file).write_all(line) {
             // Otherwise the next process removes it.
-            let _ = system::truncate(&self.file, self.length);
+            let _ = self.file.set_len(self.length);
             return Err(error);
         }
         self.length += line.len() as u64;
@@ -60,7 +56,7 @@ impl RowFile {
     /// # Errors
     /// Errors of the file system.
     pub fn sync(&self) -> io::Result<()> {
-        system::sync(&self.file)
+        self.file.sync_data()
     }
 }
 

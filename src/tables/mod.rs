@@ -22,5 +22,6 @@ pub use format::{Detected, TableFormat};
 pub use repeats::{Duplicates, RepeatedTimes, lines_in_words, repeated_times};
 pub use resample::resample;
 pub use stated::StatedUnit;
+pub(crate) use table::TABLE;
 pub use table::Table;
 pub use times::{SAMPLE_RATES, equally_spaced, equally_spaced_at, increasing, increasing_at};

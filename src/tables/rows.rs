@@ -6,7 +6,6 @@ use std::path::Path;
 use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::error::InputError;
-use crate::reading_share;
 use crate::text_io::line_ends;
 
 /// Shortest text that is read in halves, bytes: it takes a millisecond.
@@ -52,7 +51,6 @@ impl<'a> CsvText<'a> {
             quoted: (!is_plain(&self.text)).then(reader),
             counted: 0,
             line: self.first_line,
-            is_displayed: true,
         }
     }
 }
@@ -127,8 +125,6 @@ pub struct TableRows<'a> {
     /// Bytes whose lines are counted, and the line of the next one.
     counted: usize,
     line: usize,
-    /// True if the share that has been read is displayed.
-    is_displayed: bool,
 }
 
 impl<'a> TableRows<'a> {
@@ -148,7 +144,6 @@ impl<'a> TableRows<'a> {
             quoted: None,
             counted: self.text.len(),
             line: self.line + lines,
-            is_displayed: false,
         })
     }
 
@@ -156,21 +151,13 @@ impl<'a> TableRows<'a> {
     pub fn read(&mut self, record: &mut StringRecord) -> Result<Option<usize>, InputError> {
         loop {
             let Some(line) = self.next_line(record)? else {
-                self.display(0, 0);
                 return Ok(None);
             };
-            self.display(self.counted, self.text.len());
             let first = record.get(0).unwrap_or_default();
             let blank = record.len() == 1 && first.is_empty();
             if !blank && !first.starts_with('#') {
                 return Ok(Some(line));
             }
-        }
-    }
-
-    fn display(&self, read: usize, all: usize) {
-        if self.is_displayed {
-            reading_share::set(read, all);
         }
     }
 

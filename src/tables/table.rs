@@ -21,7 +21,7 @@ use kmcfit_core::internals::threads::both;
 const MOST_COLUMNS: usize = 10_000;
 
 /// Description of a table, for messages.
-const TABLE: &str = "a CSV file with one row of column names and rows of numbers";
+pub(crate) const TABLE: &str = "a CSV file with one row of column names and rows of numbers";
 
 /// A table: columns of equal length.
 ///
@@ -240,7 +240,7 @@ impl Table {
         }
     }
 
-    fn from_bytes(
+    pub(crate) fn from_bytes(
         path: &Path,
         bytes: Vec<u8>,
         format: &TableFormat,

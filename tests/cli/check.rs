@@ -1,6 +1,6 @@
 //! `kmcfit check`: validation, and gradients against finite differences.
 
-use crate::workbench::{MODEL, Workbench, column};
+use crate::workbench::{MODEL, Workbench};
 use insta::assert_snapshot;
 
 /// On coarse grids the error of the continuous gradient has a floor, which is not a failure: the exit code depends on the
@@ -15,19 +15,12 @@ fn discrete_gradient_passes_where_the_continuous_one_has_a_floor() {
         "--nodes",
         "1000,2000",
     ];
-    let stdout = bench.run_to(0, &[&check[..], &["--out", "checked"]].concat());
-    assert!(stdout.ends_with(
-        "results in checked\nthe discrete gradient is exact: smallest relative error below 1e-6\n"
-    ));
+    let stdout = bench.run_to(0, &check);
+    assert!(
+        stdout.ends_with("the discrete gradient is exact: smallest relative error below 1e-6\n")
+    );
     assert_eq!(stdout.matches("discrete  ").count(), 2, "{stdout}");
     assert_eq!(stdout.matches("continuous  ").count(), 2, "{stdout}");
-    let table = bench.read("checked/gradient.csv");
-    for (kind, nodes, below) in [("discrete", 1000, 1.2e-7), ("discrete", 2000, 1.2e-7)] {
-        let errors = column(&table, &format!("error_{kind}_{nodes}"));
-        let least = errors.into_iter().fold(f64::INFINITY, f64::min);
-        assert!(least < below, "{kind} {nodes}: {least}");
-    }
-    roxmltree::Document::parse(&bench.read("checked/figures/gradient.svg")).expect("XML");
 }
 
 #[test]

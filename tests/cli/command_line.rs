@@ -1,6 +1,6 @@
-//! Commands and options besides fits: init, explain, schema, demo, --set, completions, man.
+//! Commands and options besides fits: init, explain, schema, demo, --set, completions.
 
-use crate::workbench::{MODEL, Workbench, column, repository, sample_table};
+use crate::workbench::{MODEL, Workbench, repository, sample_table};
 use insta::assert_snapshot;
 use serde_json::Value;
 
@@ -75,47 +75,11 @@ fn the_schema_is_printed() {
     assert!(printed == shipped);
 }
 
-/// Each scaffolded model is read without a warning, and its fit explains the record if the table has all information that this
-/// needs.
-#[test]
-fn starters_can_be_fitted() {
-    let bench = Workbench::with_shipped_models();
-    for (data, fits) in [
-        ("paper.csv", 80.0),
-        ("accelerometer.txt", 97.0),
-        ("roll.tsv", 90.0),
-        ("hammer_1.csv", 99.0),
-        ("shaker.csv", 99.0),
-        ("table.csv", 99.0),
-        ("camera.csv", 0.0),
-        ("duffing.csv", 0.0),
-        ("moving_support.csv", 0.0),
-    ] {
-        let (data, model) = (format!("data/{data}"), format!("{data}.yaml"));
-        bench.run_to(0, &["init", &data, "--out", &model]);
-        assert!(bench.read(&model).contains(&format!("data: {data}\n")));
-        let (code, _, stderr) = bench.run(&["check", &model]);
-        assert_eq!(code, 0, "{model}: {stderr}");
-        assert!(!stderr.contains("warning"), "{model}: {stderr}");
-        if fits > 0.0 {
-            let fit = bench.run_to(0, &["fit", &model, "--no-report", "--json"]);
-            let result: Value = serde_json::from_str(&fit).expect("JSON");
-            let percent = &result["experiments"][0]["channels"][0]["fit_percent"];
-            assert!(
-                percent.as_f64().expect("a number") > fits,
-                "{model}: {percent}"
-            );
-        }
-    }
-    let schema: Value = serde_json::from_str(&bench.read("kmcfit.schema.json")).expect("JSON");
-    assert_eq!(schema["title"], "kmcfit model file");
-}
-
 /// Errors of arguments have the form of all input errors.
 #[test]
 fn invalid_arguments_have_found_expected_and_hint() {
     let bench = Workbench::with_small_model();
-    let lines: [&[&str]; 15] = [
+    let lines: [&[&str]; 16] = [
         &["fti", "model.yaml"],
         &["--jsn"],
         &["fit"],
@@ -124,11 +88,12 @@ fn invalid_arguments_have_found_expected_and_hint() {
         &["fit", "model.yaml", "other.yaml"],
         &["fit", "model.yaml", "--out"],
         &["fit", "model.yaml", "--out", "a", "--out", "b"],
-        &["fit", "model.yaml", "--json", "--plot"],
+        &["fit", "model.yaml", "--json", "--no-plot"],
+        &["fit", "model.yaml", "--plot"],
+        &["report", "runs/model"],
         &["simulate", "model.yaml", "--noise", "5%"],
         &["simulate", "model.yaml", "--noise", "0.1"],
         &["completions", "tcsh"],
-        &["fit", "samples.csv"],
         &["init", "."],
         &["explain", "functions.penalty"],
     ];
@@ -142,7 +107,7 @@ fn invalid_arguments_have_found_expected_and_hint() {
     $ kmcfit fti model.yaml
     error: kmcfit: unknown command
       found: `fti`
-      expected: one of: fit, fleet, simulate, check, predict, compare, verify, report, study, resume, init, explain, schema, demo, completions, man
+      expected: one of: fit, fleet, simulate, check, predict, compare, verify, study, init, explain, schema, demo, completions
       hint: did you mean `fit`?
 
     $ kmcfit --jsn
@@ -152,8 +117,8 @@ fn invalid_arguments_have_found_expected_and_hint() {
       hint: `kmcfit --help` lists the arguments
 
     $ kmcfit fit
-    error: kmcfit fit: <MODEL> is missing
-      expected: kmcfit fit [OPTIONS] <MODEL>
+    error: kmcfit fit: <MODEL|RECORD> is missing
+      expected: kmcfit fit [OPTIONS] <MODEL|RECORD>
       hint: `kmcfit fit --help` lists the arguments
 
     $ kmcfit compare
@@ -164,13 +129,13 @@ fn invalid_arguments_have_found_expected_and_hint() {
     $ kmcfit fit model.yaml --jsn
     error: kmcfit fit: unknown argument
       found: `--jsn`
-      expected: one of: --out, --set, --json, --no-report, --tables, --draws, --timings, --verbose, --strict, --plot, --no-plot, --checkpoint
+      expected: one of: --out, --set, --json, --no-report, --tables, --verbose, --strict, --no-plot
       hint: did you mean `--json`?
 
     $ kmcfit fit model.yaml other.yaml
     error: kmcfit fit: unknown argument
       found: `other.yaml`
-      expected: kmcfit fit [OPTIONS] <MODEL>
+      expected: kmcfit fit [OPTIONS] <MODEL|RECORD>
       hint: `kmcfit fit --help` lists the arguments
 
     $ kmcfit fit model.yaml --out
@@ -181,9 +146,17 @@ fn invalid_arguments_have_found_expected_and_hint() {
     error: --out: given more than once
       expected: this argument at most once
 
-    $ kmcfit fit model.yaml --json --plot
-    error: --json: cannot be combined with `--plot`
+    $ kmcfit fit model.yaml --json --no-plot
+    error: --json: cannot be combined with `--no-plot`
       expected: one of the two
+
+    $ kmcfit fit model.yaml --plot
+    error: kmcfit: `--plot` is of an earlier version
+      hint: the figures are in the page of the run, report.html
+
+    $ kmcfit report runs/model
+    error: kmcfit: `report` is of an earlier version
+      hint: run `kmcfit fit` again, which writes page and figures
 
     $ kmcfit simulate model.yaml --noise 5%
     error: --noise: not a number
@@ -201,11 +174,6 @@ fn invalid_arguments_have_found_expected_and_hint() {
       found: `tcsh`
       expected: one of: bash, elvish, fish, powershell, zsh
 
-    $ kmcfit fit samples.csv
-    error: samples.csv: a record in place of a model file
-      expected: a model file (YAML)
-      hint: `kmcfit init samples.csv` writes a model file for the record
-
     $ kmcfit init .
     error: .: this is a folder
       expected: a record: a text table, or a file of NumPy, MATLAB, HDF5, TDMS, WAV or UFF
@@ -215,25 +183,6 @@ fn invalid_arguments_have_found_expected_and_hint() {
       found: `functions.penalty`
       expected: a key of a model file, such as `sigma` or `functions.mass`; `kmcfit explain` lists the top-level keys
       hint: did you mean `functions.mass.penalty`?
-    ");
-}
-
-#[test]
-fn invalid_numbers_have_messages() {
-    let bench = Workbench::with_small_model();
-    let (code, _, said) = bench.run(&["fit", "model.yaml", "--checkpoint", "often"]);
-    assert_eq!(code, 2);
-    assert_snapshot!(said, @"
-    error: --checkpoint: not a number
-      found: `often`
-      expected: a number
-    ");
-    let (code, _, said) = bench.run(&["check", "model.yaml", "--gradient", "--nodes", "100,many"]);
-    assert_eq!(code, 2);
-    assert_snapshot!(said, @"
-    error: --nodes: not a number
-      found: `many`
-      expected: an integer, 3 or more
     ");
 }
 
@@ -271,7 +220,16 @@ fn init_prints_the_properties_of_the_record() {
     functions:
       mass:      {fixed: unknown}                     # or its value in kg; without it and without a measured force the results are ratios to the mass
       damping:   {basis: constant}                    # 1/s, ratio to the mass; starts from the decay or the frequency response
-      stiffness: {basis: constant}                    # 1/s^2, ratio to the mass; the record is too short to show a variation
+      stiffness: {basis: constant}                    # 1/s^2, ratio to the mass; starts from the dominant frequency
+    # To let a coefficient vary with time, replace {basis: constant}, for example by
+    #   {basis: polynomial, degree: 1}                # a straight line over the record
+    #   {basis: piecewise-linear, knots: 5}           # straight pieces between five knots
+    #   {basis: b-spline, knots: auto}                # smooth; its smoothness follows from the record
+    # and compare both models: `kmcfit compare MODEL OTHER_MODEL`. A variation that the record does not show widens all intervals.
+    # A known coefficient is fixed: {fixed: 4.5}; a nearly known one: {fixed: {value: 4.5, sigma: 0.02}}.
+    # Further force terms:
+    #   cubic_stiffness:  {basis: constant, start: 0.0}
+    #   coulomb_friction: {basis: constant, start: 0.0}
     # truth: {data: truth.csv}                        # the true functions, where they are known
     fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1.0e-8}}
     "#);
@@ -292,8 +250,8 @@ fn init_prints_the_properties_of_the_record() {
             "other.yaml",
         ],
     );
-    let taken = "`--sample-rate 500` is used, although `Time [ms]` has 10000 Hz\n";
-    assert!(said.contains(taken), "{said}");
+    assert!(said.contains("every 0.002 s\n"), "{said}");
+    assert!(said.contains("not used: `Time [ms]`\n"), "{said}");
     bench.write("bare.csv", &text.replace("Time [ms],Weg_mm", "t,y"));
     let said = bench.run_to(0, &["init", "bare.csv"]);
     assert!(
@@ -368,121 +326,6 @@ fn values_are_set() {
 }
 
 #[test]
-fn check_and_simulate_take_values_too() {
-    let bench = Workbench::with_shipped_models();
-    let check = [
-        "check",
-        "models/paper-lbfgs.yaml",
-        "--set",
-        "grid.nodes=1000",
-    ];
-    assert!(bench.run_to(0, &check).contains(": 1000 nodes over 25 s"));
-    let set = "functions.stiffness={fixed: 4.0}";
-    let simulate = [
-        "simulate",
-        "models/paper-device.yaml",
-        "--set",
-        set,
-        "--out",
-        "m.csv",
-    ];
-    bench.run_to(0, &simulate);
-    let record: Value = serde_json::from_str(&bench.read("m.csv.json")).expect("JSON");
-    assert_eq!(record["overrides"], serde_json::json!([set]));
-    assert_ne!(
-        column(&bench.read("m.csv"), "y_m"),
-        column(&bench.read("data/paper.csv"), "y_m")
-    );
-}
-
-#[test]
-fn invalid_overrides_have_messages() {
-    let bench = Workbench::with_small_model();
-    let said = |set: &str| {
-        let before = bench.contents();
-        let (code, stdout, stderr) = bench.run(&["fit", "model.yaml", "--set", set]);
-        assert_eq!((code, stdout.as_str()), (2, ""), "{set}");
-        assert_eq!(bench.contents(), before);
-        stderr
-    };
-    let sets = [
-        "fit.stop.iteration=5",
-        "fitt.stop=5",
-        "fit.stop.iterations=2e3",
-        "functions.mass.basis=nodes",
-        "functions.mass.start=-1",
-        "experiments.sigma=1",
-        "experiments.3.sigma.displacement=1",
-        "title.en=a",
-        "fit.0=a",
-        "fit.stop.iterations",
-        "=5",
-        "fit.stop={iterations: ",
-        "fit.stop.iterations=",
-        "functions.mass.start={data: nothing.csv, column: m}",
-    ];
-    let all: Vec<String> = sets.iter().map(|set| said(set)).collect();
-    assert_snapshot!(all.join("\n"), @"
-    error: --set fit.stop.iteration=5: fit.stop: unknown key
-      found: `iteration`
-      expected: one of: iterations, cost_ratio, gradient_ratio, tolerance, step, seconds
-      hint: did you mean `iterations`?
-
-    error: --set fitt.stop=5: unknown key
-      found: `fitt`
-      expected: one of: format, title, experiments, grid, functions, constraints, fit, truth, predict, study
-      hint: did you mean `fit`?
-
-    error: --set fit.stop.iterations=2e3: fit.stop.iterations: not an integer
-      found: the floating-point number 2000
-      expected: an integer
-      hint: write 2000
-
-    error: --set functions.mass.basis=nodes: functions.mass.basis: unknown choice
-      found: `nodes`
-      expected: one of: nodal, constant, piecewise-constant, piecewise-linear, polynomial, b-spline
-
-    error: --set functions.mass.start=-1: functions.mass.start: the mass must be positive at all times
-      found: -1
-      expected: a number greater than 0, in kg
-
-    error: --set experiments.sigma=1: experiments is a list
-      found: `sigma`
-      expected: a position, as in experiments.0.sigma
-
-    error: --set experiments.3.sigma.displacement=1: no such element in the list experiments
-      found: position 3
-      expected: the position 0
-
-    error: --set title.en=a: title is one value in this model, with no keys below it
-      expected: title=VALUE, which replaces it
-
-    error: --set fit.0=a: fit is a map
-      found: position 0
-      expected: a key
-
-    error: --set: missing `=`
-      found: `fit.stop.iterations`
-      expected: KEY=VALUE, for instance fit.stop.iterations=50
-
-    error: --set: missing key before `=`
-      found: `=5`
-      expected: KEY=VALUE, for instance fit.stop.iterations=50
-
-    error: --set: the value cannot be read
-      found: `fit.stop={iterations: `
-      expected: a value as in a model file: 50, constant, {order: 2, weight: 0.1}, …
-
-    error: --set: the value cannot be read
-      found: `fit.stop.iterations=`
-      expected: a value as in a model file: 50, constant, {order: 2, weight: 0.1}, …
-
-    error: --set functions.mass.start={data: nothing.csv, column: m}: functions.mass.start.data: nothing.csv: no such file
-      expected: a CSV file with one row of column names and rows of numbers
-    ");
-}
-
-#[test]
 fn help_has_help() {
     let bench = Workbench::empty();
     assert_eq!(
@@ -495,11 +338,16 @@ fn help_has_help() {
 fn the_demo_needs_nothing() {
     let bench = Workbench::empty();
     let stdout = bench.run_to(0, &["demo"]);
-    assert!(stdout.contains("but not by the true system"), "{stdout}");
-    assert!(
-        stdout.contains("true system recovered: k/m within"),
-        "{stdout}"
-    );
+    assert!(stdout.lines().count() <= 25, "{stdout}");
+    let row = |label: &str| {
+        let line = stdout.lines().find(|line| line.starts_with(label));
+        line.unwrap_or_else(|| panic!("{label} in {stdout}"))
+    };
+    // The paper's run ends at 8.1e-5 of its first cost, 99 % of the record, with a mass that is wrong by a factor of two and more.
+    assert!(row("fit of the displacement").ends_with("99.1         100"));
+    assert!(row("largest error of the mass").contains(" 163 "));
+    assert!(row("largest error of the mass").ends_with("< 1e-6"));
+    assert!(row("paper     ").contains("Check: ") || row("paper     ").contains("by the misfit"));
     assert!(bench.path("runs/demo/results/compare.html").exists());
     for name in ["paper.csv", "paper_truth.csv"] {
         let shipped = std::fs::read_to_string(repository("data").join(name)).expect("a file");
@@ -539,22 +387,5 @@ fn completions_know_all_commands() {
                 .run_to(0, &["completions", shell])
                 .contains("simulate")
         );
-    }
-}
-
-#[test]
-fn the_manual_has_all_options() {
-    let bench = Workbench::empty();
-    let page = bench.run_to(0, &["man"]).replace("\\-", "-");
-    assert!(page.contains(".TH kmcfit 1"), "{page}");
-    for command in commands(&bench).iter().filter(|c| *c != "help") {
-        assert!(page.contains(&format!(".SS {command}\n")), "{command}");
-        let help = bench.run_to(0, &[command, "--help"]);
-        let words = help
-            .split_whitespace()
-            .map(|w| w.trim_end_matches([',', ']']));
-        for option in words.filter(|w| w.starts_with("--") && w.len() > 2) {
-            assert!(page.contains(option), "{command} {option}");
-        }
     }
 }

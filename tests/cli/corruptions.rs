@@ -2,7 +2,7 @@
 //! corruption, or a refusal or a reason of the verdict names it. With the advised key the answer is that of the good record.
 //!
 //! The good record: an oscillator of 1 Hz with 3 % damping under a broadband force, 400 samples at 20 Hz with 2 % white noise.
-//! `KMCFIT_ROUNDS` repeats all cases with further seeds; `--nocapture` prints the table of `docs/long/corruptions.md`.
+//! `KMCFIT_ROUNDS` repeats all cases with further seeds; `--nocapture` prints the table of `.ci/long corruptions`.
 
 use crate::oscillator::displacements;
 use crate::workbench::Workbench;

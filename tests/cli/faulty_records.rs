@@ -60,20 +60,6 @@ fn a_delay_of_one_of_two_inputs_is_refused() {
     assert_snapshot!(stderr);
 }
 
-/// A free record with one channel has nothing that its delay is a delay against.
-#[test]
-fn a_delay_needs_another_clock() {
-    let bench = Workbench::with_small_model();
-    let model = bench.read("model.yaml").replace(
-        "    initial:",
-        "    sensors: {displacement: {delay: {min: -0.1, max: 0.1}}}\n    initial:",
-    );
-    bench.write("model.yaml", &model);
-    let (code, _, stderr) = bench.run(&["check", "model.yaml"]);
-    assert_eq!(code, 2);
-    assert_snapshot!(stderr);
-}
-
 /// Every other line of 21 is repeated with another value: `init` writes a model that reads it, and the file without the key is refused.
 #[test]
 fn repeated_times_are_merged_by_a_setting() {
@@ -152,90 +138,4 @@ fn excluded_samples_are_stated_everywhere() {
         serde_json::json!([7.45, 8.45])
     );
     assert_eq!(after["data"][1]["count"], 2);
-}
-
-/// A delay of 1.5 samples: estimated with an interval, stated, and used by `verify`, `predict` and `study`.
-#[test]
-fn estimated_delays_serve_all_analyses() {
-    let rows = Good::new(2).rows(1.5, 0.0);
-    let bench = bench(&rows, "sensors: {displacement: {delay: estimate}}");
-    bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
-    let found = document(&bench, "run");
-    assert_eq!(
-        found["verdict"]["level"], "adequate",
-        "{}",
-        found["verdict"]
-    );
-    let delay = &found["nuisance_parameters"][0];
-    assert_eq!(delay["name"], "delay of the displacement of shaker");
-    let number = |name: &str| delay[name].as_f64().expect("a number");
-    let (value, error) = (number("value"), number("standard_error"));
-    // A standard error of 0.01 samples, by the noise of 2 %.
-    assert!(
-        (value - 0.075).abs() < 4.0 * error && error < 0.002,
-        "{value} {error}"
-    );
-    bench.run_to(0, &["verify", "run"]);
-    bench.run_to(
-        0,
-        &[
-            "predict",
-            "run",
-            "--force",
-            "record.csv",
-            "--out",
-            "predicted",
-        ],
-    );
-    bench.run_to(0, &["study", "model.yaml", "--out", "studied"]);
-    bench.write(
-        "model.yaml",
-        &MODEL.replace("#key", "sensors: {force: {delay: -0.075}}"),
-    );
-    let shown = bench.run_to(0, &["check", "model.yaml"]);
-    assert!(
-        shown.contains("times of the force shifted by its delay of -0.075 s"),
-        "{shown}"
-    );
-    bench.run_to(0, &["fit", "model.yaml", "--out", "stated", "--no-report"]);
-    let stated = document(&bench, "stated");
-    assert_eq!(stated["verdict"]["level"], "adequate");
-    for name in ["mass", "damping", "stiffness"] {
-        let of = |document: &Value| {
-            document["estimates"][name]["value"]
-                .as_f64()
-                .expect("a number")
-        };
-        let ci = &found["estimates"][name]["ci95"];
-        let half = 0.5 * (ci[1].as_f64().expect("a number") - ci[0].as_f64().expect("a number"));
-        assert!((of(&stated) - of(&found)).abs() < half, "{name}");
-    }
-}
-
-/// A displacement rounded to 1/64 of its range, a step of three times the stated sigma: `step^2/12` is added to its variance.
-#[test]
-fn quantisation_enters_a_stated_sigma() {
-    let good = Good::new(3);
-    let step = 3.0 * good.sigma;
-    let mut rows = good.rows(0.0, 0.0);
-    rows.iter_mut()
-        .for_each(|row| row[2] = (row[2] / step).round() * step);
-    let bench = Workbench::empty();
-    bench.write("record.csv", &table(&rows));
-    let sigma = format!("sigma: {{displacement: {}}}", good.sigma);
-    let model = MODEL.replace("sigma: {displacement: estimate}", &sigma);
-    bench.write("model.yaml", &model);
-    bench.run(&["fit", "model.yaml", "--out", "run", "--no-report"]);
-    let document = document(&bench, "run");
-    let used = document["experiments"][0]["channels"][0]["sigma"]
-        .as_f64()
-        .expect("a number");
-    let expected = (good.sigma.powi(2) + step.powi(2) / 12.0).sqrt();
-    // Seven printed digits of the samples.
-    assert!((used / expected - 1.0).abs() < 1e-4, "{used} {expected}");
-    let fact = &document["data"][0];
-    assert_eq!(
-        (&fact["kind"], &fact["action"]),
-        (&"quantisation".into(), &"added_to_sigma".into())
-    );
 }

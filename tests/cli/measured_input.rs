@@ -76,20 +76,6 @@ fn refused(bench: &Workbench) -> String {
     stderr
 }
 
-/// Standard error of a fit that runs despite a warning.
-fn warned(changes: &[(&str, &str)]) -> String {
-    let bench = bench();
-    let mut model = MODEL.to_owned();
-    for (from, to) in changes {
-        assert!(model.contains(from), "{from}");
-        model = model.replacen(from, to, 1);
-    }
-    bench.write("model.yaml", &model);
-    let (code, stdout, stderr) = bench.run(&["check", "model.yaml"]);
-    assert_eq!(code, 0, "{stdout}\n{stderr}");
-    stderr
-}
-
 #[test]
 fn channels() {
     let all = [
@@ -202,91 +188,6 @@ fn forces() {
         changed(&[(
             "initial: {displacement: 1.0, velocity: estimate}",
             "force: {shape: constant, amplitude: 1.0}\n    initial: estimate",
-        )]),
-    ];
-    assert_snapshot!(all.join("\n"));
-}
-
-#[test]
-fn several() {
-    let own = "functions: {mass: {basis: constant, start: 1.0}, damping: {basis: constant, start: \
-               0.1}, stiffness: {basis: constant, start: 9.0}}";
-    let late = bench();
-    late.write("hammer.csv", "t,y\n5,1\n5.5,0\n6,-1\n6.5,0\n7,1\n");
-    let missing = bench();
-    missing.write("hammer.csv", "t,y\n0,NaN\n0.5,\n1,NA\n1.5,-\n2,\n");
-    let twice = bench();
-    twice.write("hammer.csv", "t,y\n0,1\n0.5,0\n0.5,-1\n1.5,0\n2,1\n");
-    let all = [
-        changed(&[
-            (
-                "    initial: {displacement: 1.0, velocity: estimate}",
-                &format!("    {own}\n    initial: estimate"),
-            ),
-            (
-                "    initial: {displacement: 1.0, velocity: 0.0}",
-                &format!("    {own}\n    initial: estimate"),
-            ),
-        ]),
-        changed(&[(
-            "    initial: {displacement: 1.0, velocity: 0.0}",
-            "    functions: {static_force: {basis: constant, start: 0.0}}\n    initial: estimate",
-        )]),
-        changed(&[
-            (
-                "    initial: {displacement: 1.0, velocity: estimate}",
-                "    validation: true\n    initial: estimate",
-            ),
-            (
-                "    initial: {displacement: 1.0, velocity: 0.0}",
-                "    validation: true\n    initial: estimate",
-            ),
-        ]),
-        refused(&late),
-        refused(&missing),
-        refused(&twice),
-        // Gain and initial state of a free record.
-        changed(&[(
-            "    initial: {displacement: 1.0, velocity: 0.0}",
-            "    sensors: {displacement: {gain: estimate}}\n    initial: estimate",
-        )]),
-        // Gains and the scale of the system.
-        changed(&[
-            (
-                "    initial: {displacement: 1.0, velocity: estimate}",
-                "    sensors: {displacement: {gain: estimate}, acceleration: {gain: estimate}}\n    initial: estimate",
-            ),
-            (
-                "    initial: {displacement: 1.0, velocity: 0.0}",
-                "    validation: true\n    initial: estimate",
-            ),
-        ]),
-        changed(&[(
-            "  damping:   {basis: constant, start: 0.1}",
-            "  damping:   {basis: constant, start: 0.1}\n  coulomb_friction: {basis: constant, start: 0.1}",
-        )]),
-        changed(&[(
-            "  damping:   {basis: constant, start: 0.1}",
-            "  damping:   {basis: constant, start: 0.1, width: 0.1}",
-        )]),
-    ];
-    assert_snapshot!(all.join("\n"));
-}
-
-#[test]
-fn data_warnings() {
-    let all = [
-        warned(&[(
-            "initial: {displacement: 1.0, velocity: estimate}",
-            "units: {displacement: mm}\n    initial: estimate",
-        )]),
-        warned(&[(
-            "initial: {displacement: 1.0, velocity: estimate}",
-            "units: {acceleration: g}\n    initial: estimate",
-        )]),
-        warned(&[(
-            "initial: {displacement: 1.0, velocity: estimate}",
-            "initial: {displacement: 1000.0, velocity: estimate}",
         )]),
     ];
     assert_snapshot!(all.join("\n"));

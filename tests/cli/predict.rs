@@ -96,36 +96,6 @@ fn a_rotation_has_angular_units() {
     ] {
         assert!((shown - exact).abs() <= 1e-5 * exact.abs(), "{said}");
     }
-    let said = bench.run_to(0, &["compare", "roll", "again", "--out", "both"]);
-    assert!(
-        said.contains("smallest m (kg m²)") && !said.contains("(kg)"),
-        "{said}"
-    );
-    let csv = bench.read("both/compare.csv");
-    assert!(
-        csv.contains(",mass_min_kg_m2,damping_min_N_m_s_per_rad,"),
-        "{csv}"
-    );
-}
-
-/// Samples with the fit, then each function.
-#[test]
-fn the_plot_draws_samples_and_functions() {
-    let bench = Workbench::with_small_model();
-    let plain = ["fit", "model.yaml", "--no-report", "--out", "run"];
-    let without = bench.run_to(0, &plain);
-    let plot = bench.run_to(0, &[&plain[..], &["--plot"]].concat());
-    let begin = plot.find("(line: fit, o: samples)").expect("a chart");
-    assert!(!without.contains("(line: fit"));
-    let charts = &plot[begin..];
-    for title in ["mass in kg", "damping in N s/m", "stiffness in N/m"] {
-        assert!(charts.contains(&format!("\n{title}\n")), "{charts}");
-    }
-    // Ten rows of characters for the samples, five for each function, and a time axis below each.
-    let drawn = charts
-        .lines()
-        .filter(|line| line.contains('┤') || line.contains('│') || line.contains('|'));
-    assert!(drawn.count() >= 25, "{charts}");
 }
 
 /// The record of a fit as a new one: its force file scores the prediction, whose band with noise holds about 95 % of the samples.
@@ -179,26 +149,6 @@ fn a_force_of_a_file_predicts_and_scores() {
     );
     let svg = bench.read("predicted/figures/predictions.svg");
     roxmltree::Document::parse(&svg).expect("XML");
-}
-
-/// An acceleration under a motion of the base is absolute, as that of the fit.
-#[test]
-fn a_motion_of_the_base_predicts_the_absolute_acceleration() {
-    let bench = Workbench::with_shipped_models();
-    bench.run_to(0, &["fit", "models/shaking-table.yaml", "--no-report"]);
-    let predict = [
-        "predict",
-        "runs/shaking-table",
-        "--base",
-        "data/table.csv",
-        "--json",
-    ];
-    let found: Value = serde_json::from_str(&bench.run_to(0, &predict)).expect("JSON");
-    let fit = found
-        .pointer("/0/score/fit_percent")
-        .and_then(Value::as_f64);
-    assert!(fit.expect("a fit") > 95.0, "{found}");
-    assert_eq!(found[0]["channel"], "acceleration");
 }
 
 /// Coefficients that vary are identified over their own record alone; every other mistake has its place and what is expected.

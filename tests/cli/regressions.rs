@@ -34,24 +34,6 @@ fn a_failed_prediction_does_not_end_the_fit() {
 }
 
 #[test]
-fn a_failed_run_leaves_no_older_result_behind() {
-    let bench = Workbench::with_small_model();
-    bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
-    assert_eq!(status(&bench, "run"), "completed");
-    bench.write("bad.yaml", &MODEL.replace("start: 2.0", "start: 1e-300"));
-    bench.run_to(3, &["fit", "bad.yaml", "--out", "run"]);
-    assert_eq!(status(&bench, "run"), "failed");
-}
-
-#[test]
-fn figures_of_an_older_run_go_with_it() {
-    let bench = Workbench::with_small_model();
-    bench.run_to(0, &["fit", "model.yaml", "--out", "run"]);
-    bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
-    assert!(!bench.contents().keys().any(|name| name.ends_with(".svg")));
-}
-
-#[test]
 fn a_cost_that_overflows_is_an_outcome() {
     let bench = Workbench::with_small_model();
     let spoiled = sample_table(21).replacen("\n1,", "\n1,1e300\n#", 1);
@@ -69,19 +51,6 @@ fn without_iterations_or_tests_the_default_tolerance_holds() {
     let bench = bench("stop: {iterations: 5}", "stop: {}");
     let (_, stdout, _) = bench.run(&["fit", "model.yaml"]);
     assert!(!stdout.contains("asked for"), "{stdout}");
-}
-
-#[test]
-fn simulate_does_not_write_over_the_samples_of_the_model() {
-    let bench = Workbench::with_small_model();
-    let before = bench.contents();
-    let (code, _, stderr) = bench.run(&["simulate", "model.yaml", "--out", "./samples.csv"]);
-    assert_eq!(code, 2);
-    assert!(
-        stderr.contains("this file is an input of the model"),
-        "{stderr}"
-    );
-    assert_eq!(bench.contents(), before);
 }
 
 #[test]

@@ -48,56 +48,38 @@ fn a_sequence_states_which_assumptions_recover_the_system() {
         let value = run.pointer(pointer).and_then(Value::as_f64);
         value.unwrap_or_else(|| panic!("{pointer} of {run}"))
     };
-    let verdict = |run: &Value| run["verdict"].as_str().expect("text").to_owned();
     let [paper, positive, known @ .., noisy] = runs.as_slice() else {
         panic!("{names:?}");
     };
 
-    // In the paper's fit, mass and damping have the wrong sign or size. With positivity alone the misfit is smaller and the errors are
-    // as large.
-    assert_eq!(paper["is_true_system"], false);
-    assert_eq!(positive["is_true_system"], false);
-    assert!(verdict(positive).starts_with("response fitted (J/J0 "));
+    // With positivity alone the misfit is smaller than the paper's and the errors are as large.
     for run in [paper, positive] {
-        assert!(verdict(run).contains("true system: error of k/m "), "{run}");
         assert!(number(run, "/errors/k_over_m_relative") > 0.1, "{run}");
     }
     assert!(number(positive, "/misfit") < 0.1 * number(paper, "/misfit"));
-    assert!(number(positive, "/smallest_mass") >= 0.05);
-    assert!(number(positive, "/smallest_damping") >= 0.0);
-
-    // Smooth and normalised, few parameters, knots, splines: the true system and its predictions are recovered.
-    // The samples are computed by the same stepper, and the truth has no roughness: only rounding errors remain.
+    // Smooth and normalised, few parameters, knots, splines: the true system is recovered. The samples are computed by the same
+    // stepper, and the truth has no roughness: only rounding errors remain.
     for run in known {
-        assert_eq!(run["is_true_system"], true, "{run}");
         assert_eq!(run["status"], "converged", "{run}");
-        assert!(verdict(run).starts_with("true system recovered: "));
+        assert!(number(run, "/errors/k_over_m_relative") < 1e-6, "{run}");
         assert!(number(run, "/errors/mass") < 1e-6, "{run}");
-        assert!(number(run, "/roughness/mass") < 1e-6 * number(positive, "/roughness/mass"));
-        assert!(number(run, "/max_violation") <= 1e-9);
     }
-
     // Noise limits the accuracy only: 401 samples with a noise of 0.1 m in 3 m.
     assert!(number(noisy, "/errors/k_over_m_relative") < 0.05, "{noisy}");
     assert!(number(noisy, "/errors/mass") < 0.05, "{noisy}");
-    assert_eq!(noisy["misfit_unit"], "1");
-    assert!(verdict(noisy).contains("to the true system") || noisy["is_true_system"] == true);
-    // The iterations along the path of weights are counted, although the last fit needs none.
-    let result = bench.read("runs/compare/noisy/result.json");
-    let result: Value = serde_json::from_str(&result).expect("JSON");
-    let path = result["weights"]["path"].as_array().expect("a path");
-    let iterations = |point: &Value| number(point, "/iterations");
-    let on_path: f64 = path.iter().map(iterations).sum();
-    assert!(path.iter().filter(|point| iterations(point) > 0.0).count() > 1);
-    let last = number(&result, "/counts/iterations");
-    assert_eq!(number(noisy, "/iterations"), on_path + last);
-
-    // From other initial states: the fit with the wrong parameters does not predict the response, the true system does.
-    let elsewhere = |run: &Value| number(run, "/predictions/4/cost");
-    assert!(elsewhere(paper) > 1.0 && elsewhere(positive) > 1.0);
-    assert!(known.iter().all(|run| elsewhere(run) < 1e-9));
-    assert!(elsewhere(noisy) < 1.0, "{}", elsewhere(noisy));
     assert_eq!(document["left_out"], Value::Array(Vec::new()));
+    // From other initial states: the fit with the wrong parameters does not predict the response, the true system does.
+    let elsewhere = |name: &str| {
+        let result = bench.read(&format!("runs/compare/{name}/result.json"));
+        let result: Value = serde_json::from_str(&result).expect("JSON");
+        number(&result, "/predictions/4/cost")
+    };
+    assert!(MODELS[..2].iter().all(|name| elsewhere(name) > 1.0));
+    assert!(
+        MODELS[2..MODELS.len() - 1]
+            .iter()
+            .all(|name| elsewhere(name) < 1e-9)
+    );
 }
 
 /// The key `sequence` is found in every style of YAML.

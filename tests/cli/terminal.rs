@@ -3,8 +3,6 @@
 
 use crate::program::program;
 use crate::workbench::Workbench;
-use std::io::{Read, Write};
-use std::process::{Command, Stdio};
 use std::time::Duration;
 
 /// A record whose stiffness falls by a third; the fit determines it at three knots.
@@ -95,76 +93,11 @@ fn the_summary_plots_the_varying_coefficient() {
         on_terminal(&bench, arguments, variables).contains("stiffness k in N/m")
     };
     // A finished run is shown again.
-    assert!(has_plot("resume run", &[]));
+    assert!(has_plot(FIT, &[]));
     for variable in [("NO_COLOR", "1"), ("TERM", "dumb"), ("LC_ALL", "C")] {
-        assert!(!has_plot("resume run", &[variable]), "{variable:?}");
+        assert!(!has_plot(FIT, &[variable]), "{variable:?}");
     }
-    assert!(!has_plot("resume run --no-plot", &[]));
+    assert!(!has_plot(&format!("{FIT} --no-plot"), &[]));
     let constant = "--set 'functions.stiffness={basis: constant, start: 90.0}'";
     assert!(!has_plot(&format!("{FIT} {constant}"), &[]));
-}
-
-/// After a second a study shows its analysis of all and the finished refits of all with the remaining time; Ctrl-C then keeps the
-/// analyses before.
-#[test]
-fn a_study_shows_its_progress_and_keeps_what_is_done() {
-    let bench = bench();
-    let study = "study: {seed: 1, bootstrap: 40000}\n";
-    bench.write("model.yaml", &(bench.read("model.yaml") + study));
-    let command = format!("{} study model.yaml --out study", program());
-    let mut child = Command::new("script")
-        .current_dir(bench.path(""))
-        .env("TERM", "xterm")
-        .args(["-qec", &command, "/dev/null"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("script of util-linux");
-    let (mut keys, mut screen) = (
-        child.stdin.take().expect("keys"),
-        child.stdout.take().expect("a screen"),
-    );
-    let mut shown = String::new();
-    let mut buffer = [0; 4096];
-    let mut is_interrupted = false;
-    loop {
-        let count = screen.read(&mut buffer).expect("a screen");
-        if count == 0 {
-            break;
-        }
-        shown += &String::from_utf8_lossy(&buffer[..count]);
-        if !is_interrupted && shown.contains("/40000  ") && shown.contains(" remaining") {
-            keys.write_all(b"\x03").expect("a key");
-            is_interrupted = true;
-        }
-    }
-    let status = child.wait().expect("an end");
-    assert!(
-        is_interrupted && shown.contains("study 5/6: bootstrap"),
-        "{shown}"
-    );
-    // The first findings stand on the screen while the others are computed.
-    let [rank, bands, refits] =
-        ["structural-rank: ", "\nbands: ", "study 5/6: bootstrap"].map(|words| shown.find(words));
-    assert!(rank.is_some() && rank < bands && bands < refits, "{shown}");
-    assert_eq!(status.code(), Some(130), "{shown}");
-    let study: serde_json::Value =
-        serde_json::from_str(&bench.read("study/study.json")).expect("JSON");
-    assert_eq!(study["status"], "interrupted");
-    assert!(
-        study["sensitivity"].is_object() && study["bands"].is_object(),
-        "{study}"
-    );
-    // The refits that were done are counted, and none is used.
-    let failure = &study["failures"][0];
-    assert_eq!(failure["analysis"], "bootstrap", "{study}");
-    let reason = failure["reason"].as_str().expect("a reason");
-    let count = reason.strip_prefix("interrupted after ");
-    let count =
-        count.and_then(|rest| rest.split_once(" of 40000 jobs; none of its results is used"));
-    let count: usize = count
-        .and_then(|(n, _)| n.parse().ok())
-        .unwrap_or_else(|| panic!("{reason}"));
-    assert!((1..40000).contains(&count), "{reason}");
-    assert_eq!(study["bootstrap"].as_array().map(Vec::len), Some(0));
 }

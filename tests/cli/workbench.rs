@@ -5,7 +5,9 @@ use assert_cmd::Command;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::{Output, Stdio};
 use std::sync::OnceLock;
+use std::time::Duration;
 use tempfile::TempDir;
 
 /// A small model that is fitted in milliseconds; tests change one place in it.
@@ -43,19 +45,6 @@ impl Workbench {
     pub fn empty() -> Self {
         Self {
             folder: tempfile::tempdir().expect("a temporary folder"),
-        }
-    }
-
-    /// An empty folder in memory, where syncing takes no time, if the system has one.
-    #[allow(dead_code, reason = "used by the tests of reliability")]
-    pub fn in_memory() -> Self {
-        let place = Path::new("/dev/shm");
-        let folder = match place.is_dir() {
-            true => tempfile::tempdir_in(place),
-            false => tempfile::tempdir(),
-        };
-        Self {
-            folder: folder.expect("a temporary folder"),
         }
     }
 
@@ -118,6 +107,32 @@ impl Workbench {
         let (found, stdout, stderr) = self.run(arguments);
         assert_eq!(found, code, "{arguments:?}\n{stdout}\n{stderr}");
         stdout
+    }
+
+    /// Runs the program until it has written a `file` of its results in `runs`, where it stages them, and interrupts it as Ctrl-C does.
+    #[cfg(unix)]
+    pub fn interrupt(&self, arguments: &[&str], file: &str) -> Output {
+        let mut command = std::process::Command::new(program());
+        command.current_dir(self.path("")).args(arguments);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().expect("the program runs");
+        let is_written = || {
+            let staged = fs::read_dir(self.path("runs")).into_iter().flatten();
+            staged
+                .flatten()
+                .any(|folder| folder.path().join(file).exists())
+        };
+        while !is_written() {
+            let ended = child.try_wait().expect("the state of the program");
+            assert!(ended.is_none(), "ended without {file}: {ended:?}");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let pid = child.id().to_string();
+        let killed = std::process::Command::new("kill")
+            .args(["-INT", &pid])
+            .status();
+        assert!(killed.expect("kill runs").success());
+        child.wait_with_output().expect("the program ends")
     }
 
     /// All files with their contents, and all folders, by relative path.

@@ -2,8 +2,8 @@
 """Writes the files of this folder: one record in each format, and files that are refused. Files with a shorter record are
 written into tests/fuzz/corpus/channels.
 
-Needs numpy, scipy, pyuff, soundfile, npTDMS, pandas, pyarrow and h5py. Versions of the last run: numpy 2.4.6, scipy 1.17.1,
-pyuff 2.5.8, soundfile 0.14.0, npTDMS 1.13.0, pandas 3.1.1, h5py 3.16.0, pyarrow 26.0.1.
+Needs numpy, scipy, pyuff, soundfile, npTDMS, pandas and h5py. Versions of the last run: numpy 2.4.6, scipy 1.17.1,
+pyuff 2.5.8, soundfile 0.14.0, npTDMS 1.13.0, pandas 3.1.1, h5py 3.16.0.
 
 The record is held exactly by every format: 64 samples per second, and values k/1024 with integers k of 16 bits, which
 have at most 12 significant digits. It is the displacement of an oscillator with m = 2 kg, c = 1.6 N s/m and k = 90 N/m under a
@@ -74,8 +74,6 @@ def of_matlab():
     cell[0], cell[1] = "first run", test
     parts = {"bench": {"runs": cell, "spectrum": numpy.array([1 + 2j, 3 - 1j])}}
     scipy.io.savemat(FOLDER / "v7.mat", parts, do_compression=True, oned_as="row")
-    table = numpy.stack([t, displacement, force], axis=1)
-    scipy.io.savemat(FOLDER / "v4.mat", {"record": table}, format="4")
     of_matlab_73()
 
 
@@ -135,18 +133,6 @@ def of_hdf5():
         file.create_dataset("test/chunks", data=force, chunks=(COUNT // 3,))
         for i in range(10):
             file[f"dense/{i}"] = i
-
-
-def of_parquet():
-    frame = pandas.DataFrame({"time": t, "displacement": displacement, "force": force.astype("f4")})
-    frame.to_parquet(FOLDER / "record.parquet")
-    frame["missing"] = [None if i % 5 == 2 else i for i in range(COUNT)]
-    frame["counts"] = counts["force"]
-    frame["at"] = pandas.Timestamp("2026-11-26") + pandas.to_timedelta(t, unit="s")
-    frame["note"] = "free text"
-    options = {"row_group_size": COUNT // 3, "data_page_size": 200}
-    frame.to_parquet(FOLDER / "paged.parquet", compression="gzip", data_page_version="2.0", **options)
-    frame[["time", "displacement", "force"]].to_parquet(FOLDER / "plain.parquet", compression=None, use_dictionary=False, **options)
 
 
 def of_sound():
@@ -214,5 +200,5 @@ if __name__ == "__main__":
     for folder, count in FOLDERS.items():
         folder.mkdir(exist_ok=True)
         make(folder, count)
-        for part in (*([text] if folder == HERE else []), of_numpy, of_spreadsheets, of_matlab, of_hdf5, of_parquet, of_sound, of_labview, of_universal):
+        for part in (*([text] if folder == HERE else []), of_numpy, of_spreadsheets, of_matlab, of_hdf5, of_sound, of_labview, of_universal):
             part()

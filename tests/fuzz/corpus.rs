@@ -13,7 +13,10 @@ pub fn seeds(target: &str) -> Vec<(String, Vec<u8>)> {
     assert!(!seeds.is_empty(), "the corpus of {target}");
     match target {
         "model" => seeds.extend(files("models")),
-        "channels" => seeds.extend(files("tests/formats")),
+        "channels" => {
+            seeds.extend(files("tests/formats"));
+            seeds.extend(files("tests/formats/storage"));
+        }
         "table" => {
             let cut = |(name, mut bytes): (String, Vec<u8>)| {
                 bytes.truncate(LONGEST);
@@ -33,9 +36,8 @@ fn files(folder: &str) -> Vec<(String, Vec<u8>)> {
     let folder: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
     let entries = fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
     let read = |path: PathBuf| (path.display().to_string(), fs::read(&path).expect("a file"));
-    entries
-        .map(|entry| read(entry.expect("an entry").path()))
-        .collect()
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    paths.filter(|path| path.is_file()).map(read).collect()
 }
 
 /// Long repetitive inputs, which are generated instead of stored.

@@ -3,20 +3,15 @@
 
 use kmcfit::Run;
 use kmcfit::config::values::{Count, Nodes};
-use kmcfit::config::{BuildMode, Model, ModelFile, Override, Sequence, build};
+use kmcfit::config::{BuildMode, ModelFile, Override, Sequence, build};
 use kmcfit::error::InputError;
+use kmcfit::fitting::fit_model;
 use kmcfit::formats::{self, recognise};
-use kmcfit::report::study::StudyDocument;
-use kmcfit::report::{DisplayUnits, FittedModel, RunAssessment, fit_claim, json, predict};
-use kmcfit::results::{
-    AnalysisJournal, CHECKPOINT, FIT_JOURNAL, FitJournal, Heading, OutputFolder, RESULT,
-    STUDY_JOURNAL, with_checksums,
-};
+use kmcfit::report::{CompletedFit, MODEL, RequestedFiles, predict};
+use kmcfit::results::OutputFolder;
 use kmcfit::tables::{ColumnName, Table, TableFormat, times};
-use kmcfit_core::internals::solvers::{Fit, Observer, fit_with_noise_watched};
+use kmcfit_core::internals::solvers::Observer;
 use kmcfit_core::internals::system::State;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -37,12 +32,10 @@ pub enum Verdict {
 pub static KINDS: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
 /// All targets, by the names of their folders in the corpus.
-pub const TARGETS: [(&str, Target); 9] = [
+pub const TARGETS: [(&str, Target); 7] = [
     ("model", model),
     ("table", table),
     ("run", run),
-    ("fit_journal", fit_journal),
-    ("study_journal", study_journal),
     ("yaml", yaml),
     ("override", overrides),
     ("sequence", sequence),
@@ -56,18 +49,9 @@ const TOO_MANY_NODES: usize = 1_000_000_000;
 /// Largest number of lines of each file of samples.
 const LINES: usize = 60;
 
-const METHODS: [&str; 4] = [
-    "lbfgs",
-    "gauss-newton",
-    "projected-gradient",
-    "steepest-descent",
-];
-
 /// Names, models and samples that the targets work on.
 struct Workshop {
     folder: TempDir,
-    /// For each method a model and its problem.
-    fits: Vec<(Heading, Model)>,
 }
 
 impl Workshop {
@@ -92,7 +76,7 @@ fn workshop() -> &'static Workshop {
             true => shipped.join("data"),
             false => shipped.join("../data"),
         };
-        for name in ["data", "models", "run", "fit", "study"] {
+        for name in ["data", "models"] {
             fs::create_dir(folder.path().join(name)).expect("a folder");
         }
         for entry in fs::read_dir(shipped).expect("the folder of samples") {
@@ -102,69 +86,29 @@ fn workshop() -> &'static Workshop {
             let name = path.file_name().expect("a name");
             fs::write(folder.path().join("data").join(name), lines.concat()).expect("room");
         }
-        let fits = METHODS.map(|method| small(folder.path(), method));
-        let workshop = Workshop {
-            folder,
-            fits: fits.into(),
-        };
+        let workshop = Workshop { folder };
         finish(&workshop);
         workshop
     })
 }
 
-/// A small problem on few nodes, for targets that read journals.
-fn small(folder: &Path, method: &str) -> (Heading, Model) {
-    let text = format!(
-        "format: 1\ntitle: Small\nexperiments:\n  - {{data: ../data/paper.csv, sigma: {{displacement: 0.1}}, \
-         initial: {{displacement: 3.3, velocity: 1.0}}}}\ngrid: {{method: midpoint, nodes: 16}}\nfunctions:\n  \
-         mass: {{basis: polynomial, degree: 1, start: 2.0, min: 0.1}}\n  damping: {{basis: constant, \
-         start: 1.0}}\n  stiffness: {{fixed: 1.0}}\nfit: {{method: {method}, \
-         stop: {{iterations: 5}}}}\n"
-    );
-    let text = match method {
-        "lbfgs" | "steepest-descent" => text.replace(", min: 0.1", ""),
-        _ => text,
-    };
-    let file = ModelFile::parse(folder.join("models/m.yaml"), text).expect("a model");
-    let heading = Heading {
-        // Making files durable takes most of the time.
-        checkpoint: Some(1e9),
-        ..Heading::new("fit", vec!["m.yaml".into()])
-    };
-    (heading, build(&file, BuildMode::Fit).expect("a problem"))
-}
-
-/// Fits a model with a journal.
-fn fitted(model: &Model, journal: &mut FitJournal) -> Fit {
-    let start = model.problem.start();
-    let mut observe = |_: &_| {};
-    let mut watch = Observer::new(&mut observe).with_checkpoints(journal);
-    let found = fit_with_noise_watched(&model.problem, &start, &model.settings, &mut watch);
-    found.expect("a motion").1
-}
-
-/// Writes the finished run.
+/// Writes the finished run of a small problem.
 fn finish(workshop: &Workshop) {
-    let (heading, model) = &workshop.fits[0];
-    let mut journal = FitJournal::begin(&workshop.path("fit"), heading).expect("room");
-    let fit = fitted(model, &mut journal);
-    let run_assessment = RunAssessment::of(model, &fit);
-    let finished = FittedModel {
-        model,
-        fit: &fit,
-        predictions: &[],
-        weights: None,
-        run_assessment: &run_assessment,
-        requested: heading.requested,
-        display: DisplayUnits::default(),
-        computed: Default::default(),
-    };
-    let folder = OutputFolder::prepare(&workshop.path("run"), fit_claim(model)).expect("a folder");
-    let stage = folder.stage().expect("room");
+    let text = "format: 1\ntitle: Small\nexperiments:\n  - {data: ../data/paper.csv, sigma: {displacement: 0.1}, \
+                initial: {displacement: 3.3, velocity: 1.0}}\ngrid: {method: midpoint, nodes: 16}\nfunctions:\n  \
+                mass: {basis: polynomial, degree: 1, start: 2.0}\n  damping: {basis: constant, \
+                start: 1.0}\n  stiffness: {fixed: 1.0}\nfit: {method: lbfgs, stop: {iterations: 5}}\n";
+    let file = ModelFile::parse(workshop.path("models/m.yaml"), text).expect("a model");
+    let model = build(&file, BuildMode::Fit).expect("a problem");
+    let found = fit_model(&model, &mut Observer::new(&mut |_| {})).expect("a motion");
+    let done = CompletedFit::of(found);
+    let finished = done.fitted(RequestedFiles::figures());
+    let folder = OutputFolder::prepare(&workshop.path("run"), "fit", []).expect("a folder");
     let document = finished.document();
-    finished.write(&stage, &document).expect("a run is written");
-    stage.write(RESULT, json(&document)).expect("room");
-    stage.commit().expect("a run");
+    folder.write(MODEL, text).expect("room");
+    let write = |name: &str, bytes: &[u8]| folder.write(name, bytes);
+    finished.write(&write, &document).expect("a run is written");
+    folder.commit(&document).expect("a run");
 }
 
 /// Inputs generated by the program, for files whose contents depend on the build.
@@ -179,32 +123,9 @@ pub fn made(target: &str) -> Vec<Vec<u8>> {
         ]
         .map(|name| fs::read(workshop.path("run").join(name)).expect("a run"))
         .into(),
-        "fit_journal" => (METHODS.iter().zip(&workshop.fits))
-            .map(|(method, (heading, model))| {
-                let folder = workshop.path("fit");
-                let heading = Heading {
-                    checkpoint: Some(0.0),
-                    ..heading.clone()
-                };
-                let mut journal = FitJournal::begin(&folder, &heading).expect("room");
-                fitted(model, &mut journal);
-                let read = |name| fs::read_to_string(folder.join(name)).expect("a journal");
-                // Without headings and checksums, which belong to this build.
-                let json = |text: &str| -> String {
-                    let lines = text.lines().skip(1);
-                    let json = lines.filter_map(|line| line.rsplit_once('\t'));
-                    json.map(|(json, _)| format!("{json}\n")).collect()
-                };
-                let (rows, standing) = (json(&read(FIT_JOURNAL)), json(&read(CHECKPOINT)));
-                format!("{method}\n{rows}{SEPARATOR}{standing}").into_bytes()
-            })
-            .collect(),
         _ => Vec::new(),
     }
 }
-
-/// Separator of journal and checkpoint.
-const SEPARATOR: &str = "---\n";
 
 /// Checks that a message is printable text and begins with its location.
 fn told(error: &InputError) -> Verdict {
@@ -369,9 +290,7 @@ fn columns(table: &Table) {
 
 /// A binary file of a data logger: its channels, and the tables made of them.
 pub fn channels(bytes: &[u8]) -> Verdict {
-    let any = recognise(Path::new("t"), bytes).ok().flatten();
-    // Version 4 of MATLAB is recognised by the ending of the name.
-    let path = Path::new(if any.is_some() { "t" } else { "t.mat" });
+    let path = Path::new("t");
     let format = match recognise(path, bytes) {
         Err(error) => return told(&error),
         Ok(None) => return Verdict::Refused,
@@ -426,104 +345,5 @@ pub fn run(bytes: &[u8]) -> Verdict {
             run.band("mass");
             Verdict::Accepted
         }
-    }
-}
-
-/// Unfinished work of a killed fit: the name of a method, the lines of its journal after the heading, and that of its checkpoint,
-/// all without checksums. The fit continues from it and ends with a status.
-pub fn fit_journal(bytes: &[u8]) -> Verdict {
-    let folder = workshop().path("fit");
-    let text = bytes.to_vec();
-    let method = METHODS.iter().position(|m| text.starts_with(m.as_bytes()));
-    let body: Vec<u8> = match text.iter().position(|b| *b == b'\n') {
-        Some(end) => text[end + 1..].to_vec(),
-        None => text,
-    };
-    let mark = SEPARATOR.as_bytes();
-    let cut = body.windows(mark.len()).position(|w| w == mark);
-    let (rows, standing) = match cut {
-        Some(at) => (&body[..at], &body[at + mark.len()..]),
-        None => (&body[..], &[][..]),
-    };
-    let (heading, model) = &workshop().fits[method.unwrap_or(0)];
-    for (name, lines) in [(FIT_JOURNAL, rows), (CHECKPOINT, standing)] {
-        let text = with_checksums(heading, lines).expect("a heading");
-        fs::write(folder.join(name), text).expect("room");
-    }
-    match FitJournal::resume(&folder, heading) {
-        Err(error) => told(&error),
-        Ok(mut journal) => {
-            let found = fitted(model, &mut journal);
-            assert!(found.best.evaluation.cost.is_finite());
-            assert!(found.best.evaluation.nodal.mass.iter().all(|m| *m > 0.0));
-            Verdict::Accepted
-        }
-    }
-}
-
-/// Lines of the journal of a study after the heading: the recalled analyses are printed and drawn.
-pub fn study_journal(bytes: &[u8]) -> Verdict {
-    let folder = workshop().path("study");
-    let heading = Heading::new("study", vec!["m.yaml".into()]);
-    let text = with_checksums(&heading, bytes).expect("a heading");
-    fs::write(folder.join(STUDY_JOURNAL), text).expect("room");
-    let mut journal = match AnalysisJournal::resume(&folder, STUDY_JOURNAL, &heading) {
-        Ok(journal) => journal,
-        Err(error) => return told(&error),
-    };
-    let mut document = StudyDocument {
-        fit: kept::<Result<_, String>>(&mut journal, "fit").and_then(Result::ok),
-        sensitivity: kept(&mut journal, "sensitivity"),
-        bands: kept(&mut journal, "bands"),
-        candidates: kept(&mut journal, "candidates").unwrap_or_default(),
-        equivalent_systems: kept(&mut journal, "equivalent systems").unwrap_or_default(),
-        multistart: kept(&mut journal, "starts"),
-        ..StudyDocument::default()
-    };
-    let profile = kept::<Result<_, String>>(&mut journal, "profile 0");
-    document.profiles.extend(profile.and_then(Result::ok));
-    if let Some(Ok(constancy_test)) = kept::<Result<_, String>>(&mut journal, "constancy test") {
-        document.constancy_test = constancy_test;
-    }
-    if let Some(Ok(refits)) = kept::<Result<_, String>>(&mut journal, "bootstrap") {
-        document.bootstrap = refits;
-    }
-    if let Some((extremes, predictions)) = kept(&mut journal, "extremes") {
-        document.extremes = extremes;
-        document.predictions = predictions;
-    }
-    document.text();
-    if PIECES.iter().any(|name| journal.has(name)) {
-        let claim = StudyDocument::claim().journals(&[STUDY_JOURNAL]);
-        let out = OutputFolder::prepare(&folder, claim).expect("a folder");
-        document.write(&out, &workshop().fits[0].1).expect("room");
-    }
-    Verdict::Accepted
-}
-
-/// Names of the analyses.
-const PIECES: [&str; 10] = [
-    "fit",
-    "spectrum",
-    "bands",
-    "candidates",
-    "equivalents",
-    "starts",
-    "profile 0",
-    "constancy test",
-    "bootstrap",
-    "extremes",
-];
-
-fn kept<T: Serialize + DeserializeOwned>(journal: &mut AnalysisJournal, name: &str) -> Option<T> {
-    let none = || -> Option<T> { None };
-    let has = journal.has(name);
-    match has {
-        true => journal
-            .analysis(name, none, || false)
-            .ok()
-            .flatten()
-            .flatten(),
-        false => None,
     }
 }

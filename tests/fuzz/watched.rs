@@ -13,7 +13,7 @@ static MEMORY: PeakAlloc = PeakAlloc;
 const HANGS: Duration = Duration::from_secs(60);
 
 /// Memory that reading may use: bytes per byte of input, and bytes independent of the input. Both are documented in
-/// `docs/input_errors.md`.
+/// `docs/commands.md`.
 const PER_BYTE: usize = 256;
 const BESIDES: usize = 128 << 20;
 

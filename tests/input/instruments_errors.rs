@@ -12,10 +12,6 @@ fn with(text: &str, format: &TableFormat) -> String {
     error.unwrap_err().to_string()
 }
 
-fn sample_table(text: &str, index: usize) -> String {
-    parsed(text).samples(index).unwrap_err().to_string()
-}
-
 #[test]
 fn columns() {
     let find = |text: &str, column: ColumnName| parsed(text).find(&column).unwrap_err().to_string();
@@ -45,37 +41,6 @@ fn columns() {
       found: `t`
       expected: a number from 1 to 2
       hint: the file has no column names: give the column by its number
-    ");
-}
-
-#[test]
-fn fields() {
-    assert_snapshot!(sample_table("t;y\n0;1,5\n1;off\n", 1), @"
-    t.csv:3: column `y`: not a number
-      found: `off`
-      expected: a finite number, or an empty field for a missing sample
-    ");
-    assert_snapshot!(sample_table("t;y\n0;1,5\n1;1.5\n", 1), @"
-    t.csv:2: column `y`: not a number
-      found: `1,5`
-      expected: a finite number, or an empty field for a missing sample
-      hint: write numbers with a decimal point, not a comma
-    ");
-    assert_snapshot!(sample_table("t,y\n0,1.5\n1,-inf\n", 1), @"
-    t.csv:3: column `y`: not a finite number
-      found: `-inf`
-      expected: a finite number, or an empty field for a missing sample
-      hint: leave the field empty for a missing sample or an overload
-    ");
-    assert_snapshot!(sample_table("0,1.5\n1,off\n", 1), @"
-    t.csv:2: column `2`: not a number
-      found: `off`
-      expected: a finite number, or an empty field for a missing sample
-    ");
-    assert_snapshot!(parsed("0,1.5\n1,\n").values(1).unwrap_err(), @"
-    t.csv:2: column `2`: a number is missing
-      found: nothing
-      expected: a finite number
     ");
 }
 

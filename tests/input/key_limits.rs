@@ -100,7 +100,6 @@ const BEYOND: &[(&str, &str)] = &[
     ("linear-mass", "study={starts: 0}"),
     ("linear-mass", "study={starts: 2, spread: 1}"),
     ("linear-mass", "study={starts: 2, merge_tolerance: 0}"),
-    ("linear-mass", "study={bootstrap: 10}"),
     (
         "linear-mass",
         "study={profiles: [{function: mass, at: 99}]}",
@@ -122,7 +121,10 @@ const ALONE: &[(&str, &str)] = &[
         "knots",
         "functions.mass.penalty={kind: tv, weight: 1, order: 1}",
     ),
-    ("knots", "functions.mass.penalty={kind: tv, weight: gcv}"),
+    (
+        "knots",
+        "functions.mass.penalty={kind: tv, weight: discrepancy}",
+    ),
     (
         "knots",
         "functions.mass.penalty={kind: tikhonov, order: 1, weight: discrepancy}",

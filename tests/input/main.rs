@@ -1,7 +1,6 @@
 //! Reading of model files and tables: valid inputs, and all messages about invalid ones.
 #![allow(clippy::result_large_err, reason = "as in the library")]
 
-mod arbitrary;
 mod constraint_messages;
 mod input_errors;
 mod instruments;
@@ -10,8 +9,7 @@ mod key_documentation;
 mod key_limits;
 mod model;
 mod model_errors;
-#[path = "../../crates/kmcfit-core/tests/common/properties.rs"]
-mod properties;
+mod storage;
 mod table;
 mod table_errors;
 mod units;

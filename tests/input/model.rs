@@ -119,8 +119,8 @@ fn every_key_is_read() {
 fn shapes_limits_and_penalties_are_read() {
     let text = SHORT
         .replace("mass: {basis: nodal}", "mass: {basis: piecewise-linear, knots: 11, start: [1, 2.5], min: 0.1, max: {data: m.csv, column: m}}")
-        .replace("damping: {basis: nodal}", "damping: {basis: b-spline, knots: [0, 1.5, 3], penalty: [{kind: tikhonov, order: 1, weight: l-curve}, {kind: tv, weight: 2}]}")
-        .replace("stiffness: {basis: nodal}", "stiffness: {basis: polynomial, degree: 3, penalty: [{kind: tikhonov, order: 0, weight: 1e-3, reference: 1}, {kind: tikhonov, order: 2, weight: gcv}]}");
+        .replace("damping: {basis: nodal}", "damping: {basis: b-spline, knots: [0, 1.5, 3], penalty: [{kind: tikhonov, order: 1, weight: discrepancy}, {kind: tv, weight: 2}]}")
+        .replace("stiffness: {basis: nodal}", "stiffness: {basis: polynomial, degree: 3, penalty: [{kind: tikhonov, order: 0, weight: 1e-3, reference: 1}, {kind: tikhonov, order: 2, weight: reml}]}");
     let functions = ModelFile::parse("m.yaml", text).unwrap().spec.functions;
 
     let mass = functions.mass;
@@ -146,7 +146,7 @@ fn shapes_limits_and_penalties_are_read() {
         reference,
     };
     let two: Vec<_> = damping.penalty.iter().flat_map(|s| s.iter()).collect();
-    let slope = tikhonov(1, Weight::Rule(WeightRule::LCurve), None);
+    let slope = tikhonov(1, Weight::Rule(WeightRule::Discrepancy), None);
     let variation = PenaltySpec {
         kind: PenaltyKind::TotalVariation,
         order: None,
@@ -161,7 +161,7 @@ fn shapes_limits_and_penalties_are_read() {
     let many: Vec<_> = stiffness.penalty.iter().flat_map(|s| s.iter()).collect();
     let reference = NumberOrColumn::Number(Number(1.0));
     let value = tikhonov(0, Weight::Number(Number(1e-3)), Some(reference));
-    let curvature = tikhonov(2, Weight::Rule(WeightRule::Gcv), None);
+    let curvature = tikhonov(2, Weight::Rule(WeightRule::RestrictedLikelihood), None);
     let expected = [("[0]".to_owned(), &value), ("[1]".to_owned(), &curvature)];
     assert_eq!(many, expected);
 }

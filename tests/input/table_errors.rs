@@ -154,32 +154,6 @@ fn fields() {
 }
 
 #[test]
-fn ragged_rows() {
-    assert_snapshot!(message("t,y\n0,1\n1\n"), @"
-    t.csv:3: the row does not fit the column names
-      found: 1 field
-      expected: 2 fields, one per column
-    ");
-    assert_snapshot!(message("t,y\n0,1\n\n1,2,3\n"), @"
-    t.csv:4: the row does not fit the column names
-      found: 3 fields
-      expected: 2 fields, one per column
-    ");
-    assert_snapshot!(message("t,y\n0,5,1,5\n"), @"
-    t.csv:2: the row does not fit the column names
-      found: 4 fields
-      expected: 2 fields, one per column
-      hint: write numbers with a decimal point, not a comma
-    ");
-    assert_snapshot!(message("t,y\n\"0,1\n1,2\n"), @"
-    t.csv:2: the row does not fit the column names
-      found: 1 field
-      expected: 2 fields, one per column
-      hint: a quote that is opened in this row is not closed in it
-    ");
-}
-
-#[test]
 fn spacing() {
     let increasing = |text: &str| {
         shown(times::increasing(

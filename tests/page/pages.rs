@@ -1,7 +1,7 @@
 //! Pages for the tests, each generated once.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 use std::sync::OnceLock;
 use tempfile::TempDir;
@@ -139,9 +139,4 @@ pub const PAGES: [&str; 5] = [
 pub fn pages() -> &'static Pages {
     static MADE: OnceLock<Pages> = OnceLock::new();
     MADE.get_or_init(Pages::make)
-}
-
-/// A folder of the repository.
-pub fn repository(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }

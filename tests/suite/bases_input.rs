@@ -128,7 +128,7 @@ fn limits_and_penalties_are_accepted() {
     for text in [
         "min: 0.1, max: {data: m.csv, column: m_kg}",
         "min: 1, max: 1",
-        "penalty: {kind: tikhonov, order: 2, weight: l-curve}",
+        "penalty: {kind: tikhonov, order: 2, weight: 2}",
         "penalty: [{kind: tikhonov, order: 0, weight: 1, reference: {data: m.csv, column: m_kg}}, {kind: tikhonov, order: 1, weight: 0}]",
         "penalty: {kind: tv, weight: 0.5}",
     ] {
@@ -500,9 +500,9 @@ fn penalties() {
       found: -1
       expected: a number, 0 or more
     ");
-    assert_snapshot!(with("penalty: {kind: tv, weight: gcv}"), @"
+    assert_snapshot!(with("penalty: {kind: tv, weight: discrepancy}"), @"
     m.yaml:5:62: functions.mass.penalty.weight: the weight of total variation has the rule `bic` only
-      found: `gcv`
+      found: `discrepancy`
       expected: `bic`, or a finite number
     ");
     assert_snapshot!(with("variation: 1"), @"

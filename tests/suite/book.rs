@@ -34,7 +34,7 @@ fn tour() -> &'static Tour {
 fn commands_print_what_is_shown() {
     assert!(tour().steps.len() >= 8, "{}", tour().steps.len());
     tour().holds();
-    for name in ["records", "input_errors", "paper", "studies"] {
+    for name in ["records", "paper", "studies"] {
         let tour = Tour::of(&page(&format!("docs/{name}.md")));
         assert!(!tour.steps.is_empty(), "{name}");
         tour.holds();
@@ -251,13 +251,11 @@ fn links(text: &str) -> Vec<String> {
 #[test]
 fn the_summary_lists_every_page() {
     let listed: BTreeSet<_> = pages().into_iter().collect();
-    for folder in ["docs", "docs/long"] {
-        for entry in fs::read_dir(repository(folder)).expect("a folder") {
-            let name = entry.expect("an entry").file_name();
-            let name = format!("{folder}/{}", name.to_string_lossy());
-            if name.ends_with(".md") && name != "docs/SUMMARY.md" {
-                assert!(listed.contains(&name), "{name}");
-            }
+    for entry in fs::read_dir(repository("docs")).expect("a folder") {
+        let name = entry.expect("an entry").file_name();
+        let name = format!("docs/{}", name.to_string_lossy());
+        if name.ends_with(".md") && name != "docs/SUMMARY.md" {
+            assert!(listed.contains(&name), "{name}");
         }
     }
 }
@@ -296,44 +294,4 @@ fn links_lead_somewhere() {
         }
     }
     assert!(count > 50, "{count}");
-}
-
-/// The names between backquotes in a text.
-fn quoted(text: &str) -> impl Iterator<Item = &str> {
-    text.split('`').skip(1).step_by(2)
-}
-
-/// True if a test exists in the tests of reliability: a path, `module::function`, a module or a function.
-fn is_test(name: &str) -> bool {
-    let folder = repository("tests/reliability");
-    let source = |module: &str| fs::read_to_string(folder.join(format!("{module}.rs")));
-    let has = |source: &str, function: &str| source.contains(&format!("fn {function}("));
-    if name.contains('/') {
-        return repository(name).exists();
-    }
-    match name.split_once("::") {
-        Some((module, function)) => source(module).is_ok_and(|source| has(&source, function)),
-        None => {
-            let files = fs::read_dir(&folder).expect("a folder").flatten();
-            let mut sources = files.filter_map(|file| fs::read_to_string(file.path()).ok());
-            source(name).is_ok() || sources.any(|source| has(&source, name))
-        }
-    }
-}
-
-#[test]
-fn each_promise_names_its_tests() {
-    let page = page("docs/crash_safety.md");
-    let rows = page.lines().filter(|line| line.starts_with("| ")).skip(1);
-    let mut count = 0;
-    for row in rows {
-        let (_, tests) = row.trim_end_matches(" |").rsplit_once(" | ").expect(row);
-        assert!(quoted(tests).count() > 0, "{row}");
-        for name in quoted(tests).filter(|name| !name.contains(' ')) {
-            assert!(is_test(name), "{name}");
-            count += 1;
-        }
-    }
-    assert!(count > 20, "{count}");
-    assert!(!is_test("outputs::no_such_test") && !is_test("no_such_test"));
 }

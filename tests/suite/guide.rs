@@ -10,8 +10,8 @@ use pulldown_latex::config::DisplayMode;
 use pulldown_latex::{Parser, RenderConfig, Storage, push_mathml};
 use std::fs;
 
-/// The pages; the last one is included in the front page.
-const PAGES: [&str; 4] = ["tutorial", "choosing", "theory", "equations"];
+/// The pages.
+const PAGES: [&str; 3] = ["tutorial", "choosing", "theory"];
 
 #[test]
 fn the_guide_is_that_of_the_docs() {
@@ -158,10 +158,7 @@ fn links(line: &str) -> String {
     while let Some((before, label, target, after)) = next_link(rest) {
         text.push_str(before);
         let name = target.strip_suffix(".md").unwrap_or_default();
-        if name == "equations" {
-            // Part of the front page.
-            text.push_str(&format!("[{label}](crate)"));
-        } else if PAGES.contains(&name) {
+        if PAGES.contains(&name) {
             text.push_str(&format!("[{label}](crate::guide::{name})"));
         } else if target.starts_with("https://") || target.starts_with('#') {
             text.push_str(&format!("[{label}]({target})"));
@@ -185,8 +182,8 @@ const KEYS: &str = "# Key reference
 
 Every key of a model file: a table for each map, with the type and the allowed values, the unit, the default and the
 meaning. *Range* limits a number. *Needs* names the keys or values without which the key is refused or has no effect.
-Numbers are in SI units. A key without default is optional unless it is marked as required. [Model files](model_files.md) and
-[Records](records.md) have examples; `kmcfit explain KEY` prints one entry, `kmcfit schema` the JSON schema.
+Numbers are in SI units; a column is a name, or a number from 1. A key without default is optional unless it is marked as
+required. [Model files](model_files.md) and [Records](records.md) have examples; `kmcfit explain KEY` prints one entry.
 
 This page is generated from the source of the reader.
 ";
@@ -265,15 +262,15 @@ fn value(kind: ValueType, words: &mut Vec<&(&str, &str)>) -> String {
         ValueType::Number => "number".into(),
         ValueType::Count => "integer".into(),
         ValueType::Text => "text".into(),
-        ValueType::Bool => "true or false".into(),
-        ValueType::Column => "column: name, or number from 1".into(),
+        ValueType::Bool => "boolean".into(),
+        ValueType::Column => "column".into(),
         ValueType::Word(word) => format!("`{word}`"),
         ValueType::Choice(choices) => {
             words.extend(choices);
             let names = choices.iter().map(|(word, _)| format!("`{word}`"));
             names.collect::<Vec<_>>().join(", ")
         }
-        ValueType::Map(group) => format!("map [{0}](#{0})", group.name),
+        ValueType::Map(group) => format!("[{0}](#{0})", group.name),
         ValueType::List(inner) => format!("list of: {}", value(*inner, words)),
         ValueType::AnyOf(kinds) => {
             let kinds: Vec<String> = kinds.iter().map(|kind| value(*kind, words)).collect();

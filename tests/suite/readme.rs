@@ -14,10 +14,7 @@ fn the_first_block_is_two_commands() {
     let blocks = blocks(&readme());
     let first = blocks.first().expect("a block");
     assert_eq!(first.language, "sh");
-    assert_eq!(
-        first.lines,
-        ["cargo run --release -- fit models/paper.yaml", "cargo test"]
-    );
+    assert_eq!(first.lines, ["cargo run --release -- demo", "cargo test"]);
     assert_eq!(blocks_in(&readme(), "sh").len(), 1);
 }
 
@@ -25,7 +22,7 @@ fn the_first_block_is_two_commands() {
 #[test]
 fn it_is_short() {
     let lines = readme().lines().count();
-    assert!(lines <= 250, "{lines} lines");
+    assert!(lines <= 200, "{lines} lines");
 }
 
 #[test]

@@ -216,37 +216,6 @@ fn shapes_of_forces() {
     }
 }
 
-/// A force from a digital converter, held between samples: taken as held it is exact, taken as linear
-/// it comes half a sample early.
-#[test]
-fn the_interpolation_of_a_force_affects_the_fit() {
-    let rate = 25.0;
-    let sample = |k: f64| 5.0 * (TAU * 1.7 * k / rate).sin() + 3.0 * (TAU * 0.9 * k / rate).cos();
-    let held = |t: f64| sample((t * rate).floor());
-    let y = motion(rate, 201, &held, &nothing);
-    let mut text = String::from("t_s,y_m,f_N\n");
-    for (i, y) in y.iter().enumerate() {
-        let _ = writeln!(text, "{},{y},{}", i as f64 / rate, sample(i as f64));
-    }
-    let errors = ["hold", "linear"].map(|interpolation| {
-        let experiment = format!(
-            "    columns: {{displacement: y_m, force: f_N}}
-    force: {{interpolation: {interpolation}}}
-    sigma: {{displacement: 1e-6}}
-    initial: {{displacement: 0.02, velocity: 0.0}}"
-        );
-        // Sixteen steps between two samples: the error of the stepper is negligible.
-        let mass = "{basis: constant, start: 3.0}";
-        error(&fitted_on(&text, &experiment, mass, "grid: {nodes: 3201}").1)
-    });
-    // The remaining error of the first is the rounding error of a simulation on other steps; a published benchmark reports a factor of
-    // 30 between the two.
-    assert!(
-        errors[0] < 1e-5 && errors[1] > 30.0 * errors[0],
-        "{errors:?}"
-    );
-}
-
 /// A base whose displacement was measured, and the absolute displacement of the mass.
 #[test]
 fn a_base_that_moves() {
@@ -265,32 +234,6 @@ fn a_base_that_moves() {
     let (_, run) = fitted(&text, experiment, KNOWN);
     // The relative error of the spline's second derivative is (w h)^2 / 12 = 1e-4.
     assert!(error(&run) < 2e-4, "{}", error(&run));
-}
-
-/// Records that end at different times, on an automatic grid.
-#[test]
-fn the_grid_follows_the_frequency() {
-    let y = motion(200.0, 801, &nothing, &nothing);
-    let mut text = String::from("t_s,y_m\n");
-    for (i, y) in y.iter().enumerate() {
-        if i % 7 != 3 {
-            let _ = writeln!(text, "{},{y}", i as f64 / 200.0);
-        }
-    }
-    let experiment = "    initial: {displacement: 0.02, velocity: 0.0}";
-    let (model, run) = fitted(&text, experiment, KNOWN);
-    assert_eq!(model.automatic.len(), 1, "{:?}", model.automatic);
-    assert!(error(&run) < 1e-5, "{}", error(&run));
-    let half = model
-        .problem
-        .on_half_step(&run.best.evaluation)
-        .unwrap()
-        .unwrap();
-    // The target phase error, 1e-4 rad, times the amplitude.
-    let largest = half.changes[0][0]
-        .iter()
-        .fold(0.0f64, |m, d| m.max(d.abs()));
-    assert!(largest < 1e-4 * 0.02, "{largest}");
 }
 
 /// The continuous adjoint of nonlinear terms, a moving base and an unknown initial state agrees with
@@ -357,22 +300,4 @@ fn samples_that_are_missing_at_the_ends() {
     assert_eq!(model.problem.system.grid.start(), 0.0);
     assert_eq!(model.problem.system.grid.duration(), 4.0);
     assert!(error(&run) < 1e-5, "{}", error(&run));
-}
-
-/// Decimation to few samples does not make the grid coarse.
-#[test]
-fn decimation_does_not_coarsen_the_grid() {
-    let y = motion(200.0, 801, &nothing, &nothing);
-    let mut text = String::from("t_s,y_m\n");
-    for (i, y) in y.iter().enumerate() {
-        let _ = writeln!(text, "{},{y}", i as f64 / 200.0);
-    }
-    let experiment = "    decimate: 20
-    initial: estimate";
-    let (model, run) = fitted(&text, experiment, KNOWN);
-    let samples = model.problem.sample_count();
-    let nodes = model.problem.system.grid.nodes();
-    assert!(nodes > 2 * samples, "{nodes} nodes, {samples} samples");
-    // The edges of the filter leave errors of some 1e-3 of the response at the ends of the record.
-    assert!(error(&run) < 5e-3, "{}", error(&run));
 }

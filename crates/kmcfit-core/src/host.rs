@@ -1,10 +1,7 @@
-//! Services of the host, provided by the application: a clock, the memory limit, the permission to start a thread, a display of
-//! progress, and a request to end.
+//! Services of the host, provided by the application: a clock, a display of progress, and a request to end.
 //!
-//! Without a host, a fit has no time limit, timings are zero, memory is unlimited, threads may start, no progress is shown, and no
-//! analysis ends early.
+//! Without a host, a fit has no time limit, timings are zero, no progress is shown, and no analysis ends early.
 
-use std::io;
 use std::sync::OnceLock;
 use std::time::Duration;
 
@@ -13,10 +10,6 @@ use std::time::Duration;
 pub struct Host {
     /// Time since any fixed instant; never decreasing.
     pub clock: fn() -> Duration,
-    /// True if so many more bytes may be allocated.
-    pub has_memory: fn(u64) -> bool,
-    /// Permission to start a thread; an error counts as a refusal by the operating system.
-    pub may_start_thread: fn() -> io::Result<()>,
     /// Display of progress: number of finished jobs and number of all jobs of an analysis. Called from any thread, after each job; not
     /// necessarily in increasing order.
     pub progress: fn(usize, usize),
@@ -29,19 +22,6 @@ static HOST: OnceLock<Host> = OnceLock::new();
 /// Sets the functions of the host for the rest of the process; later calls have no effect.
 pub fn set_host(host: Host) {
     let _ = HOST.set(host);
-}
-
-/// True if so many more bytes may be allocated; always true without a host.
-pub(crate) fn has_memory(bytes: u64) -> bool {
-    HOST.get().is_none_or(|host| (host.has_memory)(bytes))
-}
-
-/// Permission of the host to start a thread.
-///
-/// # Errors
-/// The refusal of the host.
-pub(crate) fn may_start_thread() -> io::Result<()> {
-    HOST.get().map_or(Ok(()), |host| (host.may_start_thread)())
 }
 
 /// Shows the number of finished jobs of all.
@@ -63,8 +43,6 @@ pub(crate) fn provide_clock() {
         std::sync::LazyLock::new(std::time::Instant::now);
     set_host(Host {
         clock: || START.elapsed(),
-        has_memory: |_| true,
-        may_start_thread: || Ok(()),
         progress: |_, _| {},
         is_interrupted: || false,
     });

@@ -12,7 +12,7 @@
 //! 7. `solvers`: steepest descent, L-BFGS, projected gradient, Gauss–Newton, the equation error; starting points, the
 //!    choice of a weight.
 //! 8. `identifiability`: what records can determine, confidence bands, experiment design; `study`: profiles,
-//!    equivalent and extreme systems, multistart, constancy test, bootstrap, prediction; `assessment`: tests of a fit.
+//!    equivalent and extreme systems, multistart, prediction; `assessment`: tests of a fit.
 //! 9. `builder`: a problem in a few lines of Rust.
 //!
 //! Beside these, `diagnostics` has tests of residuals, `noise` correlations of noise, `signal` interpolation, excitation, filters
@@ -103,7 +103,7 @@ pub use solvers::{
 };
 // Inference.
 pub use assessment::{CoarseBasis, FitAssessment, FitWarning, Unidentified};
-pub use identifiability::{BandSettings, Bands, classify_functions, structural_rank};
+pub use identifiability::{Bands, classify_functions, structural_rank};
 pub use study::{Profile, ProfileSettings, Target, profile};
 // Services of the host.
 pub use host::{Host, set_host};

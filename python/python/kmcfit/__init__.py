@@ -39,7 +39,7 @@ from ._functions import (
 )
 from ._model import Model, fit_model, init
 from ._problem import Problem
-from ._study import Candidate, Direction, Extremes, Profile, Sensitivity, Study, StudyFinding
+from ._study import Candidate, Extremes, Profile, Sensitivity, Study, StudyFinding
 
 __version__: str = _kmcfit.version()
 
@@ -49,7 +49,6 @@ __all__ = [
     "Comparison",
     "Constant",
     "Curve",
-    "Direction",
     "Error",
     "Estimate",
     "Estimates",

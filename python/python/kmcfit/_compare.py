@@ -21,8 +21,7 @@ class Comparison:
         The document of the comparison.
     """
 
-    def __init__(self, fits: Dict[str, Fit], text: str, document: str, page: str) -> None:
-        self._fits = fits
+    def __init__(self, text: str, document: str, page: str) -> None:
         self._text = text
         self._page = page
         self.result: Dict[str, Any] = json.loads(document)
@@ -49,12 +48,6 @@ class Comparison:
 
         return pandas.json_normalize(self.runs).set_index("name")
 
-    def plot(self, quantity: str = "stiffness") -> Any:
-        """A figure of matplotlib with a quantity of all fits over time."""
-        from ._plot import figure
-
-        return figure(self._fits, [quantity])
-
 
 def compare(fits: Mapping[str, Fit]) -> Comparison:
     """Compares fits, of the same records for a model selection.
@@ -72,4 +65,4 @@ def compare(fits: Mapping[str, Fit]) -> Comparison:
             run = os.path.join(folder, str(i))
             fit._write(run)
             runs.append((str(name), run))
-        return Comparison(dict(fits), *_kmcfit.compare(runs))
+        return Comparison(*_kmcfit.compare(runs))

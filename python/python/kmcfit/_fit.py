@@ -16,7 +16,7 @@ from ._curve import Curve
 from ._errors import InputError, did_you_mean, unknown_keyword
 from ._estimates import Estimates, Verdict, texts
 from ._functions import plain
-from ._page import first_screen, read_files, write_files
+from ._page import Drawing, first_screen, read_files, write_files
 from ._study import Study
 
 #: Quantities over time in `functions.csv`.
@@ -54,6 +54,8 @@ class Fit:
 
     _raw: Optional["_kmcfit.RawFit"]
     _files: Optional[Dict[str, bytes]]
+    #: Folder of an opened run.
+    _folder: Optional[str] = None
 
     def __init__(self) -> None:
         raise TypeError("a Fit is made by `Model.fit`, `fit_model` or `open`")
@@ -69,9 +71,9 @@ class Fit:
         return fit
 
     @classmethod
-    def _opened(cls, text: str, files: Dict[str, bytes]) -> "Fit":
+    def _opened(cls, text: str, folder: str) -> "Fit":
         fit = cls.__new__(cls)
-        fit.__dict__.update(_raw=None, _files=files, _cache={"json": text})
+        fit.__dict__.update(_raw=None, _files=read_files(folder), _folder=os.path.abspath(folder), _cache={"json": text})
         return fit
 
     # Documents.
@@ -211,7 +213,7 @@ class Fit:
             return _table.columns(_kmcfit.simulate(run, paths["force"], paths["base"], (state[0], state[1]), wanted))
 
     def save(
-        self, folder: Union[str, "os.PathLike[str]"], *, report: bool = True, tables: bool = False, draws: int = 0
+        self, folder: Union[str, "os.PathLike[str]"], *, report: bool = True, tables: bool = False
     ) -> None:
         """Writes the run into a folder: the files of ``kmcfit fit --out FOLDER``.
 
@@ -225,11 +227,9 @@ class Fit:
             With figures and page.
         tables : bool
             A row for every node in the tables over time.
-        draws : int
-            Number of draws from the distribution of the estimates in ``draws.csv``.
         """
         if self._raw is not None:
-            self._raw.save(os.fspath(folder), report, tables, draws)
+            self._raw.save(os.fspath(folder), report, tables)
             return
         write_files(folder, self._files or {})
 
@@ -244,10 +244,7 @@ class Fit:
         starts: Optional[int] = None,
         spread: Optional[float] = None,
         merge_tolerance: Optional[float] = None,
-        bootstrap: Optional[int] = None,
-        noise: Optional[str] = None,
         equivalent_systems: Optional[Sequence[Mapping[str, Any]]] = None,
-        constancy_test: Optional[bool] = None,
         candidates: Optional[Sequence[Mapping[str, Any]]] = None,
         threads: Optional[int] = None,
         **unknown: Any,
@@ -260,7 +257,7 @@ class Fit:
         Parameters
         ----------
         confidence : float
-            Confidence level of bands, profiles, extremes and bootstrap intervals; 0.95.
+            Confidence level of bands, profiles and extremes; 0.95.
         seed : int
             Seed of all random numbers; 1.
         profiles : list of dict
@@ -272,12 +269,8 @@ class Fit:
         starts : int
             Number of fits from random starting points, within a factor `spread` of the start; minima within `merge_tolerance` count as
             one.
-        bootstrap : int
-            Number of refits of resampled records, with ``noise="parametric"`` or ``"residual"``.
         equivalent_systems : list of dict
             Masses of equivalent systems, e.g. ``[{"name": "constant mass", "mass": 1.0}]``.
-        constancy_test : bool
-            Likelihood-ratio test of each function against a constant.
         candidates : list of dict
             Candidate experiments, e.g. ``[{"name": "again", "initial": {"displacement": 0.01, "velocity": 0.0}}]``.
         threads : int
@@ -296,10 +289,7 @@ class Fit:
             "starts": starts,
             "spread": spread,
             "merge_tolerance": merge_tolerance,
-            "bootstrap": bootstrap,
-            "noise": noise,
             "equivalent_systems": equivalent_systems,
-            "constancy_test": constancy_test,
             "candidates": candidates,
         }
         for word in unknown:
@@ -312,65 +302,36 @@ class Fit:
             if self._raw is not None:
                 findings, text, is_interrupted = _kmcfit.study(self._raw, out, changes, threads)
             else:
-                run = os.path.join(folder, "run")
-                write_files(run, self._files or {})
-                # A run of arrays has its model with it.
-                own = os.path.join(run, "model.yaml")
-                model = own if os.path.exists(own) else self.result["model"]["file"]
-                findings, text, is_interrupted = _kmcfit.study_run(run, model, out, changes, threads)
+                run = self._folder or os.path.join(folder, "run")
+                if not os.path.isdir(run):
+                    write_files(run, self._files or {})
+                findings, text, is_interrupted = _kmcfit.study_run(run, out, changes, threads)
             if is_interrupted:
                 import warnings
 
                 warnings.warn("the study was interrupted; it has the analyses finished so far", RuntimeWarning, stacklevel=2)
             return Study(findings, text, read_files(out))
 
-    def plot(self, quantities: Optional[Sequence[str]] = None) -> Any:
-        """A figure of matplotlib: the coefficients that vary (or `quantities`) with their 95 % bands."""
-        from ._plot import figure
+    def plot(self, figure: str = "functions") -> Drawing:
+        """A figure of the run, by default the coefficients with their 95 % bands; others are `ratios`, `channel`, `residuals`, ...
 
-        return figure({"": self}, list(quantities or self._varying()))
+        Raises
+        ------
+        InputError
+            If the run has no such figure.
+        """
+        files = self._run()
+        drawing = files.get(f"figures/{figure}.svg")
+        if drawing is None:
+            names = [name[8:-4] for name in files if name.startswith("figures/")]
+            raise InputError("no such figure", "Fit.plot", repr(figure), "one of: " + ", ".join(names))
+        return Drawing(drawing.decode())
 
     def to_pandas(self) -> Any:
         """Curves over time as a DataFrame of pandas, indexed by the time in s."""
         import pandas  # type: ignore[import-untyped,unused-ignore]
 
         return pandas.DataFrame(self.functions).set_index("t_s")
-
-    def to_xarray(self) -> Any:
-        """Curves over time as a Dataset of xarray, with units and the ends of the intervals."""
-        import xarray
-
-        data, names = {}, self._curve_names()
-        for name in names:
-            curve = self.curve(name)
-            data[name] = ("time", curve.values, {"units": curve.unit})
-            if curve._band is not None:
-                for end, values in zip(("low95", "high95"), curve._band):
-                    data[f"{name}_{end}"] = ("time", values, {"units": curve.unit})
-        return xarray.Dataset(data, coords={"time": ("time", self.functions["t_s"], {"units": "s"})})
-
-    def draws(self, number: int = 4000) -> Dict[str, "np.ndarray"]:
-        """Draws from the distribution of the estimates: the columns of ``draws.csv``."""
-        if self._raw is None:
-            found = (self._files or {}).get("draws.csv")
-            if found is None:
-                raise InputError("no draws in this run", "Fit.draws", expected="a run saved with `draws=…`")
-            return _table.columns(found.decode())
-        with temporary_folder() as folder:
-            self._raw.save(os.path.join(folder, "run"), False, False, number)
-            path = Path(folder, "run", "draws.csv")
-            if not path.exists():
-                raise InputError("no draws", "Fit.draws", expected="a covariance of at most 64 parameters")
-            return _table.columns(path.read_text())
-
-    def to_arviz(self, number: int = 4000) -> Any:
-        """Draws from the distribution of the estimates as InferenceData of ArviZ, one chain."""
-        import arviz
-
-        posterior = {name: values[np.newaxis] for name, values in self.draws(number).items()}
-        # Since version 1 the groups are named.
-        is_old = int(arviz.__version__.split(".")[0]) < 1
-        return arviz.from_dict(posterior if is_old else {"posterior": posterior})
 
     # Display.
 
@@ -412,7 +373,7 @@ class Fit:
         if self._raw is None:
             self.save(folder)
         else:
-            self._raw.save(folder, report, not report, 0)
+            self._raw.save(folder, report, not report)
 
     def _text(self, name: str) -> str:
         if self._files is not None:
@@ -435,16 +396,11 @@ class Fit:
                 found.setdefault(max(names, key=len), header)
         return found
 
-    def _varying(self) -> List[str]:
-        names = [name for name in self._curve_names() if name in _CURVES[:9]]
-        varying = [name for name in names if np.nanmax(self.curve(name).values) > np.nanmin(self.curve(name).values)]
-        return varying or names
-
 
 def open_run(folder: Union[str, "os.PathLike[str]"]) -> Fit:
     """A finished run from the folder that ``kmcfit fit`` or `Fit.save` wrote."""
     path = os.fspath(folder)
-    return Fit._opened(_kmcfit.open_run(path), read_files(path))
+    return Fit._opened(_kmcfit.open_run(path), path)
 
 
 def temporary_folder() -> Any:

@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
-from itertools import islice
+from itertools import chain, islice
+from pathlib import Path
 from time import perf_counter
 from types import TracebackType
-from typing import Any, Dict, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple, Type, Union
+from typing import Any, Dict, Iterable, Iterator, List, NamedTuple, Optional, Tuple, Type, Union
 
 from . import _kmcfit, _yaml
-from ._batches import Answer, Batches, Lines, failed
+from ._batches import Batches
 from ._errors import InputError, unknown_keyword
 from ._model import Model, Overrides, overrides
 from ._records import Item, Source, item, lowered, other_columns
 
-_KEYS = ("record", "estimates", "verdict", "warnings", "seconds", "error")
-#: Records of one system that are fitted one after another with `warm_start`, as in `kmcfit fleet`.
-_BLOCK = 32
-#: Most blocks that wait for further records of their systems.
-_OPEN = 256
-_WORDS = ("executor", "out", "set", "threads", "batch", "time_limit", "timeout", "retry_errors", "warm_start", "trend")
+_KEYS = ("record", "sha256", "estimates", "verdict", "warnings", "seconds", "error")
+_WORDS = ("executor", "out", "set", "threads", "batch", "retry_errors", "trend")
 
 
 class Row(Dict[str, Any]):
-    """The result of one record: a dict with `record`, `estimates`, `verdict`, `warnings`, `seconds` and `error`, also as attributes.
+    """The result of one record: a dict with `record`, `sha256`, `estimates`, `verdict`, `warnings`, `seconds` and `error`, also as attributes.
 
     Attributes
     ----------
@@ -37,15 +35,10 @@ class Row(Dict[str, Any]):
     seconds : float
     error : str or None
         Why the record has no estimates.
-    curves : list of dict
-        Coefficients that vary: `function`, `t`, `value`, `low`, `high`; empty for a row that was read from a journal.
     """
 
-    curves: List[Dict[str, Any]]
-
-    def __init__(self, line: str, curves: Sequence[str] = ()) -> None:
+    def __init__(self, line: str) -> None:
         super().__init__(json.loads(line))
-        self.curves = [json.loads(curve) for curve in curves]
 
     def __getattr__(self, name: str) -> Any:
         if name in _KEYS:
@@ -53,7 +46,7 @@ class Row(Dict[str, Any]):
         raise AttributeError(name)
 
     def __reduce__(self) -> Any:
-        return Row, (json.dumps(self), [json.dumps(curve) for curve in self.curves])
+        return Row, (json.dumps(self),)
 
     def __repr__(self) -> str:
         return f"<Row {self.record!r}: {self.error or self.verdict}>"
@@ -63,7 +56,7 @@ class RowList(List[Row]):
     """Rows of a fleet."""
 
     def to_pandas(self) -> Any:
-        """The rows as a DataFrame of pandas with the columns of ``rows.parquet``: each estimate with its interval in `_low` and `_high`."""
+        """The rows as a DataFrame of pandas with each estimate with its interval in `_low` and `_high`."""
         import pandas  # type: ignore[import-untyped,unused-ignore]
 
         names: Dict[str, None] = {}
@@ -109,7 +102,7 @@ class Rows(Iterator[Row]):
         self.close()
 
     def close(self) -> None:
-        """Ends the work; rows so far stay in the journal."""
+        """Ends the work; rows so far stay in the folder."""
         self._rows.close()  # type: ignore[attr-defined]
 
     def to_list(self) -> RowList:
@@ -133,14 +126,11 @@ def fit_many(
     set: Optional[Overrides] = None,  # noqa: A002
     threads: Optional[int] = None,
     batch: Optional[int] = None,
-    time_limit: Optional[float] = None,
-    timeout: Optional[float] = None,
     retry_errors: bool = False,
-    warm_start: bool = False,
     trend: Optional[str] = None,
     **unknown: Any,
 ) -> Rows:
-    """Fits one model to many records, as ``kmcfit fleet`` does; one row for each record, in their order (with `warm_start` block by block).
+    """Fits one model to many records, as ``kmcfit fleet`` does; one row for each record, in their order.
 
     Parameters
     ----------
@@ -150,29 +140,21 @@ def fit_many(
     records : str or iterable
         A pattern such as ``"records/*.csv"`` or a table with a column `file`, as for ``kmcfit fleet``; or the records one after another:
         paths, `Experiment`, DataFrames or dicts of arrays, pairs (name, one of these or the bytes of a file), or dicts with `record` (name),
-        `file`, `data` or arrays, `mass`, `damping`, `stiffness` (known values, SI), `window` (first and last time, s), `system`, and changed
-        keys of the model such as ``"fit.stop.iterations"``; other keys are columns of the journal. Generators are read as far as the fits
-        need them.
+        `file`, `data` or arrays, `mass`, `damping`, `stiffness` (known values, SI), `window` (first and last time, s), and changed keys of
+        the model such as ``"fit.stop.iterations"``; other keys are columns of the table. Generators are read as far as the fits need them.
     executor : object, optional
         Anything whose ``submit(function, *arguments)`` returns a future: ``concurrent.futures``, a client of Dask, loky. Threads of this
         process by default.
     out : path, optional
-        Folder of the journal. The same call again continues after the rows that are there; at the end it holds tables and the page too.
+        Folder of the rows. The same call again goes on after the rows that are there; at the end it holds the table and the page too.
     set : dict, optional
-        Changed keys of the model.
+        Changed keys of the model; ``{"fit.stop.seconds": 60}`` limits the time of a record.
     threads : int, optional
         Number of threads without `executor`; one per core by default. Rows do not depend on it.
     batch : int, optional
         Records of a task; from the time of the first ones by default: 20 ms for each worker of the executor.
-    time_limit : float, optional
-        Longest time of a record, s; its row has then an error that begins with ``time limit``.
-    timeout : float, optional
-        Longest time without an answer to the oldest task, s; its rows have then an error that begins with ``time limit``. Errors of workers
-        are not in the journal: the same call fits their records again.
     retry_errors : bool
         Fit the records again whose rows in `out` have errors.
-    warm_start : bool
-        Start each fit from the estimates of the record before of the same system, in blocks of 32.
     trend : str, optional
         Column over which the page shows the estimates.
 
@@ -191,36 +173,17 @@ def fit_many(
     for name, count in (("threads", threads), ("batch", batch)):
         if count is not None and (isinstance(count, bool) or not isinstance(count, int) or count < 1):
             raise InputError("invalid number", f"fit_many.{name}", repr(count), "1 or more")
-    _check_time("fit_many.time_limit", time_limit)
-    _check_time("fit_many.timeout", timeout)
     fleet, source = _source(model, set)
-    items, columns, count, is_listed = _items(records)
-    journal = None
-    if out is not None:
-        known = None
-        if is_listed:
-            items = list(items)
-            known = [record.listed(source) for record in items]
-        journal = _kmcfit.RawJournal(os.fspath(out), fleet, known, columns, warm_start, retry_errors, trend)
-    job = Job(_kmcfit.version(), source, warm_start, time_limit)
-    batches = Batches(fit_batch, job, lambda blocks: fit_blocks(fleet, job, blocks), executor, threads, batch, timeout)
-    rows = _rows(fleet, batches, _blocks(items, warm_start), journal, None if is_listed else source, trend)
-    return Rows(rows, count)
-
-
-def _check_time(name: str, limit: Optional[float]) -> None:
-    is_number = isinstance(limit, (int, float)) and not isinstance(limit, bool)
-    if limit is not None and not (is_number and 0.0 < limit <= 1e9):
-        raise InputError("invalid time", name, repr(limit), "seconds, greater than 0")
+    items, columns, number = _items(records)
+    folder = None if out is None else _kmcfit.RawFolder(os.fspath(out), fleet)
+    job = Job(_kmcfit.version(), source)
+    batches = Batches(executor, threads, batch)
+    local = None if executor is not None else fleet
+    return Rows(_rows(fleet, batches, (local, job), items, (folder, columns, retry_errors, trend)), number)
 
 
 def fit_partition(
-    model: Union[Model, str, "os.PathLike[str]"],
-    records: Iterable[Any],
-    *,
-    set: Optional[Overrides] = None,  # noqa: A002
-    time_limit: Optional[float] = None,
-    warm_start: bool = False,
+    model: Union[Model, str, "os.PathLike[str]"], records: Iterable[Any], *, set: Optional[Overrides] = None  # noqa: A002
 ) -> RowList:
     """Fits one model to the records of a partition where they lie, on this thread: ``bag.map_partitions(lambda part:
     km.fit_partition(model, part))``. Arguments as for `fit_many`.
@@ -229,24 +192,26 @@ def fit_partition(
     -------
     RowList
     """
-    _check_time("fit_partition.time_limit", time_limit)
     fleet, source = _source(model, set)
     items, *_ = _items(records)
-    job = Job(_kmcfit.version(), source, warm_start, time_limit)
-    rows, _ = fit_blocks(fleet, job, list(_blocks(items, warm_start)))
-    return RowList(Row(*lines) for lines in rows)
+    lines, _ = fit_batch(fleet, Job(_kmcfit.version(), source), list(items))
+    return RowList(Row(line) for line in lines)
 
 
-def read_fleet(folder: Union[str, "os.PathLike[str]"], collect: bool = False) -> RowList:
-    """The rows of the folder of a fleet that `fit_many` or ``kmcfit fleet`` wrote, in the order of the records.
-
-    Parameters
-    ----------
-    folder : path
-    collect : bool
-        Write tables, statistics and page of the rows so far, as ``kmcfit fleet collect``.
-    """
-    return RowList(map(Row, _kmcfit.fleet_rows(os.fspath(folder), collect)))
+def read_fleet(folder: Union[str, "os.PathLike[str]"]) -> RowList:
+    """The rows of the folder of a fleet that `fit_many` or ``kmcfit fleet`` wrote, in the order of the records where all have their rows."""
+    path = Path(folder) / "rows.jsonl"
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError("the rows cannot be read", str(path), str(error), "the folder of a fleet") from None
+    rows = {row["record"]: row for row in map(Row, text.splitlines())}
+    table = path.with_name("rows.csv")
+    names = list(rows)
+    if table.exists():
+        with table.open(newline="", encoding="utf-8") as lines:
+            names = [cells["record"] for cells in csv.DictReader(lines)]
+    return RowList(rows[name] for name in names if name in rows)
 
 
 class Job(NamedTuple):
@@ -254,42 +219,32 @@ class Job(NamedTuple):
 
     version: str
     source: Source
-    warm_start: bool
-    time_limit: Optional[float]
 
 
-Block = List[Item]
 _last: Optional[Tuple[Source, "_kmcfit.RawFleet"]] = None
 
 
-def fit_batch(job: Job, blocks: List[Block]) -> Answer:
-    """The task of a worker: rows and curves of the records, as JSON, and its time."""
+def fit_batch(fleet: Optional["_kmcfit.RawFleet"], job: Job, records: List[Item]) -> Tuple[List[str], float]:
+    """The task of a worker: rows of the records, as JSON, and their time; on another process the model is made once."""
     global _last
-    own = _kmcfit.version()
-    if own != job.version:
-        raise InputError("the worker has another version of kmcfit", "executor", own, job.version)
-    if _last is None or _last[0] != job.source:
-        source = job.source
-        _last = source, _kmcfit.RawFleet(source.text, source.path, source.overrides)
-    return fit_blocks(_last[1], job, blocks)
-
-
-def fit_blocks(fleet: "_kmcfit.RawFleet", job: Job, blocks: List[Block]) -> Answer:
-    """Rows and curves of the records of blocks, and the time that they took."""
     begin = perf_counter()
-    rows: List[Lines] = []
-    for block in blocks:
-        part = []
-        for record in block:
-            try:
-                part.append(lowered(record, job.source))
-            except Exception as error:  # whatever a record of a user raises is its own error
-                text = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
-                # The next record starts as the model states.
-                rows += fleet.fit([part], job.warm_start, job.time_limit)
-                rows.append(failed(record.name, text))
-                part = []
-        rows += fleet.fit([part], job.warm_start, job.time_limit)
+    source = job.source
+    if fleet is None:
+        own = _kmcfit.version()
+        if own != job.version:
+            raise InputError("the worker has another version of kmcfit", "executor", own, job.version)
+        if _last is None or _last[0] != source:
+            _last = source, _kmcfit.RawFleet(source.text, source.path, source.overrides)
+        fleet = _last[1]
+    rows = []
+    for record in records:
+        try:
+            line = fleet.fit(lowered(record, source))
+        except Exception as error:  # whatever a record of a user raises is its own error
+            text = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+            line = json.dumps({"record": record.name, "estimates": {}, "verdict": None, "warnings": [], "seconds": 0.0, "error": text})
+        if line is not None:
+            rows.append(line)
     return rows, perf_counter() - begin
 
 
@@ -307,106 +262,80 @@ def _source(model: Any, set: Optional[Overrides]) -> Tuple["_kmcfit.RawFleet", S
     return _kmcfit.RawFleet(text, model._path, changes), Source(text, model._path, changes, has_experiment, chooses_mass)
 
 
-def _items(records: Any) -> Tuple[Iterable[Item], List[str], Optional[int], bool]:
-    """The records with names, the names of their columns, their number, and True where all of them are known."""
+def _items(records: Any) -> Tuple[Iterator[Item], List[str], Optional[int]]:
+    """The records with names, the names of their columns, and their number where it is known."""
     if isinstance(records, (str, os.PathLike)):
         given, columns = _kmcfit.record_list([os.fspath(records)])
-        return [Item(*one) for one in given], columns, len(given), True
+        return iter([Item(*one) for one in given]), columns, len(given)
     if hasattr(records, "to_dict") and hasattr(records, "columns"):
         records = records.to_dict("records")
-    if isinstance(records, (list, tuple)):
-        columns = list(dict.fromkeys(name for one in records for name in other_columns(one)))
-        items = [item(one, i, columns) for i, one in enumerate(records, 1)]
-        names: Dict[str, int] = {}
-        for i, one in enumerate(items, 1):
-            if names.setdefault(one.name, i) != i:
-                found = f"`{one.name}` as number {names[one.name]} and number {i}"
-                raise InputError("two records have the same name", "records", found, "every record once")
-        return items, columns, len(items), True
-    count = len(records) if hasattr(records, "__len__") else None
     try:
         given = iter(records)
     except TypeError:
         raise InputError("no records", "records", type(records).__name__, "a pattern, a table, or an iterable of records") from None
-    first = list(islice(given, 1))
-    columns = other_columns(first[0]) if first else []
+    count = len(records) if hasattr(records, "__len__") else None
+    first = list(islice(given, count or 1))
+    columns = list(dict.fromkeys(name for one in first for name in other_columns(one)))
 
-    def lazily() -> Iterator[Item]:
-        for i, one in enumerate(first, 1):
-            yield item(one, i, columns)
-        for i, one in enumerate(given, 2):
-            yield item(one, i, columns)
+    def named() -> Iterator[Item]:
+        names: Dict[str, int] = {}
+        for i, one in enumerate(chain(first, given), 1):
+            record = item(one, i, columns)
+            if names.setdefault(record.name, i) != i:
+                found = f"`{record.name}` as number {names[record.name]} and number {i}"
+                raise InputError("two records have the same name", "records", found, "every record once")
+            yield record
 
-    return lazily(), columns, count, False
-
-
-def _blocks(items: Iterable[Item], warm_start: bool) -> Iterator[Block]:
-    """Records that are fitted one after another: single ones, or with `warm_start` those of one system."""
-    if not warm_start:
-        for record in items:
-            yield [record]
-        return
-    open_blocks: Dict[str, Block] = {}
-    for record in items:
-        block = open_blocks.setdefault(record.system, [])
-        block.append(record)
-        if len(block) == _BLOCK:
-            yield open_blocks.pop(record.system)
-        elif len(open_blocks) > _OPEN:
-            yield open_blocks.pop(next(iter(open_blocks)))
-    yield from open_blocks.values()
+    # The errors of a list come before the first fit.
+    return (named() if count is None else iter(list(named()))), columns, count
 
 
 def _rows(
     fleet: "_kmcfit.RawFleet",
     batches: Batches,
-    blocks: Iterator[Block],
-    journal: Optional["_kmcfit.RawJournal"],
-    source: Optional[Source],
-    trend: Optional[str],
+    task: Tuple[Optional["_kmcfit.RawFleet"], Job],
+    items: Iterator[Item],
+    output: Tuple[Optional["_kmcfit.RawFolder"], List[str], bool, Optional[str]],
 ) -> Iterator[Row]:
-    """Rows in the order of `blocks`; those of the journal are not fitted again. With a `source` the records become known one after another."""
+    """Rows in the order of the records; those of the folder are not fitted again."""
+    folder, columns, retry_errors, trend = output
+    seen: List[Any] = []
     before: Dict[str, str] = {}
+    order: List[str] = []
 
-    def todo(block: Block) -> bool:
-        """True if a record of the block has no row yet."""
-        is_open = journal is None
-        for record in block:
-            if source is not None and journal is not None:
-                journal.add(record.listed(source))
-            line = None if journal is None else journal.row(record.name)
-            if line is None:
-                is_open = True
-            else:
-                before[record.name] = line
-        return is_open
+    def todo() -> Iterator[Item]:
+        for record in items:
+            order.append(record.name)
+            if folder is not None:
+                try:
+                    content = lowered(record, task[1].source)
+                except Exception:  # the error of its row
+                    content = (record.name, record.path, None, [], record.columns)
+                seen.append((*content[:2], None, [], record.columns))
+                line = folder.row(content, retry_errors)
+                if line is not None:
+                    before[record.name] = line
+                    continue
+            yield record
+
+    def known() -> Iterator[Row]:
+        while order and order[0] in before:
+            yield Row(before.pop(order.pop(0)))
 
     try:
-        for found_blocks, fitted, lines in batches.run(blocks, todo):
-            # Rows come in the order of their records, whose names may be equal without a journal.
-            given = iter(lines)
-            new: Dict[int, List[Optional[Lines]]] = {id(block): [next(given, None) for _ in block] for block in fitted}
-            rows = [
-                (before.pop(record.name, None), record.name, line)
-                for block in found_blocks
-                for record, line in zip(block, new.get(id(block), [None] * len(block)))
-            ]
-            added = [line for had, name, line in rows if had is None and line is not None and name not in batches.unanswered]
-            if journal is not None and added:
-                journal.append(added)
-            for had, name, line in rows:
-                batches.unanswered.discard(name)
-                if had is not None:
-                    yield Row(had)
-                elif line is not None:
-                    yield Row(*line)
-        if journal is not None:
-            journal.finish(trend)
+        for line in batches.run(fit_batch, task, todo()):
+            yield from known()
+            if folder is not None:
+                folder.append([line])
+            order.pop(0)
+            yield Row(line)
+        yield from known()
+        if folder is not None:
+            folder.finish(seen, columns, trend)
     except BaseException:
         fleet.interrupt()
         raise
     finally:
         batches.close()
-        if journal is not None:
-            journal.close()
-
+        if folder is not None:
+            folder.close()

@@ -29,16 +29,26 @@ _STYLE = """
 .kmcfit-page figure { margin: .6em 0 0; }
 .kmcfit-page svg { display: block; width: 100%; height: auto; max-width: 760px; }
 """
-_DATA = re.compile(r'<script type="application/json">.*?</script>\n?', re.S)
 #: Anchors and names of elements, of which a notebook with several pages would have several.
 _NAMES = re.compile(r'(?<=<a) href="#[^"]*"|(?<=<figure class="chart") id="[^"]*"| tabindex="[^"]*"')
+
+
+class Drawing:
+    """A figure as SVG, which notebooks show."""
+
+    def __init__(self, svg: str) -> None:
+        #: The text of the drawing.
+        self.svg = svg
+
+    def _repr_html_(self) -> str:
+        return f'<div style="background: #fff">{self.svg}</div>'
 
 
 def first_screen(page: str) -> str:
     """What stands above the contents of a page: title, verdict, answer and chart, with its own style and without scripts."""
     begin, end = page.find("<h1>"), page.find('<div class="sections">')
     # Texts of models and records are escaped in the page: no angle bracket of theirs is found here.
-    shown = _NAMES.sub("", _DATA.sub("", page[begin:end]))
+    shown = _NAMES.sub("", page[begin:end])
     return f'<div class="kmcfit-page">\n<style>{_STYLE}</style>\n{shown}</div>'
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from hashlib import sha256
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
@@ -23,8 +22,8 @@ _SETTINGS = ("sample_rate", "sigma", "initial", "interpolation", "units", *(key 
 _PATHS = ("experiments", "functions", "fit", "grid", "constraints", "parameters")
 _EXPECTED = "a path, an `Experiment`, arrays, a pair (name, data), or a dict with `record` and `file`, `data` or arrays"
 
-#: Name, path, content, changed keys, system, other columns.
-Given = Tuple[str, str, Optional[bytes], List[str], str, List[str]]
+#: Name, path, content, changed keys, other columns.
+Given = Tuple[str, str, Optional[bytes], List[str], List[str]]
 
 
 class Item(NamedTuple):
@@ -36,20 +35,7 @@ class Item(NamedTuple):
     #: None for a file, its bytes, an `Experiment`, or columns with settings of the experiment.
     data: Any
     overrides: List[str]
-    system: str
     columns: List[str]
-
-    def listed(self, source: "Source") -> Given:
-        """The record for a journal, without its data: their digest stands for them."""
-        path, overrides = self.path, self.overrides
-        if self.data is not None:
-            try:
-                _, _, content, changes, *_ = lowered(self, source)
-            except Exception as error:  # the error of its row
-                content, changes = str(error).encode(errors="backslashreplace"), []
-            text = repr(changes).encode(errors="backslashreplace")
-            path = "sha256:" + sha256((content or b"") + text).hexdigest()
-        return self.name, path, None, overrides, self.system, self.columns
 
 
 class Source(NamedTuple):
@@ -85,7 +71,7 @@ def other_columns(given: Any) -> List[str]:
     """Names of the keys of a record that are kept beside its results."""
     if not isinstance(given, Mapping):
         return []
-    used = ("record", "file", "data", "system", "window", "start", "end", *KNOWN, *_COLUMNS, *_SETTINGS)
+    used = ("record", "file", "data", "window", "start", "end", *KNOWN, *_COLUMNS, *_SETTINGS)
     return [str(key) for key in given if key not in used and "." not in str(key)]
 
 
@@ -93,14 +79,14 @@ def _of_data(name: str, data: Any, settings: Optional[Dict[str, Any]] = None) ->
     # Names of files need not be text.
     name = name.encode(errors="backslashreplace").decode()
     if isinstance(data, (str, os.PathLike)):
-        return Item(name, os.fspath(data), None, [], "", [])
+        return Item(name, os.fspath(data), None, [], [])
     if isinstance(data, (bytes, bytearray)):
-        return Item(name, name, bytes(data), [], "", [])
+        return Item(name, name, bytes(data), [], [])
     path = f"{name}.npz"
     if isinstance(data, Experiment):
-        return Item(name, path, data, [], "", [])
+        return Item(name, path, data, [], [])
     if isinstance(data, Mapping) or hasattr(data, "columns"):
-        return Item(name, path, (data, settings or {}), [], "", [])
+        return Item(name, path, (data, settings or {}), [], [])
     raise InputError("not a record", name, type(data).__name__, _EXPECTED)
 
 
@@ -134,8 +120,7 @@ def _of_dict(given: Dict[str, Any], number: int, columns: List[str]) -> Item:
                 raise unknown_keyword(where, first, _PATHS)
             overrides.append(f"{key}={_yaml.flow(plain(value))}")
     cells = [str(plain(given[key])) if _is_given(given.get(key)) else "" for key in columns]
-    system = str(given["system"]) if _is_given(given.get("system")) else ""
-    return found_item._replace(overrides=overrides, system=system, columns=cells)
+    return found_item._replace(overrides=overrides, columns=cells)
 
 
 def _is_given(value: Any) -> bool:
@@ -154,7 +139,7 @@ def _number(where: str, value: Any) -> float:
 
 def lowered(record: Item, source: Source) -> Given:
     """The record for a fit, with its data."""
-    name, path, data, overrides, system, columns = record
+    name, path, data, overrides, columns = record
     if data is None or isinstance(data, bytes):
         if not source.has_experiment:
             raise InputError(
@@ -164,16 +149,16 @@ def lowered(record: Item, source: Source) -> Given:
                 "a model of a file, whose experiment states the columns",
                 "`km.init(path)` makes one; or give arrays",
             )
-        return name, path, data, overrides, system, columns
+        return name, path, data, overrides, columns
     if isinstance(data, tuple):
         table, settings = data
         if source.has_experiment:
             keys = table.columns if hasattr(table, "columns") else table
             content = _npz.archive({str(key): column(f"{name}.{key}", table[key]) for key in keys})
             changes = [f"experiments.0.{key}={_yaml.flow(plain(value))}" for key, value in settings.items()]
-            return name, path, content, changes + overrides, system, columns
+            return name, path, content, changes + overrides, columns
         data = Experiment(table, **settings)
     changes = [f"experiments.0={_yaml.flow({'data': 'record.npz', **data._spec})}"]
     if source.chooses_mass and data.has_force:
         changes.append("functions.mass={basis: constant}")
-    return name, path, data._file(), changes + overrides, system, columns
+    return name, path, data._file(), changes + overrides, columns

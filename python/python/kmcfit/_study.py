@@ -19,14 +19,6 @@ class StudyFinding(NamedTuple):
     text: str
 
 
-class Direction(NamedTuple):
-    """A combination of the parameters as changes of the functions over time, with its singular value: large where well determined."""
-
-    singular_value: float
-    #: Change at the nodes (`Sensitivity.times`) by the name of the function.
-    functions: Dict[str, "np.ndarray"]
-
-
 class Sensitivity(NamedTuple):
     """Identified combinations of the parameters, from the scaled sensitivity of the samples."""
 
@@ -35,11 +27,6 @@ class Sensitivity(NamedTuple):
     combinations: int
     #: All singular values, largest first.
     singular_values: "np.ndarray"
-    #: Times of the nodes, s.
-    times: "np.ndarray"
-    #: Combinations with the largest singular values, and with the smallest ones above the tolerance of the rank.
-    best: List[Direction]
-    worst: List[Direction]
     #: Name of the ambiguity that each unidentifiable combination belongs to, and its share within it.
     unidentifiable: List[Tuple[str, float]]
 
@@ -79,10 +66,8 @@ class Candidate(NamedTuple):
     name: str
     #: Combinations of parameters that it makes identifiable; None if it cannot be simulated.
     added_rank: Optional[int]
-    #: Ratios of standard errors with the experiment to those without: geometric mean, root mean square, largest.
+    #: Ratio of the geometric mean of the standard errors with the experiment to that without.
     d_ratio: Optional[float]
-    a_ratio: Optional[float]
-    e_ratio: Optional[float]
     text: str
 
 
@@ -116,16 +101,10 @@ class Study:
         if given is None:
             return None
 
-        def direction(one: Dict[str, Any]) -> Direction:
-            return Direction(one["singular_value"], {name: np.array(change) for name, change in one["functions"]})
-
         return Sensitivity(
             given["rank"],
             given["combinations"],
             np.array(given["singular_values"]),
-            np.array(given["times"]),
-            [direction(one) for one in given["best"]],
-            [direction(one) for one in given["worst"]],
             [(one["name"], one["share"]) for one in given["unidentifiable"]],
         )
 

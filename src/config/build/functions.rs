@@ -427,8 +427,6 @@ fn penalty_weight(given: Weight) -> PenaltyWeight {
         Weight::Number(Number(weight)) => return PenaltyWeight::Given(weight),
         Weight::Rule(WeightRule::Period) => return PenaltyWeight::Period,
         Weight::Rule(WeightRule::Discrepancy) => functions::WeightRule::Discrepancy,
-        Weight::Rule(WeightRule::LCurve) => functions::WeightRule::LCurve,
-        Weight::Rule(WeightRule::Gcv) => functions::WeightRule::Gcv,
         Weight::Rule(WeightRule::RestrictedLikelihood) => {
             functions::WeightRule::RestrictedLikelihood
         }

@@ -2,18 +2,19 @@
 
 mod auto;
 mod finer;
-mod per_node;
 
 pub(super) use finer::{FinerNodes, stable_nodes};
 
 use super::BuildMode;
 use super::experiments::{RawChannel, RawRecord};
+use super::functions;
 use crate::config::ModelFile;
-use crate::config::spec::FitMethod;
-use crate::config::values::{Count, Nodes};
+use crate::config::spec::{Basis, FitMethod};
+use crate::config::values::{Count, KnotSpec, Nodes};
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
-use crate::memory;
+use crate::memory::MOST_NODES_TIMES_PARAMETERS;
+use kmcfit_core::internals::solvers::FEW_PARAMETERS;
 use kmcfit_core::internals::system::{Grid, Method};
 
 /// Most nodes of an automatic choice: the same on every machine.
@@ -82,7 +83,7 @@ pub(super) fn build(
             .found(nodes)
             .expected(format!("{} or more", Grid::FEWEST_NODES)));
     }
-    fits_into_memory(file, mode, nodes)?;
+    check_size(file, mode, nodes)?;
     let grid = Grid::new(start, duration, nodes).ok_or_else(|| {
         file.error_at("grid", "invalid time axis")
             .found(format!("{nodes} nodes over {duration:?} s"))
@@ -98,27 +99,32 @@ fn about_nodes(file: &ModelFile, mode: BuildMode, problem: &str) -> InputError {
     }
 }
 
-/// Upper estimate of the memory of a run with this number of nodes, bytes.
-pub(super) fn memory_of(file: &ModelFile, mode: BuildMode, nodes: usize) -> f64 {
-    nodes as f64 * per_node::per_node(file, mode) as f64 + memory::BASE as f64
-}
-
-/// Refuses a grid that exceeds the available memory, before allocation.
-fn fits_into_memory(file: &ModelFile, mode: BuildMode, nodes: usize) -> Result<(), InputError> {
-    let needed = memory_of(file, mode, nodes);
-    let Err(available) = memory::check(needed as u64) else {
-        return Ok(());
-    };
-    let each = per_node::per_node(file, mode) as u64;
-    Err(about_nodes(file, mode, "the grid does not fit into memory")
-        .found(format!(
-            "{nodes} nodes, which may need {}: {each} bytes each",
-            memory::in_words(needed)
-        ))
-        .expected(format!(
-            "at most {} nodes within {available}",
-            available.bytes.saturating_sub(memory::BASE) / each,
-        )))
+/// Refuses a grid with too many nodes for the parameters of the functions.
+fn check_size(file: &ModelFile, mode: BuildMode, nodes: usize) -> Result<(), InputError> {
+    let counts = functions::all(file)
+        .into_iter()
+        .map(|(_, spec)| match spec.basis {
+            _ if matches!(mode, BuildMode::Simulate { .. }) => 0,
+            None => 0,
+            Some(Basis::Constant) => 1,
+            Some(Basis::Polynomial) => spec.degree.map_or(1, |degree| degree.0.saturating_add(1)),
+            Some(Basis::Nodal) => FEW_PARAMETERS,
+            Some(_) => match &spec.knots {
+                Some(KnotSpec::Count(count)) => count.0,
+                Some(KnotSpec::Times(times)) => times.len(),
+                _ => FEW_PARAMETERS,
+            },
+        });
+    let parameters = counts.fold(1, usize::saturating_add).min(FEW_PARAMETERS);
+    let most = MOST_NODES_TIMES_PARAMETERS / parameters;
+    match nodes <= most {
+        true => Ok(()),
+        false => Err(about_nodes(file, mode, "too many nodes")
+            .found(format!(
+                "{nodes} nodes with {parameters} or more parameters"
+            ))
+            .expected(format!("at most {most} nodes"))),
+    }
 }
 
 /// True if a model without a number of nodes has an automatic one: it states no stepper either, and its method refines the grid by

@@ -13,17 +13,14 @@ mod study;
 
 pub(crate) use experiments::DataWarning;
 pub use experiments::{ChannelNote, DelayLimits, HoldOut};
-#[cfg(test)]
-pub(crate) use experiments::{DataAction, DataFact, GapPlace};
 pub use kmcfit_core::internals::builder::WeightSearch;
 pub use refinement::AutomaticGrid;
-pub use study::{Candidate, Equivalent, StudyPlan, StudyTarget};
+pub use study::{StudyPlan, StudyTarget};
 
 use super::key_positions::{key_path, locate};
 use super::{ModelFile, ModelSource};
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
-use crate::memory;
 use kmcfit_core::internals::builder::{BuildError, Builder, Contradiction, listed};
 use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
@@ -60,8 +57,6 @@ pub struct Model {
     pub predictions: Vec<State>,
     /// Settings of a study.
     pub study: StudyPlan,
-    /// Upper estimate of the memory of a fit, bytes.
-    pub memory: u64,
     /// Warnings about data and specification.
     pub warnings: Vec<Finding>,
     /// What was found in the data and done with it.
@@ -330,13 +325,11 @@ fn build_on(
         displacement: s.displacement.0,
         velocity: s.velocity.0,
     };
-    let memory = grid::memory_of(file, mode, grid.nodes()) as u64;
     let study = study::build(file, &built.problem)?;
     let source = source.unwrap_or_else(|| timed(&mut reading, || ModelSource::of(file)));
     Ok(Model {
         file: file.path.clone(),
         study,
-        memory,
         title: title(file),
         problem: built.problem,
         given_start,
@@ -373,10 +366,6 @@ fn build_on(
     })
 }
 
-/// Memory that a study takes for each node beside that of a fit, bytes: bands, extremes, equivalent
-/// systems, and the figures of all. Measured to be 5.9 to 7.1 kB with 2 to 41 free parameters.
-const STUDY_PER_NODE: u64 = 8000;
-
 impl Model {
     /// The model with another width of Coulomb friction, m/s.
     #[must_use]
@@ -386,33 +375,6 @@ impl Model {
             problem: problem.expect("a width changes no number of nodes or functions"),
             ..self
         }
-    }
-
-    /// Refuses a study whose memory is not available.
-    ///
-    /// # Errors
-    /// About the model file, with what may be needed and what is available.
-    pub fn check_study_memory(&self) -> Result<(), InputError> {
-        let nodes = self.problem.system.grid.nodes() as u64;
-        let needed = nodes.saturating_mul(STUDY_PER_NODE) + self.memory;
-        memory::check(needed).map_err(|available| {
-            InputError::file(
-                &self.file,
-                "a study on so many nodes does not fit into memory",
-            )
-            .key("grid.nodes")
-            .found(format!(
-                "{nodes} nodes, for which a study may need {}",
-                memory::in_words(needed as f64)
-            ))
-            .expected(format!("at most {available}"))
-            .hint("a study of fewer nodes: `--set grid.nodes=…`")
-        })
-    }
-
-    /// Number of threads, at most `wanted` and at least one, whose simultaneous fits fit into memory.
-    pub fn threads_within_memory(&self, wanted: usize) -> usize {
-        memory::threads_within(wanted, self.memory)
     }
 }
 

@@ -3,10 +3,8 @@
 use super::experiments;
 use super::functions::values;
 use crate::config::ModelFile;
-use crate::config::spec::{
-    CandidateSpec, EquivalentSpec, FunctionName, NoiseName, ProfileSpec, StudySpec,
-};
-use crate::config::values::Number;
+use crate::config::spec::{CandidateSpec, EquivalentSpec, FunctionName, ProfileSpec, StudySpec};
+use crate::config::values::{Count, Number};
 use crate::error::InputError;
 use crate::spelling::did_you_mean;
 use crate::text_io::{one_of, quote};
@@ -14,6 +12,7 @@ use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{
     Channel, ChannelKind, Experiment, Input, Waveform, Weighting,
 };
+use kmcfit_core::internals::study::Choice;
 use kmcfit_core::internals::system::State;
 use std::time::Duration;
 
@@ -36,16 +35,10 @@ pub struct StudyPlan {
     pub spread: f64,
     /// Relative difference of ratios and responses up to which two optima count as one.
     pub merge_tolerance: f64,
-    /// Number of replicates of the bootstrap; 0 for none.
-    pub replicates: usize,
-    /// True if the noise of the replicates is drawn from the residuals.
-    pub residual_noise: bool,
     /// Requested equivalent systems, which have the response of the fit.
-    pub equivalent_systems: Vec<Equivalent>,
-    /// True for a constancy test of each function.
-    pub constancy_test: bool,
-    /// Candidate experiments for the experiment design.
-    pub candidates: Vec<Candidate>,
+    pub equivalent_systems: Vec<Choice>,
+    /// Candidate experiments, with one channel read at every node; only the noise of its samples is used.
+    pub candidates: Vec<Experiment>,
     /// Wall-clock limit of one refit.
     pub limit: Option<Duration>,
 }
@@ -55,12 +48,7 @@ impl StudyPlan {
     pub fn analyses(&self) -> usize {
         // Fit, sensitivity, bands, equivalent systems, extremes.
         let always = 5;
-        let asked = [
-            !self.candidates.is_empty(),
-            self.starts > 0,
-            self.constancy_test,
-            self.replicates > 0,
-        ];
+        let asked = [!self.candidates.is_empty(), self.starts > 0];
         always + self.profiles.len() + asked.into_iter().filter(|asked| *asked).count()
     }
 }
@@ -87,35 +75,12 @@ pub enum StudyTarget {
     },
 }
 
-/// A requested equivalent system.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Equivalent {
-    /// Name for reports.
-    pub name: String,
-    /// Its mass at the nodes, kg.
-    pub mass: Vec<f64>,
-    /// Reference damping at the nodes, N s/m; `None` for that of the fit.
-    pub damping: Option<Vec<f64>>,
-}
-
-/// A candidate experiment; only the noise of its samples is used, their values are zero.
-#[derive(Debug, Clone)]
-pub struct Candidate {
-    /// Name for reports.
-    pub name: String,
-    /// The experiment, with one channel read at every node.
-    pub experiment: Experiment,
-}
-
 const CONFIDENCE: f64 = 0.95;
 const SEED: u64 = 1;
 const SPREAD: f64 = 3.0;
 const WIDEST_SPREAD: f64 = 1e6;
-/// Most starting points or replicates; more would run for days.
+/// Most starting points; more would run for days.
 const MOST_STARTS: usize = 100_000;
-const MOST_REPLICATES: usize = 1_000_000;
-/// Fewest replicates for the ends of a 95 % interval.
-const FEWEST_REPLICATES: usize = 40;
 /// Default of `merge_tolerance`.
 const SAME: f64 = 1e-3;
 /// Default number of times of the extremes.
@@ -159,7 +124,6 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
         .collect::<Result<_, _>>()?;
     Ok(StudyPlan {
         equivalent_systems,
-        residual_noise: spec.noise == Some(NoiseName::Residual),
         confidence,
         seed: spec.seed.map_or(SEED, |seed| seed.0 as u64),
         profiles,
@@ -168,8 +132,6 @@ pub(super) fn build(file: &ModelFile, problem: &Problem) -> Result<StudyPlan, In
         starts: spec.starts.map_or(0, |count| count.0),
         spread,
         merge_tolerance,
-        replicates: spec.bootstrap.map_or(0, |count| count.0),
-        constancy_test: spec.constancy_test == Some(true),
         candidates,
         limit: None,
     })
@@ -183,48 +145,22 @@ fn check(file: &ModelFile, spec: &StudySpec) -> Result<(), InputError> {
             .found(level.0)
             .expected("a number greater than 0 (dimensionless with `sigma`, otherwise m² s)"));
     }
-    for (key, is_given, needed, is_there) in [
-        (
-            "noise",
-            spec.noise.is_some(),
-            "bootstrap",
-            spec.bootstrap.is_some(),
-        ),
-        (
-            "spread",
-            spec.spread.is_some(),
-            "starts",
-            spec.starts.is_some(),
-        ),
-        (
-            "merge_tolerance",
-            spec.merge_tolerance.is_some(),
-            "starts",
-            spec.starts.is_some(),
-        ),
+    for (key, is_given) in [
+        ("spread", spec.spread.is_some()),
+        ("merge_tolerance", spec.merge_tolerance.is_some()),
     ] {
-        if is_given && !is_there {
+        if is_given && spec.starts.is_none() {
             return Err(file
                 .error_at(&format!("study.{key}"), "this key has no effect alone")
-                .expected(format!("`{needed}` beside it")));
+                .expected("`starts` beside it"));
         }
     }
-    let limits = [
-        ("starts", spec.starts, 1, MOST_STARTS),
-        (
-            "bootstrap",
-            spec.bootstrap,
-            FEWEST_REPLICATES,
-            MOST_REPLICATES,
-        ),
-    ];
-    for (name, given, fewest, most) in limits {
-        if let Some(count) = given.filter(|count| !(fewest..=most).contains(&count.0)) {
-            return Err(file
-                .error_at(&format!("study.{name}"), "invalid number")
-                .found(count.0)
-                .expected(format!("{fewest} to {most}, or no `{name}`")));
-        }
+    let is_invalid = |count: &Count| !(1..=MOST_STARTS).contains(&count.0);
+    if let Some(count) = spec.starts.filter(is_invalid) {
+        return Err(file
+            .error_at("study.starts", "invalid number")
+            .found(count.0)
+            .expected(format!("1 to {MOST_STARTS}, or no `starts`")));
     }
     if spec
         .extremes
@@ -244,7 +180,7 @@ fn equivalent(
     problem: &Problem,
     key: &str,
     spec: &EquivalentSpec,
-) -> Result<Equivalent, InputError> {
+) -> Result<Choice, InputError> {
     let grid = &problem.system.grid;
     let mass_key = format!("{key}.mass");
     let mass = values(file, grid, &mass_key, &spec.mass)?;
@@ -256,7 +192,7 @@ fn equivalent(
     }
     let damping = spec.damping.as_ref();
     let damping = damping.map(|d| values(file, grid, &format!("{key}.damping"), d));
-    Ok(Equivalent {
+    Ok(Choice {
         name: spec.name.0.clone(),
         mass,
         damping: damping.transpose()?,
@@ -398,7 +334,7 @@ fn candidate(
     problem: &Problem,
     key: &str,
     spec: &CandidateSpec,
-) -> Result<Candidate, InputError> {
+) -> Result<Experiment, InputError> {
     let grid = &problem.system.grid;
     let nodes = grid.nodes();
     let initial = State {
@@ -439,8 +375,5 @@ fn candidate(
     };
     let channel = Channel::new(kind, grid.times(), vec![0.0; nodes], weighting, grid, nodes);
     experiment.channels.extend(channel);
-    Ok(Candidate {
-        name: spec.name.0.clone(),
-        experiment,
-    })
+    Ok(experiment)
 }

@@ -89,8 +89,8 @@ impl ColumnAssignment {
         Ok(columns)
     }
 
-    /// Assigns a column to its role. Among several sensors of one role a later one replaces an earlier one if its
-    /// standard deviation is much larger.
+    /// Assigns a column to its role. Among several axes of a sensor a later one replaces an earlier one if its standard deviation is much
+    /// larger.
     fn take(&mut self, table: &Table, column: UsedColumn) -> Result<(), InputError> {
         let Some(place) = self.used.iter().position(|c| c.role == column.role) else {
             self.used.push(column);
@@ -104,9 +104,9 @@ impl ColumnAssignment {
         let there = &self.used[place];
         let alike = column.has_unit == there.has_unit
             && column.unit.is_angular() == there.unit.is_angular();
-        let moves_more = size(&column)? > MUCH * size(there)?;
+        let moves_more = column.role.is_channel() && size(&column)? > MUCH * size(there)?;
         let is_better = match column.is_stated == there.is_stated {
-            true => column.role.is_channel() && alike && moves_more,
+            true => alike && moves_more,
             false => column.is_stated,
         };
         let left = match is_better {
@@ -114,7 +114,6 @@ impl ColumnAssignment {
             false => column,
         };
         self.unused.push(left.index);
-        self.unused.sort_unstable();
         Ok(())
     }
 
@@ -209,16 +208,8 @@ impl ColumnAssignment {
                 Role::BaseDisplacement => "displacement of the base".to_owned(),
                 _ => role,
             };
-            let gaps = match (c.role.is_channel(), table.samples(c.index)) {
-                (false, Ok(samples)) => samples.iter().filter(|x| x.is_nan()).count(),
-                _ => 0,
-            };
-            let gaps = match gaps {
-                0 => String::new(),
-                count => format!("; {count} values missing: an input needs a value in every row"),
-            };
             format!(
-                "column `{}`: {role}, {}{guess}{gaps}",
+                "column `{}`: {role}, {}{guess}",
                 table.label(c.index),
                 c.unit_in_words()
             )

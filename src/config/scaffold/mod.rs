@@ -9,7 +9,6 @@ mod roles;
 mod statements;
 
 use crate::error::InputError;
-use crate::magnitudes::{Magnitude, implausible};
 use crate::memory;
 use crate::number_format::significant;
 use crate::tables::{Table, TableFormat};
@@ -20,9 +19,6 @@ use record_summary::RecordSummary;
 pub use roles::Role;
 pub use statements::Statements;
 use std::path::{Path, PathBuf};
-
-/// Relative difference below which two sampling rates are equal.
-const SAME_RATE: f64 = 0.01;
 
 /// Memory for each row beside the table, bytes: times, samples and spectrum. Measured: 150 bytes per row in total for a
 /// million rows of two columns.
@@ -48,24 +44,6 @@ pub struct Scaffold {
     pub has_unknown_mass: bool,
 }
 
-/// A question that no file answers.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Question {
-    /// Unit of a column, which is assumed.
-    Unit {
-        /// Path of the file.
-        file: PathBuf,
-        /// Column.
-        column: String,
-        /// Quantity that it is taken for.
-        role: Role,
-        /// The assumed unit.
-        assumed: &'static str,
-    },
-    /// Mass, or another coefficient that gives the scale.
-    Scale,
-}
-
 /// A record with its columns.
 struct FileRecord<'a> {
     source: &'a Source,
@@ -81,33 +59,12 @@ struct FileRecord<'a> {
 /// concerns no column.
 pub fn scaffold(sources: &[Source], statements: &Statements) -> Result<Scaffold, InputError> {
     let records = read(sources, statements)?;
-    let found = records
-        .iter()
-        .map(|record| findings(record, statements.sample_rate));
+    let found = records.iter().map(findings);
     Ok(Scaffold {
         found: found.collect(),
         has_unknown_mass: functions::is_unknown(&records, statements),
         text: text(&records, statements),
     })
-}
-
-/// The questions that the tables and the statements leave.
-///
-/// # Errors
-/// As [`scaffold`].
-pub fn questions(sources: &[Source], statements: &Statements) -> Result<Vec<Question>, InputError> {
-    let records = read(sources, statements)?;
-    let units = records.iter().flat_map(|record| {
-        let assumed = record.columns.used.iter().filter(|c| c.has_assumed_unit());
-        assumed.map(|column| Question::Unit {
-            file: record.table.path().to_path_buf(),
-            column: record.table.label(column.index),
-            role: column.role,
-            assumed: column.unit.symbol(),
-        })
-    });
-    let scale = functions::is_unknown(&records, statements).then_some(Question::Scale);
-    Ok(units.chain(scale).collect())
 }
 
 fn read<'a>(
@@ -137,7 +94,7 @@ fn read<'a>(
 }
 
 /// Findings on a table, one sentence each.
-fn findings(record: &FileRecord, sample_rate: Option<f64>) -> Vec<String> {
+fn findings(record: &FileRecord) -> Vec<String> {
     let FileRecord {
         table,
         columns,
@@ -175,15 +132,6 @@ fn findings(record: &FileRecord, sample_rate: Option<f64>) -> Vec<String> {
             significant(first / summary.channel.1, 4)
         ));
     }
-    if let (Some(given), Some((index, rate))) = (sample_rate, columns::rate(table))
-        && (rate / given - 1.0).abs() > SAME_RATE
-    {
-        found.push(format!(
-            "`--sample-rate {given}` is used, although `{}` has {} Hz",
-            table.label(index),
-            significant(rate, 4)
-        ));
-    }
     found.push(match summary.frequency {
         Some(frequency) => format!(
             "dominant frequency {} Hz: {} in the record",
@@ -195,33 +143,7 @@ fn findings(record: &FileRecord, sample_rate: Option<f64>) -> Vec<String> {
         ),
         None => "no dominant frequency was found".into(),
     });
-    found.extend(implausible_units(record));
     found
-}
-
-/// Magnitudes outside the range of mechanical vibrations.
-fn implausible_units(record: &FileRecord) -> Option<String> {
-    let columns = &record.columns;
-    let channels = columns
-        .used
-        .iter()
-        .filter(|c| c.role.is_channel() && !c.unit.is_arbitrary());
-    let magnitudes = channels.filter_map(|column| {
-        let samples = record.table.samples(column.index).ok()?;
-        let values: Vec<f64> = samples.iter().map(|x| x * column.factor()).collect();
-        Magnitude::of(column.role.kind(), column.unit, &values)
-    });
-    let magnitudes: Vec<Magnitude> = magnitudes.collect();
-    let time = columns.find(Role::Time).map(|column| column.unit);
-    let found = implausible(record.summary.frequencies?, time, &magnitudes)?;
-    let reading = found
-        .reading
-        .map(|reading| format!(": {reading}"))
-        .unwrap_or_default();
-    Some(format!(
-        "{} is implausible{reading}; state the units by `--units`",
-        found.magnitudes
-    ))
 }
 
 /// The table of a file with its columns; of several sets of channels the only one with times and a measured response.

@@ -39,8 +39,6 @@ pub struct RecordSummary {
     pub begins: Option<f64>,
     /// Dominant frequency, Hz.
     pub frequency: Option<f64>,
-    /// Dominant frequency and that which halves the energy, Hz.
-    pub frequencies: Option<[f64; 2]>,
     /// True if the mean of the samples exceeds their deviations from it.
     pub is_off_centre: bool,
     /// True if the samples drift along a straight line.
@@ -94,7 +92,6 @@ impl RecordSummary {
             spacing,
             is_regular: (spacings.iter()).all(|s| (s - spacing).abs() <= REGULAR * spacing),
             frequency: oscillation.frequency,
-            frequencies: oscillation.frequencies(),
             is_off_centre: off_centre(pairs),
             drifts: oscillation.drifts,
         })

@@ -1,4 +1,4 @@
-//! What the options of `kmcfit init` state beside the files: roles and units of columns, and known coefficients.
+//! What the options of `kmcfit init` state beside the files: units and roles of columns, and known coefficients.
 
 use super::roles::{Role, UsedColumn, known};
 use crate::error::InputError;
@@ -8,187 +8,107 @@ use crate::text_io::{one_of, quote};
 use crate::units::{Quantity, ScaledUnit, Unit, split_factor};
 use kmcfit_core::internals::functions::CoefficientKind;
 
-/// Coefficients whose value can be stated.
-const KNOWN: [CoefficientKind; 3] = [
-    CoefficientKind::Mass,
-    CoefficientKind::Damping,
-    CoefficientKind::Stiffness,
-];
-/// A channel without a unit in a list of units by position.
-const NOT_USED: &str = "-";
-
 /// Statements of the options, for all files.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Statements {
     /// Sampling rate of a table without a column of times, Hz.
     pub sample_rate: Option<f64>,
-    /// Column of the force.
+    /// Column of the force, by name or number.
     pub force: Option<String>,
     /// Column of the motion of the base.
     pub base: Option<String>,
+    /// Known coefficients by name, in SI units.
+    pub fixed: Vec<(CoefficientKind, f64)>,
     units: Vec<UnitEntry>,
-    known: Vec<(CoefficientKind, f64)>,
 }
 
-/// An entry of `--units`.
+/// An entry of `--units`: a quantity, or the name or the number of a column, and its unit.
 #[derive(Debug, Clone, PartialEq)]
 struct UnitEntry {
-    key: UnitKey,
+    name: String,
     unit: String,
 }
 
-#[derive(Debug, Clone, PartialEq)]
-enum UnitKey {
-    /// Quantity, or name or number of a column.
-    Named(String),
-    /// Channel of a file, from 0; with the number of channels that the list has.
-    Position(usize, usize),
-}
-
 impl Statements {
-    /// Adds units: `time=ms,displacement=mm` by quantity or by column, or `50 g,200 N` by the position of a channel in a file without
-    /// names and units; a number before the unit is the value of one unit of the file.
+    /// Adds units by quantity or by column: `time=ms,displacement=mm`; a number before the unit is the value of one unit of the file.
     ///
     /// # Errors
-    /// For an entry without a unit, and for entries with a name beside entries without.
+    /// For an entry without a name or a unit.
     pub fn state_units(&mut self, text: &str) -> Result<(), InputError> {
-        let error = |problem: &str, entry: &str| {
-            InputError::argument("--units", problem)
-                .found(quote(entry))
-                .expected("NAME=UNIT with a quantity or a column, as in `time=ms,displacement=mm`")
-        };
-        let entries: Vec<&str> = text.split(',').map(str::trim).collect();
-        let count = entries.len();
-        let is_named = entries.iter().any(|entry| entry.contains('='));
-        for (index, entry) in entries.into_iter().enumerate() {
-            let (key, unit) = match entry.rsplit_once('=') {
-                Some((name, unit)) => (UnitKey::Named(name.trim().to_owned()), unit.trim()),
-                None if is_named => {
-                    return Err(error("a unit without a name beside others with one", entry));
-                }
-                None => (UnitKey::Position(index, count), entry),
+        for entry in text.split(',').map(str::trim) {
+            let pair = entry.rsplit_once('=');
+            let pair = pair.map(|(name, unit)| (name.trim(), unit.trim()));
+            let pair = pair.filter(|(name, unit)| !name.is_empty() && !unit.is_empty());
+            let Some((name, unit)) = pair else {
+                return Err(InputError::argument("--units", "not a name and a unit")
+                    .found(quote(entry))
+                    .expected("NAME=UNIT with a quantity or a column, as in `time=ms,displacement=mm` or `1=50 g`"));
             };
-            if unit.is_empty() || key == UnitKey::Named(String::new()) {
-                return Err(error("neither a name nor a unit may be empty", entry));
-            }
-            let unit = unit.to_owned();
-            self.units.push(UnitEntry { key, unit });
+            let [name, unit] = [name, unit].map(str::to_owned);
+            self.units.push(UnitEntry { name, unit });
         }
         Ok(())
     }
 
-    /// States the unit of one column.
+    /// Adds a known coefficient; `option` is named in errors.
     ///
     /// # Errors
-    /// When the text is not a unit of this quantity.
-    pub fn state_unit(
-        &mut self,
-        column: &str,
-        quantity: Quantity,
-        unit: &str,
-    ) -> Result<(), InputError> {
-        ScaledUnit::parse(quantity, unit)?;
-        self.units.push(UnitEntry {
-            key: UnitKey::Named(column.to_owned()),
-            unit: unit.to_owned(),
-        });
-        Ok(())
-    }
-
-    /// States a coefficient, `stiffness=821.96`, from the option `option`.
-    ///
-    /// # Errors
-    /// For another name, a value that is not a number or not possible, and a coefficient that is stated twice.
-    pub fn fix(&mut self, option: &str, text: &str) -> Result<(), InputError> {
-        let names = || KNOWN.iter().map(|kind| kind.name());
-        let error = |problem: &str| InputError::argument(option, problem);
-        let Some((name, value)) = text.split_once('=') else {
-            return Err(error("missing `=`")
-                .found(quote(text))
-                .expected("NAME=VALUE, as in `stiffness=821.96`"));
-        };
-        let name = name.trim();
-        let Some(kind) = KNOWN.into_iter().find(|kind| kind.name() == name) else {
-            return Err(error("no coefficient of this name")
+    /// For another name, and for a value that is no number or a mass that is not positive.
+    pub fn fix(&mut self, option: &str, name: &str, text: &str) -> Result<(), InputError> {
+        const KINDS: [CoefficientKind; 3] = [
+            CoefficientKind::Mass,
+            CoefficientKind::Damping,
+            CoefficientKind::Stiffness,
+        ];
+        let kind = KINDS.into_iter().find(|kind| kind.name() == name.trim());
+        let kind = kind.ok_or_else(|| {
+            InputError::argument(option, "no such coefficient")
                 .found(quote(name))
-                .expected(one_of(names()))
-                .hint_if(did_you_mean(name, names())));
+                .expected(one_of(KINDS.map(CoefficientKind::name)))
+        })?;
+        let (least, range) = match kind {
+            CoefficientKind::Mass => (f64::MIN_POSITIVE, " greater than 0"),
+            _ => (f64::MIN, ""),
         };
-        self.know(option, kind, value.trim())
-    }
-
-    /// States the value of a coefficient in its SI unit.
-    ///
-    /// # Errors
-    /// As [`fix`](Self::fix).
-    pub fn know(
-        &mut self,
-        option: &str,
-        kind: CoefficientKind,
-        value: &str,
-    ) -> Result<(), InputError> {
-        let least = match kind {
-            CoefficientKind::Damping => "0 or greater",
-            _ => "greater than 0",
-        };
-        let number: Option<f64> = value.parse().ok();
-        let is_possible = |x: &f64| {
-            x.is_finite() && (*x > 0.0 || (*x == 0.0 && kind == CoefficientKind::Damping))
-        };
-        let Some(number) = number.filter(is_possible) else {
-            return Err(
-                InputError::argument(option, format!("invalid {}", kind.name()))
-                    .found(quote(value))
-                    .expected(format!("a number {least}, in {}", kind.unit())),
-            );
-        };
-        if self.known.iter().any(|(other, _)| *other == kind) {
-            return Err(InputError::argument(
-                option,
-                format!("the {} is given twice", kind.name()),
-            )
-            .found(quote(value))
-            .expected("one value"));
-        }
-        self.known.push((kind, number));
+        let value = text
+            .trim()
+            .parse()
+            .ok()
+            .filter(|x: &f64| x.is_finite() && *x >= least);
+        let value = value.ok_or_else(|| {
+            InputError::argument(option, format!("invalid {}", kind.name()))
+                .found(quote(text))
+                .expected(format!("a number{range}, in {}", kind.unit()))
+        })?;
+        self.fixed.push((kind, value));
         Ok(())
     }
 
-    /// The stated value of a coefficient.
-    pub fn known(&self, kind: CoefficientKind) -> Option<f64> {
-        let stated = self.known.iter().find(|(other, _)| *other == kind);
-        stated.map(|(_, value)| *value)
+    /// The known value of a coefficient.
+    pub(super) fn known(&self, kind: CoefficientKind) -> Option<f64> {
+        let found = self.fixed.iter().find(|(of, _)| *of == kind);
+        found.map(|(_, value)| *value)
     }
 
     /// Error for a unit that no file uses; `is_used` has one entry for each unit.
     pub(super) fn check_used(&self, is_used: &[bool], tables: &[&Table]) -> Result<(), InputError> {
         let mut unused = self.units.iter().zip(is_used).filter(|(_, used)| !**used);
-        let Some((
-            UnitEntry {
-                key: UnitKey::Named(name),
-                ..
-            },
-            _,
-        )) = unused.next()
-        else {
+        let Some((UnitEntry { name, .. }, _)) = unused.next() else {
             return Ok(());
         };
-        let labels: Vec<String> = (tables.iter())
-            .flat_map(|table| (0..table.width()).map(|i| table.label(i)))
-            .collect();
-        let names = || {
-            Role::ALL
-                .iter()
-                .map(|role| role.key())
-                .chain(labels.iter().map(String::as_str))
-        };
+        let labels = tables
+            .iter()
+            .flat_map(|table| (0..table.width()).map(|i| table.label(i)));
+        let roles = Role::ALL.into_iter().map(|role| role.key().to_owned());
+        let names: Vec<String> = roles.chain(labels).filter(|other| other != name).collect();
+        let names = || names.iter().map(String::as_str);
         Err(InputError::argument(
             "--units",
             "no used column is this quantity or has this name",
         )
         .found(quote(name))
         .expected(one_of(names()))
-        .hint_if(did_you_mean(name, names().filter(|other| other != name))))
+        .hint_if(did_you_mean(name, names())))
     }
 }
 
@@ -197,13 +117,15 @@ impl Statements {
 struct ColumnStatement {
     index: usize,
     role: Role,
-    unit: Option<ScaledUnit>,
+    unit: ScaledUnit,
 }
 
 /// Statements on the columns of one table.
 #[derive(Debug, Default)]
 pub(super) struct ColumnStatements {
     columns: Vec<ColumnStatement>,
+    /// Roles of columns whose unit is their own or that of the role.
+    roles: Vec<(usize, Role)>,
     /// Units by quantity, with the place of their entry.
     quantities: Vec<(usize, Role, ScaledUnit)>,
     /// True for each entry of `--units` that concerns this table.
@@ -218,73 +140,51 @@ impl ColumnStatements {
             is_used: vec![false; statements.units.len()],
             ..Self::default()
         };
-        if let Some(name) = &statements.force {
-            found.state(
-                option_column(table, "--force", name)?,
-                Some(Role::Force),
-                None,
-            )?;
-        }
-        if let Some(name) = &statements.base {
-            let index = option_column(table, "--base", name)?;
-            let is_displacement = known(table, index)
-                .is_some_and(|c| matches!(c.role, Role::Displacement | Role::BaseDisplacement));
-            let role = match is_displacement {
-                true => Role::BaseDisplacement,
-                false => Role::BaseAcceleration,
+        for (option, name) in [("--force", &statements.force), ("--base", &statements.base)] {
+            let Some(name) = name else {
+                continue;
             };
-            found.state(index, Some(role), None)?;
+            let index = column_of(table, name).ok_or_else(|| {
+                let labels: Vec<String> = (0..table.width()).map(|i| table.label(i)).collect();
+                InputError::argument(option, "no such column")
+                    .found(quote(name))
+                    .expected(one_of(labels.iter().map(String::as_str)))
+            })?;
+            let is_length =
+                || known(table, index).is_some_and(|own| own.role.kind() == Quantity::Displacement);
+            let role = match option {
+                "--force" => Role::Force,
+                _ if is_length() => Role::BaseDisplacement,
+                _ => Role::BaseAcceleration,
+            };
+            found.roles.push((index, role));
         }
         for (place, entry) in statements.units.iter().enumerate() {
-            let index = match &entry.key {
-                UnitKey::Named(name) => match Role::ALL.iter().find(|role| role.key() == name) {
-                    Some(role) => {
-                        found
-                            .quantities
-                            .push((place, *role, parse(role.kind(), &entry.unit)?));
-                        continue;
-                    }
-                    None => column_of(table, name),
-                },
-                UnitKey::Position(index, count) => {
-                    check_positions(table, *count)?;
-                    (entry.unit != NOT_USED).then_some(*index)
+            let index = match Role::ALL.iter().find(|role| role.key() == entry.name) {
+                Some(role) => {
+                    let unit = parse(role.kind(), &entry.unit)?;
+                    found.quantities.push((place, *role, unit));
+                    continue;
                 }
+                None => column_of(table, &entry.name),
             };
             if let Some(index) = index {
                 found.is_used[place] = true;
                 let own = known(table, index).map(|column| column.role);
-                found.state(index, own, Some(&entry.unit))?;
+                found.state(index, own, &entry.unit)?;
             }
         }
         Ok(found)
     }
 
-    /// States the role and the unit of a column. The role of another quantity than that of the unit is replaced.
-    fn state(
-        &mut self,
-        index: usize,
-        role: Option<Role>,
-        unit: Option<&str>,
-    ) -> Result<(), InputError> {
-        let earlier = self.columns.iter().position(|column| column.index == index);
-        let earlier = earlier.map(|place| self.columns.remove(place));
-        let role = earlier.map(|column| column.role).or(role);
-        let (role, unit) = match (role, unit) {
-            (Some(role), None) => (role, None),
-            (None, None) => return Ok(()),
-            (role, Some(text)) => {
-                let is_of =
-                    |role: &Role| Unit::recognise(role.kind(), split_factor(text).1).is_some();
-                match role
-                    .filter(|role| earlier.is_some() || is_of(role))
-                    .or_else(|| Role::ALL.into_iter().find(is_of))
-                {
-                    Some(role) => (role, Some(parse(role.kind(), text)?)),
-                    None => return Err(unknown_unit(text)),
-                }
-            }
-        };
+    /// States the unit of a column, and its role: its own where the unit is of its quantity, else the first that has this unit.
+    fn state(&mut self, index: usize, own: Option<Role>, text: &str) -> Result<(), InputError> {
+        let is_of = |role: &Role| Unit::recognise(role.kind(), split_factor(text).1).is_some();
+        let any = || Role::ALL.into_iter().find(is_of);
+        let role = own.filter(is_of).or_else(any);
+        let role = role.ok_or_else(|| unknown_unit(text))?;
+        let unit = parse(role.kind(), text)?;
+        self.columns.retain(|column| column.index != index);
         self.columns.push(ColumnStatement { index, role, unit });
         Ok(())
     }
@@ -292,16 +192,26 @@ impl ColumnStatements {
     /// The column as stated, else as its name and unit give it.
     pub fn recognise(&self, table: &Table, index: usize) -> Option<UsedColumn> {
         let own = known(table, index);
+        if let Some((_, role)) = self.roles.iter().find(|(of, _)| *of == index) {
+            let own = own.filter(|column| column.role.kind() == role.kind());
+            let mut column = own.unwrap_or_else(|| UsedColumn::guessed(index, *role));
+            column.role = *role;
+            column.is_stated = true;
+            let unit = self
+                .columns
+                .iter()
+                .find(|column| column.index == index && column.role.kind() == role.kind());
+            unit.into_iter()
+                .for_each(|stated| column.state(stated.unit));
+            return Some(column);
+        }
         let Some(stated) = self.columns.iter().find(|column| column.index == index) else {
             return own;
         };
         let own = own.filter(|column| column.role.kind() == stated.role.kind());
         let mut column = own.unwrap_or_else(|| UsedColumn::guessed(index, stated.role));
         column.role = stated.role;
-        column.is_stated = true;
-        if let Some(unit) = stated.unit {
-            column.state(unit);
-        }
+        column.state(stated.unit);
         Some(column)
     }
 
@@ -339,42 +249,11 @@ fn unknown_unit(text: &str) -> InputError {
         .hint_if(did_you_mean(split_factor(text).1, symbols()))
 }
 
-/// Error for units by position in a file whose columns have names, or with another number of channels.
-fn check_positions(table: &Table, count: usize) -> Result<(), InputError> {
-    let error = |problem: &str| InputError::argument("--units", problem);
-    match table.time_column() {
-        None => Err(error("the units need names")
-            .found(table.path().display())
-            .expected("NAME=UNIT with a quantity or a column, as in `time=ms,displacement=mm`")),
-        Some(channels) if channels != count => Err(error("another number of units than channels")
-            .found(format!("{count} for {channels} channels"))
-            .expected(format!(
-                "{channels}, separated by commas, with `{NOT_USED}` for a channel that is not used; or NAME=UNIT"
-            ))),
-        Some(_) => Ok(()),
-    }
-}
-
 /// Column by its name, or by its number from 1.
 fn column_of(table: &Table, name: &str) -> Option<usize> {
     let by_name = (0..table.width()).find(|i| table.label(*i) == name);
     by_name.or_else(|| {
         let number = name.parse().ok()?;
         table.find(&ColumnName::Number(number)).ok()
-    })
-}
-
-fn option_column(table: &Table, option: &str, name: &str) -> Result<usize, InputError> {
-    column_of(table, name).ok_or_else(|| {
-        let labels: Vec<String> = (0..table.width()).map(|i| table.label(i)).collect();
-        let names = || labels.iter().map(String::as_str);
-        InputError::argument(option, "no such column")
-            .found(quote(name))
-            .expected(format!(
-                "a column of {}: {}",
-                table.path().display(),
-                one_of(names())
-            ))
-            .hint_if(did_you_mean(name, names()))
     })
 }

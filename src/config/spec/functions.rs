@@ -78,7 +78,8 @@ keys! {
             example "piecewise-linear",
             needs "`start`";
         /// Knots of a piecewise function or spline: their number (equally spaced, ends included) or their times; `auto`: about
-        /// 40 intervals and, where no penalty is given, one on the curvature with the weight `reml` (for equation-error `period`).
+        /// 40 intervals and, where no penalty is given, one on the curvature with the weight `reml` (for equation-error
+        /// `period`).
         knots: Option<KnotSpec>,
             example "11",
             unit "s, of times",
@@ -88,26 +89,23 @@ keys! {
         degree: Option<Count>,
             example "2",
             needs "`basis: polynomial`";
-        /// Start values of the search: one number, one value per node, cell or knot, polynomial coefficients, or a column of
-        /// a file. A mass, damping or stiffness without them starts from the record: from the frequency response to a measured force,
-        /// else from the dominant frequency, the decay and the known mass or stiffness.
+        /// Start values: one number, one value per node, cell or knot, polynomial coefficients, or a column of a file. A mass,
+        /// damping or stiffness without them starts from the record.
         start: Option<StartSpec>,
             example "2.0",
             unit "that of the function",
             default "for mass, damping and stiffness from the record",
             range "greater than 0 for a mass",
             needs "`basis`";
-        /// Fixed values, in place of `basis`; with a standard deviation, `{value: 4.5, sigma: 0.02}`, one that enters all confidence
-        /// intervals. `unknown` for a mass that nothing determines: all other coefficients are then ratios to it (stiffness in 1/s^2,
-        /// damping in 1/s), and so are the results.
+        /// Fixed values, in place of `basis`; with a standard deviation, `{value: 4.5, sigma: 0.02}`, one that enters all
+        /// intervals. `unknown` for a mass that nothing determines: all results are then ratios to it.
         fixed: Option<KnownValue>,
             example "1.0",
             unit "that of the function",
             range "greater than 0 for a mass",
             needs "no `start`";
-        /// Known values added to the estimated function, as `fixed`: a weighed block on a carriage of unknown mass. Start, bounds,
-        /// penalties and constraints concern the estimated part. In `functions` of an experiment without other keys it is
-        /// added to the shared function.
+        /// Known values added to the estimated function, as `fixed`. Start, bounds, penalties and constraints concern the
+        /// estimated part. In `functions` of an experiment without other keys it is added to the shared function.
         known_part: Option<KnownValue>,
             example "1.4665",
             unit "that of the function",
@@ -133,9 +131,8 @@ keys! {
             example "{kind: tikhonov, order: 2, weight: 0.1}",
             default "none",
             needs "`basis`";
-        /// For Coulomb friction: velocity over which its sign is smoothed, well below the peak velocity of the
-        /// response. `auto`: first a fiftieth of the root-mean-square velocity of the record, then reduced until half of it
-        /// shifts no estimate by more than a tenth of a standard error.
+        /// For Coulomb friction: velocity over which its sign is smoothed, well below the peak velocity of the response.
+        /// `auto`: reduced until half of it shifts no estimate by more than a tenth of a standard error.
         width: Option<FrictionWidth>,
             example "0.01",
             unit "m/s",
@@ -200,13 +197,7 @@ choice! {
     }
 }
 
-impl FunctionSpec {
-    /// Names of the penalty on the total variation.
-    pub fn has_total_variation(&self) -> bool {
-        let mut penalties = self.penalty.iter().flat_map(|list| list.values());
-        penalties.any(|penalty| penalty.kind == PenaltyKind::TotalVariation)
-    }
-}
+impl FunctionSpec {}
 
 choice! {
     /// Name of a coefficient function.

@@ -10,7 +10,7 @@ use crate::config::values::{Count, Number, NumberOrColumn, Text};
 keys! {
     /// Analyses of `kmcfit study`.
     pub struct StudySpec (Default) = "study", expecting "a map such as {profiles: [{function: mass, at: 0.0}], starts: 20}" {
-        /// Confidence level of bands, profiles, extremes and bootstrap intervals.
+        /// Confidence level of bands, profiles and extremes.
         confidence: Option<Number>,
             example "0.95",
             default "0.95",
@@ -48,22 +48,10 @@ keys! {
             default "1e-3",
             range "greater than 0",
             needs "`starts`";
-        /// Number of bootstrap refits.
-        bootstrap: Option<Count>,
-            example "200",
-            default "none",
-            range "40 to 1000000";
-        /// Noise of the bootstrap records.
-        noise: Option<NoiseName>,
-            example "residual",
-            default "parametric",
-            needs "`bootstrap`";
         /// Masses for which equivalent systems, with the same response, are computed.
         equivalent_systems: Option<Vec<EquivalentSpec>>,
             example "[{name: constant mass, mass: 1.0}]",
             default "increasing, decreasing and oscillating masses";
-        /// Likelihood-ratio test of each function against a constant.
-        constancy_test: Option<bool>, example "true", default "false";
         /// Candidate experiments, ranked by their information.
         candidates: Option<Vec<CandidateSpec>>,
             example "[{name: again, initial: {displacement: 3.3, velocity: 1.0}}]",
@@ -92,16 +80,6 @@ keys! {
         parameter: Option<Text>,
             example "initial velocity",
             needs "an estimated nuisance parameter of this name";
-    }
-}
-
-choice! {
-    /// Noise of the replicates of a bootstrap.
-    pub enum NoiseName {
-        /// Gaussian noise with the standard deviation of the samples.
-        Parametric = "parametric",
-        /// Residuals of the fit, drawn with replacement.
-        Residual = "residual",
     }
 }
 

@@ -4,16 +4,15 @@
 
 use crate::report::text;
 use kmcfit_core::internals::signal::Extremes;
-use serde::{Serialize, Serializer};
 use std::ops::RangeInclusive;
 
 /// Magnitudes beyond this leave gaps, so that no difference of two values overflows.
-pub(super) const LARGEST: f64 = 1e300;
+const LARGEST: f64 = 1e300;
 /// Magnitudes below this count as zero on linear axes, so that no step loses its digits.
 const SMALLEST: f64 = 1e-290;
 /// Spans below this share of the magnitude are rounding errors and are drawn as a constant.
 const FLAT: f64 = 1e-9;
-/// Blank share of a linear range above and below its data.
+/// Blank share of a vertical linear range above and below its data.
 const PAD: f64 = 0.05;
 /// Axes over more decades have no ticks between them.
 const MINOR_DECADES: f64 = 7.0;
@@ -27,23 +26,16 @@ pub enum Scale {
     Log,
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]
-fn is_log<S: Serializer>(scale: &Scale, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_bool(*scale == Scale::Log)
-}
-
 /// An axis: quantity, unit, scale and range.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// Quantity and symbol, as in `time t`.
     pub label: String,
     /// Unit, as in `s`; empty for a pure number.
     pub unit: String,
     /// Linear or logarithmic.
-    #[serde(rename = "log", serialize_with = "is_log")]
     pub scale: Scale,
     /// Lowest and highest value shown, in the unit of the axis; `None` for the range of the data.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub limits: Option<(f64, f64)>,
 }
 
@@ -116,31 +108,102 @@ pub(super) fn drawable(scale: Scale) -> RangeInclusive<f64> {
     }
 }
 
-/// The smallest range that contains both.
-pub(super) fn union(one: Option<Range>, other: Range) -> Range {
-    one.map_or(other, |one| (one.0.min(other.0), one.1.max(other.1)))
+/// A tick: position as a share of the axis from its low end, and label, which is empty for a short tick between the others.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Tick {
+    pub share: f64,
+    pub label: String,
 }
 
-/// The range of an axis for data of this extent; `pad` adds a margin to linear data.
-pub(super) fn range(axis: &Axis, extent: Option<Range>, pad: bool) -> Range {
-    if let Some(limits) = limits(axis) {
-        return limits;
-    }
-    let (low, high) = extent.unwrap_or((0.0, if axis.scale == Scale::Log { 0.0 } else { 1.0 }));
-    match axis.scale {
-        Scale::Log => decades(low, high),
-        Scale::Linear => linear(low, high, if pad { PAD } else { 0.0 }),
-    }
+/// An axis with its range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Ruler {
+    pub scale: Scale,
+    pub range: Range,
 }
 
-fn limits(axis: &Axis) -> Option<Range> {
-    let (low, high) = axis.limits?;
-    let (low, high) = (even(axis.scale, low), even(axis.scale, high));
-    (high - low > FLAT * low.abs().max(high.abs())).then_some((low, high))
+impl Ruler {
+    /// The range of an axis for data of these extents; `pad` adds a margin to linear data.
+    pub fn new(axis: &Axis, extents: impl Iterator<Item = Range>, pad: bool) -> Self {
+        let scale = axis.scale;
+        let of_axis = axis.limits.and_then(|(low, high)| {
+            let (low, high) = (even(scale, low), even(scale, high));
+            (high - low > FLAT * low.abs().max(high.abs())).then_some((low, high))
+        });
+        let of_data = || {
+            let all = extents.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+            match scale {
+                Scale::Log => decades(all.unwrap_or((0.0, 0.0))),
+                Scale::Linear => linear(all.unwrap_or((0.0, 1.0)), if pad { PAD } else { 0.0 }),
+            }
+        };
+        Self {
+            scale,
+            range: of_axis.unwrap_or_else(of_data),
+        }
+    }
+
+    /// Position of a value as a share of the axis; NaN if it cannot be drawn.
+    pub fn share(&self, value: f64) -> f64 {
+        self.place(even(self.scale, value))
+    }
+
+    fn place(&self, even: f64) -> f64 {
+        (even - self.range.0) / (self.range.1 - self.range.0)
+    }
+
+    /// At most about `most` labelled ticks, and those between them.
+    pub fn ticks(&self, most: usize) -> Vec<Tick> {
+        let most = most.max(2);
+        let (low, high) = self.range;
+        match self.scale {
+            Scale::Linear => linear_ticks(self.range, most)
+                .map(|(value, label)| Tick {
+                    share: self.place(value),
+                    label,
+                })
+                .collect(),
+            Scale::Log if (high + FLAT).floor() <= (low - FLAT).ceil() => {
+                let round = linear_ticks((10f64.powf(low), 10f64.powf(high)), most);
+                round
+                    .map(|(value, label)| Tick {
+                        share: self.share(value),
+                        label,
+                    })
+                    .filter(|tick| tick.share.is_finite())
+                    .collect()
+            }
+            Scale::Log => self.log_ticks(most),
+        }
+    }
+
+    /// Labels at decades; over few decades short ticks at their multiples.
+    fn log_ticks(&self, most: usize) -> Vec<Tick> {
+        let (low, high) = self.range;
+        let (first, last) = ((low - FLAT).ceil() as i64, (high + FLAT).floor() as i64);
+        let stride = (last - first).div_euclid(most as i64) + 1;
+        let decades = (first..=last).map(|exponent| Tick {
+            share: self.place(exponent as f64),
+            label: match exponent.rem_euclid(stride) {
+                0 => text::decade(exponent),
+                _ => String::new(),
+            },
+        });
+        let between = (first - 1..=last).filter(|_| high - low <= MINOR_DECADES);
+        let between = between.flat_map(|exponent| {
+            (2..10).map(move |digit| exponent as f64 + f64::from(digit).log10())
+        });
+        let between = between.map(|place| Tick {
+            share: self.place(place),
+            label: String::new(),
+        });
+        let inside = between.filter(|tick| (0.0..=1.0).contains(&tick.share));
+        decades.chain(inside).collect()
+    }
 }
 
 /// The whole decades around a logarithmic extent; a small tolerance keeps rounding errors from adding a decade.
-fn decades(low: f64, high: f64) -> Range {
+fn decades((low, high): Range) -> Range {
     let (low, high) = ((low + FLAT).floor(), (high - FLAT).ceil());
     if high > low {
         (low, high)
@@ -149,7 +212,7 @@ fn decades(low: f64, high: f64) -> Range {
     }
 }
 
-fn linear(low: f64, high: f64, pad: f64) -> Range {
+fn linear((low, high): Range, pad: f64) -> Range {
     let size = low.abs().max(high.abs());
     if high - low <= FLAT * size {
         let room = if size > 0.0 { 0.1 * size } else { 1.0 };
@@ -159,125 +222,17 @@ fn linear(low: f64, high: f64, pad: f64) -> Range {
     (low - room, high + room)
 }
 
-/// A tick: position as a share of the axis from its low end, and label.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Tick {
-    pub share: f64,
-    pub label: String,
-}
-
-/// An axis ready to draw.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Ruler {
-    scale: Scale,
-    range: Range,
-    /// Labelled ticks.
-    pub major: Vec<Tick>,
-    /// Shares of the short ticks without a label.
-    pub minor: Vec<f64>,
-}
-
-impl Ruler {
-    /// A ruler with at most about `most` labelled ticks.
-    pub fn new(scale: Scale, range: Range, most: usize) -> Self {
-        let mut ruler = Self {
-            scale,
-            range,
-            major: Vec::new(),
-            minor: Vec::new(),
-        };
-        match scale {
-            Scale::Linear => ruler.linear_ticks(most.max(2)),
-            Scale::Log => ruler.log_ticks(most.max(2)),
-        }
-        ruler
-    }
-
-    /// A horizontal ruler of `length` pixels without overlapping labels.
-    pub fn across(scale: Scale, range: Range, length: f64, size: f64) -> Self {
-        let most = ((length / 45.0) as usize).clamp(2, 8);
-        (2..=most)
-            .rev()
-            .map(|most| Self::new(scale, range, most))
-            .find(|ruler| ruler.widest(size) + size < length / ruler.major.len().max(1) as f64)
-            .unwrap_or_else(|| Self::new(scale, range, 2))
-    }
-
-    /// Position of a value as a share of the axis; NaN if it cannot be drawn.
-    pub fn share(&self, value: f64) -> f64 {
-        self.place(even(self.scale, value))
-    }
-
-    /// Width of the widest label, in pixels.
-    pub fn widest(&self, size: f64) -> f64 {
-        let widths = self.major.iter().map(|tick| text::width(&tick.label, size));
-        widths.fold(0.0, f64::max)
-    }
-
-    fn place(&self, even: f64) -> f64 {
-        (even - self.range.0) / (self.range.1 - self.range.0)
-    }
-
-    fn linear_ticks(&mut self, most: usize) {
-        let (low, high) = self.range;
-        let step = round_step((high - low) / most as f64);
-        let largest = low.abs().max(high.abs());
-        let slack = FLAT * (high - low) / step;
-        let (first, last) = ((low / step - slack).ceil(), (high / step + slack).floor());
-        let count = (last - first).clamp(0.0, 100.0) as usize;
-        for index in 0..=count {
-            let value = (first + index as f64) * step;
-            let label = text::tick(value, step, largest);
-            let share = self.place(value);
-            self.major.push(Tick { share, label });
-        }
-    }
-
-    /// Ticks at decades, or at round values if the range has too few decades.
-    fn log_ticks(&mut self, most: usize) {
-        let (low, high) = self.range;
-        let (first, last) = ((low - FLAT).ceil() as i64, (high + FLAT).floor() as i64);
-        if last <= first {
-            return self.round_values(most);
-        }
-        let stride = (last - first).div_euclid(most as i64) + 1;
-        for exponent in first..=last {
-            let share = self.place(exponent as f64);
-            if exponent.rem_euclid(stride) == 0 {
-                let label = text::decade(exponent);
-                self.major.push(Tick { share, label });
-            } else {
-                self.minor.push(share);
-            }
-        }
-        if high - low <= MINOR_DECADES {
-            self.between_decades(first - 1, last);
-        }
-    }
-
-    fn between_decades(&mut self, first: i64, last: i64) {
-        for exponent in first..=last {
-            for digit in 2..10 {
-                let share = self.place(exponent as f64 + f64::from(digit).log10());
-                if (0.0..=1.0).contains(&share) {
-                    self.minor.push(share);
-                }
-            }
-        }
-    }
-
-    /// Ticks at linear steps on a logarithmic axis of less than two decades.
-    fn round_values(&mut self, most: usize) {
-        let (low, high) = (10f64.powf(self.range.0), 10f64.powf(self.range.1));
-        let plain = Ruler::new(Scale::Linear, (low, high), most);
-        for tick in plain.major {
-            let share = self.share(low + tick.share * (high - low));
-            let label = tick.label;
-            if share.is_finite() {
-                self.major.push(Tick { share, label });
-            }
-        }
-    }
+/// Round values in a range with their labels.
+fn linear_ticks((low, high): Range, most: usize) -> impl Iterator<Item = (f64, String)> {
+    let step = round_step((high - low) / most as f64);
+    let largest = low.abs().max(high.abs());
+    let slack = FLAT * (high - low) / step;
+    let (first, last) = ((low / step - slack).ceil(), (high / step + slack).floor());
+    let count = (last - first).clamp(0.0, 100.0) as usize;
+    (0..=count).map(move |index| {
+        let value = (first + index as f64) * step;
+        (value, text::tick(value, step, largest))
+    })
 }
 
 /// The next larger of 1, 2 and 5 times a power of ten.
@@ -293,51 +248,26 @@ fn round_step(step: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn labels(ruler: &Ruler) -> Vec<&str> {
-        ruler.major.iter().map(|tick| tick.label.as_str()).collect()
+    fn labels(scale: Scale, range: Range, most: usize) -> Vec<String> {
+        let ticks = Ruler { scale, range }.ticks(most).into_iter();
+        ticks
+            .map(|tick| tick.label)
+            .filter(|label| !label.is_empty())
+            .collect()
     }
 
     #[test]
-    fn linear_ticks_are_round() {
-        let ruler = Ruler::new(Scale::Linear, (0.0, 25.0), 6);
-        assert_eq!(labels(&ruler), ["0", "5", "10", "15", "20", "25"]);
-        let ruler = Ruler::new(Scale::Linear, (-0.31, 0.52), 5);
-        assert_eq!(labels(&ruler), ["−0.2", "0.0", "0.2", "0.4"]);
-    }
-
-    #[test]
-    fn log_axes_label_decades_only() {
-        let axis = Axis::log("J/J0", "");
-        let range = range(
-            &axis,
-            extent(Scale::Log, &[8.1e-5, 0.8, 0.0, f64::NAN]),
-            true,
-        );
-        assert_eq!(range, (-5.0, 0.0));
-        let ruler = Ruler::new(Scale::Log, range, 6);
+    fn ticks_are_round_or_decades() {
+        let linear = |range, most| labels(Scale::Linear, range, most);
+        assert_eq!(linear((0.0, 25.0), 6), ["0", "5", "10", "15", "20", "25"]);
+        assert_eq!(linear((-0.31, 0.52), 5), ["−0.2", "0.0", "0.2", "0.4"]);
+        let log = |range| labels(Scale::Log, range, 7);
+        assert_eq!(log((-3.0, 0.0)), ["10⁻³", "10⁻²", "10⁻¹", "10⁰"]);
         assert_eq!(
-            labels(&ruler),
-            ["10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²", "10⁻¹", "10⁰"]
-        );
-        assert_eq!(ruler.minor.len(), 40);
-    }
-
-    #[test]
-    fn many_decades_are_labelled_in_strides() {
-        let ruler = Ruler::new(Scale::Log, (-16.0, 4.0), 7);
-        assert_eq!(
-            labels(&ruler),
+            log((-16.0, 4.0)),
             ["10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "10⁰", "10³"]
         );
-    }
-
-    #[test]
-    fn exact_decades_stay_within() {
-        let values: Vec<f64> = (0..4).map(|e| 10f64.powi(e)).collect();
-        assert_eq!(
-            range(&Axis::log("", ""), extent(Scale::Log, &values), true),
-            (0.0, 3.0)
-        );
+        assert_eq!(log((0.1, 0.5)), ["1.5", "2.0", "2.5", "3.0"]);
     }
 
     #[test]
@@ -351,22 +281,27 @@ mod tests {
             vec![-1e300, 1e300],
             vec![5e-324],
         ] {
-            for axis in [Axis::linear("", ""), Axis::log("", "")] {
-                let (low, high) = range(&axis, extent(axis.scale, &values), true);
+            for axis in [Axis::linear("", ""), Axis::log("", "").limits(0.0, 1.0)] {
+                let extents = extent(axis.scale, &values).into_iter();
+                let ruler = Ruler::new(&axis, extents, true);
+                let (low, high) = ruler.range;
                 assert!(
                     low < high && (high - low).is_finite(),
                     "{values:?} {axis:?}"
                 );
-                assert!(!Ruler::new(axis.scale, (low, high), 5).major.is_empty());
+                assert!(!ruler.ticks(5).is_empty());
             }
         }
     }
 
+    /// Exact decades add none.
     #[test]
-    fn useless_limits_count_as_absent() {
-        let axis = Axis::log("", "").limits(0.0, 1.0);
-        assert_eq!(range(&axis, Some((-2.0, 0.0)), true), (-2.0, 0.0));
-        let axis = Axis::linear("", "").limits(3.0, f64::NAN);
-        assert_eq!(range(&axis, Some((-2.0, 0.0)), false), (-2.0, 0.0));
+    fn a_logarithmic_range_has_whole_decades() {
+        let range = |values: &[f64]| {
+            let extents = extent(Scale::Log, values).into_iter();
+            Ruler::new(&Axis::log("", ""), extents, true).range
+        };
+        assert_eq!(range(&[8.1e-5, 0.8, 0.0, f64::NAN]), (-5.0, 0.0));
+        assert_eq!(range(&[1.0, 10.0, 1000.0]), (0.0, 3.0));
     }
 }

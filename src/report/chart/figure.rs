@@ -5,45 +5,19 @@
 
 use super::axis::Axis;
 use super::plot_mark::{Mark, MarkKind};
-use super::thin::{Detail, thinned};
-use serde::Serialize;
+use super::thin::thinned;
 
 /// Ranges below this share of the largest value are rounding errors.
 const ROUNDING: f64 = 1e-9;
 
-/// Width of a figure in print.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FigureWidth {
-    /// One column of a journal, 85 mm; the panels stand below each other.
-    Single,
-    /// Two columns, 180 mm.
-    Double,
-}
-
-impl FigureWidth {
-    /// Both widths.
-    pub const ALL: [Self; 2] = [Self::Single, Self::Double];
-
-    /// Width in mm.
-    pub fn millimetres(self) -> u32 {
-        match self {
-            Self::Single => 85,
-            Self::Double => 180,
-        }
-    }
-}
-
 /// One figure: a grid of panels with a common legend above them.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// File stem, as in `convergence` for `convergence.svg`.
-    #[serde(skip)]
     pub name: String,
     /// Title in the metadata of the file; it is not drawn, because captions belong to the surrounding text.
-    #[serde(skip)]
     pub title: String,
     /// Description for screen readers.
-    #[serde(skip)]
     pub description: String,
     /// The panels, row by row.
     pub panels: Vec<Panel>,
@@ -86,16 +60,6 @@ impl Figure {
         (!self.panels.is_empty()).then_some(self)
     }
 
-    /// The figure with its curves thinned to a detail.
-    pub(in crate::report) fn thinned(mut self, detail: Detail) -> Self {
-        for panel in &mut self.panels {
-            let scales = [panel.x.scale, panel.y.scale];
-            let marks = std::mem::take(&mut panel.marks).into_iter();
-            panel.marks = marks.map(|mark| thinned(mark, scales, 0, detail)).collect();
-        }
-        self
-    }
-
     /// Adds panels.
     #[must_use]
     pub fn panels(mut self, panels: impl IntoIterator<Item = Panel>) -> Self {
@@ -105,13 +69,13 @@ impl Figure {
 }
 
 /// One pair of axes with its marks; later marks lie on top of earlier ones.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
     /// Heading above the panel; none where empty.
     pub title: String,
-    /// Horizontal axis. Equal axes in one column share their range and labels.
+    /// Horizontal axis. Equal axes in one column share their range, and the lowest has the labels.
     pub x: Axis,
-    /// Vertical axis. Equal axes in one row share their range and labels.
+    /// Vertical axis.
     pub y: Axis,
     /// Marks, from back to front.
     pub marks: Vec<Mark>,
@@ -166,10 +130,8 @@ impl Panel {
     #[must_use]
     pub fn marks(mut self, marks: impl IntoIterator<Item = Mark>) -> Self {
         let scales = [self.x.scale, self.y.scale];
-        let marks = marks
-            .into_iter()
-            .map(|mark| thinned(mark, scales, Detail::FULL.few, Detail::FULL));
-        self.marks.extend(marks);
+        self.marks
+            .extend(marks.into_iter().map(|mark| thinned(mark, scales)));
         self
     }
 }

@@ -1,26 +1,17 @@
-//! Charts: the data model of a figure, and its two renderers.
+//! Charts: the description of a figure, and its drawing as SVG.
 //!
-//! [`figure`], [`plot_mark`] and `axis` describe the contents of a figure. `layout`, `panel`, `legend`, `axis` and `curve` turn it
-//! into primitives in pixels, which [`svg`] writes; `data` serialises the same description for the script of a page.
+//! [`figure`], [`plot_mark`] and `axis` describe the contents of a figure; [`svg`] draws them, with the panels by `panel`. The script of
+//! a page reads and zooms this drawing.
 
 mod axis;
-mod curve;
-mod data;
-mod drawing;
+mod elements;
 pub mod figure;
-mod layout;
-mod legend;
-mod numbers;
 mod panel;
 pub mod plot_mark;
 pub mod svg;
 mod thin;
 
 pub use axis::{Axis, Scale};
-pub(super) use data::{data, text_for_script};
-pub use figure::{Figure, FigureWidth, Panel};
-pub(super) use plot_mark::MarkKind;
+pub use figure::{Figure, Panel};
 pub use plot_mark::{Colour, Dash, Mark, Style};
-pub(super) use svg::sample;
-pub use svg::{render, render_at};
-pub(crate) use thin::Detail;
+pub use svg::render;

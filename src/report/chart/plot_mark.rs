@@ -1,11 +1,7 @@
 //! Marks of a panel (curves, dots, bands, spans, reference lines) and their style.
 
-use super::numbers::{places, rounded};
-use serde::Serialize;
-
 /// The colours of Okabe and Ito, distinguishable with any colour vision, and a grey.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Colour {
     Black,
@@ -31,6 +27,20 @@ impl Colour {
         Colour::Grey,
     ];
 
+    /// Red, green and blue in hexadecimal digits.
+    pub(super) fn hex(self) -> &'static str {
+        match self {
+            Colour::Black => "#000000",
+            Colour::Blue => "#0072B2",
+            Colour::Vermillion => "#D55E00",
+            Colour::Green => "#009E73",
+            Colour::Purple => "#CC79A7",
+            Colour::Orange => "#E69F00",
+            Colour::Sky => "#56B4E9",
+            Colour::Grey => "#A8A8A8",
+        }
+    }
+
     /// The colour of series `index`, from 0; starts again after the last.
     pub fn nth(index: usize) -> Self {
         Self::ALL[index % Self::ALL.len()]
@@ -53,29 +63,19 @@ impl Dash {
         [Self::Solid, Self::Dashed, Self::DashDot, Self::Dotted][index % 4]
     }
 
-    /// Lengths of dashes and gaps in tenths of a pixel.
-    pub(super) fn lengths(self) -> &'static [u16] {
+    /// Lengths of dashes and gaps in pixels.
+    pub(super) fn lengths(self) -> &'static str {
         match self {
-            Dash::Solid => &[],
-            Dash::Dashed => &[60, 32],
-            Dash::Dotted => &[16, 22],
-            Dash::DashDot => &[70, 26, 16, 26],
+            Dash::Solid => "",
+            Dash::Dashed => "6 3.2",
+            Dash::Dotted => "1.6 2.2",
+            Dash::DashDot => "7 2.6 1.6 2.6",
         }
     }
 }
 
-impl Serialize for Dash {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let lengths = self.lengths().iter();
-        let pixels: Vec<String> = lengths
-            .map(|l| (f64::from(*l) / 10.0).to_string())
-            .collect();
-        serializer.serialize_str(&pixels.join(" "))
-    }
-}
-
 /// Style of a line or of points; for points `width` is the diameter.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Style {
     /// Colour.
     pub colour: Colour,
@@ -116,8 +116,7 @@ impl Style {
 }
 
 /// Kind of a mark.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MarkKind {
     /// A curve through the points in their order.
     Line,
@@ -137,26 +136,21 @@ pub enum MarkKind {
 
 /// A mark in a panel. A mark with a label appears in the legend; equal labels with equal colour, in any panel, appear
 /// there once.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Mark {
     /// Kind.
     pub kind: MarkKind,
     /// The label for the legend; empty for none.
     pub label: String,
     /// Style; spans ignore it.
-    #[serde(flatten)]
     pub style: Style,
     /// x values; empty for a horizontal line.
-    #[serde(serialize_with = "places")]
     pub x: Vec<f64>,
     /// y values, for a band those of its lower edge; empty for a span or a vertical line.
-    #[serde(serialize_with = "rounded")]
     pub y: Vec<f64>,
     /// The upper edge of a band.
-    #[serde(serialize_with = "rounded")]
     pub high: Vec<f64>,
     /// True if points were removed that would be visible when zoomed.
-    #[serde(skip)]
     pub(super) is_thinned: bool,
 }
 
@@ -175,6 +169,11 @@ impl Mark {
             high: Vec::new(),
             is_thinned: false,
         }
+    }
+
+    /// True if points were removed that would be visible when zoomed.
+    pub(in crate::report) fn is_thinned(&self) -> bool {
+        self.is_thinned
     }
 
     /// Smallest and largest finite y; the first is infinite without any.

@@ -1,90 +1,33 @@
-//! Thinning of curves, which bounds the size of pages of long records without visible change.
+//! Thinning of long curves, which bounds the size of drawings without visible change.
 
 use super::axis::{Scale, drawable, even, extent};
 use super::plot_mark::{Mark, MarkKind};
 use kmcfit_core::internals::signal::Extremes;
 
-/// Detail of the curves of a page.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Detail {
-    /// Longest curve that is not thinned, points.
-    pub(super) few: usize,
-    /// Columns of a longer curve, in each of which its first, lowest, highest and last point are kept.
-    columns: u32,
-}
+/// Longest curve that is drawn whole, points.
+const MOST: usize = 4000;
+/// Columns of a longer curve, in each of which its first, lowest, highest and last point are kept: finer than the pixels of a panel.
+const COLUMNS: f64 = 700.0;
 
-impl Detail {
-    /// Columns finer than the pixels of a chart.
-    pub const FULL: Self = Self {
-        few: 4000,
-        columns: 700,
-    };
-    /// Fewest columns.
-    const FEWEST: u32 = 16;
-
-    /// Half the columns; `None` where curves would lose their shape.
-    pub fn coarser(self) -> Option<Self> {
-        let columns = self.columns / 2;
-        (columns >= Self::FEWEST).then_some(Self {
-            few: 2 * columns as usize,
-            columns,
-        })
-    }
-}
-
-/// Tolerance, relative to the range of the curve, within which points on a straight line are removed.
-const STRAIGHT: f64 = 1e-6;
-
-/// A curve, points or a band of more than `most` points on the scales of x and y, with the points that show.
-pub(super) fn thinned(
-    mut mark: Mark,
-    [x_scale, y_scale]: [Scale; 2],
-    most: usize,
-    detail: Detail,
-) -> Mark {
-    let is_band = mark.kind == MarkKind::Band;
-    let is_curve = is_band || matches!(mark.kind, MarkKind::Line | MarkKind::Points);
-    if !is_curve || mark.x.len() <= most {
+/// A curve, points or a band of more than [`MOST`] points on the scales of x and y, with the points that show.
+pub(super) fn thinned(mut mark: Mark, [x_scale, y_scale]: [Scale; 2]) -> Mark {
+    let is_curve = matches!(
+        mark.kind,
+        MarkKind::Line | MarkKind::Points | MarkKind::Band
+    );
+    let Mark { x, y, high, .. } = &mut mark;
+    let mut ys = vec![(y.as_slice(), y_scale)];
+    ys.extend((!high.is_empty()).then_some((&high[..], y_scale)));
+    let count = (ys.iter().map(|(y, _)| y.len())).fold(x.len(), usize::min);
+    if !is_curve || count <= MOST {
         return mark;
     }
-    let mut ys = vec![(mark.y.as_slice(), y_scale)];
-    ys.extend(is_band.then_some((&mark.high[..], y_scale)));
-    let is_joined = mark.kind != MarkKind::Points;
-    let (points, is_thinned) = kept((&mark.x, x_scale), &ys, is_joined, detail);
-    let Mark { x, y, high, .. } = &mut mark;
+    let points = columns((x, x_scale), &ys, count, COLUMNS);
     for values in [x, y, high].into_iter().filter(|values| !values.is_empty()) {
         *values = points.iter().map(|i| values[*i]).collect();
     }
-    mark.is_thinned |= is_thinned;
+    mark.is_thinned = true;
     mark
-}
-
-/// Indices of the kept points of curves `ys` over one `x`, and true if removed points would be visible when zoomed.
-/// `joined`: the points are joined by lines.
-fn kept(
-    x: (&[f64], Scale),
-    ys: &[(&[f64], Scale)],
-    joined: bool,
-    detail: Detail,
-) -> (Vec<usize>, bool) {
-    let count = (ys.iter().map(|(y, _)| y.len())).fold(x.0.len(), usize::min);
-    let thinned = count > detail.few;
-    let points = match thinned {
-        true => columns(x, ys, count, f64::from(detail.columns)),
-        false => (0..count).collect(),
-    };
-    let [(y, scale)] = ys else {
-        return (points, thinned);
-    };
-    let straight = match joined {
-        true => corners(x, (y, *scale), &points),
-        false => points.clone(),
-    };
-    // Curves over the same points share their abscissae, so removing few points saves nothing.
-    match straight.len() < points.len() / 2 {
-        true => (straight, thinned),
-        false => (points, thinned),
-    }
 }
 
 /// Per column the first and last point, and the lowest and highest of every curve.
@@ -147,57 +90,15 @@ fn peaks(scale: Scale, y: &[f64]) -> impl Iterator<Item = usize> {
     ends.chain([gap.flatten()]).flatten()
 }
 
-/// The ends of the straight segments of a curve: all points between them are within [`STRAIGHT`] of the segments.
-fn corners(x: (&[f64], Scale), y: (&[f64], Scale), points: &[usize]) -> Vec<usize> {
-    let Some((low, high)) = extent(y.1, y.0) else {
-        return points.to_vec();
-    };
-    let room = STRAIGHT * (high - low);
-    let at = |i: &usize| (even(x.1, x.0[*i]), even(y.1, y.0[*i]));
-    let places: Vec<(f64, f64)> = points.iter().map(at).collect();
-    // Positions in `points`.
-    let mut kept = vec![0];
-    let mut slopes = (f64::NEG_INFINITY, f64::INFINITY);
-    for now in 1..points.len() {
-        let before = now - 1;
-        let from = |anchor: usize| {
-            let ((x0, y0), (x1, y1)) = (places[anchor], places[now]);
-            let run = x1 - x0;
-            (
-                (y1 - y0) / run,
-                room / run,
-                run > 0.0 && (y1 - y0).is_finite(),
-            )
-        };
-        let anchor = kept.last().copied().unwrap_or(before);
-        let (slope, wide, drawable) = from(anchor);
-        if drawable && slopes.0 <= slope && slope <= slopes.1 {
-            slopes = (slopes.0.max(slope - wide), slopes.1.min(slope + wide));
-            continue;
-        }
-        if anchor != before {
-            kept.push(before);
-        }
-        let (slope, wide, drawable) = from(before);
-        slopes = (slope - wide, slope + wide);
-        if !drawable {
-            kept.push(now);
-            slopes = (f64::NEG_INFINITY, f64::INFINITY);
-        }
-    }
-    kept.push(points.len().saturating_sub(1));
-    kept.dedup();
-    kept.iter()
-        .filter_map(|i| points.get(*i))
-        .copied()
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::chart::{Colour, Style};
 
-    const LINEAR: Scale = Scale::Linear;
+    fn kept(x: &[f64], y: &[f64], scale: Scale) -> Mark {
+        let mark = Mark::line("", x, y, Style::new(Colour::Blue));
+        thinned(mark, [scale, Scale::Linear])
+    }
 
     #[test]
     fn short_curves_stay_whole_and_long_ones_keep_their_peaks() {
@@ -205,52 +106,16 @@ mod tests {
         let mut y: Vec<f64> = x.iter().map(|x| (0.3 * x).sin()).collect();
         y[40_001] = 9.0;
         y[50_001] = f64::NAN;
-        let (points, thinned) = kept((&x, LINEAR), &[(&y, LINEAR)], true, Detail::FULL);
-        assert!(thinned && points.len() <= 4 * 701 + 1, "{}", points.len());
-        assert!(
-            [0, 40_001, 50_001, 64_999]
-                .iter()
-                .all(|i| points.contains(i))
-        );
-        assert!(points.is_sorted());
-        let (points, thinned) = kept(
-            (&x[..4000], LINEAR),
-            &[(&y[..4000], LINEAR)],
-            true,
-            Detail::FULL,
-        );
-        assert!(!thinned && points.len() == 4000);
-    }
-
-    #[test]
-    fn straight_pieces_are_their_ends() {
-        let x: Vec<f64> = (0..=1000).map(|i| f64::from(i) * 0.01).collect();
-        let bent: Vec<f64> = x.iter().map(|x| (x - 4.0).abs()).collect();
-        let of = |y: &[f64]| kept((&x, LINEAR), &[(y, LINEAR)], true, Detail::FULL).0;
-        assert_eq!(of(&bent), [0, 400, 1000]);
-        assert_eq!(of(&vec![2.0; 1001]), [0, 1000]);
-        // Removed points are on the remaining segments.
-        let curved: Vec<f64> = x.iter().map(|x| (1e-3 * x).sin()).collect();
-        let corners = of(&curved);
-        assert!(corners.len() < 500, "{}", corners.len());
-        for pair in corners.windows(2) {
-            let (a, b) = (pair[0], pair[1]);
-            for i in a..b {
-                let share = (x[i] - x[a]) / (x[b] - x[a]);
-                let line = curved[a] + share * (curved[b] - curved[a]);
-                assert!((line - curved[i]).abs() <= 1.01 * STRAIGHT * 0.01, "{i}");
-            }
-        }
-    }
-
-    #[test]
-    fn points_above_each_other_are_one_column() {
-        let (x, y) = (
-            vec![1.0; 9000],
-            (0..9000).map(f64::from).collect::<Vec<_>>(),
-        );
-        let kept = kept((&x, LINEAR), &[(&y, LINEAR)], false, Detail::FULL);
-        assert_eq!(kept.0, [0, 8999]);
+        let mark = kept(&x, &y, Scale::Linear);
+        assert!(mark.is_thinned && mark.x.len() <= 4 * 701 + 1);
+        let at = |i: f64| mark.x.contains(&i);
+        assert!([0.0, 40_001.0, 50_001.0, 64_999.0].into_iter().all(at));
+        assert!(mark.x.is_sorted());
+        let mark = kept(&x[..4000], &y[..4000], Scale::Linear);
+        assert!(!mark.is_thinned && mark.x.len() == 4000);
+        // Points above each other are one column.
+        let mark = kept(&vec![1.0; 9000], &x[..9000], Scale::Linear);
+        assert_eq!(mark.y, [0.0, 8999.0]);
     }
 
     /// On a scale of frequencies each octave has its columns, with the peak of each; a frequency of zero has none.
@@ -259,29 +124,15 @@ mod tests {
         let x: Vec<f64> = (0..40_000).map(f64::from).collect();
         let mut y = vec![1.0; 40_000];
         (y[300], y[30_000]) = (50.0, 1e-6);
-        let log = Scale::Log;
-        let (points, thinned) = kept((&x, log), &[(&y, log)], false, Detail::FULL);
-        assert!(thinned && points.is_sorted());
-        assert!(
-            [0, 1, 300, 30_000, 39_999]
-                .iter()
-                .all(|i| points.contains(i))
-        );
+        let mark = kept(&x, &y, Scale::Log);
+        let at = |i: f64| mark.x.contains(&i);
+        assert!([0.0, 1.0, 300.0, 30_000.0, 39_999.0].into_iter().all(at));
         // 700 columns of log10(39,999) = 4.602: 152 in each decade, of each the first and the last point.
-        let above = |from: usize| {
-            let decade = from..10 * from;
-            points.iter().filter(|i| decade.contains(*i)).count()
+        let above = |from: f64| {
+            let decade = from..10.0 * from;
+            mark.x.iter().filter(|x| decade.contains(x)).count()
         };
-        let decades = [300, 3000].map(above);
+        let decades = [300.0, 3000.0].map(above);
         assert!(decades.iter().all(|n| n.abs_diff(304) <= 8), "{decades:?}");
-    }
-
-    #[test]
-    fn gaps_stay_gaps() {
-        let x: Vec<f64> = (0..100).map(f64::from).collect();
-        let mut y = vec![1.0; 100];
-        y[50] = f64::NAN;
-        let (points, _) = kept((&x, LINEAR), &[(&y, LINEAR)], true, Detail::FULL);
-        assert_eq!(points, [0, 49, 50, 51, 99]);
     }
 }

@@ -1,14 +1,17 @@
 //! Compared quantities of one run.
 
+use super::ComparedRun;
 use super::likelihood::Likelihood;
-use super::run::ComparedRun;
-use super::verdict::{Agreement, ResponseFit, verdict};
-use crate::finding::Finding;
-use crate::report::cost::CostKind;
-use crate::report::document::Prediction;
-use kmcfit_core::internals::assessment::{Estimate, Roughness, TruthErrors, VerdictLevel};
+use crate::number_format::{resolved, significant};
+use crate::report::document::level_in_words;
+use kmcfit_core::internals::assessment::{Estimate, TruthErrors, VerdictLevel};
 use kmcfit_core::internals::solvers::Status;
 use serde::Serialize;
+
+/// Width of an interval, relative to the estimate, below which it is not printed: samples without noise.
+const EXACT: f64 = 2e-7;
+/// Relative error below which the table says so.
+const LEAST_ERROR: f64 = 1e-4;
 
 /// Compared quantities of one run; `--json` prints them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -19,127 +22,140 @@ pub struct Measures {
     pub title: String,
     /// Status.
     pub status: Status,
-    /// Reason of the status, as a sentence.
-    pub reason: String,
-    /// Summary in one line.
-    pub verdict: String,
     /// Level of the verdict on the fit.
-    #[serde(skip)]
-    pub level: Option<VerdictLevel>,
-    /// True if the response is fitted.
-    #[serde(skip)]
-    pub is_matched: bool,
-    /// True if `k/m` and `c/m` agree with the true system; `null` if it is not known.
-    pub is_true_system: Option<bool>,
-    /// Solver.
-    pub method: String,
-    /// Number of nodes.
-    pub nodes: usize,
+    pub verdict: Option<VerdictLevel>,
     /// Number of free parameters.
     pub parameters: usize,
-    /// Part of J from the samples, in `misfit_unit`.
+    /// Part of J from the samples.
     pub misfit: f64,
-    /// `m^2 s`; `1` for a chi-square; `N^2 s` for the equation error; of a rotation `rad^2 s` and `N^2 m^2 s`.
-    pub misfit_unit: &'static str,
+    /// `J/J0`.
+    pub cost_ratio: f64,
     /// Smallest fit of a channel, per cent; `null` if no channel has one.
     pub worst_fit: Option<f64>,
+    /// Smallest fit of a channel of the validation records, per cent; `null` without any.
+    pub validation_fit: Option<f64>,
     /// Likelihood and criteria; `null` without a likelihood.
     pub likelihood: Option<Likelihood>,
     /// BIC minus that of the best run; `null` without a likelihood, and where the runs have different records.
     pub bic_difference: Option<f64>,
-    /// Smallest fit of a channel of the validation records, per cent; `null` without any.
-    pub validation_fit: Option<f64>,
     /// Natural frequency, Hz.
     pub natural_frequency: Option<Estimate>,
     /// Damping ratio.
     pub damping_ratio: Option<Estimate>,
-    /// True if the displacement is an angle; kg, N and m then denote kg m², N m and rad.
-    pub is_rotation: bool,
-    /// True if `J/J0` is meaningful: not if sigma was estimated.
-    pub has_ratio: bool,
-    /// `J/J0`.
-    pub cost_ratio: f64,
-    /// Iterations of the solver, those along a path of weights included.
-    pub iterations: u64,
-    /// Wall-clock time, s.
-    pub seconds: f64,
     /// Errors relative to the true system, if known.
     pub errors: Option<TruthErrors>,
-    /// Smallest mass at a node, kg.
-    pub smallest_mass: f64,
-    /// Smallest damping at a node, N s/m.
-    pub smallest_damping: f64,
-    /// Largest violation of a constraint relative to its scale.
-    pub max_violation: Option<f64>,
-    /// Roughness of the functions.
-    pub roughness: Roughness,
-    /// Predicted free responses.
-    pub predictions: Vec<Prediction>,
+    /// Wall-clock time, s.
+    pub seconds: f64,
     /// Assumptions of the model beside the records.
     pub assumptions: Vec<String>,
-    /// Warnings on identifiability.
-    pub identifiability: Vec<Finding>,
-    /// Warnings about data and specification.
-    pub warnings: Vec<Finding>,
 }
+
+/// Headings of the table.
+pub(super) const HEADINGS: [&str; 13] = [
+    "model",
+    "verdict",
+    "parameters",
+    "log-likelihood",
+    "AICc",
+    "BIC - best",
+    "fit",
+    "validation fit",
+    "f_n, Hz (95 % CI)",
+    "zeta (95 % CI)",
+    "error of k/m",
+    "error of c/m",
+    "error of m",
+];
 
 impl Measures {
     /// Quantities of a run.
     pub fn of(run: &ComparedRun) -> Self {
         let document = &run.finished.document;
         let coefficients = &run.finished.coefficients;
-        let response = ResponseFit::of(run);
-        let errors =
-            (run.finished.truth.as_ref()).map(|truth| TruthErrors::of(coefficients, truth));
         Self {
             name: run.name.clone(),
             title: document.title.clone(),
             status: document.outcome.status,
-            reason: document.outcome.reason.clone(),
-            verdict: verdict(&response, errors.as_ref()),
-            level: document.verdict.as_ref().map(|verdict| verdict.level),
-            is_matched: response.is_matched(),
-            is_true_system: (errors.as_ref())
-                .map(|errors| Agreement::of(errors) == Agreement::Recovered),
-            method: document.model.method.clone(),
-            nodes: document.model.nodes,
+            verdict: document.verdict.as_ref().map(|verdict| verdict.level),
             parameters: document.model.parameters,
             misfit: document.cost.misfit,
-            misfit_unit: match (document.model.cost_kind, document.is_rotation()) {
-                (CostKind::ChiSquare, _) => "1",
-                (CostKind::EquationError, false) => "N^2 s",
-                (CostKind::EquationError, true) => "N^2 m^2 s",
-                (CostKind::Integral | CostKind::Mixed, false) => "m^2 s",
-                (CostKind::Integral | CostKind::Mixed, true) => "rad^2 s",
-            },
+            cost_ratio: document.cost.ratio,
             worst_fit: document.worst_fit(),
-            likelihood: Likelihood::of(document),
-            bic_difference: None,
             validation_fit: (document.validation.iter().flat_map(|v| &v.channels))
                 .map(|c| c.fit_percent)
                 .filter(|fit| fit.is_finite())
                 .reduce(f64::min),
+            likelihood: Likelihood::of(document),
+            bic_difference: None,
             natural_frequency: document.estimates.get("natural_frequency").cloned(),
             damping_ratio: document.estimates.get("damping_ratio").cloned(),
-            is_rotation: document.is_rotation(),
-            has_ratio: document.has_ratio(),
-            cost_ratio: document.cost.ratio,
-            iterations: document.counts.iterations
-                + document.weights.as_ref().map_or(0, |w| w.iterations()),
+            errors: (run.finished.truth.as_ref()).map(|truth| TruthErrors::of(coefficients, truth)),
             seconds: document.seconds,
-            errors,
-            smallest_mass: smallest(&coefficients.mass),
-            smallest_damping: smallest(&coefficients.coefficients[0]),
-            max_violation: run.max_violation,
-            roughness: Roughness::of(coefficients, run.finished.system.grid.step()),
-            predictions: document.predictions.clone(),
             assumptions: document.identifiability.assumptions.clone(),
-            identifiability: document.fit_warnings().cloned().collect(),
-            warnings: document.warnings.clone(),
         }
+    }
+
+    /// Errors of k/m, c/m and m relative to those of the true system.
+    fn relative_errors(&self) -> [Option<f64>; 3] {
+        let errors = self.errors.as_ref();
+        let all = errors.map(|e| [e.k_over_m_relative, e.c_over_m_relative, e.mass_relative]);
+        all.map_or([None; 3], |errors| errors.map(Some))
+    }
+
+    /// The cells of [`HEADINGS`]; `–` for an unknown one.
+    pub(super) fn row(&self) -> [String; HEADINGS.len()] {
+        let or_unknown =
+            |x: Option<f64>, text: &dyn Fn(f64) -> String| x.map_or_else(|| "–".to_owned(), text);
+        let fixed = |x: f64| format!("{x:.1}");
+        let percent = |x: f64| format!("{x:.1} %");
+        let likelihood = self.likelihood;
+        let parameters = likelihood.map_or(self.parameters as f64, |l| l.parameters);
+        let [k, c, m] = self.relative_errors().map(|error| or_unknown(error, &size));
+        [
+            self.name.clone(),
+            self.verdict.map_or("–", level_in_words).to_owned(),
+            significant(parameters, 4),
+            or_unknown(likelihood.map(|l| l.log_likelihood), &fixed),
+            or_unknown(likelihood.map(|l| l.aicc), &fixed),
+            or_unknown(self.bic_difference, &|d| match d == 0.0 {
+                true => "0".to_owned(),
+                false => format!("+{d:.1}"),
+            }),
+            or_unknown(self.worst_fit, &percent),
+            or_unknown(self.validation_fit, &percent),
+            interval(self.natural_frequency.as_ref()),
+            interval(self.damping_ratio.as_ref()),
+            k,
+            c,
+            m,
+        ]
     }
 }
 
-fn smallest(f: &[f64]) -> f64 {
-    f.iter().copied().fold(f64::INFINITY, f64::min)
+/// A relative error as a percentage.
+fn size(error: f64) -> String {
+    match 100.0 * error {
+        _ if error < LEAST_ERROR => "< 0.01 %".to_owned(),
+        percent if !percent.is_finite() => "unbounded".to_owned(),
+        percent if percent >= 1e4 => format!("a factor of {error:.0e}"),
+        percent => format!("{} %", significant(percent, 2)),
+    }
+}
+
+/// An estimate with its interval, to the digits of the interval.
+fn interval(estimate: Option<&Estimate>) -> String {
+    let Some(estimate) = estimate.filter(|e| e.value.is_finite()) else {
+        return "–".into();
+    };
+    match estimate.ci95 {
+        None => significant(estimate.value, 4),
+        Some([low, high]) if (high - low).abs() <= EXACT * estimate.value.abs() => {
+            significant(estimate.value, 7)
+        }
+        Some([low, high]) => {
+            let half = 0.5 * (high - low).abs();
+            let [value, low, high] = resolved([estimate.value, low, high], half);
+            format!("{value} ({low} to {high})")
+        }
+    }
 }

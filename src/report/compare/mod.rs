@@ -1,50 +1,71 @@
-//! Comparison of several runs: a table, overlaid figures, one page.
+//! Comparison of several runs: a table with a row for each, and a page of overlaid figures.
 //!
-//! Every run is read from its folder and keeps its own grid. [`Measures`] are the compared quantities of one run; the
-//! terminal, `compare.csv` and `compare.html` show the same ones.
+//! Every run is read from its folder and keeps its own grid. [`Measures`] are the compared quantities of one run; the terminal,
+//! `--json` and `compare.html` show the same ones.
 
-mod conclusions;
 mod figures;
 mod likelihood;
 mod measures;
-mod page;
-mod run;
-mod selection;
-mod table;
-mod text;
-mod verdict;
 
-pub use likelihood::{Likelihood, LikelihoodRatio};
+pub use likelihood::Likelihood;
 pub use measures::Measures;
-pub use run::{ComparedRun, MatchedResponse};
 
+use super::page as shell;
 use super::render;
-use crate::results::{Claim, OutputFolder};
+use super::run_reader::Run;
+use super::text::{aligned, clean};
+use crate::error::InputError;
+use crate::number_format::significant;
+use measures::HEADINGS;
 use serde::Serialize;
+use std::fmt::Write;
 use std::io;
+use std::path::Path;
 
-/// Largest relative error of `k/m` and `c/m` of a system that counts as close to the true one: attainable for a smooth
-/// fit of a record with a few per cent of noise.
-pub const CLOSE: f64 = 0.05;
-
-/// Largest rms residual relative to the rms sample of a response without sigma that counts as fitted; 0.9 % for the
-/// optimum of the paper.
-pub const MATCHED: f64 = 0.01;
-
-/// Relative errors below this are rounding errors and are printed with one digit.
-const ROUNDING: f64 = 1e-12;
+/// Differences of BIC beyond which evidence is very strong, strong and positive (Kass and Raftery 1995).
+const VERY_STRONG: f64 = 10.0;
+const STRONG: f64 = 6.0;
+const POSITIVE: f64 = 2.0;
 
 /// Version of the document's format.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
-/// Several runs side by side.
+/// A finished run with its name in the comparison, which is unique.
 #[derive(Debug, Clone)]
-pub struct Comparison {
-    runs: Vec<ComparedRun>,
-    measures: Vec<Measures>,
-    likelihood_ratios: Vec<LikelihoodRatio>,
-    left_out: Vec<LeftOut>,
-    sequence: Option<String>,
+pub struct ComparedRun {
+    /// Name.
+    pub name: String,
+    /// Document, estimated coefficients and true system.
+    pub finished: Run,
+}
+
+impl ComparedRun {
+    /// Reads the folder of a finished run.
+    ///
+    /// # Errors
+    /// If there is no complete run in the folder.
+    pub fn read(name: &str, folder: &Path) -> Result<Self, InputError> {
+        Ok(Self {
+            name: name.into(),
+            finished: Run::open(folder)?,
+        })
+    }
+
+    /// True if another run has the same records: channels, numbers of samples, measured displacements.
+    fn has_records_of(&self, other: &Self) -> bool {
+        let channels = |run: &Self| -> Vec<(String, usize)> {
+            let channels = run.finished.document.channels();
+            channels.map(|c| (c.kind.clone(), c.samples)).collect()
+        };
+        let displacements = |run: &Self| -> Vec<f64> {
+            let table = &run.finished.trajectory;
+            let observed = table.headers().iter();
+            let observed = observed.filter(|name| name.starts_with("observed_"));
+            let values = observed.filter_map(|name| table.column(name)).flatten();
+            values.filter(|y| y.is_finite()).collect()
+        };
+        channels(self) == channels(other) && displacements(self) == displacements(other)
+    }
 }
 
 /// A run without a result.
@@ -65,11 +86,17 @@ pub struct ComparisonDocument<'a> {
     pub version: &'static str,
     /// The runs in the order of the arguments.
     pub runs: &'a [Measures],
-    /// Likelihood-ratio tests of the runs that another one contains.
-    #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    pub likelihood_ratios: &'a [LikelihoodRatio],
     /// The runs without a result.
     pub left_out: &'a [LeftOut],
+}
+
+/// Several runs side by side.
+#[derive(Debug, Clone)]
+pub struct Comparison {
+    title: String,
+    runs: Vec<ComparedRun>,
+    measures: Vec<Measures>,
+    left_out: Vec<LeftOut>,
 }
 
 impl Comparison {
@@ -78,50 +105,38 @@ impl Comparison {
         let mut measures: Vec<Measures> = runs.iter().map(Measures::of).collect();
         let is_same =
             (runs.first()).is_some_and(|first| runs.iter().all(|run| run.has_records_of(first)));
-        let mut likelihood_ratios = Vec::new();
         if is_same {
             let bic = |m: &Measures| m.likelihood.map(|l| l.bic);
             let best = measures.iter().filter_map(bic).reduce(f64::min);
             for m in &mut measures {
                 m.bic_difference = bic(m).zip(best).map(|(bic, best)| bic - best);
             }
-            let likelihoods: Vec<_> = measures.iter().map(|m| m.likelihood).collect();
-            likelihood_ratios = likelihood::likelihood_ratios(&runs, &likelihoods);
         }
         Self {
+            title: format!("Comparison of {} runs", runs.len() + left_out.len()),
             measures,
             runs,
-            likelihood_ratios,
             left_out,
-            sequence: None,
         }
     }
 
-    /// The comparison as a sequence with a title, whose page lists the assumptions that each run adds.
+    /// Sets the title of the page.
     #[must_use]
-    pub fn as_sequence(mut self, title: impl Into<String>) -> Self {
-        self.sequence = Some(title.into());
-        self
-    }
-
-    /// Conclusions: the assumptions that each run adds, its result, and the recovery of the true system.
-    pub fn conclusions(&self) -> Vec<String> {
-        conclusions::conclusions(&self.measures)
-    }
-
-    /// Warning where runs have different records.
-    fn warning(&self) -> Option<String> {
-        let first = self.runs.first()?;
-        let other = self.runs.iter().find(|run| !run.has_records_of(first))?;
-        Some(format!(
-            "the runs use different records ({}, {}): misfit, fit and iterations are not comparable",
-            first.name, other.name
-        ))
+    pub fn titled(self, title: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            ..self
+        }
     }
 
     /// The measures of each run.
     pub fn measures(&self) -> &[Measures] {
         &self.measures
+    }
+
+    /// The runs.
+    pub fn runs(&self) -> &[ComparedRun] {
+        &self.runs
     }
 
     /// The runs without a result.
@@ -135,58 +150,113 @@ impl Comparison {
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION"),
             runs: &self.measures,
-            likelihood_ratios: &self.likelihood_ratios,
             left_out: &self.left_out,
         }
     }
 
-    /// The comparison as text: a line for each run, then the table.
-    pub fn text(&self) -> String {
-        text::text(self)
+    /// A word and a sentence on the best model, and true if the data favour one: that with the smallest BIC.
+    fn conclusion(&self) -> (String, String, bool) {
+        let first = self.runs.first();
+        let other = first.and_then(|a| self.runs.iter().find(|b| !b.has_records_of(a)));
+        if let (Some(first), Some(other)) = (first, other) {
+            let sentence = format!(
+                "The runs use different records ({}, {}): likelihoods and fits are not comparable.",
+                first.name, other.name
+            );
+            return ("Not ranked".into(), sentence, false);
+        }
+        let mut known: Vec<(&str, f64)> = (self.measures.iter())
+            .filter_map(|m| Some((m.name.as_str(), m.bic_difference?)))
+            .collect();
+        known.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let [(best, _), (second, difference), ..] = known.as_slice() else {
+            let sentence = "Fewer than two runs have a likelihood of the same samples.";
+            return ("Not ranked".into(), sentence.into(), false);
+        };
+        let size = significant(*difference, 2);
+        let strength = match *difference {
+            d if d >= VERY_STRONG => "decisively",
+            d if d >= STRONG => "strongly",
+            d if d >= POSITIVE => "weakly",
+            _ => {
+                let sentence = format!(
+                    "The data do not distinguish `{best}` and `{second}` (difference of BIC {size})."
+                );
+                return ("No clear best".into(), sentence, false);
+            }
+        };
+        let sentence = format!(
+            "The data favour `{best}` over `{second}` {strength} (difference of BIC {size})."
+        );
+        (format!("Best: {best}"), sentence, true)
     }
 
-    /// The table as CSV: one row for each run, units in the headers, unknown values empty.
-    pub fn to_csv(&self) -> String {
-        let rows = table::csv_rows(&self.measures);
-        let mut lines = vec![rows.iter().map(|r| field(&r.header)).collect::<Vec<_>>()];
-        for i in 0..self.measures.len() {
-            lines.push(rows.iter().map(|r| field(&r.cells[i].exact())).collect());
+    /// The table: a row for each run; columns without a value are omitted.
+    fn table(&self) -> (Vec<&'static str>, Vec<Vec<String>>) {
+        let all: Vec<_> = self.measures.iter().map(Measures::row).collect();
+        let is_known = |j: &usize| all.iter().any(|row| row[*j] != "–");
+        let kept: Vec<usize> = (0..HEADINGS.len()).filter(is_known).collect();
+        let row = |row: &[String; HEADINGS.len()]| kept.iter().map(|j| row[*j].clone()).collect();
+        let headings = kept.iter().map(|j| HEADINGS[*j]).collect();
+        (headings, all.iter().map(row).collect())
+    }
+
+    fn failures(&self) -> Vec<String> {
+        let runs = self.left_out.iter();
+        runs.map(|run| format!("{}: no result: {}", run.name, run.reason))
+            .collect()
+    }
+
+    /// The comparison as text: the table, the best model, and the runs without a result.
+    pub fn text(&self) -> String {
+        let (headings, rows) = self.table();
+        let mut lines = vec![headings.iter().map(ToString::to_string).collect()];
+        // One line without control characters for each run.
+        let plain = |text: &String| clean(text).replace(['\n', '\t'], " ");
+        lines.extend(
+            rows.iter()
+                .map(|row| row.iter().map(plain).collect::<Vec<_>>()),
+        );
+        let mut text = aligned(&lines);
+        let (_, sentence, _) = self.conclusion();
+        let _ = writeln!(text, "\n{}", plain(&sentence));
+        for failure in self.failures() {
+            let _ = writeln!(text, "{}", plain(&failure));
         }
-        let lines = lines.iter().map(|line| line.join(",") + "\n");
-        lines.collect()
+        text
     }
 
     /// The page: one HTML file without external resources.
     pub fn to_html(&self) -> String {
-        page::page(self)
+        let (word, sentence, is_favoured) = self.conclusion();
+        let colour = if is_favoured { "good" } else { "warn" };
+        let (headings, rows) = self.table();
+        let above = shell::state_line(colour, &word, &sentence)
+            + &shell::table("Models", &headings, &rows)
+            + &shell::list(&self.failures());
+        let [functions, validation, residuals] = figures::all(&self.runs)
+            .map(|figure| shell::figures(&figure.into_iter().collect::<Vec<_>>()));
+        let sections: Vec<shell::Section> = vec![
+            ("functions", "Coefficients and ratios", functions),
+            (
+                "validation",
+                "Predictions of validation records",
+                validation,
+            ),
+            ("residuals", "Residuals", residuals),
+        ];
+        shell::sectioned(&self.title, &shell::screen(&above, "", None), sections)
     }
 
-    /// Files that `command` writes for a comparison.
-    pub fn claim(command: &'static str) -> Claim {
-        Claim::new(command)
-            .files(["compare.csv", "compare.html"])
-            .family("figures", "svg", figures::NAMES)
-    }
-
-    /// Writes `figures/*.svg`, `compare.csv` and `compare.html`.
+    /// Writes `figures/*.svg` and `compare.html`.
     ///
     /// # Errors
     /// An error of the file system.
-    pub fn write(&self, folder: &OutputFolder) -> io::Result<()> {
-        let stage = folder.stage()?;
-        for figure in figures::all(self) {
-            stage.write(&format!("figures/{}.svg", figure.name), render(&figure))?;
+    pub fn write(&self, write: &dyn Fn(&str, &[u8]) -> io::Result<()>) -> io::Result<()> {
+        for figure in figures::all(&self.runs).iter().flatten() {
+            let name = format!("figures/{}.svg", figure.name);
+            write(&name, render(figure).as_bytes())?;
         }
-        stage.write("compare.csv", self.to_csv())?;
-        stage.write("compare.html", self.to_html())?;
-        stage.commit()
-    }
-}
-
-/// A CSV field, quoted if necessary.
-fn field(text: &str) -> String {
-    match text.contains([',', '"', '\n', '\r', '#']) {
-        true => format!("\"{}\"", text.replace('"', "\"\"")),
-        false => text.into(),
+        write("compare.html", self.to_html().as_bytes())
     }
 }

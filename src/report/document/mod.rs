@@ -12,6 +12,7 @@ pub use estimates::Estimates;
 pub use fit_summaries::{AttemptSummary, PathPointSummary, PenaltySummary, WeightSummary};
 pub use verdict::{Verdict, level_in_words};
 
+use crate::config::DataFile;
 use crate::finding::Finding;
 use crate::report::cost::CostKind;
 use crate::report::timings::TimingsSummary;
@@ -26,6 +27,7 @@ pub use kmcfit_core::internals::study::PredictionSummary as Prediction;
 use kmcfit_core::internals::system::Grid;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// Version of the document's format.
 pub const FORMAT: u32 = 1;
@@ -111,6 +113,9 @@ pub struct ResultDocument {
     /// Predicted free responses from other initial states.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub predictions: Vec<Prediction>,
+    /// The data files as they were read.
+    #[serde(default)]
+    pub sources: Vec<DataFile>,
     /// What was found in the data and done with it: repeated times, gaps, faulty samples, quantisation and stated delays.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub data: Vec<Finding>,
@@ -131,6 +136,9 @@ pub struct ModelSummary {
     /// Path of the model file, as given.
     #[serde(default)]
     pub file: String,
+    /// Path from the folder of the run to that of the model file; the run holds the model itself as `model.yaml`.
+    #[serde(default)]
+    pub folder: PathBuf,
     /// Overrides (`--set`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub overrides: Vec<String>,

@@ -1,54 +1,31 @@
 //! The page of a fit, `report.html`: first screen, contents, and the sections from the fit to the work of the solver.
 
-use super::animation::animation;
 use super::checks::checks;
 use super::first_screen::first_screen;
 use super::table::{list, number, paragraph, table};
 use super::validation::validation;
-use super::{
-    Section, figures, figures_without, overview, reproducibility, sectioned, settings, within_limit,
-};
+use super::{Section, figures, overview, reproducibility, sectioned, settings};
 use crate::finding::Finding;
 use crate::number_format::significant;
 use crate::report::FittedModel;
-use crate::report::chart::{Detail, Figure};
+use crate::report::chart::Figure;
 use crate::report::document::{NuisanceParameter, ResultDocument};
 use crate::report::equation::equation_residual;
 use crate::report::figures::weight_path;
 use crate::report::summary::{write_attempts, write_constraints, write_nuisance_parameters};
 use crate::units::{Quantity, Unit};
 
-/// Curves that are hidden at first: the start may be far from the estimate.
-const START: &[&str] = &["start"];
-
 /// The page of a run.
 pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> String {
-    within_limit(|detail| page_of(run, document, detail))
-}
-
-fn page_of(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
-    let figures = |drawn: &[Figure]| figures(drawn, detail);
     let drawn = run.drawn();
     let sections: Vec<Section> = vec![
-        (
-            "fit",
-            "Fit and residuals",
-            fit_and_residuals(run, document, detail),
-        ),
-        (
-            "functions",
-            "Coefficients",
-            coefficients(run, document, detail),
-        ),
+        ("fit", "Fit and residuals", fit_and_residuals(run, document)),
+        ("functions", "Coefficients", coefficients(run, document)),
         ("input", "Input", figures(&drawn.inputs)),
         ("spectra", "Spectra", figures(&drawn.spectra)),
         ("tests", "Residual tests", figures(&drawn.tests)),
         ("checks", "Checks of step and terms", checks(document)),
-        (
-            "validation",
-            "Validation",
-            validation(run, document, detail),
-        ),
+        ("validation", "Validation", validation(run, document)),
         (
             "identifiability",
             "Identifiability",
@@ -67,29 +44,21 @@ fn page_of(run: &FittedModel, document: &ResultDocument, detail: Detail) -> Stri
             "Reproduce",
             reproducibility::reproducibility(run, document),
         ),
-        ("solver", "Solver", solver(run, document, detail)),
+        ("solver", "Solver", solver(run, document)),
     ];
-    sectioned(
-        &document.title,
-        &first_screen(run, document, detail),
-        sections,
-    )
+    sectioned(&document.title, &first_screen(run, document), sections)
 }
 
 /// Fit of each channel, key figures, and figures of records and residuals.
-fn fit_and_residuals(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
+fn fit_and_residuals(run: &FittedModel, document: &ResultDocument) -> String {
     let drawn = run.channel_fits();
     let equation = document.equation.iter();
     let equation = equation.map(|b| equation_residual(b, document.is_rotation()));
-    overview::records(document)
-        + &overview::facts(document)
-        + &list(&equation.collect::<Vec<_>>())
-        + &figures(&drawn, detail)
-        + &animation(run, document)
+    overview::records(document) + &list(&equation.collect::<Vec<_>>()) + &figures(&drawn)
 }
 
 /// Table of all coefficients, and figures of those that vary.
-fn coefficients(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
+fn coefficients(run: &FittedModel, document: &ResultDocument) -> String {
     let drawn = run.drawn();
     let mut ratios = drawn.ratios.clone();
     // Ratios to a damping of zero to machine precision are rounding errors.
@@ -99,16 +68,19 @@ fn coefficients(run: &FittedModel, document: &ResultDocument, detail: Detail) ->
         .is_some_and(|f| f.negligible)
     {
         let of_damping = ["c/m", "damping ratio ζ"];
-        if let Some(figure) = &mut ratios {
-            let panels = &mut figure.panels;
-            panels.retain(|panel| !of_damping.contains(&panel.y.label.as_str()));
-        }
+        let panels = &mut ratios.panels;
+        panels.retain(|panel| !of_damping.contains(&panel.y.label.as_str()));
     }
-    let both = drawn.functions.clone().into_iter().chain(ratios);
-    let varying: Vec<Figure> = both.filter_map(Figure::varying).collect();
-    overview::functions(document)
-        + &overview::ratios_of_records(run)
-        + &figures_without(START, &varying, detail)
+    let both = [drawn.functions.clone(), ratios].into_iter();
+    // The start may be far from the estimate.
+    let without_start = |mut figure: Figure| {
+        for panel in &mut figure.panels {
+            panel.marks.retain(|mark| mark.label != "start");
+        }
+        figure.varying()
+    };
+    let varying: Vec<Figure> = both.filter_map(without_start).collect();
+    overview::functions(document) + &overview::ratios_of_records(run) + &figures(&varying)
 }
 
 /// Findings in the data and what was done with them, warnings, and automatic choices.
@@ -126,7 +98,7 @@ fn data(document: &ResultDocument) -> String {
 }
 
 /// End, work and convergence of the search, folded.
-fn solver(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
+fn solver(run: &FittedModel, document: &ResultDocument) -> String {
     let mut drawn: Vec<Figure> = run.weights.map(weight_path).into_iter().collect();
     // One iteration is no curve.
     if run.fit.history.len() > 1 {
@@ -143,7 +115,7 @@ fn solver(run: &FittedModel, document: &ResultDocument, detail: Detail) -> Strin
     let attempts = list(&lines(|text| write_attempts(text, document)));
     format!(
         "<details>\n<summary>End of the search, work and convergence</summary>\n{work}{attempts}{}</details>\n",
-        figures(&drawn, detail)
+        figures(&drawn)
     )
 }
 

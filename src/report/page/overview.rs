@@ -3,9 +3,8 @@
 use super::table::{list, number, table};
 use crate::report::FittedModel;
 use crate::report::document::{ChannelSummary, ResultDocument};
-use crate::report::suggestions;
 use crate::report::summary::{count, iterations};
-use crate::report::text::{escape, prose};
+use crate::report::text::prose;
 use kmcfit_core::internals::assessment::FunctionSummary;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::identifiability::ClassificationKind;
@@ -24,55 +23,6 @@ pub(super) fn state(document: &ResultDocument) -> String {
         outcome.status.name(),
         prose(&outcome.reason)
     )
-}
-
-/// Main figures: fit, chi-square, information criteria, samples, parameters, rank bound.
-pub(super) fn facts(document: &ResultDocument) -> String {
-    let samples: usize = document.experiments.iter().map(|e| e.samples).sum();
-    let mut facts = Vec::new();
-    if let Some(balance) = &document.equation {
-        let unit = if document.is_rotation() { "N m" } else { "N" };
-        facts.push((
-            "rms residual of the equation of motion",
-            format!("{} {unit}", number(balance.residual_rms)),
-        ));
-    } else if let Some(worst) = document.worst_fit() {
-        let name = match document.channels().count() {
-            1 => "fit",
-            _ => "fit of the worst channel",
-        };
-        facts.push((name, suggestions::percent(worst, 2)));
-    }
-    if let Some(reduced) = document.statistics.reduced_chi_square {
-        facts.push(("chi-square per degree of freedom", number(reduced)));
-    }
-    let criteria = [
-        ("AIC", document.statistics.aic),
-        ("BIC", document.statistics.bic),
-    ];
-    facts.extend(
-        criteria
-            .into_iter()
-            .filter_map(|(name, x)| Some((name, number(x?)))),
-    );
-    facts.push(("samples", samples.to_string()));
-    facts.push(("parameters", document.model.parameters.to_string()));
-    let known = &document.identifiability;
-    if known.rank_bound < known.parameters && document.is_simulated() {
-        facts.push((
-            "identifiable parameter combinations",
-            format!("at most {}", known.rank_bound),
-        ));
-    }
-    let fact = |(name, value): &(&str, String)| {
-        format!(
-            "<div><dt>{}</dt><dd>{}</dd></div>\n",
-            escape(name),
-            prose(value)
-        )
-    };
-    let facts: String = facts.iter().map(fact).collect();
-    format!("<dl class=\"facts\">\n{facts}</dl>\n")
 }
 
 /// Table of the functions that vary, in the order of the equation of motion, then those of single experiments: constants stand in the

@@ -43,11 +43,11 @@ pub(super) fn command(name: &str, document: &ResultDocument) -> String {
 
 fn data(source: &ModelSource) -> String {
     let row = |file: &crate::config::DataFile| {
-        let (size, digest) = match &file.content {
-            Some((bytes, digest)) => (bytes.to_string(), digest.clone()),
-            None => ("unreadable".into(), String::new()),
-        };
-        vec![file.name.clone(), size, digest]
+        vec![
+            file.name.clone(),
+            file.bytes.to_string(),
+            file.sha256.clone(),
+        ]
     };
     let rows: Vec<Vec<String>> = source.data.iter().map(row).collect();
     table("Data files", &["data file", "bytes", "SHA-256"], &rows)

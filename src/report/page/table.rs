@@ -1,31 +1,16 @@
 //! Tables, lists and facts as HTML; every text is escaped here.
 
 use crate::report::text::{decade, escape, prose};
-use std::iter;
 
 /// A table named `name` with a heading for each column; the first cell of a row is its heading. On narrow screens each row is a list of
 /// its values with their headings, so that no column is hidden; the roles keep it a table for screen readers.
 pub(crate) fn table(name: &str, headings: &[&str], rows: &[Vec<String>]) -> String {
-    marked_table(name, headings, &[], rows)
-}
-
-/// A table whose rows have a symbol, as HTML, before their heading.
-pub(in crate::report) fn marked_table(
-    name: &str,
-    headings: &[&str],
-    symbols: &[String],
-    rows: &[Vec<String>],
-) -> String {
     if rows.is_empty() {
         return String::new();
     }
     let heading = |h: &&str| format!("<th scope=\"col\" role=\"columnheader\">{}</th>", escape(h));
     let head: String = headings.iter().map(heading).collect();
-    let symbols = symbols.iter().map(String::as_str).chain(iter::repeat(""));
-    let rows = rows.iter().zip(symbols);
-    let body: String = rows
-        .map(|(cells, symbol)| row(headings, symbol, cells))
-        .collect();
+    let body: String = rows.iter().map(|cells| row(headings, cells)).collect();
     format!(
         "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{}\">\n<table class=\"stack\" role=\"table\">\n\
          <thead role=\"rowgroup\">\n<tr role=\"row\">{head}</tr>\n</thead>\n<tbody role=\"rowgroup\">\n{body}</tbody>\n</table>\n</div>\n",
@@ -33,15 +18,12 @@ pub(in crate::report) fn marked_table(
     )
 }
 
-fn row(headings: &[&str], symbol: &str, cells: &[String]) -> String {
+fn row(headings: &[&str], cells: &[String]) -> String {
     let mut text = String::from("<tr role=\"row\">");
     for (i, cell) in cells.iter().enumerate() {
         let heading = escape(headings.get(i).copied().unwrap_or_default());
         text += &match i {
-            0 => format!(
-                "<th scope=\"row\" role=\"rowheader\">{}</th>",
-                format!("{symbol} {}", escape(cell)).trim_start()
-            ),
+            0 => format!("<th scope=\"row\" role=\"rowheader\">{}</th>", escape(cell)),
             _ => format!(
                 "<td role=\"cell\" data-heading=\"{heading}\">{}</td>",
                 escape(cell)

@@ -3,13 +3,12 @@
 use super::figures;
 use super::table::{list, paragraph};
 use crate::report::FittedModel;
-use crate::report::chart::Detail;
 use crate::report::document::{ResultDocument, ValidationSummary};
 use crate::report::extent;
 use crate::report::text::and_list;
 
 /// Result, basis and figures of the validation; empty without validation records.
-pub(super) fn validation(run: &FittedModel, document: &ResultDocument, detail: Detail) -> String {
+pub(super) fn validation(run: &FittedModel, document: &ResultDocument) -> String {
     let Some(result) = extent::validation(document) else {
         return String::new();
     };
@@ -18,9 +17,7 @@ pub(super) fn validation(run: &FittedModel, document: &ResultDocument, detail: D
     let result: String = first.into_iter().chain(capital).collect();
     let basis = "The coefficients are fixed at their estimates; these records had no part in the fit. A fit of 90 % or more passes.";
     let records: Vec<String> = document.validation.iter().map(record).collect();
-    paragraph(&format!("{result}. {basis}"))
-        + &list(&records)
-        + &figures(&run.drawn().validation, detail)
+    paragraph(&format!("{result}. {basis}")) + &list(&records) + &figures(&run.drawn().validation)
 }
 
 /// A record with its own parameters.

@@ -9,22 +9,14 @@ use kmcfit_core::internals::assessment::Plausibility;
 use kmcfit_core::internals::diagnostics::normal_half_width;
 use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::identifiability::{
-    Band, BandSettings, Bands, Classification, FunctionClassification, RelativeChange, anchors,
-    classify_functions,
+    Band, Bands, Classification, FunctionClassification, RelativeChange, classify_functions,
 };
-
-/// Random draws for the simultaneous bands.
-const DRAWS: usize = 10_000;
 
 /// Confidence bands and the classification by them.
 pub fn bands(at: Optimum, model: &Model) -> BandsRecord {
     let (plan, truth) = (&model.study, model.truth.as_ref());
     let (problem, evaluation) = (at.problem, at.evaluation);
-    let settings = BandSettings {
-        draws: DRAWS,
-        seed: plan.seed,
-    };
-    let mut bands = Bands::at(problem, at.theta, evaluation, &settings);
+    let mut bands = Bands::at(problem, at.theta, evaluation);
     for band in &mut bands.functions {
         band.unit = model.converted_unit(&band.unit).to_owned();
     }
@@ -50,10 +42,6 @@ pub fn bands(at: Optimum, model: &Model) -> BandsRecord {
         };
         band_record(band, factor, real)
     });
-    let grid = &problem.system.grid;
-    let fixed = evaluation.trajectories.first().map(|m| anchors(grid, m));
-    let [turning_points, zero_crossings] =
-        fixed.map_or_else(Default::default, |a| [a.turning_points, a.zero_crossings]);
     BandsRecord {
         times: bands.times.clone(),
         bands: records.collect(),
@@ -65,8 +53,6 @@ pub fn bands(at: Optimum, model: &Model) -> BandsRecord {
                 name: j.name,
             })
             .collect(),
-        turning_points,
-        zero_crossings,
     }
 }
 
@@ -147,15 +133,12 @@ fn band_record(band: &Band, factor: f64, truth: Option<&[f64]>) -> BandRecord {
         [finite_numbers(&low), finite_numbers(&high)]
     };
     let [low, high] = ends(factor);
-    let [simultaneous_low, simultaneous_high] = band.simultaneous.map(ends).unwrap_or_default();
     BandRecord {
         name: band.name.clone(),
         unit: band.unit.clone(),
         values: finite_numbers(&band.values),
         low,
         high,
-        simultaneous_low,
-        simultaneous_high,
         truth: truth.map(finite_numbers).unwrap_or_default(),
         notes: band.notes.clone(),
     }

@@ -3,6 +3,7 @@
 use crate::finding::Finding;
 use crate::report::document::Verdict;
 use kmcfit_core::internals::solvers::Status;
+use kmcfit_core::internals::study::extremes::ExtremeStatus;
 use serde::{Deserialize, Serialize};
 
 /// Numbers; an infinite or missing one is `null` in JSON.
@@ -42,10 +43,6 @@ pub struct StudyDocument {
     pub equivalent_systems: Vec<EquivalentSystemRecord>,
     /// Fits from random starting points.
     pub multistart: Option<MultistartRecord>,
-    /// Likelihood-ratio test of a constant for each function.
-    pub constancy_test: Vec<ConstancyRecord>,
-    /// Bootstrap intervals.
-    pub bootstrap: Vec<BootstrapRecord>,
     /// Candidate experiments, the most informative first.
     pub candidates: Vec<CandidateRecord>,
     /// Predicted responses.
@@ -103,12 +100,6 @@ pub struct SensitivityRecord {
     pub combinations: usize,
     /// Combinations that are not identifiable.
     pub unidentifiable: Vec<UnidentifiableRecord>,
-    /// Times of the nodes, s.
-    pub times: Vec<f64>,
-    /// The combinations with the largest singular values.
-    pub best: Vec<DirectionRecord>,
-    /// The combinations with the smallest singular values above the rank tolerance.
-    pub worst: Vec<DirectionRecord>,
 }
 
 /// A parameter combination that is not identifiable.
@@ -118,15 +109,6 @@ pub struct UnidentifiableRecord {
     pub name: String,
     /// Share of its squared norm within that ambiguity.
     pub share: f64,
-}
-
-/// A parameter combination as changes of the functions over time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct DirectionRecord {
-    /// Its singular value.
-    pub singular_value: f64,
-    /// Name of each function and its change at the nodes.
-    pub functions: Vec<(String, Vec<f64>)>,
 }
 
 /// Confidence bands and the classification by them.
@@ -140,10 +122,6 @@ pub struct BandsRecord {
     pub notes: Vec<String>,
     /// Classification of functions and ratios.
     pub classification: Vec<ClassificationRecord>,
-    /// Turning points, s: at them the free response determines k/m for any c.
-    pub turning_points: Vec<f64>,
-    /// Zero crossings, s: at them it determines c/m.
-    pub zero_crossings: Vec<f64>,
 }
 
 /// The band of a function or ratio.
@@ -159,10 +137,6 @@ pub struct BandRecord {
     pub low: Numbers,
     /// Upper ends of the pointwise band.
     pub high: Numbers,
-    /// Lower ends of the simultaneous band.
-    pub simultaneous_low: Numbers,
-    /// Upper ends of the simultaneous band.
-    pub simultaneous_high: Numbers,
     /// True values, where they are known.
     pub truth: Numbers,
     /// Notes.
@@ -199,17 +173,6 @@ pub struct ProfileRecord {
     pub verdict: String,
     /// The sentence.
     pub text: String,
-    /// Values at which further constraints become active.
-    pub active_from: Vec<ActiveFrom>,
-}
-
-/// A value of a profiled quantity at which a constraint becomes active.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ActiveFrom {
-    /// The value.
-    pub value: f64,
-    /// The constraint.
-    pub constraint: String,
 }
 
 /// Data-consistent extremes of a function or ratio: its smallest and largest value among all systems whose misfit is at
@@ -240,21 +203,7 @@ pub struct ExtremeSystemRecord {
     /// Misfit, recomputed.
     pub misfit: f64,
     /// End of the search.
-    pub status: ExtremeSearch,
-}
-
-/// End of the search for an extreme.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ExtremeSearch {
-    /// A local extreme was reached.
-    Converged,
-    /// The search range was reached before an extreme.
-    RangeLimit,
-    /// No step satisfied the misfit limit.
-    Stalled,
-    /// The limit on convex subproblems was reached.
-    IterationLimit,
+    pub status: ExtremeStatus,
 }
 
 /// An equivalent system: other coefficients with the response of the fit.
@@ -296,28 +245,6 @@ pub struct ClusterRecord {
     pub cost: f64,
 }
 
-/// Likelihood-ratio test of a constant function.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ConstancyRecord {
-    /// Function.
-    pub name: String,
-    /// p-value of the hypothesis that the function is constant.
-    pub p_value: f64,
-    /// The sentence.
-    pub text: String,
-}
-
-/// A bootstrap interval.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct BootstrapRecord {
-    /// The quantity.
-    pub name: String,
-    /// Its unit.
-    pub unit: String,
-    /// Interval; `null` where too few refits converged.
-    pub interval: Option<[f64; 2]>,
-}
-
 /// A candidate experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CandidateRecord {
@@ -327,10 +254,6 @@ pub struct CandidateRecord {
     pub added_rank: Option<usize>,
     /// D criterion: ratio of the geometric means of the standard errors, with the experiment to without.
     pub d_ratio: Option<f64>,
-    /// A criterion: ratio of their root mean squares.
-    pub a_ratio: Option<f64>,
-    /// E criterion: ratio of the largest standard errors.
-    pub e_ratio: Option<f64>,
     /// The sentence.
     pub text: String,
 }

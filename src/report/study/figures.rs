@@ -1,35 +1,18 @@
 //! The figures of a study.
 
 use super::{
-    BandRecord, BandsRecord, DirectionRecord, EquivalentSystemRecord, ExtremeSearch,
-    ExtremesRecord, Numbers, PredictionRecord, ProfileRecord, StudyDocument,
+    BandRecord, BandsRecord, EquivalentSystemRecord, ExtremesRecord, Numbers, PredictionRecord,
+    ProfileRecord, StudyDocument,
 };
-use crate::number_format::significant;
 use crate::report::chart::{Axis, Colour, Dash, Figure, Mark, Panel, Style};
 use crate::report::figures::truth;
 use crate::report::main_figure::variation;
-
-/// The names of the figures, some with a suffix.
-pub const NAMES: [&str; 8] = [
-    "bands",
-    "spectrum",
-    "directions",
-    "profiles",
-    "extremes",
-    "equivalent-systems",
-    "waterfall",
-    "study-predictions",
-];
-
-/// Most instants that are marked on a curve.
-const MOST_ANCHORS: usize = 12;
+use kmcfit_core::internals::study::extremes::ExtremeStatus;
 
 /// Figures of all analyses in the study.
 pub fn all(study: &StudyDocument) -> Vec<Figure> {
     let mut figures = Vec::new();
     figures.extend(bands(study));
-    figures.extend(spectrum(study));
-    figures.extend(directions(study));
     figures.extend(profiles(study));
     figures.extend(extremes(study));
     figures.extend(equivalent_systems(study));
@@ -43,12 +26,14 @@ fn gaps(numbers: &Numbers) -> Vec<f64> {
     numbers.iter().map(|x| x.unwrap_or(f64::NAN)).collect()
 }
 
-const BANDS: &str = "Pointwise confidence band (filled) and the wider simultaneous band (dashed edges). Marks: instants at \
-     which a free response determines k/m (turning points) or c/m (zero crossings).";
-
-fn bands(study: &StudyDocument) -> Option<Figure> {
+pub fn bands(study: &StudyDocument) -> Option<Figure> {
     let panels = band_panels(study).into_iter().map(|(_, panel)| panel);
-    let figure = Figure::new("bands", "Estimates with confidence bands", BANDS).columns(2);
+    let figure = Figure::new(
+        "bands",
+        "Estimates with confidence bands",
+        "Estimates with their pointwise confidence bands against time.",
+    )
+    .columns(2);
     figure.panels(panels).varying()
 }
 
@@ -60,17 +45,6 @@ fn band_panels(study: &StudyDocument) -> Vec<(&str, Panel)> {
     panels.filter(|(_, panel)| !panel.is_constant()).collect()
 }
 
-/// A figure for each function and ratio that varies, with its name.
-pub fn bands_alone(study: &StudyDocument) -> Vec<(&str, Figure)> {
-    let panels = band_panels(study).into_iter().enumerate();
-    let figure = |(i, (name, panel))| {
-        let title = format!("{name} with confidence bands");
-        let figure = Figure::new(format!("bands-{}", i + 1), title, BANDS);
-        (name, figure.panel(panel))
-    };
-    panels.map(figure).collect()
-}
-
 /// The figure of the first screen: the function or ratio that varies most relative to its interval, with its extremes; without one the first
 /// profile, else the fits from random starting points; `None` without any.
 pub fn main(study: &StudyDocument) -> Option<Figure> {
@@ -78,14 +52,13 @@ pub fn main(study: &StudyDocument) -> Option<Figure> {
     let scored = panels.filter_map(|(name, panel)| Some((variation(&panel)?, name, panel)));
     let most = scored.max_by(|a, b| a.0.total_cmp(&b.0));
     let Some((_, name, panel)) = most else {
-        let others = profiles_alone(study).into_iter().flatten();
-        let mut others = others.chain(waterfall(study));
         let name = "main".to_owned();
-        return others.next().map(|figure| Figure { name, ..figure });
+        let other = profiles(study).or_else(|| waterfall(study));
+        return other.map(|figure| Figure { name, ..figure });
     };
     let converged = |e: &&ExtremesRecord| {
         let mut systems = e.systems.iter();
-        e.name == name && systems.all(|s| s.status == ExtremeSearch::Converged)
+        e.name == name && systems.all(|s| s.status == ExtremeStatus::Converged)
     };
     let extremes = study.extremes.iter().find(converged);
     let panel = panel.marks(extremes.into_iter().flat_map(extreme_marks));
@@ -114,20 +87,10 @@ fn area(
 fn band_panel(band: &BandRecord, all: &BandsRecord) -> Panel {
     let times = &all.times;
     let values = gaps(&band.values);
-    let (anchors, label): (&[f64], &str) = match band.name.as_str() {
-        "k/m" => (&all.turning_points, "turning points"),
-        "c/m" => (&all.zero_crossings, "zero crossings"),
-        _ => (&[], ""),
-    };
-    let anchors: Vec<f64> = thinned(anchors);
-    let at = |t: &f64| values[times.partition_point(|x| x < t).min(times.len() - 1)];
-    let anchored: Vec<f64> = anchors.iter().map(at).collect();
     let real = gaps(&band.truth);
-    let whole = (&band.simultaneous_low, &band.simultaneous_high);
     let each = (&band.low, &band.high);
     Panel::of_time(&band.name, &band.unit)
-        .marks(area(times, whole, "simultaneous", Colour::Grey).map(|band| band.dash(Dash::Dashed)))
-        .marks(area(times, each, "pointwise", Colour::Sky))
+        .marks(area(times, each, "confidence band", Colour::Sky))
         .mark(Mark::line(
             "estimate",
             times,
@@ -135,102 +98,11 @@ fn band_panel(band: &BandRecord, all: &BandsRecord) -> Panel {
             Style::new(Colour::Blue).width(1.6),
         ))
         .marks((!real.is_empty()).then(|| truth(times, &real)))
-        .marks((!anchors.is_empty()).then(|| {
-            let style = Style::new(Colour::Black).width(4.0);
-            Mark::points(label, &anchors, &anchored, style)
-        }))
-}
-
-/// At most [`MOST_ANCHORS`] of the instants, evenly chosen.
-fn thinned(instants: &[f64]) -> Vec<f64> {
-    let stride = instants.len().div_ceil(MOST_ANCHORS).max(1);
-    instants.iter().copied().step_by(stride).collect()
 }
 
 /// Numbers from 1.
 fn ranks(count: usize) -> Vec<f64> {
     (1..=count).map(|i| i as f64).collect()
-}
-
-pub fn spectrum(study: &StudyDocument) -> Option<Figure> {
-    let spectrum = study.sensitivity.as_ref()?;
-    let values = &spectrum.singular_values;
-    // One value is no curve.
-    let largest = values
-        .first()
-        .copied()
-        .filter(|s| *s > 0.0 && values.len() > 1)?;
-    let relative: Vec<f64> = values.iter().map(|s| (s / largest).max(1e-20)).collect();
-    let dashed = Style::new(Colour::Vermillion).dash(Dash::Dashed);
-    let rank = spectrum.rank as f64;
-    let panel = Panel::new(
-        Axis::linear("parameter combination, largest singular value first", ""),
-        Axis::log("singular value relative to the largest", ""),
-    )
-    .marks([
-        Mark::line(
-            "",
-            &ranks(values.len()),
-            &relative,
-            Style::new(Colour::Blue),
-        ),
-        Mark::points(
-            "",
-            &ranks(values.len()),
-            &relative,
-            Style::new(Colour::Blue).width(5.0),
-        ),
-        Mark::vertical("rank", rank, dashed),
-    ]);
-    let text = "Relative to the largest one; the dashed line is at the number of identifiable parameter combinations.";
-    Some(Figure::new("spectrum", "Singular values of the sensitivity", text).panel(panel))
-}
-
-pub fn directions(study: &StudyDocument) -> Vec<Figure> {
-    let Some(spectrum) = &study.sensitivity else {
-        return Vec::new();
-    };
-    let figure = |(name, set): (&str, &[DirectionRecord])| {
-        let names = set.first()?.functions.iter().enumerate();
-        // A fixed function has no change.
-        let changes = |f: usize| {
-            set.iter()
-                .any(|d| d.functions[f].1.iter().any(|x| *x != 0.0))
-        };
-        let names = names.filter(|(f, _)| changes(*f));
-        let panels = names.map(|(f, (name, _))| {
-            let line = |(k, direction): (usize, &DirectionRecord)| {
-                let label = format!(
-                    "singular value {}",
-                    significant(direction.singular_value, 2)
-                );
-                Mark::line(
-                    label,
-                    &spectrum.times,
-                    &direction.functions[f].1,
-                    Style::nth(k),
-                )
-            };
-            Panel::of_time(format!("change of {name}"), "").marks(set.iter().enumerate().map(line))
-        });
-        let figure = Figure::new(
-            format!("directions-{name}"),
-            format!("Parameter combinations identified {name}"),
-            "Change of each function against time along these combinations.",
-        );
-        let figure = figure.panels(panels);
-        // The values of constants stand in the sentences.
-        let varies = !figure.panels.iter().all(Panel::is_constant);
-        varies.then_some(figure)
-    };
-    let sets = [("best", &spectrum.best[..]), ("worst", &spectrum.worst)];
-    // The best and the worst of a few are the same.
-    let shown = if spectrum.rank > spectrum.best.len() {
-        2
-    } else {
-        1
-    };
-    sets.into_iter().take(shown).filter_map(figure).collect()
 }
 
 /// A figure with the panels of all records that have one.
@@ -239,84 +111,36 @@ fn each<T>(records: &[T], figure: Figure, panel: impl Fn(&T) -> Option<Panel>) -
     (!panels.is_empty()).then(|| figure.panels(panels))
 }
 
-/// A figure for each record that has a panel, with a name and a title of its own.
-fn alone<T>(
-    records: &[T],
-    figure: &Figure,
-    name: impl Fn(&T) -> &str,
-    panel: impl Fn(&T) -> Option<Panel>,
-) -> Vec<Option<Figure>> {
-    let one = |(i, record): (usize, &T)| {
-        let title = format!("{}: {}", figure.title, name(record));
-        let figure_name = format!("{}-{}", figure.name, i + 1);
-        let own = Figure::new(figure_name, title, figure.description.as_str());
-        panel(record).map(|panel| own.panel(panel))
-    };
-    records.iter().enumerate().map(one).collect()
-}
-
-fn profile_figure() -> Figure {
-    Figure::new(
+pub fn profiles(study: &StudyDocument) -> Option<Figure> {
+    let figure = Figure::new(
         "profiles",
-        "Likelihood profile",
+        "Likelihood profiles",
         "Rise of the minimal cost with one quantity held at a value, against that value.",
-    )
-}
-
-fn profiles(study: &StudyDocument) -> Option<Figure> {
-    each(&study.profiles, profile_figure().columns(2), profile_panel)
-}
-
-/// A figure for each profile; `None` for one without a curve.
-pub fn profiles_alone(study: &StudyDocument) -> Vec<Option<Figure>> {
-    alone(
-        &study.profiles,
-        &profile_figure(),
-        |p| p.name.as_str(),
-        profile_panel,
-    )
+    );
+    each(&study.profiles, figure.columns(2), profile_panel)
 }
 
 fn profile_panel(p: &ProfileRecord) -> Option<Panel> {
     let least = p.costs.iter().copied().fold(f64::INFINITY, f64::min);
     let rise: Vec<f64> = p.costs.iter().map(|c| c - least).collect();
     let dashed = Style::new(Colour::Vermillion).dash(Dash::Dashed);
-    let dotted = Style::new(Colour::Grey).dash(Dash::Dotted);
     let ends = p.interval.iter().flatten();
     let x = Axis::linear(&p.name, &p.unit);
     let panel = Panel::new(x, Axis::linear("rise of the cost", ""))
         .title(&p.verdict)
         .mark(Mark::line("", &p.values, &rise, Style::new(Colour::Blue)))
-        .marks(ends.map(|end| Mark::vertical("interval", *end, dashed)))
-        .marks(
-            (p.active_from.iter())
-                .map(|a| Mark::vertical("constraint becomes active", a.value, dotted)),
-        );
+        .marks(ends.map(|end| Mark::vertical("interval", *end, dashed)));
     (p.values.len() > 1).then_some(panel)
 }
 
-fn extreme_figure() -> Figure {
-    Figure::new(
+pub fn extremes(study: &StudyDocument) -> Option<Figure> {
+    let figure = Figure::new(
         "extremes",
         "Data-consistent extremes",
         "Smallest and largest value at each of the marked times among all systems within the misfit limit, each of another system.",
-    )
-}
-
-fn extremes(study: &StudyDocument) -> Option<Figure> {
+    );
     let panel = |e: &ExtremesRecord| extreme_panel(study, e);
-    each(&study.extremes, extreme_figure().columns(2), panel)
-}
-
-/// A figure for each function and ratio with extremes at several times; `None` for constants.
-pub fn extremes_alone(study: &StudyDocument) -> Vec<Option<Figure>> {
-    let panel = |e: &ExtremesRecord| extreme_panel(study, e);
-    alone(
-        &study.extremes,
-        &extreme_figure(),
-        |e| e.name.as_str(),
-        panel,
-    )
+    each(&study.extremes, figure.columns(2), panel)
 }
 
 fn extreme_panel(study: &StudyDocument, e: &ExtremesRecord) -> Option<Panel> {
@@ -386,26 +210,13 @@ pub fn waterfall(study: &StudyDocument) -> Option<Figure> {
     (costs.len() > 1).then(|| figure.panel(panel))
 }
 
-fn prediction_figure() -> Figure {
-    Figure::new(
+pub fn predictions(study: &StudyDocument) -> Option<Figure> {
+    let figure = Figure::new(
         "study-predictions",
-        "Predicted response",
+        "Predicted responses",
         "Displacement with its 95 % confidence band, and the smallest and largest displacement of the extreme systems.",
-    )
-}
-
-fn predictions(study: &StudyDocument) -> Option<Figure> {
-    each(&study.predictions, prediction_figure(), prediction_panel)
-}
-
-/// A figure for each prediction.
-pub fn predictions_alone(study: &StudyDocument) -> Vec<Option<Figure>> {
-    alone(
-        &study.predictions,
-        &prediction_figure(),
-        |p| p.name.as_str(),
-        prediction_panel,
-    )
+    );
+    each(&study.predictions, figure, prediction_panel)
 }
 
 fn prediction_panel(p: &PredictionRecord) -> Option<Panel> {

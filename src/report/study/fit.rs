@@ -29,18 +29,6 @@ impl StudiedFit {
         }
     }
 
-    /// Checks that a record from a journal, which may be damaged, has the dimensions of `problem`.
-    pub fn is_of(&self, problem: &Problem) -> bool {
-        let lengths = [self.parameters.len(), self.weights.len(), self.sigmas.len()];
-        let expected = [
-            problem.parameters(),
-            problem.penalties.len(),
-            problem.channels().count(),
-        ];
-        let is_positive = |sigma: &f64| sigma.is_finite() && *sigma > 0.0;
-        lengths == expected && self.sigmas.iter().flatten().all(is_positive)
-    }
-
     /// The problem with the estimated sigmas and the chosen penalty weights of the fit.
     pub fn problem(&self, problem: &Problem) -> Problem {
         let fitted = problem.clone().with(|parts| {

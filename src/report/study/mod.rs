@@ -9,10 +9,9 @@ mod records;
 mod text;
 
 pub use document::{
-    ActiveFrom, AnalysisFailure, BandRecord, BandsRecord, BootstrapRecord, CandidateRecord,
-    ClassificationRecord, ClusterRecord, ConstancyRecord, DirectionRecord, EquivalentSystemRecord,
-    ExtremeSearch, ExtremeSystemRecord, ExtremesRecord, FurthestSystem, MultistartRecord, Numbers,
-    PredictionRecord, ProfileRecord, SensitivityRecord, StudiedFit, StudyDocument,
+    AnalysisFailure, BandRecord, BandsRecord, CandidateRecord, ClassificationRecord, ClusterRecord,
+    EquivalentSystemRecord, ExtremeSystemRecord, ExtremesRecord, FurthestSystem, MultistartRecord,
+    Numbers, PredictionRecord, ProfileRecord, SensitivityRecord, StudiedFit, StudyDocument,
     UnidentifiableRecord,
 };
 
@@ -21,9 +20,9 @@ pub use records::*;
 
 use super::extent::size_in_words;
 use super::page::source_line;
-use super::{json, render};
+use super::render;
 use crate::config::Model;
-use crate::results::{Claim, OutputFolder};
+use crate::results::OutputFolder;
 use kmcfit_core::internals::record::Channel;
 use std::io;
 
@@ -51,28 +50,19 @@ impl StudyDocument {
         text::text(self)
     }
 
-    /// Files that a study writes.
-    pub fn claim() -> Claim {
-        Claim::new("study")
-            .files(["study.html", "study.json"])
-            .family("figures", "svg", figures::NAMES)
-    }
-
     /// Writes `study.json`, `study.html` and `figures/*.svg` of the study of a model.
     ///
     /// # Errors
     /// An error of the file system.
     pub fn write(&self, folder: &OutputFolder, model: &Model) -> io::Result<()> {
-        let stage = folder.stage()?;
         for figure in figures::all(self) {
-            stage.write(&format!("figures/{}.svg", figure.name), render(&figure))?;
+            folder.write(&format!("figures/{}.svg", figure.name), render(&figure))?;
         }
         let samples = model.problem.channels().map(Channel::len).sum();
         let duration = model.problem.system.grid.duration();
         let size = size_in_words(samples, model.problem.experiments.len(), duration);
         let source = source_line(&model.source.data, Some(size));
-        stage.write("study.html", page::page(self, &source))?;
-        stage.write("study.json", json(self))?;
-        stage.commit()
+        folder.write("study.html", page::page(self, &source))?;
+        folder.commit(self)
     }
 }

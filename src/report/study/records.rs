@@ -1,30 +1,23 @@
 //! Records of a study from the analyses of the core.
 
 use super::document::*;
-use crate::config::{Candidate, Equivalent, Model, StudyPlan, StudyTarget};
+use crate::config::{Model, StudyTarget};
 use crate::finding::Finding;
 use crate::report::findings;
 use kmcfit_core::internals::diagnostics::chi_square_one;
 use kmcfit_core::internals::identifiability::{
-    self, CandidateChannel, ScalingAmbiguity, Sensitivity, rank_experiments, residual_spread,
+    self, ScalingAmbiguity, Sensitivity, rank_experiments,
 };
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
-use kmcfit_core::internals::study::bootstrap::{
-    NoRefits, NumberInterval, ReplicateNoise, intervals,
-};
-use kmcfit_core::internals::study::constancy_test::{
-    ConstancySettings, ConstancyTest, constancy_tests,
-};
-use kmcfit_core::internals::study::extremes::{Extreme, ExtremeStatus, MisfitLimit, envelopes};
+use kmcfit_core::internals::record::Experiment;
+use kmcfit_core::internals::study::extremes::{Extreme, MisfitLimit, envelopes};
 use kmcfit_core::internals::study::multistart::{self, Multistart, Ranges};
 use kmcfit_core::internals::study::profile_likelihood::{Interval, ProfileSettings};
 use kmcfit_core::internals::study::{
     Choice, EquivalentSystem, Linear, equivalent_systems, prediction, profile,
 };
 
-/// Parameter combinations in the figures, from each end of the spectrum.
-const DIRECTIONS: usize = 3;
 /// Most unidentifiable combinations in the document.
 const NAMED: usize = 400;
 
@@ -59,13 +52,6 @@ pub fn sensitivity(at: Optimum) -> SensitivityRecord {
     let spectrum = Sensitivity::of(at.problem, at.evaluation).spectrum();
     let unidentifiable = ScalingAmbiguity::at(at.problem, at.theta).undetermined(&spectrum);
     let unidentifiable = unidentifiable.into_iter().take(NAMED);
-    let records = |list: Vec<identifiability::ResolvedDirection>| {
-        let record = |resolved: identifiability::ResolvedDirection| DirectionRecord {
-            singular_value: resolved.singular_value,
-            functions: resolved.functions,
-        };
-        list.into_iter().map(record).collect()
-    };
     SensitivityRecord {
         text: spectrum.sentence(),
         rank: spectrum.rank(),
@@ -76,9 +62,6 @@ pub fn sensitivity(at: Optimum) -> SensitivityRecord {
                 share: named.share,
             })
             .collect(),
-        times: at.problem.system.grid.times(),
-        best: records(spectrum.best(at.problem, DIRECTIONS)),
-        worst: records(spectrum.worst(at.problem, DIRECTIONS)),
         singular_values: spectrum.singular_values().to_vec(),
     }
 }
@@ -103,7 +86,6 @@ pub fn profile_of(at: Optimum, of: &Linear, model: &Model) -> Result<ProfileReco
     };
     let mut found = profile(at.problem, at.theta, of, &how).map_err(|error| error.to_string())?;
     found.unit = model.converted_unit(&found.unit).to_owned();
-    let marks = found.marks.iter();
     Ok(ProfileRecord {
         text: found.sentence(),
         verdict: match found.verdict {
@@ -112,12 +94,6 @@ pub fn profile_of(at: Optimum, of: &Linear, model: &Model) -> Result<ProfileReco
             Interval::Flat => "flat",
         }
         .into(),
-        active_from: marks
-            .map(|m| ActiveFrom {
-                value: m.value,
-                constraint: m.constraint.clone(),
-            })
-            .collect(),
         name: found.name,
         unit: found.unit,
         optimum: found.optimum,
@@ -128,21 +104,8 @@ pub fn profile_of(at: Optimum, of: &Linear, model: &Model) -> Result<ProfileReco
 }
 
 /// Candidate experiments, the most informative first.
-pub fn candidates(at: Optimum, list: &[Candidate]) -> Vec<CandidateRecord> {
-    let spread = residual_spread(at.problem, at.evaluation);
-    let described = list.iter().map(|c| identifiability::CandidateExperiment {
-        name: c.name.clone(),
-        initial: c.experiment.initial,
-        excitation: c.experiment.excitation.clone(),
-        channels: (c.experiment.channels.iter().take(1))
-            .map(|channel| CandidateChannel {
-                kind: channel.kind(),
-                sigma: channel.weighting().sigma(0).unwrap_or(spread),
-            })
-            .collect(),
-    });
-    let described: Vec<_> = described.collect();
-    let ranked = rank_experiments(at.problem, at.theta, at.evaluation, &described, false);
+pub fn candidates(at: Optimum, list: &[Experiment]) -> Vec<CandidateRecord> {
+    let ranked = rank_experiments(at.problem, at.theta, at.evaluation, list);
     let finite = |ratio: f64| ratio.is_finite().then_some(ratio);
     let record = |r: identifiability::Ranked| {
         let gain = r.gain.as_ref().ok();
@@ -150,8 +113,6 @@ pub fn candidates(at: Optimum, list: &[Candidate]) -> Vec<CandidateRecord> {
             text: r.sentence(),
             added_rank: gain.map(|g| g.new_directions),
             d_ratio: gain.and_then(|g| finite(g.volume)),
-            a_ratio: gain.and_then(|g| finite(g.average)),
-            e_ratio: gain.and_then(|g| finite(g.worst)),
             name: r.name,
         }
     };
@@ -159,13 +120,7 @@ pub fn candidates(at: Optimum, list: &[Candidate]) -> Vec<CandidateRecord> {
 }
 
 /// Equivalent systems: other coefficients with the response of the fit.
-pub fn equivalent(at: Optimum, asked: &[Equivalent]) -> Vec<EquivalentSystemRecord> {
-    let choice = |asked: &Equivalent| Choice {
-        name: asked.name.clone(),
-        mass: asked.mass.clone(),
-        damping: asked.damping.clone(),
-    };
-    let choices: Vec<Choice> = asked.iter().map(choice).collect();
+pub fn equivalent(at: Optimum, asked: &[Choice]) -> Vec<EquivalentSystemRecord> {
     let record = |found: EquivalentSystem| {
         let mut coefficients = found.nodal.coefficients.into_iter();
         EquivalentSystemRecord {
@@ -177,7 +132,7 @@ pub fn equivalent(at: Optimum, asked: &[Equivalent]) -> Vec<EquivalentSystemReco
             response_error: found.response_error,
         }
     };
-    let found = equivalent_systems(at.problem, at.evaluation, &choices);
+    let found = equivalent_systems(at.problem, at.evaluation, asked);
     found.into_iter().map(record).collect()
 }
 
@@ -191,15 +146,10 @@ pub fn starts(model: &Model, at: Optimum, threads: usize) -> MultistartRecord {
         starts: plan.starts,
         seed: plan.seed,
         threads,
-        attempts: false,
         settings: model.settings.clone(),
     };
     let waterfall = multistart::multistart(problem, &how);
-    let tolerance = multistart::Distance {
-        ratios: plan.merge_tolerance,
-        responses: plan.merge_tolerance,
-    };
-    let clusters = waterfall.clusters(problem, tolerance);
+    let clusters = waterfall.clusters(problem, plan.merge_tolerance);
     let findings = waterfall.findings(problem, at.theta, &clusters);
     let failed = waterfall.runs.iter().filter(|run| run.found.is_none());
     let cluster = |c: &multistart::Cluster| ClusterRecord {
@@ -214,70 +164,6 @@ pub fn starts(model: &Model, at: Optimum, threads: usize) -> MultistartRecord {
             .map(|finding| findings::of_starts(finding, plan.starts))
             .collect(),
     }
-}
-
-/// Likelihood-ratio test of a constant for each function.
-///
-/// # Errors
-/// The reason for which there is none.
-pub fn constancy_test(
-    at: Optimum,
-    plan: &StudyPlan,
-    threads: usize,
-) -> Result<Vec<ConstancyRecord>, String> {
-    let asking = ConstancySettings {
-        level: 1.0 - plan.confidence,
-        seed: plan.seed,
-        threads,
-        ..ConstancySettings::default()
-    };
-    let found =
-        constancy_tests(at.problem, at.theta, &asking).map_err(|error| error.to_string())?;
-    let record = |v: ConstancyTest| ConstancyRecord {
-        text: v.sentence(),
-        p_value: v.p_value,
-        name: v.function,
-    };
-    Ok(found.into_iter().map(record).collect())
-}
-
-/// Bootstrap intervals of the profiled quantities, the constants and the nuisance parameters.
-///
-/// # Errors
-/// The reason for which there are none.
-pub fn refits(
-    at: Optimum,
-    plan: &StudyPlan,
-    threads: usize,
-) -> Result<Vec<BootstrapRecord>, String> {
-    let noise = match plan.residual_noise {
-        true => ReplicateNoise::Residual,
-        false => ReplicateNoise::Parametric,
-    };
-    let profiled = plan.profiles.iter().filter_map(|t| linear(at.problem, t));
-    let how = (noise, plan.replicates, plan.seed);
-    let found = intervals(
-        at.problem,
-        at.theta,
-        profiled,
-        how,
-        plan.confidence,
-        threads,
-    );
-    let found = found.map_err(|why| match why {
-        NoRefits::Undetermined => {
-            "bootstrap intervals need identifiable parameters, at most 64 of them: a refit does not move along a \
-             combination that is not identifiable"
-                .into()
-        }
-        NoRefits::NoResponse(error) => error.to_string(),
-    })?;
-    let record = |(of, interval): NumberInterval| BootstrapRecord {
-        interval,
-        name: of.name,
-        unit: of.unit,
-    };
-    Ok(found.into_iter().map(record).collect())
 }
 
 /// Data-consistent extremes of all estimated functions and of k/m and c/m, and the predictions of the model file and of the
@@ -302,7 +188,7 @@ pub fn extremes(
         let system = |e: &Extreme| ExtremeSystemRecord {
             name: e.name(),
             misfit: e.misfit,
-            status: status(e.ended_at(&level)),
+            status: e.ended_at(&level),
         };
         records.push(ExtremesRecord {
             name: found.name,
@@ -318,16 +204,6 @@ pub fn extremes(
     (records, predictions(model, at, &extremes))
 }
 
-/// End of the search for an extreme.
-fn status(ended: ExtremeStatus) -> ExtremeSearch {
-    match ended {
-        ExtremeStatus::Converged => ExtremeSearch::Converged,
-        ExtremeStatus::SearchLimit => ExtremeSearch::RangeLimit,
-        ExtremeStatus::NoFeasibleStep => ExtremeSearch::Stalled,
-        ExtremeStatus::ProgramLimit => ExtremeSearch::IterationLimit,
-    }
-}
-
 fn predictions(model: &Model, at: Optimum, extremes: &[Extreme]) -> Vec<PredictionRecord> {
     let covariance = at.problem.covariance_of_estimates(at.theta, at.evaluation);
     let free = model.predictions.iter().map(|state| {
@@ -339,8 +215,8 @@ fn predictions(model: &Model, at: Optimum, extremes: &[Extreme]) -> Vec<Predicti
         .candidates
         .iter()
         .map(|c| prediction::PredictionCase {
-            excitation: c.experiment.excitation.clone(),
-            ..prediction::PredictionCase::free(format!("`{}`", c.name), c.experiment.initial)
+            excitation: c.excitation.clone(),
+            ..prediction::PredictionCase::free(format!("`{}`", c.name), c.initial)
         });
     let each = free.chain(candidates).filter_map(|run| {
         let covariance = covariance.as_ref();

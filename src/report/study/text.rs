@@ -1,11 +1,9 @@
 //! Text of a study for the terminal and for its page.
 
-use super::{
-    BandsRecord, BootstrapRecord, ExtremeSearch, ExtremesRecord, PredictionRecord,
-    SensitivityRecord, StudyDocument,
-};
+use super::{BandsRecord, ExtremesRecord, PredictionRecord, SensitivityRecord, StudyDocument};
 use crate::finding::Finding;
 use crate::number_format::{resolved, significant};
+use kmcfit_core::internals::study::extremes::ExtremeStatus;
 use kmcfit_core::internals::study::prediction::BOUNDED;
 
 /// Most extremes that are listed because their search did not converge.
@@ -25,8 +23,6 @@ pub enum Part {
     Extremes,
     EquivalentSystems,
     Multistart,
-    Constancy,
-    Bootstrap,
     Candidates,
     Predictions,
     Failures,
@@ -35,14 +31,12 @@ pub enum Part {
 impl Part {
     /// All parts in order of what the user can do about them: mend the study or the fit, change the model, measure again; then what the
     /// records determine, and the basis of these findings.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 11] = [
         Self::Failures,
         Self::Multistart,
-        Self::Constancy,
         Self::Candidates,
         Self::Bands,
         Self::Profiles,
-        Self::Bootstrap,
         Self::Extremes,
         Self::Predictions,
         Self::EquivalentSystems,
@@ -62,8 +56,6 @@ impl Part {
             Self::Extremes => "extremes",
             Self::EquivalentSystems => "equivalent-systems",
             Self::Multistart => "starts",
-            Self::Constancy => "constancy",
-            Self::Bootstrap => "bootstrap",
             Self::Candidates => "candidates",
             Self::Predictions => "predictions",
             Self::Failures => "failures",
@@ -81,8 +73,6 @@ impl Part {
             Self::Extremes => "Data-consistent extremes, within the model",
             Self::EquivalentSystems => "Equivalent systems, in a wider model",
             Self::Multistart => "Fits from random starting points",
-            Self::Constancy => "Constancy test",
-            Self::Bootstrap => "Bootstrap intervals",
             Self::Candidates => "Candidate experiments",
             Self::Predictions => "Predicted responses",
             Self::Failures => "Failed analyses",
@@ -110,8 +100,6 @@ impl Part {
             Self::Multistart => (study.multistart.iter())
                 .flat_map(|m| Finding::texts(&m.findings))
                 .collect(),
-            Self::Constancy => lines(&study.constancy_test, |v| v.text.clone()),
-            Self::Bootstrap => lines(&study.bootstrap, interval),
             Self::Candidates => lines(&study.candidates, |c| c.text.clone()),
             Self::Predictions => lines(&study.predictions, prediction),
             Self::Failures => lines(&study.failures, |f| format!("{}: {}", f.analysis, f.reason)),
@@ -183,14 +171,14 @@ fn equivalent_systems(study: &StudyDocument) -> Vec<String> {
 fn extremes(study: &StudyDocument) -> Vec<String> {
     let mut lines = lines(&study.extremes, widest);
     let systems = study.extremes.iter().flat_map(|e| &e.systems);
-    let unfinished = systems.filter(|s| s.status != ExtremeSearch::Converged);
+    let unfinished = systems.filter(|s| s.status != ExtremeStatus::Converged);
     lines.extend(
         unfinished
             .take(MOST_LISTED)
             .map(|s| format!("{}: {}", s.name, search(s.status))),
     );
     let mut systems = study.extremes.iter().flat_map(|e| &e.systems);
-    if !study.roughness_limited && systems.any(|s| s.status == ExtremeSearch::RangeLimit) {
+    if !study.roughness_limited && systems.any(|s| s.status == ExtremeStatus::SearchLimit) {
         lines.push(
             "no penalty limits the roughness of these systems: their extremes are those of the constraints, or of the search range"
                 .into(),
@@ -200,12 +188,12 @@ fn extremes(study: &StudyDocument) -> Vec<String> {
 }
 
 /// End of the search for an extreme as a phrase.
-fn search(status: ExtremeSearch) -> &'static str {
+fn search(status: ExtremeStatus) -> &'static str {
     match status {
-        ExtremeSearch::Converged => "converged",
-        ExtremeSearch::RangeLimit => "search range reached; the extreme lies beyond it",
-        ExtremeSearch::Stalled => "search stalled at the misfit limit",
-        ExtremeSearch::IterationLimit => "iteration limit reached",
+        ExtremeStatus::Converged => "converged",
+        ExtremeStatus::SearchLimit => "search range reached; the extreme lies beyond it",
+        ExtremeStatus::NoFeasibleStep => "search stalled at the misfit limit",
+        ExtremeStatus::ProgramLimit => "iteration limit reached",
     }
 }
 
@@ -264,16 +252,6 @@ pub fn widest_range(e: &ExtremesRecord) -> String {
 /// The ends of an interval with three digits of its half-width.
 fn ends([low, high]: [f64; 2]) -> [String; 2] {
     resolved([low, high], 0.05 * (high - low))
-}
-
-fn interval(b: &BootstrapRecord) -> String {
-    match b.interval {
-        Some(interval) => {
-            let [low, high] = ends(interval);
-            format!("{}: {low} to {high} {}", b.name, b.unit)
-        }
-        None => format!("{}: too few refits converged", b.name),
-    }
 }
 
 fn prediction(p: &PredictionRecord) -> String {

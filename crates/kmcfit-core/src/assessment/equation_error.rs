@@ -2,7 +2,7 @@
 
 use super::function::EstimateErrors;
 use crate::identifiability::{
-    BandSettings, Bands, FunctionClassification, classify_functions, condition_on_negligible_noise,
+    Bands, FunctionClassification, classify_functions, condition_on_negligible_noise,
 };
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::{Fit, NoEquationRows, Status, equation_rows};
@@ -47,11 +47,7 @@ impl EquationErrorIntervals {
             NoEquationRows::ManySamples => NoIntervals::ManySamples,
             NoEquationRows::ScaleOverTime => NoIntervals::ScaleOverTime,
         })?;
-        let settings = BandSettings {
-            draws: 0,
-            ..BandSettings::default()
-        };
-        let bands = Bands::of_equation(problem, theta, evaluation, &rows, &settings);
+        let bands = Bands::of_equation(problem, theta, evaluation, &rows);
         let mut classifications = classify_functions(problem, evaluation, &bands);
         condition_on_negligible_noise(&mut classifications);
         Ok(Self {

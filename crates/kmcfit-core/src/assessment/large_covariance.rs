@@ -18,28 +18,18 @@ use nalgebra::DMatrix;
 
 /// Largest number of parameters with a full covariance.
 pub const MOST_WITH_COVARIANCE: usize = 1000;
-/// Largest number of parameters whose variances and factor are kept.
-const MOST_WITH_FACTOR: usize = 10_000;
-/// Relative change of the penalties in the differences of variances.
-const STEP: f64 = 1e-2;
 
 /// Covariance of the estimates of a fit with more than 64 parameters.
 #[derive(Debug, Clone)]
 pub struct LargeCovariance {
     /// Kind of the covariance.
     pub kind: CovarianceKind,
-    /// Variance of each parameter, up to 10,000 of them; none beyond.
-    pub variances: Vec<f64>,
     /// Variance of each scalar: initial states and sensor parameters.
     pub scalar_variances: Vec<f64>,
     /// Covariance of the parameters, up to 1000 of them.
     pub covariance: Option<DMatrix<f64>>,
     functions: Vec<MeanOverRecord>,
     ratios: Vec<(&'static str, MeanOverRecord)>,
-    /// Covariance of the means of functions, then of ratios.
-    pub covariance_of_means: DMatrix<f64>,
-    /// Factor of the normal matrix of parameters and states, up to 10,000 parameters.
-    pub factor: Option<BandedFactor>,
 }
 
 impl LargeCovariance {
@@ -53,42 +43,33 @@ impl LargeCovariance {
                 && channel.noise().scores == ScoreCovariance::Model
         });
         (problem.parameters() > FEW_PARAMETERS && is_gaussian).then_some(())?;
-        let normal = NormalMatrix::of(problem, theta, evaluation, 1.0)?;
+        let normal = NormalMatrix::of(problem, theta, evaluation)?;
         let shift = normal.shift(problem, evaluation);
         let (mut functions, mut ratios) = means_at(problem, theta);
-        let means = functions.iter().chain(ratios.iter().map(|(_, mean)| mean));
-        let gradients: Vec<&[f64]> = means.map(|mean| mean.gradient.as_slice()).collect();
-        let covariance_of_means = normal.covariance(&gradients, &shift);
         let all = functions
             .iter_mut()
             .chain(ratios.iter_mut().map(|(_, mean)| mean));
-        for (i, mean) in all.enumerate() {
-            let error = covariance_of_means[(i, i)].max(0.0).sqrt();
+        for mean in all {
+            let error = normal.variance(&mean.gradient, &shift).max(0.0).sqrt();
             mean.standard_error = error.hypot(mean.basis_error);
         }
         let covariance = (problem.parameters() <= MOST_WITH_COVARIANCE)
             .then(|| normal.covariance_of_parameters(&shift));
-        let is_listed = problem.parameters() <= MOST_WITH_FACTOR;
-        let variances = match &covariance {
-            Some(covariance) => covariance.diagonal().iter().copied().collect(),
-            None if is_listed => normal.variances(problem, theta, evaluation, &shift)?,
-            None => Vec::new(),
+        let scalar = |index: usize| {
+            let mut unit = vec![0.0; normal.parameters];
+            unit[index] = 1.0;
+            normal.variance(&unit, &shift)
         };
-        let scalars = problem.functions.scalar_range();
-        let scalar_variances: Vec<f64> = scalars
-            .map(|index| normal.variance(index, &shift))
-            .collect();
+        let scalar_variances: Vec<f64> = problem.functions.scalar_range().map(scalar).collect();
         let is_known = |variance: &f64| variance.is_finite() && *variance >= 0.0;
-        let mut all = variances.iter().chain(&scalar_variances);
-        all.all(is_known).then(|| Self {
+        let diagonal = covariance.as_ref().map(|covariance| covariance.diagonal());
+        let mut all = diagonal.iter().flatten().chain(&scalar_variances);
+        all.all(is_known).then_some(Self {
             kind: normal.kind,
-            variances,
             scalar_variances,
             covariance,
             functions,
             ratios,
-            covariance_of_means,
-            factor: is_listed.then_some(normal.factor),
         })
     }
 
@@ -115,17 +96,12 @@ struct NormalMatrix {
 }
 
 impl NormalMatrix {
-    /// The normal matrix with the penalties multiplied by `factor`.
-    fn of(problem: &Problem, theta: &[f64], evaluation: &Evaluation, factor: f64) -> Option<Self> {
-        let mut scaled = problem.clone();
-        for penalty in &mut scaled.parts_mut().penalties {
-            penalty.weight *= factor;
-        }
+    fn of(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Option<Self> {
         let mut sub = linear_predictions(problem, evaluation);
         let samples = sub.residuals.len();
         add_priors(problem, theta, &mut sub);
         let measured = sub.residuals.len();
-        add_penalties(&scaled, theta, &mut sub);
+        add_penalties(problem, theta, &mut sub);
         add_soft(problem, theta, &mut sub);
         sub.constrain(&problem.constraints, theta);
         let is_pulled = sub.residuals.len() > measured;
@@ -182,23 +158,10 @@ impl NormalMatrix {
         shift
     }
 
-    /// Covariance of combinations of the parameters.
-    fn covariance(&self, gradients: &[&[f64]], shift: &[f64]) -> DMatrix<f64> {
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let products: Vec<Vec<f64>> = gradients.iter().map(|g| self.times(g)).collect();
-        let shifts: Vec<f64> = gradients.iter().map(|g| dot(g, shift)).collect();
-        let n = gradients.len();
-        let once = DMatrix::from_fn(n, n, |i, j| {
-            dot(gradients[i], &products[j]) + shifts[i] * shifts[j]
-        });
-        0.5 * (&once + once.transpose())
-    }
-
-    /// Variance of the parameter `index`.
-    fn variance(&self, index: usize, shift: &[f64]) -> f64 {
-        let mut unit = vec![0.0; self.parameters];
-        unit[index] = 1.0;
-        self.times(&unit)[index] + shift[index] * shift[index]
+    /// Variance of a combination of the parameters.
+    fn variance(&self, gradient: &[f64], shift: &[f64]) -> f64 {
+        let dot = |a: &[f64]| a.iter().zip(gradient).map(|(a, b)| a * b).sum::<f64>();
+        dot(&self.times(gradient)) + dot(shift).powi(2)
     }
 
     fn covariance_of_parameters(&self, shift: &[f64]) -> DMatrix<f64> {
@@ -214,31 +177,5 @@ impl NormalMatrix {
             }
         }
         0.5 * (&once + once.transpose())
-    }
-
-    /// Variances of the parameters. `H^-1 M H^-1 = H^-1 + d/de (M + (1 + e) R)^-1` at `e = 0`: those of penalised estimates are
-    /// computed by differences of four further factors, with a relative error of about the fourth power of the step.
-    fn variances(
-        &self,
-        problem: &Problem,
-        theta: &[f64],
-        evaluation: &Evaluation,
-        shift: &[f64],
-    ) -> Option<Vec<f64>> {
-        let mut variances = self.factor.variances();
-        variances.truncate(self.parameters);
-        if self.kind == CovarianceKind::Penalised {
-            for (times, weight) in [(-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)] {
-                let moved = Self::of(problem, theta, evaluation, 1.0 + times * STEP)?;
-                let slope = weight / (12.0 * STEP);
-                for (variance, moved) in variances.iter_mut().zip(moved.factor.variances()) {
-                    *variance += slope * moved;
-                }
-            }
-        }
-        for (variance, shift) in variances.iter_mut().zip(shift) {
-            *variance += shift * shift;
-        }
-        Some(variances)
     }
 }

@@ -4,7 +4,6 @@ mod assumptions;
 mod channel;
 mod classical;
 mod constants;
-mod draws;
 mod equation_error;
 mod estimates;
 mod extension;
@@ -40,17 +39,16 @@ pub use assumptions::{VerdictAssumption, verdict_assumptions};
 pub use channel::{ResidualPattern, pattern};
 pub use classical::{ClassicalEstimate, ClassicalMethod};
 pub use constants::{constant_probability, standard_error};
-pub use draws::{Draw, NoDraws, draws};
 pub use equation_error::{EquationErrorIntervals, NoIntervals};
 pub use estimates::{Estimate, EstimateStatus, estimates};
 pub use function::{EstimateErrors, FunctionSummary, function_summaries};
-pub use gaps::{FunctionInGap, GapAssessment, GapStatus};
+pub use gaps::{FunctionInGap, GapAssessment};
 pub use implausible::Implausible;
 pub use large_covariance::{LargeCovariance, MOST_WITH_COVARIANCE};
 pub use model_tests::{BasisComparison, Extension, ExtensionTest, ModelTests};
 pub use plausibility::{BEYOND_SIGMA, EXACT, FitWarning, POOR, Plausibility, Unidentified};
 pub use record_error::RecordError;
-pub use recovery::{RECOVERY_TOLERANCE, Roughness, TruthErrors, is_same_truth};
+pub use recovery::{RECOVERY_TOLERANCE, TruthErrors};
 pub use refinement::{BasisTest, CoarseBasis};
 pub use rivals::AmplitudeRival;
 pub use statistics::{FitStatistics, statistics};
@@ -67,7 +65,7 @@ use score_tests::{ScoreTests, missing};
 use second_mode::second_modes;
 
 use crate::identifiability::{
-    BandSettings, Bands, FunctionClassification, Means, classify_functions, condition_on_bases,
+    Bands, FunctionClassification, Means, classify_functions, condition_on_bases,
     condition_on_inputs, condition_on_time, except_gap,
 };
 use crate::problem::{FEW_PARAMETERS, Problem};
@@ -175,15 +173,11 @@ impl FitAssessment {
         drop(score_tests);
         let mut gaps = Vec::new();
         if reports_errors && assessment.plausibility.errors_hold {
-            let settings = BandSettings {
-                draws: 0,
-                ..BandSettings::default()
-            };
             let (theta, evaluation) = (&best.parameters, &best.evaluation);
             let is_coloured = assessment.plausibility.is_coloured;
             let (bands, test) = at_once(
                 problem,
-                || Bands::beside(problem, theta, evaluation, halved.ok().flatten(), &settings),
+                || Bands::beside(problem, theta, evaluation, halved.ok().flatten()),
                 || match (tests_bases, is_coloured) {
                     (true, false) => BasisTest::of(problem, theta, evaluation),
                     (true, true) => BasisTest::of_halves(problem, theta, evaluation),
@@ -202,7 +196,7 @@ impl FitAssessment {
             gaps = gap_assessments(problem, fit, Some(&bands));
             for gap in &gaps {
                 let functions = gap.functions.iter();
-                let open = functions.filter(|f| f.status != GapStatus::Identified);
+                let open = functions.filter(|f| !f.is_identified);
                 let open: Vec<usize> = open.map(|f| f.index).collect();
                 except_gap(
                     problem,

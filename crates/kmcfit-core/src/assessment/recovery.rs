@@ -2,15 +2,12 @@
 //! whether two true systems are the same.
 
 use crate::functions::Ratios;
-use crate::system::{Grid, NodalCoefficients};
+use crate::system::NodalCoefficients;
 use serde::Serialize;
 
 /// Relative error of `k/m` and `c/m` below which a system counts as recovered, dimensionless: above the errors of time
 /// integration and early stopping, below what is visible in a plot.
 pub const RECOVERY_TOLERANCE: f64 = 1e-3;
-/// Largest difference of two true systems that count as the same, relative to the largest value of either function,
-/// dimensionless.
-const SAME_TRUTH: f64 = 2e-3;
 
 /// Largest absolute errors over all nodes, in SI units (for a rotation with kg m² in place of kg, and so on), and relative to
 /// true values, dimensionless.
@@ -66,11 +63,6 @@ impl TruthErrors {
         }
     }
 
-    /// Larger of the relative errors of `k/m` and `c/m`.
-    pub fn largest_ratio_error(&self) -> f64 {
-        self.k_over_m_relative.max(self.c_over_m_relative)
-    }
-
     /// True if the relative errors of `k/m` and `c/m` are within a tolerance.
     pub fn within(&self, tolerance: f64) -> bool {
         self.k_over_m_relative < tolerance && self.c_over_m_relative < tolerance
@@ -94,67 +86,6 @@ fn largest_error(found: &[f64], truth: &[f64]) -> f64 {
     found.iter().zip(truth).map(distance).fold(0.0, f64::max)
 }
 
-/// Roughness by finite differences of nodal values, independent of the basis: `integral (m'')^2 dt` over the interior nodes,
-/// `integral (c')^2 dt` and `integral (k')^2 dt` over the steps. The mass uses the second derivative because the true mass of
-/// the paper falls linearly, and thus has zero roughness, as the constant true damping and stiffness.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Roughness {
-    /// Roughness of the mass, `integral (m'')^2 dt`, kg^2/s^3.
-    pub mass: f64,
-    /// Roughness of the damping, `integral (c')^2 dt`, N^2 s/m^2.
-    pub damping: f64,
-    /// Roughness of the stiffness, `integral (k')^2 dt`, N^2/(m^2 s).
-    pub stiffness: f64,
-}
-
-impl Roughness {
-    /// Roughness of nodal coefficients on a grid with this step, s.
-    pub fn of(nodal: &NodalCoefficients, step: f64) -> Self {
-        let slope = |f: &[f64]| -> f64 {
-            let squares = f.windows(2).map(|w| ((w[1] - w[0]) / step).powi(2));
-            squares.sum::<f64>() * step
-        };
-        let curvature = |f: &[f64]| -> f64 {
-            let second = |w: &[f64]| ((w[0] - 2.0 * w[1] + w[2]) / step / step).powi(2);
-            f.windows(3).map(second).sum::<f64>() * step
-        };
-        Self {
-            mass: curvature(&nodal.mass),
-            damping: slope(&nodal.coefficients[0]),
-            stiffness: slope(&nodal.coefficients[1]),
-        }
-    }
-}
-
-/// Returns true if every function of the second system differs, at the nodes of its grid within the span of the first grid,
-/// from the linearly interpolated first by at most [`SAME_TRUTH`] times the larger maximum; also true if no node lies there.
-pub fn is_same_truth(
-    (one, grid): (&NodalCoefficients, &Grid),
-    (other, other_grid): (&NodalCoefficients, &Grid),
-) -> bool {
-    let times = other_grid.times();
-    let close = |f: &[f64], g: &[f64]| {
-        let size = f.iter().chain(g).map(|x| x.abs()).fold(0.0, f64::max);
-        times.iter().zip(g).all(|(t, value)| {
-            let index = (t - grid.start()) / grid.step();
-            interpolate(f, index).is_none_or(|x| (x - value).abs() <= SAME_TRUTH * size)
-        })
-    };
-    one.functions()
-        .zip(other.functions())
-        .all(|(f, g)| close(f, g))
-}
-
-/// Interpolates linearly at the fractional node index `index`; `None` before the first node and from the last node on.
-fn interpolate(f: &[f64], index: f64) -> Option<f64> {
-    let i = index.floor();
-    if i < 0.0 || i + 1.0 >= f.len() as f64 {
-        return None;
-    }
-    let (i, fraction) = (i as usize, index - i);
-    Some(f[i] + fraction * (f[i + 1] - f[i]))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -165,18 +96,6 @@ mod tests {
             mass: mass.to_vec(),
             coefficients: vec![constant(damping), constant(stiffness)],
         }
-    }
-
-    /// For m = 1 + t^2 on [0, 1], (m'')^2 = 4 at the 999 interior nodes.
-    #[test]
-    fn roughness_of_a_parabola() {
-        let step = 1e-3;
-        let mass: Vec<f64> = (0..=1000)
-            .map(|i| 1.0 + (i as f64 * step).powi(2))
-            .collect();
-        let found = Roughness::of(&nodal(&mass, 0.3, 1.0), step);
-        assert!((found.mass - 4.0 * 0.999).abs() < 1e-4, "{found:?}");
-        assert_eq!((found.damping, found.stiffness), (0.0, 0.0));
     }
 
     #[test]

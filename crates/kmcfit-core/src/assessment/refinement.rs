@@ -15,7 +15,7 @@ use super::model_tests::BasisComparison;
 use super::span::weighted_residuals;
 use crate::diagnostics::{rms, standard_deviation};
 use crate::functions::{Basis, CoefficientFunction, Parameterization};
-use crate::identifiability::{BandSettings, Bands, has_active_rows};
+use crate::identifiability::has_active_rows;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::solvers::{reduced_jacobian, weighted_jacobian};
@@ -111,16 +111,15 @@ pub(super) fn applies(problem: &Problem, theta: &[f64], evaluation: &Evaluation)
 }
 
 /// The problem in finer bases, without penalties and constraints.
-pub(super) struct FinerBases {
+struct FinerBases {
     problem: Problem,
-    theta: Vec<f64>,
     /// For each function with a finer basis the parameters in it of each parameter in the given one.
     maps: Vec<Option<DMatrix<f64>>>,
 }
 
 impl FinerBases {
     /// `None` where no basis can be finer.
-    pub(super) fn new(problem: &Problem, theta: &[f64]) -> Option<Self> {
+    fn new(problem: &Problem, theta: &[f64]) -> Option<Self> {
         let grid = &problem.system.grid;
         let functions = &problem.functions;
         let mut list: Vec<CoefficientFunction> = functions.iter().cloned().collect();
@@ -163,26 +162,7 @@ impl FinerBases {
         parts.variations.clear();
         parts.soft.clear();
         parts.constraints = crate::constraints::Constraints::default();
-        let mut start = Vec::with_capacity(own.parameters());
-        for (index, range) in problem.functions.ranges().iter().enumerate() {
-            match &maps[index] {
-                Some(_) => start.extend(&own.functions.get(index).start),
-                None => start.extend(&theta[range.clone()]),
-            }
-        }
-        start.extend(problem.scalars(theta));
-        Some(Self {
-            problem: own,
-            theta: start,
-            maps,
-        })
-    }
-
-    /// Bands with all finer bases; `None` with too many parameters or without a response.
-    pub(super) fn bands(&self, settings: &BandSettings) -> Option<Bands> {
-        let evaluation = self.problem.evaluate(&self.theta).ok()?;
-        let is_few = self.problem.parameters() <= MOST_PARAMETERS;
-        is_few.then(|| Bands::at(&self.problem, &self.theta, &evaluation, settings))
+        Some(Self { problem: own, maps })
     }
 
     /// Test at the evaluation of the given problem: the finer bases have the same functions.

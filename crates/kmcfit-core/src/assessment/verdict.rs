@@ -6,7 +6,7 @@
 
 use super::FitAssessment;
 use super::classical::ClassicalEstimate;
-use super::gaps::{GapAssessment, GapStatus};
+use super::gaps::GapAssessment;
 use super::implausible::Implausible;
 use super::plausibility::{FitWarning, Unidentified};
 use super::record_error::RecordError;
@@ -383,10 +383,7 @@ fn of_warning(problem: &Problem, fit: &Fit, warning: &FitWarning) -> Option<Verd
 
 /// Span of a gap in which a function is not identified by the samples.
 fn open_gap(gap: &GapAssessment) -> Option<[f64; 2]> {
-    let is_open = gap
-        .functions
-        .iter()
-        .any(|f| f.status != GapStatus::Identified);
+    let is_open = gap.functions.iter().any(|f| !f.is_identified);
     is_open.then_some(gap.span)
 }
 

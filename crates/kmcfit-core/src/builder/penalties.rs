@@ -101,9 +101,7 @@ impl Builder {
             let problem = "the rule `period` applies to the method `equation-error` only";
             return Err(BuildError::new(format!("{key}.weight"), problem)
                 .found(format!("`{}`", self.solver.name()))
-                .expected(
-                    "`l-curve`, `gcv`, `discrepancy`, a number, or `fit.method: equation-error`",
-                ));
+                .expected("`reml`, `discrepancy`, a number, or `fit.method: equation-error`"));
         }
         if order == 0 {
             let problem = "the rule `period` requires a penalty on a derivative";
@@ -126,7 +124,7 @@ impl Builder {
             let problem = "the rule `bic` applies to total variation only";
             return Err(BuildError::new(key, problem)
                 .found("`kind: tikhonov`")
-                .expected("`kind: tv`, or `reml`, `discrepancy`, `l-curve`, `gcv` or a number"));
+                .expected("`kind: tv`, or `reml`, `discrepancy` or a number"));
         }
         if self.is_equation_error() {
             let problem = "the method `equation-error` has no search for the weight";
@@ -147,14 +145,14 @@ impl Builder {
                     !record.validation && weightings.any(|w| w.is_none_or(is_unknown))
                 }),
                 "the rule `discrepancy` needs the noise of the samples",
-                "`sigma` in every experiment, or `l-curve` or `gcv`, which do without",
+                "`sigma` in every experiment, or `reml` with `estimate`",
             ),
             WeightRule::RestrictedLikelihood => (
                 self.without_likelihood(),
                 "the rule `reml` needs a likelihood of the samples",
-                "`sigma` in every experiment, a number or `estimate`; or `l-curve` or `gcv`, which do without",
+                "`sigma` in every experiment, a number or `estimate`",
             ),
-            WeightRule::LCurve | WeightRule::Gcv | WeightRule::Bic => return Ok(()),
+            WeightRule::Bic => return Ok(()),
         };
         match found {
             Some(i) => Err(BuildError::new(key, problem)

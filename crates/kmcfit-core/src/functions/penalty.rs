@@ -7,10 +7,6 @@ use crate::rows::Rows;
 pub enum WeightRule {
     /// The largest weight with chi-square at most `n + 2 sqrt(2 n)` (Morozov).
     Discrepancy,
-    /// Corner of misfit against roughness on logarithmic axes (Hansen).
-    LCurve,
-    /// Least generalised cross-validation score `n misfit / (n - dof)^2` (Golub, Heath, Wahba).
-    Gcv,
     /// Largest restricted likelihood of noise and weights, each penalty with its own weight (Wood 2011).
     RestrictedLikelihood,
     /// Least Bayesian information criterion of a total-variation penalty, then a fit without it on the jumps found.
@@ -18,15 +14,10 @@ pub enum WeightRule {
 }
 
 impl WeightRule {
-    /// Rules that choose a point of a path of weights of Tikhonov penalties.
-    pub const OF_PATHS: [Self; 3] = [Self::Discrepancy, Self::LCurve, Self::Gcv];
-
     /// Name in a model file.
     pub fn name(self) -> &'static str {
         match self {
             Self::Discrepancy => "discrepancy",
-            Self::LCurve => "l-curve",
-            Self::Gcv => "gcv",
             Self::RestrictedLikelihood => "reml",
             Self::Bic => "bic",
         }
@@ -35,7 +26,7 @@ impl WeightRule {
     /// True if intervals from the Hessian of the penalised misfit cover on average over the record; with the other rules
     /// they hold for the chosen smoothness alone.
     pub fn gives_coverage(self) -> bool {
-        matches!(self, Self::Gcv | Self::RestrictedLikelihood)
+        self == Self::RestrictedLikelihood
     }
 }
 

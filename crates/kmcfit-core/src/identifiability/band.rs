@@ -59,9 +59,6 @@ pub struct Band {
     pub sides: Vec<BandSide>,
     /// Mean over the record.
     pub mean: MeanOverRecord,
-    /// Half-width, in standard errors, of the simultaneous 95 % band, which contains the curve at all times;
-    /// `None` if not simulated.
-    pub simultaneous: Option<f64>,
     /// Notes on the band.
     pub notes: Vec<String>,
 }

@@ -43,9 +43,6 @@ use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::spans::{span_words, spans};
 use crate::system::quadrature::trapezoid_weights;
 use nalgebra::{DMatrix, DVector};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 
 /// Largest number of parameters with a full covariance; beyond it, smooth directions are used.
 const MOST_PARAMETERS: usize = 800;
@@ -55,34 +52,10 @@ const MOST_SMOOTH: usize = 400;
 const MOST_WORK: f64 = 2e9;
 /// Largest number of nodes with bands; longer grids are thinned evenly.
 const MOST_NODES: usize = 4000;
-/// Largest number of nodes in the maximum of a simultaneous band; bands vary slowly between nodes.
-const MOST_SIMULATED: usize = 300;
-/// Number of draws simulated at once.
-const BLOCK: usize = 250;
 /// Smallest share of the slope of a value in undetermined directions that makes the value undetermined.
 const UNSEEN_SHARE: f64 = 1e-6;
 /// Standard errors below this share of those without bounds count as zero.
 const HELD: f64 = 1e-6;
-/// Confidence level.
-const LEVEL: f64 = 0.95;
-
-/// Simulation of simultaneous bands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct BandSettings {
-    /// Number of draws; 0 for no simultaneous bands.
-    pub draws: usize,
-    /// Seed of the draws.
-    pub seed: u64,
-}
-
-impl Default for BandSettings {
-    fn default() -> Self {
-        Self {
-            draws: 10_000,
-            seed: 1,
-        }
-    }
-}
 
 /// Bands of all functions and of the ratios of the shared coefficient set.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,13 +83,8 @@ pub struct Bands {
 
 impl Bands {
     /// Computes the bands at the parameters `theta`, evaluated in `evaluation`.
-    pub fn at(
-        problem: &Problem,
-        theta: &[f64],
-        evaluation: &Evaluation,
-        settings: &BandSettings,
-    ) -> Self {
-        Self::beside(problem, theta, evaluation, None, settings)
+    pub fn at(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Self {
+        Self::beside(problem, theta, evaluation, None)
     }
 
     /// [`Bands::at`], with the results on half the step where they are known.
@@ -125,7 +93,6 @@ impl Bands {
         theta: &[f64],
         evaluation: &Evaluation,
         halved: Option<Refined>,
-        settings: &BandSettings,
     ) -> Self {
         let samples = problem.sample_count().max(1) as f64;
         let affordable = (MOST_WORK / samples).sqrt() as usize;
@@ -134,7 +101,7 @@ impl Bands {
         let sensitivity = Sensitivity::along(problem, evaluation, directions);
         let information = Information::new(problem, theta, sensitivity)
             .with_error_of_steps(problem, evaluation, halved);
-        Self::from_information(problem, theta, evaluation, &information, settings)
+        Self::from_information(problem, theta, evaluation, &information)
     }
 
     /// Computes the bands of the equation error at its minimum `theta`, from the scores of its samples.
@@ -143,10 +110,9 @@ impl Bands {
         theta: &[f64],
         evaluation: &Evaluation,
         equation: &EquationRows,
-        settings: &BandSettings,
     ) -> Self {
         let information = Information::of_equation(problem, theta, evaluation, equation);
-        Self::from_information(problem, theta, evaluation, &information, settings)
+        Self::from_information(problem, theta, evaluation, &information)
     }
 
     fn from_information(
@@ -154,7 +120,6 @@ impl Bands {
         theta: &[f64],
         evaluation: &Evaluation,
         information: &Information,
-        settings: &BandSettings,
     ) -> Self {
         let mut active = active_rows(problem, theta);
         active.extend(information.held().iter().cloned());
@@ -187,7 +152,6 @@ impl Bands {
             directions,
             bounds_of: bounds_of(problem.parameters(), &active),
             inwards: active.iter().map(|row| inwards(directions, row)).collect(),
-            settings,
         };
         let linearised: Vec<LinearisedCurve> = (0..problem.functions.ranges().len())
             .map(|f| maker.function(f))
@@ -285,7 +249,6 @@ struct Maker<'a> {
     bounds_of: Vec<Vec<usize>>,
     /// Slope of each active row along the directions, inwards, and its norm.
     inwards: Vec<(Vec<f64>, f64)>,
-    settings: &'a BandSettings,
 }
 
 impl Maker<'_> {
@@ -437,7 +400,6 @@ impl Maker<'_> {
             matches!(sides[i], BandSide::Above | BandSide::Below)
         });
         Band {
-            simultaneous: self.simultaneous(linear, &errors, &sides),
             mean: self.mean(&values, linear, gradient),
             name,
             unit: unit.to_owned(),
@@ -478,46 +440,6 @@ impl Maker<'_> {
         }
         // Several rows together fix the value.
         BandSide::Both
-    }
-
-    /// Factor of the simultaneous band: the 95 % quantile of `max |z_i|` over the nodes.
-    fn simultaneous(
-        &self,
-        linear: &LinearisedCurve,
-        errors: &[f64],
-        sides: &[BandSide],
-    ) -> Option<f64> {
-        if self.settings.draws == 0 {
-            return None;
-        }
-        let usable =
-            |i: &usize| errors[*i].is_finite() && errors[*i] > 0.0 && sides[*i] == BandSide::Both;
-        let usable: Vec<usize> = (0..errors.len()).filter(usable).collect();
-        if usable.is_empty() {
-            return None;
-        }
-        let stride = usable.len().div_ceil(MOST_SIMULATED);
-        let chosen: Vec<usize> = usable.into_iter().step_by(stride).collect();
-        let mut rows = linear.roots[0].select_rows(&chosen);
-        for mut row in rows.row_iter_mut() {
-            let norm = row.norm();
-            row /= norm.max(f64::MIN_POSITIVE);
-        }
-        if rows.ncols() > rows.nrows() {
-            // A factor of smaller dimension has the same joint distribution.
-            rows = rows.transpose().qr().r().transpose();
-        }
-        let mut random = ChaCha8Rng::seed_from_u64(self.settings.seed);
-        let mut most = Vec::with_capacity(self.settings.draws);
-        while most.len() < self.settings.draws {
-            let block = BLOCK.min(self.settings.draws - most.len());
-            let normal = |_, _| -> f64 { StandardNormal.sample(&mut random) };
-            let z = &rows * DMatrix::from_fn(rows.ncols(), block, normal);
-            most.extend(z.column_iter().map(|c| c.amax()));
-        }
-        most.sort_by(f64::total_cmp);
-        let index = (LEVEL * most.len() as f64).ceil() as usize;
-        Some(most[index.clamp(1, most.len()) - 1])
     }
 
     /// Ratios of the shared coefficient set, by the delta method, from the values of the functions at the nodes.

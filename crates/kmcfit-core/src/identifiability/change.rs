@@ -71,7 +71,6 @@ impl Bands {
 mod tests {
     use super::*;
     use crate::builder::{Builder, CoefficientSpec, Record};
-    use crate::identifiability::BandSettings;
 
     /// The interval is that of the gradient by central differences of `k(T)/k(0) - 1` in the parameters.
     #[test]
@@ -91,11 +90,7 @@ mod tests {
         let problem = Builder::new(parts).record(record).build().unwrap();
         let theta = problem.start();
         let evaluation = problem.evaluate(&theta).unwrap();
-        let settings = BandSettings {
-            draws: 0,
-            ..BandSettings::default()
-        };
-        let bands = Bands::at(&problem, &theta, &evaluation, &settings);
+        let bands = Bands::at(&problem, &theta, &evaluation);
         let f = problem
             .functions
             .iter()

@@ -117,7 +117,7 @@ impl Information {
         let directions = Directions::new(problem, evaluation, n, n);
         let jacobian = directions.of_jacobian(equation.rows.clone());
         let residuals = equation.residuals.clone();
-        let sensitivity = Sensitivity::of_rows(problem, jacobian, residuals, directions);
+        let sensitivity = Sensitivity::of_rows(jacobian, residuals, directions);
         let functions = problem.functions.scalar_range().start;
         let scores = Scores::of(equation, &sensitivity, theta, functions);
         let measured = sensitivity.jacobian.clone();

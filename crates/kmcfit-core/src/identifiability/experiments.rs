@@ -5,11 +5,10 @@
 //! decrease: with singular values `s` before and `t` after, restricted to the directions determined before,
 //!
 //! ```text
-//! volume  (D) = exp(mean(ln s - ln t))  average (A) = sqrt(sum 1/t^2 / sum 1/s^2)
-//! worst   (E) = s_min / t_min
+//! volume  (D) = exp(mean(ln s - ln t))
 //! ```
 //!
-//! are ratios of standard errors, after to before; 1 is no gain (Pukelsheim, *Optimal Design of Experiments*).
+//! is a ratio of standard errors, after to before; 1 is no gain (Pukelsheim, *Optimal Design of Experiments*).
 
 use super::columns::stacked;
 use super::covariance::Information;
@@ -20,8 +19,7 @@ use super::sensitivity::Sensitivity;
 use crate::diagnostics::{NORMAL_975, rms};
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::record::{Channel, ChannelKind, Experiment, Weighting};
-use crate::system::{Excitation, State};
+use crate::record::{Experiment, Weighting};
 use nalgebra::{DMatrix, DVector};
 
 /// Share of the slope of a mean in undetermined combinations from which the mean is undetermined.
@@ -29,30 +27,8 @@ const HIDDEN: f64 = 1e-6;
 /// Ratio of half-widths, after to before, above which no gain is named.
 const GAINED: f64 = 0.99;
 
-/// Measured channel of a candidate, with a sample at every node.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CandidateChannel {
-    /// Measured quantity.
-    pub kind: ChannelKind,
-    /// Standard deviation of a sample, in the unit of the kind.
-    pub sigma: f64,
-}
-
-/// A possible additional record, with the shared coefficient set over the whole grid.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CandidateExperiment {
-    /// Name.
-    pub name: String,
-    /// Displacement and velocity at the first node.
-    pub initial: State,
-    /// Excitation; `None` for a free response.
-    pub excitation: Option<Excitation>,
-    /// Measured channels.
-    pub channels: Vec<CandidateChannel>,
-}
-
 /// Root-mean-square residual of the first channel, used as noise level of candidates without sigma.
-pub fn residual_spread(problem: &Problem, evaluation: &Evaluation) -> f64 {
+fn residual_spread(problem: &Problem, evaluation: &Evaluation) -> f64 {
     let pairs = problem
         .channels()
         .zip(evaluation.predictions.iter().flatten());
@@ -68,17 +44,11 @@ pub fn residual_spread(problem: &Problem, evaluation: &Evaluation) -> f64 {
 pub struct Gain {
     /// Number of additional directions determined.
     pub new_directions: usize,
-    /// Number of directions determined with the candidate.
-    pub rank: usize,
     /// True if the candidate determines the common scale of the functions, at least at some times, which requires a force;
     /// `None` where the scale is determined already.
     pub sees_scale: Option<bool>,
     /// D: ratio of the geometric mean of the standard errors, after to before.
     pub volume: f64,
-    /// A: ratio of their root mean squares.
-    pub average: f64,
-    /// E: ratio of the largest.
-    pub worst: f64,
     /// The function whose mean over the record gains most, where all samples have a sigma.
     pub narrowed: Option<Narrowed>,
 }
@@ -152,32 +122,23 @@ impl Ranked {
     }
 }
 
-/// Ranks the candidates: by new directions, then by `volume`; candidates that cannot be simulated come last. With
-/// `penalties` these count as information in the comparison of standard errors; new directions are always those of the
-/// samples.
+/// Ranks the candidates: by new directions, then by `volume`; candidates that cannot be simulated come last. Penalties are no
+/// information.
 pub fn rank_experiments(
     problem: &Problem,
     theta: &[f64],
     evaluation: &Evaluation,
-    candidates: &[CandidateExperiment],
-    penalties: bool,
+    candidates: &[Experiment],
 ) -> Vec<Ranked> {
     let sensitivity = Sensitivity::of(problem, evaluation);
     let information = Information::new(problem, theta, sensitivity);
     let now = &information.sensitivity().jacobian;
-    let rows = match penalties {
-        true => information.rows(),
-        false => now.clone(),
-    };
-    let known = Factorisation::of(&rows);
+    let known = Factorisation::of(now);
     let determined = known.rank;
-    let rank_now = match penalties {
-        true => Factorisation::of(now).rank,
-        false => determined,
-    };
     let ambiguity = ScalingAmbiguity::at(problem, theta);
-    let gain = |candidate: &CandidateExperiment| -> Result<Gain, String> {
-        let experiment = simulated(problem, candidate)?;
+    let spread = residual_spread(problem, evaluation);
+    let gain = |candidate: &Experiment| -> Result<Gain, String> {
+        let experiment = with_sigmas(candidate, spread);
         let added = jacobian(problem, theta, experiment.clone(), &information)?;
         let rank = Factorisation::of(&stacked(now, &added)).rank;
         let before = &known.singular_values[..determined];
@@ -186,20 +147,12 @@ pub fn rank_experiments(
         let with_candidate = Factorisation::of(&both);
         let narrowed = narrowed(problem, theta, &information, [&known, &with_candidate]);
         let after = with_candidate.singular_values;
-        let inverse = |values: &[f64]| values.iter().map(|s| 1.0 / (s * s)).sum::<f64>();
-        let shrinks = |ratio: f64| if determined == 0 { 1.0 } else { ratio };
         let logs = before.iter().zip(&after).map(|(s, t)| s.ln() - t.ln());
         Ok(Gain {
-            new_directions: rank.saturating_sub(rank_now),
-            rank,
+            new_directions: rank.saturating_sub(determined),
             sees_scale: (!ambiguity.is_empty())
                 .then(|| fixes_scale(problem, theta, experiment, &ambiguity)),
-            volume: shrinks((logs.sum::<f64>() / determined as f64).exp()),
-            average: shrinks((inverse(&after) / inverse(before)).sqrt()),
-            worst: match (before.last(), after.last()) {
-                (Some(s), Some(t)) => s / t,
-                _ => 1.0,
-            },
+            volume: (logs.sum::<f64>() / determined.max(1) as f64).exp(),
             narrowed,
         })
     };
@@ -267,54 +220,14 @@ fn fixes_scale(
     ScalingAmbiguity::at(&with, theta).directions.len() < ambiguity.directions.len()
 }
 
-/// The candidate as an experiment; `Err` holds the reason for an invalid one.
-fn simulated(problem: &Problem, candidate: &CandidateExperiment) -> Result<Experiment, String> {
-    let grid = &problem.system.grid;
-    let nodes = grid.nodes();
-    if candidate.channels.is_empty() {
-        return Err("it has no channels".into());
+/// The candidate with a stated sigma in each channel: its own, or `spread`.
+fn with_sigmas(candidate: &Experiment, spread: f64) -> Experiment {
+    let mut experiment = candidate.clone();
+    for channel in &mut experiment.channels {
+        let sigma = channel.weighting().sigma(0).unwrap_or(spread);
+        *channel = channel.clone().with_weighting(Weighting::Sigma(sigma));
     }
-    let State {
-        displacement,
-        velocity,
-    } = candidate.initial;
-    if !(displacement.is_finite() && velocity.is_finite()) {
-        return Err(format!("it starts from ({displacement}, {velocity})"));
-    }
-    let mut experiment = Experiment::free(candidate.name.clone(), candidate.initial, nodes);
-    if let Some(excitation) = &candidate.excitation {
-        let parts = [&excitation.force, &excitation.base];
-        for part in parts.into_iter().flatten() {
-            if part.steps() + 1 < nodes {
-                let steps = part.steps();
-                return Err(format!(
-                    "its excitation covers {steps} of {} steps",
-                    nodes - 1
-                ));
-            }
-            if !part.iter().flatten().all(f64::is_finite) {
-                return Err("its excitation is not finite".into());
-            }
-        }
-        experiment.excitation = Some(excitation.clone());
-    }
-    for channel in &candidate.channels {
-        if !(channel.sigma > 0.0 && channel.sigma.is_finite()) {
-            return Err(format!("a sigma of {} is not positive", channel.sigma));
-        }
-        let weighting = Weighting::Sigma(channel.sigma);
-        let times = grid.times();
-        let made = Channel::new(
-            channel.kind,
-            times,
-            vec![0.0; nodes],
-            weighting,
-            grid,
-            nodes,
-        );
-        experiment = experiment.with_channel(made.ok_or("its samples are not on the grid")?);
-    }
-    Ok(experiment)
+    experiment
 }
 
 /// Jacobian of the record along the directions of the existing records.

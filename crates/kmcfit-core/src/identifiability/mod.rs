@@ -4,11 +4,9 @@
 //! * [`Sensitivity`] and [`SingularSpectrum`]: singular values of the weighted Jacobian;
 //! * [`ScalingAmbiguity`]: scaling ambiguity, directions that leave the response unchanged;
 //! * [`Bands`]: confidence bands of functions and ratios; [`classify_functions`]: their classification;
-//! * [`anchors()`]: instants at which a response determines one ratio;
 //! * [`rank_experiments`]: experiment design.
 
 mod active;
-mod anchors;
 mod band;
 mod band_curves;
 mod band_notes;
@@ -50,19 +48,13 @@ pub fn is_unhindered(problem: &Problem, theta: &[f64]) -> bool {
     !unpenalised.is_regularised() && !has_active_rows(problem, theta)
 }
 
-/// True if an equality constraint holds the parameters, which the covariance of the estimates takes into account.
-pub(crate) fn has_equality_rows(problem: &Problem, theta: &[f64]) -> bool {
-    (active::active_rows(problem, theta).iter()).any(|row| row.equality)
-}
-
 /// True if some constraint holds with equality at a point.
 pub(crate) fn has_active_rows(problem: &Problem, theta: &[f64]) -> bool {
     !active::active_rows(problem, theta).is_empty()
 }
 
-pub use anchors::anchors;
 pub use band::{Band, BandSide, MeanOverRecord};
-pub use bands::{BandSettings, Bands};
+pub use bands::Bands;
 pub use change::RelativeChange;
 pub use classification::{
     Classification, ClassificationKind, Condition, FunctionClassification, classify_functions,
@@ -75,14 +67,12 @@ pub(crate) use columns::stacked;
 pub(crate) use covariance::is_bayesian;
 pub use covariance_kind::CovarianceKind;
 pub use equation_rows::EquationRows;
-pub use experiments::{
-    CandidateChannel, CandidateExperiment, Gain, Ranked, rank_experiments, residual_spread,
-};
+pub use experiments::{Gain, Ranked, rank_experiments};
 pub(crate) use factorisation::Factorisation;
 pub use means::Means;
 pub(crate) use means::means_at;
 pub use scale_source::{ScaleSource, scale_source};
 pub use scaling_ambiguity::ScalingAmbiguity;
-pub use sensitivity::{ResolvedDirection, Sensitivity, SingularSpectrum};
+pub use sensitivity::{Sensitivity, SingularSpectrum};
 pub(crate) use step_error::step_error;
-pub use structural_rank::{RankFinding, RankFindingKind, ScaleFreedom, structural_rank};
+pub use structural_rank::{RankFinding, ScaleFreedom, structural_rank};

@@ -6,7 +6,6 @@ use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::rows::append;
 use nalgebra::DMatrix;
-use std::ops::Range;
 
 /// Rank threshold along smooth directions of many parameters, relative to the largest singular value. The error of the
 /// stepper, about 1e-5 of a response, otherwise makes the scale over time appear determined.
@@ -35,8 +34,6 @@ pub struct Sensitivity {
     pub has_sigma: Vec<bool>,
     /// Directions of the columns.
     pub directions: Directions,
-    /// Names of the functions.
-    names: Vec<String>,
 }
 
 impl Sensitivity {
@@ -93,14 +90,12 @@ impl Sensitivity {
             residuals,
             roots,
             has_sigma,
-            names: problem.functions.iter().map(|f| f.name()).collect(),
             directions,
         }
     }
 
     /// Rows with the weight one: residuals of another equation than the misfit, along the directions.
     pub(super) fn of_rows(
-        problem: &Problem,
         jacobian: DMatrix<f64>,
         residuals: Vec<f64>,
         directions: Directions,
@@ -112,7 +107,6 @@ impl Sensitivity {
             roots: vec![1.0; count],
             has_sigma: vec![true; count],
             directions,
-            names: problem.functions.iter().map(|f| f.name()).collect(),
         }
     }
 
@@ -126,7 +120,6 @@ impl Sensitivity {
         SingularSpectrum {
             factorisation,
             directions: self.directions.clone(),
-            names: self.names.clone(),
         }
     }
 }
@@ -151,18 +144,6 @@ fn by_tangents(
 pub struct SingularSpectrum {
     factorisation: Factorisation,
     directions: Directions,
-    names: Vec<String>,
-}
-
-/// A right singular vector with its singular value.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ResolvedDirection {
-    /// Singular value.
-    pub singular_value: f64,
-    /// Change of the parameters, in their units.
-    pub change: Vec<f64>,
-    /// Change of each function over the nodes, in its unit, with its name.
-    pub functions: Vec<(String, Vec<f64>)>,
 }
 
 impl SingularSpectrum {
@@ -204,30 +185,10 @@ impl SingularSpectrum {
         rest
     }
 
-    /// Singular vectors of these ranks, best determined first, as changes of every function over time.
-    pub fn at(&self, problem: &Problem, ranks: Range<usize>) -> Vec<ResolvedDirection> {
-        let each = ranks
-            .filter(|k| *k < self.factorisation.vectors().ncols())
-            .map(|k| {
-                let z = self.factorisation.vectors().column(k);
-                let change = self.directions.to_parameters(z.as_slice());
-                ResolvedDirection {
-                    singular_value: self.singular_values()[k],
-                    functions: functions_along(problem, &change, &self.names),
-                    change,
-                }
-            });
-        each.collect()
-    }
-
-    /// The `count` best determined directions.
-    pub fn best(&self, problem: &Problem, count: usize) -> Vec<ResolvedDirection> {
-        self.at(problem, 0..count)
-    }
-
-    /// The `count` worst determined directions among those determined, the worst last.
-    pub fn worst(&self, problem: &Problem, count: usize) -> Vec<ResolvedDirection> {
-        self.at(problem, self.rank().saturating_sub(count)..self.rank())
+    /// The change of the parameters, in their units, along the best determined direction.
+    pub fn best(&self) -> Vec<f64> {
+        let first = self.factorisation.vectors().column(0);
+        self.directions.to_parameters(first.as_slice())
     }
 
     /// Rank as a sentence.
@@ -242,14 +203,4 @@ impl SingularSpectrum {
             ),
         }
     }
-}
-
-fn functions_along(problem: &Problem, change: &[f64], names: &[String]) -> Vec<(String, Vec<f64>)> {
-    let functions = &problem.functions;
-    let parts = functions.iter().zip(functions.ranges()).zip(names);
-    let each = parts.map(|((function, range), name)| {
-        let values = (function.design).multiply(&change[range.clone()], functions.nodes());
-        (name.clone(), values)
-    });
-    each.collect()
 }

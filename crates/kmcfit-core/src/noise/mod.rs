@@ -26,7 +26,7 @@ pub use burg::burg;
 pub use correlation::{Correlation, CorrelationLaw, uninterrupted_runs};
 pub use exponential::select_exponential;
 pub use input_errors::{InputErrors, InputRow, InputStep};
-pub use kernel_covariance::{KernelCovariance, automatic_bandwidth, kernel_sum};
+pub use kernel_covariance::{KernelCovariance, automatic_bandwidth};
 pub use order::{HIGHEST_ORDER, select_order};
 pub use penalty_moments::PenaltyMoments;
 pub use restricted_likelihood::{ChannelMoments, NoiseCoordinates, RestrictedLikelihood, STEP};

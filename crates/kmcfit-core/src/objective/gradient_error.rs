@@ -1,4 +1,4 @@
-//! Error of a gradient against finite differences and Taylor remainders.
+//! Error of a gradient against finite differences.
 
 use super::{Evaluation, GradientKind};
 use crate::problem::Problem;
@@ -52,33 +52,5 @@ impl Problem {
             .map(|((channel, from), to)| channel.cost_difference(from, to))
             .sum();
         misfit + (to.regularisation - from.regularisation)
-    }
-
-    /// Taylor remainders `|J(theta + a d) - J(theta) - a <dJ, d>|` along `direction` for each of `steps`; proportional to the
-    /// square of the step for an exact gradient.
-    ///
-    /// # Errors
-    /// A [`SimulationError`] at `theta` or at one of the trial points.
-    pub fn taylor_remainders(
-        &self,
-        theta: &[f64],
-        direction: &[f64],
-        kind: GradientKind,
-        steps: &[f64],
-    ) -> Result<Vec<f64>, SimulationError> {
-        let here = self.evaluate(theta)?;
-        let gradient = self.gradient(theta, &here, kind).euclidean;
-        let slope: f64 = gradient.iter().zip(direction).map(|(g, d)| g * d).sum();
-        let mut trial = self.workspace();
-        let mut remainder = |step: f64| {
-            let moved: Vec<f64> = theta
-                .iter()
-                .zip(direction)
-                .map(|(p, d)| p + step * d)
-                .collect();
-            self.evaluate_into(&moved, &mut trial)?;
-            Ok((self.cost_difference(&here, &trial) - step * slope).abs())
-        };
-        steps.iter().map(|&step| remainder(step)).collect()
     }
 }

@@ -227,17 +227,6 @@ impl Channel {
             self.sensor().add_gradient(factors, *slope, scalars);
         }
     }
-
-    /// True if the predictions depend on the functions also at fixed states, as accelerations do.
-    pub fn sees_functions(&self) -> bool {
-        match self.kind() {
-            ChannelKind::Displacement => false,
-            ChannelKind::Velocity => {
-                self.sensor().is_delayed() || self.places().any(|p| p.as_node().is_none())
-            }
-            ChannelKind::Acceleration => true,
-        }
-    }
 }
 
 /// Directional derivative of an observation.

@@ -178,26 +178,8 @@ impl Channel {
         self
     }
 
-    /// Replaces the samples by simulated ones: `predicted`, after the filter, plus `noise`, before the filter.
-    ///
-    /// # Panics
-    /// If there is not one of each for every sample.
-    #[must_use]
-    pub fn with_simulated(mut self, predicted: &[f64], noise: &[f64]) -> Self {
-        assert_eq!(predicted.len(), self.len(), "one for each sample");
-        assert_eq!(noise.len(), self.len(), "one for each sample");
-        let filtered = match self.filter.is_empty() {
-            true => noise.to_vec(),
-            false => zero_phase(&self.filter, noise),
-        };
-        let pairs = predicted.iter().zip(&filtered);
-        self.observed = Arc::new(pairs.map(|(y, e)| y + e).collect());
-        self.unfiltered = Arc::default();
-        self
-    }
-
     /// The channel without its filter and with the samples as they were before it; the channel itself without a filter. `None` where
-    /// these samples are unknown ([`Channel::with_simulated`]).
+    /// these samples are unknown.
     pub(crate) fn before_filter(&self) -> Option<Self> {
         if self.filter.is_empty() {
             return Some(self.clone());
@@ -215,7 +197,7 @@ impl Channel {
     /// # Panics
     /// If there is not one in place of each.
     #[must_use]
-    pub(crate) fn with_samples(mut self, samples: Vec<f64>) -> Self {
+    pub fn with_samples(mut self, samples: Vec<f64>) -> Self {
         assert_eq!(samples.len(), self.len(), "one in place of each");
         self.observed = Arc::new(samples);
         self.unfiltered = Arc::default();

@@ -212,15 +212,6 @@ impl Channel {
         slopes
     }
 
-    /// Noise from independent numbers of unit variance, in the unit of the channel, with the standard deviations `sigmas`.
-    pub fn noise_from(&self, unit: &[f64], sigmas: &[f64]) -> Vec<f64> {
-        let coloured = match self.correlation() {
-            None => unit.to_vec(),
-            Some(correlation) => correlation.colour(unit),
-        };
-        coloured.iter().zip(sigmas).map(|(u, s)| u * s).collect()
-    }
-
     fn over_sigma(&self, values: &mut [f64]) {
         for (i, value) in values.iter_mut().enumerate() {
             *value /= self.sigma_of(i);

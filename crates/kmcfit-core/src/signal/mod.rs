@@ -25,7 +25,7 @@ mod spectrum;
 mod spline;
 
 pub use clipping::{clipped, cut_off};
-pub use decimate::{decimate, decimation_filter};
+pub use decimate::decimate;
 pub use extremes::Extremes;
 pub use faults::{dropouts, quantisation, spikes};
 pub use filter::{SecondOrder, band_pass, high_pass, low_pass, zero_phase, zero_phase_transpose};

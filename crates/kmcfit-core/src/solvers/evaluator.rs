@@ -8,7 +8,7 @@ use super::timings::{Timings, timed};
 use crate::objective::{Evaluation, Gradient, GradientKind};
 use crate::problem::Problem;
 use crate::record::{Channel, Loss};
-use crate::simulate::{EngineMode, SimulationError, Trajectory};
+use crate::simulate::{EngineMode, SimulationError};
 use std::sync::OnceLock;
 
 /// Evaluator of a problem with argmin's counters; the solvers evaluate through it alone.
@@ -61,35 +61,6 @@ impl<'a, 'p> CountedEvaluator<'a, 'p> {
         self.problem
             .problem
             .expect("the executor holds the problem")
-    }
-
-    /// Recomputes an earlier point without counting; the `fingerprint` identifies the method that computed its gradient. `None`
-    /// if the point cannot be reproduced.
-    pub fn again(&self, parameters: Vec<f64>, fingerprint: u64) -> Option<Iterate> {
-        let problem = self.problem();
-        let mut evaluation = problem.workspace();
-        (problem.evaluate_for(self.mode, &parameters, &mut evaluation)).ok()?;
-        let point = self.completed(parameters, evaluation, &mut Timings::default());
-        if point.fingerprint() == fingerprint || self.halfway.is_none() {
-            return Some(point).filter(|point| point.fingerprint() == fingerprint);
-        }
-        // After a short step the gradient came from an adjoint solve.
-        let Iterate {
-            parameters,
-            evaluation,
-            ..
-        } = point;
-        let gradient = problem.gradient(&parameters, &evaluation, self.kind);
-        let point = Iterate::new(parameters, evaluation, gradient);
-        (point.fingerprint() == fingerprint).then_some(point)
-    }
-
-    /// Recomputes the responses at an earlier point without counting.
-    pub fn responses_again(&self, parameters: &[f64]) -> Result<Vec<Trajectory>, SimulationError> {
-        let problem = self.problem();
-        let mut evaluation = problem.workspace();
-        problem.evaluate_for(self.mode, parameters, &mut evaluation)?;
-        Ok(evaluation.trajectories)
     }
 
     /// One forward solve into `evaluation`.

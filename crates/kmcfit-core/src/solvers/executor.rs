@@ -1,11 +1,11 @@
-//! Loop of a search: initialisation, iterations, stopping tests and checkpoints, run by argmin's executor.
+//! Loop of a search: initialisation, iterations and stopping tests, run by argmin's executor.
 
-use super::checkpoint::{ExactF64s, MethodState, Observer, SolverState};
 use super::evaluator::CountedEvaluator;
 use super::fit::{Fit, measured};
 use super::history::{IterationRecord, Recorder, Reference};
 use super::iterate::Iterate;
 use super::methods::{Step, StepRule, equation_error, step_rule};
+use super::observer::Observer;
 use super::reason::Reason;
 use super::settings::{FitSettings, Solver};
 use super::solve_counts::SolveCounts;
@@ -18,10 +18,8 @@ use crate::record::Channel;
 use crate::simulate::SimulationError;
 use argmin::core::{Error, Executor, IterState, KV, TerminationReason, TerminationStatus};
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 
-/// Runs one solver from `start`, reporting to `watch`. If `watch` holds a checkpoint of this search, the search continues
-/// from it. Ratios of cost and gradient refer to `reference`, by default the start.
+/// Runs one solver from `start`, reporting to `watch`.
 ///
 /// Every method accepts only points of lower cost, so the last point is the best one. The equation error is not a search;
 /// it is minimised directly.
@@ -74,7 +72,6 @@ pub(super) fn search_prepared(
         settings.gradient = GradientKind::Discrete;
     }
     let settings = &settings;
-    let kept = watch.begin_search();
     let mut method = step_rule(settings.solver);
     if let Some(spare) = prepared.spare {
         method.recycle(spare);
@@ -89,8 +86,6 @@ pub(super) fn search_prepared(
         progress: None,
         trouble: None,
         outcome: None,
-        kept,
-        before: PriorWork::default(),
         watch,
     };
     let result = Executor::new(problem, run)
@@ -141,18 +136,7 @@ struct SearchDriver<'a, 'w> {
     /// Error of the simulation at the start.
     trouble: Option<SimulationError>,
     outcome: Option<Outcome>,
-    /// Saved history and state of this search.
-    kept: Option<(Vec<IterationRecord>, SolverState)>,
-    before: PriorWork,
     watch: &'a mut Observer<'w>,
-}
-
-/// Work of a search before it was interrupted.
-#[derive(Default)]
-struct PriorWork {
-    counts: SolveCounts,
-    timings: Timings,
-    elapsed: Duration,
 }
 
 struct SearchProgress {
@@ -182,102 +166,6 @@ impl SearchDriver<'_, '_> {
             recorder: Recorder::new(work.problem(), &point, self.reference),
             point,
         })
-    }
-
-    /// The search continued from its saved state; `None` if none is saved or it cannot be reproduced bit by bit.
-    fn restored(&mut self, work: &CountedEvaluator) -> Option<SearchProgress> {
-        let (rows, state) = self.kept.take()?;
-        let progress = self.restore_state(work, rows, state);
-        if progress.is_none() {
-            // A saved state that does not fit the problem is not used in part.
-            self.method = step_rule(self.settings.solver);
-            self.watch.discard();
-        }
-        progress
-    }
-
-    fn restore_state(
-        &mut self,
-        work: &CountedEvaluator,
-        rows: Vec<IterationRecord>,
-        state: SolverState,
-    ) -> Option<SearchProgress> {
-        let fits = |parameters: &[f64]| parameters.len() == work.problem().parameters();
-        if !fits(&state.parameters.0) {
-            return None;
-        }
-        let responses = |parameters: &[f64]| match fits(parameters) {
-            true => work.responses_again(parameters).ok(),
-            false => None,
-        };
-        if rows.len() as u64 != state.iterations {
-            return None;
-        }
-        let snapshots = state.snapshots.into_iter();
-        let snapshots = snapshots.map(|(iteration, at)| (iteration, at.0)).collect();
-        let (problem, references) = (work.problem(), &state.references.0);
-        let recorder = Recorder::restored(problem, rows, references, snapshots, responses)?;
-        let mut point = work.again(state.parameters.0, state.fingerprint)?;
-        if state.outcome.is_none()
-            && !(self.method).restore(state.memory, work.problem(), &mut point)
-        {
-            return None;
-        }
-        self.outcome = state.outcome;
-        self.before = PriorWork {
-            counts: state.counts,
-            timings: state.timings,
-            elapsed: state.elapsed,
-        };
-        Some(SearchProgress { point, recorder })
-    }
-
-    /// Saves the state of the search when due, and before an interrupt ends it.
-    fn keep(&mut self, counts: SolveCounts) {
-        let interrupted = |o: &Outcome| o.status == Status::Interrupted;
-        let now = match &self.outcome {
-            Some(outcome) => interrupted(outcome),
-            None => {
-                let progress = self.progress.as_ref();
-                progress.is_some_and(|p| self.watch.is_due(p.point.parameters.len()))
-            }
-        };
-        if now {
-            self.save_state(counts, None);
-        }
-        if self.outcome.as_ref().is_some_and(interrupted) {
-            self.watch.close();
-        }
-    }
-
-    fn save_state(&mut self, counts: SolveCounts, outcome: Option<Outcome>) {
-        let Some(SearchProgress { point, recorder }) = &self.progress else {
-            return;
-        };
-        let state = || SolverState {
-            iterations: recorder.rows.len() as u64,
-            parameters: ExactF64s(point.parameters.clone()),
-            fingerprint: point.fingerprint(),
-            memory: match outcome {
-                None => self.method.state(point),
-                Some(_) => MethodState::Nothing,
-            },
-            references: ExactF64s(recorder.references()),
-            snapshots: (recorder.snapshot_points())
-                .map(|(iteration, at)| (iteration, ExactF64s(at.to_vec())))
-                .collect(),
-            counts: self.before.counts + counts,
-            timings: self.before.timings + self.timings,
-            elapsed: self.before.elapsed + self.clock.elapsed(),
-            outcome,
-        };
-        let clock = Instant::now();
-        self.watch.save_state(state);
-        self.timings.checkpoints += clock.elapsed();
-    }
-
-    fn elapsed(&self) -> Duration {
-        self.before.elapsed + self.clock.elapsed()
     }
 
     fn advance(&mut self, work: &mut CountedEvaluator) {
@@ -346,18 +234,12 @@ impl SearchDriver<'_, '_> {
             return Some(Outcome::new(Status::Interrupted, Reason::Interrupted));
         }
         let limit = self.settings.stopping.limit?;
-        let is_over = self.elapsed() >= limit;
+        let is_over = self.clock.elapsed() >= limit;
         is_over.then(|| Outcome::new(Status::TimeLimit, Reason::TimeLimit(limit)))
     }
 
-    fn finish(mut self, counts: SolveCounts) -> Result<Fit, SimulationError> {
-        match &self.outcome {
-            _ if self.progress.is_none() => self.watch.end_without_result(),
-            // Saved, so that the search can continue from here.
-            Some(outcome) if outcome.status == Status::Interrupted => {}
-            outcome => self.save_state(counts, outcome.clone()),
-        }
-        let elapsed = self.elapsed();
+    fn finish(self, counts: SolveCounts) -> Result<Fit, SimulationError> {
+        let elapsed = self.clock.elapsed();
         let Some(SearchProgress { point, recorder }) = self.progress else {
             return Err(self.trouble.expect("a search starts, or there is a reason"));
         };
@@ -369,11 +251,10 @@ impl SearchDriver<'_, '_> {
             history: recorder.rows,
             snapshots: recorder.snapshots,
             outcome: self.outcome.expect("a search ends with an outcome"),
-            counts: self.before.counts + counts,
-            timings: self.before.timings + self.timings,
+            counts,
+            timings: self.timings,
             elapsed,
             attempts: Vec::new(),
-            gaps: Vec::new(),
             optimality: None,
         })
     }
@@ -400,20 +281,12 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for SearchDriver<'_, '_>
     ) -> Result<(SearchState, Option<KV>), Error> {
         let parameters = state.take_param().unwrap_or_default();
         let mut work = CountedEvaluator::new(problem, self.settings);
-        match self.restored(&work) {
-            Some(progress) => {
-                self.at_start = None;
-                self.progress = Some(progress);
-            }
-            None => {
-                match self.start(&mut work, parameters) {
-                    Ok(progress) => self.progress = Some(progress),
-                    Err(trouble) => self.trouble = Some(trouble),
-                }
-                self.timings += work.timings;
-                self.outcome = self.nothing_to_do(problem.problem);
-            }
+        match self.start(&mut work, parameters) {
+            Ok(progress) => self.progress = Some(progress),
+            Err(trouble) => self.trouble = Some(trouble),
         }
+        self.timings += work.timings;
+        self.outcome = self.nothing_to_do(problem.problem);
         Ok((self.view(state), None))
     }
 
@@ -425,7 +298,6 @@ impl<'p> argmin::core::Solver<&'p Problem, SearchState> for SearchDriver<'_, '_>
         let mut work = CountedEvaluator::new(problem, self.settings);
         self.advance(&mut work);
         self.timings += work.timings;
-        self.keep(SolveCounts::of(problem));
         Ok((self.view(state), None))
     }
 

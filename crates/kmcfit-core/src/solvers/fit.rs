@@ -1,6 +1,5 @@
 //! Result of a fit.
 
-use super::gaps::Gap;
 use super::history::{IterationRecord, ResponseSnapshot, ratio};
 use super::iterate::Iterate;
 use super::optimality::{Optimality, judged};
@@ -39,8 +38,6 @@ pub struct Fit {
     pub elapsed: Duration,
     /// Attempts, in order.
     pub attempts: Vec<Attempt>,
-    /// Gaps of the records in which numbers of cycles were compared.
-    pub gaps: Vec<Gap>,
     /// First-order condition at the best point, if measured.
     pub optimality: Option<Optimality>,
 }

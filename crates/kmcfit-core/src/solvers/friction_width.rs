@@ -4,8 +4,8 @@
 //! shift is proportional to the width where the mass sticks, and smaller otherwise, which gives the next width. Its grid has stable
 //! steps for friction at rest and is refined as any automatic grid.
 
-use super::checkpoint::Observer;
 use super::grid_refinement::{OnNodes, RefinedFit, RunFit, carried, fit_on_refined_grids, nodes};
+use super::observer::Observer;
 use super::rounds::is_ended;
 use crate::number_format::significant;
 use crate::problem::Problem;

@@ -2,16 +2,16 @@
 //!
 //! The residuals of a fit at the minimum are noise: their squares, over the squares of stated sigmas, have a mean of one, and
 //! with estimated sigmas they are white unless the noise is correlated. Where they are not, the fit may be in a local minimum,
-//! and the searches of a scan of the natural frequency ([`scan_starts`]) are made. Values of mass and stiffness far from the median
+//! and the search of a scan of the natural frequency ([`scan_start`]) is made. Values of mass and stiffness far from the median
 //! of their function, which the record hardly determines, are moved towards it, and the search is repeated.
 
-use super::checkpoint::Observer;
 use super::correlation_estimation::misspecification;
 use super::executor::search;
 use super::fit::{Attempt, Fit};
+use super::observer::Observer;
 use super::rounds::{is_ended, with_round};
 use super::settings::{FitSettings, Solver, StartStrategy};
-use super::starts::scan_starts;
+use super::starts::scan_start;
 use super::timings::timed;
 use crate::functions::CoefficientKind;
 use crate::host::Instant;
@@ -19,7 +19,6 @@ use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, Weighting};
 use crate::signal::median;
 use crate::simulate::SimulationError;
-use std::sync::atomic::Ordering;
 
 /// Largest mean square of the residuals, in units of the stated sigma, of a fit at the noise.
 const LARGEST_MEAN_SQUARE: f64 = 1.1;
@@ -74,27 +73,17 @@ struct FurtherStarts<'a, 'w> {
 impl FurtherStarts<'_, '_> {
     /// Searches from a scan of the natural frequency where the residuals are not noise.
     fn scan(&mut self, start: &[f64]) -> Result<(), SimulationError> {
-        let (problem, settings) = (self.problem, self.settings);
+        let problem = self.problem;
         let nodes = problem.system.grid.nodes() * problem.experiments.len();
         if nodes > MOST_NODES || is_noise(problem, &self.found) {
             return Ok(());
         }
-        let flag = settings.interrupt.as_ref();
-        let is_interrupted = || flag.is_some_and(|flag| flag.load(Ordering::Relaxed));
-        let count = problem.parameters();
         let clock = Instant::now();
         let timings = &mut self.found.timings;
-        let starts = self.watch.numbers(2 * count, &is_interrupted, || {
-            let found = timed(&mut timings.start, || scan_starts(problem, start, settings));
-            found.map_or_else(|| vec![f64::NAN; 2 * count], |starts| starts.concat())
-        });
+        let from = timed(&mut timings.start, || scan_start(problem, start));
         self.found.elapsed += clock.elapsed();
-        for (from, logarithms) in starts.chunks_exact(count).zip([false, true]) {
-            let is_known = from.iter().all(|number| number.is_finite());
-            if !is_known || is_ended(&self.found) || is_noise(problem, &self.found) {
-                break;
-            }
-            self.search(StartStrategy::FrequencyScan { logarithms }, from)?;
+        if let Some(from) = from.filter(|_| !is_ended(&self.found)) {
+            self.search(StartStrategy::FrequencyScan, &from)?;
         }
         Ok(())
     }

@@ -13,24 +13,6 @@ const FEWEST_CYCLES: f64 = 0.5;
 /// Shortest gap, in median distances of neighbouring samples.
 const FEWEST_STEPS: f64 = 3.0;
 
-/// A gap of the records with the numbers of cycles in it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Gap {
-    /// Last sample before the gap and first sample after it, s.
-    pub span: [f64; 2],
-    /// Number of cycles of each fit that was compared, the best one first.
-    pub counts: Vec<CycleCount>,
-}
-
-/// Number of cycles in a gap by one fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CycleCount {
-    /// Number of cycles.
-    pub cycles: f64,
-    /// Minus twice the logarithm of its restricted likelihood, relative to the best one.
-    pub deviance: f64,
-}
-
 /// Function whose variation changes the number of cycles: the stiffness, or the mass beside a constant stiffness; `None` where
 /// both are constant or there is no stiffness, and with functions of single records or known parts.
 pub(crate) fn varying_function(problem: &Problem) -> Option<usize> {
@@ -75,7 +57,7 @@ pub(crate) fn gaps(problem: &Problem, nodal: &NodalCoefficients) -> Vec<[f64; 2]
 }
 
 /// Undamped natural frequency at the nodes, Hz; zero where stiffness or mass is negative.
-pub(super) fn frequencies(problem: &Problem, nodal: &NodalCoefficients) -> Vec<f64> {
+fn frequencies(problem: &Problem, nodal: &NodalCoefficients) -> Vec<f64> {
     let mut terms = problem.system.terms.iter();
     let Some(place) = terms.position(|t| *t == Term::Stiffness) else {
         return vec![0.0; nodal.mass.len()];
@@ -85,15 +67,11 @@ pub(super) fn frequencies(problem: &Problem, nodal: &NodalCoefficients) -> Vec<f
 }
 
 /// Number of cycles of the undamped oscillation within a span of time (s), by the trapezoidal rule on the nodes.
-pub fn cycles(problem: &Problem, nodal: &NodalCoefficients, span: [f64; 2]) -> f64 {
-    integral(problem, &frequencies(problem, nodal), span)
-}
-
-/// Integral of nodal values over a span of time (s), by the trapezoidal rule.
-pub(super) fn integral(problem: &Problem, values: &[f64], [from, to]: [f64; 2]) -> f64 {
+pub fn cycles(problem: &Problem, nodal: &NodalCoefficients, [from, to]: [f64; 2]) -> f64 {
     let grid = &problem.system.grid;
     let (first, last) = (grid.nearest(from), grid.nearest(to));
-    let pairs = values[first..=last].windows(2);
+    let frequencies = frequencies(problem, nodal);
+    let pairs = frequencies[first..=last].windows(2);
     pairs
         .map(|pair| 0.5 * grid.step() * (pair[0] + pair[1]))
         .sum()

@@ -6,8 +6,8 @@
 //! number of nodes for which it is small enough. The next fit starts from the estimates, or from the start values where the
 //! response changes so much that the estimates belong to another system.
 
-use super::checkpoint::Observer;
 use super::fit::Fit;
+use super::observer::Observer;
 use super::rounds::is_ended;
 use super::termination::Status;
 use crate::functions::Basis;

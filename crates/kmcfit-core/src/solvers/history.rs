@@ -72,8 +72,6 @@ pub(super) struct Recorder {
     pub initial_cost: f64,
     pub started_from: f64,
     pub initial_norm_squared: f64,
-    /// Parameters of the snapshots.
-    snapshot_parameters: Vec<Vec<f64>>,
 }
 
 impl Recorder {
@@ -89,56 +87,9 @@ impl Recorder {
             initial_cost: reference.cost,
             started_from: start.evaluation.cost,
             initial_norm_squared: reference.norm_squared,
-            snapshot_parameters: Vec::new(),
         };
         recorder.keep_snapshot(problem, 0, start);
         recorder
-    }
-
-    /// Restores the history of a saved search from [`Recorder::references`] and [`Recorder::snapshot_points`], with responses
-    /// computed by `at`; `None` where it is incomplete.
-    pub fn restored(
-        problem: &Problem,
-        rows: Vec<IterationRecord>,
-        references: &[f64],
-        snapshots: Vec<(u64, Vec<f64>)>,
-        at: impl Fn(&[f64]) -> Option<Vec<Trajectory>>,
-    ) -> Option<Self> {
-        let [initial_cost, started_from, initial_norm_squared] = *references else {
-            return None;
-        };
-        let iterations = rows.len() as u64;
-        let known = snapshots.iter().map(|(iteration, _)| iteration);
-        let expected = SNAPSHOT_ITERATIONS.iter();
-        if !known.eq(expected.take_while(|i| **i <= iterations)) {
-            return None;
-        }
-        let restored = snapshots.iter().map(|(iteration, parameters)| {
-            Some(ResponseSnapshot::new(*iteration, problem, &at(parameters)?))
-        });
-        Some(Self {
-            rows,
-            snapshots: restored.collect::<Option<_>>()?,
-            initial_cost,
-            started_from,
-            initial_norm_squared,
-            snapshot_parameters: snapshots.into_iter().map(|(_, at)| at).collect(),
-        })
-    }
-
-    /// `J0`, the cost at the start of the search, and `G0^2`.
-    pub fn references(&self) -> Vec<f64> {
-        vec![
-            self.initial_cost,
-            self.started_from,
-            self.initial_norm_squared,
-        ]
-    }
-
-    /// Parameters of the snapshots, by iteration.
-    pub fn snapshot_points(&self) -> impl Iterator<Item = (u64, &[f64])> {
-        let iterations = self.snapshots.iter().map(|s| s.iteration);
-        iterations.zip(self.snapshot_parameters.iter().map(Vec::as_slice))
     }
 
     /// Records the iteration from `before` to `after`.
@@ -162,7 +113,6 @@ impl Recorder {
         if SNAPSHOT_ITERATIONS.contains(&iteration) {
             let responses = &point.evaluation.trajectories;
             (self.snapshots).push(ResponseSnapshot::new(iteration, problem, responses));
-            self.snapshot_parameters.push(point.parameters.clone());
         }
     }
 }

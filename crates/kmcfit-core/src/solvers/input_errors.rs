@@ -10,10 +10,10 @@
 //!   add the bias that these derivatives remove (Fuller 1987, Söderström 2007). The response to `eta` by the same linearisation
 //!   is subtracted, so that the residuals stay those of the measured input.
 
-use super::checkpoint::Observer;
 use super::correlation_estimation::movement;
 use super::executor::search;
 use super::fit::Fit;
+use super::observer::Observer;
 use super::rounds::{counted, is_ended, with_round};
 use super::settings::FitSettings;
 use crate::noise::{Correlation, CorrelationLaw, InputErrors, InputRow, InputStep};

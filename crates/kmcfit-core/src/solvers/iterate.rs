@@ -40,14 +40,6 @@ impl Iterate {
         Self { cached, ..self }
     }
 
-    /// Adopts the Jacobian computed at the nearby parameters `at`; returns false where that is not possible.
-    pub(super) fn reuse_linearization(&mut self, problem: &Problem, at: Vec<f64>) -> bool {
-        let reused = Linearization::reused(problem, at, &self.evaluation, &self.gradient);
-        let is_usable = reused.is_some();
-        self.cached.linearization = reused.unwrap_or_default();
-        is_usable
-    }
-
     /// Linearisation for a step from the iterate.
     pub(super) fn linearization(&self) -> &Linearization {
         &self.cached.linearization
@@ -73,23 +65,6 @@ impl Iterate {
     /// [`Problem::relative_change`] between two parameter vectors, with the sizes at the iterate.
     pub(crate) fn distance(&self, problem: &Problem, from: &[f64], to: &[f64]) -> f64 {
         problem.change_in_scales(self.natural_scales(problem), from, to)
-    }
-    /// Hash of the bits of cost and gradient.
-    pub fn fingerprint(&self) -> u64 {
-        let Self {
-            evaluation,
-            gradient,
-            ..
-        } = self;
-        let gradients = gradient.euclidean.iter().chain(&gradient.l2);
-        let numbers = [&evaluation.cost, &gradient.norm_squared].into_iter();
-        // FNV-1a, word by word.
-        let hash = numbers
-            .chain(gradients)
-            .fold(0xcbf2_9ce4_8422_2325_u64, |hash, x| {
-                (hash ^ x.to_bits()).wrapping_mul(0x0100_0000_01b3)
-            });
-        hash ^ (hash >> 32)
     }
 }
 

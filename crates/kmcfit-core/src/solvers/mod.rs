@@ -1,12 +1,10 @@
 //! Fits: methods, each a search direction and a step rule, their common loop, starting points, and analyses based on fits.
 //!
-//! Order of imports: settings, termination, history and checkpoint; linearisation; iterate and counted evaluations;
+//! Order of imports: settings, termination, history and observer; linearisation; iterate and counted evaluations;
 //! methods; executor (the loop); starts; start strategy; noise estimation, weight path and validation; grid refinement.
 
 mod active_set;
-mod checkpoint;
 mod correlation_estimation;
-mod cycle_counts;
 mod evaluator;
 mod executor;
 mod fit;
@@ -23,6 +21,7 @@ mod linearization;
 mod methods;
 mod no_response;
 mod noise_estimation;
+mod observer;
 mod optimality;
 mod path;
 mod reason;
@@ -35,7 +34,6 @@ mod start_projection;
 mod start_strategy;
 mod starts;
 mod state_estimation;
-mod stored_fit;
 mod termination;
 mod timings;
 mod traces;
@@ -46,13 +44,10 @@ mod weight_rules;
 
 pub use crate::record::Measurements;
 pub use active_set::{ActiveGroup, active_constraints};
-pub use checkpoint::{
-    CheckpointStore, CheckpointUnit, ExactF64s, IterationEvent, Observer, SolverState,
-};
 pub use executor::fit_from;
 pub use fit::{Attempt, Fit};
 pub use friction_width::{WidthNotice, fit_on_reduced_widths};
-pub use gaps::{CycleCount, Gap, cycles};
+pub use gaps::cycles;
 pub(crate) use gaps::{gaps, varying_function};
 pub use grid_refinement::{GridNotice, OnNodes, fit_on_refined_grids};
 pub use history::{IterationRecord, number_or_nan};
@@ -68,6 +63,7 @@ pub use methods::equation_error::{
 };
 pub use no_response::no_response;
 pub use noise_estimation::{fit_with_noise, fit_with_noise_watched};
+pub use observer::{IterationEvent, Observer};
 pub use optimality::Optimality;
 pub use path::{PathPoint, WeightPath};
 pub use reason::{BoundedValue, ConditionFailure, MissingMeasurement, Reason, UnsupportedRecord};
@@ -76,7 +72,6 @@ pub use solve_counts::SolveCounts;
 pub use start_projection::StartProjection;
 pub use start_strategy::fit;
 pub use state_estimation::estimate_states;
-pub use stored_fit::stored_fit;
 pub use termination::{Outcome, Status, Stopping};
 pub use timings::{Timings, timed};
 pub use validation::predict_validation;

@@ -1,16 +1,15 @@
 //! Estimation of sigmas and correlations of the noise and of penalty weights, in alternation with fits.
 
-use super::checkpoint::Observer;
 use super::correlation_estimation::{
     correlated, is_likelihood, is_white, is_worse, mark_misspecified, may_correlate, movement,
     orders,
 };
-use super::cycle_counts::with_cycle_counts;
 use super::executor::search;
 use super::fit::{Fit, measured};
 use super::further_starts::with_further_starts;
 use super::history::IterationRecord;
 use super::input_errors::{has_input_errors, with_input_errors};
+use super::observer::Observer;
 use super::reml::{estimates_weights, refined, start_weights};
 use super::reml_by_traces::with_reml_weights;
 use super::rounds::{counted, is_ended, with_round};
@@ -63,7 +62,7 @@ pub fn fit_with_noise(
     fit_with_noise_watched(problem, start, settings, &mut Observer::new(observe))
 }
 
-/// [`fit_with_noise`] with an observer, which may hold checkpoints.
+/// [`fit_with_noise`] with an observer.
 ///
 /// # Errors
 /// As [`fit_with_noise`].
@@ -90,20 +89,6 @@ pub fn fit_with_noise_watched(
             true => with_weights(&mut problem, found, settings, watch)?,
             false => with_sigmas(&mut problem, found, settings, watch)?,
         };
-    }
-    if is_likelihood(settings) {
-        found = with_cycle_counts(&mut problem, found, &mut |problem, start| {
-            let chooses = estimates_weights(problem);
-            if chooses {
-                start_weights(problem, start);
-            }
-            let fit = search(problem, start, settings, None, watch).ok()?;
-            let fit = match chooses {
-                true => with_weights(problem, fit, settings, watch),
-                false => with_sigmas(problem, fit, settings, watch),
-            };
-            fit.ok()
-        });
     }
     if has_input_errors(&problem) {
         found = with_input_errors(&mut problem, found, settings, watch)?;

@@ -10,13 +10,14 @@ use super::reason::{ConditionFailure, Reason};
 use super::termination::{Outcome, Status};
 use super::timings::Timings;
 use crate::constraints::TOLERANCE;
-use crate::host;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::qp::{Solution, Subproblem};
 use serde::{Deserialize, Serialize};
 
 /// Share of the zero-response misfit below which a fit is exact: its residuals are then ten digits below the measurements.
 const NEGLIGIBLE: f64 = 1e-20;
+/// Most memory of the linearised problem, bytes: the first-order condition of larger fits is not measured.
+const MOST_MEMORY: u64 = 8_000_000_000;
 /// Relative rounding error of a computed response, in units of machine precision: some thousand steps.
 const MOTION_ROUNDING: f64 = 1000.0;
 /// Memory of a linearised problem with many parameters: 3564 bytes per node were measured for nodal functions.
@@ -106,7 +107,7 @@ impl Optimality {
                 tolerance,
             });
         }
-        if !host::has_memory(linearisation_memory(problem)) {
+        if linearisation_memory(problem) > MOST_MEMORY {
             return None;
         }
         let (mut sub, _) = linearise(

@@ -26,7 +26,7 @@ pub struct PathPoint {
 pub struct WeightPath {
     /// Fits, by falling weight.
     pub points: Vec<PathPoint>,
-    /// Index chosen by each rule of [`WeightRule::OF_PATHS`](crate::functions::WeightRule::OF_PATHS); `None` where a rule chooses none.
+    /// Index that each of [`WeightPath::RULES`] would choose; `None` where one chooses none.
     pub picks: [Option<usize>; 3],
     /// Index of the point whose weight is used.
     pub chosen: usize,
@@ -37,6 +37,10 @@ pub struct WeightPath {
 }
 
 impl WeightPath {
+    /// The discrepancy principle, which chooses the weight; the corner of misfit against roughness on logarithmic axes (Hansen); the
+    /// least generalised cross-validation score `n misfit / (n - dof)^2` (Golub, Heath, Wahba).
+    pub const RULES: [&'static str; 3] = ["discrepancy", "l-curve", "gcv"];
+
     /// Chosen weight.
     pub fn chosen_weight(&self) -> f64 {
         self.points[self.chosen].weight

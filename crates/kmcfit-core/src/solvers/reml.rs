@@ -104,30 +104,6 @@ pub(super) fn refined(
     Some(next)
 }
 
-/// Minus twice the logarithm of the largest restricted likelihood of noise and weights, linearised at `theta`, without a constant of
-/// the problem: smaller is better. `None` with more than [`FEW_PARAMETERS`] parameters, where a combination of parameters is
-/// undetermined, or if the likelihood has no maximum.
-pub(super) fn restricted_deviance(
-    problem: &Problem,
-    theta: &[f64],
-    evaluation: &Evaluation,
-) -> Option<f64> {
-    if problem.parameters() > FEW_PARAMETERS {
-        return None;
-    }
-    let (likelihood, map) = likelihood(problem, theta, evaluation);
-    let n = problem.parameters();
-    (map.ncols() == n + 1).then_some(())?;
-    let value = likelihood.fit()?.value;
-    // The likelihood is that of scaled parameters and of residuals over the present sigma.
-    let scale = map.view((0, 0), (n, n)).determinant().abs().ln();
-    let sigmas = problem.channels().map(|channel| match channel.weighting() {
-        Weighting::Estimated { sigma } => 2.0 * channel.len() as f64 * sigma.ln(),
-        _ => 0.0,
-    });
-    Some(value - 2.0 * scale + sigmas.sum::<f64>())
-}
-
 /// Builds the restricted likelihood of noise and weights in the q parameter combinations determined by data, priors and
 /// penalties, scaled so that their Gram matrix (at the current weights) is the identity; with the matrix that scales them
 /// ([`determined`]).

@@ -16,7 +16,6 @@ pub(super) fn with_round(found: Fit, next: Fit, ended: bool) -> Fit {
     let next = next.with_work_of(found.counts, found.timings, found.elapsed);
     Fit {
         attempts: found.attempts,
-        gaps: found.gaps,
         history: match next.history.is_empty() {
             true => found.history,
             false => next.history,

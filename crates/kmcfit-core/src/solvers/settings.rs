@@ -70,14 +70,8 @@ pub enum StartStrategy {
     EquationError,
     /// Minimum of the equation error, fitted to growing parts of the record.
     GrowingHorizon,
-    /// Collocation: states and parameters fitted together, from a response near the measurements.
-    Collocation,
-    /// Constants by a scan of the natural frequency, then three knots, then the functions; the last in the parameters or in their
-    /// logarithms.
-    FrequencyScan {
-        /// True for steps in the logarithms of mass, damping and stiffness.
-        logarithms: bool,
-    },
+    /// Constants by a scan of the natural frequency, then three knots, then the functions.
+    FrequencyScan,
     /// The best fit with outliers of mass and stiffness moved to the median of their function.
     WithoutOutliers,
     /// End of the attempt with the lowest cost.
@@ -92,9 +86,7 @@ impl StartStrategy {
             Self::StartValues => "start values",
             Self::EquationError => "equation error",
             Self::GrowingHorizon => "growing part of the record",
-            Self::Collocation => "collocation",
-            Self::FrequencyScan { logarithms: false } => "frequency scan",
-            Self::FrequencyScan { logarithms: true } => "frequency scan in logarithms",
+            Self::FrequencyScan => "frequency scan",
             Self::WithoutOutliers => "best of these, without outliers",
             Self::Continued => "best of these, continued",
         }

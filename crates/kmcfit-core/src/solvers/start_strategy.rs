@@ -2,18 +2,17 @@
 //!
 //! A response whose period is off by a few per cent fits worse than the zero response, so a descent from a wrong start ends in
 //! a spurious local minimum. Order of the starting points: the first steps of a long record, for constant functions; the
-//! start as given; the equation error; a horizon that grows from an eighth of the record to all of it; collocation from a
-//! response near the measurements.
+//! start as given; the equation error; a horizon that grows from an eighth of the record to all of it.
 
-use super::checkpoint::Observer;
 use super::executor::{Prepared, search, search_prepared};
 use super::fit::{Attempt, Fit, measured};
 use super::history::{IterationRecord, Reference};
+use super::observer::Observer;
 use super::settings::{FitSettings, Initial, Solver, StartStrategy};
 use super::solve_counts::SolveCounts;
 use super::starts::{
-    Referred, collocation_start, equation_error_start, growing_horizon_start, reference,
-    truncated_start, truncated_steps,
+    Referred, equation_error_start, growing_horizon_start, reference, truncated_start,
+    truncated_steps,
 };
 use super::termination::Status;
 use super::timings::{Timings, timed};
@@ -22,7 +21,6 @@ use crate::objective::GradientKind;
 use crate::problem::Problem;
 use crate::record::Channel;
 use crate::simulate::SimulationError;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// Misfit of a channel beyond the stated noise, as a share of its zero-response misfit, below which a fit explains the samples. Spurious minima leave per cents (a mass close to zero) to tens of per cent (a wrong period); a
@@ -47,7 +45,7 @@ pub fn fit(
     Ok(measured(problem, fit, settings))
 }
 
-/// [`fit`] without measuring the first-order condition; `watch` may hold checkpoints, from which it continues.
+/// [`fit`] without measuring the first-order condition.
 pub(super) fn search_from_starts(
     problem: &Problem,
     start: &[f64],
@@ -154,13 +152,13 @@ impl<'a, 'w> Attempts<'a, 'w> {
 
     /// Strategies in the order of the attempts.
     fn strategies(&self) -> Vec<StartStrategy> {
-        use StartStrategy::{Collocation, EquationError, GrowingHorizon, StartValues};
+        use StartStrategy::{EquationError, GrowingHorizon, StartValues};
         let first = match self.settings.initial {
             Initial::Functions => [StartValues, EquationError],
             Initial::Data => [EquationError, StartValues],
         };
         let truncated = self.truncated.iter().map(|(strategy, _)| *strategy);
-        let order = truncated.chain(first).chain([GrowingHorizon, Collocation]);
+        let order = truncated.chain(first).chain([GrowingHorizon]);
         order.collect()
     }
 
@@ -220,7 +218,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
                 None => start.to_vec(),
             },
             StartStrategy::StartValues
-            | StartStrategy::FrequencyScan { .. }
+            | StartStrategy::FrequencyScan
             | StartStrategy::WithoutOutliers
             | StartStrategy::Continued => start.to_vec(),
             StartStrategy::EquationError => {
@@ -233,18 +231,6 @@ impl<'a, 'w> Attempts<'a, 'w> {
                     growing_horizon_start(problem, from, &self.probing, self.watch);
                 self.counts += counts;
                 self.timings += timings;
-                problem.feasible_or(found, start)
-            }
-            StartStrategy::Collocation => {
-                let flag = self.settings.interrupt.as_ref();
-                let interrupted = || flag.is_some_and(|flag| flag.load(Ordering::Relaxed));
-                let timings = &mut self.timings;
-                let found = self.watch.numbers(start.len(), &interrupted, || {
-                    let found = timed(&mut timings.start, || {
-                        collocation_start(problem, start, &interrupted)
-                    });
-                    found.unwrap_or_else(|| equation_error_start(timings))
-                });
                 problem.feasible_or(found, start)
             }
         };

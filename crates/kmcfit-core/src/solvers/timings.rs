@@ -21,21 +21,12 @@ pub struct Timings {
     pub linear_algebra: Duration,
     /// Starting points from the samples.
     pub start: Duration,
-    /// Checkpoints and the final state of the search, without the rows of iterations.
-    #[serde(default)]
-    pub checkpoints: Duration,
 }
 
 impl Timings {
     /// Sum of all.
     pub fn sum(&self) -> Duration {
-        self.forward
-            + self.adjoint
-            + self.tangent
-            + self.qp
-            + self.linear_algebra
-            + self.start
-            + self.checkpoints
+        self.forward + self.adjoint + self.tangent + self.qp + self.linear_algebra + self.start
     }
 }
 
@@ -50,7 +41,6 @@ impl Add for Timings {
             qp: self.qp + other.qp,
             linear_algebra: self.linear_algebra + other.linear_algebra,
             start: self.start + other.start,
-            checkpoints: self.checkpoints + other.checkpoints,
         }
     }
 }

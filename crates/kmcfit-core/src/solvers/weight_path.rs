@@ -1,9 +1,9 @@
 //! Choice of penalty weights: fits along a path of weights.
 
-use super::checkpoint::Observer;
 use super::executor::search;
 use super::fit::{Attempt, Fit, measured};
 use super::linearization::linearisation_tangents;
+use super::observer::Observer;
 use super::path::{PathPoint, WeightPath};
 use super::settings::FitSettings;
 use super::solve_counts::SolveCounts;
@@ -12,7 +12,6 @@ use super::termination::{Outcome, Status};
 use super::timings::Timings;
 use super::traces::{SEED, Traces};
 use super::weight_rules::{discrepancy, gcv, l_curve, remark};
-use crate::functions::WeightRule;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
 use std::time::Duration;
@@ -35,12 +34,12 @@ impl Problem {
     }
 }
 
-/// [`choose_weight`] at the noise of the problem.
-pub(super) fn choose_weight_at_noise(
+/// Fits along the path, and again at the weight of the discrepancy principle.
+pub(super) fn choose_by_discrepancy(
     problem: &Problem,
     start: &[f64],
     settings: &FitSettings,
-    (rule, which): (WeightRule, &[usize]),
+    which: &[usize],
     watch: &mut Observer,
 ) -> Result<(WeightPath, Problem, Fit), SimulationError> {
     let mut walk = WeightPathSearch {
@@ -62,11 +61,8 @@ pub(super) fn choose_weight_at_noise(
         l_curve(&points),
         gcv(&points),
     ];
-    let index = WeightRule::OF_PATHS
-        .iter()
-        .position(|r| *r == rule)
-        .and_then(|i| picks[i]);
-    let remark = remark(problem, rule, index, &points);
+    let [index, ..] = picks;
+    let remark = remark(problem, index, &points);
     // Without a choice, the weakest smoothing is closest to the rule.
     let chosen = index.unwrap_or(points.len() - 1);
     let weighted = problem.with_penalty_factor(which, points[chosen].weight);
@@ -142,11 +138,8 @@ impl WeightPathSearch<'_, '_> {
         let n = problem.sample_count() as f64;
         self.counts.tangent += linearisation_tangents(&problem);
         let timings = &mut self.timings;
-        let compute = || {
-            let traces = Traces::at(&problem, &found, timings);
-            vec![traces.of_samples(timings).unwrap_or(f64::NAN)]
-        };
-        let degrees_of_freedom = self.watch.numbers(1, &|| false, compute)[0];
+        let traces = Traces::at(&problem, &found, timings);
+        let degrees_of_freedom = traces.of_samples(timings).unwrap_or(f64::NAN);
         Ok(PathPoint {
             weight,
             iterations: iterations(&found),

@@ -1,7 +1,6 @@
 //! Selection rules on a path of fits with falling penalty weights: discrepancy principle, L-curve, generalised cross-validation.
 
 use super::path::PathPoint;
-use crate::functions::WeightRule;
 use crate::problem::Problem;
 
 /// The largest weight with chi-square at most `n + 2 sqrt(2 n)`.
@@ -36,20 +35,19 @@ pub(super) fn gcv(points: &[PathPoint]) -> Option<usize> {
         .map(|(i, _)| i)
 }
 
-/// Note on the choice of a rule.
+/// Note on the choice of the discrepancy principle.
 pub(super) fn remark(
     problem: &Problem,
-    rule: WeightRule,
     index: Option<usize>,
     points: &[PathPoint],
 ) -> Option<String> {
-    match (rule, index) {
-        (WeightRule::Discrepancy, Some(0)) => Some(
+    match index {
+        Some(0) => Some(
                 "the largest weight tried fits within the noise and was used: the data are compatible with the smoothest \
                  functions"
                 .into(),
         ),
-        (WeightRule::Discrepancy, None) => {
+        None => {
             let least = points
                 .iter()
                 .map(|p| p.misfit)
@@ -60,10 +58,6 @@ pub(super) fn remark(
                 problem.largest_chi_square().unwrap_or(f64::NAN)
             ))
         }
-        (rule, None) => Some(format!(
-            "the rule `{}` chooses no weight on this path; the smallest is used",
-            rule.name()
-        )),
         _ => None,
     }
 }

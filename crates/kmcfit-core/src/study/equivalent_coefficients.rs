@@ -229,33 +229,3 @@ impl NodeLine {
         (lower <= upper).then_some([lower, upper])
     }
 }
-
-/// Zero crossings of the displacement: time (s) and the damping (N s/m) that the mass `mass` requires there, by linear
-/// interpolation between nodes; second-order accurate in the step.
-pub fn anchors(mass: &[f64], response: &TargetResponse) -> Vec<(f64, f64)> {
-    let y = &response.displacement;
-    let at = |i: usize, share: f64, f: &dyn Fn(usize) -> f64| f(i) + share * (f(i + 1) - f(i));
-    let crossing = |i: usize| {
-        (y[i] * y[i + 1] <= 0.0 && y[i] != y[i + 1] && y[i + 1] != 0.0).then(|| {
-            let share = y[i] / (y[i] - y[i + 1]);
-            let force = at(i, share, &|i| {
-                response.force[i] - mass[i] * response.acceleration[i]
-            });
-            let velocity = at(i, share, &|i| response.velocity[i]);
-            let time = response.grid.time(i) + share * response.grid.step();
-            (time, force / velocity)
-        })
-    };
-    (0..y.len() - 1).filter_map(crossing).collect()
-}
-
-/// Residual of the equation of motion along the response, `m a + c v + k y - f`, N at the nodes.
-pub fn imbalance(nodal: &NodalCoefficients, response: &TargetResponse) -> Vec<f64> {
-    let at = |i: usize| {
-        nodal.mass[i] * response.acceleration[i]
-            + nodal.coefficients[0][i] * response.velocity[i]
-            + nodal.coefficients[1][i] * response.displacement[i]
-            - response.force[i]
-    };
-    (0..response.grid.nodes()).map(at).collect()
-}

@@ -5,15 +5,11 @@
 //! * [`extremes`]: its smallest and largest values over all parameters compatible with the data;
 //! * [`equivalent_coefficients`]: other coefficients with the same response; [`equivalent_systems`] computes and confirms
 //!   those of a fit;
-//! * [`multistart`]: fits from many starting points, their clusters, and paths between minima;
-//! * [`constancy_test`]: likelihood-ratio test of a constant against a time-varying function;
-//! * [`bootstrap`]: intervals from fits to simulated samples;
+//! * [`multistart`]: fits from many starting points, and their clusters;
 //! * [`prediction`]: response to another excitation or initial state, with its uncertainty.
 //!
 //! Random numbers are seeded, and results do not depend on the number of threads.
 
-pub mod bootstrap;
-pub mod constancy_test;
 pub mod equivalent_coefficients;
 mod equivalent_systems;
 pub mod extremes;
@@ -24,12 +20,9 @@ pub mod multistart;
 pub mod prediction;
 pub mod profile_likelihood;
 mod refit;
-mod simulate;
-mod verification;
 
 pub use equivalent_systems::{Choice, EquivalentSystem, equivalent_systems};
 pub use forced_prediction::{IdentifiedSystem, PredictedChannel};
 pub use free_response::{PredictedResponse, PredictionSummary, predict};
 pub use functional::{Linear, Target};
-pub use profile_likelihood::{Profile, ProfileSettings, profile, profiles};
-pub use verification::ReferenceValues;
+pub use profile_likelihood::{Profile, ProfileSettings, profile};

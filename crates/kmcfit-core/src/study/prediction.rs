@@ -27,8 +27,6 @@ pub struct PredictionCase {
     pub initial: State,
     /// Excitation on the grid of the problem; `None` for a free response.
     pub excitation: Option<Excitation>,
-    /// Index of the coefficient set.
-    pub coefficient_set: usize,
 }
 
 impl PredictionCase {
@@ -38,7 +36,6 @@ impl PredictionCase {
             name: name.into(),
             initial,
             excitation: None,
-            coefficient_set: 0,
         }
     }
 }
@@ -145,7 +142,6 @@ fn with_run(problem: &Problem, run: &PredictionCase) -> Problem {
     let channel = Channel::displacement_at_nodes(zeros, 1, Weighting::Sigma(1.0), &grid);
     let mut experiment = Experiment::free(run.name.clone(), run.initial, nodes);
     experiment.excitation.clone_from(&run.excitation);
-    experiment.coefficient_set = run.coefficient_set;
     seen.parts_mut().experiments = vec![experiment.with_channel(channel)];
     seen
 }

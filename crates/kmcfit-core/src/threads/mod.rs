@@ -9,7 +9,6 @@ mod parallel;
 
 pub use parallel::{interruptible, map, map_with_progress};
 
-use crate::host;
 use std::cell::Cell;
 use std::io;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -72,12 +71,11 @@ pub fn share() {
 /// Starts a scoped thread.
 ///
 /// # Errors
-/// If the operating system or the host refuses.
+/// If the operating system refuses.
 pub fn spawn_scoped<'scope, T: Send + 'scope>(
     scope: &'scope Scope<'scope, '_>,
     work: impl FnOnce() -> T + Send + 'scope,
 ) -> io::Result<ScopedJoinHandle<'scope, T>> {
-    host::may_start_thread()?;
     Builder::new().spawn_scoped(scope, work)
 }
 

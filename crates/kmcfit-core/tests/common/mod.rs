@@ -74,8 +74,6 @@ pub fn provide_clock() {
     static START: LazyLock<Instant> = LazyLock::new(Instant::now);
     host::set_host(Host {
         clock: || START.elapsed(),
-        has_memory: |_| true,
-        may_start_thread: || Ok(()),
         progress: |_, _| {},
         is_interrupted: || false,
     });

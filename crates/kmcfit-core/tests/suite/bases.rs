@@ -1,18 +1,13 @@
 //! Every basis against independent evaluations of its functions.
 
 use kmcfit_core::internals::constraints::Rows;
+use kmcfit_core::internals::functions::Basis;
 use kmcfit_core::internals::functions::basis::{
     from_physical_powers, physical_powers, uniform_knots,
 };
-use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, Gram, Parameterization,
-};
 use kmcfit_core::internals::system::Grid;
 use kmcfit_core::internals::system::quadrature::trapezoid_weights;
-use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
-
-use crate::common::properties::properties;
 
 /// A record that does not begin at zero, with knots that are not multiples of the step.
 fn grid(nodes: usize) -> Grid {
@@ -297,48 +292,6 @@ fn roughness_of_a_parabola_in_closed_form() {
 }
 
 #[test]
-fn a_smooth_function_is_equally_rough_in_every_basis() {
-    // p = 2 + sin t
-    let exact = |q: usize| {
-        let integral = |f: fn(f64) -> f64| f(2.5) - f(-1.5);
-        match q {
-            0 => integral(|t| 4.5 * t - 4.0 * t.cos() - 0.25 * (2.0 * t).sin()),
-            1 => integral(|t| 0.5 * t + 0.25 * (2.0 * t).sin()),
-            _ => integral(|t| 0.5 * t - 0.25 * (2.0 * t).sin()),
-        }
-    };
-    for nodes in [301, 1201] {
-        let grid = grid(nodes);
-        let nodal: Vec<f64> = grid.times().iter().map(|t| 2.0 + t.sin()).collect();
-        let knots = |count| uniform_knots(&grid, count);
-        for (basis, tolerances) in [
-            (Basis::Nodal, [1e-5, 1e-4, 2e-2]),
-            (
-                Basis::PiecewiseLinear { knots: knots(81) },
-                [1e-4, 1e-3, 4e-2],
-            ),
-            // Cell values differ from the function by the size of a step, which affects slopes, and dominates curvatures unless the
-            // cells are wide.
-            (
-                Basis::PiecewiseConstant { knots: knots(51) },
-                [4e-3, 4e-2, 8e-2],
-            ),
-            (Basis::Polynomial { degree: 14 }, [1e-10, 1e-9, 1e-7]),
-            (Basis::BSpline { knots: knots(21) }, [1e-6, 1e-5, 1e-3]),
-            (Basis::BSpline { knots: knots(81) }, [1e-8, 1e-7, 1e-4]),
-        ] {
-            let theta = basis.project(&grid, &nodal).unwrap();
-            for (q, tolerance) in tolerances.into_iter().enumerate() {
-                let found = squared(&basis.roughness(&grid, q), &theta);
-                let error = (found / exact(q) - 1.0).abs();
-                let name = basis.name();
-                assert!(error < tolerance, "{name}, {nodes}, {q}: {error:e}");
-            }
-        }
-    }
-}
-
-#[test]
 fn second_differences_keep_their_digits_on_fine_grids() {
     let grid = Grid::new(0.0, 25.0, 40_000).unwrap();
     let line: Vec<f64> = grid.times().iter().map(|t| 1.0 - 0.02 * t).collect();
@@ -391,68 +344,6 @@ fn splines_agree_with_the_textbook_recursion() {
     }
 }
 
-/// `B^T W B`, dense.
-fn gram(basis: &Basis, grid: &Grid) -> DMatrix<f64> {
-    let weights = DVector::from(trapezoid_weights(grid.nodes(), grid.step()));
-    let design = basis.rows(grid, &grid.times(), 0).dense();
-    design.transpose() * DMatrix::from_diagonal(&weights) * design
-}
-
-fn condition(matrix: &DMatrix<f64>) -> f64 {
-    let values = matrix.clone().symmetric_eigenvalues();
-    values.max() / values.min()
-}
-
-#[test]
-fn legendre_polynomials_are_well_conditioned() {
-    let grid = grid(2000);
-    // Orthogonal with squares T / (2 n + 1), so 2 degree + 1 up to the trapezoid rule.
-    for degree in [1, 20, 30] {
-        let condition = condition(&gram(&Basis::Polynomial { degree }, &grid));
-        let exact = 2.0 * degree as f64 + 1.0;
-        assert!(
-            (condition / exact - 1.0).abs() < 0.05,
-            "{degree}: {condition}"
-        );
-    }
-}
-
-#[test]
-fn gram_matrices_multiply_and_solve() {
-    let grid = grid(41);
-    for (basis, _, _) in table() {
-        let weights = trapezoid_weights(41, grid.step());
-        let found = Gram::new(&basis.design(&grid), &weights).unwrap();
-        let theta = some_parameters(basis.parameters(&grid));
-        let mut product = theta.clone();
-        found.multiply(&theta, &mut product);
-        let dense = gram(&basis, &grid) * DVector::from(theta.clone());
-        assert_close(&product, dense.as_slice(), 1e-13, basis.name());
-        let mut back = theta.clone();
-        found.solve(&product, &mut back);
-        assert_close(&back, &theta, 1e-11, basis.name());
-    }
-}
-
-#[test]
-fn dependent_functions_are_refused() {
-    let grid = grid(9);
-    let weights = trapezoid_weights(9, grid.step());
-    let refused = |basis: Basis| {
-        assert!(Gram::new(&basis.design(&grid), &weights).is_none());
-        assert!(basis.project(&grid, &[1.0; 9]).is_none());
-    };
-    let knots = |count| uniform_knots(&grid, count);
-    refused(Basis::PiecewiseConstant { knots: knots(11) });
-    refused(Basis::PiecewiseLinear { knots: knots(10) });
-    refused(Basis::BSpline { knots: knots(8) });
-    refused(Basis::Polynomial { degree: 9 });
-    // Enough nodes, but only four of them lie in the support of five functions.
-    refused(Basis::PiecewiseLinear {
-        knots: vec![-1.5, -1.4, -1.3, -1.2, -1.1, 2.5],
-    });
-}
-
 #[test]
 fn physical_powers_there_and_back() {
     let grid = grid(41);
@@ -479,29 +370,6 @@ fn physical_powers_there_and_back() {
 }
 
 #[test]
-fn members_of_the_space_are_projected_onto_themselves() {
-    for nodes in [41, 2000] {
-        let grid = grid(nodes);
-        for (basis, _, _) in table() {
-            let theta = some_parameters(basis.parameters(&grid));
-            let nodal = basis.design(&grid).multiply(&theta, nodes);
-            let found = basis.project(&grid, &nodal).unwrap();
-            assert_close(&found, &theta, 1e-12, basis.name());
-        }
-    }
-    let grid = grid(2000);
-    let basis = Basis::Polynomial { degree: 30 };
-    let theta = some_parameters(31);
-    let nodal = basis.design(&grid).multiply(&theta, 2000);
-    assert_close(
-        &basis.project(&grid, &nodal).unwrap(),
-        &theta,
-        1e-12,
-        "degree 30",
-    );
-}
-
-#[test]
 fn the_projection_is_orthogonal() {
     let grid = grid(200);
     let nodal: Vec<f64> = grid.times().iter().map(|t| (3.0 * t).sin().exp()).collect();
@@ -519,73 +387,6 @@ fn the_projection_is_orthogonal() {
     }
 }
 
-#[test]
-fn coefficient_functions_of_every_basis() {
-    let grid = grid(41);
-    let list: Vec<CoefficientFunction> = table()
-        .into_iter()
-        .map(|(basis, _, _)| {
-            let start = basis.constant(&grid, 2.0);
-            CoefficientFunction::free(CoefficientKind::Mass, basis, &grid, start)
-        })
-        .collect();
-    let functions = Parameterization::new(list, 41, grid.step()).unwrap();
-    let nodal = functions.nodal(&functions.start());
-    for values in nodal.functions() {
-        assert_close(values, &[2.0; 41], 1e-15, "start");
-    }
-    let nodal = CoefficientFunction::nodal(CoefficientKind::Mass, vec![1.0; 41]);
-    assert_eq!(nodal.basis, Some(Basis::Nodal));
-    let constant = CoefficientFunction::constant(CoefficientKind::Mass, 1.0, 41);
-    assert_eq!(constant.basis, Some(Basis::Constant));
-    let fixed = CoefficientFunction::fixed(CoefficientKind::Mass, vec![1.0; 41]);
-    assert_eq!(fixed.basis, None);
-}
-
-/// Knots over `[-1.5, 2.5]` with cells whose widths differ by a factor of at most 50.
-fn random_knots() -> impl Strategy<Value = Vec<f64>> {
-    proptest::collection::vec(0.02..1.0_f64, 1..12).prop_map(|widths| {
-        let total: f64 = widths.iter().sum();
-        let mut knots = vec![-1.5];
-        let mut sum = 0.0;
-        for width in &widths[..widths.len() - 1] {
-            sum += width;
-            knots.push(-1.5 + 4.0 * sum / total);
-        }
-        knots.push(2.5);
-        knots
-    })
-}
-
 proptest! {
     #![proptest_config(properties(200, 1))]
-
-    #[test]
-    fn bases_on_random_knots_reproduce_their_polynomials(knots in random_knots(), times in proptest::collection::vec(-1.5..2.5_f64, 1..40)) {
-        let grid = grid(2001);
-        for basis in [
-            Basis::PiecewiseConstant { knots: knots.clone() },
-            Basis::PiecewiseLinear { knots: knots.clone() },
-            Basis::BSpline { knots: knots.clone() },
-        ] {
-            let values = basis.rows(&grid, &times, 0);
-            prop_assert!((0..values.len()).all(|i| values.row(i).all(|(_, v)| v > 0.0)));
-            for sum in apply(&values, &basis.constant(&grid, 1.0)) {
-                prop_assert!((sum - 1.0).abs() < 1e-14);
-            }
-            let theta = some_parameters(basis.parameters(&grid));
-            let nodal = basis.design(&grid).multiply(&theta, grid.nodes());
-            let found = basis.project(&grid, &nodal).unwrap();
-            for (f, t) in found.iter().zip(&theta) {
-                prop_assert!((f - t).abs() < 1e-10, "{basis:?}: {f} for {t}");
-            }
-        }
-        let spline = Basis::BSpline { knots: knots.clone() };
-        let theta = some_parameters(spline.parameters(&grid));
-        for q in 0..=2 {
-            let found = squared(&spline.roughness(&grid, q), &theta);
-            let expected = integral(&spline, &grid, &theta, q);
-            prop_assert!((found / expected - 1.0).abs() < 1e-7, "{q}: {found} {expected}");
-        }
-    }
 }

@@ -1,8 +1,6 @@
 //! Constraints: every kind on every basis against a dense evaluation of the functions.
 
-use kmcfit_core::internals::constraints::{
-    Constraint, ConstraintError, Constraints, RowGroup, Shape, TimeHistory,
-};
+use kmcfit_core::internals::constraints::{Constraint, Constraints, RowGroup, Shape, TimeHistory};
 use kmcfit_core::internals::functions::basis::uniform_knots;
 use kmcfit_core::internals::functions::{
     Basis, CoefficientFunction, CoefficientKind, Parameterization,
@@ -14,7 +12,6 @@ use kmcfit_core::internals::solvers::StartProjection;
 use kmcfit_core::internals::system::{Grid, Method, State, System, Term};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::f64::consts::TAU;
 
 const MASS: CoefficientKind = CoefficientKind::Mass;
 const DAMPING: CoefficientKind = CoefficientKind::Damping;
@@ -201,36 +198,6 @@ fn rows_agree_with_the_functions() {
 }
 
 #[test]
-fn one_row_for_every_value_that_can_differ() {
-    let rows = |basis: &Basis, statement: &Constraint| {
-        let functions = functions([basis, &Basis::Constant, &Basis::Constant]);
-        let groups = built(statement, &functions).groups;
-        groups.iter().map(|g| g.rows.len()).collect::<Vec<_>>()
-    };
-    let positive = Constraint::Bounds {
-        of: MASS,
-        min: Some(TimeHistory::Constant(0.0)),
-        max: None,
-    };
-    let falls = shape(MASS, Shape::NonIncreasing);
-    let convex = shape(MASS, Shape::Convex);
-    let counts: Vec<_> = (bases().iter())
-        .map(|b| [rows(b, &positive), rows(b, &falls), rows(b, &convex)].concat())
-        .collect();
-    let expected: Vec<Vec<usize>> = vec![
-        vec![NODES, NODES - 1, NODES - 2],
-        vec![1],
-        vec![4, 3, 2],
-        vec![5, 4, 3],
-        vec![11, 10, 9],
-        vec![2, 1],
-        vec![NODES, NODES, NODES],
-        vec![NODES, NODES, 5],
-    ];
-    assert_eq!(counts, expected);
-}
-
-#[test]
 fn projected_functions_satisfy_the_constraint_between_nodes() {
     let limit = |t: f64| 0.2 + 0.3 * (t - 1.0) / 10.0 * ((t - 1.0) * 2.0).sin();
     let moving = Constraint::Bounds {
@@ -284,63 +251,6 @@ fn projected_functions_satisfy_the_constraint_between_nodes() {
         ) {
             let bent = theta(&shape(MASS, Shape::Concave));
             assert!(falls(&functions, &bent, 0, 1), "{basis:?}");
-        }
-    }
-}
-
-#[test]
-fn two_functions_at_once() {
-    for (i, mass) in bases().iter().enumerate() {
-        for (j, other) in bases().iter().enumerate() {
-            let functions = functions([mass, other, other]);
-            let seed = (10 * i + j) as u64;
-            let times = match is_piecewise(mass) && is_piecewise(other) {
-                true => fine(),
-                false => grid().times(),
-            };
-            let slack = 1e-6;
-            let band = Constraint::Frequency {
-                min: Some(0.1),
-                max: Some(0.5),
-            };
-            let theta = inside(&built(&band, &functions), &functions, seed);
-            let m = dense(&functions, &theta, 0, 0, &times);
-            let k = dense(&functions, &theta, 2, 0, &times);
-            for (m, k) in m.iter().zip(&k) {
-                assert!(*k >= (TAU * 0.1).powi(2) * m - slack, "{mass:?} {other:?}");
-                assert!(*k <= (TAU * 0.5).powi(2) * m + slack, "{mass:?} {other:?}");
-            }
-
-            let theta = inside(&built(&Constraint::Passive, &functions), &functions, seed);
-            let m = dense(&functions, &theta, 0, 1, &times);
-            let c = dense(&functions, &theta, 1, 0, &times);
-            for (c, slope) in c.iter().zip(&m) {
-                assert!(c - 0.5 * slope >= -slack, "{mass:?} {other:?} {c} {slope}");
-            }
-            assert!(falls(&functions, &theta, 2, 0), "{other:?}");
-        }
-    }
-}
-
-#[test]
-fn equal_functions() {
-    for a in bases() {
-        for b in bases() {
-            let functions = functions([&Basis::Constant, &a, &b]);
-            let statement = Constraint::Equal {
-                first: DAMPING,
-                second: STIFFNESS,
-                ratio: 2.0,
-            };
-            let constraints = built(&statement, &functions);
-            assert!(constraints.groups[0].rows.len() <= functions.parameters());
-            let theta = inside(&constraints, &functions, 3);
-            let times = grid().times();
-            let c = dense(&functions, &theta, 1, 0, &times);
-            let k = dense(&functions, &theta, 2, 0, &times);
-            for (c, k) in c.iter().zip(&k) {
-                assert!((c - 2.0 * k).abs() < 1e-6, "{a:?} {b:?} {c} {k}");
-            }
         }
     }
 }
@@ -421,61 +331,6 @@ fn the_cone_is_the_bound_on_the_damping_ratio() {
     let cap = built(&Constraint::DampingRatio { max: zeta }, &collect(list));
     assert!(cap.hold(&[1.0, 0.8], 1e-12));
     assert!(!cap.hold(&[1.0, 0.81], 1e-12));
-}
-
-#[test]
-fn fixed_functions_move_to_the_bounds() {
-    let known = |q: CoefficientKind, f: &dyn Fn(f64) -> f64| {
-        CoefficientFunction::fixed(q, grid().times().into_iter().map(f).collect())
-    };
-    let with = |k: CoefficientFunction| {
-        let knots = uniform_knots(&grid(), 3);
-        let mass = free(MASS, &Basis::PiecewiseLinear { knots }, 1.0);
-        collect(vec![mass, free(DAMPING, &Basis::Constant, 1.0), k])
-    };
-    let flat = with(known(STIFFNESS, &|_| 2.0));
-    let band = Constraint::Frequency {
-        min: None,
-        max: Some(0.5),
-    };
-    let groups = built(&band, &flat).groups;
-    // A bound on each knot of the mass alone.
-    assert_eq!(groups[0].rows.len(), 3);
-    for i in 0..3 {
-        assert!(groups[0].single(i).is_some());
-        assert_eq!(groups[0].bounds(i), [f64::NEG_INFINITY, -2.0]);
-    }
-    // Only the rows on estimated functions remain of passivity.
-    let names = |f: &Parameterization| {
-        let groups = built(&Constraint::Passive, f).groups;
-        groups.into_iter().map(|g| g.name).collect::<Vec<_>>()
-    };
-    assert_eq!(names(&flat), ["passive: c >= m'/2"]);
-    let rising = with(known(STIFFNESS, &|t| 1.0 + t));
-    let broken = Constraint::Passive.build(&grid(), &rising);
-    assert!(
-        matches!(broken, Err(ConstraintError::Broken { name, .. }) if name == "passive: k' <= 0")
-    );
-    assert_eq!(
-        bounds(STIFFNESS, 0.0, 1.0).build(&grid(), &flat),
-        Err(ConstraintError::Fixed(vec![STIFFNESS]))
-    );
-    // A line cannot be a parabola.
-    let bent = with(known(STIFFNESS, &|t| 1.0 + t * t));
-    let equal = Constraint::Equal {
-        first: MASS,
-        second: STIFFNESS,
-        ratio: 1.0,
-    };
-    assert!(matches!(
-        equal.build(&grid(), &bent),
-        Err(ConstraintError::Broken { .. })
-    ));
-    let theta = inside(&built(&equal, &rising), &rising, 2);
-    let mass = dense(&rising, &theta, 0, 0, &fine());
-    for (m, t) in mass.iter().zip(fine()) {
-        assert!((m - 1.0 - t).abs() < 1e-6, "{m} {t}");
-    }
 }
 
 #[test]

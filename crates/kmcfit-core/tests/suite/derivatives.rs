@@ -209,9 +209,20 @@ fn taylor_remainders_of_the_discrete_gradient_fall_with_the_square_of_the_step()
     let theta = problem.functions.start();
     let direction: Vec<f64> = (0..theta.len()).map(|i| (0.01 * i as f64).sin()).collect();
     let steps: Vec<f64> = (0..8).map(|i| 1e-2 * 0.5f64.powi(i)).collect();
-    let remainders = problem
-        .taylor_remainders(&theta, &direction, GradientKind::Discrete, &steps)
-        .unwrap();
+    let here = problem.evaluate(&theta).unwrap();
+    let gradient = problem.gradient(&theta, &here, GradientKind::Discrete);
+    let products = gradient
+        .euclidean
+        .iter()
+        .zip(&direction)
+        .map(|(g, d)| g * d);
+    let slope: f64 = products.sum();
+    let remainder = |step: &f64| {
+        let moved = theta.iter().zip(&direction).map(|(p, d)| p + step * d);
+        let there = problem.evaluate(&moved.collect::<Vec<f64>>()).unwrap();
+        (problem.cost_difference(&here, &there) - step * slope).abs()
+    };
+    let remainders: Vec<f64> = steps.iter().map(remainder).collect();
     let rates: Vec<f64> = remainders
         .windows(2)
         .map(|w| (w[0] / w[1]).log2())

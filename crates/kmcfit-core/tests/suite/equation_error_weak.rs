@@ -7,10 +7,8 @@ use kmcfit_core::internals::assessment::EquationErrorIntervals;
 use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Loss, Weighting};
-use kmcfit_core::internals::signal::{SecondOrder, band_pass, low_pass};
-use kmcfit_core::internals::solvers::{
-    EquationForm, EquationPart, Fit, FitSettings, Solver, Status, equation_balance, fit,
-};
+use kmcfit_core::internals::signal::SecondOrder;
+use kmcfit_core::internals::solvers::{Fit, FitSettings, Solver, Status, fit};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
@@ -314,77 +312,4 @@ fn robust_losses_limit_the_influence_of_outliers() {
         assert!(robust[0] < 0.02 && robust[2] < 0.02, "{robust:?}");
         assert!(robust.iter().all(|e| *e < 0.1), "{robust:?}");
     }
-}
-
-/// Without outliers the robust estimates are those of least squares within a standard error or so.
-#[test]
-fn robust_losses_agree_without_outliers() {
-    let cart = plain();
-    let samples = cart.samples();
-    let found = [Loss::Squares, Loss::Huber { threshold: 1.345 }].map(|loss| {
-        let problem = cart.problem(cart.record(&samples).loss(loss));
-        let found = fitted(&problem);
-        let intervals = EquationErrorIntervals::of(&problem, &found).expect("intervals");
-        let covariance = intervals.bands.covariance.clone().expect("a covariance");
-        (found.best.parameters, covariance)
-    });
-    for j in 0..4 {
-        let error = found[0].1[(j, j)].sqrt();
-        let off = (found[1].0[j] - found[0].0[j]).abs();
-        assert!(off < 2.0 * error, "{j}: {off} {error}");
-        let ratio = found[1].1[(j, j)].sqrt() / error;
-        assert!((0.7..1.6).contains(&ratio), "{j}: {ratio}");
-    }
-}
-
-/// A filter of the channel is applied to all terms of the equation, the friction included: a low pass at 6 Hz, and a band from 0.4 Hz
-/// to 6 Hz.
-#[test]
-fn filtered_channels_give_the_estimates_of_plain_ones() {
-    let cart = plain();
-    let samples = cart.samples();
-    let spacing = samples.times[1];
-    let filters: [Vec<SecondOrder>; 2] = [
-        low_pass(4, 6.0, 1.0 / spacing).expect("a filter"),
-        band_pass(4, 0.4, 6.0, 1.0 / spacing).expect("a filter"),
-    ];
-    for filter in filters {
-        let found = fitted(&cart.problem(cart.filtered_record(&samples, &filter)));
-        let errors = errors(cart, &found);
-        assert!(errors[0] < 0.01 && errors[2] < 0.02, "{errors:?}");
-        assert!(errors.iter().all(|e| *e < 0.06), "{errors:?}");
-    }
-}
-
-/// The residual is stated beside each force; with friction left out it exceeds a tenth of the damping.
-#[test]
-fn the_residual_is_stated_beside_each_force() {
-    let cart = plain();
-    let samples = cart.samples();
-    let full = cart.problem(cart.record(&samples));
-    let parts = [100.0, 100.0, 1000.0].map(CoefficientSpec::constant);
-    let lacking = Builder::new(parts).record(cart.record(&samples));
-    let lacking = lacking
-        .solver(Solver::EquationError)
-        .build()
-        .expect("a problem");
-    let shares = [full, lacking].map(|problem| {
-        let found = fitted(&problem);
-        let balance = equation_balance(&problem, &found.best.parameters).expect("a balance");
-        assert_eq!(balance.form, EquationForm::Weak);
-        assert_eq!(balance.bump_lengths.len(), 1);
-        let share = |part| {
-            let found = balance.parts.iter().find(|share| share.part == part);
-            found.expect("the part").residual_share
-        };
-        [
-            EquationPart::Inertia,
-            EquationPart::Damping,
-            EquationPart::Force,
-        ]
-        .map(share)
-    });
-    println!("{shares:?}");
-    assert!(shares[0].iter().all(|share| *share < 0.05), "{shares:?}");
-    assert!(shares[1][1] > 0.1, "{shares:?}");
 }

@@ -1,16 +1,16 @@
 //! Gaps of a record: an oscillator of 1 Hz with a stiffness that varies, sampled at 20 Hz with 2 % noise, without samples in 30 % of
 //! the record; data by an independent integrator. Seeds are 0, 1, 2, ...
 
-use crate::common::counts::{least_held, seeds, widened};
+use crate::common::counts::{seeds, widened};
 use crate::common::forced::{response, white};
-use kmcfit_core::internals::assessment::{FitAssessment, FitWarning, GapAssessment, GapStatus};
+use kmcfit_core::internals::assessment::{FitAssessment, FitWarning, GapAssessment};
 use kmcfit_core::internals::builder::{
     BasisSpec, Builder, ChannelSpec, CoefficientSpec, Knots, Record, Start,
 };
 use kmcfit_core::internals::identifiability::Classification;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{ChannelKind, Weighting};
-use kmcfit_core::internals::solvers::{Fit, FitSettings, cycles, fit, fit_with_noise};
+use kmcfit_core::internals::solvers::{FitSettings, fit_with_noise};
 use kmcfit_core::internals::system::Method;
 use std::f64::consts::TAU;
 
@@ -103,10 +103,9 @@ impl Case {
         let truth = self.cycles(gap.span);
         let bands = assessment.bands.as_ref().unwrap();
         let band = &bands.functions[2];
-        let share = |is_inside: bool| {
+        let share_outside = || {
             let times = bands.times.iter().enumerate();
-            let chosen =
-                times.filter(|(_, time)| (gap.span[0]..=gap.span[1]).contains(*time) == is_inside);
+            let chosen = times.filter(|(_, time)| !(gap.span[0]..=gap.span[1]).contains(*time));
             let held: Vec<f64> = chosen
                 .map(|(i, time)| {
                     let miss = (band.values[i] - self.stiffness(*time)).abs();
@@ -117,29 +116,23 @@ impl Case {
         };
         Outcome {
             is_right: (gap.cycles - truth).abs() < 0.5,
-            holds_cycles: gap
-                .ci95
-                .is_some_and(|[low, high]| low <= truth && truth <= high),
-            status: gap.functions[0].status,
+            is_open: !gap.functions[0].is_identified,
             excludes_gap: match &assessment.classifications[2].verdict {
                 Classification::PartlyIdentified(spans) => spans
                     .iter()
                     .all(|[from, to]| *to <= gap.span[0] || *from >= gap.span[1]),
                 _ => false,
             },
-            outside: share(false),
-            inside: share(true),
+            outside: share_outside(),
         }
     }
 }
 
 struct Outcome {
     is_right: bool,
-    holds_cycles: bool,
-    status: GapStatus,
+    is_open: bool,
     excludes_gap: bool,
     outside: f64,
-    inside: f64,
 }
 
 fn spline(knots: Knots) -> CoefficientSpec {
@@ -151,12 +144,9 @@ fn spline(knots: Knots) -> CoefficientSpec {
 struct Counts {
     records: u64,
     right: usize,
-    holds_cycles: usize,
     open: usize,
     excludes_gap: usize,
     outside: f64,
-    /// Within the gap, of the fits that call the stiffness identified there.
-    inside: f64,
 }
 
 impl Counts {
@@ -165,26 +155,19 @@ impl Counts {
         let all: Vec<Outcome> = (0..records).map(|seed| case.outcome(seed)).collect();
         let count = |of: fn(&Outcome) -> bool| all.iter().filter(|o| of(o)).count();
         let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
-        let identified = all.iter().filter(|o| o.status == GapStatus::Identified);
         Self {
             records,
             right: count(|o| o.is_right),
-            holds_cycles: count(|o| o.holds_cycles),
-            open: count(|o| o.status != GapStatus::Identified),
+            open: count(|o| o.is_open),
             excludes_gap: count(|o| o.excludes_gap),
             outside: mean(all.iter().map(|o| o.outside).collect()),
-            inside: mean(identified.map(|o| o.inside).collect()),
         }
     }
 
-    /// The right number of cycles in all records but one, its interval in as many as a coverage of 95 % implies, and coverage of the band
+    /// The right number of cycles in all records but one, and coverage of the band
     /// outside the gap of 91 to 99.5 % on average of 40 records.
     fn hold(&self, name: &str) {
         assert!(self.right + 1 >= self.records as usize, "{name}: {self:?}");
-        assert!(
-            self.holds_cycles >= least_held(self.records),
-            "{name}: {self:?}"
-        );
         let range = 0.95 - widened(0.04, 40, self.records)..=0.995;
         assert!(range.contains(&self.outside), "{name}: {self:?}");
         assert_eq!(self.open, self.excludes_gap, "{name}");
@@ -198,55 +181,16 @@ fn case(duration: f64, knots: Knots) -> Case {
     }
 }
 
-/// The basis carries the stiffness across the gap: it is identified only outside.
+/// The stiffness is identified only outside of the gap, however smooth it is.
 #[test]
-fn a_spline_without_penalty_is_identified_outside_the_gap() {
+fn a_stiffness_that_varies_is_identified_outside_the_gap() {
     for (name, duration, knots) in [
         ("two periods of seven, 8 knots", 7.0, Knots::Count(8)),
         ("six periods of twenty, 10 knots", 20.0, Knots::Count(10)),
-        ("six periods of twenty, 13 knots", 20.0, Knots::Count(13)),
+        ("six periods of twenty, automatic knots", 20.0, Knots::Auto),
     ] {
         let counts = Counts::of(&case(duration, knots));
         counts.hold(name);
         assert_eq!(counts.open, counts.records as usize, "{name}: {counts:?}");
     }
-}
-
-/// A smooth stiffness can be identified across a gap of two periods; where it is called so, the band holds it there too.
-#[test]
-fn a_penalised_spline_may_be_identified_within_a_short_gap() {
-    let short = Counts::of(&case(7.0, Knots::Auto));
-    short.hold("two periods of seven, automatic knots");
-    assert!(short.inside.is_nan() || short.inside > 0.9, "{short:?}");
-    let long = Counts::of(&case(20.0, Knots::Auto));
-    long.hold("six periods of twenty, automatic knots");
-    assert!(long.inside.is_nan() || long.inside > 0.9, "{long:?}");
-}
-
-/// From a start with one cycle more in the gap, least squares converges to that number of cycles, and the comparison of the numbers
-/// returns to the right one.
-#[test]
-fn a_wrong_number_of_cycles_is_left() {
-    let mut case = case(20.0, Knots::Count(13));
-    let [from, to] = case.gap();
-    let nodes = case.nodes();
-    let values = (0..nodes).map(|i| {
-        let time = case.duration * i as f64 / (nodes - 1) as f64;
-        let share = ((time - from) / (to - from)).clamp(0.0, 1.0);
-        case.stiffness(time) * (1.0 + 0.75 * (0.5 * TAU * share).sin().powi(2))
-    });
-    let start = Start::Nodal(values.collect());
-    case.stiffness = CoefficientSpec::estimated(BasisSpec::BSpline(Knots::Count(13)), start);
-    let problem = case.problem(0);
-    let settings = FitSettings::default();
-    let direct = fit(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
-    let (_, found) = fit_with_noise(&problem, &problem.start(), &settings, &mut |_| {}).unwrap();
-    let truth = case.cycles(case.gap());
-    let count = |fit: &Fit| cycles(&problem, &fit.best.evaluation.nodal, case.gap());
-    assert!(
-        (count(&direct) - truth - 1.0).abs() < 0.2,
-        "{}",
-        count(&direct)
-    );
-    assert!((count(&found) - truth).abs() < 0.2, "{}", count(&found));
 }

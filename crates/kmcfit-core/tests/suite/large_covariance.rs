@@ -1,17 +1,15 @@
 //! Covariance of fits with more than 64 parameters, by the banded factor, beside dense decompositions.
 
 use crate::common::forced::{broadband, response, white};
-use kmcfit_core::internals::assessment::{LargeCovariance, MOST_WITH_COVARIANCE};
+use kmcfit_core::internals::assessment::LargeCovariance;
 use kmcfit_core::internals::builder::{
     Builder, CoefficientSpec, PenaltySpec, PenaltyWeight, Record,
 };
 use kmcfit_core::internals::constraints::Constraint;
 use kmcfit_core::internals::functions::{CoefficientKind, WeightRule};
-use kmcfit_core::internals::identifiability::{BandSettings, Bands, CovarianceKind};
+use kmcfit_core::internals::identifiability::{Bands, CovarianceKind};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{Fit, FitSettings, fit_with_noise};
-use kmcfit_core::internals::system::Method;
-use nalgebra::DVector;
 
 const SIGMA: f64 = 2e-3;
 
@@ -42,11 +40,7 @@ fn both(problem: &Problem) -> (LargeCovariance, Vec<[f64; 2]>) {
     let (problem, fit) = fitted(problem);
     let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);
     let large = LargeCovariance::of(&problem, theta, evaluation).expect("a covariance");
-    let settings = BandSettings {
-        draws: 0,
-        ..BandSettings::default()
-    };
-    let bands = Bands::at(&problem, theta, evaluation, &settings);
+    let bands = Bands::at(&problem, theta, evaluation);
     assert_eq!(bands.undetermined, 0);
     assert_eq!(bands.covariance_kind, large.kind);
     let (ours, dense) = (large.means(), bands.means());
@@ -116,45 +110,7 @@ fn standard_errors_are_those_of_dense_decompositions() {
         let (large, pairs) = both(&builder.build().unwrap());
         assert_eq!(large.kind, kind);
         assert!(largest(&pairs) < TOLERANCE, "{kind:?}: {pairs:?}");
-        let covariance = large.covariance.expect("up to 1000 parameters");
-        for (a, b) in covariance.diagonal().iter().zip(&large.variances) {
-            assert!((a - b).abs() <= 1e-12 * b);
-        }
-    }
-}
-
-/// Variances of more parameters than have a full covariance, by recursion and differences of the penalties, beside the normal
-/// equations `H^-1 (J^T W J + d d^T) H^-1` of dense matrices.
-#[test]
-fn variances_of_many_parameters_are_those_of_the_normal_equations() {
-    let weight = 2.0;
-    let builder = nodal(0.02, 1200, 4, PenaltyWeight::Given(weight)).method(Method::Rk4);
-    let (problem, fit) = fitted(&builder.build().unwrap());
-    let (theta, evaluation) = (&fit.best.parameters, &fit.best.evaluation);
-    let large = LargeCovariance::of(&problem, theta, evaluation).unwrap();
-    let n = problem.parameters();
-    assert!(n > MOST_WITH_COVARIANCE && large.covariance.is_none());
-    let jacobian = problem.predictions_jacobian(evaluation) / SIGMA;
-    let information = jacobian.tr_mul(&jacobian);
-    let mut hessian = information.clone();
-    let penalty = &problem.penalties[0];
-    for i in 0..penalty.rows.len() {
-        let row: Vec<(usize, f64)> = penalty.rows.row(i).collect();
-        for (j, a) in &row {
-            for (k, b) in &row {
-                hessian[(2 + j, 2 + k)] += weight * a * b;
-            }
-        }
-    }
-    let inverse = hessian.cholesky().unwrap();
-    for j in [0, 1, 2, 302, 602, 1201] {
-        let mut unit = DVector::zeros(n);
-        unit[j] = 1.0;
-        let a = inverse.solve(&unit);
-        let dense = a.dot(&(&information * &a)).sqrt();
-        // The normal equations lose half of the digits; the steps of a fiftieth of a period shift no estimate by 0.01 standard errors.
-        let ours = large.variances[j].sqrt();
-        assert!((ours / dense - 1.0).abs() < 1e-3, "{j}: {ours} {dense}");
+        assert!(large.covariance.is_some());
     }
 }
 

@@ -125,59 +125,6 @@ fn responses_of_a_linear_system_superpose() {
     });
 }
 
-#[test]
-fn a_common_factor_is_not_identifiable() {
-    for_cases(|case| {
-        let system = system(501, Method::Midpoint);
-        let nodal = case.nodal(&system.grid);
-        let mut scaled = nodal.clone();
-        scaled
-            .functions_mut()
-            .for_each(|f| f.iter_mut().for_each(|p| *p *= 1.7));
-        let [a, b] = [&nodal, &scaled].map(|d| system.forward(d, case.state(), None).unwrap());
-        let scale = size(&a.displacement);
-        assert!(
-            distance(&a.displacement, &b.displacement) <= ROUNDING * scale,
-            "{case:?}"
-        );
-    });
-}
-
-/// Backwards in time the damping changes its sign; the stepper is not symmetric, so this holds to
-/// its order.
-#[test]
-fn time_can_be_turned_round_to_the_order_of_the_stepper() {
-    for (method, order) in [(Method::Midpoint, 2), (Method::Rk4, 4)] {
-        for_cases(|case| {
-            let error = |nodes: usize| -> f64 {
-                let system = system(nodes, method);
-                // Constant functions: sampled ones are lines between nodes, of order 2 whatever the stepper.
-                let constant = |f: usize| vec![case.functions[f][0]; nodes];
-                let nodal = |sign: f64| NodalCoefficients {
-                    mass: constant(0),
-                    coefficients: vec![constant(1).iter().map(|c| sign * c).collect(), constant(2)],
-                };
-                let there = system.forward(&nodal(1.0), case.state(), None).unwrap();
-                let last = nodes - 1;
-                let turned = State {
-                    displacement: there.displacement[last],
-                    velocity: -there.velocity[last],
-                };
-                let back = system.forward(&nodal(-1.0), turned, None).unwrap();
-                let Trajectory {
-                    displacement,
-                    velocity,
-                } = back;
-                (displacement[last] - case.start[0]).abs() + (velocity[last] + case.start[1]).abs()
-            };
-            let (coarse, fine) = (error(401), error(801));
-            // The error of a method of odd symmetry may fall faster, never slower.
-            let bound = coarse / 2f64.powi(order) * 1.15 + 1e-12;
-            assert!(fine <= bound, "{case:?}: {coarse:e} -> {fine:e}");
-        });
-    }
-}
-
 /// `E' = -(c - m'/2) v^2 + k' y^2/2 + f v`, to the second order of functions sampled at nodes.
 #[test]
 fn energy_is_balanced_to_the_order_of_the_stepper() {

@@ -4,8 +4,6 @@ use crate::common;
 
 use kmcfit_core::internals::objective::GradientKind;
 use kmcfit_core::internals::solvers::{FitSettings, Initial, Solver, Status, Stopping, fit};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 
 fn settings(stopping: Stopping) -> FitSettings {
     FitSettings {
@@ -23,37 +21,6 @@ fn until(cost_ratio: f64, iterations: u64) -> FitSettings {
         cost_ratio: Some(cost_ratio),
         ..Stopping::exactly(iterations)
     })
-}
-
-#[test]
-fn twenty_starts_near_the_paper_s_all_reach_its_accuracy_in_200_iterations() {
-    let mut random = ChaCha8Rng::seed_from_u64(1);
-    let problem = common::paper_problem(2000, [2.0, 1.0, 1.0]);
-    for seed in 0..20 {
-        // Half of the starts move each function as a whole, half move every value by itself.
-        let together = seed % 2 == 0;
-        let start: Vec<f64> = problem
-            .functions
-            .ranges()
-            .iter()
-            .zip([2.0, 1.0, 1.0])
-            .flat_map(|(range, value)| {
-                let mut factor = || 1.0 + random.random_range(-1e-3..1e-3);
-                let shared = factor();
-                range
-                    .clone()
-                    .map(|_| value * if together { shared } else { factor() })
-                    .collect::<Vec<f64>>()
-            })
-            .collect();
-        let run = fit(&problem, &start, &until(1e-4, 200), &mut |_| {}).unwrap();
-        assert_eq!(
-            run.outcome.status,
-            Status::Converged,
-            "start {seed}: {:?}",
-            run.outcome
-        );
-    }
 }
 
 #[test]

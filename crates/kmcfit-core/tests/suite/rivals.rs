@@ -133,7 +133,7 @@ fn a_dependence_on_time_is_identified() {
     assert!(time + rival <= 1, "{time} {rival} {constant}");
 }
 
-/// The table of docs/long/rivals.md.
+/// The table of `.ci/long rivals`.
 #[test]
 #[ignore = "minutes; .ci/long rivals"]
 fn many_records() {

@@ -149,7 +149,7 @@ fn counts_of_200_further_seeds() {
             "| {channel:?} | {:.0} % | 200 | {count} | {largest:.3} |",
             100.0 * noise
         );
-        // 10 of 800 in the last long run (docs/long/search.md).
+        // 10 of 800 in the last long run.
         assert!(count <= 10, "{channel:?}, {noise}: {missed:?}");
     }
 }

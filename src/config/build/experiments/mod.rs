@@ -24,8 +24,6 @@ use crate::tables::resample;
 use crate::units::Unit;
 pub(super) use channel::RawChannel;
 pub(super) use data_facts::RecordNotes;
-#[cfg(test)]
-pub(crate) use data_facts::{DataAction, DataFact, GapPlace};
 pub use delays::DelayLimits;
 use excitation::RawExcitation;
 use kmcfit_core::internals::builder::{self, ChannelSpec, ScalarSpec, listed};

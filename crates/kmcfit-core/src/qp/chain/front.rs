@@ -84,16 +84,6 @@ impl Front {
         }
     }
 
-    /// Places of the variables of the present block: first those that are eliminated in it.
-    pub fn columns(&self) -> &[u32] {
-        &self.columns
-    }
-
-    /// Number of variables that are eliminated in the present block.
-    pub fn own(&self) -> usize {
-        self.own
-    }
-
     /// Registers a variable of the following rows.
     pub fn meet(&mut self, place: u32) {
         if self.met[place as usize] != self.block {

@@ -47,11 +47,6 @@ impl TriangularRows {
         self.right.extend_from_slice(&row[columns.len()..]);
     }
 
-    /// Number of rows.
-    pub fn len(&self) -> usize {
-        self.places.len()
-    }
-
     /// True for the row of an equality.
     pub fn is_exact(&self, i: usize) -> bool {
         self.exact[i]

@@ -25,10 +25,10 @@
 
 mod levels;
 
-use super::checkpoint::Observer;
 use super::executor::search;
 use super::fit::{Attempt, Fit};
 use super::noise_estimation::{fit_with_noise_watched, with_sigmas};
+use super::observer::Observer;
 use super::path::{PathPoint, WeightPath};
 use super::rounds::is_ended;
 use super::settings::{FitSettings, Initial};

@@ -46,19 +46,6 @@ impl Linearization {
         Self::Halves(reduce(problem, evaluation, timings))
     }
 
-    /// Jacobian computed at the parameters `at`, for an evaluated point nearby; `None` where it is inconsistent with the point.
-    pub fn reused(
-        problem: &Problem,
-        at: Vec<f64>,
-        evaluation: &Evaluation,
-        gradient: &Gradient,
-    ) -> Option<Self> {
-        let there = problem.evaluate(&at).ok()?;
-        let reduced = reduce(problem, &there, &mut Timings::default());
-        let reduced = reduced.nearby(evaluation.misfit, &gradient.euclidean)?;
-        Some(Self::Reused { at, reduced })
-    }
-
     /// This linearisation for a point near `from`, its own; `None` where it is inconsistent with the point.
     pub fn nearby(
         &self,
@@ -170,18 +157,6 @@ pub(super) fn linearise(
         add_the_rest(problem, parameters, evaluation, &mut sub);
     });
     (sub, samples)
-}
-
-/// Subproblem in parameters and states about arbitrary states.
-pub(super) fn linearise_about(
-    problem: &Problem,
-    parameters: &[f64],
-    evaluation: &Evaluation,
-) -> Subproblem {
-    let steps = structured::steps(problem, evaluation);
-    let mut sub = structured::subproblem(problem, evaluation, &steps);
-    add_the_rest(problem, parameters, evaluation, &mut sub);
-    sub
 }
 
 /// Adds the terms of the cost besides the samples, and the constraints.

@@ -16,7 +16,6 @@ use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::simd::sum::{dot, largest};
 use crate::simd::{self, Elementwise};
-use crate::solvers::checkpoint::{ExactF64s, MethodState};
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::iterate::Iterate;
 use crate::solvers::reason::Reason;
@@ -201,74 +200,6 @@ impl StepRule for Lbfgs {
             }
         }
         Step::Stuck(Reason::NoLowerLineStep)
-    }
-
-    fn state(&self, _: &Iterate) -> MethodState {
-        let here = self.here.as_ref();
-        let pair = |p: &Pair| {
-            let [s, z] = [&p.s, &p.z].map(|v| ExactF64s(v.primal.clone()));
-            [
-                s,
-                z,
-                ExactF64s(p.z.dual.clone()),
-                ExactF64s(vec![p.curvature]),
-            ]
-        };
-        MethodState::Lbfgs {
-            x: ExactF64s(here.map_or(Vec::new(), |here| here.x.clone())),
-            logarithmic: here.map_or(Vec::new(), |here| here.logarithmic.clone()),
-            pairs: self.pairs.iter().map(pair).collect(),
-        }
-    }
-
-    fn restore(&mut self, memory: MethodState, problem: &Problem, point: &mut Iterate) -> bool {
-        let MethodState::Lbfgs {
-            x,
-            logarithmic,
-            pairs,
-        } = memory
-        else {
-            return false;
-        };
-        let len = point.parameters.len();
-        let pair = |[s, z, dual, curvature]: [ExactF64s; 4]| {
-            let whole = [&s, &z, &dual].iter().all(|v| v.0.len() == len);
-            let [curvature] = *curvature.0.as_slice() else {
-                return None;
-            };
-            whole.then(|| Pair {
-                s: Vector {
-                    dual: problem.functions.gram_multiply(&s.0),
-                    primal: s.0,
-                },
-                z: Vector {
-                    primal: z.0,
-                    dual: dual.0,
-                },
-                curvature,
-            })
-        };
-        let pairs: Option<VecDeque<Pair>> = pairs.into_iter().map(pair).collect();
-        let Some(pairs) = pairs.filter(|pairs| pairs.len() <= self.memory) else {
-            return false;
-        };
-        // After a step, the point reached is always present.
-        if [x.0.len(), logarithmic.len()] != [len; 2] {
-            return false;
-        }
-        let at = Coordinates {
-            functions: &problem.functions,
-            units: units(&problem.functions),
-            logarithmic,
-        };
-        self.here = Some(Here {
-            parameters: point.parameters.clone(),
-            x: x.0,
-            gradient: at.gradient(point),
-            logarithmic: at.logarithmic,
-        });
-        self.pairs = pairs;
-        true
     }
 }
 

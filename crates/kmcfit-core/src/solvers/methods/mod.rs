@@ -7,10 +7,6 @@ mod line_search;
 mod projected_gradient;
 mod steepest_descent;
 
-#[cfg(test)]
-pub(super) use gauss_newton::GaussNewton;
-
-use super::checkpoint::MethodState;
 use super::evaluator::CountedEvaluator;
 use super::iterate::Iterate;
 use super::reason::Reason;
@@ -54,18 +50,6 @@ pub(crate) trait StepRule {
     fn recycle(&mut self, evaluation: Evaluation) {
         let _ = evaluation;
     }
-
-    /// State of the method at `point`.
-    fn state(&self, point: &Iterate) -> MethodState {
-        let _ = point;
-        MethodState::Nothing
-    }
-
-    /// Restores a state at `point`; `false` if it belongs to another method or problem, after which the method must not be used.
-    fn restore(&mut self, memory: MethodState, problem: &Problem, point: &mut Iterate) -> bool {
-        let _ = (problem, point);
-        memory == MethodState::Nothing
-    }
 }
 
 /// Step rule of a solver.
@@ -90,67 +74,5 @@ pub(super) fn no_step(problem: &Problem, point: &Iterate, status: ConicStatus) -
     match status == ConicStatus::Infeasible && !inside {
         true => Step::Infeasible(reason),
         false => Step::Stuck(reason),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::builder::{Builder, CoefficientSpec, Record};
-    use crate::objective::GradientKind;
-    use crate::solvers::checkpoint::ExactF64s;
-
-    /// Every method rejects a state with vectors of the wrong length, as in a damaged checkpoint.
-    #[test]
-    fn states_of_wrong_length_are_rejected() {
-        let times: Vec<f64> = (0..21).map(|i| 0.1 * f64::from(i)).collect();
-        let response: Vec<f64> = times.iter().map(|t| t.cos()).collect();
-        let system = [
-            CoefficientSpec::constant(2.0),
-            CoefficientSpec::constant(0.1),
-            CoefficientSpec::fixed(1.0),
-        ];
-        let record = Record::new("r")
-            .from_state(1.0, 0.0)
-            .displacement(&times, &response);
-        let problem = Builder::new(system)
-            .record(record)
-            .build()
-            .expect("a problem");
-        let start = problem.start();
-        let evaluation = problem.evaluate(&start).expect("a response");
-        let gradient = problem.gradient(&start, &evaluation, GradientKind::Discrete);
-        let mut point = Iterate::new(start, evaluation, gradient);
-        for length in [0, 1, 3, 9] {
-            let vector = || ExactF64s(vec![1.0; length]);
-            let states = [
-                (
-                    Solver::ProjectedGradient,
-                    MethodState::ProjectedGradient {
-                        metric: vector(),
-                        lengths: ExactF64s(vec![1.0; 2]),
-                    },
-                ),
-                (
-                    Solver::Lbfgs { memory: 5 },
-                    MethodState::Lbfgs {
-                        x: vector(),
-                        logarithmic: vec![false; length],
-                        pairs: Vec::new(),
-                    },
-                ),
-                (
-                    Solver::GaussNewton,
-                    MethodState::GaussNewton {
-                        numbers: ExactF64s(vec![1.0]),
-                        made_at: Some(vector()),
-                    },
-                ),
-            ];
-            for (solver, state) in states {
-                let is_restored = step_rule(solver).restore(state, &problem, &mut point);
-                assert!(!is_restored, "{solver:?}, {length}");
-            }
-        }
     }
 }

@@ -6,9 +6,7 @@
 
 use super::{Step, StepRule, difference, no_step};
 use crate::constraints::TOLERANCE;
-use crate::problem::Problem;
 use crate::qp::{ConicStatus, StageLayout, project_within};
-use crate::solvers::checkpoint::{ExactF64s, MethodState};
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::iterate::Iterate;
 use crate::solvers::reason::Reason;
@@ -68,31 +66,6 @@ impl StepRule for ProjectedGradient {
             share *= 0.5;
         }
         Step::Stuck(Reason::NoLowerStepToProjection)
-    }
-
-    fn state(&self, _: &Iterate) -> MethodState {
-        MethodState::ProjectedGradient {
-            metric: ExactF64s(self.metric.clone()),
-            lengths: ExactF64s(vec![self.first_length, self.length]),
-        }
-    }
-
-    fn restore(&mut self, memory: MethodState, _: &Problem, point: &mut Iterate) -> bool {
-        let MethodState::ProjectedGradient { metric, lengths } = memory else {
-            return false;
-        };
-        let [first_length, length] = *lengths.0.as_slice() else {
-            return false;
-        };
-        if metric.0.len() != point.parameters.len() {
-            return false;
-        }
-        *self = Self {
-            metric: metric.0,
-            first_length,
-            length,
-        };
-        true
     }
 }
 

@@ -1,17 +1,14 @@
-//! Starting points by a scan of the natural frequency.
+//! Starting point by a scan of the natural frequency.
 //!
 //! A response of a wrong period fits worse than no response, so that a search from a distant start ends in a local minimum. With
 //! constant coefficients the frequency `sqrt(k/m)` is one number: steps from [`FREQUENCIES`] values of it, the best one
 //! continued, give the level of each function; three knots give their course, and the functions of the problem their details.
 //!
-//! The steps are taken in the logarithms of mass, damping and stiffness, which stay positive without a bound. From three knots
-//! on they are taken in the parameters themselves as well: either may end in a higher minimum.
+//! The steps are taken in the logarithms of mass, damping and stiffness, which stay positive without a bound.
 
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization};
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::solvers::executor::search_unobserved;
 use crate::solvers::linearization::{Linearization, linearise};
-use crate::solvers::settings::FitSettings;
 use crate::solvers::timings::Timings;
 use crate::system::Term;
 use nalgebra::{DMatrix, DVector};
@@ -36,33 +33,20 @@ const DAMPING: [f64; 3] = [1e-3, 10.0, 1e8];
 /// Relative decrease of the cost below which steps end.
 const CONVERGED: f64 = 1e-7;
 
-/// Starting points for `problem` by a scan with the other values of `start`, by steps in the parameters and in logarithms; `None`
-/// where no frequency can be set.
-pub(in crate::solvers) fn scan_starts(
-    problem: &Problem,
-    start: &[f64],
-    settings: &FitSettings,
-) -> Option<[Vec<f64>; 2]> {
-    let constants = with_knots(problem, 1)?;
-    let best = scanned(problem, &constants, start)?;
-    let mut in_logarithms = best.clone();
-    let mut in_parameters = best;
-    let mut stage = constants;
+/// Starting point for `problem` by a scan with the other values of `start`; `None` where no frequency can be set.
+pub(in crate::solvers) fn scan_start(problem: &Problem, start: &[f64]) -> Option<Vec<f64>> {
+    let mut stage = with_knots(problem, 1)?;
+    let mut theta = scanned(problem, &stage, start)?;
     if let Some(coarse) = with_knots(problem, COARSE_KNOTS) {
-        in_logarithms = transferred(&stage, &in_logarithms, &coarse);
-        in_parameters = transferred(&stage, &in_parameters, &coarse);
-        in_logarithms = Descent::new(&coarse, STEPS).run(in_logarithms).0;
-        if let Ok(fit) = search_unobserved(&coarse, &in_parameters, settings) {
-            in_parameters = fit.best.parameters;
-        }
+        theta = transferred(&stage, &theta, &coarse);
+        theta = Descent::new(&coarse, STEPS).run(theta).0;
         stage = coarse;
     }
-    in_parameters = transferred(&stage, &in_parameters, problem);
-    in_logarithms = transferred(&stage, &in_logarithms, problem);
+    theta = transferred(&stage, &theta, problem);
     if problem.parameters() <= FEW_PARAMETERS {
-        in_logarithms = Descent::new(problem, STEPS).run(in_logarithms).0;
+        theta = Descent::new(problem, STEPS).run(theta).0;
     }
-    Some([in_parameters, in_logarithms])
+    Some(theta)
 }
 
 /// The problem with each function that has more parameters on so many knots, constant with one, and without penalties and

@@ -1,8 +1,8 @@
 //! Starting point fitted to growing parts of the record.
 
 use crate::problem::Problem;
-use crate::solvers::checkpoint::Observer;
 use crate::solvers::executor::search;
+use crate::solvers::observer::Observer;
 use crate::solvers::settings::FitSettings;
 use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::timings::Timings;

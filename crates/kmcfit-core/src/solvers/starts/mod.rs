@@ -1,14 +1,12 @@
 //! Starting points, one module for each strategy.
 
-mod collocation;
 mod equation_error;
 mod frequency_scan;
 mod growing_horizon;
 mod truncated;
 
-pub(super) use collocation::collocation_start;
 pub(super) use equation_error::equation_error_start;
-pub(super) use frequency_scan::scan_starts;
+pub(super) use frequency_scan::scan_start;
 pub(super) use growing_horizon::growing_horizon_start;
 pub(super) use truncated::{truncated_start, truncated_steps};
 

@@ -7,7 +7,7 @@ mod stencil;
 mod uniform;
 
 pub(super) use band_limited::PassBand;
-pub(super) use spline::kinematics as by_spline;
+use spline::kinematics as by_spline;
 use uniform::Grouping;
 pub(super) use uniform::{fine_differences, smooth};
 
@@ -68,9 +68,9 @@ impl Kinematics {
             [] => None,
             [channel] => match channel.stride() {
                 Some(stride) => uniform::kinematics(channel, stride, problem.system.grid.step()),
-                None => by_spline(problem, experiment, scalars).map(|(near, _)| near),
+                None => by_spline(problem, experiment, scalars),
             },
-            _ => by_spline(problem, experiment, scalars).map(|(near, _)| near),
+            _ => by_spline(problem, experiment, scalars),
         }
     }
 }

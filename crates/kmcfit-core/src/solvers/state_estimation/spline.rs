@@ -13,7 +13,6 @@ use crate::record::{Channel, ChannelKind, Experiment, Weighting};
 use crate::signal::median_spacing;
 use crate::signal::{Interpolation, Signal, Spectrum};
 use crate::simd::sum::rms;
-use crate::simulate::Trajectory;
 use crate::system::{State, TimePoint};
 use std::f64::consts::TAU;
 
@@ -46,7 +45,7 @@ pub fn kinematics(
     problem: &Problem,
     experiment: &Experiment,
     scalars: &[f64],
-) -> Option<(Kinematics, Trajectory)> {
+) -> Option<Kinematics> {
     let grid = &problem.system.grid;
     let nodes = experiment.nodes;
     if nodes < 2 * POINTS || experiment.sample_count() < 2 * POINTS {
@@ -85,7 +84,7 @@ pub fn kinematics(
         velocity: v[0],
     });
     let at_chosen = |f: &[f64]| chosen.iter().map(|&i| f[i]).collect();
-    let near = (chosen.len() >= POINTS).then(|| Kinematics {
+    (chosen.len() >= POINTS).then(|| Kinematics {
         y: at_chosen(&y),
         v: at_chosen(&v),
         a: at_chosen(&a),
@@ -94,12 +93,7 @@ pub fn kinematics(
         weight: weight_of(main.channel),
         nodes: chosen.clone(),
         grouping: None,
-    })?;
-    let response = Trajectory {
-        displacement: y.clone(),
-        velocity: v.clone(),
-    };
-    Some((near, response))
+    })
 }
 
 /// Typical weight of a channel's samples.

@@ -59,15 +59,19 @@ impl MisfitLimit {
 }
 
 /// End of the search for an extreme.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ExtremeStatus {
     /// The convex programs predict no further gain.
     Converged,
     /// The quantity has reached the search limit.
+    #[serde(rename = "range_limit")]
     SearchLimit,
     /// No trial could be restored to the misfit limit.
+    #[serde(rename = "stalled")]
     NoFeasibleStep,
     /// The limit of convex programs is reached.
+    #[serde(rename = "iteration_limit")]
     ProgramLimit,
 }
 

@@ -6,17 +6,6 @@ use crate::objective::Evaluation;
 use crate::problem::Problem;
 use crate::solvers::Status;
 
-/// Distance between two minima, dimensionless.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Distance {
-    /// Largest RMS difference over the nodes of any coefficient divided by the mass (`c/m`, `k/m`, …), relative to the quotient
-    /// of their natural scales ([`Problem::natural_scales`]) at the first point.
-    pub ratios: f64,
-    /// RMS displacement difference over all nodes and experiments, divided by the RMS displacement of the first point,
-    /// dimensionless.
-    pub responses: f64,
-}
-
 /// Minima within the tolerance of the one with the lowest cost.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cluster {
@@ -29,7 +18,7 @@ pub struct Cluster {
 impl Waterfall {
     /// Clusters by rising cost. A run joins the first cluster whose best member is within `tolerance` in both ratios and
     /// responses. Runs that have not converged are left out, because they have not reached a minimum.
-    pub fn clusters(&self, problem: &Problem, tolerance: Distance) -> Vec<Cluster> {
+    pub fn clusters(&self, problem: &Problem, tolerance: f64) -> Vec<Cluster> {
         let mut clusters: Vec<Cluster> = Vec::new();
         for &i in &self.order {
             let run = &self.runs[i];
@@ -39,8 +28,7 @@ impl Waterfall {
             let near = |cluster: &&mut Cluster| {
                 let best = self.runs[cluster.members[0]].found.as_ref();
                 best.is_some_and(|best| {
-                    let apart = distance(problem, &best.evaluation, &found.evaluation);
-                    apart.ratios <= tolerance.ratios && apart.responses <= tolerance.responses
+                    distance(problem, &best.evaluation, &found.evaluation) <= tolerance
                 })
             };
             match clusters.iter_mut().find(near) {
@@ -55,8 +43,10 @@ impl Waterfall {
     }
 }
 
-/// Returns the distance from evaluation `a` to evaluation `b`, scaled by `a`. A difference that is NaN counts as infinite.
-pub fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> Distance {
+/// Distance from evaluation `a` to evaluation `b`, dimensionless: the larger of the RMS difference of the displacements, divided by their RMS
+/// in `a`, and of the largest RMS difference over the nodes of any coefficient divided by the mass (`c/m`, `k/m`, …), relative to the quotient
+/// of their natural scales ([`Problem::natural_scales`]) in `a`. A difference that is NaN counts as infinite.
+fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> f64 {
     let natural = problem.natural_scales(a);
     let mut ratios = 0.0f64;
     for (which, assembly) in problem.functions.coefficient_sets().iter().enumerate() {
@@ -76,10 +66,7 @@ pub fn distance(problem: &Problem, a: &Evaluation, b: &Evaluation) -> Distance {
         .trajectories
         .iter()
         .flat_map(|t| t.displacement.iter().copied());
-    Distance {
-        ratios,
-        responses: relative(rms(changes), rms(own)),
-    }
+    ratios.max(relative(rms(changes), rms(own)))
 }
 
 /// Returns `change / size`: zero if `change` is zero, infinite if the quotient is NaN.

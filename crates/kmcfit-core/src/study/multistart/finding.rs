@@ -1,13 +1,8 @@
-//! Findings of a multistart analysis: number of minima, lower minima, connected minima.
+//! Findings of a multistart analysis: number of minima, lower minima.
 
-use super::{Cluster, Ranges, Waterfall, between};
+use super::{Cluster, Ranges, Waterfall};
 use crate::functions::Parameterization;
 use crate::problem::Problem;
-
-/// Number of steps of a path between two minima.
-const PATH: usize = 40;
-/// Largest rise along a path between two connected minima, as a share of the higher end's cost.
-const RISE: f64 = 0.05;
 
 /// A finding of a multistart analysis.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,8 +18,6 @@ pub enum MultistartFinding {
         /// Lowest cost.
         lowest: f64,
     },
-    /// Connection of the two lowest minima by a path of nearly constant cost.
-    Connected(bool),
     /// A minimum below the fit.
     Lower {
         /// Cost of the minimum.
@@ -73,14 +66,6 @@ impl Waterfall {
             different: clusters.len().max(1),
             lowest,
         }];
-        if let [first, second, ..] = clusters {
-            let of = |cluster: &Cluster| self.runs[cluster.members[0]].found.as_ref();
-            if let (Some(a), Some(b)) = (of(first), of(second)) {
-                let paths = between(problem, &a.parameters, &b.parameters, PATH);
-                let rise = RISE * second.cost.max(first.cost);
-                findings.push(MultistartFinding::Connected(paths.one_valley(rise)));
-            }
-        }
         // Differences of costs below this share of the zero-response misfit are rounding errors.
         let rounding = 1e-12 * problem.zero_response_misfit();
         let fit = problem.evaluate(theta).map(|here| here.cost);

@@ -1,4 +1,4 @@
-//! Multistart: fits from many starting points, their clusters, and paths between minima.
+//! Multistart: fits from many starting points, and their clusters.
 //!
 //! Starting points are a Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, *Technometrics* 21 (1979)
 //! 239-245): each range is divided into as many parts as there are starting points, and each part is used once.
@@ -8,19 +8,17 @@
 
 mod cluster;
 mod finding;
-mod path;
 
-pub use cluster::{Cluster, Distance, distance};
+pub use cluster::Cluster;
 pub use finding::MultistartFinding;
-pub use path::{Paths, between};
 
 use super::refit::{nearest, sizes};
-use super::simulate::stream;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::solvers::{FitSettings, Status, fit, fit_from};
+use crate::solvers::{FitSettings, Status, fit_from};
 use crate::threads::map_with_progress;
-use rand::RngExt;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// Ranges of the starting points.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,8 +64,6 @@ pub struct Multistart {
     pub seed: u64,
     /// Largest number of threads; results do not depend on it.
     pub threads: usize,
-    /// Permission for each fit to try further starting points after its own.
-    pub attempts: bool,
     /// Settings of the fits.
     pub settings: FitSettings,
 }
@@ -103,8 +99,6 @@ pub struct Waterfall {
     pub runs: Vec<StartRun>,
     /// Indices of the fits with a result, by rising cost.
     pub order: Vec<usize>,
-    /// Seed of the starting points.
-    pub seed: u64,
 }
 
 /// Starting points of `how`, before projection onto the constraints.
@@ -115,7 +109,8 @@ pub fn starts(problem: &Problem, how: &Multistart) -> Vec<Vec<f64>> {
     let (Ranges::Parameters(ranges) | Ranges::Constants(ranges)) = &how.ranges;
     let mut columns = Vec::with_capacity(ranges.len());
     for (j, [low, high]) in ranges.iter().enumerate() {
-        let mut random = stream(how.seed, j);
+        let mut random = ChaCha8Rng::seed_from_u64(how.seed);
+        random.set_stream(j as u64);
         let mut cells: Vec<usize> = (0..how.starts).collect();
         for i in (1..cells.len()).rev() {
             cells.swap(i, random.random_range(0..=i));
@@ -170,11 +165,7 @@ pub fn multistart(problem: &Problem, how: &Multistart) -> Waterfall {
     };
     // A stable sort keeps equal costs in the order of the starting points.
     order.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
-    Waterfall {
-        runs,
-        order,
-        seed: how.seed,
-    }
+    Waterfall { runs, order }
 }
 
 fn run(problem: &Problem, how: &Multistart, start: &[f64]) -> StartRun {
@@ -190,11 +181,7 @@ fn run(problem: &Problem, how: &Multistart, start: &[f64]) -> StartRun {
             "the start cannot be brought into the constraints".into(),
         );
     };
-    let result = match how.attempts {
-        true => fit(problem, &start, &how.settings, &mut |_| {}),
-        false => fit_from(problem, &start, &how.settings),
-    };
-    match result {
+    match fit_from(problem, &start, &how.settings) {
         Err(breakdown) => failed(&start, breakdown.to_string()),
         Ok(fit) => StartRun {
             start,
@@ -217,10 +204,5 @@ impl Waterfall {
             .iter()
             .filter_map(|i| self.runs[*i].found.as_ref());
         found.map(|f| f.evaluation.cost).collect()
-    }
-
-    /// Number of fits without a result.
-    pub fn failures(&self) -> usize {
-        self.runs.len() - self.order.len()
     }
 }

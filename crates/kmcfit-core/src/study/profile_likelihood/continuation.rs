@@ -1,6 +1,6 @@
 //! Continuation along a likelihood profile, outwards from the optimum on both sides.
 
-use super::{ActivationPoint, End, FAR, Interval, Profile, ProfileSettings};
+use super::{End, FAR, Interval, Profile, ProfileSettings};
 use crate::constraints::RowGroup;
 use crate::problem::Problem;
 use crate::qp::Subproblem;
@@ -25,8 +25,6 @@ const END_FITS: usize = 60;
 const BETTER: f64 = 1e-3;
 /// First step without a covariance, as a share of the quantity's size.
 const FIRST_STEP: f64 = 0.02;
-/// Bisections for the value at which a constraint becomes active: accuracy of a thousandth of a step.
-const MARK_FITS: usize = 10;
 /// Distance kept from a bound found by a convex program, as a share of the quantity's size.
 const SPARE: f64 = 1e-6;
 /// A rise is attributed to a constraint if less than this share of the quantile remains without it.
@@ -71,7 +69,6 @@ pub struct ProfileSearch<'a> {
     base: f64,
     sample_count: f64,
     sigma: bool,
-    marks: Vec<ActivationPoint>,
     points: Vec<ProfilePoint>,
 }
 
@@ -93,7 +90,6 @@ impl<'a> ProfileSearch<'a> {
             base: cost,
             sample_count: problem.sample_count() as f64,
             sigma: problem.channels().all(|c| c.weighting().is_sigma()),
-            marks: Vec::new(),
             points: vec![ProfilePoint {
                 value: of.of(&start.parameters),
                 cost,
@@ -107,9 +103,6 @@ impl<'a> ProfileSearch<'a> {
     pub fn run(mut self) -> Profile {
         let first = self.points[0].clone();
         let sides = [-1.0, 1.0].map(|side| self.side(side, &first));
-        for side in [-1.0, 1.0] {
-            self.mark(side, &first);
-        }
         self.finish(first.value, sides)
     }
 
@@ -283,40 +276,6 @@ impl<'a> ProfileSearch<'a> {
         outside
     }
 
-    /// Locates the values at which constraints become active on one side, by bisection between the last point without the
-    /// constraint and the first one with it.
-    fn mark(&mut self, side: f64, start: &ProfilePoint) {
-        let beyond = |s: &&ProfilePoint| (s.value - start.value) * side >= 0.0;
-        let mut points: Vec<ProfilePoint> = self.points.iter().filter(beyond).cloned().collect();
-        sort(&mut points);
-        if side < 0.0 {
-            points.reverse();
-        }
-        let mut seen = start.active.clone();
-        for pair in points.windows(2) {
-            for constraint in &pair[1].active {
-                if seen.contains(constraint) {
-                    continue;
-                }
-                seen.push(constraint.clone());
-                let (mut without, mut with) = (pair[0].clone(), pair[1].clone());
-                for _ in 0..MARK_FITS {
-                    let middle = 0.5 * (without.value + with.value);
-                    let guess = extrapolated(Some(&without), &with, middle);
-                    match self.fit(self.problem, middle, &guess) {
-                        Ok(next) if next.active.contains(constraint) => with = next,
-                        Ok(next) => without = next,
-                        Err(_) => break,
-                    }
-                }
-                self.marks.push(ActivationPoint {
-                    value: with.value,
-                    constraint: constraint.clone(),
-                });
-            }
-        }
-    }
-
     /// Attribution of the rise at `end` to the constraints `new`, which are not active at the optimum: the fit is repeated
     /// without them.
     fn blame(&self, end: &ProfilePoint, new: Vec<String>) -> End {
@@ -358,7 +317,6 @@ impl<'a> ProfileSearch<'a> {
             interval: [low, high],
             ends: [below, above],
             verdict,
-            marks: self.marks,
             better_optimum: better,
         }
     }

@@ -20,7 +20,6 @@ mod continuation;
 use super::functional::Linear;
 use crate::problem::Problem;
 use crate::simulate::SimulationError;
-use crate::threads::map_with_progress;
 use continuation::ProfileSearch;
 
 /// The 95 % quantile of chi-square with one degree of freedom.
@@ -80,15 +79,6 @@ pub enum End {
     Failed(String),
 }
 
-/// A constraint that becomes active along the profile.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ActivationPoint {
-    /// Value at which it becomes active, outwards from the optimum.
-    pub value: f64,
-    /// Name of the constraint.
-    pub constraint: String,
-}
-
 /// The profile of one quantity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
@@ -112,8 +102,6 @@ pub struct Profile {
     pub ends: [End; 2],
     /// Classification.
     pub verdict: Interval,
-    /// Constraints that become active along the profile.
-    pub marks: Vec<ActivationPoint>,
     /// Parameters of a better minimum, if one was found.
     pub better_optimum: Option<Vec<f64>>,
 }
@@ -170,21 +158,4 @@ pub fn profile(
     how: &ProfileSettings,
 ) -> Result<Profile, SimulationError> {
     ProfileSearch::new(problem, optimum, of, how).map(ProfileSearch::run)
-}
-
-/// Profiles of several quantities, on up to `threads` threads; results do not depend on their number.
-///
-/// # Errors
-/// As [`profile()`].
-pub fn profiles(
-    problem: &Problem,
-    optimum: &[f64],
-    of: &[Linear],
-    how: &ProfileSettings,
-    threads: usize,
-) -> Result<Vec<Profile>, SimulationError> {
-    let each = map_with_progress(of.len(), threads, |i| {
-        profile(problem, optimum, &of[i], how)
-    });
-    each.into_iter().collect()
 }

@@ -1,6 +1,6 @@
 use kmcfit_core::internals::qp::ConicStatus;
 use kmcfit_core::internals::study::equivalent_coefficients::{
-    EquivalentOptions, TargetResponse, anchors, equivalent_coefficients, imbalance,
+    EquivalentOptions, TargetResponse, equivalent_coefficients,
 };
 use kmcfit_core::internals::system::{
     Excitation, Grid, Method, NodalCoefficients, State, System, Term,
@@ -117,17 +117,6 @@ fn random_masses_have_the_response_to_the_order_of_the_stepper() {
         assert!((3.0..5.5).contains(&rate), "{rate}");
         assert!(fine < 1e-2, "{fine}");
         assert!(least >= 0.05 - 1e-7 && most < 50.0, "{least} {most}");
-        // The equation holds at the nodes: forces are of the size of some newtons.
-        let off = imbalance(&nodal, &response)
-            .iter()
-            .fold(0.0f64, |m, r| m.max(r.abs()));
-        assert!(off < 1e-6, "{off}");
-        // At zero crossings of y the damping is that of the anchor, to second order in the step.
-        for (t, c) in anchors(&nodal.mass, &response) {
-            let i = (t / response.grid.step()).round() as usize;
-            let found = nodal.coefficients[0][i];
-            assert!((found - c).abs() < 0.05, "at {t}: {found} {c}");
-        }
         // It is a different parameter set.
         let truth = truth(&response.grid);
         assert!(crate::common::errors(&nodal, &truth)[0] > 0.1);
@@ -160,10 +149,7 @@ fn impossible_responses_are_infeasible() {
         .collect();
     let mut options = EquivalentOptions::near(vec![0.1; 401], 0.05);
     options.least_damping = Some(0.0);
-    let negative = anchors(&mass, &response).iter().any(|(_, c)| *c < -1e-3);
     let found = equivalent_coefficients(&mass, &response, &options);
-    println!("{negative} {:?}", found.as_ref().err());
-    assert!(negative);
     assert_eq!(found, Err(ConicStatus::Infeasible));
 }
 

@@ -84,9 +84,9 @@ fn with_a_robust_loss_the_extremes_are_the_ends_of_the_profile() {
     let problem = regular(3);
     let channel = problem.experiments[0].channels[0].clone();
     let far = |i: usize| if i % 10 == 3 { 1.0 } else { 0.0 };
-    let noise: Vec<f64> = (0..channel.len()).map(far).collect();
-    let observed = channel.observed().to_vec();
-    let channel = channel.with_simulated(&observed, &noise);
+    let samples = channel.observed().iter().enumerate();
+    let samples = samples.map(|(i, y)| y + far(i)).collect();
+    let channel = channel.with_samples(samples);
     let channel = channel.with_loss(Loss::Huber { threshold: 1.345 });
     let problem = problem
         .with(|parts| parts.experiments[0].channels[0] = channel)

@@ -1,7 +1,5 @@
-//! Further analyses of a fit: profiles, extremes, equivalent systems, multistart, bootstrap, predictions.
+//! Further analyses of a fit: profiles, extremes, equivalent systems, multistart, predictions.
 
-mod bootstrap;
-mod constancy_test;
 mod equivalent;
 mod extremes;
 mod forced;

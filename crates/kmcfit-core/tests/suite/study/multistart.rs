@@ -1,9 +1,7 @@
 use super::problems::{REST, Record, bound, constants, nodal, problem, samples, system};
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::Weighting;
-use kmcfit_core::internals::study::multistart::{
-    Distance, Multistart, Ranges, between, multistart,
-};
+use kmcfit_core::internals::study::multistart::{Multistart, Ranges, multistart};
 
 /// One sample per second of an undamped response from rest, `cos(w n)`: the frequencies
 /// `2 pi j +- w` give the same samples. k from 1 to 60, w = 1.5: 2.25, 22.9, 60.6 are exact.
@@ -42,7 +40,6 @@ fn how(threads: usize) -> Multistart {
         starts: 80,
         seed: 4,
         threads,
-        attempts: false,
         settings: crate::common::synthetic::settings(),
     }
 }
@@ -52,13 +49,7 @@ fn the_aliases_of_a_period_are_found_and_counted() {
     let problem = aliased(0.0);
     let expected = minima(&problem);
     let found = multistart(&problem, &how(2));
-    let clusters = found.clusters(
-        &problem,
-        Distance {
-            ratios: 1e-3,
-            responses: 1e-2,
-        },
-    );
+    let clusters = found.clusters(&problem, 1e-2);
     let mut k: Vec<f64> = clusters
         .iter()
         .map(|c| found.runs[c.members[0]].found.as_ref().unwrap().parameters[0])
@@ -83,17 +74,6 @@ fn the_aliases_of_a_period_are_found_and_counted() {
     assert_eq!(exact, 3);
     let costs = found.costs();
     assert!(costs.windows(2).all(|w| w[0] <= w[1]));
-    // The cost between two of them rises to thousands; a minimum is connected with itself.
-    let best = |i: usize| {
-        found.runs[clusters[i].members[0]]
-            .found
-            .as_ref()
-            .unwrap()
-            .parameters
-            .clone()
-    };
-    assert!(!between(&problem, &best(0), &best(1), 100).one_valley(1.0));
-    assert!(between(&problem, &best(0), &best(0), 10).one_valley(1e-9));
 }
 
 #[test]
@@ -123,30 +103,7 @@ fn starts_that_cannot_be_simulated_are_listed_with_their_reason() {
         ..how(2)
     };
     let found = multistart(&problem, &how);
-    assert_eq!(found.failures(), 4);
+    assert_eq!(found.runs.len() - found.order.len(), 4);
     let failed = found.runs.iter().find(|r| r.found.is_none()).unwrap();
     assert!(failed.reason.contains("mass"), "{}", failed.reason);
-}
-
-/// Free response: two systems of which one is twice the other fit equally well, and the scaling path connects them.
-#[test]
-fn a_system_and_its_multiple_are_connected_by_the_scaling_path() {
-    let problem = crate::common::paper_problem(200, [2.0, 1.0, 1.0]);
-    let n = 200;
-    let truth: Vec<f64> = {
-        let d = crate::common::paper_system(n);
-        [&d.mass[..], &d.coefficients[0], &d.coefficients[1]].concat()
-    };
-    // Another common factor, s(t) = 1 + t/25, which the midpoint rule follows to its order.
-    let other: Vec<f64> = (0..3 * n)
-        .map(|j| truth[j] * (1.0 + (j % n) as f64 / n as f64))
-        .collect();
-    let paths = between(&problem, &truth, &other, 20);
-    let scaling = paths.scaling.as_ref().unwrap();
-    let most = scaling.iter().fold(0.0f64, |m, c| m.max(*c));
-    println!(
-        "scaling {most:.2e}, straight {:.2e}",
-        paths.straight.iter().fold(0.0f64, |m, c| m.max(*c))
-    );
-    assert!(paths.one_valley(1e-6), "{paths:?}");
 }

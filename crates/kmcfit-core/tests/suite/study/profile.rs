@@ -11,7 +11,7 @@ use kmcfit_core::internals::record::{Channel, Sensor, Weighting};
 use kmcfit_core::internals::solvers::{fit, fit_from};
 use kmcfit_core::internals::study::extremes::{MisfitLimit, extreme_pairs};
 use kmcfit_core::internals::study::profile_likelihood::{End, Interval, QUANTILE_95};
-use kmcfit_core::internals::study::{Linear, Profile, ProfileSettings, Target, profile, profiles};
+use kmcfit_core::internals::study::{Linear, Profile, ProfileSettings, Target, profile};
 use kmcfit_core::internals::system::{Excitation, Method};
 
 fn optimum(problem: &Problem) -> Vec<f64> {
@@ -173,13 +173,6 @@ fn a_rise_caused_by_another_bound_is_reported() {
     assert_eq!(found.verdict, Interval::OneSided);
     assert_eq!(found.ends[1], End::RiseBy(vec!["stiffness <= 3".into()]));
     assert!(found.sentence().contains("stiffness <= 3"));
-    let mark = found.marks.iter().find(|m| m.value > 1.0).unwrap();
-    assert_eq!(mark.constraint, "stiffness <= 3");
-    // It becomes active where the best stiffness is 3, at m = 3/(k/m), before the rise.
-    let best = optimum(&problem);
-    let expected = 3.0 * best[0] / best[2];
-    println!("{mark:?} {expected}");
-    assert!((mark.value - expected).abs() < 2e-3 && mark.value < found.interval[1].unwrap());
     // k/m is 2 within one per cent or two.
     assert!((found.interval[1].unwrap() - 1.5).abs() < 0.05);
 }
@@ -292,21 +285,14 @@ fn the_mean_of_a_monotone_function_has_the_same_ends_both_ways() {
     assert!(Linear::value(&problem, 2, 10.1).is_none());
     let list = [q, at];
     let how = ProfileSettings::default();
-    let found = profiles(&problem, &best, &list, &how, 2).unwrap();
-    let again = profiles(&problem, &best, &list, &how, 1).unwrap();
-    assert_eq!(found, again, "the threads change no bit");
+    let found = list
+        .each_ref()
+        .map(|of| profile(&problem, &best, of, &how).unwrap());
     let targets = list.map(Target::Linear);
     let level = MisfitLimit::of(misfit + QUANTILE_95);
     let bands = extreme_pairs(&problem, std::slice::from_ref(&best), &targets, &level, 1).unwrap();
     for (profile, band) in found.iter().zip(&bands) {
         let [low, high] = profile.interval.map(Option::unwrap);
-        println!(
-            "{}\n  {low} {high}; {} {} {:?}",
-            profile.sentence(),
-            band.low.value,
-            band.high.value,
-            profile.marks
-        );
         // Clarabel keeps rows about several parameters to 1e-9 of their size; along a level's root
         // that is some 1e-5 of the width.
         let tolerance = 1e-4 * (high - low);

@@ -16,7 +16,6 @@ use crate::solvers::reason::{Reason, UnsupportedRecord};
 use crate::solvers::solve_counts::SolveCounts;
 use crate::solvers::termination::{Outcome, Status};
 use crate::solvers::timings::{Timings, timed};
-use crate::system::Term;
 
 /// Factor between a function and its start beyond which the problem is solved again, and the number of repetitions.
 const FAR: f64 = 1e4;
@@ -105,38 +104,8 @@ pub fn fit(problem: &Problem, start: &[f64], observe: &mut dyn FnMut(&IterationR
         timings,
         elapsed: clock.elapsed(),
         attempts: Vec::new(),
-        gaps: Vec::new(),
         optimality,
     }
-}
-
-/// The fit from `start` whose minimum is `theta`, evaluated without a search and its outcome; `None` for nonlinear terms and robust losses,
-/// whose factors depend on the search, and without a response.
-pub fn at(problem: &Problem, start: &[f64], theta: &[f64]) -> Option<Fit> {
-    let terms = &problem.system.terms;
-    let is_linear = terms.iter().all(|t| t.is_linear() || *t == Term::Offset);
-    let measurements = Measurements::with_scalars(problem, problem.scalars(theta)).ok()?;
-    let cost = Cost::of(problem, &measurements);
-    (is_linear && !cost.equations.are_robust()).then_some(())?;
-    let [first, best] = [start, theta].map(|theta| cost.point(theta.to_vec()));
-    let mut timings = Timings::default();
-    let optimality = cost.minimise_from(theta, &mut timings).ok();
-    let optimality = optimality.filter(|_| problem.parameters() > 0);
-    Some(Fit {
-        initial_cost: first.evaluation.cost,
-        started_from: first.evaluation.cost,
-        initial_norm_squared: first.gradient.norm_squared,
-        optimality: optimality.and_then(|m| cost.optimality(&best, &m, &mut timings)),
-        best,
-        history: Vec::new(),
-        snapshots: Vec::new(),
-        outcome: Outcome::new(Status::Completed, Reason::NoParameters),
-        counts: SolveCounts::default(),
-        timings,
-        elapsed: std::time::Duration::ZERO,
-        attempts: Vec::new(),
-        gaps: Vec::new(),
-    })
 }
 
 fn reason(problem: &Problem, minimum: &ConvexMinimum, has_mass: bool) -> Reason {
@@ -193,7 +162,6 @@ fn failed(problem: &Problem, start: &[f64], reason: UnsupportedRecord) -> Fit {
         timings: Timings::default(),
         elapsed: std::time::Duration::ZERO,
         attempts: Vec::new(),
-        gaps: Vec::new(),
         optimality: None,
     }
 }

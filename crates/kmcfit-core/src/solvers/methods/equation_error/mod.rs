@@ -21,7 +21,6 @@ mod rows;
 
 pub use balance::{EquationBalance, EquationPart, EquationShare, equation_balance};
 pub use equation::EquationForm;
-pub(crate) use fit::at as equation_error_at;
 pub(in crate::solvers) use fit::fit;
 pub(crate) use missing_terms::TESTED_TERMS;
 pub use missing_terms::{MissingTerm, missing_terms};
@@ -70,21 +69,12 @@ pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, Coni
     let kinematics: Vec<Option<Kinematics>> = (problem.experiments.iter())
         .map(|experiment| Kinematics::of(problem, experiment, problem.scalars(start)))
         .collect();
-    from_kinematics(problem, start, &kinematics)
-}
-
-/// [`equation_error`] with given kinematics of each experiment.
-pub(in crate::solvers) fn from_kinematics(
-    problem: &Problem,
-    start: &[f64],
-    kinematics: &[Option<Kinematics>],
-) -> Result<Vec<f64>, ConicStatus> {
-    let start = &with_initial_states(problem, start, kinematics);
+    let start = &with_initial_states(problem, start, &kinematics);
     let mut sub = Subproblem::new(problem.parameters());
     sub.elimination_order = problem.functions.first_nodes();
     sub.layout = StageLayout::of(&problem.functions);
     let mut experiments = Vec::new();
-    for (experiment, states) in problem.experiments.iter().zip(kinematics) {
+    for (experiment, states) in problem.experiments.iter().zip(&kinematics) {
         experiments.push(states.as_ref().map(|states| {
             let measured = Measured::at_nodes(problem, experiment, states);
             let root = root_weight(problem, experiment, states, start);
@@ -292,7 +282,7 @@ fn equalities_fix_scale(constraints: &Constraints, start: &[f64]) -> bool {
 }
 
 /// `start` with estimated initial states set from the kinematics, where these include the first node.
-pub(in crate::solvers) fn with_initial_states(
+fn with_initial_states(
     problem: &Problem,
     start: &[f64],
     kinematics: &[Option<Kinematics>],

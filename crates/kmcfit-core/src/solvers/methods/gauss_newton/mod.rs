@@ -9,9 +9,7 @@ mod proposal;
 
 use super::{Step, StepRule, no_step};
 use crate::objective::Evaluation;
-use crate::problem::Problem;
 use crate::qp::{ConicStatus, Subproblem};
-use crate::solvers::checkpoint::{ExactF64s, MethodState};
 use crate::solvers::evaluator::CountedEvaluator;
 use crate::solvers::iterate::Iterate;
 use crate::solvers::linearization::{Linearization, linearisation_tangents, linearise};
@@ -136,38 +134,6 @@ impl StepRule for GaussNewton {
 
     fn recycle(&mut self, evaluation: Evaluation) {
         self.spare = Some(evaluation);
-    }
-
-    fn state(&self, point: &Iterate) -> MethodState {
-        let numbers = std::iter::once(self.damping).chain(self.first_cost);
-        // Known only with a first cost.
-        let numbers = numbers.chain(self.last_change);
-        let made_at = point.linearization().computed_at();
-        MethodState::GaussNewton {
-            numbers: ExactF64s(numbers.collect()),
-            made_at: made_at.map(|at| ExactF64s(at.to_vec())),
-        }
-    }
-
-    fn restore(&mut self, memory: MethodState, problem: &Problem, point: &mut Iterate) -> bool {
-        let MethodState::GaussNewton { numbers, made_at } = memory else {
-            return false;
-        };
-        let (damping, first_cost, last_change) = match *numbers.0.as_slice() {
-            [damping] => (damping, None, None),
-            [damping, first_cost] => (damping, Some(first_cost), None),
-            [damping, first_cost, last_change] => (damping, Some(first_cost), Some(last_change)),
-            _ => return false,
-        };
-        if let Some(ExactF64s(at)) = made_at {
-            let is_whole = at.len() == problem.parameters();
-            if !is_whole || !point.reuse_linearization(problem, at) {
-                return false;
-            }
-        }
-        self.damping = damping;
-        (self.first_cost, self.last_change) = (first_cost, last_change);
-        true
     }
 }
 
