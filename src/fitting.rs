@@ -1,13 +1,12 @@
-//! Fits of models: with their noise, the weights chosen by a rule, finer grids where the number of nodes is automatic, and smaller
-//! widths of Coulomb friction where the width is.
+//! Fits of models: with their noise, the weights chosen by a rule, finer grids where the number of nodes is automatic.
 
 use crate::config::{AutomaticGrid, Model, WeightSearch};
 use crate::finding::Finding;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::simulate::SimulationError;
 use kmcfit_core::internals::solvers::{
-    Fit, GridNotice, Observer, OnNodes, WeightPath, WidthNotice, choose_weight_watched,
-    fit_on_reduced_widths, fit_on_refined_grids, fit_with_noise_watched, no_response,
+    Fit, GridNotice, Observer, OnNodes, WeightPath, choose_weight_watched, fit_on_refined_grids,
+    fit_with_noise_watched, no_response,
 };
 
 /// A fit, and the model as fitted.
@@ -28,8 +27,7 @@ pub fn fit_model(model: &Model, watch: &mut Observer) -> Result<ModelFit, Simula
     let start = model.problem.functions.start();
     let mut run =
         |problem: &Problem, start: &[f64], watch: &mut Observer| run(model, problem, start, watch);
-    let grid = model.grid.as_ref();
-    if grid.is_none() && !model.reduces_width {
+    let Some(grid) = &model.grid else {
         let (weights, problem, fit) = run(&model.problem, &start, watch)?;
         let model = Model {
             problem,
@@ -40,21 +38,16 @@ pub fn fit_model(model: &Model, watch: &mut Observer) -> Result<ModelFit, Simula
             weights,
             fit,
         });
-    }
-    let nodes = model.problem.system.grid.nodes();
-    let most = grid.map_or(nodes, AutomaticGrid::most);
-    let mut on_nodes = |least| match grid {
-        Some(_) => Some(model.on_nodes(least)?.problem),
-        None => (least <= nodes).then(|| model.problem.clone()),
     };
-    let (problem, on_nodes) = (&model.problem, &mut on_nodes as &mut OnNodes);
-    let (found, widths) = match model.reduces_width {
-        true => fit_on_reduced_widths(problem, &start, most, on_nodes, &mut run, watch)?,
-        false => {
-            let found = fit_on_refined_grids(problem, &start, most, on_nodes, &mut run, watch)?;
-            (found, Vec::new())
-        }
-    };
+    let mut on_nodes = |least| Some(model.on_nodes(least)?.problem);
+    let found = fit_on_refined_grids(
+        &model.problem,
+        &start,
+        AutomaticGrid::most(grid),
+        &mut on_nodes as &mut OnNodes,
+        &mut run,
+        watch,
+    )?;
     let nodes = found.problem.system.grid.nodes();
     let is_same = nodes == model.problem.system.grid.nodes();
     let refined = (!is_same).then(|| model.on_nodes(nodes)).flatten();
@@ -66,12 +59,6 @@ pub fn fit_model(model: &Model, watch: &mut Observer) -> Result<ModelFit, Simula
         match notice {
             GridNotice::GridRefined { .. } => model.automatic.push(Finding::stated(&notice)),
             GridNotice::GridLimited { .. } => model.warnings.push(Finding::stated(&notice)),
-        }
-    }
-    for notice in widths {
-        match notice {
-            WidthNotice::WidthReduced { .. } => model.automatic.push(Finding::stated(&notice)),
-            WidthNotice::WidthLimited { .. } => model.warnings.push(Finding::stated(&notice)),
         }
     }
     Ok(ModelFit {

@@ -306,7 +306,18 @@ fn unreadable(path: &Path, what: &str, error: &std::io::Error) -> InputError {
     }
     InputError::file(path, "no such file")
         .expected(what)
-        .hint_if(similar_name(path))
+        .hint_if(foreign_path(path).or_else(|| similar_name(path)))
+}
+
+/// Remedy for a path that another program or system wrote: in quotes, or with backslashes.
+fn foreign_path(path: &Path) -> Option<String> {
+    let text = path.to_str()?;
+    let is_quote = |c: char| matches!(c, '"' | '\'' | '\u{201c}' | '\u{201d}');
+    if text.starts_with(is_quote) && text.ends_with(is_quote) {
+        return Some("the quotes are part of the name: leave them out".to_owned());
+    }
+    (cfg!(unix) && text.contains('\\'))
+        .then(|| "a path of Windows: on this system folders are separated by `/`".to_owned())
 }
 
 /// Remedy for a missing file: a missing folder, or a similar file name.

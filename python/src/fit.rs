@@ -233,17 +233,8 @@ impl RawFit {
     }
 
     /// Writes the run into a folder.
-    fn save(
-        &self,
-        py: Python<'_>,
-        folder: PathBuf,
-        figures: bool,
-        tables: bool,
-    ) -> PyResult<()> {
-        let requested = RequestedFiles {
-            figures,
-            tables,
-        };
+    fn save(&self, py: Python<'_>, folder: PathBuf, figures: bool, tables: bool) -> PyResult<()> {
+        let requested = RequestedFiles { figures, tables };
         guarded(py, || self.write(&folder, requested))
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::errors::{Failure, guarded, keyed};
 use kmcfit::config::{ModelFile, Override};
-use kmcfit::fleet::{FleetFolder, FleetModel, Record, RecordList, Row, Trend, finish, fit_record};
+use kmcfit::fleet::{FleetFolder, Record, RecordList, Row, Trend, check_model, finish, fit_record};
 use kmcfit_core::internals::threads::sharing;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -22,7 +22,7 @@ type Given = (
 /// The model of a fleet.
 #[pyclass(frozen, module = "kmcfit._kmcfit")]
 pub struct RawFleet {
-    model: FleetModel,
+    model: ModelFile,
     interrupt: Arc<AtomicBool>,
 }
 
@@ -44,7 +44,7 @@ impl RawFleet {
                     Some(text) => ModelFile::parse(&path, text)?,
                     None => ModelFile::read(&path)?,
                 };
-                FleetModel::new(file.with_overrides(&overrides)?)
+                check_model(file.with_overrides(&overrides)?)
             };
             let model = read().map_err(|error| match is_text {
                 true => keyed(error, &path),
@@ -68,7 +68,7 @@ impl RawFleet {
             let name = record.0.clone();
             let row = match given(record) {
                 Ok(record) => sharing(|| fit_record(&self.model, &record, &self.interrupt)),
-                Err(error) => Some(Row::failed(&name, String::new(), error.to_string())),
+                Err(error) => Some(Row::failed(&name, error.to_string())),
             };
             let line = row.map(|row| serde_json::to_string(&row));
             line.transpose()
@@ -117,19 +117,17 @@ impl RawFolder {
         })
     }
 
-    /// The row that a record had before, as JSON; with `retry_errors` none with an error. A record that has changed is refused.
-    fn row(&self, py: Python<'_>, record: Given, retry_errors: bool) -> PyResult<Option<String>> {
+    /// The row that a record had before, as JSON; none with an error. A record that has changed is refused.
+    fn row(&self, py: Python<'_>, record: Given) -> PyResult<Option<String>> {
         guarded(py, || {
             self.with(|folder| {
                 let row = folder.row(&record.0);
-                let Some(row) = row.filter(|row| !(retry_errors && row.error.is_some())) else {
+                let Some(row) = row.filter(|row| row.error.is_none()) else {
                     return Ok(None);
                 };
                 let line = serde_json::to_string(row)
                     .map_err(|error| Failure::Panic(error.to_string()))?;
-                if row.error.is_none() {
-                    folder.check_record(&given(record)?)?;
-                }
+                folder.check_record(&given(record)?)?;
                 Ok(Some(line))
             })
         })
@@ -165,11 +163,8 @@ impl RawFolder {
             });
             let records = records.collect::<Result<_, kmcfit::error::InputError>>()?;
             let list = RecordList { records, columns }.checked()?;
-            let trend = Trend::named(&list, trend.as_deref())?;
-            self.with(|folder| {
-                folder.check_names(&list)?;
-                Ok(drop(finish(folder, &list, &trend)?))
-            })
+            let trend = Trend::of(&list, trend.as_deref())?;
+            self.with(|folder| Ok(drop(finish(folder, &list, &trend)?)))
         })
     }
 

@@ -100,7 +100,7 @@ pub fn simulate(
                     .hint("fit with the mass: `km.Model(mass=…)`, in kg"),
             ));
         }
-        let record = NewRecord::read(force.as_deref(), base.as_deref())?;
+        let record = NewRecord::read(force.as_deref(), base.as_deref(), &run.own_model()?)?;
         let found = ForcedPredictions::of(&run, &record, &[state], &kinds)?;
         Ok(found.map_err(Failure::Numerical)?.csv().to_csv())
     })

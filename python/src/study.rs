@@ -6,6 +6,7 @@ use kmcfit::Run;
 use kmcfit::cli::{CommandError, study_into};
 use kmcfit::config::{ModelFile, Override};
 use kmcfit::report::study::{StudiedFit, StudyDocument};
+use kmcfit_core::internals::problem::Problem;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -33,7 +34,8 @@ pub fn study(
             false => error,
         };
         let finished = StudiedFit::of(&fit.done.model, &fit.done.fit);
-        studied(file, &overrides, &folder, threads, Some(finished), flag).map_err(|error| {
+        let finished = Some((finished, fit.done.model.problem.clone()));
+        studied(file, &overrides, &folder, threads, finished, flag).map_err(|error| {
             match error {
                 Failure::Input(error) => Failure::Input(located(error)),
                 other => other,
@@ -77,7 +79,7 @@ fn studied(
     overrides: &[String],
     folder: &Path,
     threads: Option<usize>,
-    finished: Option<StudiedFit>,
+    finished: Option<(StudiedFit, Problem)>,
     flag: Arc<AtomicBool>,
 ) -> Result<StudyDocument, Failure> {
     let file = file.with_overrides(&Override::parse_all(overrides)?)?;

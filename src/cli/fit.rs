@@ -8,6 +8,7 @@ use crate::config::{BuildMode, Model, ModelFile, Source, Statements, build, is_r
 use crate::error::InputError;
 use crate::fitting::fit_or_no_response;
 use crate::report::document::{FailureDocument, ResultDocument};
+use crate::report::trial::advice;
 use crate::report::{
     FittedModel, MODEL, OverheadTimings, RequestedFiles, RunAssessment, TimingsSummary, json,
     model_predictions, summary, summary_plot,
@@ -46,7 +47,7 @@ pub struct Arguments {
     /// Write a row for every node into the tables over time.
     #[arg(long)]
     tables: bool,
-    /// Print all findings, the fit of each channel and the work of the solver.
+    /// Print all findings, the constraints and the work of the solver.
     #[arg(long, conflicts_with = "json")]
     verbose: bool,
     /// Exit with 4 for the verdict Check, with 5 for Inadequate.
@@ -247,6 +248,7 @@ pub(super) fn fit_into(
         computed: Default::default(),
     };
     let mut document = fitted.document_and_figures();
+    document.advice = advice(file, model, &found, &document);
     document.model.folder = run.folder.path_to(run.inside, file.path.parent());
     activity.stage(progress.named_stage("writing the results"));
     let writing = fitted

@@ -2,13 +2,13 @@
 
 use super::progress::{Activity, show_jobs};
 use super::{CommandError, OK, Overrides, interrupt, print, say};
-use crate::fleet::{FleetFolder, FleetModel, RecordList, Trend, finish, run as fit_records};
+use crate::fleet::{FleetFolder, RecordList, Trend, check_model, finish, run as fit_records};
 use std::path::PathBuf;
 
 /// Fit one model to many records: one row of results for each, in a file that grows as the fits end.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  kmcfit fleet model.yaml \"records/*.csv\" --out fleets/bridge\n  kmcfit fleet model.yaml records.csv --out fleets/bridge --trend temperature\n\nThe same command again goes on after the rows that are written."
+    after_help = "Examples:\n  kmcfit fleet model.yaml \"records/*.csv\" --out fleets/bridge\n  kmcfit fleet model.yaml records.csv --out fleets/bridge --trend temperature\n\nThe same command again goes on after the rows that are written; records with errors are fitted again."
 )]
 pub struct Arguments {
     /// Model file (YAML) with one experiment, whose data each record replaces.
@@ -24,10 +24,7 @@ pub struct Arguments {
     /// Number of threads; results do not depend on it [default: one per core].
     #[arg(long, value_name = "NUMBER")]
     threads: Option<usize>,
-    /// Fit the records again whose rows have errors, as after a file was repaired.
-    #[arg(long)]
-    retry_errors: bool,
-    /// Column of the table over which the page shows the estimates [default: `date`, else the first one of numbers].
+    /// Column of the table over which the page shows the estimates [default: their order].
     #[arg(long, value_name = "COLUMN")]
     trend: Option<String>,
 }
@@ -35,32 +32,21 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     let threads = super::study::threads(arguments.threads)?;
     let reading = Activity::begin("reading the list of records");
-    let model = FleetModel::new(arguments.set.read(&arguments.model)?)?;
+    let model = check_model(arguments.set.read(&arguments.model)?)?;
     let list = RecordList::read(&arguments.records)?;
-    let trend = Trend::named(&list, arguments.trend.as_deref())?;
+    // Keys that the model does not have are errors of the table, which has a record.
+    model.clone().with_overrides(&list.records[0].overrides)?;
+    let trend = Trend::of(&list, arguments.trend.as_deref())?;
     let mut folder = FleetFolder::open(&arguments.out, &model)?;
-    folder.check_names(&list)?;
     (list.records.iter()).try_for_each(|record| folder.check_record(record))?;
     drop(reading);
     let all = list.records.len();
-    let before = list
-        .records
-        .iter()
-        .filter(|record| folder.row(&record.name).is_some())
-        .count();
-    if before > 0 {
-        say(
-            "note",
-            format!("{before} of {all} records had their row before"),
-        );
-    }
     let activity = Activity::begin(format!("fitting {all} records"));
-    let work = (threads, arguments.retry_errors);
     let is_done = fit_records(
         &mut folder,
         &model,
         &list,
-        work,
+        threads,
         &interrupt::flag(),
         &show_jobs,
     )?;

@@ -4,7 +4,7 @@ use super::progress::Activity;
 use super::{CommandError, OK, print, schema, unwritable};
 use crate::config::{ModelFile, Source, Statements, scaffold};
 use crate::error::InputError;
-use crate::report::shell_quoted;
+use crate::escape::shell_quoted;
 use crate::results::write_together;
 use crate::tables::SAMPLE_RATES;
 use std::path::{Component, Path, PathBuf};
@@ -25,7 +25,7 @@ pub struct Arguments {
     #[arg(long, value_name = "MODEL")]
     out: Option<PathBuf>,
     /// Sampling rate, Hz, if the file has no column of times.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     sample_rate: Option<f64>,
     /// Units by quantity or column, as in `time=ms,displacement=mm` or `ch1=50 g`; of a column without a name by its number, `1=50 g`.
     #[arg(long, value_name = "UNITS")]

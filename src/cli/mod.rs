@@ -3,7 +3,6 @@
 mod arguments;
 mod check;
 mod check_file;
-mod check_gradient;
 mod compare;
 mod demo;
 mod environment;

@@ -6,8 +6,7 @@ use super::{CommandError, OK, print, unwritable};
 use crate::config::NewRecord;
 use crate::error::InputError;
 use crate::report::{
-    CsvTable, Figure, ForcedPredictions, PredictedResponse, Run, figures, json, predict,
-    prediction_table, render,
+    CsvTable, Figure, ForcedPredictions, FreePredictions, Run, figures, json, render,
 };
 use crate::results::OutputFolder;
 use kmcfit_core::internals::record::ChannelKind;
@@ -81,9 +80,9 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     }
     let folder = prepare()?;
     let predicting = Activity::begin(PREDICTING);
-    let responses = predict(&run.system, &run.coefficients, run.truth.as_ref(), &states).map_err(
-        |breakdown| CommandError::Numerical(format!("--initial: no response: {breakdown}")),
-    )?;
+    let predictions = FreePredictions::of(&run, &states).map_err(|breakdown| {
+        CommandError::Numerical(format!("--initial: no response: {breakdown}"))
+    })?;
     drop(predicting);
     if let Some(folder) = folder {
         let unit = if run.document.is_rotation() {
@@ -91,13 +90,12 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
         } else {
             "m"
         };
-        write(&folder, &run.system.grid.times(), &responses, unit)
+        write(&folder, &run.system.grid.times(), &predictions, unit)
             .map_err(|error| unwritable(folder.shown(), &error))?;
     }
-    let summaries: Vec<_> = responses.into_iter().map(|m| m.summary).collect();
     match arguments.json {
-        true => print(&json(&summaries)),
-        false => print(&prediction_table(&summaries, run.document.is_rotation())),
+        true => print(&json(&predictions.summaries())),
+        false => print(&predictions.table()),
     }
     Ok(OK)
 }
@@ -133,7 +131,8 @@ fn forced(
             .hint("fit with the mass: `--set functions.mass.fixed=4.5` (kg)")
             .into());
     }
-    let record = NewRecord::read(arguments.force.as_deref(), arguments.base.as_deref())?;
+    let (force, base) = (arguments.force.as_deref(), arguments.base.as_deref());
+    let record = NewRecord::read(force, base, &run.own_model()?)?;
     if states.is_empty() {
         states.push(State {
             displacement: 0.0,
@@ -183,13 +182,20 @@ fn state(text: &str) -> Result<State, InputError> {
 fn write(
     folder: &OutputFolder,
     times: &[f64],
-    responses: &[PredictedResponse],
+    predictions: &FreePredictions,
     unit: &str,
 ) -> std::io::Result<()> {
     let mut table = CsvTable::new().column("t_s", times.to_vec());
-    for (i, predicted) in responses.iter().enumerate() {
+    let pairs = predictions.responses.iter().zip(&predictions.bands);
+    for (i, (predicted, band)) in pairs.enumerate() {
         let header = format!("y_{unit}_{}", i + 1);
         table = table.column(header, predicted.response.displacement.clone());
+        for (end, side) in ["low", "high"].into_iter().enumerate() {
+            if let Some(band) = band {
+                let ends = band.iter().map(|ends| ends[end]).collect();
+                table = table.column(format!("y_{side}_95_{unit}_{}", i + 1), ends);
+            }
+        }
         if let Some(truth) = &predicted.truth {
             table = table.column(
                 format!("true_y_{unit}_{}", i + 1),
@@ -197,12 +203,11 @@ fn write(
             );
         }
     }
-    let summaries: Vec<_> = responses.iter().map(|r| r.summary.clone()).collect();
     write_files(
         folder,
         &table,
-        &figures::predictions(times, responses),
-        &summaries,
+        &figures::predictions(times, &predictions.responses),
+        &predictions.summaries(),
     )
 }
 

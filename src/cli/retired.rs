@@ -4,7 +4,7 @@ use crate::error::InputError;
 use std::ffi::OsString;
 
 /// Words of the command line.
-const RETIRED: [(&[&str], &str); 13] = [
+const RETIRED: [(&[&str], &str); 14] = [
     (
         &["resume"],
         "run the command again: a fit takes seconds, and `kmcfit fleet` goes on after its rows",
@@ -26,6 +26,10 @@ const RETIRED: [(&[&str], &str); 13] = [
         "`kmcfit fit MODEL --set experiments.0.data=RECORD` makes the page of a record",
     ),
     (
+        &["--retry-errors"],
+        "the same command fits the records with errors again",
+    ),
+    (
         &["--checkpoint"],
         "an interrupted fit writes its best point: run it again",
     ),
@@ -34,8 +38,8 @@ const RETIRED: [(&[&str], &str); 13] = [
         "for many machines use `fit_many` of the Python package with an executor",
     ),
     (
-        &["check", "--out"],
-        "`kmcfit check --gradient` prints the errors of the gradient",
+        &["check", "--gradient"],
+        "the tests of the program check the gradient: `cargo test -p kmcfit-core gradient`",
     ),
     (
         &["--plot"],

@@ -11,6 +11,7 @@ use crate::error::InputError;
 use crate::report::study::{StudiedFit, StudyDocument};
 use crate::report::{Run, json};
 use crate::results::OutputFolder;
+use kmcfit_core::internals::problem::Problem;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -98,7 +99,7 @@ pub fn study_into(
     out: &Path,
     file: &ModelFile,
     threads: Option<usize>,
-    finished: Option<StudiedFit>,
+    finished: Option<(StudiedFit, Problem)>,
     flag: Arc<AtomicBool>,
 ) -> Result<StudyDocument, CommandError> {
     let threads = self::threads(threads)?;
@@ -110,7 +111,7 @@ fn studied(
     out: &Path,
     (file, model): (&ModelFile, Model),
     threads: usize,
-    finished: Option<StudiedFit>,
+    finished: Option<(StudiedFit, Problem)>,
     flag: Arc<AtomicBool>,
 ) -> Result<StudyDocument, CommandError> {
     let folder = OutputFolder::prepare(out, "study", inputs(file))?;

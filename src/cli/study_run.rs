@@ -16,20 +16,14 @@ use kmcfit_core::internals::threads::interruptible;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The model on the grid of a fit, with its width of Coulomb friction; `None` if it cannot be built.
+/// The model on the grid of a fit; `None` if it cannot be built.
 fn on_grid_of(model: &Arc<Model>, fit: &StudiedFit) -> Option<Arc<Model>> {
     let system = &model.problem.system;
     let is_same_grid = fit.nodes == system.grid.nodes();
-    if is_same_grid && fit.friction_width == system.friction_width() {
+    if is_same_grid {
         return Some(Arc::clone(model));
     }
-    let mut found = match is_same_grid {
-        true => Model::clone(model),
-        false => model.on_nodes(fit.nodes)?,
-    };
-    if let Some(width) = fit.friction_width {
-        found = found.with_friction_width(width);
-    }
+    let found = model.on_nodes(fit.nodes)?;
     (found.problem.system.grid.nodes() == fit.nodes).then(|| Arc::new(found))
 }
 
@@ -45,8 +39,8 @@ pub(super) struct StudyTask<'a> {
     pub model: Model,
     /// Number of threads, at least 1.
     pub threads: usize,
-    /// The fit, if the model was fitted before.
-    pub finished: Option<StudiedFit>,
+    /// The fit and the problem as fitted, if the model was fitted before.
+    pub finished: Option<(StudiedFit, Problem)>,
     /// Ends the study.
     pub flag: Arc<AtomicBool>,
 }
@@ -67,9 +61,11 @@ impl StudyTask<'_> {
             ..StudyDocument::default()
         };
         let threads = self.threads;
+        let (finished, fitted) = self.finished.unzip();
         let mut work = StudyRun {
             model: Arc::new(model),
-            finished: self.finished,
+            finished,
+            fitted,
             flag: self.flag,
             threads,
             begun: 1,
@@ -97,6 +93,8 @@ struct StudyRun {
     model: Arc<Model>,
     /// The fit of a finished run.
     finished: Option<StudiedFit>,
+    /// The problem as fitted, with the noise of the fit.
+    fitted: Option<Problem>,
     flag: Arc<AtomicBool>,
     threads: usize,
     /// Number of analyses begun, the fit included.
@@ -123,7 +121,17 @@ impl StudyRun {
         let model = Arc::clone(&self.model);
         let plan = &model.study;
         self.document.sensitivity = Some(self.analysis("sensitivity", || study::sensitivity(at))?);
-        let bands = || study::bands(at, &model);
+        // The intervals of the fit are those with its correlation of the noise.
+        let fitted = self.fitted.take().and_then(|problem| {
+            let evaluation = problem.evaluate(at.theta).ok()?;
+            Some((problem, evaluation))
+        });
+        let of_fit = fitted.as_ref().map_or(at, |(problem, evaluation)| Optimum {
+            problem,
+            evaluation,
+            ..at
+        });
+        let bands = || study::bands(of_fit, &model);
         self.document.bands = Some(self.analysis("bands", bands)?);
         for target in &plan.profiles {
             let Some(of) = study::linear(at.problem, target) else {
@@ -221,7 +229,9 @@ impl StudyRun {
             None => {
                 let (fitted, _, found) =
                     search(&model, &progress).map_err(StudyError::Numerical)?;
-                StudiedFit::of(&fitted, &found)
+                let fit = StudiedFit::of(&fitted, &found);
+                self.fitted = Some(fitted.problem);
+                fit
             }
         };
         let interrupted = fit.status == Status::Interrupted;

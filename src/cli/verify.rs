@@ -114,12 +114,8 @@ impl Compared {
                 }
             }
             (Value::Array(stored), Value::Array(new)) if stored.len() == new.len() => {
-                let size = |list: &[Value]| {
-                    list.iter()
-                        .filter_map(Value::as_f64)
-                        .fold(0.0, |a: f64, x| a.max(x.abs()))
-                };
-                let floor = OF_LARGEST * size(new);
+                let sizes = new.iter().filter_map(Value::as_f64).map(f64::abs);
+                let floor = OF_LARGEST * sizes.fold(0.0, f64::max);
                 for (i, (stored, new)) in stored.iter().zip(new).enumerate() {
                     self.values(&format!("{place}/{}", i + 1), stored, new, floor);
                 }
@@ -168,10 +164,5 @@ fn table(text: &str) -> Value {
             column.push(number.unwrap_or_else(|_| field.into()));
         }
     }
-    Value::Object(
-        columns
-            .into_iter()
-            .map(|(name, values)| (name, values.into()))
-            .collect(),
-    )
+    columns.into_iter().collect()
 }

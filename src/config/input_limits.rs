@@ -4,14 +4,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::expansion;
 use super::key_positions::Position;
 use super::key_positions::place;
 use crate::error::InputError;
 use crate::text_io::{binary_size, quote};
 use serde::de::DeserializeOwned;
 
-/// Longest model file that is read, in bytes; also its longest length with the aliases written out.
+/// Longest model file that is read, in bytes.
 ///
 /// A model file is written by hand and takes a few kilobytes; samples belong in CSV files. The limit rejects a data
 /// file given by mistake before it is parsed as YAML.
@@ -25,9 +24,12 @@ const MOST_OPEN_BRACKETS: usize = 200;
 
 /// Most aliases (`*name`), and as many anchors (`&name`), in a file.
 ///
-/// A model needs a dozen. Each alias repeats its anchored value, so a short file with many aliases can expand to a very
-/// long one.
+/// A model needs a dozen. Each alias repeats its anchored value, which the YAML crate limits to a hundred for each value of the
+/// file.
 const MOST_ALIASES: usize = 1000;
+
+/// Longest file with aliases, bytes: each repeats a value of at most this length.
+const LONGEST_WITH_ALIASES: usize = 1 << 14;
 
 /// A text within the limits of [`check`]; only such texts are deserialised.
 pub(super) struct Checked<'a>(&'a str);
@@ -60,47 +62,7 @@ pub(super) fn check(file: &Path, text: &str) -> Result<(), InputError> {
             .hint("put samples into CSV files"));
     }
     check_brackets(file, text)?;
-    check_anchors(file, text)?;
-    check_expansion(file, text)
-}
-
-/// Refuses a text that expands to more than [`LONGEST_MODEL`] bytes.
-fn check_expansion(file: &Path, text: &str) -> Result<(), InputError> {
-    const LONGEST: usize = LONGEST_MODEL as usize;
-    let Some(passed) = expansion::beyond(text, LONGEST) else {
-        return Ok(());
-    };
-    let uses = |name: &str| names(text, '*').filter(|(_, alias)| *alias == name).count();
-    let anchors = names(text, '&').map(|(index, name)| (Position::of(text, index), name));
-    // The anchored value whose repetition exceeds the limit: the last anchor before that position.
-    let repeated = anchors
-        .take_while(|(begin, _)| *begin <= passed)
-        .filter(|(_, name)| uses(name) > 0)
-        .last();
-    let (at, which) = match repeated {
-        Some((at, name)) => {
-            let times = match uses(name) {
-                1 => "once".to_owned(),
-                times => format!("{times} times"),
-            };
-            let (anchor, alias) = (quote(&format!("&{name}")), quote(&format!("*{name}")));
-            (
-                at,
-                format!("; {alias} repeats the value of {anchor} {times}"),
-            )
-        }
-        None => (passed, String::new()),
-    };
-    Err(
-        InputError::new(place(file, at), "the aliases expand to too long a text")
-            .found(format!(
-                "more than {LONGEST} bytes with all aliases written out{which}"
-            ))
-            .expected(format!(
-                "at most {LONGEST} bytes with all aliases written out"
-            ))
-            .hint("put samples and long lists into CSV files"),
-    )
+    check_anchors(file, text)
 }
 
 fn check_brackets(file: &Path, text: &str) -> Result<(), InputError> {
@@ -130,6 +92,17 @@ fn check_brackets(file: &Path, text: &str) -> Result<(), InputError> {
 fn check_anchors(file: &Path, text: &str) -> Result<(), InputError> {
     if names(text, '*').next().is_none() {
         return Ok(());
+    }
+    if text.len() > LONGEST_WITH_ALIASES {
+        return Err(
+            InputError::file(file, "the model file with aliases is too large")
+                .found(binary_size(text.len() as u64))
+                .expected(format!(
+                    "at most {}",
+                    binary_size(LONGEST_WITH_ALIASES as u64)
+                ))
+                .hint("write the values out, or put samples and long lists into CSV files"),
+        );
     }
     for mark in ['*', '&'] {
         if let Some((index, _)) = names(text, mark).nth(MOST_ALIASES) {

@@ -1,12 +1,13 @@
 //! Inputs of a prediction: force and base motion from files of their own, with measurements to score it, if any.
 
-use super::scaffold::{ColumnAssignment, Role};
+use super::ModelFile;
+use super::run_settings::{RunSensor, RunSettings};
+use super::scaffold::{ColumnAssignment, Role, recognised};
 use crate::error::InputError;
 use crate::tables::{Table, increasing_at};
 use crate::text_io::quote;
-use crate::units::Unit;
 use kmcfit_core::internals::record::{BaseMotion, ChannelKind, Input, Waveform};
-use kmcfit_core::internals::signal::{Interpolation, Signal, median_spacing};
+use kmcfit_core::internals::signal::{Signal, median_spacing};
 use std::path::{Path, PathBuf};
 
 /// Inputs over a span of time, and measurements in the same files.
@@ -27,8 +28,8 @@ pub struct NewRecord {
 pub struct MeasuredChannel {
     /// Kind.
     pub kind: ChannelKind,
-    /// Unit in the file.
-    pub unit: Unit,
+    /// Its sensor, as in the run.
+    pub sensor: RunSensor,
     /// Times, s.
     pub times: Vec<f64>,
     /// Samples, SI.
@@ -37,12 +38,20 @@ pub struct MeasuredChannel {
 
 impl NewRecord {
     /// Reads the files of the options `--force` and `--base`, one of them at least. Roles and units of their columns follow from names
-    /// and units, as in `kmcfit init`.
+    /// and units, as in `kmcfit init`, unless the model of the run, `model`, names and states them; interpolation and sensors are those of
+    /// its first record with the same input.
     ///
     /// # Errors
     /// If a file cannot be read, has no column of times or of the input, or gaps in the input; if the base ends before the force.
-    pub fn read(force: Option<&Path>, base: Option<&Path>) -> Result<Self, InputError> {
-        let [force, base] = [force, base].map(|path| path.map(InputFile::read).transpose());
+    pub fn read(
+        force: Option<&Path>,
+        base: Option<&Path>,
+        model: &ModelFile,
+    ) -> Result<Self, InputError> {
+        let [force, base] = [(force, true), (base, false)].map(|(path, is_force)| {
+            path.map(|path| InputFile::read(path, RunSettings::of(model, is_force)))
+                .transpose()
+        });
         let (force, base) = (force?, base?);
         let mut input = Input::default();
         let mut used = Vec::new();
@@ -109,19 +118,31 @@ impl NewRecord {
 struct InputFile {
     table: Table,
     columns: ColumnAssignment,
+    settings: RunSettings,
     /// Times of the rows, s.
     times: Vec<f64>,
 }
 
 impl InputFile {
-    fn read(path: &Path) -> Result<Self, InputError> {
+    fn read(path: &Path, settings: RunSettings) -> Result<Self, InputError> {
         let table = Table::read(path)?;
-        let columns = ColumnAssignment::without_guess(&table, None)?;
-        let time = columns.find(Role::Time).ok_or_else(|| {
-            InputError::file(path, "no column of times").expected("a column of times in s")
-        })?;
-        let times = increasing_at(&table, time.index)?;
-        let times: Vec<f64> = times.iter().map(|t| t * time.unit.factor()).collect();
+        let named = settings.columns_of(&table);
+        let has_times = (0..table.width()).any(|i| {
+            recognised(&table, i).is_some_and(|(role, ..)| role == Role::Time)
+                || named.contains(&(i, Role::Time))
+        });
+        let rate = settings.sample_rate().filter(|_| !has_times);
+        let columns = ColumnAssignment::as_in_run(&table, rate, named, settings.units())?;
+        let times: Vec<f64> = match rate {
+            Some(rate) => (0..table.rows()).map(|i| i as f64 / rate).collect(),
+            None => {
+                let time = columns.find(Role::Time).ok_or_else(|| {
+                    InputError::file(path, "no column of times").expected("a column of times in s")
+                })?;
+                let times = increasing_at(&table, time.index)?;
+                times.iter().map(|t| t * time.factor()).collect()
+            }
+        };
         if times.len() < 3 {
             return Err(InputError::file(path, "too few rows for a prediction")
                 .found(times.len())
@@ -129,6 +150,7 @@ impl InputFile {
         }
         Ok(Self {
             columns,
+            settings,
             times,
             table,
         })
@@ -168,12 +190,8 @@ impl InputFile {
             .found(format!("{missing} of {} values missing", samples.len()))
             .expected("a value in every row: it acts at all times"));
         }
-        let values = samples.iter().map(|x| x * column.unit.factor()).collect();
-        let interpolation = match column.role {
-            // A displacement is differentiated twice.
-            Role::BaseDisplacement => Interpolation::Cubic,
-            _ => Interpolation::default(),
-        };
+        let values = samples.iter().map(|x| x * column.factor()).collect();
+        let interpolation = self.settings.interpolation(column.role);
         let signal = Signal::new(self.times.clone(), values, interpolation);
         let signal = signal.ok_or_else(|| {
             InputError::file(path, "invalid samples of the input")
@@ -205,10 +223,10 @@ impl InputFile {
                 .iter()
                 .zip(samples)
                 .filter(|(_, x)| x.is_finite());
-            let (times, values) = pairs.map(|(t, x)| (*t, x * column.unit.factor())).unzip();
+            let (times, values) = pairs.map(|(t, x)| (*t, x * column.factor())).unzip();
             found.push(MeasuredChannel {
                 kind,
-                unit: column.unit,
+                sensor: self.settings.sensor(kind),
                 times,
                 values,
             });

@@ -5,7 +5,7 @@ const OTHER_RULES: &str = "`reml` chooses the weight by the likelihood of noise 
      page of `discrepancy` shows what L-curve and cross-validation would choose";
 
 /// Path of the key, the choice where one of its values was removed, and what takes its place.
-const RETIRED: [(&str, &str, &str); 5] = [
+const RETIRED: [(&str, &str, &str); 6] = [
     (
         "study.bootstrap",
         "",
@@ -20,6 +20,11 @@ const RETIRED: [(&str, &str, &str); 5] = [
         "study.constancy_test",
         "",
         "the fit tests each function that varies against a constant; `kmcfit compare` compares a model with a constant",
+    ),
+    (
+        "functions.width",
+        "auto",
+        "a fit warns where the estimates depend on the width, and names a smaller one",
     ),
     (WEIGHT, "l-curve", OTHER_RULES),
     (WEIGHT, "gcv", OTHER_RULES),

@@ -250,29 +250,6 @@ impl Value for Nodes {
     }
 }
 
-/// Width of Coulomb friction.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum FrictionWidth {
-    /// Given, m/s.
-    Number(Number),
-    /// Reduced by the fit until the estimates do not depend on it.
-    Auto,
-}
-
-impl Value for FrictionWidth {
-    const KIND: ValueType = ValueType::AnyOf(&[ValueType::Number, ValueType::Word("auto")]);
-    fn scalar(scalar: Scalar<'_>) -> Result<Self, Mistake> {
-        let expected = "a finite number, or `auto`";
-        match scalar {
-            Scalar::Text("auto") => Ok(Self::Auto),
-            Scalar::Text(word) if number_in(word).is_none() => Err(scalar
-                .refused("neither a number nor `auto`", expected)
-                .suggest(did_you_mean(word, ["auto"]))),
-            other => number_or(other, expected).map(Self::Number),
-        }
-    }
-}
-
 /// Break points: their number, equally spaced over the record, or their times in s.
 #[derive(Debug, Clone, PartialEq)]
 pub enum KnotSpec {

@@ -4,7 +4,6 @@ use super::records::Record;
 use crate::config::{BuildMode, ModelFile, build};
 use crate::digest::digest;
 use crate::error::InputError;
-use crate::finding::Finding;
 use crate::fitting::fit_or_no_response;
 use crate::report::document::Estimates;
 use crate::report::{CompletedFit, RequestedFiles};
@@ -12,13 +11,14 @@ use crate::text_io::{LONGEST_TABLE, read_bytes};
 use kmcfit_core::internals::assessment::VerdictLevel;
 use kmcfit_core::internals::solvers::{IterationRecord, Observer, Status};
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Result of the fit of one record: a line of `rows.jsonl`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// The record: its path as given.
     pub record: String,
@@ -39,43 +39,32 @@ pub struct Row {
 
 impl Row {
     /// The row of a record without estimates.
-    pub fn failed(record: &str, sha256: String, error: impl Into<String>) -> Self {
+    pub fn failed(record: &str, error: impl Into<String>) -> Self {
         Self {
             record: record.to_owned(),
-            sha256,
-            estimates: Estimates(Vec::new()),
-            verdict: None,
-            warnings: Vec::new(),
-            seconds: 0.0,
             error: Some(error.into()),
+            ..Self::default()
         }
     }
 }
 
-/// A model with one experiment, whose data are those of each record in turn.
-#[derive(Debug, Clone)]
-pub struct FleetModel {
-    /// The model file.
-    pub file: ModelFile,
-}
-
-impl FleetModel {
-    /// # Errors
-    /// If the model has several experiments, or one without `data`.
-    pub fn new(file: ModelFile) -> Result<Self, InputError> {
-        let experiments = &file.spec.experiments;
-        if experiments.len() > 1 {
-            return Err(file
-                .error_at("experiments[1]", "the model of a fleet has one experiment")
-                .found(format!("{} experiments", experiments.len()))
-                .expected("one experiment, whose `data` each record replaces"));
-        }
-        match experiments.first().is_some_and(|e| e.data.is_some()) {
-            true => Ok(Self { file }),
-            false => Err(file
-                .error_at("experiments[0].data", "the experiment has no data")
-                .expected("`data: FILE`, in whose place each record is read")),
-        }
+/// The model of a fleet: it has one experiment, whose data are those of each record in turn.
+///
+/// # Errors
+/// If the model has several experiments, or one without `data`.
+pub fn check_model(file: ModelFile) -> Result<ModelFile, InputError> {
+    let experiments = &file.spec.experiments;
+    if experiments.len() > 1 {
+        return Err(file
+            .error_at("experiments[1]", "the model of a fleet has one experiment")
+            .found(format!("{} experiments", experiments.len()))
+            .expected("one experiment, whose `data` each record replaces"));
+    }
+    match experiments.first().is_some_and(|e| e.data.is_some()) {
+        true => Ok(file),
+        false => Err(file
+            .error_at("experiments[0].data", "the experiment has no data")
+            .expected("`data: FILE`, in whose place each record is read")),
     }
 }
 
@@ -101,37 +90,36 @@ pub fn content_of(record: &Record) -> Result<(Arc<[u8]>, String), InputError> {
 }
 
 /// Fits a record; `None` where `interrupt` ended it. Every failure, a panic included, is the error of the row.
-pub fn fit_record(model: &FleetModel, record: &Record, interrupt: &Arc<AtomicBool>) -> Option<Row> {
+pub fn fit_record(model: &ModelFile, record: &Record, interrupt: &Arc<AtomicBool>) -> Option<Row> {
     let clock = Instant::now();
-    let (content, sha256) = match content_of(record) {
-        Ok(found) => found,
-        Err(error) => return Some(Row::failed(&record.name, String::new(), error.to_string())),
-    };
-    // The fit shares no state with others that a panic could leave half changed.
-    let fit = || fitted(model, record, content, interrupt);
-    let mut row = match catch_unwind(AssertUnwindSafe(fit)) {
-        Ok(Ok(row)) => row?,
-        Ok(Err(error)) => Row::failed(&record.name, String::new(), error),
-        Err(_) => Row::failed(
-            &record.name,
-            String::new(),
-            "internal error: the fit panicked",
-        ),
-    };
-    row.sha256 = sha256;
-    row.seconds = (clock.elapsed().as_secs_f64() * 1e6).round() / 1e6;
-    Some(row)
+    let found = content_of(record).map(|(content, sha256)| {
+        // The fit shares no state with others that a panic could leave half changed.
+        let fit = || fitted(model, record, content, interrupt);
+        let row = catch_unwind(AssertUnwindSafe(fit));
+        (
+            sha256,
+            row.unwrap_or_else(|_| Err("internal error: the fit panicked".into())),
+        )
+    });
+    let (sha256, row) = found.unwrap_or_else(|error| (String::new(), Err(error.to_string())));
+    let row = row.unwrap_or_else(|error| Some(Row::failed(&record.name, error)))?;
+    let seconds = (clock.elapsed().as_secs_f64() * 1e6).round() / 1e6;
+    Some(Row {
+        sha256,
+        seconds,
+        ..row
+    })
 }
 
 /// The row of a record without digest and time; `None` where the fit was interrupted.
 fn fitted(
-    fleet: &FleetModel,
+    fleet: &ModelFile,
     record: &Record,
     content: Arc<[u8]>,
     interrupt: &Arc<AtomicBool>,
 ) -> Result<Option<Row>, String> {
     let text = |error: InputError| error.to_string();
-    let file = fleet.file.clone();
+    let file = fleet.clone();
     let file = file.with_overrides(&record.overrides).map_err(text)?;
     let name = record.path.to_string_lossy();
     // The name of a file in memory states its format; that of another one is shown in messages.
@@ -151,20 +139,15 @@ fn fitted(
     let document = CompletedFit::of(found);
     let document = document.fitted(RequestedFiles::default()).document();
     let reasons = document.verdict.iter().flat_map(|verdict| &verdict.reasons);
-    let mut warnings = Vec::new();
-    for finding in reasons.chain(&document.warnings) {
-        let Finding { text, .. } = finding;
-        if !warnings.contains(text) {
-            warnings.push(text.clone());
-        }
-    }
+    let findings = reasons.chain(&document.warnings);
+    let mut warnings: Vec<String> = findings.map(|finding| finding.text.clone()).collect();
+    let mut seen = HashSet::new();
+    warnings.retain(|text| seen.insert(text.clone()));
     Ok(Some(Row {
         record: record.name.clone(),
-        sha256: String::new(),
         estimates: document.estimates,
         verdict: document.verdict.map(|verdict| verdict.level),
         warnings,
-        seconds: 0.0,
-        error: None,
+        ..Row::default()
     }))
 }

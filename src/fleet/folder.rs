@@ -1,13 +1,14 @@
 //! The folder of a fleet: its model, and the rows so far.
 
-use super::fit::{FleetModel, Row, content_of};
-use super::records::{Record, RecordList};
+use super::fit::{Row, content_of};
+use super::records::Record;
+use crate::config::ModelFile;
 use crate::digest::digest;
 use crate::error::InputError;
 use crate::results::{RowFile, write_together};
-use crate::text_io::{LONGEST_TABLE, quote, read_bytes, read_text};
+use crate::text_io::{LONGEST_TABLE, read_bytes, read_text};
 use serde::{Deserialize, Serialize};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -15,51 +16,34 @@ use std::path::{Path, PathBuf};
 const IDENTITY: &str = "fleet.json";
 /// The rows.
 const ROWS: &str = "rows.jsonl";
-/// All files of a fleet: a folder with others is refused.
-const FILES: [&str; 4] = [IDENTITY, ROWS, "rows.csv", "fleet.html"];
-/// Version of the format.
-const FORMAT: u32 = 1;
-/// Longest identity, bytes.
-const LONGEST: u64 = 1 << 24;
 
 /// The model of a fleet. Only rows of the same model and version belong together.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FleetIdentity {
-    format: u32,
     /// Version of kmcfit.
     pub version: String,
     /// Model file, as given.
     pub model: PathBuf,
-    /// Overrides (`--set`).
-    pub overrides: Vec<String>,
-    /// SHA-256 digests of the model with its overrides, and of the files that it reads beside the records.
-    pub sha256: Vec<(PathBuf, String)>,
+    /// SHA-256 digest of the model with its overrides, and of the files that it reads beside the records.
+    sha256: String,
 }
 
 impl FleetIdentity {
-    fn of(model: &FleetModel) -> Result<Self, InputError> {
-        let file = &model.file;
-        let own = (file.path.clone(), digest(file.effective_text().as_bytes()));
-        let record = file.spec.experiments.first().and_then(|e| e.data.as_ref());
-        let record = record.map(|name| file.resolve(&name.0));
-        let others = file
-            .data_files()
-            .into_iter()
-            .filter(|path| Some(path) != record.as_ref());
-        let others = others.map(|path| {
-            let bytes = read_bytes(&path, "a data file", LONGEST_TABLE)?;
-            Ok((path, digest(&bytes)))
-        });
-        let sha256 = std::iter::once(Ok(own))
-            .chain(others)
-            .collect::<Result<_, InputError>>()?;
-        Ok(Self {
-            format: FORMAT,
+    fn of(model: &ModelFile) -> Self {
+        let mut content = model.effective_text().to_owned();
+        let record = model.spec.experiments.first().and_then(|e| e.data.as_ref());
+        let record = record.map(|name| model.resolve(&name.0));
+        let others = model.data_files().into_iter();
+        for path in others.filter(|path| Some(path) != record.as_ref()) {
+            // A file that cannot be read is the error of the fits.
+            let bytes = read_bytes(&path, "a data file", LONGEST_TABLE);
+            content += &digest(&bytes.unwrap_or_default());
+        }
+        Self {
             version: env!("CARGO_PKG_VERSION").into(),
-            model: file.path.clone(),
-            overrides: file.override_texts(),
-            sha256,
-        })
+            model: model.path.clone(),
+            sha256: digest(content.as_bytes()),
+        }
     }
 }
 
@@ -79,8 +63,8 @@ impl FleetFolder {
     ///
     /// # Errors
     /// If the folder belongs to another model or holds other files, or another process works in it.
-    pub fn open(path: &Path, model: &FleetModel) -> Result<Self, InputError> {
-        let identity = FleetIdentity::of(model)?;
+    pub fn open(path: &Path, model: &ModelFile) -> Result<Self, InputError> {
+        let identity = FleetIdentity::of(model);
         if path.exists() {
             check(path, &identity)?;
         }
@@ -103,11 +87,6 @@ impl FleetFolder {
                 InputError::file(&file, "another process works on this fleet")
                     .expected("one process for each fleet")
                     .hint("wait for it, or give another folder with --out")
-            }
-            io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
-                InputError::file(&file, "this is not a row of a fleet of this version")
-                    .found(&error)
-                    .expected("a folder of its own for the fleet")
             }
             _ => unusable(&file, &error),
         })?;
@@ -147,31 +126,6 @@ impl FleetFolder {
         }
     }
 
-    /// Checks that all rows are those of records of the list.
-    ///
-    /// # Errors
-    /// Names the first other one.
-    pub fn check_names(&self, list: &RecordList) -> Result<(), InputError> {
-        let names: HashSet<&str> = list
-            .records
-            .iter()
-            .map(|record| record.name.as_str())
-            .collect();
-        let others = self
-            .rows
-            .keys()
-            .filter(|name| !names.contains(name.as_str()));
-        match others.min() {
-            None => Ok(()),
-            Some(other) => Err(InputError::file(
-                &self.path,
-                "the folder holds rows of other records",
-            )
-            .found(quote(other))
-            .expected("the records with which the fleet was begun, or a folder of its own")),
-        }
-    }
-
     /// Appends a row.
     ///
     /// # Errors
@@ -189,69 +143,46 @@ impl FleetFolder {
     /// # Errors
     /// Errors of the file system.
     pub fn write(&self, table: &str, page: &str) -> Result<(), InputError> {
-        let [.., table_name, page_name] = FILES.map(|name| self.path.join(name));
-        let files = [(table_name.as_path(), table), (page_name.as_path(), page)];
+        let [table_path, page_path] = ["rows.csv", "fleet.html"].map(|name| self.path.join(name));
+        let files = [(table_path.as_path(), table), (page_path.as_path(), page)];
         let written = self.file.sync().and_then(|()| write_together(&files));
         written.map_err(|error| unusable(&self.path, &error))
     }
 }
 
-/// Refuses a folder of another fleet or with other files.
+/// Refuses a folder of another fleet, and one with files of something else.
 fn check(path: &Path, identity: &FleetIdentity) -> Result<(), InputError> {
-    let entries = std::fs::read_dir(path).map_err(|error| unusable(path, &error))?;
-    for entry in entries.flatten() {
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if !FILES.contains(&name.as_str()) && !name.starts_with(".kmcfit-") {
-            return Err(
+    let file = path.join(IDENTITY);
+    if !file.exists() {
+        let entries = std::fs::read_dir(path).map_err(|error| unusable(path, &error))?;
+        let names = entries.flatten().map(|entry| entry.file_name());
+        let others = names.filter(|name| !name.to_string_lossy().starts_with(".kmcfit-"));
+        return others.min().map_or(Ok(()), |name| {
+            Err(
                 InputError::file(path.join(name), "this file is not one of a fleet")
                     .expected("a folder of its own for the fleet")
                     .hint("move it away, or give another folder with --out"),
-            );
-        }
+            )
+        });
     }
-    let file = path.join(IDENTITY);
-    if !file.exists() {
-        return match path.join(ROWS).exists() {
-            true => Err(
-                InputError::file(path, "the folder holds rows of an unknown fleet")
-                    .found(format!("{ROWS} without {IDENTITY}"))
-                    .expected("a folder of its own for the fleet"),
-            ),
-            false => Ok(()),
-        };
-    }
-    let text = read_text(&file, "the identity of a fleet", LONGEST)?;
+    let text = read_text(&file, "the identity of a fleet", LONGEST_TABLE)?;
     let known: FleetIdentity = serde_json::from_str(&text).map_err(|error| {
         InputError::file(&file, "this is not the identity of a fleet of this version")
             .found(error)
             .expected("a folder of its own for the fleet")
     })?;
-    let other = |found: String| {
+    if known.version == identity.version && known.sha256 == identity.sha256 {
+        return Ok(());
+    }
+    let found = match known.version == identity.version {
+        true => format!("rows of another content of {}", known.model.display()),
+        false => format!("rows of kmcfit {}", known.version),
+    };
+    Err(
         InputError::file(path, "the folder belongs to another fleet")
             .found(found)
-            .expected("the model with which the fleet was begun, or a folder of its own")
-    };
-    if known.version != identity.version {
-        return Err(other(format!("rows of kmcfit {}", known.version)));
-    }
-    if known.overrides != identity.overrides {
-        return Err(other(format!(
-            "values {}",
-            quote(&known.overrides.join(", "))
-        )));
-    }
-    match known
-        .sha256
-        .iter()
-        .zip(&identity.sha256)
-        .find(|(a, b)| a.1 != b.1)
-    {
-        Some((_, (file, _))) => Err(other(format!("{}, which has changed", file.display()))),
-        None if known.sha256.len() != identity.sha256.len() => {
-            Err(other(known.model.display().to_string()))
-        }
-        None => Ok(()),
-    }
+            .expected("the model with which the fleet was begun, with its overrides and files, or a folder of its own"),
+    )
 }
 
 fn unusable(path: &Path, error: &io::Error) -> InputError {

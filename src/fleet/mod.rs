@@ -11,7 +11,7 @@ mod run;
 mod statistics;
 mod trend;
 
-pub use fit::{FleetModel, Row, fit_record};
+pub use fit::{Row, check_model, fit_record};
 pub use folder::FleetFolder;
 pub use records::{Record, RecordList};
 pub use report::finish;

@@ -2,8 +2,8 @@
 
 use crate::config::Override;
 use crate::error::InputError;
-use crate::text_io::{one_of, quote, read_text};
-use std::collections::HashMap;
+use crate::text_io::{quote, read_text};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -11,12 +11,6 @@ use std::sync::Arc;
 const FILE: &str = "file";
 /// Columns that are known coefficients.
 const KNOWN: [&str; 3] = ["mass", "damping", "stiffness"];
-/// Columns of the first and last time that is used, with the keys of `window`.
-const WINDOW: [(&str, &str); 2] = [("start", "min"), ("end", "max")];
-/// First names of keys of a model: a column such as `experiments.0.sigma.displacement` overrides a key.
-const KEYS: [&str; 5] = ["experiments", "functions", "fit", "grid", "constraints"];
-/// Headings that are meant as [`FILE`].
-const LIKE_FILE: [&str; 4] = ["files", "filename", "file_name", "path"];
 /// Longest table of records, bytes.
 const LONGEST: u64 = 1 << 32;
 
@@ -107,29 +101,13 @@ impl RecordList {
         let headings = reader.headers().cloned().unwrap_or_default();
         let at = |line: u64, problem: &str| InputError::line(path, line as usize, 1, problem);
         if !headings.iter().any(|heading| heading == FILE) {
-            let meant = headings
-                .iter()
-                .find(|h| LIKE_FILE.contains(&&*h.to_lowercase()));
-            return meant.map_or(Ok(None), |name| {
-                Err(at(1, "a table of records without the column `file`")
-                    .found(quote(name))
-                    .expected("the column `file`, with the paths of the records"))
-            });
+            return Ok(None);
         }
         for (i, heading) in headings.iter().enumerate() {
             if headings.iter().take(i).any(|other| other == heading) {
                 return Err(at(1, "two columns of one name")
                     .found(quote(heading))
                     .expected("every column once"));
-            }
-            let first = heading.split(['.', '[']).next().unwrap_or_default();
-            if heading.contains('.') && !KEYS.contains(&first) {
-                return Err(at(1, "a column with the name of no key")
-                    .found(quote(heading))
-                    .expected(format!(
-                        "a key that begins with {}, or a name without a point",
-                        one_of(KEYS)
-                    )));
             }
         }
         let mut list = Self {
@@ -166,21 +144,13 @@ impl RecordList {
             return Err(InputError::argument("RECORDS", "no records")
                 .expected("files, patterns in quotes, or a table with a column `file`"));
         }
-        let mut seen: HashMap<&str, usize> = HashMap::with_capacity(self.records.len());
-        for (i, record) in self.records.iter().enumerate() {
-            if let Some(first) = seen.insert(&record.name, i) {
-                let found = format!(
-                    "{} as number {} and number {}",
-                    quote(&record.name),
-                    first + 1,
-                    i + 1
-                );
-                return Err(
-                    InputError::argument("RECORDS", "two records have the same name")
-                        .found(found)
-                        .expected("every record once"),
-                );
-            }
+        let mut seen = HashSet::new();
+        if let Some(twice) = self.records.iter().find(|r| !seen.insert(r.name.as_str())) {
+            return Err(
+                InputError::argument("RECORDS", "two records have the same name")
+                    .found(quote(&twice.name))
+                    .expected("every record once"),
+            );
         }
         Ok(self)
     }
@@ -188,8 +158,7 @@ impl RecordList {
 
 /// True for a column that is kept beside the results.
 fn is_other(heading: &str) -> bool {
-    let is_window = WINDOW.iter().any(|(name, _)| *name == heading);
-    heading != FILE && !KNOWN.contains(&heading) && !is_window && !heading.contains('.')
+    heading != FILE && !KNOWN.contains(&heading) && !heading.contains('.')
 }
 
 /// The record of a row of a table.
@@ -199,7 +168,6 @@ fn record(
     row: &csv::StringRecord,
 ) -> Result<Record, InputError> {
     let mut record = Record::of_file("");
-    let mut window = Vec::new();
     for (heading, cell) in headings.iter().zip(row) {
         let number = || {
             let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
@@ -218,8 +186,6 @@ fn record(
             record.columns.push(cell.to_owned());
         } else if cell.is_empty() {
             // The value of the model.
-        } else if let Some((_, limit)) = WINDOW.iter().find(|(name, _)| *name == heading) {
-            window.push(format!("{limit}: {:?}", number()?));
         } else {
             record
                 .overrides
@@ -234,29 +200,23 @@ fn record(
             InputError::argument("", "a row without a file").expected("the path of a record")
         );
     }
-    if !window.is_empty() {
-        let text = format!("experiments.0.window={{{}}}", window.join(", "));
-        record.overrides.push(Override::parse(&text)?);
-    }
     Ok(record)
 }
 
 /// The files of a pattern, in the order of their names.
 fn matches(pattern: &str) -> Result<Vec<Record>, InputError> {
-    let wrong = |problem: &str| {
-        InputError::argument("RECORDS", problem)
-            .found(quote(pattern))
-            .expected("a pattern such as \"records/*.csv\"")
-    };
-    let paths = glob::glob(pattern)
-        .map_err(|error| wrong("the pattern cannot be read").hint(error.to_string()))?;
+    let paths = glob::glob(pattern).into_iter().flatten();
     // A pattern finds names in UTF-8 only.
     let files = paths.filter_map(Result::ok).filter(|path| path.is_file());
     let records: Vec<Record> = files
         .filter_map(|path| Some(Record::of_file(path.to_str()?)))
         .collect();
     match records.is_empty() {
-        true => Err(wrong("no file matches this pattern")),
+        true => Err(
+            InputError::argument("RECORDS", "no file matches this pattern")
+                .found(quote(pattern))
+                .expected("a pattern such as \"records/*.csv\""),
+        ),
         false => Ok(records),
     }
 }

@@ -1,31 +1,33 @@
 //! The fits of a fleet on several threads.
 
-use super::fit::{FleetModel, fit_record};
+use super::fit::fit_record;
 use super::folder::FleetFolder;
 use super::records::{Record, RecordList};
+use crate::config::ModelFile;
 use crate::error::InputError;
 use kmcfit_core::internals::threads::{map, sharing};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Fits the records that have no row yet, with `retries` also those whose rows have errors. True when all have their rows; false where
+/// Fits the records that have no row yet, and those whose rows have errors. True when all have their rows; false where
 /// `interrupt` ended the work. `progress` receives the number of rows and that of all records.
 ///
 /// # Errors
 /// If a row cannot be written; the rows before are kept.
 pub fn run(
     folder: &mut FleetFolder,
-    model: &FleetModel,
+    model: &ModelFile,
     list: &RecordList,
-    (threads, retries): (usize, bool),
+    threads: usize,
     interrupt: &Arc<AtomicBool>,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<bool, InputError> {
-    let is_open = |record: &&Record| match folder.row(&record.name) {
-        Some(row) => retries && row.error.is_some(),
-        None => true,
+    let is_open = |record: &&&Record| {
+        folder
+            .row(&record.name)
+            .is_none_or(|row| row.error.is_some())
     };
-    let todo: Vec<&Record> = list.records.iter().filter(is_open).collect();
+    let todo: Vec<&Record> = list.records.iter().filter(|r| is_open(&r)).collect();
     let before = list.records.len() - todo.len();
     let shared = Mutex::new((folder, 0, None));
     let lock = || shared.lock().unwrap_or_else(PoisonError::into_inner);

@@ -133,6 +133,7 @@ fn is_negligible(document: &ResultDocument, name: &str) -> bool {
 
 fn status(document: &ResultDocument, estimate: &Estimate) -> String {
     match estimate.status {
+        EstimateStatus::NotIdentifiable => "not identifiable by this method".to_owned(),
         EstimateStatus::Estimated if !estimate.value.is_finite() => "not defined".to_owned(),
         _ if is_not_unique(document, estimate) => "not unique".to_owned(),
         EstimateStatus::Estimated => "estimated".to_owned(),

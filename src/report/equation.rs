@@ -3,9 +3,18 @@
 use crate::number_format::significant;
 use kmcfit_core::internals::solvers::{EquationBalance, EquationForm};
 
-/// The residual and its share of each force, the largest force first.
-pub(super) fn equation_residual(balance: &EquationBalance, is_rotation: bool) -> String {
-    let unit = if is_rotation { "N m" } else { "N" };
+/// The residual and its share of each force, the largest force first; per unit of an unknown mass they are accelerations.
+pub(super) fn equation_residual(
+    balance: &EquationBalance,
+    is_rotation: bool,
+    mass_unknown: bool,
+) -> String {
+    let unit = match (is_rotation, mass_unknown) {
+        (false, false) => "N",
+        (true, false) => "N m",
+        (false, true) => "m/s^2",
+        (true, true) => "rad/s^2",
+    };
     let averaged = match balance.form {
         EquationForm::Weak => ", averaged by bump functions",
         EquationForm::Pointwise => "",
@@ -13,9 +22,13 @@ pub(super) fn equation_residual(balance: &EquationBalance, is_rotation: bool) ->
     let mut parts = balance.parts.clone();
     parts.sort_by(|a, b| b.rms.total_cmp(&a.rms));
     let shares = parts.iter().map(|share| {
-        let percent = significant(100.0 * share.residual_share, 2);
         let size = significant(share.rms, 3);
-        format!("{percent} % of {} ({size} {unit})", share.part.name())
+        let beside = match share.residual_share {
+            // As a percentage it would only be a large number.
+            share if share > 1.0 => "more than the".to_owned(),
+            share => format!("{} % of", significant(100.0 * share, 2)),
+        };
+        format!("{beside} {} ({size} {unit})", share.part.name())
     });
     let residual = significant(balance.residual_rms, 3);
     format!(
@@ -46,7 +59,7 @@ mod tests {
             ],
         };
         assert_eq!(
-            equation_residual(&balance, false),
+            equation_residual(&balance, false, false),
             "residual of the equation of motion 3.1 N rms: 1 % of inertia (310 N), 45 % of damping (6.9 N)"
         );
     }

@@ -1,10 +1,11 @@
 //! Findings and warnings about a fit, from the typed results of the core.
 
+use super::text::and_list;
 use crate::finding::Finding;
 use crate::number_format::{resolved, significant, times_in_words};
 use kmcfit_core::internals::assessment::{
-    ClassicalEstimate, ClassicalMethod, CoarseBasis, FitWarning, GapAssessment, NoIntervals,
-    RecordError, Unidentified,
+    ClassicalEstimate, ClassicalMethod, CoarseBasis, FitWarning, NoIntervals, RecordError,
+    Unidentified,
 };
 use kmcfit_core::internals::identifiability::{
     Classification, FunctionClassification, RankFinding, span_words,
@@ -59,9 +60,13 @@ pub fn equation_error(reason: Option<&NoIntervals>) -> Finding {
         None => ", and the intervals exclude this bias".to_owned(),
         Some(reason) => format!("; no confidence intervals: {}", no_intervals(*reason)),
     };
+    let refine = match reason {
+        // A simulation needs the force.
+        Some(NoIntervals::UnmeasuredForce) => "",
+        _ => "; refine the fit with `method: gauss-newton` and `initial: data`",
+    };
     let text = format!(
-        "noise of the measured response biases the estimates of the equation error{intervals}; refine the fit with \
-         `method: gauss-newton` and `initial: data`"
+        "noise of the measured response biases the estimates of the equation error{intervals}{refine}"
     );
     Finding::new("equation_error", text)
 }
@@ -75,6 +80,9 @@ fn no_intervals(reason: NoIntervals) -> &'static str {
             "m, c and k are determined only up to a common factor at every time"
         }
         NoIntervals::NoMinimum => "no admissible minimum",
+        NoIntervals::UnmeasuredForce => {
+            "no force is measured, and one larger than that of the damping acts"
+        }
     }
 }
 
@@ -151,7 +159,6 @@ pub fn warning(warning: &FitWarning) -> Finding {
              and autocorrelation-consistent covariance; a term missing from the model leaves such residuals too"
                 .into()
         }
-        FitWarning::Gap(gap) => gap_in_words(gap),
         FitWarning::Correlated => {
             "the residuals are autocorrelated: the confidence intervals assume correlated noise; a term missing from the model \
              leaves such residuals too"
@@ -165,6 +172,31 @@ pub fn warning(warning: &FitWarning) -> Finding {
              fit equally well; use a higher sampling rate or unequal intervals"
         ),
         FitWarning::CoarseBasis(basis) => coarse_basis(basis),
+        FitWarning::FastVariation {
+            functions,
+            per_period,
+        } => format!(
+            "the {}: up to {} parameters a period; what varies within a period cannot be told from an offset, a harmonic or a second mode; a \
+             constant, or one knot in two periods, can",
+            and_list(functions),
+            significant(*per_period, 2)
+        ),
+        FitWarning::Oscillates {
+            function,
+            frequency,
+        } => oscillates(function, *frequency),
+        FitWarning::InterpolationLoss {
+            experiment,
+            input,
+            share,
+            errors,
+        } => format!(
+            "lines between the samples of the {} of {experiment} lose {} of it at the natural frequency; cubics in their place would shift \
+             an estimate by {} standard errors, which the intervals exclude",
+            input.name().replace('_', " "),
+            super::suggestions::percent(100.0 * share, 2),
+            significant(*errors, 2)
+        ),
         FitWarning::DisturbedInput {
             experiment,
             input,
@@ -266,6 +298,14 @@ pub fn warning(warning: &FitWarning) -> Finding {
     Finding::of(warning, text)
 }
 
+/// A function that oscillates, as a clause.
+pub fn oscillates(function: &str, frequency: f64) -> String {
+    format!(
+        "the {function} oscillates at {} Hz, as a second mode that beats with the first makes it",
+        significant(frequency, 2)
+    )
+}
+
 /// A classical estimate beside that of the fit, as a clause.
 pub fn classical(estimate: &ClassicalEstimate) -> String {
     let [names, of_damping] = match estimate.method {
@@ -350,19 +390,6 @@ fn p_in_words(p: f64) -> String {
         true => "p < 1e-6".to_owned(),
         false => format!("p = {}", significant(p, 2)),
     }
-}
-
-fn gap_in_words(gap: &GapAssessment) -> String {
-    let [from, to] = gap.span.map(|time| significant(time, 4));
-    let functions = gap.functions.iter().map(|f| match f.is_identified {
-        true => format!("; the {} is identified in it", f.function),
-        false => format!("; the {} is not identified in it", f.function),
-    });
-    let functions: String = functions.collect();
-    format!(
-        "the records have a gap from {from} to {to} s, with {} cycles, or another whole number more or less{functions}",
-        significant(gap.cycles, 4)
-    )
 }
 
 fn coarse_basis(basis: &CoarseBasis) -> String {

@@ -63,6 +63,11 @@ impl RunAssessment {
         }
     }
 
+    /// True where an unmeasured force acts, so that the equation error does not determine the damping.
+    pub(super) fn lacks_force(&self) -> bool {
+        matches!(self.equation, Some(Err(NoIntervals::UnmeasuredForce)))
+    }
+
     /// Variances of the scalars with the indices `range` of a simulated response, if standard errors are meaningful.
     pub(super) fn scalar_variances(&self, range: Range<usize>) -> Option<Vec<f64>> {
         let assessment = self.assessment.as_ref()?;

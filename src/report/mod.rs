@@ -53,6 +53,7 @@ mod tables;
 mod terminal;
 pub(crate) mod text;
 mod timings;
+pub mod trial;
 mod verdict;
 
 pub(crate) use answer::quantity;
@@ -65,8 +66,7 @@ pub use csv::CsvTable;
 pub use fit_assessment::RunAssessment;
 pub use kmcfit_core::internals::study::{PredictedResponse, predict};
 pub use overview::overview;
-pub(crate) use page::shell_quoted;
-pub use prediction::{ForcedPredictions, ForcedSummary, Score};
+pub use prediction::{ForcedPredictions, ForcedSummary, FreePredictions, Score};
 pub use result_table::ResultTable;
 pub use run::{FittedModel, MODEL, RequestedFiles, json};
 pub use run_reader::Run;

@@ -20,14 +20,21 @@ pub fn rival_in_words(rival: &AmplitudeRival) -> String {
         1 => "varies",
         _ => "vary",
     };
-    let terms = and_list(&terms);
+    let constants = match terms.is_empty() {
+        true => "constants".to_owned(),
+        false => format!("constants with {}", and_list(&terms)),
+    };
     let size = significant(rival.bic_difference.abs(), 2);
     match rival.bic_difference {
+        d if terms.is_empty() => format!(
+            "constants explain the samples as well as a {functions} that {verb} with time (BIC {size} {})",
+            if d < 0.0 { "lower" } else { "higher" }
+        ),
         d if d < FAVOURED => format!(
-            "{functions} {verb} with amplitude rather than time: constants with {terms} explain the samples better (BIC {size} lower)"
+            "{functions} {verb} with amplitude rather than time: {constants} explain the samples better (BIC {size} lower)"
         ),
         d => format!(
-            "{functions} {verb} with time or with amplitude: constants with {terms} explain the samples as well (BIC {size} {})",
+            "{functions} {verb} with time or with amplitude: {constants} explain the samples as well (BIC {size} {})",
             if d < 0.0 { "lower" } else { "higher" }
         ),
     }

@@ -14,7 +14,6 @@ use super::fit_quality;
 use super::npy::npy;
 use super::page::fit_page;
 use super::ratios;
-use super::suggestions::suggestions;
 use super::tables::{FUNCTION_ROWS, TRAJECTORY_ROWS};
 use super::timings::{OverheadTimings, TimingsSummary};
 use crate::config::{ChannelNote, Model};
@@ -247,7 +246,7 @@ impl FittedModel<'_> {
             warnings: model.warnings.clone(),
             advice: Vec::new(),
         };
-        document.advice = suggestions(&document);
+        document.advice = super::suggestions::untried(&document, model);
         document
     }
 

@@ -157,6 +157,14 @@ impl Run {
                 .expected(format!("the data of {}", self.folder.display()))
                 .hint("restore the file, or fit the model again"));
         }
+        self.own_model()
+    }
+
+    /// The model that was fitted, with its overrides, from the run's own copy; its data may have changed.
+    ///
+    /// # Errors
+    /// If the copy is missing or damaged.
+    pub fn own_model(&self) -> Result<ModelFile, InputError> {
         let text = read_text(
             &self.folder.join(MODEL),
             "the model of a run",

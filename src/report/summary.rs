@@ -12,17 +12,16 @@ use super::rule_names::rule_in_words;
 use super::suggestions;
 pub(crate) use super::text::count;
 use crate::finding::Finding;
-use crate::number_format::{at_most, resolved, significant};
+use crate::number_format::{resolved, significant};
 use kmcfit_core::internals::assessment::ClassicalEstimate;
 use kmcfit_core::internals::functions::WeightRule;
-use kmcfit_core::internals::identifiability::ClassificationKind;
 use std::fmt::Write;
 
 /// Width of the interval of a classical frequency, relative to it, beyond which it is not shown.
 const UNSHARP: f64 = 0.2;
 
-/// The summary of a fit: verdict, estimates, fit of the samples, advice; `verbose` adds the solver, each channel, all findings and the
-/// constraints. `plot` stands below the estimates.
+/// The summary of a fit: verdict, estimates, fit of the samples, advice; `verbose` adds the end of the search, all findings, the
+/// nuisance parameters and the constraints. `plot` stands below the estimates.
 pub fn summary(document: &ResultDocument, verbose: bool, plot: Option<&str>) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
@@ -104,7 +103,7 @@ fn truth(document: &ResultDocument) -> Option<String> {
     (!errors.is_empty()).then(|| format!("largest errors: {}", errors.join(", ")))
 }
 
-/// Everything besides the answer: end of the search, cost and work, findings, channels, statistics, functions, constraints, attempts.
+/// End of the search, cost and work, findings, nuisance parameters, constraints and attempts.
 fn write_details(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
     let cost = &document.cost;
     let outcome = &document.outcome;
@@ -121,7 +120,7 @@ fn write_details(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
     writeln!(
         text,
         "; {}, {} forward and {}, {:.2} s",
-        iterations(document),
+        count(counts.iterations as usize, "iteration"),
         counts.forward,
         count(others as usize, &format!("{what} solve")),
         document.seconds
@@ -138,17 +137,6 @@ fn write_details(text: &mut String, document: &ResultDocument) -> std::fmt::Resu
             writeln!(text, "{heading:<15} {finding}")?;
         }
     }
-    for (name, channel) in document.records() {
-        write_channel(text, &name, channel)?;
-    }
-    for out in &document.validation {
-        if let Some(failure) = &out.failure {
-            writeln!(text, "{}: no response: {failure}", out.title())?;
-        }
-    }
-    write_statistics(text, document)?;
-    writeln!(text)?;
-    write_functions(text, document)?;
     write_nuisance_parameters(text, &document.nuisance_parameters)?;
     write_constraints(text, document)?;
     write_attempts(text, document)
@@ -162,7 +150,9 @@ fn fit(document: &ResultDocument) -> Vec<String> {
     let channels: Vec<&ChannelSummary> = document.channels().collect();
     let mut text = match (&document.equation, channels.as_slice()) {
         // Its response is the smoothed record, whose fit is no measure of the model.
-        (Some(balance), _) => equation_residual(balance, document.is_rotation()),
+        (Some(balance), _) => {
+            equation_residual(balance, document.is_rotation(), document.model.mass_unknown)
+        }
         (None, [only]) => format!(
             "{} of {}; residual {} {} rms",
             fit_percent(worst),
@@ -193,82 +183,6 @@ fn fit_percent(fit: f64) -> String {
     suggestions::percent(fit, 2)
 }
 
-/// Fit of one channel.
-pub(super) fn write_channel(
-    text: &mut String,
-    name: &str,
-    channel: &ChannelSummary,
-) -> std::fmt::Result {
-    write!(
-        text,
-        "{name}: {}, rms residual {:.4e} {}, {}, {}",
-        channel.kind,
-        channel.rms_residual,
-        channel.unit,
-        fit_in_words(channel.fit_percent),
-        count(channel.samples, "sample")
-    )?;
-    if channel.outliers > 0 {
-        write!(text, "; {} rejected", count(channel.outliers, "outlier"))?;
-    }
-    for ignored in &channel.ignored {
-        write!(text, "; {} not used ({})", ignored.samples, ignored.reason)?;
-    }
-    writeln!(text)?;
-    if let (Some(sigma), true) = (channel.sigma, channel.sigma_estimated) {
-        writeln!(text, "  sigma estimated: {sigma:.4e} {}", channel.unit)?;
-    }
-    if let Some(noise) = &channel.noise {
-        writeln!(text, "  {}", noise.sentence())?;
-    }
-    // Without a sigma the residuals are not assumed to be noise.
-    if channel.sigma.is_some() {
-        writeln!(text, "  {}", channel.whiteness)?;
-    }
-    Ok(())
-}
-
-/// Fit of a channel in per cent; samples that are all equal have none.
-pub(super) fn fit_in_words(percent: f64) -> String {
-    match percent.is_finite() {
-        true => format!("fit {}", fit_percent(percent)),
-        false => "fit undefined".into(),
-    }
-}
-
-/// Statistics of all samples and the step-size check.
-pub(super) fn write_statistics(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
-    let statistics = &document.statistics;
-    if let Some(reduced) = statistics.reduced_chi_square {
-        write!(
-            text,
-            "chi-square per degree of freedom {} ({} samples, {} parameters)",
-            significant(reduced, 4),
-            statistics.samples,
-            statistics.parameters
-        )?;
-        match (statistics.aic, statistics.bic) {
-            (Some(aic), Some(bic)) => {
-                let [aic, bic] = [aic, bic].map(|x| significant(x, 5));
-                writeln!(text, ", AIC {aic}, BIC {bic}")?;
-            }
-            _ => writeln!(text)?,
-        }
-    }
-    match &document.step_check {
-        Some(half) if !half.change_per_sample.is_finite() => {
-            writeln!(text, "step-size check: the response is zero")
-        }
-        Some(half) => writeln!(
-            text,
-            "step-size check: halving the step changes the response by at most {} % of its peak",
-            at_most(100.0 * half.change_per_sample, 2)
-        ),
-        None if !document.is_simulated() => Ok(()),
-        None => writeln!(text, "step-size check: no response with half the step"),
-    }
-}
-
 /// Nuisance parameters with their confidence intervals.
 pub(super) fn write_nuisance_parameters(
     text: &mut String,
@@ -284,80 +198,6 @@ pub(super) fn write_nuisance_parameters(
             }
             None => writeln!(text, "{name} = {} {unit}", significant(parameter.value, 6))?,
         }
-    }
-    Ok(())
-}
-
-/// Iterations in all, and in parentheses those of the reported fit and of the others: along the path of weights, or from other
-/// starting points.
-pub(super) fn iterations(document: &ResultDocument) -> String {
-    let last = document.counts.iterations;
-    let attempts = document.attempts.iter().map(|attempt| attempt.iterations);
-    let (others, what) = match &document.weights {
-        Some(weights) => {
-            let fits = count(weights.path.len(), "weight");
-            (weights.iterations(), format!("along the path of {fits}"))
-        }
-        None if document.attempts.len() < 2 => (0, String::new()),
-        // Sigma is estimated after the attempts.
-        None if document.estimates_sigma() => (attempts.sum(), "before sigma was estimated".into()),
-        None => (
-            attempts.sum::<u64>().saturating_sub(last),
-            "in other attempts".into(),
-        ),
-    };
-    let all = count((last + others) as usize, "iteration");
-    match what.is_empty() {
-        true => all,
-        false => format!("{all} ({last} in the final fit, {others} {what})"),
-    }
-}
-
-/// Numbers with five decimals, or in powers of ten if the largest is below 0.01 or at least 10^6. Zero has no sign.
-pub(super) fn alike<const N: usize>(numbers: [f64; N]) -> [String; N] {
-    let largest = numbers.iter().fold(0.0f64, |most, x| most.max(x.abs()));
-    match largest == 0.0 || (1e-2..1e6).contains(&largest) {
-        true => numbers.map(decimals),
-        false => numbers.map(|x| format!("{x:.5e}")),
-    }
-}
-
-fn decimals(x: f64) -> String {
-    let text = format!("{x:.5}");
-    match text.strip_prefix('-') {
-        Some(zero) if zero.bytes().all(|b| b == b'0' || b == b'.') => zero.into(),
-        _ => text,
-    }
-}
-
-fn write_functions(text: &mut String, document: &ResultDocument) -> std::fmt::Result {
-    let has_truth = document
-        .functions
-        .values()
-        .any(|f| f.truth_max_error.is_some());
-    let longest = document.functions.keys().map(String::len).max();
-    let width = longest.unwrap_or(0).max(10);
-    write!(text, "{:<width$} {:>12} {:>12}", "function", "min", "max")?;
-    if has_truth {
-        write!(text, " {:>14} {:>14}", "max error", "rms error")?;
-    }
-    writeln!(text)?;
-    for (name, function) in document.all_functions() {
-        let [min, max] = match function.negligible {
-            true => [0.0; 2].map(decimals),
-            false => alike([function.min, function.max]),
-        };
-        write!(text, "{name:<width$} {min:>12} {max:>12}")?;
-        if let (Some(most), Some(rms)) = (function.truth_max_error, function.truth_rms_error) {
-            write!(text, " {most:>14.3e} {rms:>14.3e}")?;
-        }
-        let is_identifiable = function.verdict != Some(ClassificationKind::NotIdentified);
-        match function.standard_error.filter(|_| !function.negligible) {
-            _ if !is_identifiable => write!(text, "  not identifiable")?,
-            Some(error) => write!(text, "  s.e. {error:.2e}")?,
-            None => {}
-        }
-        writeln!(text)?;
     }
     Ok(())
 }
@@ -467,15 +307,6 @@ pub fn prediction_table(predictions: &[Prediction], is_rotation: bool) -> String
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn zero_has_no_sign() {
-        assert_eq!(decimals(-1e-9), "0.00000");
-        assert_eq!(decimals(-0.0), "0.00000");
-        assert_eq!(decimals(-1e-5), "-0.00001");
-        assert_eq!(decimals(-0.09917), "-0.09917");
-        assert_eq!(decimals(12.0), "12.00000");
-    }
 
     #[test]
     fn counts_have_singular_and_plural() {

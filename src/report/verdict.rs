@@ -44,7 +44,7 @@ impl FittedModel<'_> {
         reasons.extend(missing.map(|term| VerdictReason::MissingTerm(*term)));
         if self.model.has_unknown_mass {
             // Ratios are what is reported.
-            reasons.retain(|reason| !matches!(reason, VerdictReason::OnlyRatios { .. }));
+            reasons.retain(|reason| !matches!(reason, VerdictReason::OnlyRatios));
         }
         reasons.extend(self.implausible().map(VerdictReason::ImplausibleUnits));
         let has_units = |r: &VerdictReason| matches!(r, VerdictReason::ImplausibleUnits(_));
@@ -53,11 +53,15 @@ impl FittedModel<'_> {
             reasons.push(VerdictReason::DoubtfulUnits);
         }
         let balance = self.run_assessment.balance.as_ref();
-        reasons.extend(balance.and_then(of_balance));
+        match self.run_assessment.lacks_force() {
+            true => reasons.push(VerdictReason::UnmeasuredForce),
+            false => reasons.extend(balance.and_then(of_balance)),
+        }
         let has_mode = |r: &VerdictReason| matches!(r, VerdictReason::SecondMode { .. });
         if !reasons.iter().any(has_mode) {
             reasons.extend(self.model.warnings.iter().find_map(two_modes));
         }
+        reasons.extend(self.model.warnings.iter().filter_map(repeated_record));
         let faults: BTreeMap<String, VerdictReason> = (self.model.warnings.iter())
             .filter_map(faulty_samples)
             .map(|reason| (format!("{reason:?}"), reason))
@@ -170,6 +174,12 @@ impl FittedModel<'_> {
         let estimates = is_system.then(|| self.estimates())?;
         let mut all = estimates.0.iter();
         let frequency = all.find(|(name, _)| name == "natural_frequency")?.1.value;
+        // A system without a spring has none.
+        let frequency = if frequency == 0.0 {
+            f64::NAN
+        } else {
+            frequency
+        };
         let largest = |list: &[f64]| list.iter().fold(0.0f64, |most, x| most.max(x.abs()));
         let responses = self.fit.best.evaluation.trajectories.iter();
         let response = responses.fold([0.0f64; 2], |most, response| {
@@ -255,6 +265,14 @@ impl FittedModel<'_> {
         {
             self.unit(function).clone_into(&mut estimate.unit);
         }
+        if self.run_assessment.lacks_force() {
+            let is_damping = |name: &str| matches!(name, "damping" | "damping_ratio" | "c_over_m");
+            for (_, estimate) in found.iter_mut().filter(|(name, _)| is_damping(name)) {
+                estimate.value = f64::NAN;
+                estimate.range = None;
+                estimate.status = EstimateStatus::NotIdentifiable;
+            }
+        }
         found
     }
 }
@@ -288,6 +306,16 @@ fn two_modes(warning: &Finding) -> Option<VerdictReason> {
     let frequencies: Vec<f64> = frequencies.iter().filter_map(|f| f.as_f64()).collect();
     Some(VerdictReason::SecondMode {
         frequencies: frequencies.try_into().ok()?,
+    })
+}
+
+/// A record that is listed twice, from a warning about the data.
+fn repeated_record(warning: &Finding) -> Option<VerdictReason> {
+    (warning.kind == "repeated_record").then_some(())?;
+    let text = |name: &str| Some(warning.quantities.get(name)?.as_str()?.to_owned());
+    Some(VerdictReason::RepeatedRecord {
+        experiment: text("experiment")?,
+        other: text("other")?,
     })
 }
 
@@ -354,6 +382,9 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
         VerdictReason::Saturation { channel } => {
             format!("the {channel} saturates: many samples equal the largest one")
         }
+        VerdictReason::RepeatedRecord { experiment, other } => {
+            format!("{experiment} has the samples of {other}, which the intervals count twice")
+        }
         VerdictReason::FaultySamples {
             experiment,
             channel,
@@ -397,12 +428,21 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
         VerdictReason::CoarseBasis { function } => {
             format!("the {function} varies more than its basis allows")
         }
+        VerdictReason::FastVariation { functions } => format!(
+            "the {} can vary within a period, which offsets, harmonics and second modes look like",
+            and_list(functions)
+        ),
+        VerdictReason::Oscillates {
+            function,
+            frequency,
+        } => super::findings::oscillates(function, *frequency),
+        VerdictReason::InterpolationLoss { input, share } => format!(
+            "lines between the samples of the {} lose {} of it at the natural frequency",
+            input.name().replace('_', " "),
+            percent(100.0 * share, 2)
+        ),
         VerdictReason::ColouredResiduals => {
             "the residuals are autocorrelated beyond the noise model".to_owned()
-        }
-        VerdictReason::Gap { span } => {
-            let [from, to] = span.map(|time| significant(time, 4));
-            format!("the records have a gap from {from} to {to} s")
         }
         VerdictReason::Aliased { per_period } => format!(
             "aliasing: with {per_period:.1} samples per period other frequencies fit equally well"
@@ -427,15 +467,9 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
         } => {
             format!("at most {rank_bound} of {parameters} parameter combinations are identifiable")
         }
-        VerdictReason::OnlyRatios { fixed } => match fixed.is_empty() {
-            true => {
-                "no force is measured: the samples determine ratios to the mass only".to_owned()
-            }
-            false => format!(
-                "no force is measured: the samples determine ratios only, with the {} fixed by the model",
-                and_list(fixed)
-            ),
-        },
+        VerdictReason::OnlyRatios => {
+            "no force is measured: the samples determine ratios to the mass only".to_owned()
+        }
         VerdictReason::ImplausibleUnits(implausible) => {
             let (quantity, value, unit) = match implausible {
                 Implausible::NaturalFrequency { value } => ("natural frequency", value, "Hz"),
@@ -449,6 +483,9 @@ pub fn reason_in_words(reason: &VerdictReason) -> Finding {
         }
         VerdictReason::DoubtfulUnits => {
             "a unit may be wrong: the warnings about the data state what shows it".to_owned()
+        }
+        VerdictReason::UnmeasuredForce => {
+            "no force is measured and an unknown one acts: the damping is not identifiable from this record by this method".to_owned()
         }
         VerdictReason::EquationResidual { share } => format!(
             "the residual of the equation of motion is {} of its largest force",
@@ -474,6 +511,10 @@ pub fn assumption(assumption: &VerdictAssumption) -> Finding {
         } => format!(
             "the units of the {channel} and of the input of {experiment} are right: an error of either changes mass, damping and \
              stiffness by the same factor"
+        ),
+        VerdictAssumption::Scale { functions } => format!(
+            "the {} fixed by the model is right: no force is measured, and the other coefficients scale with it",
+            and_list(functions)
         ),
     };
     Finding::of(assumption, text)

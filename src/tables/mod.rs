@@ -24,4 +24,6 @@ pub use resample::resample;
 pub use stated::StatedUnit;
 pub(crate) use table::TABLE;
 pub use table::Table;
-pub use times::{SAMPLE_RATES, equally_spaced, equally_spaced_at, increasing, increasing_at};
+pub use times::{
+    SAMPLE_RATES, equally_spaced, equally_spaced_at, increasing, increasing_at, without_rounding,
+};

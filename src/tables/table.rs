@@ -254,6 +254,11 @@ impl Table {
 
     fn from_text(path: &Path, bytes: Vec<u8>, format: &TableFormat) -> Result<Self, InputError> {
         let (text, encoding) = decode(path, bytes)?;
+        if is_model(&text) {
+            return Err(InputError::file(path, "a model file in place of data")
+                .expected(TABLE)
+                .hint("name the record; `kmcfit fit` and `kmcfit check` read models"));
+        }
         let text = with_newlines(text);
         check_lines(path, &text)?;
         let layout = detect(path, &text, format);
@@ -505,4 +510,10 @@ fn ragged(place: Location, fields: &StringRecord, expected: usize, named: bool) 
         return error.hint("write numbers with a decimal point, not a comma");
     }
     error
+}
+
+/// True for the text of a model file: a line that begins with each of its first keys.
+fn is_model(text: &str) -> bool {
+    let has = |key: &str| text.lines().any(|line| line.starts_with(key));
+    has("format:") && has("experiments:") && has("functions:")
 }

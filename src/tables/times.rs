@@ -42,6 +42,63 @@ pub fn increasing_at(table: &Table, index: usize) -> Result<&[f64], InputError> 
     }
 }
 
+/// Fewest times whose rounding is judged, and most decimals of printed times.
+const FEWEST: usize = 8;
+const MOST_DECIMALS: usize = 12;
+/// Rounding of printed times, relative to the step, above which they are no longer equally spaced for certain.
+const COARSE: f64 = 0.2;
+
+/// Times `t_i = t_0 + i dt` without the rounding of their printed digits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExactTimes {
+    /// The times.
+    pub times: Vec<f64>,
+    /// Their step.
+    pub step: f64,
+    /// Decimals with which they were printed.
+    pub digits: usize,
+}
+
+/// Times that are equally spaced where all deviations are within the rounding of their printed digits; `None` for others, and for those that
+/// are equally spaced as they are.
+pub fn without_rounding(times: &[f64]) -> Option<ExactTimes> {
+    let (&[first, .., last], count) = (times, times.len()) else {
+        return None;
+    };
+    (count >= FEWEST).then_some(())?;
+    let intervals = (count - 1) as f64;
+    let chord = (last - first) / intervals;
+    let deviation = |step: f64| {
+        let off = times.iter().enumerate();
+        off.fold(0.0f64, |most, (i, t)| {
+            most.max((t - first - i as f64 * step).abs())
+        })
+    };
+    let largest = deviation(chord);
+    if largest <= SPACING_TOLERANCE * chord || largest > COARSE * chord {
+        return None;
+    }
+    let is_printed = |digits: &usize| {
+        let scale = 10f64.powi(*digits as i32);
+        let is_whole = |t: &f64| {
+            let whole = t * scale;
+            (whole - whole.round()).abs() <= 1e-3f64.max(4.0 * f64::EPSILON * whole.abs())
+        };
+        times.iter().all(is_whole)
+    };
+    let digits = (0..=MOST_DECIMALS).find(is_printed)?;
+    let rounding = 10f64.powi(-(digits as i32));
+    // The first and the last time are rounded as well. A whole rate within their rounding is the rate.
+    let rate = 1.0 / chord;
+    let is_whole = (rate.round() / rate - 1.0).abs() <= rounding / (last - first);
+    let step = if is_whole { 1.0 / rate.round() } else { chord };
+    (deviation(step) <= rounding * 1.001).then(|| ExactTimes {
+        times: (0..count).map(|i| first + i as f64 * step).collect(),
+        step,
+        digits,
+    })
+}
+
 /// The step dt, in the unit of the column, of times t_i = t_0 + i dt.
 ///
 /// The step is the mean spacing, (t_last - t_0)/(rows - 1). Spacings are compared with their median, so that a single
@@ -136,4 +193,26 @@ pub(super) fn not_increasing(table: &Table, column: &str, times: &[f64], row: us
 /// A spacing without the last digits, which are rounding errors of the difference.
 fn spacing(value: f64) -> f64 {
     format!("{value:.9e}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn printed_times_are_equally_spaced_within_their_rounding() {
+        let printed = |digits: i32, at: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            let scale = 10f64.powi(digits);
+            (0..500).map(|i| (at(i) * scale).round() / scale).collect()
+        };
+        let even = |i: usize| i as f64 / 2048.0;
+        let found = without_rounding(&printed(6, &even)).unwrap();
+        assert_eq!((found.step, found.digits), (1.0 / 2048.0, 6));
+        assert_eq!(found.times[499], even(499));
+        // A clock that jitters by 2 % of a step is none, nor one with exact times.
+        let jitter = |i: usize| even(i) + 1e-5 * (7.0 * i as f64).sin();
+        assert_eq!(without_rounding(&printed(6, &jitter)), None);
+        assert_eq!(without_rounding(&printed(10, &even)), None);
+        assert_eq!(without_rounding(&printed(3, &even)), None);
+    }
 }

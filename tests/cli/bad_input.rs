@@ -16,10 +16,7 @@ fn refused(bench: &Workbench, arguments: &[&str]) -> String {
 /// Message about a model and its samples; `fit` and `check` print the same.
 fn message(bench: &Workbench) -> String {
     let message = refused(bench, &["fit", "model.yaml", "--out", "out"]);
-    assert_eq!(
-        refused(bench, &["check", "model.yaml", "--gradient"]),
-        message
-    );
+    assert_eq!(refused(bench, &["check", "model.yaml"]), message);
     message
 }
 
@@ -222,11 +219,6 @@ fn too_many_nodes_are_refused() {
       found: 100000000000 nodes with 1 or more parameters
       expected: at most 1000000000 nodes
     ");
-    assert_snapshot!(with(&["check", "--gradient"]), @"
-    error: --nodes: too many nodes
-      found: 100000000000 nodes with 64 or more parameters
-      expected: at most 15625000 nodes
-    ");
     assert_snapshot!(with_nodes("study", "100000000000"), @"
     error: model.yaml:8:15: grid.nodes: too many nodes
       |
@@ -427,22 +419,6 @@ fn simulate_arguments() {
     7 | grid: {nodes: 21, method: midpoint}
       |       ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
       expected: `duration` in s, because there is no record
-    ");
-}
-
-#[test]
-fn check_arguments() {
-    let bench = Workbench::with_small_model();
-    let with = |more: &[&str]| {
-        refused(
-            &bench,
-            &[&["check", "model.yaml", "--gradient"], more].concat(),
-        )
-    };
-    assert_snapshot!(with(&["--nodes", "1"]), @"
-    error: --nodes: invalid number of nodes
-      found: 1
-      expected: 3 or more
     ");
 }
 

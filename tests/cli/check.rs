@@ -1,27 +1,7 @@
-//! `kmcfit check`: validation, and gradients against finite differences.
+//! `kmcfit check`: the overview of a model.
 
 use crate::workbench::{MODEL, Workbench};
 use insta::assert_snapshot;
-
-/// On coarse grids the error of the continuous gradient has a floor, which is not a failure: the exit code depends on the
-/// discrete gradient.
-#[test]
-fn discrete_gradient_passes_where_the_continuous_one_has_a_floor() {
-    let bench = Workbench::with_shipped_models();
-    let check = [
-        "check",
-        "models/paper.yaml",
-        "--gradient",
-        "--nodes",
-        "1000,2000",
-    ];
-    let stdout = bench.run_to(0, &check);
-    assert!(
-        stdout.ends_with("the discrete gradient is exact: smallest relative error below 1e-6\n")
-    );
-    assert_eq!(stdout.matches("discrete  ").count(), 2, "{stdout}");
-    assert_eq!(stdout.matches("continuous  ").count(), 2, "{stdout}");
-}
 
 #[test]
 fn the_overview_writes_nothing() {
@@ -41,33 +21,18 @@ fn the_overview_writes_nothing() {
 }
 
 #[test]
-fn a_model_with_fixed_functions_has_no_gradient() {
+fn a_model_with_fixed_functions_is_said_to_have_no_parameters() {
     let bench = Workbench::with_small_model();
     let model = MODEL.replace("basis: nodal, start", "fixed");
     bench.write(
         "model.yaml",
         &model.replace("basis: constant, start", "fixed"),
     );
-    let (code, stdout, stderr) = bench.run(&["check", "model.yaml", "--gradient"]);
+    let (code, stdout, stderr) = bench.run(&["check", "model.yaml"]);
     assert_eq!(code, 0);
     assert!(stdout.contains("0 parameters"), "{stdout}");
     assert_eq!(
         stderr,
         "warning: every function is fixed: there are no parameters to estimate\n"
     );
-}
-
-/// The steps of the differences scale with the cost: a chi-square of a million is checked as accurately as an integral of
-/// a hundred.
-#[test]
-fn steps_follow_the_size_of_the_cost() {
-    let bench = Workbench::with_shipped_models();
-    let model = bench.read("models/paper-lbfgs.yaml");
-    let sigma = |sigma: &str| format!("    sigma: {{displacement: {sigma}}}\n    initial:");
-    for value in ["1e-4", "0.1", "1e4"] {
-        let spoilt = model.replace("    initial:", &sigma(value));
-        bench.write("models/sigma.yaml", &spoilt);
-        let stdout = bench.run_to(0, &["check", "models/sigma.yaml", "--gradient"]);
-        assert!(stdout.contains("exact"), "{value}: {stdout}");
-    }
 }

@@ -215,6 +215,7 @@ fn init_prints_the_properties_of_the_record() {
         columns: {time: "Time [ms]", displacement: Weg_mm}  # by name or by number from 1
         units: {displacement: mm}                     # converted to SI
         sigma: {displacement: estimate}               # standard deviation of a sample, SI; give a number if it is known
+        sensors: {displacement: {offset: estimate}}   # the zero of a displacement is seldom that of the rest position; remove the line if yours is
         initial: estimate                             # or {displacement: …, velocity: …} in m and m/s
     grid: {nodes: auto}                               # chosen from the spectrum of the record
     functions:

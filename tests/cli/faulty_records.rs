@@ -52,7 +52,13 @@ fn a_delay_of_one_of_two_inputs_is_refused() {
         "sensors: {force: {delay: estimate}}",
     );
     let model = bench.read("model.yaml");
-    let both = model.replace("force: F_N", "force: F_N, base_acceleration: F_N");
+    let record = bench.read("record.csv");
+    let wider = record.lines().enumerate().map(|(i, line)| match i {
+        0 => format!("{line},b_m_per_s2\n"),
+        _ => format!("{line},{}\n", i % 7),
+    });
+    bench.write("record.csv", &wider.collect::<String>());
+    let both = model.replace("force: F_N", "force: F_N, base_acceleration: b_m_per_s2");
     assert_ne!(both, model);
     bench.write("model.yaml", &both);
     let (code, _, stderr) = bench.run(&["check", "model.yaml"]);
@@ -72,13 +78,13 @@ fn repeated_times_are_merged_by_a_setting() {
     );
     lines.insert(9, lines[8].clone());
     bench.write("samples.csv", &(lines.join("\n") + "\n"));
-    let found = bench.run_to(0, &["init", "samples.csv"]);
-    assert!(
-        found.contains("times are repeated in lines 7, 10"),
-        "{found}"
-    );
+    bench.run_to(0, &["init", "samples.csv"]);
     let model = bench.read("samples.yaml");
     assert!(model.contains("    duplicates: first"), "{model}");
+    assert!(
+        model.contains("times are repeated in lines 7, 10"),
+        "{model}"
+    );
     let shown = bench.run_to(0, &["check", "samples.yaml"]);
     assert!(
         shown.contains("2 rows repeat a time (lines 7, 10): the first row of each time is used"),

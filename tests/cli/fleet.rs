@@ -111,7 +111,7 @@ fn each_record_has_the_estimates_of_its_own_fit() {
     assert_eq!(self::rows(&bench, "one"), rows);
 }
 
-/// A record that cannot be fitted has a row with its error, and stops no other one; after a repair it is fitted again on request. A hostile
+/// A record that cannot be fitted has a row with its error, and stops no other one; after a repair it is fitted again. A hostile
 /// name is a text.
 #[test]
 fn bad_records_are_rows() {
@@ -141,8 +141,7 @@ fn bad_records_are_rows() {
     assert!(!page.contains("<img"), "markup of a name");
     roxmltree::Document::parse(page.trim_start_matches("<!DOCTYPE html>\n")).expect("well-formed");
     bench.write("records/broken.csv", &record(2.1));
-    assert!(bench.run_to(0, &fleet).contains("2 errors"));
-    let out = bench.run_to(0, &[&fleet[..], &["--retry-errors"]].concat());
+    let out = bench.run_to(0, &fleet);
     assert!(
         out.contains("1 error\n") && error("records/broken.csv").is_empty(),
         "{out}"
@@ -208,10 +207,10 @@ fn a_table_lists_records() {
     let bench = bench(3);
     bench.write(
         "list.csv",
-        "file,mass,start,end,functions.damping.start,date\n\
-         records/r01.csv,2.0,0,5,0.2,2026-01-01\n\
-         records/r02.csv,,1,,,2026-02-01\n\
-         records/r03.csv,4.0,,,,2026-03-01\n",
+        "file,mass,experiments.0.window.min,experiments.0.window.max,functions.damping.start,load\n\
+         records/r01.csv,2.0,0,5,0.2,10\n\
+         records/r02.csv,,1,,,20\n\
+         records/r03.csv,4.0,,,,30\n",
     );
     bench.run_to(
         0,
@@ -222,18 +221,18 @@ fn a_table_lists_records() {
             "--out",
             "fleet",
             "--trend",
-            "date",
+            "load",
         ],
     );
     let rows = rows(&bench, "fleet");
     let mass = |name: &str| rows[name]["estimates"]["mass"]["value"].as_f64();
     let names = ["records/r01.csv", "records/r02.csv", "records/r03.csv"];
     assert_eq!(names.map(mass), [2.0, 1.0, 4.0].map(Some));
-    assert!(bench.read("fleet/fleet.html").contains("over date"));
+    assert!(bench.read("fleet/fleet.html").contains("over load"));
     assert!(
         bench
             .read("fleet/rows.csv")
-            .starts_with("record,table_date,")
+            .starts_with("record,table_load,")
     );
 }
 
@@ -285,12 +284,10 @@ fn wrong_arguments() {
     bench.write("twice.csv", "file,file\na,b\n");
     bench.write("empty.csv", "file\n");
     bench.write("value.csv", "file,functions.mass\nrecords/r01.csv,}\n");
-    bench.write("path.csv", "Path,mass\nrecords/r01.csv,1\n");
     bench.write("equal.csv", "file,mass,mass\nrecords/r01.csv,1,50\n");
     bench.write("same.csv", "file,x,x\nrecords/r01.csv,1,50\n");
     bench.write("own/summary.json", "{}");
     let all = [
-        run(&["model.yaml", "path.csv", "--out", "fleet"]),
         run(&["model.yaml", "equal.csv", "--out", "fleet"]),
         run(&["model.yaml", "same.csv", "--out", "fleet"]),
         run(&["model.yaml", "records/*.csv", "--out", "own"]),
@@ -354,7 +351,6 @@ fn other_fleets_are_refused() {
     bench.run_to(0, &["fit", "model.yaml", "--out", "run", "--no-report"]);
     bench.write("other.yaml", &MODEL.replace("start: 0.1", "start: 0.2"));
     let mut all = vec![
-        refused(&["fleet", "model.yaml", "records/r01.csv", "--out", "fleet"]),
         refused(&["fleet", "model.yaml", "list.csv", "--out", "run"]),
         refused(&[&fleet[..], &["--trend", "note"]].concat()),
         refused(&["fleet", "other.yaml", "list.csv", "--out", "fleet"]),

@@ -39,7 +39,7 @@ fn keys(text: &str) -> String {
 fn several_records_are_the_experiments_of_one_model() {
     let bench = Workbench::empty();
     bench.write("hit_1.csv", &decay("t,y", 1000.0, 1000.0));
-    bench.write("hit_2.csv", &decay("t,y", 1000.0, 1000.0));
+    bench.write("hit_2.csv", &decay("t,y", 1000.0, 900.0));
     let arguments = [
         "init",
         "hit_1.csv",
@@ -76,12 +76,14 @@ fn several_records_are_the_experiments_of_one_model() {
         columns: {time: t, displacement: y}
         units: {time: ms, displacement: mm}
         sigma: {displacement: estimate}
+        sensors: {displacement: {offset: estimate}}
         initial: estimate
       - name: "record 2: hit_2"
         data: hit_2.csv
         columns: {time: t, displacement: y}
         units: {time: ms, displacement: mm}
         sigma: {displacement: estimate}
+        sensors: {displacement: {offset: estimate}}
         initial: estimate
     grid: {nodes: auto}
     functions:
@@ -257,9 +259,9 @@ fn an_unknown_mass_leaves_ratios() {
     Adequate   no significant autocorrelation of the residuals; step-size, refinement and missing-term checks passed
 
                                 estimate  95 % CI               unit   status
-    undamped natural frequency  2.000001  1.999957 to 2.000045  Hz     estimated
+    undamped natural frequency  2.000001  1.999957 to 2.000046  Hz     estimated
     damping ratio               0.010047  0.010025 to 0.010069         estimated
-    stiffness / mass            157.9138  157.9068 to 157.9208  1/s^2  estimated
+    stiffness / mass            157.9139  157.9068 to 157.9209  1/s^2  estimated
     damping / mass               0.25250  0.25195 to 0.25306    1/s    estimated
 
     Mass   the mass is unknown: all coefficients are ratios to it; `--set functions.mass.fixed=4.5` (kg) states it

@@ -183,12 +183,13 @@ fn forces() {
         force("base: {interpolation: hold}"),
         changed(&[(
             "force: f}",
-            "force: f, base_acceleration: a, base_displacement: y}",
+            "force: f, base_acceleration: s, base_displacement: t}",
         )]),
         changed(&[(
             "initial: {displacement: 1.0, velocity: estimate}",
             "force: {shape: constant, amplitude: 1.0}\n    initial: estimate",
         )]),
+        changed(&[("force: f}", "force: y}")]),
     ];
     assert_snapshot!(all.join("\n"));
 }

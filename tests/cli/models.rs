@@ -170,8 +170,9 @@ fn paper() {
     assert_eq!(result["counts"]["iterations"], 1000);
     assert_eq!(result["counts"]["forward"], 50_001);
     assert!(stdout.starts_with(
-        "The paper's run, start (2, 1, 1): 2000 samples, 25 s\nCheck      at most 1999 of 6000 "
+        "The paper's run, start (2, 1, 1): 2000 samples, 25 s\nCheck      at most 1999 of 6000 parameter combinations"
     ));
+    assert!(stdout.contains("at most 1999 of 6000 parameter combinations are identifiable"));
     let ratio = result["cost"]["ratio"].as_f64().expect("a number");
     assert!((ratio / 8.130_155_3e-5 - 1.0).abs() < 1e-7, "{ratio}");
     left_behind(bench, "runs/paper");
@@ -495,6 +496,12 @@ fn moving_support() {
     let (_, result) = fitted("moving-support", 0);
     assert_eq!(result["outcome"]["status"], "converged");
     assert_eq!(result["model"]["cost_kind"], "equation-error");
+    // The force is not measured.
+    let damping = &result["estimates"]["damping"];
+    assert_eq!(damping["status"], "not_identifiable", "{damping}");
+    assert!(damping["value"].is_null(), "{damping}");
+    let reasons = result["verdict"]["reasons"].as_array().expect("a list");
+    assert!(reasons.iter().any(|r| r["kind"] == "unmeasured_force"));
 }
 
 /// Two free records give the ratios and leave the scale; a force gives the scale as well.

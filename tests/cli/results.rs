@@ -163,6 +163,7 @@ fn polynomials_are_given_in_powers_of_t() {
 fn a_coarse_fit_starts_a_finer_one() {
     let bench = bench();
     let noise = ["--noise", "0.02", "--seed", "3", "--out", "samples.csv"];
+    std::fs::remove_file(bench.path("samples.csv")).expect("a file can be removed");
     bench.run_to(0, &[&["simulate", "device.yaml"][..], &noise].concat());
     let model = |knots: usize, start: [&str; 3]| {
         let [mass, damping, stiffness] = start;

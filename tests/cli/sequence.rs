@@ -20,6 +20,9 @@ fn bench() -> Workbench {
     let bench = Workbench::with_shipped_models();
     let simulate = ["simulate", "models/paper-device.yaml", "--nodes", "401"];
     let noise = ["--noise", "0.1", "--seed", "1", "--out", "data/noisy.csv"];
+    for name in ["data/paper.csv", "data/noisy.csv"] {
+        std::fs::remove_file(bench.path(name)).expect("a file can be removed");
+    }
     bench.run_to(0, &[&simulate[..], &["--out", "data/paper.csv"]].concat());
     bench.run_to(0, &[&simulate[..], &noise].concat());
     for name in MODELS {

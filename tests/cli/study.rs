@@ -38,8 +38,8 @@ fn bench() -> Workbench {
     let mut text = String::from("t_s,y_m\n");
     for i in 0..201 {
         let t = 0.05 * f64::from(i);
-        // Deterministic noise: a sum of tones that no system of the model contains.
-        let noise = 0.01 * ((37.0 * t).sin() + (53.0 * t + 1.0).cos() + (71.0 * t).sin());
+        // Uniform pseudorandom noise.
+        let noise = 0.035 * ((12.9898 * f64::from(i)).sin() * 43_758.545).fract();
         let y = (-0.1 * t).exp() * (1.99 * t).cos() + noise;
         text += &format!("{t},{y}\n");
     }
@@ -192,5 +192,75 @@ fn a_study_of_a_rotation_has_its_units() {
     }
     for unit in ["kg (", "N s/m", "N/m^3"] {
         assert!(!text.contains(unit), "{unit}\n{text}");
+    }
+}
+
+/// A record of 40 s of a mass that falls linearly from 50 to 38 kg on a spring of 2000 N/m.
+fn falling_mass() -> String {
+    let step = 0.005;
+    let slope = |t: f64, y: f64, v: f64| [v, -(2000.0 * y + 4.0 * v) / (50.0 - 0.3 * t)];
+    let (mut y, mut v) = (0.1, 0.0);
+    let mut text = String::from("t_s,y_m\n");
+    for i in 0..=8000 {
+        let t = step * f64::from(i);
+        if i % 4 == 0 {
+            let x = (f64::from(i) * 12.9898 + 4.1).sin() * 43_758.545_3;
+            text += &format!("{t:.2},{}\n", y + 2e-3 * (x - x.floor() - 0.5));
+        }
+        let a = slope(t, y, v);
+        let b = slope(t + 0.5 * step, y + 0.5 * step * a[0], v + 0.5 * step * a[1]);
+        let c = slope(t + 0.5 * step, y + 0.5 * step * b[0], v + 0.5 * step * b[1]);
+        let d = slope(t + step, y + step * c[0], v + step * c[1]);
+        y += step / 6.0 * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0]);
+        v += step / 6.0 * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1]);
+    }
+    text
+}
+
+/// On 6001 nodes the bands have every second node; the means of functions and ratios are those of the estimates of the fit, with their
+/// intervals, whether the model or its run is studied.
+#[test]
+fn a_study_has_the_means_of_the_fit() {
+    let bench = Workbench::empty();
+    bench.write("samples.csv", &falling_mass());
+    bench.write(
+        "model.yaml",
+        "format: 1\nexperiments:\n  - data: samples.csv\n    sigma: {displacement: estimate}\n    initial: estimate\n\
+         grid: {nodes: 6001}\nfunctions:\n  mass: {basis: polynomial, degree: 1, start: 45.0, min: 1.0}\n  \
+         damping: {basis: constant}\n  stiffness: {fixed: 2000.0}\n",
+    );
+    bench.run_to(0, &["fit", "model.yaml", "--no-report"]);
+    let fit: Value = serde_json::from_str(&bench.read("runs/model/result.json")).expect("JSON");
+    for studied in ["model.yaml", "runs/model"] {
+        let text = bench.run_to(0, &["study", studied, "--out", "studied"]);
+        let study = document(&bench, "studied");
+        let bands = study["bands"]["bands"].as_array().expect("bands");
+        for (name, of_fit) in [
+            ("mass", "mass"),
+            ("damping", "damping"),
+            ("k/m", "k_over_m"),
+            ("c/m", "c_over_m"),
+            ("natural frequency", "natural_frequency"),
+            ("damping ratio", "damping_ratio"),
+        ] {
+            let band = bands.iter().find(|band| band["name"] == name).expect(name);
+            let estimate = &fit["estimates"][of_fit];
+            let number = |value: &Value| value.as_f64().expect(name);
+            let ends = |value: &Value| [number(&value[0]), number(&value[1])];
+            let [low, high] = ends(&estimate["ci95"]);
+            let error = 0.25 * (high - low);
+            let off = number(&band["mean"]) - number(&estimate["value"]);
+            assert!(
+                off.abs() < 1e-3 * error,
+                "{studied}, {name}: {off} of {error}"
+            );
+            let [from, to] = ends(&band["mean_95"]);
+            assert!(
+                (from - low).abs() < 1e-3 * error && (to - high).abs() < 1e-3 * error,
+                "{name}"
+            );
+        }
+        // The mean over the record, exactly 44 kg, in the text.
+        assert!(text.contains("mass: mean 4"), "{text}");
     }
 }

@@ -72,16 +72,6 @@ fn roles_of_experiments() {
                 (STIFFNESS, &shared),
             ],
         ),
-        changed(
-            "fit",
-            &[
-                (
-                    "grid: {nodes: 21",
-                    &second(&friction.replace("0.2}}", "auto}}")),
-                ),
-                (STIFFNESS, &shared),
-            ],
-        ),
         changed("fit", &[("    initial:", sensor), method]),
     ];
     assert_snapshot!(all.join("\n"));

@@ -91,10 +91,7 @@ fn models_that_expand_beyond_the_limit() {
         "*a, ".repeat(900)
     ));
     assert!(
-        said.contains("m.yaml:1:4: the aliases expand to too long a text")
-            && said.contains("found: more than 262144 bytes")
-            && said.contains("`*a` repeats the value of `&a` 900 times")
-            && said.contains("expected: at most 262144 bytes with all aliases written out"),
+        said.contains("m.yaml: the model file with aliases is too large"),
         "{said}"
     );
     let said = refuse("[".repeat(1000));

@@ -115,7 +115,6 @@ const ALONE: &[(&str, &str)] = &[
     ("linear-mass", "functions.stiffness={fixed: 1.0, knots: 3}"),
     ("linear-mass", "functions.stiffness={fixed: 1.0, min: 0.5}"),
     ("linear-mass", "functions.damping.width=1"),
-    ("linear-mass", "functions.damping.width=auto"),
     ("paper-lbfgs", "functions.mass.min=0.1"),
     (
         "knots",

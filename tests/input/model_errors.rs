@@ -621,6 +621,6 @@ fn repeated_aliases_are_limited() {
     assert_snapshot!(message(&bomb), @"
     m.yaml:2:8: experiments[0]: unknown key
       found: `b`
-      expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, duplicates, exclude, decimate, band, sigma, loss, noise, sensors, force, base, initial, functions, validation
+      expected: one of: name, data, format, columns, sample_rate, units, window, time_zero, duplicates, missing, exclude, decimate, band, sigma, loss, noise, sensors, force, base, initial, functions, validation
     ");
 }

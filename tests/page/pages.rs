@@ -140,3 +140,11 @@ pub fn pages() -> &'static Pages {
     static MADE: OnceLock<Pages> = OnceLock::new();
     MADE.get_or_init(Pages::make)
 }
+
+/// Fewest figures of a page: a comparison has one.
+pub fn least_figures(page: &str) -> usize {
+    match page.ends_with("compare.html") {
+        true => 1,
+        false => 2,
+    }
+}

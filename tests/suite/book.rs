@@ -62,9 +62,6 @@ fn models_are_valid_and_their_gradients_exact() {
         let printed = output(clone.path(), &format!("kmcfit check {name}"));
         assert!(printed.contains(expected[i]), "{printed}");
         assert!(!printed.contains("no response"), "{printed}");
-        let printed = output(clone.path(), &format!("kmcfit check {name} --gradient"));
-        let verdict = "the discrete gradient is exact: smallest relative error below 1e-6\n";
-        assert!(printed.ends_with(verdict), "{printed}");
         let printed = output(clone.path(), &format!("kmcfit fit {name}"));
         assert!(!printed.contains("warning"), "{printed}");
         let end = format!("results in runs/shown-{i}\n");

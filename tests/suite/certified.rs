@@ -164,7 +164,7 @@ fn certified_problems_are_solved_to_the_stated_digits() {
     let page = include_str!("../certified/README.md");
     let problems = problems();
     assert!(problems.len() >= FEWEST, "{}", problems.len());
-    map(problems.len(), available(), |i| {
+    let rows = map(problems.len(), available(), |i| {
         let problem = &problems[i];
         let name = text(problem, "name");
         let stated = both(problem, &[]);
@@ -186,6 +186,12 @@ fn certified_problems_are_solved_to_the_stated_digits() {
             auto[0].nodes,
         );
         println!("{row}");
-        assert!(page.contains(&row), "not on the page: {row}");
+        row
     });
+    let missing: Vec<String> = rows.into_iter().filter(|r| !page.contains(r)).collect();
+    assert!(
+        missing.is_empty(),
+        "not on the page:\n{}",
+        missing.join("\n")
+    );
 }

@@ -6,12 +6,11 @@ pub mod assessment {
         AmplitudeRival, BEYOND_SIGMA, BasisComparison, BasisTest, ClassicalEstimate,
         ClassicalMethod, CoarseBasis, EXACT, EquationErrorIntervals, Estimate, EstimateErrors,
         EstimateStatus, Extension, ExtensionTest, FitAssessment, FitStatistics, FitWarning,
-        FunctionInGap, FunctionSummary, GapAssessment, Implausible, LargeCovariance,
-        MOST_WITH_COVARIANCE, ModelTests, NoIntervals, POOR, Plausibility, RECOVERY_TOLERANCE,
-        RecordError, ResidualPattern, SampleFault, StepCheck, TruthErrors, Unidentified,
-        VerdictAssumption, VerdictLevel, VerdictReason, all_diagnostics, estimates,
-        function_summaries, outliers, pattern, standard_error, verdict_assumptions, verdict_level,
-        verdict_reasons,
+        FunctionSummary, Implausible, LargeCovariance, MOST_WITH_COVARIANCE, ModelTests,
+        NoIntervals, POOR, Plausibility, RECOVERY_TOLERANCE, RecordError, ResidualPattern,
+        SampleFault, StepCheck, TruthErrors, Unidentified, VerdictAssumption, VerdictLevel,
+        VerdictReason, all_diagnostics, estimates, function_summaries, outliers, pattern,
+        standard_error, verdict_assumptions, verdict_level, verdict_reasons,
     };
 }
 pub mod builder {
@@ -99,11 +98,10 @@ pub mod solvers {
         EquationPart, EquationShare, Fit, FitSettings, GridNotice, Initial, IterationEvent,
         IterationRecord, Measurements, MissingMeasurement, MissingTerm, Observer, OnNodes,
         Optimality, PathPoint, QpSolver, Reason, Solver, StartProjection, StartStrategy, Status,
-        Stopping, UnsupportedRecord, WeightPath, WidthNotice, active_constraints, choose_weight,
-        choose_weight_watched, cycles, equation_balance, equation_error, equation_rows, fit,
-        fit_from, fit_on_reduced_widths, fit_on_refined_grids, fit_with_noise,
-        fit_with_noise_watched, missing_terms, no_response, number_or_nan, predict_validation,
-        timed,
+        Stopping, UnsupportedRecord, WeightPath, active_constraints, choose_weight,
+        choose_weight_watched, equation_balance, equation_error, equation_rows, fit, fit_from,
+        fit_on_refined_grids, fit_with_noise, fit_with_noise_watched, missing_terms, no_response,
+        number_or_nan, predict_validation, timed,
     };
 }
 pub mod study {

@@ -35,8 +35,6 @@ pub struct ProblemParts {
     pub soft: Vec<RowGroup>,
     /// Jumps found in functions, on which all estimates are conditional.
     pub jumps: Vec<Jumps>,
-    /// True where the width of Coulomb friction approximates the width zero: intervals then include its error.
-    pub friction_is_ideal: bool,
 }
 
 /// Jumps found in a function by the rule `bic` of its total variation.
@@ -207,7 +205,6 @@ impl Problem {
             constraints: Constraints::default(),
             soft: Vec::new(),
             jumps: Vec::new(),
-            friction_is_ideal: false,
         };
         parts.check().map(|()| Self {
             parts,
@@ -222,11 +219,6 @@ impl Problem {
     pub fn with(mut self, change: impl FnOnce(&mut ProblemParts)) -> Result<Self, ProblemError> {
         change(self.parts_mut());
         self.parts.check().map(|()| self)
-    }
-
-    /// Lets the intervals include the error of the width of Coulomb friction.
-    pub fn idealise_friction(&mut self) {
-        self.parts.friction_is_ideal = true;
     }
 
     /// Adds constraints; groups with a penalty weight are soft.
@@ -433,7 +425,7 @@ mod tests {
         copy.parts_mut().experiments[0].initial.displacement = 0.5;
         assert_eq!(estimated(&copy, &[]), 1);
         assert_eq!(estimated(&problem, &[]), 0);
-        let changed = problem.with(|parts| parts.friction_is_ideal = true);
+        let changed = problem.with(|parts| parts.jumps.clear());
         assert_eq!(estimated(&changed.expect("consistent"), &[]), 1);
     }
 }

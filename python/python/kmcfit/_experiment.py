@@ -77,7 +77,7 @@ class Experiment:
     Notes
     -----
     The arrays are copied and never changed. What is not given is chosen from the record as ``kmcfit init`` chooses it: interpolation of the
-    input, offsets of sensors, a robust loss where there are outliers, and a window that leaves out a rest before the motion.
+    input, with `sigma` offsets of sensors and a robust loss where there are outliers, and a window that leaves out a rest before the motion.
     """
 
     def __init__(
@@ -161,7 +161,8 @@ class Experiment:
         spec["initial"] = _initial(initial)
         chosen = self._chosen_by_init(spec["units"])
         for key in ("window", "duplicates", "loss", "sensors", "force", "base"):
-            if key in chosen and (key != "loss" or "sigma" in spec):
+            # The paper's integral has no likelihood for what sensors and losses estimate.
+            if key in chosen and (key not in ("loss", "sensors") or "sigma" in spec):
                 spec[key] = chosen[key]
         if self._waveform is not None:
             spec["force"] = self._waveform

@@ -6,14 +6,14 @@ import html
 import json
 import os
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from . import _kmcfit, _npz, _table, _yaml
 from ._arrays import column
 from ._curve import Curve
-from ._errors import InputError, did_you_mean, unknown_keyword
+from ._errors import InputError, did_you_mean
 from ._estimates import Estimates, Verdict, texts
 from ._functions import plain
 from ._page import Drawing, first_screen, read_files, write_files
@@ -236,43 +236,17 @@ class Fit:
     def study(
         self,
         *,
-        confidence: Optional[float] = None,
-        seed: Optional[int] = None,
-        profiles: Optional[Sequence[Mapping[str, Any]]] = None,
-        extremes: Any = None,
-        misfit_limit: Optional[float] = None,
-        starts: Optional[int] = None,
-        spread: Optional[float] = None,
-        merge_tolerance: Optional[float] = None,
-        equivalent_systems: Optional[Sequence[Mapping[str, Any]]] = None,
-        candidates: Optional[Sequence[Mapping[str, Any]]] = None,
         threads: Optional[int] = None,
-        **unknown: Any,
+        **keys: Any,
     ) -> Study:
         """Analyses what the records determine, as ``kmcfit study`` does: identified directions, profiles, extremes, candidates.
 
-        The arguments are the keys of ``study`` in the model file; those that are not given have the values of the model, or its
-        defaults. Ctrl-C ends the study after the analyses finished so far, with the status ``"interrupted"``.
+        Further arguments are the keys of ``study`` in the model file, such as ``starts=5`` or ``extremes=[1.0, 2.0]``; those that are not
+        given have the values of the model, or its defaults. Ctrl-C ends the study after the analyses finished so far, with the status
+        ``"interrupted"``.
 
         Parameters
         ----------
-        confidence : float
-            Confidence level of bands, profiles and extremes; 0.95.
-        seed : int
-            Seed of all random numbers; 1.
-        profiles : list of dict
-            Quantities for a likelihood profile, e.g. ``[{"function": "stiffness", "mean": True}]``.
-        extremes : float or sequence of float
-            Times of the data-consistent extremes, s; five over the record.
-        misfit_limit : float
-            Largest misfit of a system that is consistent with the data; from the confidence level.
-        starts : int
-            Number of fits from random starting points, within a factor `spread` of the start; minima within `merge_tolerance` count as
-            one.
-        equivalent_systems : list of dict
-            Masses of equivalent systems, e.g. ``[{"name": "constant mass", "mass": 1.0}]``.
-        candidates : list of dict
-            Candidate experiments, e.g. ``[{"name": "again", "initial": {"displacement": 0.01, "velocity": 0.0}}]``.
         threads : int
             Number of threads, one per core if not given; results do not depend on it.
 
@@ -280,23 +254,9 @@ class Fit:
         -------
         Study
         """
-        given = {
-            "confidence": confidence,
-            "seed": seed,
-            "profiles": profiles,
-            "extremes": extremes,
-            "misfit_limit": misfit_limit,
-            "starts": starts,
-            "spread": spread,
-            "merge_tolerance": merge_tolerance,
-            "equivalent_systems": equivalent_systems,
-            "candidates": candidates,
-        }
-        for word in unknown:
-            raise unknown_keyword("Fit.study", word, [*given, "threads"])
         if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
             raise InputError("invalid number of threads", "Fit.study.threads", repr(threads), "1 or more")
-        changes = [f"study.{key}={_yaml.flow(plain(value))}" for key, value in given.items() if value is not None]
+        changes = [f"study.{key}={_yaml.flow(plain(value))}" for key, value in keys.items() if value is not None]
         with temporary_folder() as folder:
             out = os.path.join(folder, "study")
             if self._raw is not None:

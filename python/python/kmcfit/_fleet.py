@@ -18,7 +18,7 @@ from ._model import Model, Overrides, overrides
 from ._records import Item, Source, item, lowered, other_columns
 
 _KEYS = ("record", "sha256", "estimates", "verdict", "warnings", "seconds", "error")
-_WORDS = ("executor", "out", "set", "threads", "batch", "retry_errors", "trend")
+_WORDS = ("executor", "out", "set", "threads", "batch", "trend")
 
 
 class Row(Dict[str, Any]):
@@ -126,7 +126,6 @@ def fit_many(
     set: Optional[Overrides] = None,  # noqa: A002
     threads: Optional[int] = None,
     batch: Optional[int] = None,
-    retry_errors: bool = False,
     trend: Optional[str] = None,
     **unknown: Any,
 ) -> Rows:
@@ -146,15 +145,13 @@ def fit_many(
         Anything whose ``submit(function, *arguments)`` returns a future: ``concurrent.futures``, a client of Dask, loky. Threads of this
         process by default.
     out : path, optional
-        Folder of the rows. The same call again goes on after the rows that are there; at the end it holds the table and the page too.
+        Folder of the rows. The same call again goes on after the rows that are there, and fits records with errors again; at the end it holds the table and the page too.
     set : dict, optional
         Changed keys of the model; ``{"fit.stop.seconds": 60}`` limits the time of a record.
     threads : int, optional
         Number of threads without `executor`; one per core by default. Rows do not depend on it.
     batch : int, optional
         Records of a task; from the time of the first ones by default: 20 ms for each worker of the executor.
-    retry_errors : bool
-        Fit the records again whose rows in `out` have errors.
     trend : str, optional
         Column over which the page shows the estimates.
 
@@ -179,7 +176,7 @@ def fit_many(
     job = Job(_kmcfit.version(), source)
     batches = Batches(executor, threads, batch)
     local = None if executor is not None else fleet
-    return Rows(_rows(fleet, batches, (local, job), items, (folder, columns, retry_errors, trend)), number)
+    return Rows(_rows(fleet, batches, (local, job), items, (folder, columns, trend)), number)
 
 
 def fit_partition(
@@ -295,10 +292,10 @@ def _rows(
     batches: Batches,
     task: Tuple[Optional["_kmcfit.RawFleet"], Job],
     items: Iterator[Item],
-    output: Tuple[Optional["_kmcfit.RawFolder"], List[str], bool, Optional[str]],
+    output: Tuple[Optional["_kmcfit.RawFolder"], List[str], Optional[str]],
 ) -> Iterator[Row]:
     """Rows in the order of the records; those of the folder are not fitted again."""
-    folder, columns, retry_errors, trend = output
+    folder, columns, trend = output
     seen: List[Any] = []
     before: Dict[str, str] = {}
     order: List[str] = []
@@ -312,7 +309,7 @@ def _rows(
                 except Exception:  # the error of its row
                     content = (record.name, record.path, None, [], record.columns)
                 seen.append((*content[:2], None, [], record.columns))
-                line = folder.row(content, retry_errors)
+                line = folder.row(content)
                 if line is not None:
                     before[record.name] = line
                     continue

@@ -58,7 +58,7 @@ class Function:
         Penalty on the roughness, e.g. ``{"kind": "tikhonov", "order": 2, "weight": "reml"}``.
     known_part : float, sequence or dict, optional
         Known values added to the estimated function.
-    width : float or "auto", optional
+    width : float, optional
         For Coulomb friction: velocity over which its sign is smoothed, m/s.
     """
 

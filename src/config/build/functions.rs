@@ -6,8 +6,8 @@ use crate::config::spec::{
     self as config, Basis, ColumnSpec, FunctionSpec, PenaltyKind, WeightRule,
 };
 use crate::config::values::{
-    Bound, Count, FrictionWidth, KnotSpec, KnownValue, KnownValueMap, Number, NumberOrColumn,
-    StartSpec, Text, Weight,
+    Bound, Count, KnotSpec, KnownValue, KnownValueMap, Number, NumberOrColumn, StartSpec, Text,
+    Weight,
 };
 use crate::error::InputError;
 use kmcfit_core::internals::builder::{
@@ -129,7 +129,10 @@ pub(super) fn specification(
                 )
                 .expected("either `fixed`, or `basis` with `start`"));
         }
-        (Some(fixed), None, None) => known(file, grid, &format!("{key}.fixed"), fixed)?,
+        (Some(fixed), None, None) => {
+            refuse_negative_stiffness(file, key, kind, fixed)?;
+            known(file, grid, &format!("{key}.fixed"), fixed)?
+        }
         (None, None, None) if is_own && is_known_part_alone(given) => CoefficientSpec::shared(),
         (None, None, basis_name) => {
             let start = defaults.starts.and_then(|starts| starts.of_kind(kind));
@@ -169,9 +172,35 @@ pub(super) fn specification(
         spec = spec.known_part(known(file, grid, &format!("{key}.known_part"), part)?);
     }
     Ok(match given.width {
-        Some(FrictionWidth::Number(width)) => spec.width(width.0),
-        Some(FrictionWidth::Auto) | None => spec,
+        Some(width) => spec.width(width.0),
+        None => spec,
     })
+}
+
+/// Refuses a fixed negative stiffness without a stiffening term: every motion would grow without end.
+fn refuse_negative_stiffness(
+    file: &ModelFile,
+    key: &str,
+    kind: CoefficientKind,
+    fixed: &KnownValue,
+) -> Result<(), InputError> {
+    let value = match fixed {
+        KnownValue::Number(value) => Some(value.0),
+        KnownValue::Map(map) => map.value.map(|value| value.0),
+        KnownValue::Unknown => None,
+    };
+    let functions = &file.spec.functions;
+    let is_stiffened = functions.cubic_stiffness.is_some() || functions.quintic_stiffness.is_some();
+    match value.filter(|value| *value < 0.0 && kind == CoefficientKind::Stiffness) {
+        Some(value) if !is_stiffened => Err(file
+            .error_at(
+                &format!("{key}.fixed"),
+                "a negative stiffness without a term that stiffens: every motion grows without end",
+            )
+            .found(value)
+            .expected("a positive stiffness, or `cubic_stiffness` beside it")),
+        _ => Ok(()),
+    }
 }
 
 /// True for a function of an experiment that has a known part and no other key.

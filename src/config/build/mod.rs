@@ -3,7 +3,6 @@
 mod constraints;
 mod experiments;
 mod fit;
-mod friction;
 mod functions;
 mod grid;
 mod on_grid;
@@ -12,6 +11,7 @@ mod starts;
 mod study;
 
 pub(crate) use experiments::DataWarning;
+pub(super) use experiments::sensor_of;
 pub use experiments::{ChannelNote, DelayLimits, HoldOut};
 pub use kmcfit_core::internals::builder::WeightSearch;
 pub use refinement::AutomaticGrid;
@@ -22,7 +22,6 @@ use super::{ModelFile, ModelSource};
 use crate::error::{InputError, Location};
 use crate::finding::Finding;
 use kmcfit_core::internals::builder::{BuildError, Builder, Contradiction, listed};
-use kmcfit_core::internals::functions::CoefficientKind;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::solvers::{FitSettings, Solver, timed};
 use kmcfit_core::internals::system::{Grid, NodalCoefficients, State};
@@ -51,6 +50,8 @@ pub struct Model {
     pub truth: Option<NodalCoefficients>,
     /// Notes for reports on the channels of each experiment.
     pub notes: Vec<Vec<ChannelNote>>,
+    /// Index in the file of each experiment of the problem, which has no validation records.
+    pub places: Vec<usize>,
     /// Validation records.
     pub validation: Vec<HoldOut>,
     /// Initial states of the predictions.
@@ -69,8 +70,6 @@ pub struct Model {
     pub assumed_units: Vec<Finding>,
     /// True if the model states that the mass is unknown: it is 1, and the other coefficients are ratios to it.
     pub has_unknown_mass: bool,
-    /// True if a fit reduces the width of Coulomb friction.
-    pub reduces_width: bool,
     /// The automatic grid of a fit, which may be refined; `None` for a stated number of nodes.
     pub grid: Option<AutomaticGrid>,
     /// Source files.
@@ -98,18 +97,13 @@ pub enum BuildMode {
         /// Number of nodes instead of the model's.
         nodes: Option<usize>,
     },
-    /// Gradient check: samples are required, and interpolated at nodes without one.
-    Check {
-        /// Number of nodes instead of the model's.
-        nodes: Option<usize>,
-    },
 }
 
 impl BuildMode {
     fn nodes(self) -> Option<usize> {
         match self {
             BuildMode::Fit => None,
-            BuildMode::Simulate { nodes } | BuildMode::Check { nodes } => nodes,
+            BuildMode::Simulate { nodes } => nodes,
         }
     }
 }
@@ -139,7 +133,6 @@ fn builder(
     grid: &Grid,
     solver: Solver,
     records: Vec<Option<experiments::RawRecord>>,
-    automatic_width: Option<f64>,
 ) -> Result<(Builder, Vec<Vec<ChannelNote>>), InputError> {
     let is_limited =
         mode == BuildMode::Fit && matches!(solver, Solver::GaussNewton | Solver::ProjectedGradient);
@@ -152,11 +145,6 @@ fn builder(
     let shared = shared.map(|given| {
         let key = format!("functions.{}", given.0.name());
         let spec = functions::specification(file, grid, &key, given, defaults)?;
-        let width = automatic_width.filter(|_| given.0 == CoefficientKind::CoulombFriction);
-        let spec = match width {
-            Some(width) => spec.width(width),
-            None => spec,
-        };
         Ok((given.0, spec))
     });
     let shared = shared.collect::<Result<_, _>>()?;
@@ -167,8 +155,7 @@ fn builder(
     }
     let mut notes = Vec::new();
     for (i, record) in records.into_iter().enumerate() {
-        let (record, of_record) =
-            experiments::specification(file, mode, grid, i, record, defaults)?;
+        let (record, of_record) = experiments::specification(file, grid, i, record, defaults)?;
         builder = builder.record(record);
         notes.push(of_record);
     }
@@ -283,13 +270,12 @@ fn build_on(
     let choice = grid::build(file, mode, records, least, &mut automatic)?;
     let grid = choice.grid;
     let solver = fit::solver(file)?;
-    let automatic_width = friction::automatic_width(file, records)?;
     let automatic_grid = AutomaticGrid::of(file, mode, solver, choice.finer, &read);
     let records = match Arc::try_unwrap(read) {
         Ok(read) => read.records,
         Err(read) => read.records.clone(),
     };
-    let (builder, notes) = builder(file, mode, &grid, solver, records, automatic_width)?;
+    let (builder, notes) = builder(file, mode, &grid, solver, records)?;
     let builder = builder.states(states);
     let about = |error| input_error(file, error);
     let mut built = builder.lower().map_err(about)?;
@@ -297,9 +283,6 @@ fn build_on(
     let searches =
         built.weight_search.is_some() || built.problem.penalties.iter().any(|p| p.rule.is_some());
     let settings = fit::build(file, &built.problem, solver, searches)?;
-    if automatic_width.is_some() {
-        built.problem.idealise_friction();
-    }
     let given_start = built.problem.functions.start();
     // A simulation uses the functions as given.
     if !matches!(mode, BuildMode::Simulate { .. }) {
@@ -341,6 +324,7 @@ fn build_on(
             .and_then(|fit| fit.refinement)
             .unwrap_or(true),
         truth,
+        places: notes.iter().map(|(i, _)| *i).collect(),
         notes: notes.into_iter().map(|(_, notes)| notes).collect(),
         validation: (built.validation.into_iter().zip(own))
             .map(|((experiment, scalars), (_, notes))| HoldOut {
@@ -356,7 +340,6 @@ fn build_on(
         automatic,
         assumed_units,
         has_unknown_mass: functions::has_unknown_mass(file),
-        reduces_width: automatic_width.is_some() && solver != Solver::EquationError,
         grid: automatic_grid,
         source,
         preparation: Preparation {
@@ -364,18 +347,6 @@ fn build_on(
             total: clock.elapsed(),
         },
     })
-}
-
-impl Model {
-    /// The model with another width of Coulomb friction, m/s.
-    #[must_use]
-    pub fn with_friction_width(self, width: f64) -> Self {
-        let problem = (self.problem).with(|parts| parts.system.set_friction_width(width));
-        Self {
-            problem: problem.expect("a width changes no number of nodes or functions"),
-            ..self
-        }
-    }
 }
 
 fn title(file: &ModelFile) -> String {

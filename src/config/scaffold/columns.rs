@@ -5,7 +5,7 @@ use super::roles::{Role, UsedColumn, is_foreign, known};
 use super::statements::{ColumnStatements, Statements};
 use crate::error::InputError;
 use crate::tables::{Duplicates, Table, increasing_at, repeated_times};
-use crate::units::Unit;
+use crate::units::{ScaledUnit, Unit};
 use kmcfit_core::internals::diagnostics::standard_deviation;
 
 /// Ratio of standard deviations beyond which a later sensor replaces an earlier one of the same role.
@@ -35,7 +35,24 @@ impl ColumnAssignment {
 
     /// The columns with recognised names or units and the column of times; none of them need be a channel.
     pub fn without_guess(table: &Table, sample_rate: Option<f64>) -> Result<Self, InputError> {
-        let columns = Self::known(table, sample_rate, &ColumnStatements::default())?;
+        Self::as_in_run(table, sample_rate, Vec::new(), Vec::new())
+    }
+
+    /// The columns with the roles `named`, those with recognised names or units and the column of times; none of them need be a channel.
+    /// Units of a role hold for a named column, and for others where the table states none.
+    pub fn as_in_run(
+        table: &Table,
+        sample_rate: Option<f64>,
+        named: Vec<(usize, Role)>,
+        units: Vec<(Role, ScaledUnit)>,
+    ) -> Result<Self, InputError> {
+        let stated = ColumnStatements::of_run(named, &units);
+        let mut columns = Self::known(table, sample_rate, &stated)?;
+        for column in columns.used.iter_mut().filter(|c| c.has_assumed_unit()) {
+            if let Some((_, unit)) = units.iter().find(|(role, _)| *role == column.role) {
+                column.state(*unit);
+            }
+        }
         columns.check_units(table)?;
         Ok(columns)
     }
@@ -160,9 +177,21 @@ impl ColumnAssignment {
         self.used.iter().find(|c| c.role == role)
     }
 
+    /// True if the name of the column of a role has this word.
+    pub fn is_named(&self, table: &Table, role: Role, word: &str) -> bool {
+        let name = self.find(role).and_then(|c| table.headers().get(c.index));
+        name.is_some_and(|name| name.to_lowercase().contains(word))
+    }
+
     /// Roles of the measured responses.
     pub fn channels(&self) -> impl Iterator<Item = Role> {
         self.used.iter().map(|c| c.role).filter(|r| r.is_channel())
+    }
+
+    /// Indices of the columns of samples.
+    pub fn measured(&self) -> impl Iterator<Item = usize> {
+        let measured = self.used.iter().filter(|c| c.role != Role::Time);
+        measured.map(|c| c.index)
     }
 
     /// `{time: t_s, displacement: y_m}`

@@ -2,6 +2,7 @@
 //!
 //! Columns are assigned by options, then by units, then by names. Where nothing determines the mass, the model states that it is unknown.
 
+mod codes;
 mod columns;
 mod functions;
 mod record_summary;
@@ -49,6 +50,8 @@ struct FileRecord<'a> {
     source: &'a Source,
     table: Table,
     columns: ColumnAssignment,
+    /// Codes that stand for missing samples, in the unit of the file, with their numbers.
+    codes: Vec<(f64, usize)>,
     summary: RecordSummary,
 }
 
@@ -80,11 +83,13 @@ fn read<'a>(
             true => used,
             false => is_used.iter().zip(used).map(|(a, b)| *a || b).collect(),
         };
-        let summary = RecordSummary::of(&table, &columns, statements.sample_rate)?;
+        let codes = codes::codes(&table, columns.measured());
+        let summary = RecordSummary::of(&table, &columns, statements.sample_rate, &codes)?;
         records.push(FileRecord {
             source,
             table,
             columns,
+            codes,
             summary,
         });
     }
@@ -99,9 +104,21 @@ fn findings(record: &FileRecord) -> Vec<String> {
         table,
         columns,
         summary,
+        codes,
         ..
     } = record;
     let mut found = Vec::new();
+    if !codes.is_empty() {
+        let each = codes.iter().map(|(code, count)| match count {
+            1 => format!("1 value of {code}"),
+            _ => format!("{count} values of {code}"),
+        });
+        let each: Vec<String> = each.collect();
+        found.push(format!(
+            "{} taken as missing samples: far outside the others (`missing`)",
+            each.join(" and ")
+        ));
+    }
     if let Some(begins) = summary.begins {
         found.push(format!("at rest before {begins} s: excluded by `window`"));
     }
@@ -230,6 +247,7 @@ fn keys(
         table,
         columns,
         summary: record,
+        codes,
         ..
     }: &FileRecord,
     sample_rate: Option<f64>,
@@ -240,7 +258,7 @@ fn keys(
     let has_base = columns.has(Role::BaseAcceleration) || columns.has(Role::BaseDisplacement);
     let between = format!("{{interpolation: {}}}", record.between);
     let or = "between samples: or hold, linear, cubic";
-    let (sensors, why) = sensors(columns, record);
+    let (sensors, why) = sensors(columns, table, record);
     let repeated = record.repeated.as_deref().unwrap_or_default();
     let repeated = format!("times are repeated in {repeated}; or `mean`");
     let robust = format!("{{{}: huber}}", record.channel.0.key());
@@ -261,6 +279,14 @@ fn keys(
             "    duplicates",
             record.repeated.as_ref().map(|_| "first".to_owned()),
             &repeated,
+        ),
+        (
+            "    missing",
+            (!codes.is_empty()).then(|| {
+                let each: Vec<String> = codes.iter().map(|(code, _)| format!("{code:?}")).collect();
+                format!("[{}]", each.join(", "))
+            }),
+            "values that stand for missing samples: far outside the others",
         ),
         (
             "    window",
@@ -301,28 +327,41 @@ fn keys(
 /// Sensors with estimated parameters, and the reasons.
 fn sensors(
     columns: &ColumnAssignment,
+    table: &Table,
     record: &RecordSummary,
 ) -> (Vec<&'static str>, Vec<&'static str>) {
     let mut sensors = Vec::new();
     if columns.has(Role::Acceleration) {
-        sensors.push((
-            "acceleration: {offset: estimate}",
-            "accelerometers usually have an offset; remove the line if yours has none",
-        ));
+        let has_base = columns.has(Role::BaseAcceleration) || columns.has(Role::BaseDisplacement);
+        sensors.push(
+            match has_base && columns.is_named(table, Role::Acceleration, "relative") {
+                true => (
+                    "acceleration: {offset: estimate, absolute: false}",
+                    "relative to the base, by its name; accelerometers usually have an offset",
+                ),
+                false => (
+                    "acceleration: {offset: estimate}",
+                    "accelerometers usually have an offset; remove the line if yours has none",
+                ),
+            },
+        );
     }
-    // A static force can cause the offset of a displacement.
-    if columns.has(Role::Displacement) && !columns.has(Role::Force) {
-        if record.drifts {
-            sensors.push((
+    if columns.has(Role::Displacement) {
+        sensors.push(match record.drifts {
+            true => (
                 "displacement: {offset: estimate, drift: estimate}",
                 "the record oscillates about a sloping line",
-            ));
-        } else if record.is_off_centre {
-            sensors.push((
+            ),
+            false if columns.is_named(table, Role::Displacement, "absolute") && columns.has(Role::BaseDisplacement) => (
+                "displacement: {offset: estimate, absolute: true}",
+                "relative to the ground, by its name; the zero of a displacement is seldom that of the rest position",
+            ),
+            // A small offset is invisible in a short record and changes frequency and damping.
+            false => (
                 "displacement: {offset: estimate}",
-                "the record oscillates about a value other than zero",
-            ));
-        }
+                "the zero of a displacement is seldom that of the rest position; remove the line if yours is",
+            ),
+        });
     }
     sensors.into_iter().unzip()
 }

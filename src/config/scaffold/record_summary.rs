@@ -6,7 +6,6 @@ use super::roles::{Role, UsedColumn};
 use crate::config::dominant::{Oscillation, remove_outliers, values_of};
 use crate::error::InputError;
 use crate::tables::{Duplicates, RepeatedTimes, Table, lines_in_words, repeated_times};
-use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::signal::{median, onset};
 use kmcfit_core::internals::system::round_time;
 
@@ -39,8 +38,6 @@ pub struct RecordSummary {
     pub begins: Option<f64>,
     /// Dominant frequency, Hz.
     pub frequency: Option<f64>,
-    /// True if the mean of the samples exceeds their deviations from it.
-    pub is_off_centre: bool,
     /// True if the samples drift along a straight line.
     pub drifts: bool,
     /// Interpolation of force and base motion between samples.
@@ -52,9 +49,10 @@ impl RecordSummary {
         table: &Table,
         columns: &ColumnAssignment,
         sample_rate: Option<f64>,
+        codes: &[(f64, usize)],
     ) -> Result<Self, InputError> {
         let (times, repeated) = times(table, columns, sample_rate)?;
-        let in_si = |table, column| in_si(table, column, &repeated);
+        let in_si = |table, column| in_si(table, column, &repeated, codes);
         let channel = |role: Role| columns.find(role);
         let order = [Role::Displacement, Role::Velocity, Role::Acceleration];
         let Some(column) = order.into_iter().find_map(channel) else {
@@ -65,7 +63,10 @@ impl RecordSummary {
         let spacing = median(&*spacings);
         let drives = [Role::Force, Role::BaseAcceleration, Role::BaseDisplacement];
         let input = drives.into_iter().find_map(channel);
-        let input = input.map(|c| in_si(table, c)).transpose()?;
+        let mut input = input.map(|c| in_si(table, c)).transpose()?;
+        if let Some(input) = &mut input {
+            input.retain(|x| x.is_finite());
+        }
         let missing = times.len() - pairs.len();
         let outliers = remove_outliers(&mut pairs);
         let values = values_of(&pairs);
@@ -92,7 +93,6 @@ impl RecordSummary {
             spacing,
             is_regular: (spacings.iter()).all(|s| (s - spacing).abs() <= REGULAR * spacing),
             frequency: oscillation.frequency,
-            is_off_centre: off_centre(pairs),
             drifts: oscillation.drifts,
         })
     }
@@ -184,13 +184,11 @@ fn in_si(
     table: &Table,
     column: &UsedColumn,
     repeated: &RepeatedTimes,
+    codes: &[(f64, usize)],
 ) -> Result<Vec<f64>, InputError> {
     let factor = column.factor();
     let samples = repeated.merged(table.samples(column.index)?, Duplicates::First);
-    Ok(samples.iter().map(|x| x * factor).collect())
-}
-
-fn off_centre(pairs: &[(f64, f64)]) -> bool {
-    let mean = pairs.iter().map(|(_, value)| value).sum::<f64>() / pairs.len() as f64;
-    mean.abs() > standard_deviation(&values_of(pairs))
+    let is_code = |x: f64| codes.iter().any(|(code, _)| *code == x);
+    let value = |x: &f64| if is_code(*x) { f64::NAN } else { x * factor };
+    Ok(samples.iter().map(value).collect())
 }

@@ -177,6 +177,23 @@ impl ColumnStatements {
         Ok(found)
     }
 
+    /// Columns by role, each with the unit of its role in `units`, if any.
+    pub fn of_run(roles: Vec<(usize, Role)>, units: &[(Role, ScaledUnit)]) -> Self {
+        let unit_of = |(index, role): &(usize, Role)| {
+            let (_, unit) = units.iter().find(|(of, _)| of == role)?;
+            Some(ColumnStatement {
+                index: *index,
+                role: *role,
+                unit: *unit,
+            })
+        };
+        Self {
+            columns: roles.iter().filter_map(unit_of).collect(),
+            roles,
+            ..Self::default()
+        }
+    }
+
     /// States the unit of a column, and its role: its own where the unit is of its quantity, else the first that has this unit.
     fn state(&mut self, index: usize, own: Option<Role>, text: &str) -> Result<(), InputError> {
         let is_of = |role: &Role| Unit::recognise(role.kind(), split_factor(text).1).is_some();
@@ -191,7 +208,10 @@ impl ColumnStatements {
 
     /// The column as stated, else as its name and unit give it.
     pub fn recognise(&self, table: &Table, index: usize) -> Option<UsedColumn> {
-        let own = known(table, index);
+        let own = known(table, index).filter(|own| {
+            let is_other = |(of, role): &(usize, Role)| *role == Role::Time && *of != index;
+            own.role != Role::Time || !self.roles.iter().any(is_other)
+        });
         if let Some((_, role)) = self.roles.iter().find(|(of, _)| *of == index) {
             let own = own.filter(|column| column.role.kind() == role.kind());
             let mut column = own.unwrap_or_else(|| UsedColumn::guessed(index, *role));

@@ -55,6 +55,11 @@ keys! {
             example "first",
             default "error",
             needs "a column of times";
+        /// Values in the file that stand for missing samples, in the unit of the file.
+        missing: Option<OneOrList<Number>>,
+            example "[-9999.0]",
+            default "none",
+            needs "`data`";
         /// Faulty samples that are left out of the fit, as missing samples.
         exclude: Option<OneOrList<FaultName>>,
             example "[dropouts, spikes]",

@@ -4,7 +4,7 @@ use crate::config::alternatives::OneOrList;
 use crate::config::choice::choice;
 use crate::config::map::keys;
 use crate::config::values::{
-    Bound, Count, FrictionWidth, KnotSpec, KnownValue, NumberOrColumn, StartSpec, Weight,
+    Bound, Count, KnotSpec, KnownValue, Number, NumberOrColumn, StartSpec, Weight,
 };
 
 keys! {
@@ -132,12 +132,11 @@ keys! {
             default "none",
             needs "`basis`";
         /// For Coulomb friction: velocity over which its sign is smoothed, well below the peak velocity of the response.
-        /// `auto`: reduced until half of it shifts no estimate by more than a tenth of a standard error.
-        width: Option<FrictionWidth>,
+        width: Option<Number>,
             example "0.01",
             unit "m/s",
             range "greater than 0",
-            needs "coulomb_friction, which requires it; `auto` also a record";
+            needs "coulomb_friction, which requires it";
     }
 }
 

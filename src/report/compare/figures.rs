@@ -7,8 +7,8 @@ use kmcfit_core::internals::functions::Ratios;
 use kmcfit_core::internals::system::NodalCoefficients;
 
 /// The figures of a comparison.
-pub(super) fn all(runs: &[ComparedRun]) -> [Option<Figure>; 3] {
-    [functions(runs), validation(runs), residuals(runs)]
+pub(super) fn all(runs: &[ComparedRun]) -> [Option<Figure>; 2] {
+    [functions(runs), validation(runs)]
 }
 
 /// Line style of run `index`; up to 24 runs differ in colour or dash pattern.
@@ -81,25 +81,21 @@ struct Channel {
     table: ResultTable,
 }
 
-/// The channels of all runs: those that were fitted, or those of validation records.
-fn channels(runs: &[ComparedRun], is_validation: bool) -> Vec<Channel> {
+/// The channels of the validation records of all runs.
+fn channels(runs: &[ComparedRun]) -> Vec<Channel> {
     let mut all = Vec::new();
     for (i, run) in runs.iter().enumerate() {
-        let document = &run.finished.document;
-        let experiments = document.experiments.iter().map(|e| (&e.name, &e.channels));
-        let validation = document.validation.iter().map(|v| (&v.name, &v.channels));
-        let records: Vec<_> = match is_validation {
-            true => validation.collect(),
-            false => experiments.collect(),
-        };
-        let prefix = if is_validation { "validation-" } else { "" };
-        for (number, (name, channels)) in records.into_iter().enumerate() {
-            for channel in channels {
-                let file = format!("channels/{prefix}{}-{}.csv", number + 1, channel.kind);
+        for (number, record) in run.finished.document.validation.iter().enumerate() {
+            for channel in &record.channels {
+                let file = format!("channels/validation-{}-{}.csv", number + 1, channel.kind);
                 let table = ResultTable::read(&run.finished.folder.join(file));
                 all.extend(table.ok().map(|table| Channel {
                     run: i,
-                    key: [name.clone(), channel.kind.clone(), channel.unit.clone()],
+                    key: [
+                        record.name.clone(),
+                        channel.kind.clone(),
+                        channel.unit.clone(),
+                    ],
                     table,
                 }));
             }
@@ -108,8 +104,8 @@ fn channels(runs: &[ComparedRun], is_validation: bool) -> Vec<Channel> {
     all
 }
 
-/// A panel for each channel, with the curve of a column for each run that has it.
-fn panels(runs: &[ComparedRun], channels: &[Channel], column: &str) -> Vec<Panel> {
+/// A panel for each channel, with the prediction of each run that has it.
+fn panels(runs: &[ComparedRun], channels: &[Channel]) -> Vec<Panel> {
     let mut keys: Vec<&[String; 3]> = Vec::new();
     for channel in channels {
         if !keys.contains(&&channel.key) {
@@ -124,9 +120,8 @@ fn panels(runs: &[ComparedRun], channels: &[Channel], column: &str) -> Vec<Panel
         let alike = || channels.iter().filter(|channel| channel.key == **key);
         let dots = Style::new(Colour::Black).width(2.4);
         let measured = alike().next().and_then(|channel| of(channel, "measured"));
-        let measured = measured.filter(|_| column != "residual");
         let curves = alike().filter_map(|channel| {
-            let [t, y] = of(channel, column)?;
+            let [t, y] = of(channel, "predicted")?;
             let name = &runs[channel.run].name;
             Some(Mark::line(name, &t, &y, style(channel.run).width(1.2)))
         });
@@ -140,22 +135,11 @@ fn panels(runs: &[ComparedRun], channels: &[Channel], column: &str) -> Vec<Panel
 
 /// Samples of the validation records with the prediction of each run.
 fn validation(runs: &[ComparedRun]) -> Option<Figure> {
-    let panels = panels(runs, &channels(runs, true), "predicted");
+    let panels = panels(runs, &channels(runs));
     let figure = Figure::new(
         "validation",
         "Validation records",
         "Samples that were not fitted, and the prediction of each model.",
-    );
-    (!panels.is_empty()).then(|| figure.panels(panels))
-}
-
-/// The residuals of the records.
-fn residuals(runs: &[ComparedRun]) -> Option<Figure> {
-    let panels = panels(runs, &channels(runs, false), "residual");
-    let figure = Figure::new(
-        "residuals",
-        "Residuals",
-        "Measured minus fitted channel of each run against time.",
     );
     (!panels.is_empty()).then(|| figure.panels(panels))
 }

@@ -234,7 +234,7 @@ impl Comparison {
         let above = shell::state_line(colour, &word, &sentence)
             + &shell::table("Models", &headings, &rows)
             + &shell::list(&self.failures());
-        let [functions, validation, residuals] = figures::all(&self.runs)
+        let [functions, validation] = figures::all(&self.runs)
             .map(|figure| shell::figures(&figure.into_iter().collect::<Vec<_>>()));
         let sections: Vec<shell::Section> = vec![
             ("functions", "Coefficients and ratios", functions),
@@ -243,7 +243,6 @@ impl Comparison {
                 "Predictions of validation records",
                 validation,
             ),
-            ("residuals", "Residuals", residuals),
         ];
         shell::sectioned(&self.title, &shell::screen(&above, "", None), sections)
     }

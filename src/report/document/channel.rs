@@ -1,7 +1,6 @@
 //! Channels, nuisance parameters and validation records in the result document.
 
 use super::{is_one, one};
-use crate::number_format::significant;
 use kmcfit_core::internals::assessment::ResidualPattern;
 use kmcfit_core::internals::diagnostics::student_half_width;
 use kmcfit_core::internals::solvers::number_or_nan;
@@ -76,25 +75,6 @@ pub struct NoiseSummary {
     /// True if the correlation is that of the response to stated errors of the input.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub input_errors: bool,
-}
-
-impl NoiseSummary {
-    /// The noise in words.
-    pub(in crate::report) fn sentence(&self) -> String {
-        match self.correlation_time {
-            _ if self.input_errors => {
-                "the intervals account for the errors of the input".to_owned()
-            }
-            Some(time) => format!(
-                "noise correlated over {} s; the intervals account for it",
-                significant(time, 3)
-            ),
-            None => format!(
-                "noise AR({}); the intervals account for its correlation",
-                self.coefficients.len()
-            ),
-        }
-    }
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it so")]

@@ -1,10 +1,10 @@
-//! The page of a fit, `report.html`: first screen, contents, and the sections from the fit to the work of the solver.
+//! The page of a fit, `report.html`: first screen, contents, and the sections from the fit to the search.
 
 use super::checks::checks;
 use super::first_screen::first_screen;
 use super::table::{list, number, paragraph, table};
 use super::validation::validation;
-use super::{Section, figures, overview, reproducibility, sectioned, settings};
+use super::{Section, figures, overview, reproducibility, sectioned};
 use crate::finding::Finding;
 use crate::number_format::significant;
 use crate::report::FittedModel;
@@ -38,13 +38,12 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
             predictions(document),
         ),
         ("data", "Data", data(document)),
-        ("settings", "Settings", settings::settings(document)),
         (
             "repeat",
             "Reproduce",
             reproducibility::reproducibility(run, document),
         ),
-        ("solver", "Solver", solver(run, document)),
+        ("solver", "Search", search(run, document)),
     ];
     sectioned(&document.title, &first_screen(run, document), sections)
 }
@@ -53,7 +52,8 @@ pub(in crate::report) fn page(run: &FittedModel, document: &ResultDocument) -> S
 fn fit_and_residuals(run: &FittedModel, document: &ResultDocument) -> String {
     let drawn = run.channel_fits();
     let equation = document.equation.iter();
-    let equation = equation.map(|b| equation_residual(b, document.is_rotation()));
+    let equation =
+        equation.map(|b| equation_residual(b, document.is_rotation(), document.model.mass_unknown));
     overview::records(document) + &list(&equation.collect::<Vec<_>>()) + &figures(&drawn)
 }
 
@@ -97,8 +97,8 @@ fn data(document: &ResultDocument) -> String {
     lists.collect()
 }
 
-/// End, work and convergence of the search, folded.
-fn solver(run: &FittedModel, document: &ResultDocument) -> String {
+/// End and convergence of the search, folded, and the cost that it minimises.
+fn search(run: &FittedModel, document: &ResultDocument) -> String {
     let mut drawn: Vec<Figure> = run.weights.map(weight_path).into_iter().collect();
     // One iteration is no curve.
     if run.fit.history.len() > 1 {
@@ -109,12 +109,11 @@ fn solver(run: &FittedModel, document: &ResultDocument) -> String {
         let response = response.filter(|_| !run.fit.snapshots.is_empty());
         drawn.extend(response.map(|figure| run.titled(figure.clone(), i, 0)));
     }
-    let work = overview::state(document)
-        + &paragraph(&overview::work(document))
-        + &settings::solver(run, document);
+    let end =
+        overview::state(document) + &paragraph(&format!("J: {}", document.model.cost_definition));
     let attempts = list(&lines(|text| write_attempts(text, document)));
     format!(
-        "<details>\n<summary>End of the search, work and convergence</summary>\n{work}{attempts}{}</details>\n",
+        "<details>\n<summary>End and convergence of the search</summary>\n{end}{attempts}{}</details>\n",
         figures(&drawn)
     )
 }

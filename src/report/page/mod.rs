@@ -9,14 +9,12 @@ mod first_screen;
 mod fit;
 mod overview;
 mod reproducibility;
-mod settings;
 mod table;
 mod validation;
 
 pub(crate) use first_screen::{screen, state_line};
 pub(super) use first_screen::{source_line, verdict_line};
 pub(super) use fit::page as fit_page;
-pub(crate) use reproducibility::quoted as shell_quoted;
 pub(super) use table::list;
 pub(crate) use table::{paragraph, table};
 

@@ -1,9 +1,9 @@
-//! Status, key figures, and the tables of coefficients, records and work.
+//! Status, key figures, and the tables of coefficients and records.
 
 use super::table::{list, number, table};
 use crate::report::FittedModel;
 use crate::report::document::{ChannelSummary, ResultDocument};
-use crate::report::summary::{count, iterations};
+use crate::report::summary::count;
 use crate::report::text::prose;
 use kmcfit_core::internals::assessment::FunctionSummary;
 use kmcfit_core::internals::functions::Ratios;
@@ -145,19 +145,4 @@ fn record(name: &str, channel: &ChannelSummary) -> Vec<String> {
         sigma,
         channel.samples.to_string(),
     ]
-}
-
-/// Cost and work in one sentence.
-pub(super) fn work(document: &ResultDocument) -> String {
-    let (cost, counts) = (&document.cost, &document.counts);
-    format!(
-        "J fell from {} to {} in {}, with {}, {}, {} and {}.",
-        number(cost.initial),
-        number(cost.r#final),
-        iterations(document),
-        count(counts.forward as usize, "forward solve"),
-        count(counts.adjoint as usize, "adjoint solve"),
-        count(counts.tangent as usize, "tangent solve"),
-        count(counts.qp as usize, "quadratic program"),
-    )
 }

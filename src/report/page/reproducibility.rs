@@ -2,6 +2,7 @@
 
 use super::table::{pairs, paragraph, table};
 use crate::config::ModelSource;
+use crate::escape::shell_quoted;
 use crate::report::FittedModel;
 use crate::report::document::ResultDocument;
 use crate::report::text::escape;
@@ -34,9 +35,9 @@ pub(super) fn reproducibility(run: &FittedModel, document: &ResultDocument) -> S
 
 /// A command of the program on the model of the run.
 pub(super) fn command(name: &str, document: &ResultDocument) -> String {
-    let mut line = format!("kmcfit {name} {}", quoted(&document.model.file));
+    let mut line = format!("kmcfit {name} {}", shell_quoted(&document.model.file));
     for change in &document.model.overrides {
-        line += &format!(" --set {}", quoted(change));
+        line += &format!(" --set {}", shell_quoted(change));
     }
     block(&line)
 }
@@ -69,30 +70,4 @@ fn cite() -> String {
 /// Preformatted text in a scrolling box.
 fn block(text: &str) -> String {
     format!("<pre tabindex=\"0\"><code>{}</code></pre>\n", escape(text))
-}
-
-/// A path or an argument quoted for a shell.
-pub fn quoted(path: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+,:@=".contains(c) || !c.is_ascii();
-    match !path.is_empty() && path.chars().all(plain) && !path.starts_with('-') {
-        true => path.to_owned(),
-        false => format!("'{}'", path.replace('\'', "'\\''")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn paths_are_quoted_where_a_shell_would_take_them_apart() {
-        let paths = ["models/a.yaml", "my model.yaml", "it's.yaml", "$(x)"];
-        let expected = [
-            "models/a.yaml",
-            "'my model.yaml'",
-            "'it'\\''s.yaml'",
-            "'$(x)'",
-        ];
-        assert_eq!(paths.map(quoted), expected);
-    }
 }

@@ -1,14 +1,15 @@
 //! The identified system of a run, from `parameters.json` and `functions.csv`.
 
+use crate::config::{RunSensor, SensorValue};
 use crate::error::InputError;
 use crate::report::Run;
 use crate::report::parameters::{FunctionBasis, ParametersDocument};
 use crate::report::run_reader::at_nodes;
 use crate::units::{Quantity, Unit};
 use kmcfit_core::internals::functions::{
-    Basis, CoefficientFunction, CoefficientKind, CoefficientSet,
+    Basis, CoefficientFunction, CoefficientKind, CoefficientSet, ScalarParameter, ScalarValue,
 };
-use kmcfit_core::internals::record::ChannelKind;
+use kmcfit_core::internals::record::{ChannelKind, Sensor};
 use kmcfit_core::internals::study::IdentifiedSystem;
 use kmcfit_core::internals::system::Grid;
 use nalgebra::DMatrix;
@@ -21,6 +22,8 @@ pub(super) struct SystemOfRun {
     pub kind: ChannelKind,
     /// Standard deviation of the noise of each channel, SI.
     sigmas: Vec<(ChannelKind, f64)>,
+    /// Estimated parameters of sensors, the last ones of the system.
+    pub scalars: Vec<ScalarParameter>,
 }
 
 impl SystemOfRun {
@@ -29,13 +32,31 @@ impl SystemOfRun {
         let found = self.sigmas.iter().find(|(known, _)| *known == kind);
         found.map(|(_, sigma)| *sigma)
     }
+
+    /// The sensor with its estimated parameters; one that the run did not estimate has the value of an ideal sensor.
+    pub fn sensor(&self, given: &RunSensor) -> Sensor {
+        let value = |given: &SensorValue, ideal: f64| match given {
+            SensorValue::Known(value) => ScalarValue::Known(*value),
+            SensorValue::Estimated(name) => {
+                let found = self.scalars.iter().position(|scalar| scalar.name == *name);
+                found.map_or(ScalarValue::Known(ideal), ScalarValue::Estimated)
+            }
+        };
+        Sensor {
+            gain: value(&given.gain, 1.0),
+            offset: value(&given.offset, 0.0),
+            drift: value(&given.drift, 0.0),
+            delay: value(&given.delay, 0.0),
+            input_delay: value(&given.input_delay, 0.0),
+        }
+    }
 }
 
-/// The shared coefficient set of a run.
+/// The shared coefficient set of a run, and its estimated parameters among those of `sensors`.
 ///
 /// # Errors
 /// If `parameters.json` is missing, damaged, or has no shared coefficients.
-pub(super) fn system_of(run: &Run) -> Result<SystemOfRun, InputError> {
+pub(super) fn system_of(run: &Run, sensors: &[&RunSensor]) -> Result<SystemOfRun, InputError> {
     let (parameters, _) = ParametersDocument::read(&run.folder)?;
     let terms = run.document.model.terms.iter().map(String::as_str);
     let names: Vec<&str> = std::iter::once("mass").chain(terms).collect();
@@ -62,6 +83,20 @@ pub(super) fn system_of(run: &Run) -> Result<SystemOfRun, InputError> {
         functions.push(function(run, &parameters, stored, names[place], true)?);
         indices.extend(stored.first..stored.first + stored.count);
         places.push((place, first + i));
+    }
+    let mut scalars: Vec<ScalarParameter> = Vec::new();
+    for name in sensors.iter().flat_map(|sensor| sensor.estimated()) {
+        let place = parameters.names.iter().position(|known| known == name);
+        if let Some(index) = place.filter(|index| !indices.contains(index)) {
+            indices.push(index);
+            scalars.push(ScalarParameter {
+                name: name.to_owned(),
+                unit: String::new(),
+                start: parameters.values[index],
+                size: 1.0,
+                prior: None,
+            });
+        }
     }
     let set = CoefficientSet::from((0..first).collect::<Vec<usize>>()).with_known_parts(places);
     let covariance = parameters.covariance.as_ref().map(|rows| {
@@ -94,6 +129,7 @@ pub(super) fn system_of(run: &Run) -> Result<SystemOfRun, InputError> {
             .first()
             .map_or(ChannelKind::Displacement, |(kind, _)| *kind),
         sigmas: sigmas.collect(),
+        scalars,
     })
 }
 

@@ -1,22 +1,23 @@
 //! Predictions of a fitted system under a new excitation: table, figure, CSV and JSON.
 
+mod free;
 mod identified;
+mod record;
 
 use super::chart::{Colour, Figure, Mark, Panel, Style};
 use super::csv::CsvTable;
 use super::run_reader::Run;
-use crate::config::NewRecord;
+use crate::config::{NewRecord, RunSensor};
 use crate::error::InputError;
 use crate::number_format::significant;
-use identified::{SystemOfRun, system_of};
+pub use free::FreePredictions;
+use identified::system_of;
 use kmcfit_core::internals::diagnostics::{rms, standard_deviation};
-use kmcfit_core::internals::record::{Channel, ChannelKind, Experiment, Input, Weighting};
+use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::study::PredictedChannel;
-use kmcfit_core::internals::system::{Grid, InputSample, State};
+use kmcfit_core::internals::system::State;
+use record::{experiment, grid};
 use serde::Serialize;
-
-/// Most nodes of a prediction.
-const MOST_NODES: usize = 5_000_000;
 
 /// Responses to one excitation from several initial states.
 pub struct ForcedPredictions {
@@ -78,15 +79,19 @@ impl ForcedPredictions {
         states: &[State],
         kinds: &[ChannelKind],
     ) -> Result<Result<Self, String>, InputError> {
-        let system = system_of(run)?;
+        let sensors: Vec<&RunSensor> = record.measured.iter().map(|m| &m.sensor).collect();
+        let system = system_of(run, &sensors)?;
         let grid = grid(run, &system, record)?;
         let mut cases = Vec::new();
         for state in states {
-            let (experiment, is_measured) = experiment(&system, record, *state, kinds, &grid);
+            let (experiment, is_measured) = experiment(&system, record, *state, kinds, &grid)?;
             let sigmas: Vec<Option<f64>> = (experiment.channels.iter())
                 .map(|channel| system.sigma(channel.kind()))
                 .collect();
-            let Some(problem) = system.identified.problem(grid, experiment) else {
+            let scalars = system.scalars.clone();
+            let identified = &system.identified;
+            let problem = identified.problem_with_sensors(grid, experiment, scalars);
+            let Some(problem) = problem else {
                 return Err(InputError::file(
                     run.folder.join("parameters.json"),
                     "the parameters do not describe the system of the run",
@@ -302,97 +307,4 @@ fn aligned(rows: &[Vec<String>]) -> String {
         text.push('\n');
     }
     text
-}
-
-/// The grid of a prediction over the inputs: steps of at most those of the fit and of the samples of the inputs.
-fn grid(run: &Run, system: &SystemOfRun, record: &NewRecord) -> Result<Grid, InputError> {
-    let of_fit = &system.identified.system.grid;
-    let [from, to] = record.span;
-    let file = record.files.first().cloned().unwrap_or_default();
-    let (start, end) = (of_fit.start(), of_fit.start() + of_fit.duration());
-    let slack = of_fit.step();
-    if !system.identified.is_constant() && (from < start - slack || to > end + slack) {
-        return Err(InputError::file(
-            &file,
-            "the coefficients vary with time and are identified over their record only",
-        )
-        .found(format!("inputs from {from} s to {to} s"))
-        .expected(format!(
-            "times from {start} s to {end} s, those of the record of {}",
-            run.folder.display()
-        )));
-    }
-    let step = of_fit.step().min(record.spacing);
-    let nodes = ((to - from) / step).ceil() + 1.0;
-    let grid = (nodes <= MOST_NODES as f64)
-        .then(|| Grid::new(from, to - from, (nodes as usize).max(Grid::FEWEST_NODES)))
-        .flatten();
-    grid.ok_or_else(|| {
-        InputError::file(&file, "too long for the time step of the run")
-            .found(format!("{nodes} nodes with steps of {step:e} s"))
-            .expected(format!("at most {MOST_NODES} nodes"))
-    })
-}
-
-/// The record with its channels; true for those with measurements.
-fn experiment(
-    system: &SystemOfRun,
-    record: &NewRecord,
-    state: State,
-    kinds: &[ChannelKind],
-    grid: &Grid,
-) -> (Experiment, Vec<bool>) {
-    let nodes = grid.nodes();
-    let mut experiment = Experiment::free("prediction", state, nodes);
-    experiment.excitation = Some(record.input.on(grid, nodes));
-    experiment.input = record.input.clone();
-    let measured: Vec<ChannelKind> = record.measured.iter().map(|m| m.kind).collect();
-    let kinds = match (kinds, measured.as_slice()) {
-        ([], []) => vec![system.kind],
-        ([], measured) => measured.to_vec(),
-        (kinds, _) => kinds.to_vec(),
-    };
-    let mut is_measured = Vec::new();
-    for kind in kinds {
-        let samples = record.measured.iter().find(|m| m.kind == kind);
-        let weighting = Weighting::Sigma(1.0);
-        let channel = samples.and_then(|m| {
-            Channel::new(
-                kind,
-                m.times.clone(),
-                m.values.clone(),
-                weighting.clone(),
-                grid,
-                nodes,
-            )
-        });
-        is_measured.push(channel.is_some());
-        let at_nodes = || {
-            let zeros = vec![0.0; nodes];
-            Channel::new(kind, grid.times(), zeros, weighting.clone(), grid, nodes)
-        };
-        let channel = channel.or_else(at_nodes);
-        let channel = channel.map(|channel| with_inputs(channel, &record.input));
-        experiment.channels.extend(channel);
-    }
-    (experiment, is_measured)
-}
-
-/// The channel with the inputs at its samples. Accelerations are absolute, as in model files; other quantities are relative to the base.
-fn with_inputs(channel: Channel, input: &Input) -> Channel {
-    if channel.kind() != ChannelKind::Acceleration {
-        return channel;
-    }
-    let times = channel.times().to_vec();
-    let inputs = times.iter().map(|t| InputSample {
-        force: input.force_at(*t),
-        base: input.base_acceleration_at(*t),
-    });
-    let bases = times.iter().map(|t| input.base_acceleration_at(*t));
-    let bases: Vec<f64> = bases.collect();
-    let channel = channel.with_inputs_at_samples(inputs.collect());
-    match input.base.is_some() {
-        true => channel.with_base(bases),
-        false => channel,
-    }
 }

@@ -139,6 +139,8 @@ fn band_record(band: &Band, factor: f64, truth: Option<&[f64]>) -> BandRecord {
         values: finite_numbers(&band.values),
         low,
         high,
+        mean: Some(band.mean.value).filter(|mean| mean.is_finite()),
+        mean_95: band.mean.interval(),
         truth: truth.map(finite_numbers).unwrap_or_default(),
         notes: band.notes.clone(),
     }

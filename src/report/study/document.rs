@@ -137,6 +137,12 @@ pub struct BandRecord {
     pub low: Numbers,
     /// Upper ends of the pointwise band.
     pub high: Numbers,
+    /// Mean over the record, at all nodes of the fit; `null` where a value is not defined.
+    #[serde(default)]
+    pub mean: Option<f64>,
+    /// 95 % confidence interval of the mean; `null` where there is none.
+    #[serde(default)]
+    pub mean_95: Option<[f64; 2]>,
     /// True values, where they are known.
     pub truth: Numbers,
     /// Notes.

@@ -1,5 +1,6 @@
 //! Assumptions of a verdict that the records cannot test.
 
+use crate::identifiability::{ScaleSource, scale_source};
 use crate::problem::Problem;
 use serde::Serialize;
 
@@ -19,10 +20,15 @@ pub enum VerdictAssumption {
         /// Kind of the channel.
         channel: String,
     },
+    /// The values of the fixed functions that determine the scale of mass, damping and stiffness, which the samples leave open.
+    Scale {
+        /// Names of the functions.
+        functions: Vec<String>,
+    },
 }
 
 /// Assumptions of the verdict on a fit: an error of the clock scales all frequencies, and one of the unit of an only channel the mass, the
-/// damping and the stiffness.
+/// damping and the stiffness; fixed functions scale the others.
 pub fn verdict_assumptions(problem: &Problem) -> Vec<VerdictAssumption> {
     let each = problem
         .experiments
@@ -41,5 +47,9 @@ pub fn verdict_assumptions(problem: &Problem) -> Vec<VerdictAssumption> {
             };
             std::iter::once(clock).chain(unit)
         });
-    each.collect()
+    let scale = match scale_source(problem) {
+        ScaleSource::Fixed(functions) => Some(VerdictAssumption::Scale { functions }),
+        _ => None,
+    };
+    each.chain(scale).collect()
 }

@@ -62,7 +62,9 @@ pub struct ClassicalEstimate {
     pub agrees: bool,
 }
 
-/// Classical estimate from the first channel of the first experiment that allows one, for a linear model with constant coefficients.
+/// Classical estimate from the first channel of the first experiment that allows one, for a linear model; of a forced response with constant
+/// coefficients only. Beside coefficients that vary the frequency alone is compared, with its range over the record: the amplitude of a decay
+/// also changes with mass and stiffness.
 pub(super) fn classical_estimate(
     problem: &Problem,
     evaluation: &Evaluation,
@@ -73,26 +75,35 @@ pub(super) fn classical_estimate(
     let is_constant = set.iter().all(|f| functions.is_constant_or_known(*f));
     let is_linear = problem.system.terms == [Term::Damping, Term::Stiffness];
     let ratios = Ratios::of(&evaluation.nodal);
+    is_linear.then_some(())?;
     let is_steady = |values: &[f64]| values.iter().all(|v| *v == values[0]);
-    let is_comparable = is_steady(&ratios.frequency) && is_steady(&ratios.damping_ratio);
-    (is_constant && is_linear && is_comparable).then_some(())?;
+    let is_constant =
+        is_constant && is_steady(&ratios.frequency) && is_steady(&ratios.damping_ratio);
     let each = problem.experiments.iter().zip(&evaluation.predictions);
-    let mut each = each.filter(|(experiment, _)| experiment.coefficient_set == 0);
+    let mut each = each.filter(|(experiment, _)| {
+        experiment.coefficient_set == 0 && (is_constant || experiment.is_free())
+    });
     let mut found =
         each.find_map(|(experiment, predictions)| of_experiment(experiment, predictions.first()?))?;
-    let interval = |name: &str, value: f64| {
+    let interval = |name: &str, values: &[f64]| {
         let interval = bands
             .and_then(|b| b.ratio(name))
             .and_then(|b| b.mean.interval());
-        interval.unwrap_or([value; 2])
+        let range = values
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |r, x| {
+                [r[0].min(*x), r[1].max(*x)]
+            });
+        let [low, high] = interval.unwrap_or(range);
+        [low.min(range[0]), high.max(range[1])]
     };
     let overlap = |[a, b]: [f64; 2], [c, d]: [f64; 2]| a <= d && c <= b;
-    let frequency = interval("natural frequency", ratios.frequency[0]);
-    let damping = interval("damping ratio", ratios.damping_ratio[0]);
+    let frequency = interval("natural frequency", &ratios.frequency);
+    let damping = interval("damping ratio", &ratios.damping_ratio);
     found.agrees = overlap(found.frequency_interval, frequency)
         && found
             .damping_interval
-            .is_none_or(|own| overlap(own, damping));
+            .is_none_or(|own| !is_constant || overlap(own, damping));
     Some(found)
 }
 

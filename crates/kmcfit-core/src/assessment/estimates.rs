@@ -1,11 +1,12 @@
 //! The answer of a fit: estimates of natural frequency, damping ratio, coefficients and ratios with their confidence intervals.
 
 use crate::functions::{CoefficientFunction, Ratios};
-use crate::identifiability::{MeanOverRecord, Means, ScaleSource, scale_source};
+use crate::identifiability::{
+    MeanOverRecord, Means, ScaleSource, mean_over_record, mean_weights, scale_source,
+};
 use crate::problem::Problem;
 use crate::solvers::{Fit, number_or_nan};
 use crate::system::NodalCoefficients;
-use crate::system::quadrature::trapezoid_weights;
 use serde::{Deserialize, Serialize};
 
 /// How an estimate was obtained.
@@ -14,6 +15,8 @@ use serde::{Deserialize, Serialize};
 pub enum EstimateStatus {
     /// From the samples.
     Estimated,
+    /// Not determined by the samples with the method of the fit.
+    NotIdentifiable,
     /// Fixed by the model; with an interval where its standard deviation is stated.
     Fixed,
     /// The samples determine ratios only: mass, damping and stiffness scale with a value that the model assumes.
@@ -152,11 +155,7 @@ fn estimate(
     unit: &str,
     status: EstimateStatus,
 ) -> Estimate {
-    let shares = trapezoid_weights(values.len(), 1.0 / (values.len() - 1).max(1) as f64);
-    let value: f64 = match values.iter().all(|v| *v == values[0]) {
-        true => values[0],
-        false => values.iter().zip(shares).map(|(v, w)| v * w).sum(),
-    };
+    let value = mean_over_record(values, &mean_weights(values.len()));
     let half = mean.and_then(|mean| {
         let [low, high] = mean.interval()?;
         Some(0.5 * (high - low))

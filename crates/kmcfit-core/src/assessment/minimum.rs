@@ -1,11 +1,9 @@
 //! Minima of linearised sums of squares.
 
 use crate::identifiability::Factorisation;
-use crate::noise::KernelCovariance;
 use crate::simd::tall_qr::Triangle;
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
-use std::ops::Range;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// Root `F` of `(J^T J)^-1 = F F^T` on the combinations of parameters that `J` determines, with columns of unit length for the decision.
 pub(super) fn inverse_root(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
@@ -33,8 +31,6 @@ pub(super) struct Minimum {
     rank: usize,
     /// The minimiser.
     pub(super) change: DVector<f64>,
-    /// Root `F` of `(J^T J)^-1 = F F^T`.
-    root: DMatrix<f64>,
 }
 
 impl Minimum {
@@ -45,31 +41,7 @@ impl Minimum {
             squares: (residuals + jacobian * &change).norm_squared(),
             rank: root.ncols(),
             change,
-            root,
         }
-    }
-
-    /// Probability of at least this difference of the parameters at `place` and `place + 1` by noise, from the covariance
-    /// `F F^T S F F^T` with the kernel's covariance `S` of the scores.
-    pub(super) fn difference(
-        &self,
-        jacobian: &DMatrix<f64>,
-        residuals: &DVector<f64>,
-        place: usize,
-        records: &[Range<usize>],
-    ) -> Option<f64> {
-        let left = residuals + jacobian * &self.change;
-        let mut scores = jacobian * &self.root;
-        for (mut row, r) in scores.row_iter_mut().zip(left.iter()) {
-            row *= *r;
-        }
-        let covariance = KernelCovariance::of(&scores, records, self.rank as f64)?.sum;
-        let contrast = (self.root.row(place) - self.root.row(place + 1)).transpose();
-        let variance = contrast.dot(&(covariance * &contrast));
-        let difference = self.change[place] - self.change[place + 1];
-        let statistic = difference * difference / variance;
-        let law = ChiSquared::new(1.0).ok()?;
-        statistic.is_finite().then(|| law.sf(statistic))
     }
 
     /// Probability of at least this improvement over `coarse` by noise alone.

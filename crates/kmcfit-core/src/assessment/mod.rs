@@ -9,12 +9,13 @@ mod estimates;
 mod extension;
 mod friction_width;
 mod function;
-mod gaps;
 mod implausible;
 mod input_correlation;
 mod input_disturbance;
 mod input_pulses;
+mod interpolation_loss;
 mod large_covariance;
+mod median_frequency;
 mod minimum;
 mod model_tests;
 mod plausibility;
@@ -32,6 +33,7 @@ mod second_mode;
 mod span;
 mod statistics;
 mod step_check;
+mod variation;
 mod verdict;
 
 pub use crate::objective::{all_diagnostics, outliers};
@@ -42,7 +44,6 @@ pub use constants::{constant_probability, standard_error};
 pub use equation_error::{EquationErrorIntervals, NoIntervals};
 pub use estimates::{Estimate, EstimateStatus, estimates};
 pub use function::{EstimateErrors, FunctionSummary, function_summaries};
-pub use gaps::{FunctionInGap, GapAssessment};
 pub use implausible::Implausible;
 pub use large_covariance::{LargeCovariance, MOST_WITH_COVARIANCE};
 pub use model_tests::{BasisComparison, Extension, ExtensionTest, ModelTests};
@@ -57,16 +58,18 @@ pub use verdict::{SampleFault, VerdictLevel, VerdictReason, verdict_level, verdi
 
 use classical::classical_estimate;
 use friction_width::width_warning;
-use gaps::gap_assessments;
 use input_pulses::input_pulses;
+use interpolation_loss::interpolation_losses;
 use record_errors::large_error;
 use rivals::amplitude_rival;
 use score_tests::{ScoreTests, missing};
-use second_mode::second_modes;
+use second_mode::{second_modes, second_modes_in_place};
+use variation::variation_warnings;
 
+use crate::functions::CoefficientFunction;
 use crate::identifiability::{
     Bands, FunctionClassification, Means, classify_functions, condition_on_bases,
-    condition_on_inputs, condition_on_time, except_gap,
+    condition_on_inputs, condition_on_time,
 };
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::{Fit, Status};
@@ -128,13 +131,8 @@ impl FitAssessment {
                 Err(error) => Err(*error),
             };
             let statistics = statistics(problem, &best.evaluation);
-            let plausibility = Plausibility::of(
-                problem,
-                &best.evaluation,
-                &step_check,
-                &statistics,
-                reports_errors,
-            );
+            let plausibility =
+                Plausibility::of(problem, &best.evaluation, &step_check, reports_errors);
             (halved, step_check, statistics, plausibility)
         };
         let score_tests = || {
@@ -171,40 +169,31 @@ impl FitAssessment {
         }
         // Its Jacobian is as large as those that follow.
         drop(score_tests);
-        let mut gaps = Vec::new();
         if reports_errors && assessment.plausibility.errors_hold {
             let (theta, evaluation) = (&best.parameters, &best.evaluation);
             let is_coloured = assessment.plausibility.is_coloured;
             let (bands, test) = at_once(
                 problem,
                 || Bands::beside(problem, theta, evaluation, halved.ok().flatten()),
-                || match (tests_bases, is_coloured) {
-                    (true, false) => BasisTest::of(problem, theta, evaluation),
-                    (true, true) => BasisTest::of_halves(problem, theta, evaluation),
-                    (false, _) => BasisTest::default(),
+                || match tests_bases && !is_coloured {
+                    true => BasisTest::of(problem, theta, evaluation),
+                    false => BasisTest::default(),
                 },
             );
             assessment.classifications = classify_functions(problem, &best.evaluation, &bands);
-            condition_on_bases(problem, &mut assessment.classifications, &test.doubtful);
+            let is_white = !is_coloured && !assessment.plausibility.is_disturbed;
+            let losses = interpolation_losses(problem, theta, evaluation, is_white);
+            assessment.plausibility.warnings.extend(losses);
+            let may_vary = may_vary(&assessment.plausibility);
+            if may_vary {
+                condition_on_bases(problem, &mut assessment.classifications, &test.doubtful);
+            }
             if !test.comparisons.is_empty() {
                 assessment.model_tests.p_limit = test.level;
                 assessment.model_tests.bases = test.comparisons;
             }
             if assessment.plausibility.is_disturbed {
                 condition_on_inputs(&mut assessment.classifications);
-            }
-            gaps = gap_assessments(problem, fit, Some(&bands));
-            for gap in &gaps {
-                let functions = gap.functions.iter();
-                let open = functions.filter(|f| !f.is_identified);
-                let open: Vec<usize> = open.map(|f| f.index).collect();
-                except_gap(
-                    problem,
-                    &mut assessment.classifications,
-                    &open,
-                    gap.span,
-                    &bands,
-                );
             }
             if !problem.penalties.is_empty() {
                 assessment.effective_parameters = problem.effective_parameters(theta, evaluation);
@@ -216,28 +205,34 @@ impl FitAssessment {
                 condition_on_time(problem, &mut assessment.classifications, &rival.indices);
                 (assessment.plausibility.warnings).push(FitWarning::TimeOrAmplitude(rival));
             }
-            let warnings = test.coarse.into_iter().map(FitWarning::CoarseBasis);
+            let coarse = test.coarse.into_iter().filter(|_| may_vary);
+            let warnings = coarse.map(FitWarning::CoarseBasis);
             assessment.plausibility.warnings.extend(warnings);
             assessment
                 .degrees_of_freedom
                 .clone_from(&bands.degrees_of_freedom);
             assessment.covariance = bands.covariance.clone();
             assessment.bands = Some(bands);
-        } else if few {
-            gaps = gap_assessments(problem, fit, None);
-        } else if assessment.plausibility.errors_hold && !assessment.plausibility.is_coloured {
+        } else if !few
+            && assessment.plausibility.errors_hold
+            && !assessment.plausibility.is_coloured
+        {
             assessment.large_covariance =
                 LargeCovariance::of(problem, &best.parameters, &best.evaluation);
         }
         if fit.outcome.status != Status::Failed {
+            let (bands, effective) = (
+                assessment.bands.as_ref(),
+                assessment.effective_parameters.as_deref(),
+            );
+            let varying = variation_warnings(problem, &best.evaluation, bands, effective);
+            assessment.plausibility.warnings.extend(varying);
             assessment.classical =
                 classical_estimate(problem, &best.evaluation, assessment.bands.as_ref());
         }
         let disagrees = assessment.classical.iter().filter(|c| !c.agrees).cloned();
         let disagrees = disagrees.map(FitWarning::ClassicalDisagrees);
         assessment.plausibility.warnings.extend(disagrees);
-        let gaps = gaps.into_iter().map(FitWarning::Gap);
-        assessment.plausibility.warnings.extend(gaps);
         assessment
     }
 
@@ -258,6 +253,30 @@ impl FitAssessment {
             tests_constants: !self.plausibility.is_coloured,
         }
     }
+}
+
+fn is_constant(function: &CoefficientFunction) -> bool {
+    function.parameters() < 2
+}
+
+/// True where a finer basis that fits better may mean that a coefficient varies: no other test explains the residuals. Correlated residuals are
+/// not tested: what leaves them also makes constants seem to vary.
+fn may_vary(plausibility: &Plausibility) -> bool {
+    let explains = |warning: &FitWarning| {
+        matches!(
+            warning,
+            FitWarning::DisturbedInput { .. }
+                | FitWarning::ContradictedInputSigma { .. }
+                | FitWarning::InterpolationLoss { .. }
+                | FitWarning::CoherentResiduals { .. }
+                | FitWarning::MissingTerm(_)
+                | FitWarning::SecondMode { .. }
+                | FitWarning::ResidualMean { .. }
+                | FitWarning::FrictionWidth { .. }
+                | FitWarning::RecordError(_)
+        )
+    };
+    !plausibility.warnings.iter().any(explains)
 }
 
 /// Causes of residuals that the model does not explain: the width of friction and, with `tests` of larger models, a missing term, an error of a
@@ -290,7 +309,10 @@ fn causes(
             };
             let found = match small.or_else(large).or_else(pulses) {
                 Some(cause) => vec![cause],
-                None => second_modes(problem, evaluation, &plausibility.residuals),
+                None => match problem.functions.iter().all(is_constant) {
+                    true => second_modes(problem, evaluation, &plausibility.residuals),
+                    false => second_modes_in_place(problem, theta, evaluation),
+                },
             };
             (found, tests)
         }

@@ -1,27 +1,25 @@
 //! Plausibility of a fit: conditions under which its optimum identifies no system, and warnings about its intervals.
 
 use super::classical::ClassicalEstimate;
-use super::gaps::GapAssessment;
 use super::input_correlation::coherent_residuals;
 use super::input_disturbance::input_warnings;
+use super::median_frequency::median_frequency;
 use super::record_error::RecordError;
 use super::refinement::CoarseBasis;
 use super::residual_mean::mean_warnings;
 use super::rivals::AmplitudeRival;
-use super::statistics::{FitStatistics, statistics};
 use super::step_check::{StepCheckOutcome, step_check};
 use crate::diagnostics::{ResidualDiagnostics, rms};
 use crate::functions::CoefficientKind;
 use crate::objective::{Evaluation, all_diagnostics, channel_fit_percent};
 use crate::problem::Problem;
-use crate::record::{Channel, Loss, ScoreCovariance};
+use crate::record::{Channel, Loss, ScoreCovariance, Weighting};
 use crate::signal::median;
 use crate::simulate::SimulationError;
 use crate::solvers::MissingTerm;
-use crate::system::{Excitation, InputQuantity, Term};
+use crate::system::{Excitation, InputQuantity};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use std::f64::consts::TAU;
 
 /// Largest change of the predictions by halving the step, as a share of the largest sample; beyond it the step-size error
 /// dominates the fit.
@@ -30,8 +28,10 @@ const STEPPER: f64 = 0.1;
 const UNRELATED: f64 = -100.0;
 /// NRMSE fit, per cent, below which a fit does not explain the record.
 pub const POOR: f64 = 90.0;
-/// Root of the reduced chi-square above which the stated sigma is inconsistent with the residuals.
+/// Residuals of a channel over its stated sigma above which the two are inconsistent.
 pub const BEYOND_SIGMA: f64 = 3.0;
+/// Median of the size of a standard normal variable.
+const MEDIAN_SIZE: f64 = 0.674_489_750_196_081_7;
 /// p-value of the residuals under white noise below which they are certainly coloured.
 const CERTAIN: f64 = 1e-6;
 /// NRMSE fit, per cent, above which the residuals are rounding errors of the samples.
@@ -75,7 +75,7 @@ pub enum Unidentified {
 pub enum FitWarning {
     /// The residuals are a multiple of sigma: standard errors are unknown.
     BeyondSigma {
-        /// Root of the reduced chi-square.
+        /// Residuals of the worst channel over its sigma.
         times: f64,
     },
     /// Halving the step changes the response by a multiple of the residuals: standard errors are unknown.
@@ -101,8 +101,31 @@ pub enum FitWarning {
     },
     /// A finer basis fits significantly better: the intervals exclude the error of the basis.
     CoarseBasis(CoarseBasis),
-    /// The records have a gap of more than half a period.
-    Gap(GapAssessment),
+    /// Functions can vary within the periods of the vibration, which cannot be told from offsets, harmonics and second modes.
+    FastVariation {
+        /// Names of the functions.
+        functions: Vec<String>,
+        /// Most parameters per period.
+        per_period: f64,
+    },
+    /// A function oscillates, as the sum of two modes that beat makes it.
+    Oscillates {
+        /// Name of the function.
+        function: String,
+        /// Frequency of the oscillation, Hz.
+        frequency: f64,
+    },
+    /// The interpolation between the samples of an input loses a share of it, which the coefficients have lost as well.
+    InterpolationLoss {
+        /// Name of the experiment.
+        experiment: String,
+        /// The input.
+        input: InputQuantity,
+        /// Share lost at the natural frequency.
+        share: f64,
+        /// Largest shift of an estimate by cubics in place of the lines, in standard errors.
+        errors: f64,
+    },
     /// The residuals are those of errors of a measured input, or of a term missing from the equation of motion.
     DisturbedInput {
         /// Name of the experiment.
@@ -210,13 +233,12 @@ pub struct Plausibility {
 }
 
 impl Plausibility {
-    /// Plausibility of the optimum `evaluation`, given its step-size check and statistics; `reports_errors` is true if standard errors
+    /// Plausibility of the optimum `evaluation`, given its step-size check; `reports_errors` is true if standard errors
     /// are reported also for samples without sigma.
     pub fn of(
         problem: &Problem,
         evaluation: &Evaluation,
         step_check: &StepCheckOutcome,
-        statistics: &FitStatistics,
         reports_errors: bool,
     ) -> Self {
         let unidentified = unidentified(problem, evaluation, step_check).or_else(|| {
@@ -225,7 +247,7 @@ impl Plausibility {
         });
         let residuals = all_diagnostics(problem, evaluation);
         let (coloured, poor) = coloured_and_poor(problem, &residuals, reports_errors);
-        let unexplained = unexplained(statistics)
+        let unexplained = unexplained(problem, evaluation)
             .or_else(|| coarse(problem, evaluation, step_check))
             .or_else(|| poor.then_some(FitWarning::PoorFit));
         let aliased = aliased(problem, evaluation);
@@ -275,8 +297,7 @@ impl Plausibility {
     /// Plausibility of the optimum `evaluation`, with standard errors reported for all samples.
     pub fn at(problem: &Problem, evaluation: &Evaluation) -> Self {
         let step_check = step_check(problem, evaluation);
-        let statistics = statistics(problem, evaluation);
-        Self::of(problem, evaluation, &step_check, &statistics, true)
+        Self::of(problem, evaluation, &step_check, true)
     }
 
     /// Marks a failed fit.
@@ -421,10 +442,23 @@ fn implausible(problem: &Problem, evaluation: &Evaluation) -> Vec<FitWarning> {
     warnings
 }
 
-/// Warning where the residuals exceed the stated sigma, so that standard errors are too small; `None` where they do not, or no
-/// sigma is stated.
-fn unexplained(statistics: &FitStatistics) -> Option<FitWarning> {
-    let times = statistics.reduced_chi_square?.sqrt();
+/// Warning where the residuals of a channel exceed its stated sigma, so that standard errors are too small. Each channel is judged by itself,
+/// whatever penalties, bounds and other channels do to the degrees of freedom: by the root mean square of its innovations over sigma, and
+/// with a robust loss, which outliers may exceed, by the median of their sizes over that of a normal distribution.
+fn unexplained(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
+    let times_sigma = |(channel, predicted): (&Channel, &Vec<f64>)| match channel.weighting() {
+        Weighting::Sigma(_) | Weighting::Sigmas(_) if channel.loss() == Loss::Squares => {
+            (channel.cost(predicted) / channel.len() as f64).sqrt()
+        }
+        Weighting::Sigma(_) | Weighting::Sigmas(_) => {
+            let sizes = channel.residuals(predicted).enumerate();
+            let sizes = sizes.filter_map(|(i, r)| Some(r.abs() / channel.weighting().sigma(i)?));
+            median(sizes.collect::<Vec<_>>()) / MEDIAN_SIZE
+        }
+        _ => 0.0,
+    };
+    let times = problem.predicted(evaluation).map(times_sigma);
+    let times = times.fold(0.0, f64::max);
     (times > BEYOND_SIGMA).then_some(FitWarning::BeyondSigma { times })
 }
 
@@ -445,12 +479,8 @@ fn aliased(problem: &Problem, evaluation: &Evaluation) -> Option<FitWarning> {
     if !channels.all(alike) || experiments.any(|e| driven(&e.excitation)) {
         return None;
     }
-    let place = (problem.system.terms.iter()).position(|term| *term == Term::Stiffness)?;
-    let nodal = &evaluation.nodal;
-    let pairs = nodal.mass.iter().zip(&nodal.coefficients[place]);
-    let squares: Vec<f64> = pairs.map(|(m, k)| (k / m).max(0.0)).collect();
     // Median over time, because k/m may be arbitrary at the ends of a record.
-    let frequency = median(squares).sqrt() / TAU;
+    let frequency = median_frequency(problem, evaluation)?;
     (frequency * spacing > PERIODS_PER_SAMPLE).then(|| FitWarning::Aliased {
         per_period: 1.0 / (frequency * spacing),
         frequency,

@@ -12,13 +12,12 @@
 
 use super::minimum::Minimum;
 use super::model_tests::BasisComparison;
-use super::span::weighted_residuals;
 use crate::diagnostics::{rms, standard_deviation};
 use crate::functions::{Basis, CoefficientFunction, Parameterization};
 use crate::identifiability::has_active_rows;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use crate::solvers::{reduced_jacobian, weighted_jacobian};
+use crate::solvers::reduced_jacobian;
 use crate::spans::spans;
 use crate::system::Grid;
 use nalgebra::{DMatrix, DVector};
@@ -78,17 +77,6 @@ impl BasisTest {
     /// active constraint, for residuals at machine precision, and with few samples.
     pub fn of(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Self {
         Self::where_it_applies(problem, theta, evaluation).unwrap_or_default()
-    }
-
-    /// Tests the constants by halves of the record, with a covariance that is consistent under heteroscedasticity and autocorrelation: for
-    /// residuals that are not white. Empty where [`BasisTest::of`] is.
-    pub fn of_halves(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Self {
-        let test = || {
-            applies(problem, theta, evaluation).then_some(())?;
-            let finer = FinerBases::new(problem, theta)?;
-            Some(finer.halves(problem, evaluation))
-        };
-        test().unwrap_or_default()
     }
 
     fn where_it_applies(problem: &Problem, theta: &[f64], evaluation: &Evaluation) -> Option<Self> {
@@ -209,42 +197,6 @@ impl FinerBases {
             open.retain(|i| *i != index);
             finer.push(index);
             coarse = minimum;
-        }
-    }
-
-    /// Wald test of each constant, with all of them in halves: the difference of its values beside its standard error by the kernel's
-    /// covariance.
-    fn halves(&self, given: &Problem, evaluation: &Evaluation) -> BasisTest {
-        let jacobian = weighted_jacobian(&self.problem, evaluation);
-        let residuals = weighted_residuals(&self.problem, evaluation);
-        let records = self.problem.channel_samples();
-        let constants: Vec<usize> = (0..self.maps.len())
-            .filter(|i| self.maps[*i].is_some() && given.functions.is_constant(*i))
-            .collect();
-        let sizes = given.median_scales(evaluation);
-        let coarse = Minimum::of(&self.columns(&jacobian, &[]), &residuals);
-        let columns = self.columns(&jacobian, &constants);
-        let minimum = Minimum::of(&columns, &residuals);
-        let mut found: Vec<CoarseBasis> = Vec::new();
-        let mut comparisons = Vec::new();
-        let level = LEVEL / constants.len().max(1) as f64;
-        for &index in &constants {
-            let place = self.place(index, &constants);
-            let p_value = minimum.difference(&columns, &residuals, place, &records);
-            comparisons.extend(p_value.map(|p| self.comparison(given, index, p)));
-            if let Some(p_value) = p_value.filter(|p| *p < level) {
-                let to = minimum.change.rows(place, 2).into_owned();
-                let from = coarse.change[self.place(index, &[])];
-                let change = [to.clone(), to.add_scalar(-from)];
-                found.push(self.finding(given, index, &change, p_value, sizes[index]));
-            }
-        }
-        found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
-        BasisTest {
-            doubtful: found.iter().map(|basis| basis.index).collect(),
-            coarse: found,
-            comparisons,
-            level,
         }
     }
 

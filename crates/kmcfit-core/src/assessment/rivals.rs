@@ -25,7 +25,7 @@ use crate::functions::{CoefficientFunction, CoefficientKind, CoefficientSet, Par
 use crate::objective::Evaluation;
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, Loss, Weighting};
-use crate::solvers::{FitSettings, Stopping, fit_from};
+use crate::solvers::{Fit, FitSettings, Stopping, fit_from};
 use crate::system::Term;
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -64,7 +64,7 @@ const DAMPING: [CoefficientKind; 2] = [
 pub struct AmplitudeRival {
     /// Functions that vary with time in the fit.
     pub functions: Vec<String>,
-    /// Terms of the rival that depend on the amplitude.
+    /// Terms of the rival that depend on the amplitude; none for constants alone.
     pub terms: Vec<CoefficientKind>,
     /// BIC of the rival minus that of the fit.
     pub bic_difference: f64,
@@ -90,6 +90,7 @@ pub(super) fn amplitude_rival(
     let may_apply = !indices.is_empty() && is_few && is_long && is_plain && is_one_set;
     (may_apply && applies(problem, theta, evaluation)).then_some(())?;
     let response = Response::of(problem, evaluation)?;
+    let varies = response.varies();
     let own = problem.parameters() as f64 - penalty_freedom(problem, effective);
     let here = criterion(problem, evaluation, own);
     let comparison = Comparison {
@@ -101,7 +102,11 @@ pub(super) fn amplitude_rival(
         here,
         own,
     };
-    let first = comparison.best(first_terms(problem, &indices), None)?;
+    // Constants alone are the first rival.
+    let alone = std::iter::once(Vec::new());
+    let further = first_terms(problem, &indices).into_iter();
+    let first = alone.chain(further.filter(|_| varies)).collect();
+    let first = comparison.best(first, None)?;
     let second = comparison.best(with_another(problem, &first.kinds), Some(&first));
     let best = second.filter(|second| second.difference < first.difference);
     let Rival {
@@ -216,20 +221,42 @@ impl Comparison<'_> {
     /// BIC of the fitted rival with the terms `kinds`; `None` without a response.
     fn criterion(&self, kinds: &[CoefficientKind]) -> Option<f64> {
         let (rival, start) = self.rival(kinds)?;
-        let settings = FitSettings {
-            stopping: Stopping {
-                tolerance: Some(1e-6),
-                ..Stopping::exactly(ITERATIONS)
-            },
-            ..FitSettings::default()
-        };
-        let fit = fit_from(&rival, &start, &settings).ok()?;
+        let fit = search(&rival, &start)?;
         Some(criterion(
             &rival,
             &fit.best.evaluation,
             rival.parameters() as f64,
         ))
     }
+}
+
+/// A short search from a start.
+fn search(problem: &Problem, start: &[f64]) -> Option<Fit> {
+    let settings = FitSettings {
+        stopping: Stopping {
+            tolerance: Some(1e-6),
+            ..Stopping::exactly(ITERATIONS)
+        },
+        ..FitSettings::default()
+    };
+    fit_from(problem, start, &settings).ok()
+}
+
+/// The problem with constants for all functions that can vary, fitted.
+pub(super) fn fit_of_constants(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+) -> Option<(Problem, Fit)> {
+    (problem.functions.coefficient_sets().len() == 1).then_some(())?;
+    let response = Response::of(problem, evaluation)?;
+    let all = 0..problem.functions.ranges().len();
+    let indices: Vec<usize> = all
+        .filter(|f| problem.functions.get(*f).parameters() > 1)
+        .collect();
+    let (constants, start) = rival(problem, theta, &indices, &[], &response)?;
+    let fit = search(&constants, &start)?;
+    Some((constants, fit))
 }
 
 /// True if a rival has no better minimum far from the fit. One with friction, which ends a motion, may have: it was better by 100 where the response
@@ -271,7 +298,7 @@ fn varying(
 }
 
 /// Parameters that penalties hold.
-fn penalty_freedom(problem: &Problem, effective: Option<&[f64]>) -> f64 {
+pub(super) fn penalty_freedom(problem: &Problem, effective: Option<&[f64]>) -> f64 {
     let pairs = problem.penalties.iter().zip(effective.unwrap_or_default());
     let held = pairs.map(|(penalty, effective)| {
         problem.functions.ranges()[penalty.function].len() as f64 - effective
@@ -345,7 +372,6 @@ struct Response {
 }
 
 impl Response {
-    /// `None` where the amplitude hardly varies.
     fn of(problem: &Problem, evaluation: &Evaluation) -> Option<Self> {
         let longest = (evaluation.trajectories.iter()).max_by_key(|response| response.nodes())?;
         let (y, v) = (&longest.displacement, &longest.velocity);
@@ -357,14 +383,19 @@ impl Response {
             .collect();
         let last = *amplitude.last()?;
         amplitude.resize(problem.functions.nodes(), last);
-        let mut sorted = amplitude.clone();
-        sorted.sort_by(f64::total_cmp);
-        let at = |share: f64| sorted[(share * (sorted.len() - 1) as f64) as usize];
-        (at(0.9) > AMPLITUDES * at(0.1)).then(|| Self {
+        Some(Self {
             amplitude,
             frequency,
             speed: size(v),
         })
+    }
+
+    /// False where the amplitude hardly varies.
+    fn varies(&self) -> bool {
+        let mut sorted = self.amplitude.clone();
+        sorted.sort_by(f64::total_cmp);
+        let at = |share: f64| sorted[(share * (sorted.len() - 1) as f64) as usize];
+        at(0.9) > AMPLITUDES * at(0.1)
     }
 
     /// Equivalent linear coefficient at amplitude `a` of a unit coefficient of this kind.

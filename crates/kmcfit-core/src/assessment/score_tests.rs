@@ -182,6 +182,7 @@ fn most_significant(
                     value,
                     t,
                     share: size / largest_force(problem, evaluation),
+                    width: term.friction_width(),
                 };
                 let Some(refit) = refit(problem, theta, &missing) else {
                     continue;

@@ -12,9 +12,10 @@
 //! noise by the Bayesian information criterion, their residuals are white or much smaller, and their frequencies are apart.
 
 use super::FitWarning;
+use super::rivals::{fit_of_constants, penalty_freedom};
 use crate::diagnostics::{ResidualDiagnostics, SIGNIFICANCE};
 use crate::functions::Ratios;
-use crate::objective::{Evaluation, diagnostics};
+use crate::objective::{Evaluation, all_diagnostics, diagnostics};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::record::{Channel, ChannelKind, Experiment};
 use crate::signal::{Spectrum, even_spacing, median};
@@ -51,26 +52,68 @@ const SMALL: f64 = 1e-4;
 /// Natural frequency (Hz) and damping ratio.
 type Mode = [f64; 2];
 
-/// Warnings about second modes where the coefficients are constant, at most one for each experiment, given the diagnostics of the residuals
-/// of each channel of each experiment.
+/// Warnings about second modes beside the constants of a fit, at most one for each experiment, given the diagnostics of the residuals of each
+/// channel of each experiment.
 pub(super) fn second_modes(
     problem: &Problem,
     evaluation: &Evaluation,
     residuals: &[Vec<ResidualDiagnostics>],
 ) -> Vec<FitWarning> {
-    // A coefficient that varies spreads one mode over a band.
-    let functions = &problem.functions;
-    let is_constant = |values: &[f64]| values.iter().all(|v| *v == values[0]);
-    let is_steady = (functions
-        .coefficient_set(0)
-        .iter()
-        .all(|f| functions.is_constant_or_known(*f)))
-        && evaluation.nodal.functions().all(is_constant);
-    if problem.parameters() > FEW_PARAMETERS || !is_steady {
+    warnings(problem, evaluation, residuals, |_| f64::INFINITY)
+}
+
+/// The same for a fit whose functions vary: beside constants in their place, where two modes also explain the samples better than the
+/// functions that vary, by the Bayesian information criterion.
+pub(super) fn second_modes_in_place(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+) -> Vec<FitWarning> {
+    let constants = || {
+        let few = (1..=FEW_PARAMETERS).contains(&problem.parameters());
+        let (constants, fit) = few.then(|| fit_of_constants(problem, theta, evaluation))??;
+        let effective = match problem.penalties.is_empty() {
+            true => 0.0,
+            false => {
+                let of_penalties = problem.effective_parameters(theta, evaluation)?;
+                penalty_freedom(problem, Some(&of_penalties))
+            }
+        };
+        let more = (problem.parameters() - constants.parameters()) as f64 - effective;
+        Some((constants, fit, more))
+    };
+    let Some((constants, fit, more)) = constants() else {
+        return Vec::new();
+    };
+    let there = &fit.best.evaluation;
+    let residuals = all_diagnostics(&constants, there);
+    let advantage = |e: usize| {
+        let of = |problem: &Problem, evaluation: &Evaluation| {
+            let channel = &problem.experiments[e].channels[0];
+            let innovations = channel.innovations(&evaluation.predictions[e][0]);
+            mean_square(&innovations[..innovations.len().min(MOST)])
+        };
+        let n = problem.experiments[e].channels[0].len().min(MOST) as f64;
+        // Of the functions that vary over the constants.
+        n * (of(&constants, there) / of(problem, evaluation)).ln() - more * n.ln()
+    };
+    warnings(&constants, there, &residuals, |e| -advantage(e))
+}
+
+/// Warnings where the gain of two modes over the fit of an experiment exceeds [`EVIDENCE`], and with `beside`, less the gain of another
+/// model, zero.
+fn warnings(
+    problem: &Problem,
+    evaluation: &Evaluation,
+    residuals: &[Vec<ResidualDiagnostics>],
+    beside: impl Fn(usize) -> f64,
+) -> Vec<FitWarning> {
+    if problem.parameters() > FEW_PARAMETERS {
         return Vec::new();
     }
     let each = (0..problem.experiments.len()).filter_map(|e| {
-        let frequencies = second_mode(problem, evaluation, e, residuals[e].first()?)?;
+        let (frequencies, gain) = second_mode(problem, evaluation, e, residuals[e].first()?)?;
+        (gain + beside(e) > 0.0).then_some(())?;
         Some(FitWarning::SecondMode {
             experiment: problem.experiments[e].name.clone(),
             frequencies,
@@ -79,13 +122,14 @@ pub(super) fn second_modes(
     each.collect()
 }
 
-/// Frequencies of two modes in the first channel of an experiment, the stronger first; `of_residuals` are the diagnostics of its residuals.
+/// Frequencies of two modes in the first channel of an experiment, the stronger first, and the difference of the criteria; `of_residuals` are the
+/// diagnostics of its residuals.
 fn second_mode(
     problem: &Problem,
     evaluation: &Evaluation,
     e: usize,
     of_residuals: &ResidualDiagnostics,
-) -> Option<[f64; 2]> {
+) -> Option<([f64; 2], f64)> {
     let experiment = &problem.experiments[e];
     let channel = experiment.channels.first()?;
     let predicted = evaluation.predictions[e].first()?;
@@ -117,10 +161,11 @@ fn second_mode(
     let [first, second] = found.sizes();
     let is_noticeable = first.min(second) > WEAKEST * first.max(second);
     (gain > EVIDENCE && is_explained && is_resolved && are_modes && is_noticeable).then(|| {
-        match first >= second {
+        let frequencies = match first >= second {
             true => [modes[0][0], modes[1][0]],
             false => [modes[1][0], modes[0][0]],
-        }
+        };
+        (frequencies, gain)
     })
 }
 

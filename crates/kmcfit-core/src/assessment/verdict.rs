@@ -1,17 +1,14 @@
 //! Verdict on a fit: may its estimates be used?
 //!
 //! The verdict is the worst level of its reasons. Each reason is one test of the fit: its end, the fit of the samples, the residuals after the
-//! noise model, the time steps, the bases, missing force terms, gaps, the inputs, and what the samples identify. A negative damping is no
-//! reason: some systems gain energy.
+//! noise model, the time steps, the bases, missing force terms, the inputs, and what the samples identify.
 
 use super::FitAssessment;
 use super::classical::ClassicalEstimate;
-use super::gaps::GapAssessment;
 use super::implausible::Implausible;
 use super::plausibility::{FitWarning, Unidentified};
 use super::record_error::RecordError;
 use super::rivals::AmplitudeRival;
-use crate::functions::CoefficientKind;
 use crate::identifiability::{
     Classification, FunctionClassification, ScaleSource, scale_source, structural_rank,
 };
@@ -57,7 +54,7 @@ pub enum VerdictReason {
     },
     /// The residuals are a multiple of the stated sigma.
     BeyondSigma {
-        /// Root of the reduced chi-square.
+        /// Residuals of the worst channel over its sigma.
         times: f64,
     },
     /// The error of the time steps exceeds the residuals.
@@ -95,6 +92,13 @@ pub enum VerdictReason {
     Saturation {
         /// Name of the channel.
         channel: String,
+    },
+    /// A record with the samples of another one.
+    RepeatedRecord {
+        /// Name of the experiment.
+        experiment: String,
+        /// Name of the other one.
+        other: String,
     },
     /// Faulty samples that are used.
     FaultySamples {
@@ -143,19 +147,33 @@ pub enum VerdictReason {
         /// Name of the function.
         function: String,
     },
+    /// Functions can vary within the periods of the vibration.
+    FastVariation {
+        /// Names of the functions.
+        functions: Vec<String>,
+    },
+    /// A function oscillates, as the sum of two modes makes it.
+    Oscillates {
+        /// Name of the function.
+        function: String,
+        /// Frequency of the oscillation, Hz.
+        frequency: f64,
+    },
+    /// The interpolation of an input loses a share of it that is not small beside the standard errors.
+    InterpolationLoss {
+        /// The input.
+        input: InputQuantity,
+        /// Share lost at the natural frequency.
+        share: f64,
+    },
     /// Residuals that are not white after the noise model.
     ColouredResiduals,
-    /// A gap in the records in which a function is not identified.
-    Gap {
-        /// The gap, s.
-        span: [f64; 2],
-    },
     /// Other frequencies match the samples as well.
     Aliased {
         /// Samples per period.
         per_period: f64,
     },
-    /// A mass or a stiffness is negative at most times.
+    /// A mass, damping or stiffness is negative at most times.
     Negative {
         /// Name of the function.
         function: String,
@@ -179,11 +197,10 @@ pub enum VerdictReason {
         /// Number of parameters.
         parameters: usize,
     },
-    /// Without a measured force the samples determine ratios to the mass only.
-    OnlyRatios {
-        /// Names of the functions that the model fixes; none where constraints or penalties determine the scale.
-        fixed: Vec<String>,
-    },
+    /// Without a measured force the samples determine ratios to the mass only, and no function is fixed.
+    OnlyRatios,
+    /// No input is measured, and an unknown force acts: the equation error does not determine the damping.
+    UnmeasuredForce,
     /// The equation error neglects the noise of the response, which biases its estimates.
     EquationError,
     /// The residual of the equation of motion is a large share of its largest force.
@@ -278,7 +295,9 @@ pub fn verdict_reasons(
         reasons.extend(of_scale(problem));
     }
     reasons.extend(saturations(problem));
-    reasons.sort_by_key(|reason| std::cmp::Reverse(reason.level()));
+    // What the basis permits explains less than what the samples show.
+    let is_general = |reason: &VerdictReason| matches!(reason, VerdictReason::FastVariation { .. });
+    reasons.sort_by_key(|reason| (std::cmp::Reverse(reason.level()), is_general(reason)));
     reasons
 }
 
@@ -326,8 +345,19 @@ fn of_warning(problem: &Problem, fit: &Fit, warning: &FitWarning) -> Option<Verd
         FitWarning::CoarseBasis(coarse) => VerdictReason::CoarseBasis {
             function: coarse.function.clone(),
         },
-        FitWarning::Gap(gap) => VerdictReason::Gap {
-            span: open_gap(gap)?,
+        FitWarning::FastVariation { functions, .. } => VerdictReason::FastVariation {
+            functions: functions.clone(),
+        },
+        FitWarning::Oscillates {
+            function,
+            frequency,
+        } => VerdictReason::Oscillates {
+            function: function.clone(),
+            frequency: *frequency,
+        },
+        FitWarning::InterpolationLoss { input, share, .. } => VerdictReason::InterpolationLoss {
+            input: *input,
+            share: *share,
         },
         FitWarning::DisturbedInput {
             experiment, input, ..
@@ -369,9 +399,6 @@ fn of_warning(problem: &Problem, fit: &Fit, warning: &FitWarning) -> Option<Verd
         FitWarning::FrictionWidth { estimate, .. } => VerdictReason::FrictionWidth {
             estimate: estimate.clone(),
         },
-        FitWarning::Negative { function } if function == CoefficientKind::Damping.name() => {
-            return None;
-        }
         FitWarning::Negative { function } => VerdictReason::Negative {
             function: function.clone(),
         },
@@ -379,12 +406,6 @@ fn of_warning(problem: &Problem, fit: &Fit, warning: &FitWarning) -> Option<Verd
             experiment: experiment.clone(),
         },
     })
-}
-
-/// Span of a gap in which a function is not identified by the samples.
-fn open_gap(gap: &GapAssessment) -> Option<[f64; 2]> {
-    let is_open = gap.functions.iter().any(|f| !f.is_identified);
-    is_open.then_some(gap.span)
 }
 
 /// Fit of the worst channel, per cent.
@@ -421,9 +442,6 @@ fn of_rank(problem: &Problem, is_classified: bool) -> Option<VerdictReason> {
 }
 
 fn of_scale(problem: &Problem) -> Option<VerdictReason> {
-    match scale_source(problem) {
-        ScaleSource::Force | ScaleSource::KnownValue => None,
-        ScaleSource::Fixed(fixed) => Some(VerdictReason::OnlyRatios { fixed }),
-        ScaleSource::Model => Some(VerdictReason::OnlyRatios { fixed: Vec::new() }),
-    }
+    // What the user states is no doubt about the model: a fixed function is an assumption.
+    (scale_source(problem) == ScaleSource::Model).then_some(VerdictReason::OnlyRatios)
 }

@@ -6,12 +6,15 @@ use super::{BuildError, Builder, Record};
 use crate::functions::WeightRule;
 use crate::problem::FEW_PARAMETERS;
 use crate::record::Weighting;
+use crate::signal::{Spectrum, median_spacing};
 use crate::system::Grid;
 
 /// Number of intervals: with a penalty, more change neither estimate nor interval.
 const INTERVALS: usize = 40;
 /// Samples per interval.
 const SAMPLES_PER_INTERVAL: usize = 10;
+/// Fewest periods of the vibration per interval: a coefficient that varies faster absorbs offsets, harmonics and second modes.
+const PERIODS_PER_INTERVAL: f64 = 2.0;
 /// Parameters left to the other functions, initial states and sensors, of those for which covariances are computed.
 const OTHERS: usize = 12;
 /// Order of the penalised derivative.
@@ -48,9 +51,13 @@ impl Builder {
             .sum();
         let room = (FEW_PARAMETERS - OTHERS) / keys.len();
         let most = grid.nodes().saturating_sub(5).min(room.saturating_sub(3));
+        let slow = self.periods().map_or(INTERVALS, |periods| {
+            (periods / PERIODS_PER_INTERVAL) as usize
+        });
         let intervals = INTERVALS
             .min(samples / SAMPLES_PER_INTERVAL)
             .min(most)
+            .min(slow)
             .max(1);
         let own = next.records.iter_mut().flat_map(|r| &mut r.coefficients);
         for (_, spec) in next.coefficients.iter_mut().chain(own) {
@@ -66,6 +73,18 @@ impl Builder {
             }
         }
         Ok(next)
+    }
+
+    /// Most periods of the dominant frequency of a channel over its samples; `None` without a channel that has one.
+    fn periods(&self) -> Option<f64> {
+        let channels = self.records.iter().flat_map(|record| &record.channels);
+        let periods = channels.filter_map(|channel| {
+            let (first, last) = (channel.times.first()?, channel.times.last()?);
+            (channel.times.len() > 1).then_some(())?;
+            let spectrum = Spectrum::of(&channel.values, median_spacing(&channel.times))?;
+            Some(spectrum.dominant() * (last - first))
+        });
+        periods.reduce(f64::max)
     }
 
     /// The first record with a channel without standard deviation, validation records excepted.

@@ -35,13 +35,12 @@ use super::degrees::{NoiseVariants, degrees_of_parameters};
 use super::directions::Directions;
 use super::equation_rows::EquationRows;
 use super::linearised_curve::{LinearisedCurve, combine};
-use super::means::Means;
+use super::means::{Means, means_at};
 use super::ratios::{RatioOfSet, ratios_of_set};
 use super::sensitivity::Sensitivity;
 use crate::objective::{Evaluation, Refined};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::spans::{span_words, spans};
-use crate::system::quadrature::trapezoid_weights;
 use nalgebra::{DMatrix, DVector};
 
 /// Largest number of parameters with a full covariance; beyond it, smooth directions are used.
@@ -50,7 +49,7 @@ const MOST_PARAMETERS: usize = 800;
 const MOST_SMOOTH: usize = 400;
 /// Largest work of the decomposition of smooth directions, samples x directions^2.
 const MOST_WORK: f64 = 2e9;
-/// Largest number of nodes with bands; longer grids are thinned evenly.
+/// Largest number of nodes with bands, apart from the last one; longer grids are thinned evenly.
 const MOST_NODES: usize = 4000;
 /// Smallest share of the slope of a value in undetermined directions that makes the value undetermined.
 const UNSEEN_SHARE: f64 = 1e-6;
@@ -132,7 +131,9 @@ impl Bands {
             false => loose.clone(),
         };
         let stride = problem.functions.nodes().div_ceil(MOST_NODES);
-        let nodes: Vec<usize> = (0..problem.functions.nodes()).step_by(stride).collect();
+        let all = problem.functions.nodes();
+        let thinned = (0..all - 1).step_by(stride);
+        let nodes: Vec<usize> = thinned.chain([all - 1]).collect();
         let variants = match information.is_equation() {
             true => None,
             false => NoiseVariants::of(problem, evaluation, Some(information.sensitivity())),
@@ -143,7 +144,6 @@ impl Bands {
             theta,
             variants: variants.as_ref(),
             times: nodes.iter().map(|i| problem.system.grid.time(*i)).collect(),
-            shares: trapezoid_weights(nodes.len(), 1.0 / (nodes.len() - 1).max(1) as f64),
             nodes,
             factors: match bounded {
                 true => vec![&tight, &loose],
@@ -157,16 +157,29 @@ impl Bands {
             .map(|f| maker.function(f))
             .collect();
         let values = problem.functions.values_at(theta, &maker.nodes);
-        let functions = linearised.iter().enumerate().map(|(f, linear)| {
-            let function = problem.functions.get(f);
-            let unit = function.quantity.unit();
-            let entries = |i: usize, into: &mut Vec<(usize, f64)>| {
-                maker.add_entries(f, maker.nodes[i], 1.0, into);
-            };
-            let degrees = maker.degrees(&entries);
-            let at_nodes = values[f].clone();
-            maker.band(function.name(), unit, at_nodes, linear, (degrees, Some(f)))
-        });
+        let (means, means_of_ratios) = means_at(problem, theta);
+        let means = means.into_iter();
+        let functions = linearised
+            .iter()
+            .enumerate()
+            .zip(means)
+            .map(|((f, linear), mean)| {
+                let function = problem.functions.get(f);
+                let unit = function.quantity.unit();
+                let entries = |i: usize, into: &mut Vec<(usize, f64)>| {
+                    maker.add_entries(f, maker.nodes[i], 1.0, into);
+                };
+                let degrees = maker.degrees(&entries);
+                let at_nodes = values[f].clone();
+                let mean = maker.mean(mean, linear);
+                maker.band(
+                    (function.name(), unit),
+                    at_nodes,
+                    linear,
+                    (degrees, mean),
+                    Some(f),
+                )
+            });
         let functions = functions.collect();
         let undetermined = loose.undetermined.ncols();
         let mut notes = notes(problem, information, &active);
@@ -177,7 +190,7 @@ impl Bands {
         }
         Self {
             functions,
-            ratios: maker.ratios(&values, &linearised),
+            ratios: maker.ratios(&values, &linearised, means_of_ratios),
             sigma: tight.variance.map(f64::sqrt),
             covariance: match problem.parameters() {
                 1..=FEW_PARAMETERS => information.of_parameters(&loose),
@@ -240,8 +253,6 @@ struct Maker<'a> {
     variants: Option<&'a NoiseVariants>,
     nodes: Vec<usize>,
     times: Vec<f64>,
-    /// Weight of each node in a mean over the record.
-    shares: Vec<f64>,
     /// With all active rows fixed, and with only the equalities fixed; a single one where no bound is active.
     factors: Vec<&'a CovarianceRoot>,
     directions: &'a Directions,
@@ -268,44 +279,36 @@ impl Maker<'_> {
         into.extend(row.map(|(j, b)| (first + j, factor * b)));
     }
 
-    /// Degrees of freedom of the values with these entries at each node of the band, and the gradient of their mean.
-    fn degrees(&self, add: &AddEntries) -> (Vec<f64>, Vec<f64>) {
-        let mut gradient = vec![0.0; self.problem.parameters()];
+    /// Degrees of freedom of the values with these entries at each node of the band.
+    fn degrees(&self, add: &AddEntries) -> Vec<f64> {
         let mut entries = Vec::new();
         let degrees = (0..self.nodes.len()).map(|i| {
             entries.clear();
             add(i, &mut entries);
-            let weight = self.shares[i];
-            entries.iter().for_each(|(j, a)| gradient[*j] += weight * a);
             self.variants
                 .map_or(f64::INFINITY, |variants| variants.degrees(&entries))
         });
-        (degrees.collect(), gradient)
+        degrees.collect()
     }
 
-    /// Mean over the record of a curve with these values, with the equalities fixed.
-    fn mean(&self, values: &[f64], linear: &LinearisedCurve, gradient: Vec<f64>) -> MeanOverRecord {
-        let shares = DVector::from_column_slice(&self.shares);
-        let sum = |values: &[f64]| values.iter().zip(&self.shares).map(|(x, w)| x * w).sum();
-        let size: f64 = sum(&linear.sizes);
-        // With only the equalities fixed.
-        let case = linear.roots.len() - 1;
-        let hidden = linear.hidden[case].tr_mul(&shares).norm();
-        let error = linear.roots[case].tr_mul(&shares).norm();
-        let basis_error: f64 = sum(&linear.basis_error);
+    /// The mean over the record of a curve with its standard error, with only the equalities fixed.
+    fn mean(&self, mean: MeanOverRecord, linear: &LinearisedCurve) -> MeanOverRecord {
+        let entries: Vec<(usize, f64)> = mean.gradient.iter().copied().enumerate().collect();
+        let slope = DVector::from_vec(self.directions.row(entries.iter().copied()));
+        let factor = self.factors[self.factors.len() - 1];
+        let hidden = factor.undetermined.tr_mul(&slope).norm();
+        let error = factor.root.tr_mul(&slope).norm();
+        let size = linear.sizes.iter().sum::<f64>() / linear.sizes.len() as f64;
         let is_known = hidden <= UNSEEN_SHARE * size && error.is_finite();
-        let entries: Vec<(usize, f64)> = gradient.iter().copied().enumerate().collect();
         MeanOverRecord {
-            value: sum(values),
             standard_error: match is_known {
-                true => error.hypot(basis_error),
+                true => error.hypot(mean.basis_error),
                 false => f64::INFINITY,
             },
-            basis_error,
             degrees: self
                 .variants
                 .map_or(f64::INFINITY, |variants| variants.degrees(&entries)),
-            gradient,
+            ..mean
         }
     }
 
@@ -349,11 +352,11 @@ impl Maker<'_> {
 
     fn band(
         &self,
-        name: String,
-        unit: &str,
+        (name, unit): (String, &str),
         values: Vec<f64>,
         linear: &LinearisedCurve,
-        ((degrees, gradient), function): ((Vec<f64>, Vec<f64>), Option<usize>),
+        (degrees, mean): (Vec<f64>, MeanOverRecord),
+        function: Option<usize>,
     ) -> Band {
         let count = self.nodes.len();
         let cases = 0..linear.roots.len();
@@ -400,7 +403,7 @@ impl Maker<'_> {
             matches!(sides[i], BandSide::Above | BandSide::Below)
         });
         Band {
-            mean: self.mean(&values, linear, gradient),
+            mean,
             name,
             unit: unit.to_owned(),
             values,
@@ -442,9 +445,14 @@ impl Maker<'_> {
         BandSide::Both
     }
 
-    /// Ratios of the shared coefficient set, by the delta method, from the values of the functions at the nodes.
-    fn ratios(&self, values: &[Vec<f64>], linearised: &[LinearisedCurve]) -> Vec<Band> {
-        let band = |ratio: &RatioOfSet| {
+    /// Ratios of the shared coefficient set, by the delta method, from the values of the functions at the nodes and the means of the ratios.
+    fn ratios(
+        &self,
+        values: &[Vec<f64>],
+        linearised: &[LinearisedCurve],
+        means: Vec<(&'static str, MeanOverRecord)>,
+    ) -> Vec<Band> {
+        let band = |(ratio, (name, mean)): (RatioOfSet, (&'static str, MeanOverRecord))| {
             let functions = ratio.functions();
             let (ratios, slopes) = ratio.at_nodes(values);
             let linear = combine(linearised, &functions, &slopes);
@@ -455,14 +463,16 @@ impl Maker<'_> {
                 }
             };
             let degrees = self.degrees(&entries);
+            let mean = self.mean(mean, &linear);
             self.band(
-                ratio.name.into(),
-                ratio.unit,
+                (name.into(), ratio.unit),
                 ratios,
                 &linear,
-                (degrees, None),
+                (degrees, mean),
+                None,
             )
         };
-        ratios_of_set(self.problem).iter().map(band).collect()
+        let ratios = ratios_of_set(self.problem).into_iter();
+        ratios.zip(means).map(band).collect()
     }
 }

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 /// Largest half-width of the 95 % band of an identified function, as a share of its size ([`Problem::natural_scales`] with
 /// the median of its values in place of the largest).
-pub const IDENTIFIED: f64 = 0.25;
+const IDENTIFIED: f64 = 0.25;
 /// Share of the nodes at which a function must be identified to be identified as a whole; the ends of a record carry less
 /// information.
 pub const MOST: f64 = 0.95;
@@ -195,38 +195,6 @@ pub(crate) fn condition_on_time(
 ) {
     for classification in of_functions(problem, classifications, varying) {
         classification.depends_on(Condition::Time);
-    }
-}
-
-/// Excludes the span of a gap (s) from the times at which these functions, and the ratios with them, are identified.
-pub(crate) fn except_gap(
-    problem: &Problem,
-    classifications: &mut [FunctionClassification],
-    open: &[usize],
-    gap: [f64; 2],
-    bands: &Bands,
-) {
-    let grid = &problem.system.grid;
-    let whole = [grid.start(), grid.start() + grid.duration()];
-    for classification in of_functions(problem, classifications, open) {
-        let before = match &classification.verdict {
-            Classification::Identified { .. } | Classification::Conditional { .. } => vec![whole],
-            Classification::PartlyIdentified(spans) => spans.clone(),
-            _ => continue,
-        };
-        let parts = |[from, to]: [f64; 2]| [[from, to.min(gap[0])], [from.max(gap[1]), to]];
-        let spans = before.into_iter().flat_map(parts);
-        let spans: Vec<[f64; 2]> = spans.filter(|[from, to]| from < to).collect();
-        let mut all = bands.functions.iter().chain(&bands.ratios);
-        let band = all.find(|band| band.name == classification.name);
-        classification.identified_range = band.and_then(|band| {
-            let is_inside = |t: f64| spans.iter().any(|[from, to]| (*from..=*to).contains(&t));
-            let nodes = (0..band.values.len()).filter(|i| is_inside(bands.times[*i]));
-            let values = nodes.map(|i| [band.values[i]; 2]);
-            values.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
-        });
-        classification.sentence = partly_identified(&classification.name, &spans);
-        classification.verdict = Classification::PartlyIdentified(spans);
     }
 }
 

@@ -10,7 +10,6 @@ use super::factorisation::Factorisation;
 use super::misspecified::kernels;
 use super::sensitivity::Sensitivity;
 use super::step_error::{self, step_error};
-use super::width_shift::width_error;
 use crate::functions::{Penalty, Prior, WeightRule};
 use crate::noise::KernelCovariance;
 use crate::objective::{Evaluation, Refined};
@@ -148,14 +147,10 @@ impl Information {
         self.scores.as_ref().map_or(&[], |scores| &scores.held)
     }
 
-    /// Includes the discretisation error of the time steps, with that of an automatic width of friction.
+    /// Includes the discretisation error of the time steps.
     pub fn with_numerical_error(self, problem: &Problem, evaluation: &Evaluation) -> Self {
         let roots = &self.sensitivity.roots;
-        let error = match problem.friction_is_ideal {
-            true => width_error(problem, evaluation, roots),
-            false => step_error(problem, evaluation, roots),
-        };
-        match error {
+        match step_error(problem, evaluation, roots) {
             Some(error) => self.with_error(&error),
             None => self,
         }
@@ -168,7 +163,7 @@ impl Information {
         evaluation: &Evaluation,
         halved: Option<Refined>,
     ) -> Self {
-        match halved.filter(|_| !problem.friction_is_ideal) {
+        match halved {
             None => self.with_numerical_error(problem, evaluation),
             Some(halved) => {
                 let roots = &self.sensitivity.roots;

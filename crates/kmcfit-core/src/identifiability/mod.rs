@@ -60,8 +60,7 @@ pub use classification::{
     Classification, ClassificationKind, Condition, FunctionClassification, classify_functions,
 };
 pub(crate) use classification::{
-    IDENTIFIED, condition_on_bases, condition_on_inputs, condition_on_negligible_noise,
-    condition_on_time, except_gap,
+    condition_on_bases, condition_on_inputs, condition_on_negligible_noise, condition_on_time,
 };
 pub(crate) use columns::stacked;
 pub(crate) use covariance::is_bayesian;
@@ -70,7 +69,7 @@ pub use equation_rows::EquationRows;
 pub use experiments::{Gain, Ranked, rank_experiments};
 pub(crate) use factorisation::Factorisation;
 pub use means::Means;
-pub(crate) use means::means_at;
+pub(crate) use means::{mean_over_record, mean_weights, means_at};
 pub use scale_source::{ScaleSource, scale_source};
 pub use scaling_ambiguity::ScalingAmbiguity;
 pub use sensitivity::{Sensitivity, SingularSpectrum};

@@ -7,13 +7,10 @@
 //! delta = -H^+ J^T W (z_(w/2) - z_w)
 //! ```
 //!
-//! Both predictions are those on half the step, on which half the width is as stable as the width on the whole step. An error
-//! proportional to the width and to the step, which passes each reversal of the velocity, is twice the change where both are halved.
+//! Both predictions are those on half the step, on which half the width is as stable as the width on the whole step.
 
-use super::step_error::weighted;
 use crate::objective::Evaluation;
 use crate::problem::Problem;
-use nalgebra::DVector;
 
 impl Problem {
     /// Shift of each parameter where the width of Coulomb friction is halved, and its standard error. `None` without friction or
@@ -21,21 +18,6 @@ impl Problem {
     pub fn shifts_by_width(&self, theta: &[f64], evaluation: &Evaluation) -> Option<Vec<[f64; 2]>> {
         self.shifts_by(theta, evaluation, differences(self, evaluation)?)
     }
-}
-
-/// Weighted and whitened error of the predictions by an automatic width of Coulomb friction and its steps, in the rows of
-/// [`Sensitivity`](super::Sensitivity) with the roots `roots`.
-pub(super) fn width_error(
-    problem: &Problem,
-    evaluation: &Evaluation,
-    roots: &[f64],
-) -> Option<DVector<f64>> {
-    weighted(
-        problem,
-        changes(&narrower(problem)?, evaluation)?,
-        roots,
-        2.0,
-    )
 }
 
 /// Change of the predictions of each channel where the width is halved.

@@ -4,6 +4,7 @@ use super::autoregression::Autoregression;
 use super::input_errors::InputErrors;
 use crate::signal::median;
 use nalgebra::{DMatrix, DVector};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -282,30 +283,34 @@ fn predictors_after_gaps(
     let reach = 2 * order + 1;
     let lags = process.autocorrelation(LONGEST_GAP);
     let mut predictors = Vec::new();
+    // Many gaps are alike: single samples left out.
+    let mut known: BTreeMap<Vec<usize>, Option<(Vec<f64>, f64)>> = BTreeMap::new();
     for pair in runs.windows(2) {
         let run = &pair[1];
         for sample in run.start..run.end.min(run.start + order) {
             let place = |i: usize| ((times[sample] - times[i]) / spacing).round() as usize;
             let before = (0..sample).rev().take(reach);
             let before: Vec<usize> = before.map(place).take_while(|p| *p < lags.len()).collect();
-            predictors.extend(predictor(sample, &before, &lags));
+            let found = known.entry(before);
+            let found = found.or_insert_with_key(|before| predictor(before, &lags));
+            predictors.extend(found.clone().map(|(coefficients, variance)| Predictor {
+                sample,
+                coefficients,
+                variance,
+            }));
         }
     }
     predictors
 }
 
-/// Best linear predictor of a sample from those at the distances `before`, in spacings.
-fn predictor(sample: usize, before: &[usize], lags: &[f64]) -> Option<Predictor> {
+/// Coefficients of the best linear predictor of a sample from those at the distances `before`, in spacings, and the variance of its error.
+fn predictor(before: &[usize], lags: &[f64]) -> Option<(Vec<f64>, f64)> {
     let count = before.len();
     let matrix = DMatrix::from_fn(count, count, |i, j| lags[before[i].abs_diff(before[j])]);
     let right = DVector::from_fn(count, |i, _| lags[before[i]]);
     let coefficients = matrix.cholesky()?.solve(&right);
     let variance = 1.0 - coefficients.dot(&right);
-    (variance > 0.0).then(|| Predictor {
-        sample,
-        coefficients: coefficients.as_slice().to_vec(),
-        variance,
-    })
+    (variance > 0.0).then(|| (coefficients.as_slice().to_vec(), variance))
 }
 
 #[cfg(test)]

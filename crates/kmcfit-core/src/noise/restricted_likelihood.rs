@@ -17,6 +17,7 @@ use super::autoregression::Autoregression;
 use super::correlation::Correlation;
 use super::penalty_moments::PenaltyMoments;
 use nalgebra::DMatrix;
+use std::collections::BTreeMap;
 
 /// Step of central differences in the coordinates.
 pub const STEP: f64 = 1e-3;
@@ -151,6 +152,9 @@ fn autoregressive(rows: &DMatrix<f64>, order: usize) -> Products {
     }
 }
 
+/// Gram matrix of the whitened rows of a channel and `log |R|`, by the bits of its correlation parameters.
+type WhitenedProducts = BTreeMap<Vec<u64>, (DMatrix<f64>, f64)>;
+
 /// Restricted likelihood of the noise of all channels, and of weights of penalties.
 pub struct RestrictedLikelihood {
     channels: Vec<ChannelMoments>,
@@ -236,10 +240,20 @@ impl RestrictedLikelihood {
 
     /// `f` at the coordinates of all channels and the logarithms of the weights; NaN where the Gram matrix is not positive definite.
     pub fn value(&self, at: &[f64]) -> f64 {
+        self.value_beside(at, &mut vec![BTreeMap::new(); self.channels.len()])
+    }
+
+    /// [`Self::value`], with the whitened products of each channel at earlier points.
+    fn value_beside(&self, at: &[f64], whitened: &mut [WhitenedProducts]) -> f64 {
         let mut gram = self.known.clone();
         let mut constant = self.constant;
-        for (channel, noise) in self.channels.iter().zip(self.split(at)) {
-            let (own, determinant) = channel.whitened(&noise.correlation_parameters);
+        let channels = self.channels.iter().zip(whitened);
+        for ((channel, whitened), noise) in channels.zip(self.split(at)) {
+            let place = noise.correlation_parameters.iter().map(|z| z.to_bits());
+            let whitened = whitened.entry(place.collect());
+            let (own, determinant) =
+                whitened.or_insert_with(|| channel.whitened(&noise.correlation_parameters));
+            let (own, determinant) = (&*own, *determinant);
             let log_sigma = noise.log_sigma.unwrap_or(0.0);
             gram += own * (-2.0 * log_sigma).exp();
             constant += 2.0 * channel.samples as f64 * log_sigma + determinant;
@@ -320,10 +334,12 @@ impl RestrictedLikelihood {
 
     fn derivatives(&self, at: &[f64], value: f64) -> (DMatrix<f64>, DMatrix<f64>) {
         let n = at.len();
-        let moved = |changes: &[(usize, f64)]| {
+        // Most points differ from others in one channel only.
+        let mut whitened = vec![BTreeMap::new(); self.channels.len()];
+        let mut moved = |changes: &[(usize, f64)]| {
             let mut trial = at.to_vec();
             changes.iter().for_each(|(j, by)| trial[*j] += by);
-            self.value(&trial)
+            self.value_beside(&trial, &mut whitened)
         };
         let sides: Vec<[f64; 2]> = (0..n)
             .map(|j| [STEP, -STEP].map(|h| moved(&[(j, h)])))

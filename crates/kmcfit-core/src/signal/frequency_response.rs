@@ -35,6 +35,8 @@ const ROUNDS: usize = 6;
 const APART: usize = 4;
 /// Half the width of a peak, relative to its frequency.
 const WIDTH: f64 = 0.1;
+/// Smallest density of the force at the weaker mode, relative to that at the stronger one: the noise of a force sensor is below it.
+const DRIVEN_OF_FIRST: f64 = 1e-3;
 /// Smallest squared mobility of the weaker mode, relative to that of the stronger one.
 const WEAKEST: f64 = 0.02;
 /// Largest squared mobility at the lowest place between two modes, the mean of three neighbours, relative to the lower peak.
@@ -65,8 +67,12 @@ pub fn two_forced_modes(
     let of_second = found.squares[second];
     let around = second - APART / 2..=second + APART / 2;
     let is_peak = around.into_iter().all(|k| found.squares[k] <= of_second);
-    let is_mode =
-        is_peak && of_second > WEAKEST * found.squares[first] && lowest < DEEPEST * of_second;
+    // Beyond the band of a sweep the force is the noise of its sensor, which is coherent with the response by chance.
+    let is_driven = found.drive[second] > DRIVEN_OF_FIRST * found.drive[first];
+    let is_mode = is_peak
+        && is_driven
+        && of_second > WEAKEST * found.squares[first]
+        && lowest < DEEPEST * of_second;
     is_mode.then(|| [first, second].map(|k| k as f64 * found.resolution))
 }
 
@@ -190,8 +196,10 @@ pub struct Mobility {
     pub squares: Vec<f64>,
     /// Coherence of response and force, 0 to 1; NaN at frequency zero.
     pub coherence: Vec<f64>,
-    /// True where the force drives the response.
-    is_driven: Vec<bool>,
+    /// Sum over the segments of `|X|^2`.
+    drive: Vec<f64>,
+    /// Smallest such sum where the force drives the response.
+    least_drive: f64,
 }
 
 impl Mobility {
@@ -211,7 +219,8 @@ impl Mobility {
             coherence: (sums.iter())
                 .map(|(xx, yy, xy)| xy.norm_sqr() / (xx * yy))
                 .collect(),
-            is_driven: sums.iter().map(|(xx, ..)| *xx >= least).collect(),
+            drive: sums.iter().map(|(xx, ..)| *xx).collect(),
+            least_drive: least,
         })
     }
 
@@ -228,7 +237,9 @@ impl Mobility {
     }
 
     fn is_usable(&self, k: usize) -> bool {
-        self.coherence[k] >= COHERENT && self.is_driven[k] && self.squares[k].is_finite()
+        self.coherence[k] >= COHERENT
+            && self.drive[k] >= self.least_drive
+            && self.squares[k].is_finite()
     }
 }
 

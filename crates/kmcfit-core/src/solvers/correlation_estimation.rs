@@ -15,7 +15,7 @@ use crate::threads::{available_for, map};
 
 /// Smallest number of samples per parameter for which an order is chosen and whiteness judged: with fewer, the correlation of residuals
 /// differs from that of the noise. At 10 per parameter intervals of 95 % under white noise cover 91 % with a chosen order, 95 % without
-/// (200 seeds of `tests/gaps.rs`).
+/// (200 seeds).
 const SAMPLES_PER_PARAMETER: usize = 16;
 /// Range of the residuals, as a share of the variation of the samples, in which they may be noise: smaller ones are rounding
 /// and step-size errors, larger ones those of a model that does not explain the record.

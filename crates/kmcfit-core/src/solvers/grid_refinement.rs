@@ -31,16 +31,17 @@ const POOR: f64 = 0.25;
 const BEYOND: f64 = 16.0;
 /// Change of the response by halving the step, relative to the largest sample, from which the estimates are no start.
 const OTHER_SYSTEM: f64 = 0.01;
-/// Smallest and largest factor of the number of steps from one grid to the next. Beyond the largest one the order of the stepper
-/// predicts nothing.
-const FACTORS: [f64; 2] = [1.1, 16.0];
+/// Smallest and largest factor of the number of steps from one grid to the next. The order of convergence is measured from grid to grid, and
+/// at kinks of a force or contacts it is not that of the stepper: by larger factors a grid became seventeen times as fine as the
+/// least that has the error. A further fit starts at the estimates and costs little.
+const FACTORS: [f64; 2] = [1.1, 2.5];
 /// Smallest observed order of convergence: that of a jump within a step.
 const LEAST_ORDER: f64 = 1.0;
 /// Largest second difference of a function at the nodes, relative to its largest value, for which it is linear between the nodes: its
 /// deviation in between changes no response by a share of [`RESOLUTION`].
 const LINEAR: f64 = 1e-10;
-/// Largest number of finer grids.
-const ROUNDS: usize = 6;
+/// Largest number of finer grids: together a factor of 4000.
+const ROUNDS: usize = 9;
 
 /// Problems on other grids: the one with at least so many nodes, and a number of steps that is a multiple of the samples of a
 /// force; `None` if it does not fit into memory.
@@ -164,7 +165,7 @@ pub fn fit_on_refined_grids<T>(
 
 impl<T> RefinedFit<T> {
     /// True for a minimum that explains three quarters of the misfit of the zero response.
-    pub(super) fn is_explained(&self) -> bool {
+    fn is_explained(&self) -> bool {
         let is_minimum = match self.fit.outcome.status {
             // A limit on the ratios of J or of its gradient is no minimum and is not measured.
             Status::Converged => self.fit.optimality.is_some(),
@@ -176,7 +177,7 @@ impl<T> RefinedFit<T> {
     }
 
     /// The fit on the next grid, with the work of this one.
-    pub(super) fn followed_by(self, further: T, problem: Problem, fit: Fit) -> Self {
+    fn followed_by(self, further: T, problem: Problem, fit: Fit) -> Self {
         let before = self.fit;
         Self {
             further,
@@ -190,7 +191,7 @@ impl<T> RefinedFit<T> {
     }
 }
 
-pub(super) fn nodes(problem: &Problem) -> usize {
+fn nodes(problem: &Problem) -> usize {
     problem.system.grid.nodes()
 }
 
@@ -323,7 +324,7 @@ fn changes_on_finer_grid<T>(
 }
 
 /// Parameters of a fit for the same problem on another grid; `None` for functions with one value per node.
-pub(super) fn carried<T>(found: &RefinedFit<T>, next: &Problem) -> Option<Vec<f64>> {
+fn carried<T>(found: &RefinedFit<T>, next: &Problem) -> Option<Vec<f64>> {
     let theta = &found.fit.best.parameters;
     let nodal = |f: &crate::functions::CoefficientFunction| f.basis == Some(Basis::Nodal);
     let is_same = theta.len() == next.parameters() && !next.functions.iter().any(nodal);

@@ -9,7 +9,7 @@
 //! with the derivatives `J` of the sample in the parameters and their covariance `C`.
 
 use super::prediction::Z_95;
-use crate::functions::{CoefficientFunction, CoefficientSet, Parameterization};
+use crate::functions::{CoefficientFunction, CoefficientSet, Parameterization, ScalarParameter};
 use crate::problem::Problem;
 use crate::record::{Channel, Experiment};
 use crate::simulate::SimulationError;
@@ -25,7 +25,7 @@ pub struct IdentifiedSystem {
     pub functions: Vec<CoefficientFunction>,
     /// The functions of the equation of motion by their index.
     pub set: CoefficientSet,
-    /// Parameters of the functions.
+    /// Parameters of the functions, then those of sensors.
     pub theta: Vec<f64>,
     /// Their covariance, if known.
     pub covariance: Option<DMatrix<f64>>,
@@ -43,13 +43,24 @@ impl IdentifiedSystem {
     ///
     /// `None` if the functions do not fit the terms, or the record does not fit the grid.
     pub fn problem(&self, grid: Grid, record: Experiment) -> Option<Problem> {
+        self.problem_with_sensors(grid, record, Vec::new())
+    }
+
+    /// [`Self::problem`] of a record whose sensors have the estimated parameters `scalars`, the last ones of [`Self::theta`].
+    pub fn problem_with_sensors(
+        &self,
+        grid: Grid,
+        record: Experiment,
+        scalars: Vec<ScalarParameter>,
+    ) -> Option<Problem> {
         let from = &self.system.grid;
         let functions: Vec<CoefficientFunction> = (self.functions.iter())
             .map(|f| f.resampled(from, &grid))
             .collect();
         let sets = vec![self.set.clone()];
         let functions =
-            Parameterization::with_coefficient_sets(functions, sets, grid.nodes(), grid.step())?;
+            Parameterization::with_coefficient_sets(functions, sets, grid.nodes(), grid.step())?
+                .with_scalars(scalars);
         let system = System {
             grid,
             ..self.system.clone()

@@ -1,9 +1,9 @@
 //! Quantities derived from the parameters: linear functionals and ratios of two of them.
 
 use crate::functions::Basis;
+use crate::identifiability::mean_weights;
 use crate::problem::Problem;
 use crate::system::TimePoint;
-use crate::system::quadrature::trapezoid_weights;
 
 /// Linear functional `q(theta) = constant + sum_j a_j theta_j`: a parameter, a scalar, the value of a function or its mean.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,15 +65,13 @@ impl Linear {
 
     /// Mean `1/T integral p dt` of function `function`, by the trapezoid rule over the grid.
     pub fn mean(problem: &Problem, function: usize) -> Self {
-        let grid = &problem.system.grid;
-        let weights = trapezoid_weights(grid.nodes(), grid.step());
-        let shares = weights.into_iter().map(|w| w / grid.duration());
+        let weights = mean_weights(problem.functions.nodes()).into_iter();
         let of = problem.functions.get(function);
         let name = match of.basis {
             Some(Basis::Constant) => of.name(),
             _ => format!("mean of {}", of.name()),
         };
-        Self::combine(problem, function, name, shares.enumerate())
+        Self::combine(problem, function, name, weights.enumerate())
     }
 
     /// Sum `sum_i w_i p(t_i)` over nodes.

@@ -28,6 +28,14 @@ pub enum Term {
 pub const MOST_TERMS: usize = 8;
 
 impl Term {
+    /// Width of Coulomb friction, m/s; `None` for other terms.
+    pub fn friction_width(&self) -> Option<f64> {
+        match self {
+            Term::CoulombFriction { width } => Some(*width),
+            _ => None,
+        }
+    }
+
     /// Element response `phi(y, v)`.
     ///
     /// Smoothed Coulomb friction differs from the sign of `v` by `width^2 / (2 v^2)` at speeds well above the width. A square root,

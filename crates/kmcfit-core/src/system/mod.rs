@@ -37,10 +37,7 @@ pub struct System {
 impl System {
     /// Width of Coulomb friction, m/s; `None` without it.
     pub fn friction_width(&self) -> Option<f64> {
-        self.terms.iter().find_map(|term| match term {
-            Term::CoulombFriction { width } => Some(*width),
-            _ => None,
-        })
+        self.terms.iter().find_map(Term::friction_width)
     }
 
     /// Sets the width of Coulomb friction, m/s.

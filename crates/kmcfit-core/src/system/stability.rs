@@ -22,33 +22,6 @@ impl System {
         (steps.ceil() as usize).saturating_add(1)
     }
 
-    /// Smallest number of nodes with stable steps for Coulomb friction of this `width` (m/s): at rest it is a damping `F/width`, with
-    /// the rate `F/(m width)`.
-    pub fn nodes_for_friction(&self, nodal: &NodalCoefficients, width: f64) -> usize {
-        let rate = self.friction_over_mass(nodal) / width;
-        let steps = self.grid.duration() * rate / self.method.stability_limit();
-        // The cast saturates.
-        (steps.ceil() as usize).saturating_add(1)
-    }
-
-    /// Smallest width of Coulomb friction (m/s) with stable steps on `nodes` nodes.
-    pub fn least_friction_width(&self, nodal: &NodalCoefficients, nodes: usize) -> f64 {
-        let steps = nodes.saturating_sub(1).max(1) as f64;
-        let force = self.friction_over_mass(nodal);
-        self.grid.duration() * force / (self.method.stability_limit() * steps)
-    }
-
-    /// Largest ratio of Coulomb friction to mass at the nodes, N/kg; nodes where it is not finite are omitted.
-    fn friction_over_mass(&self, nodal: &NodalCoefficients) -> f64 {
-        let is_friction = |term: &Term| matches!(term, Term::CoulombFriction { .. });
-        let Some(index) = self.terms.iter().position(is_friction) else {
-            return 0.0;
-        };
-        let pairs = nodal.coefficients[index].iter().zip(&nodal.mass);
-        let ratios = pairs.map(|(force, mass)| (force / mass).abs());
-        ratios.filter(|ratio| ratio.is_finite()).fold(0.0, f64::max)
-    }
-
     /// Largest magnitude of a root of `m lambda^2 + c lambda + k` at the nodes, 1/s; nodes where it is not finite are omitted.
     fn largest_rate(&self, nodal: &NodalCoefficients) -> f64 {
         let of = |wanted: Term| {
@@ -91,21 +64,6 @@ mod tests {
             mass: vec![m; 101],
             coefficients: vec![vec![c; 101], vec![k; 101]],
         }
-    }
-
-    /// At rest a friction of 4 N on 2 kg over 0.01 m/s decays at 200 per second.
-    #[test]
-    fn the_number_of_nodes_for_friction_follows_from_its_rate_at_rest() {
-        let mut rk4 = system(Method::Rk4);
-        let mut nodal = constant(2.0, 0.0, 200.0);
-        assert_eq!(rk4.nodes_for_friction(&nodal, 0.01), 1);
-        rk4.terms.push(Term::CoulombFriction { width: 0.1 });
-        nodal.coefficients.push(vec![4.0; 101]);
-        assert_eq!(rk4.nodes_for_friction(&nodal, 0.01), 161);
-        assert!((rk4.least_friction_width(&nodal, 161) - 0.01).abs() < 1e-15);
-        assert_eq!(rk4.friction_width(), Some(0.1));
-        rk4.set_friction_width(0.2);
-        assert_eq!(rk4.friction_width(), Some(0.2));
     }
 
     /// Decay rates of 2 and 498 per second, and oscillation at 10 rad/s.

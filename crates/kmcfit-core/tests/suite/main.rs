@@ -19,7 +19,6 @@ mod equation_error_intervals;
 mod equation_error_weak;
 mod experiments;
 mod features;
-mod gaps;
 mod gauss_newton;
 mod identifiability;
 mod infeasible;

@@ -3,7 +3,8 @@
 
 use crate::common::forced::{broadband, response, rms, white};
 use kmcfit_core::internals::assessment::{
-    EstimateStatus, FitAssessment, VerdictReason, estimates, verdict_reasons,
+    EstimateStatus, FitAssessment, VerdictAssumption, VerdictReason, estimates,
+    verdict_assumptions, verdict_reasons,
 };
 use kmcfit_core::internals::builder::{Builder, CoefficientSpec, Record};
 use kmcfit_core::internals::problem::Problem;
@@ -17,11 +18,21 @@ const TRUTH: [f64; 3] = [2.0, 0.06 * TAU * 2.0, TAU * TAU * 2.0];
 
 /// The problem of constants m, c, k for a forced record.
 fn problem() -> Problem {
+    with_stiffness(0.0, CoefficientSpec::constant(90.0))
+}
+
+/// Beats of a stiffness over the record.
+const BEATS: f64 = 6.0;
+
+/// The problem for a stiffness that varies by the share `beat` in [`BEATS`] cycles, with another function for it.
+fn with_stiffness(beat: f64, stiffness: CoefficientSpec) -> Problem {
     let times: Vec<f64> = (0..SAMPLES).map(|i| SPACING * i as f64).collect();
     let force = broadband(white(0, 1, SAMPLES));
     let [m, c, k] = TRUTH;
-    let states = response(SPACING, [0.0, 0.0], &force, |_, y, v, f| {
-        (f - c * v - k * y) / m
+    let duration = SPACING * (SAMPLES - 1) as f64;
+    let states = response(SPACING, [0.0, 0.0], &force, |t, y, v, f| {
+        let varied = 1.0 + beat * (TAU * BEATS * t / duration).sin();
+        (f - c * v - k * varied * y) / m
     });
     let exact: Vec<f64> = states.iter().map(|[y, ..]| *y).collect();
     let sigma = 0.02 * rms(&exact);
@@ -30,7 +41,7 @@ fn problem() -> Problem {
     let system = [
         CoefficientSpec::constant(1.5),
         CoefficientSpec::constant(0.5),
-        CoefficientSpec::constant(90.0),
+        stiffness,
     ];
     let record = Record::new("forced")
         .from_state(0.0, 0.0)
@@ -49,6 +60,51 @@ fn assessed(problem: &Problem) -> (Problem, Fit, FitAssessment) {
     let (problem, fit) = fit_with_noise(problem, &problem.start(), &settings, &mut |_| {}).unwrap();
     let assessment = FitAssessment::of(&problem, &fit, true);
     (problem, fit, assessment)
+}
+
+/// Reasons about functions that vary too fast, or with a beat.
+fn reasons_of_variation(beat: f64, knots: usize) -> Vec<VerdictReason> {
+    let spec = CoefficientSpec::piecewise_linear(knots, 90.0);
+    let (problem, fit, assessment) = assessed(&with_stiffness(beat, spec));
+    let mut reasons = verdict_reasons(&problem, &fit, Some(&assessment));
+    reasons.retain(|reason| {
+        matches!(
+            reason,
+            VerdictReason::FastVariation { .. } | VerdictReason::Oscillates { .. }
+        )
+    });
+    reasons
+}
+
+/// Of 50 periods: more than one parameter in two periods can absorb what varies within a period.
+#[test]
+fn functions_with_more_than_one_parameter_in_two_periods_are_fast() {
+    let function = "stiffness".to_owned();
+    assert_eq!(
+        reasons_of_variation(0.0, 32),
+        [VerdictReason::FastVariation {
+            functions: vec![function]
+        }]
+    );
+    assert_eq!(reasons_of_variation(0.0, 20), []);
+}
+
+/// The sine of a stiffness has the frequency of its cycles over the record.
+#[test]
+fn a_function_that_is_a_sine_oscillates() {
+    let reasons = reasons_of_variation(0.2, 25);
+    let [
+        VerdictReason::Oscillates {
+            function,
+            frequency,
+        },
+    ] = &reasons[..]
+    else {
+        panic!("{reasons:?}");
+    };
+    assert_eq!(function, "stiffness");
+    let expected = BEATS / (SPACING * (SAMPLES - 1) as f64);
+    assert!((frequency / expected - 1.0).abs() < 1e-9, "{frequency}");
 }
 
 /// Intervals of the ratios by the delta method, written out, from the covariance of the parameters.
@@ -147,9 +203,9 @@ fn free_records_determine_ratios_to_an_assumed_mass() {
         let (problem, fit, assessment) = assessed(&problem.unwrap());
         let all = estimates(&problem, &fit, assessment.means().as_ref());
         let reasons = verdict_reasons(&problem, &fit, Some(&assessment));
-        (all, reasons)
+        (all, reasons, verdict_assumptions(&problem))
     };
-    let (assumed, reasons) = with(CoefficientSpec::fixed(2.0));
+    let (assumed, reasons, assumptions) = with(CoefficientSpec::fixed(2.0));
     let names: Vec<&str> = assumed
         .iter()
         .take(4)
@@ -166,9 +222,13 @@ fn free_records_determine_ratios_to_an_assumed_mass() {
     };
     assert_eq!(status(&assumed, "mass"), EstimateStatus::Fixed);
     assert_eq!(status(&assumed, "stiffness"), EstimateStatus::OnlyAsRatio);
-    let fixed = vec!["mass".to_owned()];
-    assert_eq!(reasons, [VerdictReason::OnlyRatios { fixed }]);
-    let (weighed, reasons) = with(CoefficientSpec::uncertain(2.0, 0.01));
+    // A stated value is an assumption of the verdict, no reason.
+    assert_eq!(reasons, []);
+    let functions = vec!["mass".to_owned()];
+    assert!(assumptions.contains(&VerdictAssumption::Scale { functions }));
+    let (weighed, reasons, assumptions) = with(CoefficientSpec::uncertain(2.0, 0.01));
     assert_eq!(status(&weighed, "stiffness"), EstimateStatus::Estimated);
     assert_eq!(reasons, []);
+    let is_scale = |a: &VerdictAssumption| matches!(a, VerdictAssumption::Scale { .. });
+    assert!(!assumptions.iter().any(is_scale));
 }

@@ -13,7 +13,6 @@ use kmcfit_core::internals::assessment::{
 };
 use kmcfit_core::internals::builder::{Builder, ChannelSpec, CoefficientSpec, Record, ScalarSpec};
 use kmcfit_core::internals::functions::CoefficientKind;
-use kmcfit_core::internals::identifiability::Bands;
 use kmcfit_core::internals::objective::Evaluation;
 use kmcfit_core::internals::problem::Problem;
 use kmcfit_core::internals::record::{Channel, ChannelKind, NoiseModel, Weighting};
@@ -37,8 +36,6 @@ const SATURATED: f64 = 2.0;
 const FRICTION: f64 = 0.05;
 /// Part of a second mode whose residuals the noise model describes.
 const WEAK: f64 = 0.1;
-/// Fall of the stiffness in a gap of two periods.
-const FALL: f64 = 0.25;
 
 /// A defect of the model or of the data.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,7 +50,6 @@ enum Kind {
     ForceSign,
     Factor(f64),
     Friction,
-    Gap,
     Coloured,
 }
 
@@ -78,9 +74,7 @@ impl Case {
         let frequency = 0.5 * 40f64.powf(between(0.0, 1.0));
         let mass = 0.5 * 40f64.powf(between(0.0, 1.0));
         let ratio = between(0.01, 0.05);
-        // A gap of two periods holds two knots of a spline with at most 64 parameters.
-        let fewest = if kind == Kind::Gap { 20.0 } else { 12.0 };
-        let spacing = 1.0 / (frequency * between(fewest, 30.0));
+        let spacing = 1.0 / (frequency * between(12.0, 30.0));
         let draws = [(); 3].map(|()| between(0.0, 1.0));
         let omega = TAU * frequency;
         let can_be_free = matches!(
@@ -133,27 +127,8 @@ impl Case {
                     (f - c * v - k * y - friction * sign) / m
                 })
             }
-            Kind::Gap => run(&|t, y, v, f| (f - c * v - self.stiffness_at(t) * y) / m),
             _ => linear,
         }
-    }
-
-    fn periods(&self) -> f64 {
-        self.frequency * self.spacing * SAMPLES as f64
-    }
-
-    /// Stiffness at a time, N/m; it falls in the gap.
-    fn stiffness_at(&self, time: f64) -> f64 {
-        let [from, to] = self.gap();
-        let share = ((time - from) / (to - from)).clamp(0.0, 1.0);
-        let smooth = share * share * (3.0 - 2.0 * share);
-        self.stiffness * (1.0 - FALL * smooth)
-    }
-
-    /// The gap, two periods long, s.
-    fn gap(&self) -> [f64; 2] {
-        let from = (0.3 + 0.3 * self.draws[0]) * self.spacing * SAMPLES as f64;
-        [from, from + 2.0 / self.frequency]
     }
 
     /// Response at the sample times without noise, with those of a second mode or on another clock.
@@ -234,14 +209,6 @@ impl Case {
         {
             samples.iter_mut().for_each(|y| *y *= factor);
         }
-        let (times, samples): (Vec<f64>, Vec<f64>) = match self.kind {
-            Kind::Gap => {
-                let [from, to] = self.gap();
-                let all = times.into_iter().zip(samples);
-                all.filter(|(t, _)| !(from..to).contains(t)).unzip()
-            }
-            _ => (times, samples),
-        };
         let mut spec = ChannelSpec::new(kind, &times, &samples);
         spec.weighting = Some(Weighting::Estimated { sigma });
         if self.kind == Kind::Coloured {
@@ -255,7 +222,6 @@ impl Case {
         let states = self.states(&force);
         let kinds: &[ChannelKind] = match self.kind {
             Kind::Factor(_) => &[ChannelKind::Displacement, ChannelKind::Acceleration],
-            Kind::Gap => &[ChannelKind::Displacement],
             _ if self.seed.is_multiple_of(2) => &[ChannelKind::Displacement],
             _ => &[ChannelKind::Acceleration],
         };
@@ -286,14 +252,10 @@ impl Case {
             true => CoefficientSpec::uncertain(self.mass, 0.01 * self.mass),
             false => CoefficientSpec::constant(0.9 * self.mass),
         };
-        let stiffness = match self.kind {
-            Kind::Gap => CoefficientSpec::b_spline(self.periods() as usize, self.stiffness),
-            _ => CoefficientSpec::constant(1.1 * self.stiffness),
-        };
         let parts = [
             mass,
             CoefficientSpec::constant(0.7 * self.damping),
-            stiffness,
+            CoefficientSpec::constant(1.1 * self.stiffness),
         ];
         let builder = Builder::new(parts).record(record);
         (builder.nodes(2 * (SAMPLES - 1) + 1).build().unwrap(), sigma)
@@ -372,30 +334,6 @@ impl Case {
         }
     }
 
-    /// Largest error of the stiffness in the gap, in the median standard error outside of it.
-    fn error_in_gap(&self, bands: Option<&Bands>, evaluation: &Evaluation) -> f64 {
-        let Some(bands) = bands else {
-            return f64::INFINITY;
-        };
-        let [from, to] = self.gap();
-        let is_inside = |t: f64| (from..to).contains(&t);
-        let errors = bands.times.iter().zip(&bands.functions[2].standard_error);
-        let mut outside: Vec<f64> = errors
-            .filter(|(t, _)| !is_inside(**t))
-            .map(|(_, e)| *e)
-            .collect();
-        outside.sort_by(f64::total_cmp);
-        let step = self.spacing / 2.0;
-        let stiffness = evaluation.nodal.coefficients[1].iter().enumerate();
-        let inside = stiffness
-            .map(|(i, k)| (step * i as f64, *k))
-            .filter(|(t, _)| is_inside(*t));
-        let most = inside
-            .map(|(t, k)| (k - self.stiffness_at(t)).abs())
-            .fold(0.0, f64::max);
-        most / outside[outside.len() / 2]
-    }
-
     fn verdict(&self) -> Found {
         let (problem, sigma) = self.problem();
         let settings = FitSettings::default();
@@ -416,10 +354,7 @@ impl Case {
             let [low, high] = estimate.ci95?;
             Some((estimate.value - truth).abs() / ((high - low) / (2.0 * 1.96)))
         });
-        let shift = match self.kind {
-            Kind::Gap => self.error_in_gap(assessment.bands.as_ref(), &fit.best.evaluation),
-            _ => shifts.reduce(f64::max).unwrap_or(f64::INFINITY),
-        };
+        let shift = shifts.reduce(f64::max).unwrap_or(f64::INFINITY);
         Found {
             classical: assessment.classical.clone(),
             level: verdict_level(&reasons),
@@ -442,8 +377,7 @@ struct Found {
     classical: Option<ClassicalEstimate>,
     level: VerdictLevel,
     reasons: Vec<VerdictReason>,
-    /// Largest error of mass, damping and stiffness in standard errors, infinite without them; with a gap that of the stiffness in it, in
-    /// standard errors outside.
+    /// Largest error of mass, damping and stiffness in standard errors, infinite without them.
     shift: f64,
     /// Root mean square of the residuals over sigma of the noise, or over that of its innovations.
     residual: f64,
@@ -698,13 +632,6 @@ fn is_factor(reason: &VerdictReason, expected: f64) -> bool {
 #[test]
 fn one_of_two_channels_off_by_1000() {
     assert_found(Kind::Factor(1000.0), |r| is_factor(r, 1000.0));
-}
-
-#[test]
-fn a_gap_of_two_periods_under_a_spline() {
-    assert_found(Kind::Gap, |reason| {
-        matches!(reason, VerdictReason::Gap { .. })
-    });
 }
 
 #[test]

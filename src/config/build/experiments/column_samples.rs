@@ -3,7 +3,7 @@
 use super::data_facts::{DataAction, DataFact, MOST_PLACES, RecordNotes};
 use super::unit::QuantityColumn;
 use crate::config::ModelFile;
-use crate::config::alternatives::ScalarOr;
+use crate::config::alternatives::{OneOrList, ScalarOr};
 use crate::config::build::asked_for;
 use crate::config::spec::{ColumnRef, DecimalSign, Delimiter, ExperimentSpec, SourceSpec};
 use crate::config::values::{ColumnId, Text};
@@ -11,6 +11,7 @@ use crate::error::InputError;
 use crate::number_format::significant;
 use crate::tables::{
     ColumnName, Duplicates, RepeatedTimes, SAMPLE_RATES, Table, TableFormat, repeated_times,
+    without_rounding,
 };
 use crate::units::{Quantity, Unit};
 use std::borrow::Cow;
@@ -128,7 +129,8 @@ pub fn read(
     };
     let unit = column(index).unit(&mut notes.warnings)?;
     let factor = unit.factor();
-    let times = times(file, spec, &experiment, own, table, notes)?;
+    let place = (wanted.experiment, &*experiment);
+    let times = times(file, spec, place, own, table, notes)?;
     let values = table.samples(index).map_err(asked_for(file, &column_key))?;
     let beside = match wanted.beside {
         Some((name, key)) => {
@@ -156,10 +158,16 @@ pub fn read(
     repeats(file, spec, wanted.experiment, table, &times, notes);
     let inside = inside(file, &experiment, spec, &times.values)?;
     let duplicates = spec.duplicates.unwrap_or_default();
+    let codes = spec.missing.as_ref().map_or(&[][..], OneOrList::values);
+    let is_code = |value: f64| codes.iter().any(|code| code.0 == value);
     let samples = |column| {
         let merged = times.repeated.merged(column, duplicates);
         let inside = merged[inside.clone()].iter();
-        inside.map(|value| factor * value).collect()
+        let value = |value: &f64| match is_code(*value) {
+            true => f64::NAN,
+            false => factor * value,
+        };
+        inside.map(value).collect()
     };
     let (values, beside) = (samples(values), beside.map(samples));
     let zero = spec.time_zero.map_or(0.0, |t| t.0);
@@ -332,7 +340,7 @@ struct Times {
 fn times(
     file: &ModelFile,
     spec: &ExperimentSpec,
-    experiment: &str,
+    (number, experiment): (usize, &str),
     own: Option<&SourceSpec>,
     table: &Table,
     notes: &mut RecordNotes,
@@ -397,7 +405,15 @@ fn times(
     let duplicates = spec.duplicates.unwrap_or_default();
     let repeated = repeated_times(table, index, duplicates).map_err(asked_for(file, &key))?;
     let values = table.values(index).map_err(asked_for(file, &key))?;
-    let values = repeated.merged(values, Duplicates::First);
+    let mut values = repeated.merged(values, Duplicates::First);
+    if let Some(exact) = without_rounding(&values) {
+        let fact = DataFact::RoundedTimes {
+            digits: exact.digits,
+            rate: 1.0 / (exact.step * unit.factor()),
+        };
+        notes.state(&file.experiment_name(number), &fact);
+        values = exact.times.into();
+    }
     Ok(Times {
         values: values.iter().map(|t| t * unit.factor()).collect(),
         label: table.label(index),

@@ -72,6 +72,7 @@ pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord)
             warnings.extend(rest_before_motion(spec, record));
         }
         warnings.extend(modes(spec, record));
+        warnings.extend(excluded_frequency(file, record));
         warnings
     };
     let (mut warnings, others) = both(of_units, of_motion);
@@ -80,6 +81,29 @@ pub fn of(file: &ModelFile, i: usize, spec: &ExperimentSpec, record: &RawRecord)
     let each = warnings.iter();
     each.map(|warning| warning.at(&place).with("experiment", &name))
         .collect()
+}
+
+/// A constraint of the natural frequency that excludes the frequency of a free record.
+fn excluded_frequency(file: &ModelFile, record: &RawRecord) -> Option<DataWarning> {
+    let constraints = file.spec.constraints.iter().flatten();
+    let mut ranges = constraints.filter_map(|constraint| constraint.frequency.as_ref());
+    let channel = record.channels.first().filter(|_| record.is_free())?;
+    let spectrum = Spectrum::of(&channel.values, channel.median_spacing)?;
+    let frequency = spectrum.dominant();
+    // A frequency is known to about the spacing of the spectrum.
+    let error = spectrum.resolution();
+    let range = ranges.find_map(|range| {
+        let [min, max] = [&range.min, &range.max].map(|end| end.as_ref().map(|end| end.0));
+        let is_below = min.is_some_and(|min| frequency + error < min);
+        let is_above = max.is_some_and(|max| frequency - error > max);
+        (is_below || is_above).then_some([min, max])
+    })?;
+    Some(DataWarning::FrequencyExcluded {
+        channel: channel.kind.name(),
+        frequency,
+        min: range[0],
+        max: range[1],
+    })
 }
 
 /// Spectra of the channels of a record, each computed where it is first needed.

@@ -128,6 +128,9 @@ pub enum DataFact {
         lines: Vec<usize>,
         action: DataAction,
     },
+    /// Times that are equally spaced but for the rounding of their printed digits.
+    #[error("times printed with {digits} decimals: taken as equally spaced, at {} Hz", significant(*rate, 9))]
+    RoundedTimes { digits: usize, rate: f64 },
     /// Gaps in the times or samples of a channel.
     #[error("{} in the {channel}, {}: {}", counted(*count, "gap"), gaps_in_words(places, *count), action.words())]
     Gaps {

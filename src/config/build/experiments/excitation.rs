@@ -51,6 +51,16 @@ impl RawExcitation {
         }
     }
 
+    /// The measured input and its name, if it is one series of samples.
+    pub fn samples(&self) -> Option<(&'static str, &Signal)> {
+        match (&self.input.force, &self.input.base) {
+            (Some(Waveform::Samples(signal)), None) => Some(("force", signal)),
+            (None, Some(BaseMotion::Acceleration(signal))) => Some(("base_acceleration", signal)),
+            (None, Some(BaseMotion::Displacement(signal))) => Some(("base_displacement", signal)),
+            _ => None,
+        }
+    }
+
     /// Forces (N) at some times (s), if measured and if no other input acts.
     pub fn forces_at(&self, times: &[f64]) -> Option<Arc<Vec<f64>>> {
         self.force()?;

@@ -7,6 +7,7 @@ mod data_facts;
 mod delays;
 mod excitation;
 mod faults;
+mod shared_samples;
 mod unit;
 mod warning;
 
@@ -20,18 +21,17 @@ use crate::config::spec::{
 use crate::config::values::{Estimate, NumberOrEstimate};
 use crate::error::InputError;
 use crate::finding::Finding;
-use crate::tables::resample;
 use crate::units::Unit;
 pub(super) use channel::RawChannel;
+pub(in crate::config) use channel::sensor_of;
 pub(super) use data_facts::RecordNotes;
 pub use delays::DelayLimits;
 use excitation::RawExcitation;
 use kmcfit_core::internals::builder::{self, ChannelSpec, ScalarSpec, listed};
 use kmcfit_core::internals::functions::{Prior, ScalarParameter};
-use kmcfit_core::internals::record::{ChannelKind, Experiment, InputErrorKind, Weighting};
+use kmcfit_core::internals::record::{ChannelKind, Experiment, InputErrorKind};
 use kmcfit_core::internals::signal::Signal;
 use kmcfit_core::internals::system::{Grid, InputQuantity};
-use std::sync::Arc;
 
 pub(super) use excitation::shape;
 pub(crate) use warning::DataWarning;
@@ -148,9 +148,13 @@ pub(super) fn read(
         }
     }
     let records = specs.iter().enumerate();
-    records
+    let records: Result<Vec<Option<RawRecord>>, InputError> = records
         .map(|(i, spec)| read_one(file, i, spec, notes).map(Some))
-        .collect()
+        .collect();
+    let records = records?;
+    let repeated = shared_samples::repeated_records(file, &records);
+    notes.warnings.extend(repeated);
+    Ok(records)
 }
 
 fn read_one(
@@ -159,11 +163,13 @@ fn read_one(
     spec: &ExperimentSpec,
     notes: &mut RecordNotes,
 ) -> Result<RawRecord, InputError> {
+    shared_samples::refuse_one_column_twice(file, i, spec)?;
     let channels = channel::read(file, i, spec, notes)?;
     let mut record = RawRecord {
         channels,
         excitation: excitation::read(file, i, spec, notes)?,
     };
+    shared_samples::refuse_input_as_response(file, i, &record)?;
     if let Some(channel) = record.channels.first() {
         record.excitation.share_times(&channel.times);
     }
@@ -186,7 +192,6 @@ fn read_one(
 /// The specification of experiment `i` with its data, and the notes on its channels.
 pub(super) fn specification(
     file: &ModelFile,
-    mode: BuildMode,
     grid: &Grid,
     i: usize,
     record: Option<RawRecord>,
@@ -215,14 +220,11 @@ pub(super) fn specification(
         found = found.input_error(quantity, kind, error.value.0);
     }
     let mut notes = Vec::new();
-    if let Some(mut record) = record {
+    if let Some(record) = record {
         if let Some(delay) = delays::of_input(file, i, record.spacing())?.parameter() {
             found = found.input_delay(delay);
         }
         found = found.input(record.excitation.into_input());
-        if let (BuildMode::Check { .. }, [only]) = (mode, record.channels.as_mut_slice()) {
-            sample_per_node(only, grid);
-        }
         for raw in record.channels {
             notes.push(raw.note());
             let delay = delays::of_channel(file, i, raw.kind, raw.median_spacing)?;
@@ -290,20 +292,6 @@ fn channel(spec: &ExperimentSpec, raw: RawChannel, delay: Option<ScalarSpec>) ->
         angular: raw.unit.is_angular(),
         times: raw.times,
         values: raw.values,
-    }
-}
-
-/// Interpolates the samples of an integral cost at every node, so that a gradient check of the continuous adjoint is
-/// possible on any grid.
-fn sample_per_node(raw: &mut RawChannel, grid: &Grid) {
-    let plain = raw.kind == ChannelKind::Displacement && raw.filter.is_empty();
-    let integral = matches!(raw.weighting, Some(Weighting::Integral { .. }) | None);
-    if plain && integral && raw.spacing.is_some() && raw.times.len() != grid.nodes() {
-        raw.values = Arc::new(resample(&raw.values, grid.nodes()));
-        raw.times = Arc::new(grid.times());
-        raw.spacing = Some(grid.step());
-        raw.decimated = false;
-        raw.weighting = None;
     }
 }
 

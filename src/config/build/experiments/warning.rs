@@ -58,12 +58,6 @@ pub(crate) enum DataWarning {
         used: String,
         stated: String,
     },
-    /// The times look equally spaced but rounded.
-    #[error(
-        "the times are nearly but not exactly equally spaced, as if printed with too few digits; they are used as given. \
-         `sample_rate` in place of the column of times states them exactly"
-    )]
-    NearlyEqualTimes,
     /// Two channels, or a channel and the initial state, disagree by the factor between two units.
     #[error("{quantity} is {} times its expected value, {factor}; check `units`", significant(*ratio, 4))]
     SuspiciousFactor {
@@ -126,6 +120,18 @@ pub(crate) enum DataWarning {
         channel: &'static str,
         /// The stronger one first, Hz.
         frequencies: [f64; 2],
+    },
+    /// A constraint excludes the frequency at which the record vibrates.
+    #[error(
+        "the {channel} vibrates at {} Hz, which the constraint on the natural frequency ({}) excludes",
+        significant(*frequency, 3),
+        range_in_words(*min, *max)
+    )]
+    FrequencyExcluded {
+        channel: &'static str,
+        frequency: f64,
+        min: Option<f64>,
+        max: Option<f64>,
     },
     /// Outliers under a quadratic loss.
     #[error(
@@ -200,6 +206,11 @@ pub(crate) enum DataWarning {
         #[serde(skip)]
         is_input: bool,
     },
+    /// A record with the samples of another one: the intervals count them twice.
+    #[error(
+        "{experiment} has the samples of {other}: listed twice, they narrow the intervals without further information; remove one"
+    )]
+    RepeatedRecord { experiment: String, other: String },
     /// Gaps in the samples of an input.
     #[error(
         "the {channel} has {}, across which it is interpolated, the longest from {} to {} s; keep a part without them by \
@@ -213,6 +224,16 @@ pub(crate) enum DataWarning {
         count: usize,
         longest: [f64; 2],
     },
+}
+
+/// A range of frequencies in words.
+fn range_in_words(min: Option<f64>, max: Option<f64>) -> String {
+    match (min, max) {
+        (Some(min), Some(max)) => format!("{min} to {max} Hz"),
+        (Some(min), None) => format!("at least {min} Hz"),
+        (None, Some(max)) => format!("at most {max} Hz"),
+        (None, None) => "any".to_owned(),
+    }
 }
 
 impl DataWarning {

@@ -1,8 +1,9 @@
 //! Starting point by a scan of the natural frequency.
 //!
 //! A response of a wrong period fits worse than no response, so that a search from a distant start ends in a local minimum. With
-//! constant coefficients the frequency `sqrt(k/m)` is one number: steps from [`FREQUENCIES`] values of it, the best one
-//! continued, give the level of each function; three knots give their course, and the functions of the problem their details.
+//! constant coefficients the frequency `sqrt(k/m)` is one number: steps from [`FREQUENCIES`] values of it, those of the [`KEPT`] lowest costs
+//! and then the best one continued, give the level of each function; three knots give their course, and the functions of the problem their
+//! details.
 //!
 //! The steps are taken in the logarithms of mass, damping and stiffness, which stay positive without a bound.
 
@@ -11,6 +12,7 @@ use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::solvers::linearization::{Linearization, linearise};
 use crate::solvers::timings::Timings;
 use crate::system::Term;
+use crate::threads::{analyses_at_once, map};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
@@ -18,8 +20,12 @@ use std::f64::consts::TAU;
 const FREQUENCIES: usize = 25;
 /// Periods of the lowest frequency in the shortest record, and samples per period of the highest one.
 const LIMITS: [f64; 2] = [2.0, 2.5];
-/// Steps from each frequency.
-const SCAN_STEPS: u64 = 6;
+/// Steps from each frequency, and further ones from those kept.
+const SCAN_STEPS: [u64; 2] = [2, 4];
+/// Frequencies that are kept after the first steps.
+const KEPT: usize = 6;
+/// Relative distance of natural frequencies and costs below which two descents approach the same minimum.
+const SAME: f64 = 1e-3;
 /// Steps from the best frequency, and in the logarithms of further functions.
 const STEPS: u64 = 40;
 /// Knots of the functions between constants and those of the problem.
@@ -143,11 +149,11 @@ fn scanned(problem: &Problem, constants: &Problem, start: &[f64]) -> Option<Vec<
     };
     let (m, k) = (level(mass), level(stiffness));
     let k = if k > 0.0 { k } else { m };
-    let mut best: Option<(Vec<f64>, f64)> = None;
-    for omega in frequencies(problem)? {
+    let place = (first(mass), first(stiffness));
+    let from = |omega: f64| -> Vec<f64> {
         let mut theta = base.clone();
         let ratio = omega * omega * m / k;
-        let (to_mass, to_stiffness) = match (first(mass), first(stiffness)) {
+        let (to_mass, to_stiffness) = match place {
             (Some(i), Some(j)) => {
                 theta[i] = m / ratio.sqrt();
                 theta[j] = k * ratio.sqrt();
@@ -161,19 +167,43 @@ fn scanned(problem: &Problem, constants: &Problem, start: &[f64]) -> Option<Vec<
                 theta[j] = k * ratio;
                 (m, k * ratio)
             }
-            (None, None) => return None,
+            (None, None) => (m, k),
         };
         if let Some(i) = at(Term::Damping).and_then(first) {
             let least = 2.0 * LEAST_DAMPING_RATIO * (to_mass * to_stiffness).sqrt();
             theta[i] = theta[i].max(least);
         }
-        let (theta, cost) = Descent::new(constants, SCAN_STEPS).run(theta);
-        if cost.is_finite() && best.as_ref().is_none_or(|(_, least)| cost < *least) {
-            best = Some((theta, cost));
+        theta
+    };
+    let frequency = |theta: &[f64]| {
+        let of = |f: Option<usize>, fixed: f64| f.map_or(fixed, |i| theta[i]);
+        (of(place.1, k) / of(place.0, m)).sqrt()
+    };
+    let starts: Vec<Vec<f64>> = frequencies(problem)?.into_iter().map(from).collect();
+    let mut points = descents(constants, SCAN_STEPS[0], starts);
+    points.dedup_by(|next, point| {
+        let is_near = |a: f64, b: f64| (a - b).abs() <= SAME * a.abs().max(b.abs());
+        let is_same = is_near(point.1, next.1) && is_near(frequency(&point.0), frequency(&next.0));
+        if is_same && next.1 < point.1 {
+            std::mem::swap(point, next);
         }
-    }
-    let (theta, _) = best?;
+        is_same
+    });
+    points.sort_by(|a, b| a.1.total_cmp(&b.1));
+    points.truncate(KEPT);
+    let kept = points.into_iter().map(|(theta, _)| theta).collect();
+    let points = descents(constants, SCAN_STEPS[1], kept).into_iter();
+    let (theta, _) = points.min_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(Descent::new(constants, STEPS).run(theta).0)
+}
+
+/// Parameters after so many steps from each start, with their costs; without starts that cannot be simulated.
+fn descents(problem: &Problem, steps: u64, starts: Vec<Vec<f64>>) -> Vec<(Vec<f64>, f64)> {
+    let descent = Descent::new(problem, steps);
+    let threads = analyses_at_once(problem.sample_count());
+    let points = map(starts.len(), threads, |i| descent.run(starts[i].clone()));
+    let points = points.into_iter();
+    points.filter(|(_, cost)| cost.is_finite()).collect()
 }
 
 /// Natural frequencies of the scan, rad/s: equally spaced logarithms between [`LIMITS`].
@@ -246,6 +276,13 @@ impl<'a> Descent<'a> {
                     damped[(j, j)] += damping * normal[(j, j)].max(f64::MIN_POSITIVE);
                 }
                 let step = damped.cholesky().map(|factor| factor.solve(&descent));
+                // With more damping the decrease is smaller: none that counts is left.
+                let predicted = step.as_ref().map_or(f64::INFINITY, |step| {
+                    2.0 * step.dot(&descent) - step.dot(&(&normal * step))
+                });
+                if predicted <= CONVERGED * before {
+                    break;
+                }
                 let moved = step.map(|step| self.moved(&theta, &scales, step.as_slice()));
                 let there =
                     moved.and_then(|moved| Some((self.problem.evaluate(&moved).ok()?, moved)));

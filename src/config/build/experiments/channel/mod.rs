@@ -6,7 +6,6 @@ mod sampling;
 use super::column_samples::{self, ColumnRequest, ColumnSamples, PresentRows};
 use super::data_facts::{DataFact, RecordNotes};
 use super::faults::{Column, is_coarse, quantisation_step};
-use super::warning::DataWarning;
 use super::{ChannelNote, names};
 use crate::config::ModelFile;
 use crate::config::alternatives::ScalarOr;
@@ -23,7 +22,7 @@ use kmcfit_core::internals::signal::SecondOrder;
 use kmcfit_core::internals::signal::{even_spacing, median_spacing};
 use kmcfit_core::internals::system::Grid;
 use noise::{loss, noise_model, weighting, with_quantisation};
-use sampling::{band, decimate, nearly_equal};
+use sampling::{band, decimate};
 use std::sync::Arc;
 
 /// Default name of the column of the displacement, for files without `columns`.
@@ -263,9 +262,6 @@ fn read_one(
     let [times, values] = [&mut source.times, &mut source.values]
         .map(|column| present.picked(std::mem::take(column)));
     let spacing = even_spacing(&times);
-    if spacing.is_none() && missing == 0 && nearly_equal(&times) {
-        notes.warnings.push(DataWarning::NearlyEqualTimes.at(&key));
-    }
     let filter = band(file, &key, spec, spacing, missing)?;
     let weighting = weighting(file, &sigma_key, of_kind.sigma, sigmas, &values)?;
     let (weighting, action) = with_quantisation(weighting, step.unwrap_or(0.0));

@@ -4,20 +4,11 @@ use super::super::column_samples;
 use crate::config::ModelFile;
 use crate::config::spec::ExperimentSpec;
 use crate::error::InputError;
+use kmcfit_core::internals::signal::even_spacing;
 use kmcfit_core::internals::signal::{self, SecondOrder};
-use kmcfit_core::internals::signal::{even_spacing, median_spacing};
 
 /// Order of the filter of a band, run forward and backward.
 const BAND_ORDER: usize = 2;
-/// Relative difference of spacings below which times count as rounded.
-const ROUNDED: f64 = 0.05;
-
-/// True if all spacings are within 5 % of their median.
-pub(super) fn nearly_equal(times: &[f64]) -> bool {
-    let median = median_spacing(times);
-    let off = |w: &[f64]| (w[1] - w[0] - median).abs() > ROUNDED * median;
-    !times.windows(2).any(off)
-}
 
 /// Keeps every `factor`-th sample after a low-pass filter.
 pub(super) fn decimate(

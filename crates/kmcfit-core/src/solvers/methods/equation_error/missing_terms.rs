@@ -53,6 +53,9 @@ pub struct MissingTerm {
     pub t: f64,
     /// Root mean square of its force, relative to the largest term of the model.
     pub share: f64,
+    /// Width of Coulomb friction with which it was tested, m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub width: Option<f64>,
 }
 
 /// Missing terms at the minimum `theta` of the equation error, the most significant one first; none where they cannot be tested.
@@ -74,7 +77,7 @@ pub fn missing_terms(problem: &Problem, theta: &[f64]) -> Vec<MissingTerm> {
     while found.len() < MOST_TERMS {
         let tests = left.iter().enumerate().filter_map(|(i, candidate)| {
             let factor = weak.factor(candidate.term);
-            Some((i, weak.test(&terms, &factor, candidate.kind)?, factor))
+            Some((i, weak.test(&terms, &factor, candidate)?, factor))
         });
         let best = tests.max_by(|a, b| a.1.t.abs().total_cmp(&b.1.t.abs()));
         let Some((i, test, factor)) = best else { break };
@@ -187,7 +190,7 @@ impl<'a> WeakForm<'a> {
         &self,
         terms: &[DVector<f64>],
         factor: &DVector<f64>,
-        kind: CoefficientKind,
+        candidate: &Candidate,
     ) -> Option<MissingTerm> {
         let scaled: Vec<DVector<f64>> = terms.iter().map(|term| term.normalize()).collect();
         let basis = DMatrix::from_columns(&scaled).qr().q();
@@ -204,10 +207,11 @@ impl<'a> WeakForm<'a> {
         let size = (factor.norm_squared() / factor.len() as f64).sqrt();
         // The residual has the sign of the left side of the equation of motion, which lacks the term.
         Some(MissingTerm {
-            term: kind,
+            term: candidate.kind,
             value: -slope,
             t: -slope / error.max(f64::MIN_POSITIVE),
             share: slope.abs() * size / self.largest,
+            width: candidate.term.friction_width(),
         })
     }
 }

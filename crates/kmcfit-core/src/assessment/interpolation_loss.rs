@@ -1,0 +1,146 @@
+//! Loss of an input by lines between its samples.
+//!
+//! Lines between equally spaced samples pass a sine of frequency `f` by the factor `sinc(f dt)^2` with `sinc(x) = sin(pi x) / (pi x)`. A response
+//! near its natural frequency shows the input there: the coefficients have lost the same share, and short pulses lose more. What the estimates
+//! have lost is seen by a second interpolation: the predictions with cubic splines, less those with lines, shift the estimates by one
+//! Gauss-Newton step.
+//!
+//! White residuals show that the input is as interpolated, unless errors of the input are stated, which whiten what an interpolation leaves.
+
+use super::FitWarning;
+use super::input_correlation::measured;
+use super::median_frequency::median_frequency;
+use crate::objective::Evaluation;
+use crate::problem::Problem;
+use crate::record::{BaseMotion, Input, Waveform};
+use crate::signal::{Interpolation, Signal, even_spacing};
+use crate::system::InputQuantity;
+use std::f64::consts::PI;
+
+/// Smallest shift of an estimate, in standard errors, that is named.
+const NOTICEABLE: f64 = 0.5;
+
+/// Warnings about the interpolation of the inputs of all experiments; `is_white` where the residuals are.
+pub(super) fn interpolation_losses(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+    is_white: bool,
+) -> Vec<FitWarning> {
+    let frequency = median_frequency(problem, evaluation);
+    let each = problem.experiments.iter().enumerate();
+    let each = each.filter_map(|(e, experiment)| {
+        let is_open = !is_white || experiment.input_error.is_some();
+        let (input, cubic) = is_open.then(|| with_cubics(problem, e)).flatten()?;
+        let cycles = frequency? * even_spacing(cubic.times())?;
+        let errors = shift_by(problem, theta, evaluation, e, (input, cubic))?;
+        (errors > NOTICEABLE).then(|| FitWarning::InterpolationLoss {
+            experiment: experiment.name.clone(),
+            input,
+            share: 1.0 - passed(cycles),
+            errors,
+        })
+    });
+    each.collect()
+}
+
+/// Factor by which lines pass a sine of so many cycles per sample.
+fn passed(cycles: f64) -> f64 {
+    let sinc = (PI * cycles).sin() / (PI * cycles);
+    sinc * sinc
+}
+
+/// The input of experiment `e`, if lines connect its samples, with cubic splines in their place. With errors of the input the samples are those
+/// of the estimated input.
+fn with_cubics(problem: &Problem, e: usize) -> Option<(InputQuantity, Signal)> {
+    let experiment = &problem.experiments[e];
+    let (input, times, values) = match (measured(experiment), &experiment.input_error) {
+        (Some((input, signal)), _) => {
+            (signal.interpolation() == Interpolation::Linear).then_some(())?;
+            (input, signal.times().to_vec(), signal.values().to_vec())
+        }
+        (None, Some(error)) => {
+            let excitation = experiment.excitation.as_ref()?;
+            let part = match error.quantity {
+                InputQuantity::Force => &excitation.force,
+                InputQuantity::BaseAcceleration => &excitation.base,
+            };
+            let at_nodes = part.as_ref()?.at_nodes();
+            let grid = &problem.system.grid;
+            let last = at_nodes.len().checked_sub(2)?;
+            let at = |t: &f64| {
+                let place = (t - grid.start()) / grid.step();
+                let left = (place.max(0.0) as usize).min(last);
+                let share = place - left as f64;
+                at_nodes[left] + share * (at_nodes[left + 1] - at_nodes[left])
+            };
+            let values = error.times.iter().map(at).collect();
+            (error.quantity, error.times.clone(), values)
+        }
+        (None, None) => return None,
+    };
+    let cubic = Signal::new(times, values, Interpolation::Cubic)?;
+    Some((input, cubic))
+}
+
+/// Largest shift of a parameter, in standard errors, with this signal in place of the input of experiment `e`.
+fn shift_by(
+    problem: &Problem,
+    theta: &[f64],
+    evaluation: &Evaluation,
+    e: usize,
+    (input, signal): (InputQuantity, Signal),
+) -> Option<f64> {
+    let mut other = problem.clone();
+    let grid = other.system.grid;
+    let experiment = other.parts_mut().experiments.get_mut(e)?;
+    let input = match input {
+        InputQuantity::Force => Input {
+            force: Some(Waveform::Samples(signal)),
+            base: None,
+        },
+        InputQuantity::BaseAcceleration => Input {
+            force: None,
+            base: Some(BaseMotion::Acceleration(signal)),
+        },
+    };
+    experiment.excitation = Some(input.on(&grid, experiment.nodes));
+    let there = other.evaluate(theta).ok()?;
+    let pairs = problem.predicted(evaluation);
+    let pairs = pairs.zip(there.predictions.iter().flatten());
+    let changes = pairs.map(|((_, here), there)| {
+        let both = there.iter().zip(here);
+        both.map(|(a, b)| a - b).collect()
+    });
+    let shifts = problem.shifts_by(theta, evaluation, changes.collect())?;
+    let errors = shifts
+        .into_iter()
+        .map(|[shift, error]| (shift / error).abs());
+    Some(errors.filter(|x| x.is_finite()).fold(0.0, f64::max))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    /// The factor is the projection of the interpolated sine on the sine, over many periods.
+    #[test]
+    fn the_factor_is_that_of_an_interpolated_sine() {
+        let cycles = 0.037;
+        let times: Vec<f64> = (0..4001).map(f64::from).collect();
+        let sine = |t: f64| (TAU * cycles * t).sin();
+        let values = times.iter().map(|t| sine(*t)).collect();
+        let signal = Signal::new(times, values, Interpolation::Linear).unwrap();
+        let (mut product, mut square) = (0.0, 0.0);
+        // 10 points in each interval of 100 periods in the middle.
+        for i in 0..27_027 {
+            let t = 600.0 + 0.1 * (f64::from(i) + 0.5);
+            product += signal.value(t) * sine(t);
+            square += sine(t) * sine(t);
+        }
+        let loss = 1.0 - product / square;
+        let expected = 1.0 - passed(cycles);
+        assert!((loss / expected - 1.0).abs() < 0.02, "{loss} {expected}");
+    }
+}

@@ -1,0 +1,215 @@
+//! Suggestions from the size and the patterns of the residuals.
+
+use super::{Suggestion, is_poor, number_of, of_channel, percent};
+use crate::number_format::{significant, times_in_words};
+use crate::report::document::{ChannelSummary, ExperimentSummary, ResultDocument};
+use kmcfit_core::internals::assessment::{BEYOND_SIGMA, EXACT, POOR, ResidualPattern};
+use kmcfit_core::internals::diagnostics::SIGNIFICANCE;
+use kmcfit_core::internals::solvers::StartStrategy;
+
+/// Residuals with a lower probability under white noise have a pattern.
+const PATTERN: f64 = 1e-3;
+/// Fit of a free record, per cent, below which an unknown force may act.
+const HARDLY: f64 = 50.0;
+
+/// The suggestion from the first pattern in the residuals of a channel, or from a sigma that is too small.
+pub(super) fn about_patterns(document: &ResultDocument) -> Option<Suggestion> {
+    // The equation error supports robust losses and bands, but estimates no sensor.
+    let is_possible = |pattern: &ResidualPattern| {
+        let is_of_sensor = matches!(pattern, ResidualPattern::Offset | ResidualPattern::Drift);
+        document.is_simulated() || !is_of_sensor
+    };
+    let pattern = |c: &ChannelSummary| c.pattern.clone().filter(is_possible);
+    let mut patterns = document
+        .channels()
+        .filter_map(|c| Some((&c.kind, pattern(c)?)));
+    if let Some((channel, pattern)) = patterns.next() {
+        return Some(of_pattern(document, channel, &pattern));
+    }
+    let fit = document.worst_fit().unwrap_or(100.0);
+    let beyond = document.fit_warning("beyond_sigma")?;
+    let times = number_of(beyond, "times")?;
+    let estimated = document.experiments.iter().enumerate().flat_map(|(i, e)| {
+        (e.channels.iter()).map(move |c| format!("experiments.{i}.sigma.{}=estimate", c.kind))
+    });
+    (fit > POOR).then(|| {
+        Suggestion::change(
+            "larger_sigma",
+            format!(
+                "sigma is too small: the residuals are {} times sigma although the fit is {}; estimate it",
+                times_in_words(times),
+                percent(fit, 2)
+            ),
+            estimated.collect(),
+        )
+    })
+}
+
+fn of_pattern(document: &ResultDocument, channel: &str, pattern: &ResidualPattern) -> Suggestion {
+    let of = |what: &str, keys: &[&str]| {
+        let change = |i: usize| {
+            let each = keys.iter();
+            each.map(|key| format!("experiments.{i}.{key}")).collect()
+        };
+        let text = format!("{channel}: {what}");
+        (text, of_channel(document, channel, change))
+    };
+    let offset = format!("sensors.{channel}.offset=estimate");
+    let drift = format!("sensors.{channel}.drift=estimate");
+    let (kind, (text, overrides)) = match pattern {
+        ResidualPattern::Outliers { samples, first } => {
+            let outliers = match samples {
+                1 => format!("one outlier, at {first} s"),
+                _ => format!("{samples} outliers, the first at {first} s"),
+            };
+            let what = format!("{outliers}: use a robust loss");
+            (
+                "robust_loss",
+                of(&what, &[&format!("loss.{channel}=huber")]),
+            )
+        }
+        ResidualPattern::Offset => (
+            "estimate_offset",
+            of("the residuals have an offset: estimate it", &[&offset]),
+        ),
+        ResidualPattern::Drift => (
+            "estimate_drift",
+            of(
+                "the residuals drift: estimate offset and drift",
+                &[&offset, &drift],
+            ),
+        ),
+        ResidualPattern::Tone { frequency, beside } => {
+            let end = if frequency > beside { "max" } else { "min" };
+            let limit = super::written((frequency * beside).sqrt());
+            let what = format!(
+                "the residuals oscillate at {} Hz, the response at {} Hz (mains hum or another mode): restrict the frequency band",
+                significant(*frequency, 3),
+                significant(*beside, 3)
+            );
+            (
+                "restrict_band",
+                of(&what, &[&format!("band.{end}={limit}")]),
+            )
+        }
+    };
+    Suggestion::change(kind, text, overrides)
+}
+
+/// Suggestions for the first channel that is fitted poorly.
+pub(super) fn about_misfit(document: &ResultDocument) -> Vec<Suggestion> {
+    let records = document.experiments.iter().enumerate();
+    let mut named = records.flat_map(|(i, e)| e.channels.iter().map(move |c| (i, e, c)));
+    let reasons = document.verdict.iter().flat_map(|verdict| &verdict.reasons);
+    // No change of a model with one mode explains two.
+    let mut reasons = reasons.filter(|reason| reason.kind == "second_mode");
+    if reasons.next().is_some() {
+        return Vec::new();
+    }
+    let Some((i, record, channel)) = named.find(|(_, _, c)| is_poor(c.fit_percent)) else {
+        return Vec::new();
+    };
+    let (kind, fit) = (&channel.kind, percent(channel.fit_percent, 0));
+    let has_outliers = |sigma: f64| channel.rms_residual > BEYOND_SIGMA * sigma;
+    if channel.robust && channel.sigma.is_some_and(has_outliers) {
+        return vec![Suggestion::outside(
+            "outliers_limited",
+            format!(
+                "{kind}: outliers cause the low fit of {fit}; the robust loss limits their influence on the estimates"
+            ),
+        )];
+    }
+    let is_white = channel.whiteness_p_value.is_some_and(|p| p >= SIGNIFICANCE);
+    if channel.sigma.is_some() && is_white && !is_coloured(channel) {
+        return vec![Suggestion::outside(
+            "noise_limited",
+            format!(
+                "{kind}: fit {fit}, but the residuals have no significant autocorrelation: measurement noise limits the fit, not the model"
+            ),
+        )];
+    }
+    of_record(document, i, record)
+}
+
+fn is_coloured(channel: &ChannelSummary) -> bool {
+    channel.sigma.is_some()
+        && channel.fit_percent < EXACT
+        && (channel
+            .noise
+            .as_ref()
+            .is_some_and(|noise| !noise.input_errors)
+            || channel.whiteness_p_value.is_some_and(|p| p < PATTERN))
+}
+
+/// Overrides for the equation error, which takes no estimated offset: those of the fit are stated.
+fn equation_of_motion(
+    document: &ResultDocument,
+    i: usize,
+    record: &ExperimentSummary,
+) -> Vec<String> {
+    let of_channel = |c: &ChannelSummary| {
+        let mut estimated = document.nuisance_parameters.iter();
+        let is_offset = |name: &str| {
+            name.contains("offset") && name.contains(&c.kind) && name.contains(&record.name)
+        };
+        let offset = estimated.find(|scalar| is_offset(&scalar.name))?;
+        let value = super::written(offset.value);
+        Some(format!("experiments.{i}.sensors.{}.offset={value}", c.kind))
+    };
+    let offsets = record.channels.iter().filter_map(of_channel);
+    offsets
+        .chain(["fit={method: equation-error}".to_owned()])
+        .collect()
+}
+
+/// Changes of the start, the sensors and the method for a record that the fit does not explain.
+fn of_record(document: &ResultDocument, i: usize, record: &ExperimentSummary) -> Vec<Suggestion> {
+    let name = &record.name;
+    let mut steps = Vec::new();
+    let start = StartStrategy::StartValues.name();
+    let is_tried = document.attempts.iter().any(|r| r.start != start);
+    if document.is_simulated() && !is_tried {
+        steps.push(Suggestion::change(
+            "start_from_data",
+            "start from the record",
+            vec!["fit.initial=data".to_owned()],
+        ));
+    }
+    let Some(drive) = record.driven_by.first() else {
+        let worst = (record.channels.iter()).fold(100.0f64, |least, c| least.min(c.fit_percent));
+        if worst < HARDLY && document.is_simulated() {
+            steps.push(Suggestion::change(
+                "equation_of_motion",
+                "if an unmeasured force acts, fit the equation of motion",
+                equation_of_motion(document, i, record),
+            ));
+        }
+        return steps;
+    };
+    let sensors = |key: &str| -> Vec<String> {
+        let channels = record.channels.iter();
+        channels
+            .map(|c| format!("experiments.{i}.sensors.{}.{key}", c.kind))
+            .collect()
+    };
+    if drive == "base" {
+        steps.push(Suggestion::change(
+            "absolute",
+            format!("{name}: if the response is measured relative to the ground, not to the base, say so"),
+            sensors("absolute=true"),
+        ));
+    }
+    let initial = format!("initial displacement of {name}");
+    if !document
+        .nuisance_parameters
+        .iter()
+        .any(|s| s.name == initial)
+    {
+        steps.push(Suggestion::change(
+            "estimate_initial",
+            format!("{name}: estimate the initial state"),
+            vec![format!("experiments.{i}.initial=estimate")],
+        ));
+    }
+    steps
+}

@@ -1,0 +1,167 @@
+//! Advice is tried before it is given: each change of the model is fitted, and recommended only if the verdict or the criterion improves.
+//!
+//! All trials together have as many iterations as the fit itself, so that they take at most about its time; what does not fit into these is
+//! *not tried*. The number of iterations, not the time, is the limit: the same input gives the same advice on every machine.
+
+use super::document::ResultDocument;
+use super::fit_assessment::RunAssessment;
+use super::run::{FittedModel, RequestedFiles};
+use super::suggestions::{MOST, Step, is_unexplained, suggestions};
+use crate::config::{BuildMode, Model, ModelFile, Override, build};
+use crate::finding::Finding;
+use crate::fitting::fit_model;
+use crate::number_format::significant;
+use kmcfit_core::internals::assessment::VerdictLevel;
+use kmcfit_core::internals::solvers::{Fit, IterationRecord, Observer};
+use std::cmp::Ordering::Equal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Fewest iterations of all trials: a fit that begins near its optimum has few.
+const FEWEST: usize = 60;
+/// Decrease of BIC from which a change is worth it: odds of 20 to 1 (6 = 2 ln 20).
+const BETTER: f64 = 6.0;
+
+/// How much a change improves the fit: the levels of the verdict, then the decrease of the criterion.
+#[derive(PartialEq, PartialOrd)]
+struct Gain(u8, f64);
+
+/// Result of a trial.
+enum Outcome {
+    /// What became better.
+    Better(Gain, String),
+    /// The change cannot be made, or nothing became better.
+    Worse,
+    /// It would take longer than the fit.
+    TooLong,
+}
+
+/// Advice on a fit: its suggestions, those that change the model tried.
+pub fn advice(
+    file: &ModelFile,
+    model: &Model,
+    fit: &Fit,
+    document: &ResultDocument,
+) -> Vec<Finding> {
+    let searches = fit.attempts.iter().map(|attempt| attempt.history.len());
+    let mut left = (searches.sum::<usize>() + fit.history.len()).max(FEWEST);
+    let mut better: Vec<(Gain, Finding)> = Vec::new();
+    let mut others: Vec<Finding> = Vec::new();
+    for suggestion in suggestions(document, model) {
+        match &suggestion.step {
+            Step::Outside => others.push(suggestion.finding(None)),
+            Step::Untried => others.push(suggestion.finding(Some("not tried"))),
+            Step::Change(overrides) => match tried(file, model, document, overrides, &mut left) {
+                Outcome::Better(gain, words) => {
+                    let words = format!("tried: {words}");
+                    better.push((gain, suggestion.finding(Some(&words))));
+                }
+                Outcome::TooLong => others.push(suggestion.finding(Some("not tried"))),
+                Outcome::Worse => {}
+            },
+        }
+    }
+    // The sort is stable: equal ones keep the order of the suggestions.
+    better.sort_by(|(a, _), (b, _)| b.partial_cmp(a).unwrap_or(Equal));
+    let mut found: Vec<Finding> = better.into_iter().map(|(_, finding)| finding).collect();
+    found.extend(others);
+    found.truncate(MOST);
+    if found.is_empty() && is_unexplained(document) {
+        found.push(Finding::new(
+            "unexplained",
+            "nothing that was tried explains the residuals: look at their figures in report.html, and measure again where a sensor or a force is in doubt",
+        ));
+    }
+    found
+}
+
+/// Fits the changed model in at most `left` iterations, which are counted down.
+fn tried(
+    file: &ModelFile,
+    before: &Model,
+    document: &ResultDocument,
+    overrides: &[String],
+    left: &mut usize,
+) -> Outcome {
+    let stop = before.settings.interrupt.clone();
+    let is_stopped = || {
+        stop.as_ref()
+            .is_some_and(|stop| stop.load(Ordering::Relaxed))
+    };
+    if *left == 0 || is_stopped() {
+        return Outcome::TooLong;
+    }
+    let changed = Override::parse_all(overrides)
+        .and_then(|overrides| file.clone().with_overrides(&overrides))
+        .and_then(|file| build(&file, BuildMode::Fit));
+    let Ok(mut model) = changed else {
+        return Outcome::Worse;
+    };
+    let limit = Arc::new(AtomicBool::new(false));
+    model.settings.interrupt = Some(Arc::clone(&limit));
+    let mut count = |_: &IterationRecord| {
+        *left = left.saturating_sub(1);
+        if *left == 0 || is_stopped() {
+            limit.store(true, Ordering::Relaxed);
+        }
+    };
+    let fitted = fit_model(&model, &mut Observer::new(&mut count));
+    if limit.load(Ordering::Relaxed) {
+        return Outcome::TooLong;
+    }
+    let Ok(found) = fitted else {
+        return Outcome::Worse;
+    };
+    let assessment = RunAssessment::of(&found.model, &found.fit);
+    let fitted = FittedModel {
+        model: &found.model,
+        fit: &found.fit,
+        predictions: &[],
+        weights: None,
+        run_assessment: &assessment,
+        requested: RequestedFiles::default(),
+        computed: Default::default(),
+    };
+    let level = fitted.verdict().level;
+    let level_before = document.verdict.as_ref().map(|verdict| verdict.level);
+    let bic = assessment
+        .assessment
+        .as_ref()
+        .and_then(|a| a.statistics.bic);
+    // Sigmas, losses and filters change what the criterion compares.
+    let changes = [".sigma.", ".loss.", ".band."];
+    let is_comparable = !overrides
+        .iter()
+        .any(|o| changes.iter().any(|key| o.contains(key)));
+    let gain = document.statistics.bic.zip(bic).filter(|_| is_comparable);
+    let gain = gain.map(|(before, after)| before - after);
+    match (level_before, gain) {
+        (Some(before), _) if level < before => {
+            let steps = before as u8 - level as u8;
+            Outcome::Better(Gain(steps, gain.unwrap_or(0.0)), words(level).to_owned())
+        }
+        (Some(before), Some(gain)) if level == before && gain > BETTER => {
+            Outcome::Better(Gain(0, gain), format!("BIC {} lower", significant(gain, 2)))
+        }
+        _ => Outcome::Worse,
+    }
+}
+
+fn words(level: VerdictLevel) -> &'static str {
+    match level {
+        VerdictLevel::Adequate => "Adequate",
+        VerdictLevel::Check => "Check",
+        VerdictLevel::Inadequate => "Inadequate",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_better_verdict_precedes_a_better_criterion() {
+        assert!(Gain(1, -5.0) > Gain(0, 300.0));
+        assert!(Gain(1, 9.0) > Gain(1, 8.0));
+    }
+}
