@@ -409,7 +409,7 @@ fn slips_have_their_own_messages() {
 
 /// Ring-downs with an offset, a drift or a third harmonic of 0.1 to 3 %, 5 to 50 periods long, by constants alone: of those that end Adequate
 /// natural frequency and damping ratio are each outside their interval in at most 8 %, and farther than 3.5 standard errors in at most 1 %.
-/// Of 30 records each is outside in at most 6 with a probability of 0.98 at 8 %.
+/// Of the 22 or so Adequate ones of 30 records at most a fifth is outside with a probability of 0.97 at 8 %.
 #[test]
 fn contaminated_ring_downs_are_adequate_where_their_intervals_hold() {
     let (count, most, far) = match crate::program::is_long() {
