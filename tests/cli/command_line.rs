@@ -230,7 +230,7 @@ fn init_prints_the_properties_of_the_record() {
     # A known coefficient is fixed: {fixed: 4.5}; a nearly known one: {fixed: {value: 4.5, sigma: 0.02}}.
     # Further force terms:
     #   cubic_stiffness:  {basis: constant, start: 0.0}
-    #   coulomb_friction: {basis: constant, start: 0.0}
+    #   coulomb_friction: {basis: constant, start: 0.0, width: 0.001}
     # truth: {data: truth.csv}                        # the true functions, where they are known
     fit: {method: gauss-newton, stop: {iterations: 100, tolerance: 1.0e-8}}
     "#);

@@ -14,7 +14,7 @@ const OTHERS: &str = "\
 # A known coefficient is fixed: {fixed: 4.5}; a nearly known one: {fixed: {value: 4.5, sigma: 0.02}}.
 # Further force terms:
 #   cubic_stiffness:  {basis: constant, start: 0.0}
-#   coulomb_friction: {basis: constant, start: 0.0}
+#   coulomb_friction: {basis: constant, start: 0.0, width: 0.001}
 ";
 
 /// The section `functions`. Start values are left out: they follow from the records.
