@@ -31,6 +31,7 @@ pub mod guide;
 mod magnitudes;
 mod memory;
 mod number_format;
+pub mod quantity_names;
 pub mod report;
 pub mod results;
 mod source_snippet;

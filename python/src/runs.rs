@@ -5,9 +5,11 @@ use crate::source::to_bytes;
 use kmcfit::Run;
 use kmcfit::config::{ModelFile, NewRecord, Source, Statements};
 use kmcfit::error::InputError;
+use kmcfit::quantity_names::quantity_of;
 use kmcfit::report::compare::{ComparedRun, Comparison};
 use kmcfit::report::{CsvTable, ForcedPredictions, json, predict};
 use kmcfit::tables::Table;
+use kmcfit::units::{Quantity, Unit};
 use kmcfit_core::internals::record::ChannelKind;
 use kmcfit_core::internals::system::State;
 use pyo3::prelude::*;
@@ -42,6 +44,19 @@ pub fn scaffold(py: Python<'_>, paths: Vec<PathBuf>) -> PyResult<String> {
             .collect();
         Ok(kmcfit::config::scaffold(&sources, &Statements::default())?.text)
     })
+}
+
+/// The quantity of a channel by its unit and name, as `kmcfit init` finds it.
+#[pyfunction]
+pub fn quantity(name: &str, unit: &str) -> Option<&'static str> {
+    let by_name = quantity_of(name);
+    let of = |kind: &Quantity| Unit::recognise(*kind, unit).is_some_and(|unit| !unit.is_arbitrary());
+    let by_unit = Quantity::ALL.into_iter().find(of);
+    let found = match unit.trim() {
+        "" => by_name,
+        _ => by_name.filter(of).or(by_unit),
+    };
+    found.map(Quantity::name)
 }
 
 /// The numeric columns of a data file, each with its name.

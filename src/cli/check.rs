@@ -3,7 +3,7 @@
 use super::fit::read;
 use super::progress::Activity;
 use super::{CommandError, OK, Overrides, announce, check_file, print};
-use crate::formats::has_data_extension;
+use crate::config::is_record;
 use crate::report::overview;
 use std::path::PathBuf;
 
@@ -20,7 +20,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
-    if has_data_extension(&arguments.model) {
+    if is_record(&arguments.model) {
         return Ok(check_file::run(&arguments.model)?);
     }
     let file = arguments.set.read(&arguments.model)?;

@@ -25,10 +25,17 @@ pub(super) fn run(path: &Path) -> Result<u8, InputError> {
             .to_vec(),
     ];
     for table in &tables {
-        rows.extend((0..table.width()).map(|index| row(table, index)));
+        let rate = rate(table).filter(|_| table.rows() > 1);
+        let rate = rate.map_or("-".to_owned(), |(_, rate)| {
+            format!("{} Hz", significant(rate, 6))
+        });
+        rows.extend((0..table.width()).map(|index| row(table, index, &rate)));
     }
     for line in aligned(&rows).lines() {
         text += &format!("  {line}\n");
+    }
+    for note in tables.first().map_or(&[][..], Table::notes) {
+        text += &format!("note: {note}\n");
     }
     for other in tables.first().map_or(&[][..], Table::unusable) {
         text += &format!("not usable: `{}`, {}\n", other.name, other.content);
@@ -49,7 +56,7 @@ fn format_of(tables: &[Table]) -> String {
 }
 
 /// Number, name, quantity, unit, number of samples and sampling rate of a column.
-fn row(table: &Table, index: usize) -> Vec<String> {
+fn row(table: &Table, index: usize, rate: &str) -> Vec<String> {
     // A single number is no record.
     let known = recognised(table, index).filter(|_| table.rows() > 1);
     let unit = match (known, table.unit(index)) {
@@ -68,9 +75,6 @@ fn row(table: &Table, index: usize) -> Vec<String> {
         }
         Err(_) => "not numbers".to_owned(),
     };
-    let rate = rate(table)
-        .filter(|_| table.rows() > 1)
-        .map(|(_, rate)| format!("{} Hz", significant(rate, 6)));
     vec![
         table
             .number(index)
@@ -79,6 +83,6 @@ fn row(table: &Table, index: usize) -> Vec<String> {
         known.map_or("-".to_owned(), |(role, ..)| role.key().replace('_', " ")),
         unit,
         samples,
-        rate.unwrap_or_else(|| "-".to_owned()),
+        rate.to_owned(),
     ]
 }

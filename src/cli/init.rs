@@ -30,6 +30,12 @@ pub struct Arguments {
     /// Units by quantity or column, as in `time=ms,displacement=mm` or `ch1=50 g`; of a column without a name by its number, `1=50 g`.
     #[arg(long, value_name = "UNITS")]
     units: Vec<String>,
+    /// Column of the times, by name or number.
+    #[arg(long, value_name = "COLUMN")]
+    time: Option<String>,
+    /// Column of a response, with its quantity where neither name nor unit states it, as in `acceleration=ch1`.
+    #[arg(long, value_name = "COLUMN")]
+    response: Vec<String>,
     /// Column of the force, by name or number.
     #[arg(long, value_name = "COLUMN")]
     force: Option<String>,
@@ -73,7 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<u8, CommandError> {
     }
     write_together(&files).map_err(|error| unwritable(&out, &error))?;
     let mut text = String::new();
-    for (file, sentences) in arguments.data.iter().zip(&scaffold.found) {
+    for (file, sentences) in &scaffold.found {
         text += &format!("{}\n", file.display());
         for sentence in sentences {
             text += &format!("  {sentence}\n");
@@ -112,6 +118,8 @@ fn statements(arguments: &Arguments) -> Result<Statements, InputError> {
     for units in &arguments.units {
         statements.state_units(units)?;
     }
+    statements.time.clone_from(&arguments.time);
+    statements.responses.clone_from(&arguments.response);
     statements.force.clone_from(&arguments.force);
     statements.base.clone_from(&arguments.base);
     if let Some(text) = &arguments.mass {

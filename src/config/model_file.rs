@@ -41,11 +41,16 @@ pub struct ModelFile {
     read: Arc<ReadFiles>,
 }
 
-/// True for a file of measurements by its name, unless it has the keys of a model.
+/// True for a file of measurements: by its content no model, and by its name no YAML; or one that is not there with a name of such a file.
 pub fn is_record(path: &Path) -> bool {
     let has_keys = |text: &str| text.lines().any(|line| line.starts_with("format:"));
     let text = || read_text(path, MODEL_FILE, LONGEST_MODEL);
-    path.is_file() && has_data_extension(path) && !text().is_ok_and(|text| has_keys(&text))
+    let extension = path.extension().map(|own| own.to_ascii_lowercase());
+    let is_yaml = extension.is_none_or(|own| own == "yaml" || own == "yml");
+    match path.is_file() {
+        true => !is_yaml && !text().is_ok_and(|text| has_keys(&text)),
+        false => has_data_extension(path),
+    }
 }
 
 impl ModelFile {

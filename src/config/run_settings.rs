@@ -139,7 +139,7 @@ impl RunSettings {
             (Role::BaseDisplacement, &units.base_displacement),
         ];
         let parsed = stated.into_iter().filter_map(|(role, text)| {
-            let unit = ScaledUnit::parse(role.kind(), &text.as_ref()?.0).ok()?;
+            let unit = ScaledUnit::parse(role.kind(), &text.as_ref()?.0, None).ok()?;
             Some((role, unit))
         });
         parsed.collect()

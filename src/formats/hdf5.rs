@@ -13,12 +13,15 @@ use super::array::Array;
 use super::budget::{Budget, damaged};
 use super::hdf5_guards::{Missing, remove_soft_links};
 use super::hdf5_number::Number;
+use super::stated::{self, Meaning, Stated};
 use super::{Channels, Format, mat_class, refused};
 use crate::error::InputError;
 use crate::text_io::quote;
 
 /// First bytes of a file without a block of the user's.
 pub(super) const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
+/// Value of floating-point samples of netCDF that were never written.
+const FILL: f64 = 9.969_209_968_386_869e36;
 /// Deepest nesting of groups and cells: hard links can form circles.
 const DEEPEST: usize = 32;
 /// Groups of MATLAB with the targets of references and the data of objects.
@@ -44,6 +47,7 @@ pub(super) fn read<'a>(
         format,
         budget,
         channels: Channels::default(),
+        stated: Vec::new(),
     };
     reader.members(&file.root(), "", 0)?;
     Ok(reader.channels)
@@ -54,6 +58,8 @@ struct Reader<'a, 'b> {
     format: Format,
     budget: &'b mut Budget<'a>,
     channels: Channels,
+    /// What the attributes of the groups state, outermost first.
+    stated: Vec<Stated>,
 }
 
 /// Why a data set is not read.
@@ -96,6 +102,8 @@ impl Reader<'_, '_> {
         if depth > DEEPEST {
             return Err(refused::nested(self.path, name, DEEPEST));
         }
+        let mut stated = self.stated.last().cloned().unwrap_or_default();
+        add_attributes(&mut stated, &group.attrs().unwrap_or_default());
         let members = match listed(group) {
             Ok(members) => members,
             Err(error) => {
@@ -103,6 +111,7 @@ impl Reader<'_, '_> {
                 return self.report(name, Unread::from(error));
             }
         };
+        self.stated.push(stated);
         for (own, member) in members {
             if !(name.is_empty() && INTERNAL.contains(&own.as_str())) {
                 let path = joined(name, &own);
@@ -110,6 +119,7 @@ impl Reader<'_, '_> {
                 self.object(&member, &path, depth)?;
             }
         }
+        self.stated.pop();
         Ok(())
     }
 
@@ -220,20 +230,41 @@ impl Reader<'_, '_> {
                 bytes.len()
             )));
         }
-        let one = |key: &str| attributes.get(key).and_then(AttrValue::as_f64);
-        let (factor, offset) = (one("scale_factor"), one("add_offset"));
-        let fill = one("_FillValue").or_else(|| one("missing_value"));
-        let units = ["units", "unit"]
-            .iter()
-            .find_map(|key| attributes.get(*key)?.as_strings());
+        let mut fill = vec![FILL];
+        for key in ["_FillValue", "missing_value"] {
+            fill.extend(attributes.get(key).map(numbers).unwrap_or_default());
+        }
+        let of = |meaning: Meaning| {
+            attributes
+                .iter()
+                .filter(move |(key, _)| stated::meaning(key) == Some(meaning))
+        };
+        let units = of(Meaning::Unit).find_map(|(_, value)| value.as_strings());
+        // One for all columns, or one for each.
+        let scale = |meaning: Meaning, neutral: f64| {
+            let found = of(meaning)
+                .map(|(_, value)| numbers(value))
+                .find(|found| !found.is_empty());
+            move |column: usize| match found.as_deref() {
+                Some([one]) => *one,
+                Some(several) => several.get(column).copied().unwrap_or(f64::NAN),
+                None => neutral,
+            }
+        };
+        let (factor, offset) = (scale(Meaning::Factor, 1.0), scale(Meaning::Offset, 0.0));
+        let mut stated = self.stated.last().cloned().unwrap_or_default();
+        add_attributes(&mut stated, attributes);
         for (field, number, at) in &fields {
             let value = |i: usize| {
                 let own = bytes.get(i * size + at..).unwrap_or_default();
                 let value = number.value(own);
-                if fill == Some(value) || missing.contains([i / columns, i % columns]) {
+                let column = i % columns;
+                if fill.contains(&value) || missing.contains([i / columns, column]) {
                     return f64::NAN;
                 }
-                factor.unwrap_or(1.0) * value + offset.unwrap_or(0.0)
+                // Without a scale no digit changes.
+                let column = if rows == 1 { 0 } else { column };
+                factor(column) * value + offset(column)
             };
             // MATLAB states columns before rows: these are the adjacent elements.
             let is_matlab = class.name.is_some();
@@ -247,7 +278,18 @@ impl Reader<'_, '_> {
                 Some(field) => (joined(name, field), &[][..]),
                 None => (name.to_owned(), units.unwrap_or_default()),
             };
+            let before = self.channels.channels.len();
             array.add_to(&mut self.channels, &name, units, self.budget)?;
+            for channel in self
+                .channels
+                .channels
+                .iter_mut()
+                .skip(before)
+                .filter(|c| c.values.len() > 1)
+            {
+                channel.sampling = stated.sampling();
+                channel.unapplied.clone_from(&stated.unapplied);
+            }
         }
         Ok(())
     }
@@ -358,6 +400,36 @@ fn fields(kind: &Datatype) -> Result<Option<Vec<(Option<String>, Number, usize)>
     match numbers.is_empty() {
         true => Err(content("a table without numbers", None)),
         false => Ok(Some(numbers)),
+    }
+}
+
+/// The numbers of an attribute, also of one that is a text.
+fn numbers(value: &AttrValue) -> Vec<f64> {
+    let integers = || Some(value.to_i64s()?.into_iter().map(|x| x as f64).collect());
+    let texts = || {
+        value
+            .as_strings()?
+            .iter()
+            .map(|text| text.trim().parse().ok())
+            .collect()
+    };
+    value
+        .to_f64s()
+        .or_else(integers)
+        .or_else(texts)
+        .unwrap_or_default()
+}
+
+fn add_attributes(stated: &mut Stated, attributes: &Attributes) {
+    let mut all: Vec<(&String, &AttrValue)> = attributes.iter().collect();
+    all.sort_by_key(|(name, _)| *name);
+    for (name, value) in all {
+        let text = match (value.as_str(), numbers(value).as_slice()) {
+            (Some(text), _) => text.to_owned(),
+            (None, [one]) => one.to_string(),
+            (None, several) => format!("{several:?}"),
+        };
+        stated.add(name, &text);
     }
 }
 

@@ -9,6 +9,7 @@ mod bytes;
 mod hdf5;
 mod hdf5_guards;
 mod hdf5_number;
+mod lvm;
 mod mat5;
 mod mat_class;
 mod npy;
@@ -17,8 +18,11 @@ mod python_literal;
 mod recognise;
 mod refused;
 mod sampling;
+mod series;
+mod stated;
 mod tdms;
 mod tdms_meta;
+mod tdms_scales;
 mod uff;
 mod uff_header;
 mod wav;
@@ -33,7 +37,7 @@ pub use sampling::Sampling;
 use crate::error::InputError;
 
 /// One variable, array column or channel of a file.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Channel {
     /// Dotted path in the file, as in `test.force`; unique in the file.
     pub name: String,
@@ -43,6 +47,8 @@ pub struct Channel {
     pub sampling: Option<Sampling>,
     /// Samples; NaN for a missing one.
     pub values: Vec<f64>,
+    /// Scales that the file states and that are not applied.
+    pub unapplied: Vec<String>,
 }
 
 /// A variable or channel that holds no samples in time, and the reason.
@@ -63,6 +69,8 @@ pub struct Channels {
     pub channels: Vec<Channel>,
     /// All others.
     pub unusable: Vec<Unusable>,
+    /// Treatment of the samples, a clause each.
+    pub notes: Vec<String>,
 }
 
 impl Channels {
@@ -78,7 +86,15 @@ impl Channels {
             unit: unit.filter(|unit| !unit.trim().is_empty()),
             sampling,
             values,
+            unapplied: Vec::new(),
         });
+    }
+
+    /// Adds scales that are not applied to the last channel.
+    fn leave_unapplied(&mut self, stated: &[String]) {
+        if let Some(last) = self.channels.last_mut() {
+            last.unapplied.extend_from_slice(stated);
+        }
     }
 
     fn refuse(&mut self, name: &str, content: impl Into<String>, hint: Option<&str>) {
@@ -105,8 +121,14 @@ pub fn read(path: &Path, bytes: &[u8], format: Format) -> Result<Channels, Input
         Format::Mat5 => mat5::read(path, bytes, &mut budget),
         Format::Mat73 | Format::Hdf5 => hdf5::read(path, bytes, format, &mut budget),
         Format::Tdms => tdms::read(path, bytes, &mut budget),
+        Format::Lvm => lvm::read(path, bytes, &mut budget),
+        Format::Series => series::read(path, bytes, &mut budget),
         other => Err(refused::whole(path, other)),
     }?;
+    let note = stated::times_of_numbers(&mut channels.channels);
+    channels.notes.extend(note);
+    let note = stated::align(&mut channels.channels);
+    channels.notes.extend(note);
     rename_repeated(&mut channels.channels);
     if channels.channels.is_empty() {
         return Err(refused::nothing(path, format, &channels.unusable));
@@ -163,6 +185,10 @@ mod tests {
         for name in ["a", "a", "a.2", "a", "b"] {
             channels.push(name, None, None, vec![0.0]);
         }
+        let note = stated::times_of_numbers(&mut channels.channels);
+        channels.notes.extend(note);
+        let note = stated::align(&mut channels.channels);
+        channels.notes.extend(note);
         rename_repeated(&mut channels.channels);
         let names: Vec<&str> = channels.channels.iter().map(|c| &*c.name).collect();
         assert_eq!(names, ["a", "a.3", "a.2", "a.4", "b"]);

@@ -62,8 +62,15 @@ pub(super) fn add(
     };
     let count = rows.saturating_mul(columns);
     match header.descr {
-        Literal::Text(descr) => match number(&descr) {
-            Ok((kind, order)) => {
+        Literal::Text(descr) => match (ticks(&descr), number(&descr)) {
+            (Some((unit, order)), _) => {
+                let data = bytes.take(count.saturating_mul(8), &what)?;
+                let mut values = budget.list(count as usize)?;
+                values.extend(since_first(data, order, 0, 8));
+                channels.push(name, Some(unit), None, values);
+                Ok(())
+            }
+            (None, Ok((kind, order))) => {
                 let length = count.saturating_mul(kind.size() as u64);
                 let data = bytes.take(length, &what)?;
                 let array = Array {
@@ -74,7 +81,7 @@ pub(super) fn add(
                 };
                 array.add_to(channels, name, &[], budget)
             }
-            Err((content, hint)) => {
+            (None, Err((content, hint))) => {
                 channels.refuse(name, content, hint);
                 Ok(())
             }
@@ -176,7 +183,7 @@ fn no_number(descr: &str, code: &str) -> (String, Option<&'static str>) {
         ),
         Some('U' | 'S' | 'a') => ("texts".to_owned(), None),
         Some('M' | 'm') => (
-            "dates".to_owned(),
+            "dates without a unit of time".to_owned(),
             Some("save seconds: `(t - t[0]) / numpy.timedelta64(1, 's')`"),
         ),
         _ => (
@@ -184,6 +191,58 @@ fn no_number(descr: &str, code: &str) -> (String, Option<&'static str>) {
             Some("save them as double precision: `x.astype(float)`"),
         ),
     }
+}
+
+/// Unit and byte order of `<M8[ns]` or `<m8[25us]`: numbers of 8 bytes.
+fn ticks(descr: &str) -> Option<(String, ByteOrder)> {
+    let order = match descr.split_at_checked(1)? {
+        (">", _) => ByteOrder::Big,
+        _ => ByteOrder::Little,
+    };
+    let kind = descr.trim_start_matches(['<', '>', '=', '|']);
+    let unit = kind
+        .strip_prefix("M8[")
+        .or(kind.strip_prefix("m8["))?
+        .strip_suffix(']')?;
+    let name = unit.trim_start_matches(|c: char| c.is_ascii_digit());
+    let name = match name {
+        "s" | "ms" | "us" | "ns" | "h" => name,
+        "m" => "min",
+        "D" => "day",
+        _ => return None,
+    };
+    // Multiples of a unit are rare.
+    (!unit.starts_with(|c: char| c.is_ascii_digit())).then(|| (name.to_owned(), order))
+}
+
+/// Ticks since the first; NaN for `NaT`, the least number.
+fn since_first(
+    data: &[u8],
+    order: ByteOrder,
+    offset: usize,
+    stride: usize,
+) -> impl Iterator<Item = f64> + '_ {
+    let ticks = move |record: &[u8]| {
+        let own: [u8; 8] = record
+            .get(offset..offset + 8)
+            .and_then(|own| own.try_into().ok())
+            .unwrap_or_default();
+        match order {
+            ByteOrder::Little => i64::from_le_bytes(own),
+            ByteOrder::Big => i64::from_be_bytes(own),
+        }
+    };
+    let first = data
+        .chunks_exact(stride.max(1))
+        .map(ticks)
+        .find(|t| *t != i64::MIN)
+        .unwrap_or(0);
+    data.chunks_exact(stride.max(1))
+        .map(ticks)
+        .map(move |t| match t {
+            i64::MIN => f64::NAN,
+            t => t.wrapping_sub(first) as f64,
+        })
 }
 
 /// Adds the fields of a structured array, each as a channel `name.field`.
@@ -229,14 +288,19 @@ fn structured(
     for (field, descr, offset) in used {
         let path = format!("{name}.{field}");
         budget.name(&path)?;
-        match number(descr) {
-            Ok(_) if count == 0 => channels.refuse(&path, "an empty array", None),
-            Ok((kind, order)) => {
+        match (ticks(descr), number(descr)) {
+            _ if count == 0 => channels.refuse(&path, "an empty array", None),
+            (Some((unit, order)), _) => {
+                let mut values = budget.list(count as usize)?;
+                values.extend(since_first(data, order, offset as usize, stride));
+                channels.push(&path, Some(unit), None, values);
+            }
+            (None, Ok((kind, order))) => {
                 let mut values = budget.list(count as usize)?;
                 values.extend(kind.values(data, order, offset as usize, stride));
                 channels.push(&path, None, None, values);
             }
-            Err((content, hint)) => channels.refuse(&path, content, hint),
+            (None, Err((content, hint))) => channels.refuse(&path, content, hint),
         }
     }
     Ok(())
@@ -244,6 +308,9 @@ fn structured(
 
 /// Bytes of a field of type `<f8`, `|S12`, `<U5` or `|V4`; `None` for objects and others.
 fn size_of_type(descr: &str) -> Option<u64> {
+    if ticks(descr).is_some() {
+        return Some(8);
+    }
     let digits = descr.trim_start_matches(|c: char| !c.is_ascii_digit());
     let size: u64 = digits.parse().ok().filter(|size| *size <= 1 << 20)?;
     match descr.contains('O') {

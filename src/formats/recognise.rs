@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use super::{hdf5, mat5, npy, tdms, uff};
+use super::{hdf5, lvm, mat5, npy, series, tdms, uff};
 use crate::error::InputError;
 
 /// Format of a binary file.
@@ -25,6 +25,10 @@ pub enum Format {
     Mat73,
     /// LabVIEW.
     Tdms,
+    /// Measurement file of LabVIEW, a text.
+    Lvm,
+    /// One series in rows of several numbers, a text.
+    Series,
     /// Index file of LabVIEW; refused.
     TdmsIndex,
     /// HDF5.
@@ -50,6 +54,8 @@ impl fmt::Display for Format {
             Self::Mat5 => "MATLAB file (version 5 to 7)",
             Self::Mat73 => "MATLAB file (version 7.3)",
             Self::Tdms => "TDMS file",
+            Self::Lvm => "LabVIEW measurement file",
+            Self::Series => "text with one series in rows",
             Self::TdmsIndex => "index of a TDMS file",
             Self::Hdf5 => "HDF5 file",
             Self::Parquet => "Parquet file",
@@ -57,6 +63,13 @@ impl fmt::Display for Format {
             Self::Pickle => "pickle of Python",
             Self::Workbook => "workbook of a spreadsheet",
         })
+    }
+}
+
+impl Format {
+    /// True for a text, which a stated format of text reads as a table.
+    pub fn is_text(self) -> bool {
+        matches!(self, Self::Lvm | Self::Series)
     }
 }
 
@@ -146,7 +159,8 @@ fn hexadecimal(bytes: &[u8]) -> String {
 }
 
 fn by_content(bytes: &[u8]) -> Option<Format> {
-    let magic: [(&[u8], Format); 13] = [
+    let magic: [(&[u8], Format); 14] = [
+        (lvm::MAGIC, Format::Lvm),
         (npy::MAGIC, Format::Npy),
         (b"PK\x03\x04", Format::Npz),
         (b"PK\x05\x06", Format::Npz),
@@ -175,5 +189,8 @@ fn by_content(bytes: &[u8]) -> Option<Format> {
     if matches!(version, Some(b"\x00\x01IM" | b"\x01\x00MI")) {
         return Some(Format::Mat5);
     }
-    uff::begins_so(bytes).then_some(Format::Uff)
+    match uff::begins_so(bytes) {
+        true => Some(Format::Uff),
+        false => series::begins_so(bytes).then_some(Format::Series),
+    }
 }

@@ -21,6 +21,16 @@ impl Sampling {
         valid.then_some(Self::Interval { start, step })
     }
 
+    /// These times, later by `late` (s).
+    pub(super) fn later(self, late: f64) -> Self {
+        let (start, step) = match self {
+            Self::Rate(rate) => (0.0, 1.0 / rate),
+            Self::Interval { start, step } => (start, step),
+        };
+        let start = start + late;
+        Self::Interval { start, step }
+    }
+
     /// Time of sample i, s.
     pub fn time(self, i: usize) -> f64 {
         match self {

@@ -9,8 +9,9 @@ use std::path::Path;
 use super::budget::Budget;
 use super::bytes::Bytes;
 use super::number::ByteOrder;
+use super::stated::{Meaning, Stated, meaning};
 use super::tdms_meta::{Properties, Property, RawData, RawIndex, SampleType, dotted, object};
-use super::{Channels, Sampling};
+use super::{Channels, tdms_scales as scales};
 use crate::error::InputError;
 
 /// First bytes of a segment.
@@ -22,12 +23,14 @@ const HAS_RAW: u32 = 1 << 3;
 const INTERLEAVED: u32 = 1 << 5;
 const BIG_ENDIAN: u32 = 1 << 6;
 const HAS_DAQMX: u32 = 1 << 7;
-/// Length of a segment whose writing was interrupted.
-const UNFINISHED: u64 = u64::MAX;
+/// Bytes before a segment.
+const LEAD: u64 = 28;
 
 /// A channel over all segments.
 struct Track {
     name: String,
+    /// Path of its group.
+    group: String,
     properties: Properties,
     index: Option<RawIndex>,
     values: Vec<f64>,
@@ -43,6 +46,8 @@ struct Track {
 struct Tracks {
     all: Vec<Track>,
     by_path: BTreeMap<String, usize>,
+    /// Properties of the file and of groups.
+    outer: BTreeMap<String, Properties>,
     /// Channels with raw data in the current segment.
     active: Vec<usize>,
 }
@@ -50,30 +55,39 @@ struct Tracks {
 pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Channels, InputError> {
     let mut file = Bytes::new(path, bytes, ByteOrder::Little);
     let mut tracks = Tracks::default();
-    let mut unread = 0;
-    while !file.is_empty() {
-        unread = segment(path, &mut file, &mut tracks, budget)?;
+    let mut unread = None;
+    while !file.is_empty() && unread.is_none() {
+        unread = match file.left() < LEAD as usize {
+            true => Some(file.left()),
+            false => segment(path, &mut file, &mut tracks, budget)?,
+        };
     }
     let mut channels = Channels::default();
-    if unread > 0 {
-        let content = format!("{unread} bytes of a segment whose writing was interrupted");
-        channels.refuse("end of the file", content, None);
+    if let Some(unread) = unread {
+        channels.notes.push(format!(
+            "the writing of the last segment was interrupted: its whole chunks are read, and not the last {unread} bytes"
+        ));
     }
+    let starts = tracks.all.iter().filter_map(Track::start);
+    let first = starts.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let none = Properties::new();
     for track in tracks.all {
-        track.finish(&mut channels);
+        let outer = |path: &str| tracks.outer.get(path).unwrap_or(&none);
+        let outer = [outer(&track.group), outer("/")];
+        track.finish(outer, first, &mut channels);
     }
     Ok(channels)
 }
 
-/// Reads a segment and returns the number of bytes of an unfinished chunk at its end.
+/// Reads a segment and returns the number of bytes at its end that are not read, where it is unfinished.
 fn segment(
     path: &Path,
     file: &mut Bytes,
     tracks: &mut Tracks,
     budget: &mut Budget,
-) -> Result<usize, InputError> {
+) -> Result<Option<usize>, InputError> {
     let what = "the beginning of a segment";
-    let mut lead = file.part(28, what)?;
+    let mut lead = file.part(LEAD, what)?;
     if lead.take(4, what)? != MAGIC {
         return Err(budget.damaged(what).expected("the letters `TDSm`"));
     }
@@ -83,10 +97,13 @@ fn segment(
     }
     lead.take(4, what)?;
     let (length, raw_at) = (lead.u64(what)?, lead.u64(what)?);
-    let stated = match length {
-        UNFINISHED => file.left() as u64,
-        length => length,
-    };
+    // The end of a segment is missing where its writing or a copy was interrupted.
+    let left = file.left() as u64;
+    let is_unfinished = length > left;
+    let stated = length.min(left);
+    if is_unfinished && raw_at > left {
+        return Ok(Some(file.left()));
+    }
     let mut segment = file.part(stated, "a segment")?;
     segment.order = lead.order;
     if flags & HAS_META != 0 {
@@ -102,11 +119,11 @@ fn segment(
         true => tracks.raw(&mut segment, flags & INTERLEAVED != 0, budget)?,
         false => 0,
     };
-    match left > 0 && length != UNFINISHED {
+    match left > 0 && !is_unfinished {
         true => Err(budget
             .damaged("a segment")
             .found(format!("{left} bytes after its last chunk of samples"))),
-        false => Ok(left),
+        false => Ok(is_unfinished.then_some(left)),
     }
 }
 
@@ -139,14 +156,17 @@ impl Tracks {
                 return Err(daqmx(path));
             }
             let Some(name) = dotted(&object.path) else {
+                let outer = self.outer.entry(object.path).or_default();
+                outer.extend(object.properties);
                 continue;
             };
             let place = match self.by_path.get(&object.path) {
                 Some(place) => *place,
                 None => {
                     budget.name(&name)?;
-                    self.by_path.insert(object.path, self.all.len());
-                    self.all.push(Track::new(name));
+                    let group = object.path.rsplit_once("'/'").unwrap_or_default().0;
+                    self.all.push(Track::new(name, format!("{group}'")));
+                    self.by_path.insert(object.path, self.all.len() - 1);
                     self.all.len() - 1
                 }
             };
@@ -225,9 +245,10 @@ impl Tracks {
 }
 
 impl Track {
-    fn new(name: String) -> Self {
+    fn new(name: String, group: String) -> Self {
         Self {
             name,
+            group,
             properties: Properties::new(),
             index: None,
             values: Vec::new(),
@@ -282,49 +303,62 @@ impl Track {
         seconds.wrapping_sub(epoch) as i64 as f64 + fraction as f64 / 2f64.powi(64)
     }
 
-    fn number(&self, name: &str) -> Option<f64> {
-        match self.properties.get(name)? {
-            Property::Number(number) => Some(*number),
+    /// Time of the first sample, where the channel has an interval of samples.
+    fn start(&self) -> Option<(i64, f64)> {
+        self.properties.get("wf_increment")?;
+        match self.properties.get("wf_start_time")? {
+            Property::Time(seconds, fraction) => Some((*seconds, *fraction)),
             _ => None,
         }
     }
 
-    fn text(&self, name: &str) -> Option<&str> {
-        match self.properties.get(name)? {
-            Property::Text(text) => Some(text),
-            _ => None,
-        }
-    }
-
-    /// Adds the channel to those of the file, with its scale applied.
-    fn finish(mut self, channels: &mut Channels) {
+    /// Adds the channel to those of the file, with its scales applied: its own, else those of its group, else those of the file. Its times
+    /// begin at the earliest start of a channel, `first`.
+    fn finish(
+        mut self,
+        outer: [&Properties; 2],
+        first: Option<(i64, f64)>,
+        channels: &mut Channels,
+    ) {
         if let Some(other) = self.other {
             return channels.refuse(&self.name, other, None);
         }
         if self.values.is_empty() {
             return channels.refuse(&self.name, "no samples", None);
         }
-        let scales = self.number("NI_Number_Of_Scales").unwrap_or(0.0);
-        if scales > 0.0 && self.text("NI_Scaling_Status") != Some("scaled") {
-            let kind = self.text("NI_Scale[0]_Scale_Type").unwrap_or("unknown");
-            let slope = self.number("NI_Scale[0]_Linear_Slope");
-            let (Some(slope), 1.0, "Linear") = (slope, scales, kind) else {
-                let content = format!("raw samples with {scales} scales, the first of type {kind}");
-                let hint = "save the scaled samples; one linear scale is supported";
-                return channels.refuse(&self.name, content, Some(hint));
-            };
-            let zero = self.number("NI_Scale[0]_Linear_Y_Intercept").unwrap_or(0.0);
-            for value in &mut self.values {
-                *value = slope * *value + zero;
+        let [group, file] = outer;
+        let mut of = [&self.properties, group, file].into_iter();
+        if let Some(scaled) = of.find(|properties| scales::count(properties) > 0) {
+            match scales::of(scaled) {
+                Ok(scales) => scales::apply(&scales, &mut self.values),
+                Err(content) => {
+                    let hint = "save the scaled samples: scales of type Linear and Polynomial are supported";
+                    return channels.refuse(&self.name, content, Some(hint));
+                }
             }
         }
-        let sampling = self.number("wf_increment").and_then(|step| {
-            Sampling::interval(self.number("wf_start_offset").unwrap_or(0.0), step)
-        });
+        let mut stated = Stated::default();
+        for (name, value) in file.iter().chain(group).chain(&self.properties) {
+            match value {
+                Property::Number(number) => stated.add(name, &number.to_string()),
+                Property::Text(text) => stated.add(name, text),
+                Property::Time(..) | Property::Other => {}
+            }
+        }
+        let late = match (self.start(), first) {
+            (Some(own), Some(first)) => (own.0 as f64 - first.0 as f64) + (own.1 - first.1),
+            _ => 0.0,
+        };
+        let sampling = stated.sampling().map(|sampling| sampling.later(late));
+        let text = |(name, value): (&String, &Property)| match value {
+            Property::Text(text) if meaning(name) == Some(Meaning::Unit) => Some(text.clone()),
+            _ => None,
+        };
         let unit = match self.epoch {
             Some(_) => Some("s".to_owned()),
-            None => self.text("unit_string").map(str::to_owned),
+            None => self.properties.iter().find_map(text),
         };
-        channels.push(&self.name, unit, sampling, std::mem::take(&mut self.values));
+        channels.push(&self.name, unit, sampling, self.values);
+        channels.leave_unapplied(&stated.unapplied);
     }
 }

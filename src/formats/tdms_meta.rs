@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::bytes::Bytes;
-use super::number::NumberType;
+use super::number::{ByteOrder, NumberType};
+use super::stated::meaning;
 use crate::error::InputError;
 
 /// Index of raw data: none, and as in the segment before.
@@ -16,8 +17,8 @@ const DAQMX: [u32; 3] = [0x1269, 0x126a, 0x1369];
 const TEXT: u32 = 0x20;
 const TIMESTAMP: u32 = 0x44;
 
-/// Properties that are used; names that begin so.
-const USED: [&str; 4] = ["wf_", "unit_string", "NI_Scal", "NI_Number_Of_Scales"];
+/// Beginning of the names of properties that are used, beside those that have a meaning of their own.
+const USED: [&str; 2] = ["wf_start_time", "NI_"];
 
 /// Type of the samples of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,6 +64,8 @@ pub(super) enum RawData {
 pub(super) enum Property {
     Number(f64),
     Text(String),
+    /// Whole seconds, and fraction of a second.
+    Time(i64, f64),
     Other,
 }
 
@@ -98,7 +101,7 @@ pub(super) fn object(bytes: &mut Bytes) -> Result<Object, InputError> {
     for _ in 0..bytes.u32(what)? {
         let name = text(bytes)?;
         let value = property(bytes)?;
-        if USED.iter().any(|used| name.starts_with(used)) {
+        if meaning(&name).is_some() || USED.iter().any(|used| name.starts_with(used)) {
             properties.insert(name, value);
         }
     }
@@ -167,7 +170,18 @@ fn property(bytes: &mut Bytes) -> Result<Property, InputError> {
     }
     match known_type(bytes, code)? {
         SampleType::Number(kind) => bytes.number(kind, what).map(Property::Number),
-        other => {
+        SampleType::Timestamp => {
+            let [first, second] = [bytes.u64(what)?, bytes.u64(what)?];
+            let (fraction, seconds) = match bytes.order {
+                ByteOrder::Little => (first, second),
+                ByteOrder::Big => (second, first),
+            };
+            Ok(Property::Time(
+                seconds as i64,
+                fraction as f64 / 2f64.powi(64),
+            ))
+        }
+        other @ SampleType::Other(..) => {
             bytes.take(other.size(), what)?;
             Ok(Property::Other)
         }

@@ -76,7 +76,14 @@ pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Cha
         count: 0,
     };
     let mut channels = Channels::default();
-    let mut units = None;
+    // Sets before the first units have these as well.
+    let mut search = Lines { ..lines };
+    let mut is_begun = false;
+    let mut is_units = |line: &String| {
+        std::mem::replace(&mut is_begun, line.trim() == MARK) && line.trim() == "164"
+    };
+    let first = std::iter::from_fn(|| search.next()).find(|line| is_units(line));
+    let mut units = first.and_then(|_| unit_factors(&mut search));
     while let Some(line) = lines.next() {
         if line.trim() != MARK {
             continue;
@@ -86,7 +93,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Cha
         match words.next() {
             Some("58") => function(&mut lines, units, &mut channels, budget)?,
             Some("58b") => binary_function(&mut lines, &first, units, &mut channels, budget)?,
-            Some("164") => units = unit_factors(&mut lines),
+            Some("164") => units = unit_factors(&mut lines).or(units),
             _ => {}
         }
         while lines.next().is_some_and(|line| line.trim() != MARK) {}
@@ -213,15 +220,31 @@ fn binary_function(
     };
     let mut rest = Bytes::new(lines.path, rest, order);
     let what = format!("the function {}", quote(&header.name));
-    let data = rest.take(stated, &what)?;
+    // pyuff states 8 bytes a sample also where they take 16: the set ends at its mark.
+    let count = header.count;
+    let value = if header.is_complex { 2 * size } else { size };
+    let before: &[usize] = if header.is_uneven { &[4, 8] } else { &[0] };
+    let lengths = before
+        .iter()
+        .map(|before| count.saturating_mul(before + value) as u64);
+    let is_end = |length: &u64| {
+        let from = usize::try_from(*length)
+            .ok()
+            .and_then(|length| lines.at.checked_add(length));
+        let after = from
+            .and_then(|from| lines.bytes.get(from..))
+            .unwrap_or_default();
+        after.trim_ascii_start().starts_with(MARK.as_bytes())
+    };
+    let length = std::iter::once(stated).chain(lengths).find(is_end);
+    let data = rest.take(length.unwrap_or(stated), &what)?;
     lines.at += data.len();
     if header.other.is_some() {
         return add(header, Vec::new(), channels, budget);
     }
-    let count = header.count;
-    // Abscissas of double ordinates have 4 or 8 bytes.
+    // Abscissas have 4 or 8 bytes.
     let before = match header.is_uneven {
-        true => [4, size]
+        true => [4, 8]
             .into_iter()
             .find(|before| count.saturating_mul(before + size) == data.len()),
         false => (count.saturating_mul(size) == data.len()).then_some(0),
@@ -251,10 +274,13 @@ fn binary_function(
 /// Adds a function: its samples, with their times as a channel of their own where the spacing is uneven.
 fn add(
     header: FunctionHeader,
-    numbers: Vec<f64>,
+    mut numbers: Vec<f64>,
     channels: &mut Channels,
     budget: &mut Budget,
 ) -> Result<(), InputError> {
+    let ordinate = if header.is_uneven { 2 } else { 1 };
+    let ordinates = numbers.iter_mut().skip(ordinate - 1).step_by(ordinate);
+    ordinates.for_each(|x| *x *= header.scale);
     budget.name(&header.name)?;
     if let Some(other) = header.other {
         let hint = "kmcfit reads records in time: export the time histories";
@@ -281,9 +307,13 @@ fn add(
         return Ok(());
     }
     let unit = Unit::recognise(Quantity::Time, &header.time_unit);
+    let is_unknown = unit.is_none() && !header.time_unit.is_empty();
     let factor = unit.map_or(1.0, |unit| unit.factor());
     let sampling = Sampling::interval(factor * header.start, factor * header.step);
     channels.push(&header.name, header.unit, sampling, numbers);
+    if is_unknown {
+        channels.leave_unapplied(&[format!("times in {}", quote(&header.time_unit))]);
+    }
     Ok(())
 }
 

@@ -36,6 +36,10 @@ pub(super) struct FunctionHeader {
     /// Unit of the abscissa, as spelt.
     pub time_unit: String,
     pub unit: Option<String>,
+    /// Factor of the numbers to this unit.
+    pub scale: f64,
+    /// Two numbers for each sample.
+    pub is_complex: bool,
 }
 
 /// The field at these columns, from 0, without blanks around it.
@@ -100,9 +104,10 @@ impl FunctionHeader {
             Some(_) => function_noun(kind).replace(' ', "_"),
             None => noun.to_owned(),
         };
-        let unit = match label.is_empty() {
-            false => Some(label),
-            true => units.and_then(|units| quantity.map(|quantity| units.symbol(quantity))),
+        let (scale, unit) = match (label.is_empty(), units, quantity) {
+            (false, ..) => (1.0, Some(label)),
+            (true, Some(units), Some(quantity)) => units.scaled(quantity),
+            (true, ..) => (1.0, None),
         };
         Ok(Self {
             name: format!("{name}{}", place(ends)),
@@ -114,6 +119,8 @@ impl FunctionHeader {
             step,
             time_unit,
             unit,
+            scale,
+            is_complex,
         })
     }
 }
@@ -190,8 +197,8 @@ fn content(kind: u32, abscissa: u32, is_complex: bool) -> Option<String> {
 }
 
 impl UnitFactors {
-    /// Unit of a quantity in the file: a symbol, or the factor from SI.
-    fn symbol(self, quantity: Quantity) -> String {
+    /// Unit of a quantity in the file: a factor and a symbol, of SI unless the factor is 1.
+    fn scaled(self, quantity: Quantity) -> (f64, Option<String>) {
         let (factor, symbols): (f64, &[(f64, &str)]) = match quantity {
             Quantity::Force => (self.force, &FORCES),
             _ => (self.length, &LENGTHS),
@@ -199,15 +206,15 @@ impl UnitFactors {
         let known = symbols
             .iter()
             .find(|(of, _)| (factor / of - 1.0).abs() < SAME);
-        let unit = match known {
-            Some((_, symbol)) => (*symbol).to_owned(),
-            None => format!("1/{factor} {}", Unit::si(quantity).symbol()),
+        let after = match quantity {
+            Quantity::Velocity => "/s",
+            Quantity::Acceleration => "/s²",
+            _ => "",
         };
         match (quantity, known) {
-            (Quantity::Velocity, Some(_)) => unit + "/s",
-            (Quantity::Acceleration, Some(_)) => unit + "/s²",
-            (Quantity::Time, _) => "s".to_owned(),
-            _ => unit,
+            (Quantity::Time, _) => (1.0, Some("s".to_owned())),
+            (_, Some((_, symbol))) => (1.0, Some(format!("{symbol}{after}"))),
+            (_, None) => (1.0 / factor, Some(Unit::si(quantity).symbol().to_owned())),
         }
     }
 }
@@ -221,7 +228,9 @@ const LENGTHS: [(f64, &str); 5] = [
     (1.0 / 0.0254, "in"),
     (1.0 / 0.3048, "ft"),
 ];
-const FORCES: [(f64, &str); 4] = [
+const FORCES: [(f64, &str); 6] = [
+    (1.0 / 9.806_65, "kgf"),
+    (1e5, "dyn"),
     (1.0, "N"),
     (1000.0, "mN"),
     (0.001, "kN"),
@@ -241,10 +250,13 @@ mod tests {
             (units(1000.0, 1000.0), Quantity::Force, "mN"),
             (units(39.37008, 0.2248089), Quantity::Displacement, "in"),
             (units(39.37008, 0.2248089), Quantity::Force, "lbf"),
-            (units(1.0, 0.101_971_6), Quantity::Force, "1/0.1019716 N"),
+            (units(1.0, 0.101_971_6), Quantity::Force, "kgf"),
         ] {
-            assert_eq!(factors.symbol(quantity), symbol);
+            let unit = (1.0, Some(symbol.to_owned()));
+            assert_eq!(factors.scaled(quantity), unit);
         }
+        let other = units(4.0, 1.0).scaled(Quantity::Velocity);
+        assert_eq!(other, (0.25, Some("m/s".to_owned())));
     }
 
     #[test]

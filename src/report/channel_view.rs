@@ -34,9 +34,9 @@ impl ChannelView<'_> {
     }
 
     /// Unit in which reports give the channel.
-    pub fn unit(&self) -> &'static str {
-        self.shown()
-            .map_or(self.channel.kind().unit(), |unit| unit.symbol())
+    pub fn unit(&self) -> &str {
+        self.note
+            .map_or(self.channel.kind().unit(), |note| note.unit.symbol())
     }
 
     /// Standard deviation of a sample in this unit; `None` if it differs between samples, and without one.

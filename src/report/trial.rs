@@ -67,10 +67,17 @@ pub fn advice(
     found.extend(others);
     found.truncate(MOST);
     if found.is_empty() && is_unexplained(document) {
-        found.push(Finding::new(
-            "unexplained",
-            "nothing that was tried explains the residuals: look at their figures in report.html, and measure again where a sensor or a force is in doubt",
-        ));
+        let mut reasons = document.verdict.iter().flat_map(|verdict| &verdict.reasons);
+        found.push(match reasons.any(|reason| reason.kind == "second_mode") {
+            true => Finding::new(
+                "two_modes",
+                "one oscillator cannot have two modes: measure or excite where one of them is at rest, or fit a part of the record in which one alone moves",
+            ),
+            false => Finding::new(
+                "unexplained",
+                "nothing that was tried explains the residuals: look at their figures in report.html, and measure again where a sensor or a force is in doubt",
+            ),
+        });
     }
     found
 }

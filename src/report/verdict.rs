@@ -94,6 +94,14 @@ impl FittedModel<'_> {
                 finding.text += " from the samples; penalties and constraints determine the others";
                 finding
             }
+            VerdictReason::DoubtfulUnits => {
+                let warning = self.model.warnings.iter().find(|w| is_doubtful(w));
+                let mut finding = reason_in_words(reason);
+                if let Some((_, text)) = warning.and_then(|w| w.text.split_once(": ")) {
+                    finding.text = text.to_owned();
+                }
+                finding
+            }
             _ => reason_in_words(reason),
         };
         let level = verdict_level(&reasons);

@@ -33,7 +33,11 @@ impl Table {
             .found(format!("{}, a {binary}", path.display()))
             .expected("a text table, or no `format`"));
         }
-        let Channels { channels, unusable } = formats::read(path, &bytes, binary)?;
+        let Channels {
+            channels,
+            unusable,
+            notes,
+        } = formats::read(path, &bytes, binary)?;
         // The numbers take as much again.
         drop(bytes);
         let mut keys = BTreeMap::new();
@@ -42,6 +46,7 @@ impl Table {
             names: Vec::new(),
             sets: Vec::new(),
             unusable,
+            notes,
         };
         let mut members: Vec<Vec<(usize, Channel)>> = Vec::new();
         for (i, channel) in channels.into_iter().enumerate() {
@@ -84,6 +89,8 @@ impl Table {
             units: Vec::new(),
             columns: Vec::new(),
             lines: (1..=rows).collect(),
+            notes: file.notes.clone(),
+            first: 0,
         };
         for (_, channel) in members {
             table.push_channel(channel);
@@ -95,12 +102,14 @@ impl Table {
                 name: (*name).to_owned(),
                 unit: Some("s".to_owned()),
                 sampling: None,
+                unapplied: Vec::new(),
                 values: (0..rows).map(|i| sampling.time(i)).collect(),
             });
             if let Origin::Channels(origin) = &mut table.origin {
                 origin.numbers.push(0);
             }
         }
+        table.state_clocks();
         Ok(table)
     }
 
@@ -127,6 +136,8 @@ impl Table {
                     .expected("a finite number, or NaN for a missing sample")
             }),
             samples,
+            unapplied: channel.unapplied,
+            clock: None,
         });
         self.headers.push(channel.name);
         self.units.push(channel.unit.unwrap_or_default());
@@ -145,7 +156,7 @@ impl Table {
     ) -> Result<&'a Self, InputError> {
         let mut best: Option<(usize, &Self)> = None;
         for table in tables {
-            let count = columns.iter().filter(|c| table.find(c).is_ok()).count();
+            let count = columns.iter().filter(|c| table.has(c)).count();
             if best.is_none_or(|(most, _)| count > most) {
                 best = Some((count, table));
             }
@@ -252,7 +263,7 @@ impl Table {
     pub fn number(&self, index: usize) -> Option<usize> {
         match self.channel_origin() {
             Some(origin) => origin.numbers.get(index).copied().filter(|n| *n > 0),
-            None => Some(index + 1),
+            None => Some(self.first + index + 1),
         }
     }
 
@@ -261,14 +272,14 @@ impl Table {
         let index = number.checked_sub(1)?;
         match self.channel_origin() {
             Some(origin) => origin.numbers.iter().position(|own| *own == number),
-            None => Some(index),
+            None => index.checked_sub(self.first),
         }
     }
 
     /// Number of columns that have a number in the file.
     pub(super) fn numbered(&self) -> usize {
         self.channel_origin()
-            .map_or(self.width(), |origin| origin.file.names.len())
+            .map_or(self.first + self.width(), |origin| origin.file.names.len())
     }
 
     /// Names of all columns; of a binary file those of all sets of channels.

@@ -6,6 +6,7 @@ use super::Table;
 use crate::error::InputError;
 use crate::spelling::did_you_mean;
 use crate::text_io::{one_of, quote};
+use crate::units::Unit;
 
 /// A column, by its name or by its number.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,6 +49,14 @@ impl Table {
         }
     }
 
+    /// True if [`find`](Self::find) finds a column.
+    pub(super) fn has(&self, column: &ColumnName) -> bool {
+        match column {
+            ColumnName::Name(name) => self.matches(name).len() == 1,
+            ColumnName::Number(number) => self.index_of(*number).is_some_and(|i| i < self.width()),
+        }
+    }
+
     pub(super) fn no_such_number(&self, number: usize) -> InputError {
         if let Some(error) = self.of_other_times(&ColumnName::Number(number)) {
             return error;
@@ -81,18 +90,7 @@ impl Table {
     }
 
     fn find_name(&self, name: &str) -> Result<usize, InputError> {
-        if let Some(index) = self.headers().iter().position(|header| header == name) {
-            return Ok(index);
-        }
-        let bare = |header: &str| split_unit(header).0.to_owned();
-        let wanted = name.trim().trim_matches(['"', '\'']).trim();
-        let mut matches = Vec::new();
-        for (index, header) in self.headers().iter().enumerate() {
-            if !wanted.is_empty() && (bare(header) == wanted || header == wanted) {
-                matches.push(index);
-            }
-        }
-        match matches.as_slice() {
+        match self.matches(name).as_slice() {
             [only] => Ok(*only),
             [] => Err(self.no_such(name)),
             several => {
@@ -104,6 +102,19 @@ impl Table {
                 )
             }
         }
+    }
+
+    /// The columns of this name: that with exactly it, else those with it up to their units.
+    fn matches(&self, name: &str) -> Vec<usize> {
+        let headers = self.headers();
+        if let Some(index) = headers.iter().position(|header| header == name) {
+            return vec![index];
+        }
+        let wanted = name.trim().trim_matches(['"', '\'']).trim();
+        let is = |header: &String| {
+            !wanted.is_empty() && (split_unit(header).0 == wanted || header == wanted)
+        };
+        (0..headers.len()).filter(|i| is(&headers[*i])).collect()
     }
 
     fn no_such(&self, name: &str) -> InputError {
@@ -135,19 +146,81 @@ fn numbers(width: usize) -> String {
     }
 }
 
-/// A header's name and unit: `acc [g]`, `acc (g)`, `acc / g`.
+/// Separators between a name and its unit.
+const SEPARATORS: [&str; 7] = ["/", ",", ":", ";", "|", " - ", " in "];
+/// First words of texts in brackets that are no units.
+pub(super) const REMARKS: &str = "left right front rear back top bottom upper lower mid middle x y z xx yy zz filtered smoothed smooth corrected \
+    measured absolute relative abs rel total mean ch channel run trial test sensor node no input output";
+
+/// A header's name and unit: `acc [g]`, `acc (g) Run 1`, `acc / g`, `acc, g`, `acc in g`, `X (16g)`. A text in brackets that is no unit is
+/// returned as one, but for remarks such as `(left)`.
 pub(super) fn split_unit(header: &str) -> (&str, Option<&str>) {
     let header = header.trim_matches(['"', '\'']).trim();
-    for (open, close) in [('[', ']'), ('(', ')')] {
-        if let Some(rest) = header.strip_suffix(close)
-            && let Some((name, unit)) = rest.rsplit_once(open)
-            && !name.trim().is_empty()
-        {
-            return (name.trim(), Some(unit.trim()));
-        }
+    if header.contains('/') && Unit::any(header).is_some() {
+        return ("", Some(header));
     }
-    match header.split_once(" / ") {
-        Some((name, unit)) => (name.trim(), Some(unit.trim())),
-        None => (header, None),
+    let groups = || bracketed(header);
+    let unit = |text: &&str| Unit::any(without_range(text)).is_some();
+    let name = |at: usize, end: usize| match header[..at].trim() {
+        "" => header[end..].trim(),
+        name => name,
+    };
+    if let Some((at, text, end)) = groups().find(|(_, text, _)| unit(text)) {
+        return (name(at, end), Some(without_range(text)));
+    }
+    // The longest text that is a unit: `km/h` of `v in km/h`.
+    let behind = SEPARATORS
+        .iter()
+        .flat_map(|sign| header.match_indices(sign));
+    let behind = behind.filter(|(at, sign)| *at > 0 && unit(&&header[at + sign.len()..]));
+    let behind = behind
+        .min_by_key(|(at, _)| *at)
+        .map(|(at, sign)| (header[..at].trim(), Some(header[at + sign.len()..].trim())));
+    if let Some(found) = behind {
+        return found;
+    }
+    // A number, or a word such as `left`.
+    let is_remark = |at: usize, text: &str| {
+        let mut words = text.split(|c: char| !c.is_alphabetic());
+        let first = words.next().unwrap_or_default().to_lowercase();
+        let is_number = text
+            .chars()
+            .all(|c| c.is_ascii_digit() || "#. ".contains(c));
+        header[at..].starts_with('(') && (is_number || REMARKS.split(' ').any(|word| word == first))
+    };
+    match groups().find(|(at, text, _)| !text.is_empty() && !is_remark(*at, text)) {
+        Some((at, text, end)) => (name(at, end), Some(text)),
+        None => match header.split_once(" / ") {
+            Some((name, text)) => (name.trim(), Some(text.trim())),
+            None => (header, None),
+        },
+    }
+}
+
+/// The texts in brackets with their places: that of the opening bracket, and that behind the closing one. The last group comes first.
+fn bracketed(header: &str) -> impl Iterator<Item = (usize, &str, usize)> {
+    let pairs = [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>')];
+    let opening = header.char_indices().filter_map(move |(at, c)| {
+        let (open, close) = pairs.into_iter().find(|pair| pair.0 == c)?;
+        let mut depth = 0;
+        let end = header[at..].char_indices().find(|(_, c)| {
+            depth += i32::from(*c == open) - i32::from(*c == close);
+            depth == 0
+        });
+        let end = at + end?.0;
+        Some((at, header[at + 1..end].trim(), end + 1))
+    });
+    opening.collect::<Vec<_>>().into_iter().rev()
+}
+
+/// A unit without the range of a sensor before it: `g` of `±16g`.
+fn without_range(text: &str) -> &str {
+    let text = text.trim();
+    let unsigned = text.trim_start_matches(['±', '+', '-', '/']);
+    match unsigned.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.') {
+        rest if rest.starts_with(|c: char| c.is_alphabetic() || c == '%') && rest != unsigned => {
+            rest
+        }
+        _ => text,
     }
 }

@@ -8,6 +8,7 @@ use std::rc::Rc;
 
 use csv::StringRecord;
 
+use super::clock::Clock;
 use super::field::{self, Field};
 use super::format::TableFormat;
 use super::rows::CsvText;
@@ -38,7 +39,7 @@ pub fn detect(path: &Path, text: &str, format: &TableFormat) -> Layout {
     let records = |delimiter| records(path, sample, format, delimiter);
     let (mut best, mut single): (Option<DialectCandidate>, Option<DialectCandidate>) = (None, None);
     let mut split: (Option<char>, Rc<[StringRecord]>) = (None, Rc::new([]));
-    for (delimiter, decimal) in signs(format) {
+    for (delimiter, decimal) in signs(format, sample.contains('"')) {
         if split.0 != Some(delimiter) {
             split = (Some(delimiter), records(delimiter).into());
         }
@@ -66,12 +67,49 @@ pub fn detect(path: &Path, text: &str, format: &TableFormat) -> Layout {
     };
     match found.and_then(|candidate| candidate.layout(format)) {
         Some(layout) => layout,
-        None => without_numbers(signs(format), records, format),
+        None => without_numbers(signs(format, false), records, format),
     }
 }
 
-/// Candidate delimiters and decimal signs.
-fn signs(format: &TableFormat) -> impl Iterator<Item = (char, char)> + use<> {
+/// The text without lines of words after the last row, where rows begin with a number or a time; and the number of these lines.
+pub(super) fn without_footer<'a>(text: &'a str, layout: &Layout) -> (&'a str, usize) {
+    let is_word = |field: &str| {
+        let field = field.trim().trim_matches('"');
+        field::read(field, layout.decimal) == Field::Text && Clock::read(field).is_none()
+    };
+    // A row of data with a word in place of its first number is a mistake.
+    let is_footer = |line: &'a str| {
+        let fields = match layout.delimiter {
+            ' ' => line.split_whitespace().collect::<Vec<_>>(),
+            delimiter => line.split(delimiter).collect(),
+        };
+        let is_number =
+            |field: &&str| matches!(field::read(field.trim(), layout.decimal), Field::Number(_));
+        let is_row = layout.width == Some(fields.len())
+            && (fields.len() == 1 || fields.iter().any(is_number));
+        line.starts_with('#') || fields.first().is_some_and(|first| is_word(first)) && !is_row
+    };
+    let begins = |line: &str| line.trim_start().chars().next().is_some();
+    let (mut rest, mut count) = (text, 0);
+    loop {
+        let line = rest.trim_end().rsplit('\n').next().unwrap_or_default();
+        match (begins(line), is_footer(line)) {
+            (false, _) => return (text, 0),
+            (true, true) => {}
+            (true, false) => break,
+        }
+        count += 1;
+        rest = &rest[..rest.trim_end().len() - line.len()];
+    }
+    // A quoted field can hold several lines.
+    match rest.contains('"') && text[rest.len()..].contains('"') {
+        true => (text, 0),
+        false => (rest, count),
+    }
+}
+
+/// Candidate delimiters and decimal signs; in quotes a comma can be both.
+fn signs(format: &TableFormat, quoted: bool) -> impl Iterator<Item = (char, char)> + use<> {
     let delimiters = match format.delimiter {
         Some(delimiter) => vec![delimiter],
         None => DELIMITERS.to_vec(),
@@ -82,7 +120,7 @@ fn signs(format: &TableFormat) -> impl Iterator<Item = (char, char)> + use<> {
     };
     delimiters.into_iter().flat_map(move |delimiter| {
         let decimals = decimals.clone().into_iter();
-        decimals.filter_map(move |sign| (sign != delimiter).then_some((delimiter, sign)))
+        decimals.filter_map(move |sign| (sign != delimiter || quoted).then_some((delimiter, sign)))
     })
 }
 

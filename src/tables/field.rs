@@ -3,8 +3,9 @@
 use crate::error::{InputError, Location};
 use crate::text_io::quote;
 
-/// Markers of a missing sample, in lower case; an empty field is one as well.
-const MISSING: [&str; 7] = ["nan", "na", "n/a", "-", "null", "#n/a", "--"];
+/// Markers of a missing sample, in lower case; an empty field is one as well. Instruments write the last ones for an overload.
+const MISSING: &str = "nan|na|n/a|-|null|#n/a|--|---|----|none|missing|no data|nodata|*|**|***|#nv|#n/v\
+    |err|error|ovld|ol|over|overload|overrange";
 
 /// Longest field that is compared with the markers or read with a decimal comma, bytes.
 const LONGEST: usize = 64;
@@ -35,27 +36,58 @@ pub fn read(field: &str, decimal: char) -> Field {
 
 /// Parses a number with this decimal sign, infinities and NaN included.
 fn parse(field: &str, decimal: char) -> Option<f64> {
-    if decimal == '.' {
-        return field.parse().ok();
+    let other = if decimal == '.' { ',' } else { '.' };
+    let plain = match decimal {
+        '.' => field.parse().ok(),
+        _ => with_point(field),
+    };
+    let begins = field.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
+    if plain.is_some() || !begins || field.len() > LONGEST || field.ends_with(',') {
+        return plain;
     }
-    // With a decimal comma a point would be a thousands separator, which is not supported.
-    if field.len() > LONGEST || field.contains('.') || field.ends_with(',') {
+    let (whole, fraction) = field.split_once(decimal).unwrap_or((field, ""));
+    if fraction.contains([decimal, other]) {
         return None;
     }
-    if !field.contains(',') {
-        return field.parse().ok();
+    let groups: Vec<&str> = whole.split([other, '\'', '\u{a0}', '\u{202f}']).collect();
+    // One group without a fraction could be a decimal.
+    let is_ambiguous = groups.len() == 2 && !field.contains(decimal);
+    let is_group = |group: &&str| group.len() == 3 && group.bytes().all(|b| b.is_ascii_digit());
+    if is_ambiguous || !groups.iter().skip(1).all(is_group) {
+        return None;
     }
+    let number = format!("{}.{fraction}", groups.concat());
+    let number = match field.contains(decimal) {
+        true => number,
+        false => groups.concat(),
+    };
+    // Fortran writes double precision with a D.
+    let number: String = number
+        .chars()
+        .map(|c| if matches!(c, 'D' | 'd') { 'e' } else { c })
+        .collect();
+    number.parse().ok()
+}
+
+/// Parses a number whose decimal sign is a comma.
+fn with_point(field: &str) -> Option<f64> {
     let mut bytes = [0; LONGEST];
-    let bytes = &mut bytes[..field.len()];
+    let bytes = bytes.get_mut(..field.len())?;
+    if field.contains('.') || field.ends_with(',') {
+        return None;
+    }
     bytes.copy_from_slice(field.as_bytes());
-    if let Some(comma) = bytes.iter().position(|&b| b == b',') {
-        bytes[comma] = b'.';
+    if let Some(comma) = bytes.iter_mut().find(|b| **b == b',') {
+        *comma = b'.';
     }
     std::str::from_utf8(bytes).ok()?.parse().ok()
 }
 
 fn is_missing(field: &str) -> bool {
-    field.is_empty() || MISSING.iter().any(|word| field.eq_ignore_ascii_case(word))
+    field.is_empty()
+        || MISSING
+            .split('|')
+            .any(|word| field.eq_ignore_ascii_case(word))
 }
 
 /// The error for a field that is not a finite number, where one must be.
@@ -87,9 +119,6 @@ fn wrong(place: Location, problem: &str, field: &str, decimal: char) -> InputErr
     if field.contains('\n') {
         return error.hint("a quote that is opened in this row is not closed in it");
     }
-    if is_clock(field) {
-        return error.hint("write times in seconds: dates and times of day are not read");
-    }
     let other = if decimal == '.' { ',' } else { '.' };
     match parse(field, other) {
         Some(_) if field.contains(other) => error.hint(match decimal {
@@ -100,35 +129,9 @@ fn wrong(place: Location, problem: &str, field: &str, decimal: char) -> InputErr
     }
 }
 
-/// True for a date or a time of day such as `12:00:01.5`, `2026-03-01T12:00` or `1.3.2026`.
-fn is_clock(field: &str) -> bool {
-    let belongs = |c: char| c.is_ascii_digit() || ":-/., TZ+".contains(c);
-    let signs = |sign: char| field.chars().filter(|c| *c == sign).count();
-    field.len() <= LONGEST
-        && field.starts_with(|c: char| c.is_ascii_digit())
-        && field.chars().all(belongs)
-        && (field.contains(':') || ['-', '/', '.'].into_iter().any(|sign| signs(sign) == 2))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn dates_and_times_of_day() {
-        for field in [
-            "12:00:01.5",
-            "9:30",
-            "2026-03-01T12:00:00Z",
-            "2026-03-01",
-            "1/3/2026",
-        ] {
-            assert!(is_clock(field), "{field}");
-        }
-        for field in ["12.5", "1e-3-2-", "-1", "a:b", "", ":", "1-2", "3/4"] {
-            assert!(!is_clock(field), "{field}");
-        }
-    }
 
     #[test]
     fn fields_are_classified_by_their_contents() {
@@ -150,6 +153,18 @@ mod tests {
             ("null", '.', Field::Missing),
             ("-", '.', Field::Missing),
             ("off", '.', Field::Text),
+            ("OVLD", '.', Field::Missing),
+            ("---", ',', Field::Missing),
+            ("1.5D-03", '.', Field::Number(1.5e-3)),
+            ("-1,5d2", ',', Field::Number(-150.0)),
+            ("1,234.5", '.', Field::Number(1234.5)),
+            ("-1,234,567", '.', Field::Number(-1_234_567.0)),
+            ("1.234,5", ',', Field::Number(1234.5)),
+            ("1'234.5", '.', Field::Number(1234.5)),
+            ("1,234", '.', Field::Text),
+            ("12,34.5", '.', Field::Text),
+            ("1.2.3", '.', Field::Text),
+            ("1D", '.', Field::Text),
         ] {
             assert_eq!(read(text, decimal), field, "{text} {decimal}");
         }

@@ -2,6 +2,7 @@
 //! times, and resampling.
 
 mod channels;
+mod clock;
 mod columns;
 mod detect;
 mod encoding;
@@ -14,6 +15,7 @@ mod rows;
 mod stated;
 mod table;
 mod table_memory;
+mod text_columns;
 pub mod times;
 
 pub use columns::ColumnName;

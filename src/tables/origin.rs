@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::clock::Clock;
 use super::format::Detected;
 use crate::error::InputError;
 use crate::formats::{Format, Sampling, Unusable};
@@ -23,6 +24,10 @@ pub(super) struct ColumnValues {
     pub unnumbered: Option<InputError>,
     /// The first field that is neither a finite number nor missing.
     pub unreadable: Option<InputError>,
+    /// Scales that the file states and that are not applied.
+    pub unapplied: Vec<String>,
+    /// Of times of day or dates: the first.
+    pub clock: Option<Clock>,
 }
 
 /// The channels of a file.
@@ -34,6 +39,7 @@ pub(super) struct ChannelFile {
     /// Number of samples and sampling of each set.
     pub sets: Vec<(usize, Option<Sampling>)>,
     pub unusable: Vec<Unusable>,
+    pub notes: Vec<String>,
 }
 
 /// Source of a table of channels.

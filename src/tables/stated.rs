@@ -1,7 +1,7 @@
 //! Units stated by a table: in its row of units, in brackets after a column's name, and at the end of the name.
 
 use super::Table;
-use super::columns::split_unit;
+use super::columns::{REMARKS, split_unit};
 use crate::error::InputError;
 use crate::text_io::quote;
 use crate::units::{Quantity, Unit, unbracketed};
@@ -29,12 +29,30 @@ impl<'a> StatedUnit<'a> {
         unit(self.row).or_else(|| unit(self.header))
     }
 
-    /// The unit of this quantity at the end of the name, as in `y_mm` and `a_m_per_s2`.
+    /// The unit of this quantity at the end of the name, as in `y_mm` and `a_m_per_s2`, or before remarks and numbers, as in `acc_g_filtered`.
     pub fn suffix(&self, kind: Quantity) -> Option<Unit> {
-        self.name.match_indices('_').find_map(|(at, _)| {
-            let end = &self.name[at + 1..];
-            Unit::recognise(kind, &end.replace("_per_", "/").replace('_', " "))
+        let mut name = self.name;
+        let is_remark = |word: &str| {
+            let small = word.to_lowercase();
+            word.chars().all(|c| c.is_ascii_digit())
+                || (REMARKS.split(' ').chain(["raw", "filt"])).any(|remark| remark == small)
+        };
+        while let Some((before, word)) = name.rsplit_once('_')
+            && is_remark(word)
+        {
+            name = before;
+        }
+        name.match_indices('_').find_map(|(at, _)| {
+            let end = name[at + 1..].replace("_per_", "/");
+            let unit = |between: &str| Unit::recognise(kind, &end.replace('_', between));
+            unit(" ").or_else(|| unit("/")).or_else(|| unit(""))
         })
+    }
+
+    /// The unit of this quantity as the last word of the name, as in `Force N`.
+    pub fn last_word(&self, kind: Quantity) -> Option<Unit> {
+        let (_, last) = self.name.rsplit_once(' ')?;
+        Unit::recognise(kind, last)
     }
 
     /// True if the row of units and the name state different units for every quantity.
@@ -110,11 +128,14 @@ mod tests {
             ("y", Quantity::Displacement, None),
             ("mm", Quantity::Displacement, None),
             ("y_raw", Quantity::Displacement, None),
+            ("Acc_g_filtered", Quantity::Acceleration, Some("g")),
+            ("Accel_gs", Quantity::Acceleration, Some("g")),
+            ("force_N_2", Quantity::Force, Some("N")),
             ("y_mm", Quantity::Time, None),
         ] {
             let table = table(&format!("{name},z\n1,2\n2,3\n"));
             let unit = table.stated_unit(0).suffix(kind);
-            assert_eq!(unit.map(|u| u.symbol()), symbol, "{name}");
+            assert_eq!(unit.as_ref().map(Unit::symbol), symbol, "{name}");
         }
     }
 

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
 
-use super::detect::{Layout, detect};
+use super::clock::Clock;
+use super::detect::{Layout, detect, without_footer};
 use super::encoding::decode;
 use super::field::{self, Field};
 use super::format::{Detected, TableFormat};
@@ -39,6 +40,10 @@ pub struct Table {
     pub(super) units: Vec<String>,
     pub(super) columns: Vec<ColumnValues>,
     pub(super) lines: Vec<usize>,
+    /// Treatment of the file, a clause each.
+    pub(super) notes: Vec<String>,
+    /// Number of columns of the file before the first one.
+    pub(super) first: usize,
 }
 
 impl Table {
@@ -150,6 +155,18 @@ impl Table {
         &self.units
     }
 
+    /// Treatment of the file, a clause each: cut channels, units of clocks, lines that are left out.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// Scales of a column that the file states and that are not applied.
+    pub fn unapplied(&self, index: usize) -> &[String] {
+        self.columns
+            .get(index)
+            .map_or(&[], |column| &column.unapplied)
+    }
+
     /// Line in the file of each data row, from 1; of a binary file the number of the sample.
     pub fn lines(&self) -> &[usize] {
         &self.lines
@@ -247,8 +264,10 @@ impl Table {
     ) -> Result<Vec<Self>, InputError> {
         format.check()?;
         match formats::recognise(path, &bytes)? {
-            Some(binary) => Self::from_binary(path, bytes, binary, format),
-            None => Ok(vec![Self::from_text(path, bytes, format)?]),
+            Some(binary) if !(binary.is_text() && format.first_given().is_some()) => {
+                Self::from_binary(path, bytes, binary, format)
+            }
+            _ => Ok(Self::from_text(path, bytes, format)?.runs()),
         }
     }
 
@@ -278,14 +297,29 @@ impl Table {
             units: Vec::new(),
             columns: Vec::new(),
             lines: Vec::new(),
+            notes: Vec::new(),
+            first: 0,
         };
         let room = TableMemory::of(path, &text);
         let width = layout.width.unwrap_or(1);
         room.check(width)?;
         table.lines = room.list(width)?;
-        let source = CsvText::new(&text, skipped, layout.delimiter);
-        table.fill(&source, &layout, room, &mut detected)?;
+        let (rows, footer) = without_footer(&text, &layout);
+        let source = CsvText::new(rows, skipped, layout.delimiter);
+        let repeated = table.fill(&source, &layout, room, &mut detected)?;
         table.origin = Origin::Text(detected);
+        for (count, what) in [
+            (footer, "of text after the rows"),
+            (repeated, "that repeat the column names"),
+        ] {
+            if count > 0 {
+                table.notes.push(format!("lines {what}, left out: {count}"));
+            }
+        }
+        if table.headers.is_empty() && format.header.is_none() {
+            table.name_by_comments(&text, layout.delimiter);
+        }
+        table.state_clocks();
         Ok(table)
     }
 
@@ -295,7 +329,8 @@ impl Table {
         layout: &Layout,
         room: TableMemory,
         format: &mut Detected,
-    ) -> Result<(), InputError> {
+    ) -> Result<usize, InputError> {
+        let mut repeated = 0;
         let path = self.path.clone();
         let mut rows = source.rows(&path);
         let mut fields = StringRecord::new();
@@ -312,10 +347,10 @@ impl Table {
                 self.units = fields.iter().map(str::to_owned).collect();
                 format.units_row = Some(line);
             } else if count >= layout.data {
-                self.push(line, &fields, layout, room)?;
+                repeated += usize::from(!self.push(line, &fields, layout, room)?);
                 // The first row of data defines the columns.
                 if let Some(later) = rows.split_off() {
-                    self.push_halves(rows, later, layout, room)?;
+                    repeated += self.push_halves(rows, later, layout, room)?;
                     break;
                 }
             }
@@ -329,7 +364,7 @@ impl Table {
                 .expected(TABLE)),
             (Some(head), _) => {
                 format.skipped = head - 1;
-                Ok(())
+                Ok(repeated)
             }
         }
     }
@@ -341,22 +376,28 @@ impl Table {
         second: TableRows,
         layout: &Layout,
         room: TableMemory,
-    ) -> Result<(), InputError> {
+    ) -> Result<usize, InputError> {
+        let begun = |own: &ColumnValues| ColumnValues {
+            clock: own.clock,
+            ..ColumnValues::default()
+        };
         let mut later = Self {
             path: self.path.clone(),
             origin: self.origin.clone(),
             headers: self.headers.clone(),
             units: self.units.clone(),
-            columns: vec![ColumnValues::default(); self.columns.len()],
+            columns: self.columns.iter().map(begun).collect(),
             lines: Vec::new(),
+            notes: Vec::new(),
+            first: 0,
         };
         let (first, second) = both(
             || self.push_all(first, layout, room),
-            || later.push_all(second, layout, room).map(|()| later),
+            || Ok((later.push_all(second, layout, room)?, later)),
         );
         // The first mistake in the file is reported.
-        first?;
-        let later = second?;
+        let first = first?;
+        let (second, later): (usize, Self) = second?;
         self.lines.extend(later.lines);
         for (column, later) in self.columns.iter_mut().zip(later.columns) {
             // An unreadable column has no samples after its first mistake.
@@ -366,32 +407,38 @@ impl Table {
                 column.unnumbered = column.unnumbered.take().or(later.unnumbered);
             }
         }
-        Ok(())
+        Ok(first + second)
     }
 
-    /// Adds all rows as data.
+    /// Adds all rows as data, and counts those that repeat the column names.
     fn push_all(
         &mut self,
         mut rows: TableRows,
         layout: &Layout,
         room: TableMemory,
-    ) -> Result<(), InputError> {
+    ) -> Result<usize, InputError> {
         let mut fields = StringRecord::new();
+        let mut repeated = 0;
         while let Some(line) = rows.read(&mut fields)? {
             check_width(&self.path, line, fields.len())?;
-            self.push(line, &fields, layout, room)?;
+            repeated += usize::from(!self.push(line, &fields, layout, room)?);
         }
-        Ok(())
+        Ok(repeated)
     }
 
-    /// Adds a data row. A field that is not a number makes its column unusable.
+    /// Adds a data row, unless it is that of the column names. A field that is not a number makes its column unusable.
     fn push(
         &mut self,
         line: usize,
         fields: &StringRecord,
         layout: &Layout,
         room: TableMemory,
-    ) -> Result<(), InputError> {
+    ) -> Result<bool, InputError> {
+        if fields.get(0) == self.headers.first().map(String::as_str)
+            && fields == self.headers.as_slice()
+        {
+            return Ok(false);
+        }
         let row = self.lines.len();
         self.lines.push(line);
         if self.columns.is_empty() {
@@ -416,6 +463,14 @@ impl Table {
                 self.columns[index].samples.push(value);
                 continue;
             }
+            let is_clock = || column.clock.is_some() || column.samples.iter().all(|x| x.is_nan());
+            let clock = (read == Field::Text).then(|| Clock::read(text)).flatten();
+            if let Some(clock) = clock.filter(|_| is_clock()) {
+                let column = &mut self.columns[index];
+                let first = column.clock.get_or_insert(clock);
+                column.samples.push(clock.since(first));
+                continue;
+            }
             let place = || self.place(row, Some(&self.label(index)));
             let unnumbered = column
                 .unnumbered
@@ -428,7 +483,7 @@ impl Table {
             column.unnumbered = column.unnumbered.take().or(unnumbered);
             column.unreadable = unreadable;
         }
-        Ok(())
+        Ok(true)
     }
 }
 

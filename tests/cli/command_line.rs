@@ -269,7 +269,7 @@ fn init_prints_the_properties_of_the_record() {
     assert_snapshot!(bench.run(&["init", "only.csv"]).2, @"
     error: only.csv: no column of times
       found: no column whose numbers increase from row to row
-      expected: a column of times, or `--sample-rate HZ`
+      expected: a column of times, `--time COLUMN`, or `--sample-rate HZ`
     ");
     assert_snapshot!(bench.run(&["init", "only.csv", "--sample-rate", "0"]).2, @"
     error: --sample-rate: invalid sampling rate

@@ -160,6 +160,58 @@ fn codes_of_missing_samples_are_taken_as_missing() {
     assert!(holds(&document, "damping_ratio", 0.02));
 }
 
+/// Missing values of a force: `init` takes the longest part without any, and the message on another part names it.
+#[test]
+fn gaps_of_a_force_are_left_out_by_a_window() {
+    let bench = Workbench::empty();
+    let frequency = 4.0;
+    let noise = noise(12, 1000);
+    let (mut x, mut v) = (0.0, 0.0);
+    let force = |t: f64| 20.0 * (TAU * (1.0 + 0.6 * t) * t).sin();
+    let omega: f64 = TAU * frequency;
+    let acceleration =
+        |t: f64, x: f64, v: f64| 0.5 * force(t) - omega * omega * x - 0.08 * omega * v;
+    let mut text = "t_s,force_N,acc_m_s2\n".to_owned();
+    for (i, noise) in noise.iter().enumerate() {
+        let t = 0.005 * i as f64;
+        let known = if matches!(i, 90..95 | 120) {
+            -9999.0
+        } else {
+            force(t)
+        };
+        text += &format!(
+            "{t:.4},{known:.9},{:.9}\n",
+            acceleration(t, x, v) + 0.2 * noise
+        );
+        for j in 0..10 {
+            let (t, h) = (t + 0.0005 * f64::from(j), 0.0005);
+            let middle = (x + 0.5 * h * v, v + 0.5 * h * acceleration(t, x, v));
+            x += h * middle.1;
+            v += h * acceleration(t + 0.5 * h, middle.0, middle.1);
+        }
+    }
+    bench.write("gaps.csv", &text);
+    let said = bench.run_to(0, &["init", "gaps.csv"]);
+    assert!(
+        said.contains("0.605 to 4.995 s is the longest part"),
+        "{said}"
+    );
+    let document = fit(&bench, &["gaps.yaml"]);
+    assert!(holds(&document, "natural_frequency", frequency));
+    assert!(holds(&document, "mass", 2.0));
+    let window = "experiments.0.window={min: 0.1, max: 4.9}";
+    let (code, _, said) = bench.run(&["fit", "gaps.yaml", "--set", window]);
+    assert_eq!(code, 2, "{said}");
+    assert!(
+        said.contains("6 of 1000 values missing, the first at 0.45 s"),
+        "{said}"
+    );
+    assert!(
+        said.contains("`window: {min: 0.605, max: 4.995}`"),
+        "{said}"
+    );
+}
+
 /// A sigma stated 100 times too small is a reason, whatever penalties and bounds do.
 #[test]
 fn no_penalty_hides_a_sigma_that_is_too_small() {

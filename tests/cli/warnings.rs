@@ -117,7 +117,7 @@ fn autocorrelated_residuals_are_reported() {
     );
     // A band leaves them autocorrelated.
     assert!(
-        summary.contains("Next   nothing that was tried explains the residuals"),
+        summary.contains("Next   one oscillator cannot have two modes"),
         "{summary}"
     );
 }

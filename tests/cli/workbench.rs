@@ -75,8 +75,13 @@ impl Workbench {
         self.folder.path().join(name)
     }
 
-    /// Writes a file.
+    /// Writes a text file.
     pub fn write(&self, name: &str, text: &str) {
+        self.write_bytes(name, text.as_bytes());
+    }
+
+    /// Writes a file.
+    pub fn write_bytes(&self, name: &str, text: &[u8]) {
         let path = self.path(name);
         fs::create_dir_all(path.parent().expect("a file has a folder")).expect("a folder");
         fs::write(path, text).expect("a file");

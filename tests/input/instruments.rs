@@ -148,7 +148,7 @@ fn names_are_found_without_their_units() {
 fn files_without_names_have_numbered_columns() {
     for text in [
         "0,1\n0.5,2\n",
-        "# t,y\n0,1\n0.5,2\n",
+        "# made by hand\n0,1\n0.5,2\n",
         "Rig 7\n2024\n0,1\n0.5,2\n",
         "0 1\n0.5 2\n",
         "Made by hand on Monday\n\n0;1\n0,5;2\n",

@@ -64,8 +64,10 @@ fn a_name_that_ends_like_another_unit_than_the_file_states() {
     experiments[0].columns.displacement: column `y_mm`: unit taken from the file's row of units (m); its name ends in mm
     experiments[0].columns.time: column `t_s [ms]`: unit taken from the file's row of units (ms); its name ends in s
     ");
-    let unknown = built(&rows("t [h],y"), ["t", "y"], "").expect("a model").0;
-    assert_snapshot!(unknown, @"experiments[0].columns.time: unknown unit `h` of time in column `t [h]`; s is assumed");
+    let unknown = built(&rows("t [weeks],y"), ["t", "y"], "")
+        .expect("a model")
+        .0;
+    assert_snapshot!(unknown, @"experiments[0].columns.time: the unit `weeks` of the time in the column `t [weeks]` is not known: s is assumed; state one under `units`");
 }
 
 #[test]

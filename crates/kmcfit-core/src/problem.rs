@@ -409,9 +409,7 @@ mod tests {
             let before = count;
             let estimate = || {
                 count += 1;
-                Ok::<_, ()>(Measurements {
-                    experiments: Vec::new(),
-                })
+                Ok::<_, ()>(Measurements::default())
             };
             problem.measurements(scalars, estimate).expect("states");
             count - before

@@ -39,6 +39,7 @@ from ._functions import (
 )
 from ._model import Model, fit_model, init
 from ._problem import Problem
+from ._read import read_record
 from ._study import Candidate, Extremes, Profile, Sensitivity, Study, StudyFinding
 
 __version__: str = _kmcfit.version()
@@ -82,6 +83,7 @@ __all__ = [
     "open",
     "read",
     "read_fleet",
+    "read_record",
 ]
 
 

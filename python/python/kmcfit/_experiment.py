@@ -52,7 +52,8 @@ class Experiment:
     time : array_like, shape (n,)
         Increasing times, s, or dates and times (counted in s from the first one).
     displacement, velocity, acceleration : array_like, shape (n,), optional
-        Measured responses, m, m/s, m/s^2 (rad and so on where `units` says so). NaN and masked values are missing samples.
+        Measured responses, m, m/s, m/s^2 (rad and so on where `units` says so). NaN and masked values are missing samples. A pair
+        (times, values) is a channel with a clock of its own; so for inputs, which must cover the times of the responses.
     force : array_like, shape (n,), or dict, optional
         Force on the mass, N; a dict is a waveform, e.g. ``{"shape": "sine", "amplitude": 2.0, "frequency": 1.5}``.
     base_acceleration, base_displacement : array_like, shape (n,), optional
@@ -65,7 +66,7 @@ class Experiment:
     initial : "estimate", (displacement, velocity) or dict
         Initial state, m and m/s. Default: estimated.
     interpolation : {"linear", "cubic", "hold"}, optional
-        Interpolation of the input between samples.
+        Interpolation of the input between samples; for one with a clock of its own cubic by default.
     units : dict, optional
         Units of columns in place of SI, e.g. ``{"acceleration": "g"}``.
     name : str, optional
@@ -134,7 +135,7 @@ class Experiment:
         return len(next(iter(self._columns.values())))
 
     def __repr__(self) -> str:
-        columns = ", ".join(name for name in self._columns if not name.startswith("sigma "))
+        columns = ", ".join(name for name in self._columns if not name.startswith(("sigma ", "time ")))
         name = "" if self.name is None else f" {self.name!r}:"
         return f"<Experiment{name} {len(self)} samples of {columns}>"
 
@@ -152,7 +153,9 @@ class Experiment:
         for word in units:
             if word not in names:
                 raise unknown_keyword("Experiment.units", word, names)
-        spec: Dict[str, Any] = {"columns": {name: name for name in names}}
+        own = [name for name in names if f"time {name}" in self._columns]
+        columns = {name: {"column": name, "time": f"time {name}"} if name in own else name for name in names}
+        spec: Dict[str, Any] = {"columns": columns}
         if sample_rate is not None:
             spec["sample_rate"] = plain(sample_rate)
         spec["units"] = {name: units.get(name, _UNITS[name]) for name in names}
@@ -160,10 +163,15 @@ class Experiment:
             spec["sigma"] = self._sigma(sigma)
         spec["initial"] = _initial(initial)
         chosen = self._chosen_by_init(spec["units"])
+        if any(np.isnan(self._columns[name]).any() for name in INPUTS if name in self._columns):
+            # An input acts at all times: the fit refuses its gaps, and names the longest part without.
+            chosen.pop("window", None)
         for key in ("window", "duplicates", "loss", "sensors", "force", "base"):
             # The paper's integral has no likelihood for what sensors and losses estimate.
             if key in chosen and (key not in ("loss", "sensors") or "sigma" in spec):
                 spec[key] = chosen[key]
+        if interpolation is None and any(name in own for name in INPUTS):
+            interpolation = "cubic"
         if self._waveform is not None:
             spec["force"] = self._waveform
         elif interpolation is not None:
@@ -179,7 +187,7 @@ class Experiment:
         """The experiment that ``kmcfit init`` writes for these columns; empty where it refuses them."""
         from ._fit import temporary_folder
 
-        columns = {f"{name} [{units[name]}]": self._columns[name] for name in units}
+        columns = {f"{name} [{units[name]}]": self._columns[name] for name in units if f"time {name}" not in self._columns}
         with temporary_folder() as folder:
             path = Path(folder, "record.npz")
             path.write_bytes(_npz.archive(columns))
@@ -223,7 +231,13 @@ def _columns(data: Any, given: Dict[str, Any], sample_rate: Optional[float]) -> 
     """The columns as float64."""
     if data is not None:
         given = _chosen(data, given)
-    columns = {name: column(f"Experiment.{name}", value) for name, value in given.items() if value is not None}
+    columns = {}
+    for name, value in given.items():
+        if name != "time" and isinstance(value, tuple) and len(value) == 2 and np.ndim(value[1]) == 1:
+            columns[f"time {name}"] = column(f"Experiment.{name}[0]", value[0])
+            value = value[1]
+        if value is not None:
+            columns[name] = column(f"Experiment.{name}", value)
     if "time" not in columns and sample_rate is None:
         raise InputError("no times", "Experiment.time", expected="`time=…` in s, or `sample_rate=…` in Hz")
     if not any(name in columns for name in CHANNELS):
@@ -233,13 +247,14 @@ def _columns(data: Any, given: Dict[str, Any], sample_rate: Optional[float]) -> 
             ", ".join(columns) or "no columns",
             "at least one of: " + ", ".join(CHANNELS),
         )
-    first = next(iter(columns))
+    shared = [name for name in columns if not name.startswith("time ") and f"time {name}" not in columns]
     for name, values in columns.items():
+        first = shared[0] if name in shared else name if name.startswith("time ") else f"time {name}"
         _check_length(f"Experiment.{name}", values, len(columns[first]), f"`{first}`")
     for name, values in columns.items():
         _check_finite(f"Experiment.{name}", values)
-    if "time" in columns:
-        _check_times(columns["time"])
+        if name.startswith("time"):
+            _check_times(f"Experiment.{name}", values)
     return columns
 
 
@@ -255,18 +270,18 @@ def _check_finite(where: str, values: "np.ndarray") -> None:
         raise InputError("not a finite number", where, f"{values[first]} at index {first}", "a finite number, or NaN where missing")
 
 
-def _check_times(times: "np.ndarray") -> None:
+def _check_times(where: str, times: "np.ndarray") -> None:
     bad = ~np.isfinite(times)
     if bad.any():
         first = int(np.argmax(bad))
         found = f"{times[first]} at index {first}"
-        raise InputError("a time is missing", "Experiment.time", found, "a finite time for every sample")
+        raise InputError("a time is missing", where, found, "a finite time for every sample")
     falls = np.diff(times) < 0
     if falls.any():
         first = int(np.argmax(falls)) + 1
         raise InputError(
             "the times do not increase",
-            "Experiment.time",
+            where,
             f"{times[first]} s at index {first} after {times[first - 1]} s",
             "increasing times",
             "sort the samples, or pass each record as an experiment",

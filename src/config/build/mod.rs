@@ -11,6 +11,7 @@ mod starts;
 mod study;
 
 pub(crate) use experiments::DataWarning;
+pub(in crate::config) use experiments::known_stretches;
 pub(super) use experiments::sensor_of;
 pub use experiments::{ChannelNote, DelayLimits, HoldOut};
 pub use kmcfit_core::internals::builder::WeightSearch;

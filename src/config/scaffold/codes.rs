@@ -7,20 +7,26 @@ use kmcfit_core::internals::signal::median;
 const KNOWN: [f64; 11] = [
     999.0, 999.9, 999.99, 7999.0, 8888.0, 9999.0, 9999.9, 9999.99, 99_999.0, 999_999.0, 1e20,
 ];
-/// Distance of a code from the median, relative to the largest one of other values: of a known code, and of another value that repeats.
-const FAR: [f64; 2] = [3.0, 10.0];
+/// Distance of a code from the median, relative to the largest one of other values: of a known code, of another value that repeats, and of
+/// a single one, which no motion reaches: the largest and the smallest sample of a sensor are five decades apart at most.
+const FAR: [f64; 3] = [3.0, 10.0, 1000.0];
 /// Fewest repetitions of another value.
 const REPEATED: usize = 2;
 /// Most distinct codes in a column.
 const MOST: usize = 4;
 
 /// Codes in the columns of a table with these indices, in the unit of the file, with their numbers.
-pub(super) fn codes(table: &Table, columns: impl Iterator<Item = usize>) -> Vec<(f64, usize)> {
+///
+/// A column of an input, as the bool says, can hold a single large value: a blow between quiet samples.
+pub(super) fn codes(
+    table: &Table,
+    columns: impl Iterator<Item = (usize, bool)>,
+) -> Vec<(f64, usize)> {
     let mut found: Vec<(f64, usize)> = Vec::new();
-    for index in columns {
+    for (index, is_input) in columns {
         // A column that cannot be read has its own message.
         let values = table.samples(index).unwrap_or_default();
-        for (code, count) in of_column(values) {
+        for (code, count) in of_column(values, is_input) {
             match found.iter_mut().find(|(known, _)| *known == code) {
                 Some((_, all)) => *all += count,
                 None => found.push((code, count)),
@@ -30,7 +36,7 @@ pub(super) fn codes(table: &Table, columns: impl Iterator<Item = usize>) -> Vec<
     found
 }
 
-fn of_column(values: &[f64]) -> Vec<(f64, usize)> {
+fn of_column(values: &[f64], is_input: bool) -> Vec<(f64, usize)> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
     if sorted.is_empty() {
         return Vec::new();
@@ -42,7 +48,12 @@ fn of_column(values: &[f64]) -> Vec<(f64, usize)> {
     let distance = |x: f64| (x - middle).abs();
     groups.sort_by(|a, b| distance(b.0).total_cmp(&distance(a.0)));
     let is_known = |x: f64| KNOWN.contains(&x.abs());
-    let is_possible = |(x, count): &&(f64, usize)| is_known(*x) || *count >= REPEATED;
+    let kind = |(x, count): &(f64, usize)| match is_known(*x) {
+        true => 0,
+        false if *count >= REPEATED => 1,
+        false => 2,
+    };
+    let is_possible = |group: &&(f64, usize)| kind(group) < 2 || !is_input;
     let possible: Vec<(f64, usize)> = (groups.iter().take(MOST))
         .take_while(is_possible)
         .copied()
@@ -52,9 +63,8 @@ fn of_column(values: &[f64]) -> Vec<(f64, usize)> {
         .rev()
         .find(|count| {
             let rest = groups.get(*count).map_or(0.0, |(x, _)| distance(*x));
-            let is_far = |(x, _): &(f64, usize)| {
-                distance(*x) > FAR[usize::from(!is_known(*x))] * rest && rest > 0.0
-            };
+            let is_far =
+                |group: &(f64, usize)| distance(group.0) > FAR[kind(group)] * rest && rest > 0.0;
             possible[..*count].iter().all(is_far)
         })
         .map_or_else(Vec::new, |count| possible[..count].to_vec())
@@ -77,7 +87,7 @@ mod tests {
             for (i, code) in codes.iter().enumerate() {
                 values[17 * i] = *code;
             }
-            of_column(&values)
+            of_column(&values, false)
         };
         assert_eq!(with(2.0, &[-9999.0]), [(-9999.0, 1)]);
         assert_eq!(
@@ -87,10 +97,15 @@ mod tests {
         assert_eq!(with(2.0, &[-7999.0, -7999.0]), [(-7999.0, 2)]);
         // No known code, but equal values far outside.
         assert_eq!(with(2.0, &[1234.5, 1234.5]), [(1234.5, 2)]);
+        assert_eq!(with(2.0, &[1e30]), [(1e30, 1)]);
+        assert_eq!(with(2.0, &[32767.0]), [(32767.0, 1)]);
+        let mut blow = wave(1e-3);
+        blow[20] = 500.0;
+        assert_eq!(of_column(&blow, true), []);
         // A single spike is none, nor is a code within the range of the samples.
         assert_eq!(with(2.0, &[1234.5]), []);
         assert_eq!(with(5000.0, &[9999.0]), []);
         assert_eq!(with(2.0, &[]), []);
-        assert_eq!(of_column(&[f64::NAN; 3]), []);
+        assert_eq!(of_column(&[f64::NAN; 3], false), []);
     }
 }

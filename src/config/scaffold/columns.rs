@@ -1,17 +1,20 @@
 //! Assignment of the columns of a table to time, channels, force and base motion, from units, names and values.
 
 use super::quoted;
-use super::roles::{Role, UsedColumn, is_foreign, known};
+use super::roles::{Role, UsedColumn, known};
 use super::statements::{ColumnStatements, Statements};
 use crate::error::InputError;
+use crate::quantity_names::{is_drive, is_foreign};
 use crate::tables::{Duplicates, Table, increasing_at, repeated_times};
 use crate::units::{ScaledUnit, Unit};
 use kmcfit_core::internals::diagnostics::standard_deviation;
 
 /// Ratio of standard deviations beyond which a later sensor replaces an earlier one of the same role.
 const MUCH: f64 = 3.0;
+/// Rows for each of which a clock may step back once.
+const FEW_STEPS: usize = 20;
 /// Remedy for a column of times that cannot be used.
-const OTHER_TIMES: &str = "correct the times in the file; `--sample-rate HZ` replaces them if the samples are equally spaced";
+const OTHER_TIMES: &str = "correct the times in the file; `--sample-rate HZ` replaces them if the samples are equally spaced, `--time COLUMN` names another column";
 
 /// Columns of a table by role, and unused columns.
 #[derive(Debug)]
@@ -27,6 +30,12 @@ impl ColumnAssignment {
         let mut columns = Self::known(table, statements.sample_rate, &stated)?;
         if columns.channels().next().is_none() {
             columns.guess(table, stated.response())?;
+        }
+        if !statements.responses.is_empty() {
+            let is_other = |c: &UsedColumn| c.role.is_channel() && !c.is_stated;
+            let (others, used): (Vec<_>, Vec<_>) = columns.used.into_iter().partition(is_other);
+            columns.used = used;
+            columns.unused.extend(others.iter().map(|c| c.index));
         }
         stated.state_quantities(&mut columns.used);
         columns.check_units(table)?;
@@ -94,11 +103,20 @@ impl ColumnAssignment {
         if sample_rate.is_none() {
             columns.used.push(time(table, &numeric, &known)?);
         }
-        for index in numeric {
+        // Voltages stand for a response only where no other column does.
+        let rank = |index: &usize| {
+            let found = known(table, *index).filter(|column| !column.is_stated);
+            found.is_some_and(|column| column.unit.is_arbitrary() && column.role.is_channel())
+        };
+        let (volts, others): (Vec<usize>, Vec<usize>) = numeric.into_iter().partition(rank);
+        for index in others.into_iter().chain(volts) {
             if columns.used.iter().any(|c| c.index == index) {
                 continue;
             }
             match known(table, index) {
+                Some(_) if rank(&index) && columns.has_mechanical_channel() => {
+                    columns.unused.push(index);
+                }
                 Some(column) if column.role != Role::Time => columns.take(table, column)?,
                 _ => columns.unused.push(index),
             }
@@ -149,7 +167,9 @@ impl ColumnAssignment {
                 .expected("at least one sample"));
         }
         let is_open = |i: &usize| !is_foreign(table.quantity_name(*i));
-        let Some(place) = self.unused.iter().position(is_open) else {
+        let has_no_unit = |i: &usize| is_open(i) && table.unit(*i).is_none();
+        let place = self.unused.iter().position(has_no_unit);
+        let Some(place) = place.or_else(|| self.unused.iter().position(is_open)) else {
             let names = (0..table.width()).map(|i| table.label(i));
             return Err(InputError::file(
                 table.path(),
@@ -162,9 +182,13 @@ impl ColumnAssignment {
             .expected("a column of samples in addition to the times"));
         };
         let index = self.unused.remove(place);
+        let own = UsedColumn::guessed(index, role.unwrap_or(Role::Displacement));
+        let unit = table.stated_unit(index).explicit(own.role.kind());
         self.used.push(UsedColumn {
             guessed: role.is_none(),
-            ..UsedColumn::guessed(index, role.unwrap_or(Role::Displacement))
+            unit: unit.unwrap_or(own.unit),
+            has_unit: unit.is_some(),
+            ..own
         });
         Ok(())
     }
@@ -177,10 +201,17 @@ impl ColumnAssignment {
         self.used.iter().find(|c| c.role == role)
     }
 
-    /// True if the name of the column of a role has this word.
-    pub fn is_named(&self, table: &Table, role: Role, word: &str) -> bool {
+    /// True if the name of the column of a role has one of these words, which may be shortened as in `rel_x`.
+    pub fn is_named(&self, table: &Table, role: Role, words: &[&str]) -> bool {
         let name = self.find(role).and_then(|c| table.headers().get(c.index));
-        name.is_some_and(|name| name.to_lowercase().contains(word))
+        let name = name.map(|name| name.to_lowercase()).unwrap_or_default();
+        let mut parts = name.split(|c: char| !c.is_alphabetic());
+        parts.any(|part| words.contains(&part))
+    }
+
+    fn has_mechanical_channel(&self) -> bool {
+        let mut channels = self.used.iter().filter(|c| c.role.is_channel());
+        channels.any(|c| !c.unit.is_arbitrary())
     }
 
     /// Roles of the measured responses.
@@ -188,10 +219,10 @@ impl ColumnAssignment {
         self.used.iter().map(|c| c.role).filter(|r| r.is_channel())
     }
 
-    /// Indices of the columns of samples.
-    pub fn measured(&self) -> impl Iterator<Item = usize> {
+    /// Indices of the columns of samples, and whether they are inputs.
+    pub fn measured(&self) -> impl Iterator<Item = (usize, bool)> {
         let measured = self.used.iter().filter(|c| c.role != Role::Time);
-        measured.map(|c| c.index)
+        measured.map(|c| (c.index, !c.role.is_channel()))
     }
 
     /// `{time: t_s, displacement: y_m}`
@@ -227,7 +258,15 @@ impl ColumnAssignment {
     pub fn in_words(&self, table: &Table) -> Vec<String> {
         let said = |c: &UsedColumn| {
             let guess = match (c.guessed, c.has_unit) {
-                (true, _) => "; quantity and unit are assumed, please check",
+                (false, _) if c.unit.is_arbitrary() => {
+                    "; state the sensitivity of the sensor: `--units \"COLUMN=10 V/(m/s²)\"`"
+                }
+                (true, _) => {
+                    "; quantity and unit are assumed, please check: `--response QUANTITY=COLUMN`, `--units COLUMN=UNIT`"
+                }
+                (_, false) if table.unit(c.index).is_some() => {
+                    "; the stated unit is not known: `--units COLUMN=UNIT` states one"
+                }
                 (false, false) => "; the unit is assumed, please check",
                 (false, true) => "",
             };
@@ -249,6 +288,14 @@ impl ColumnAssignment {
             .collect();
         if !unused.is_empty() {
             words.push(format!("not used: {}", unused.join(", ")));
+            let mut drives = self
+                .unused
+                .iter()
+                .map(|i| table.label(*i))
+                .filter(|label| is_drive(label));
+            if let Some(drive) = drives.next() {
+                words.push(format!("`{drive}` may drive the system: `--force` takes it as a force, `--base` as a motion of the base"));
+            }
         }
         words
     }
@@ -304,8 +351,24 @@ fn time(
                 guessed: true,
                 ..UsedColumn::guessed(*index, Role::Time)
             })),
-        None => Err(InputError::file(table.path(), "no column of times")
-            .found("no column whose numbers increase from row to row")
-            .expected("a column of times, or `--sample-rate HZ`")),
+        None => {
+            // A clock that steps back in a few rows.
+            let mostly = |i: &&usize| {
+                let steps = table
+                    .values(**i)
+                    .map(|times| times.windows(2).filter(|pair| pair[1] <= pair[0]).count());
+                steps.is_ok_and(|back| back * FEW_STEPS < table.rows())
+            };
+            if let Some(Err(error)) = numeric
+                .iter()
+                .find(mostly)
+                .map(|i| increasing_at(table, *i))
+            {
+                return Err(error.hint(OTHER_TIMES));
+            }
+            Err(InputError::file(table.path(), "no column of times")
+                .found("no column whose numbers increase from row to row")
+                .expected("a column of times, `--time COLUMN`, or `--sample-rate HZ`"))
+        }
     }
 }

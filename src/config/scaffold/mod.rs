@@ -39,8 +39,8 @@ pub struct Source {
 pub struct Scaffold {
     /// The text of the model file.
     pub text: String,
-    /// Findings on each table, one sentence each.
-    pub found: Vec<Vec<String>>,
+    /// Findings on each table, one sentence each, with its path.
+    pub found: Vec<(PathBuf, Vec<String>)>,
     /// True if nothing determines the mass.
     pub has_unknown_mass: bool,
 }
@@ -62,7 +62,9 @@ struct FileRecord<'a> {
 /// concerns no column.
 pub fn scaffold(sources: &[Source], statements: &Statements) -> Result<Scaffold, InputError> {
     let records = read(sources, statements)?;
-    let found = records.iter().map(findings);
+    let found = records
+        .iter()
+        .map(|record| (record.source.path.clone(), findings(record)));
     Ok(Scaffold {
         found: found.collect(),
         has_unknown_mass: functions::is_unknown(&records, statements),
@@ -77,21 +79,22 @@ fn read<'a>(
     let mut is_used: Vec<bool> = Vec::new();
     let mut records = Vec::new();
     for source in sources {
-        let (table, columns, used) = record(&source.path, statements)?;
-        memory::check_file(&source.path, table.rows() as u64 * PER_ROW)?;
-        is_used = match is_used.is_empty() {
-            true => used,
-            false => is_used.iter().zip(used).map(|(a, b)| *a || b).collect(),
-        };
-        let codes = codes::codes(&table, columns.measured());
-        let summary = RecordSummary::of(&table, &columns, statements.sample_rate, &codes)?;
-        records.push(FileRecord {
-            source,
-            table,
-            columns,
-            codes,
-            summary,
-        });
+        for (table, columns, used) in records_of(&source.path, statements)? {
+            memory::check_file(&source.path, table.rows() as u64 * PER_ROW)?;
+            is_used = match is_used.is_empty() {
+                true => used,
+                false => is_used.iter().zip(used).map(|(a, b)| *a || b).collect(),
+            };
+            let codes = codes::codes(&table, columns.measured());
+            let summary = RecordSummary::of(&table, &columns, statements.sample_rate, &codes)?;
+            records.push(FileRecord {
+                source,
+                table,
+                columns,
+                codes,
+                summary,
+            });
+        }
     }
     let tables: Vec<&Table> = records.iter().map(|record| &record.table).collect();
     statements.check_used(&is_used, &tables)?;
@@ -122,12 +125,18 @@ fn findings(record: &FileRecord) -> Vec<String> {
     if let Some(begins) = summary.begins {
         found.push(format!("at rest before {begins} s: excluded by `window`"));
     }
+    if let Some([from, to]) = summary.known {
+        found.push(format!(
+            "the input has missing values; {from} to {to} s is the longest part without: chosen by `window`"
+        ));
+    }
     found.push(format!(
         "{} samples over {} s, {}",
         summary.samples,
         short(summary.duration),
         summary.spacing_in_words()
     ));
+    found.extend_from_slice(table.notes());
     found.extend(columns.in_words(table));
     let others: Vec<String> = table.channels_of_other_times().map(quote).collect();
     if !others.is_empty() {
@@ -163,17 +172,25 @@ fn findings(record: &FileRecord) -> Vec<String> {
     found
 }
 
-/// The table of a file with its columns; of several sets of channels the only one with times and a measured response.
-fn record(
+/// The table of a file with its columns: of several sets of channels the only one with times and a measured response, and each run of a
+/// text table with runs side by side.
+fn records_of(
     path: &Path,
     statements: &Statements,
-) -> Result<(Table, ColumnAssignment, Vec<bool>), InputError> {
+) -> Result<Vec<(Table, ColumnAssignment, Vec<bool>)>, InputError> {
     let mut tables = Table::read_all(path, &TableFormat::default())?;
     let has_samples = tables.iter().any(|table| table.rows() > 1);
     tables.retain(|table| !has_samples || table.rows() > 1);
     if let [table] = tables.as_slice() {
         let (columns, is_used) = ColumnAssignment::of(table, statements)?;
-        return Ok((tables.remove(0), columns, is_used));
+        return Ok(vec![(tables.remove(0), columns, is_used)]);
+    }
+    if tables.iter().all(|table| table.text_format().is_some()) {
+        let runs = tables.into_iter().map(|table| {
+            let (columns, is_used) = ColumnAssignment::of(&table, statements)?;
+            Ok((table, columns, is_used))
+        });
+        return runs.collect();
     }
     let mut found = Vec::new();
     for (i, table) in tables.iter().enumerate() {
@@ -188,7 +205,7 @@ fn record(
     };
     let table = tables.remove(*only);
     let (columns, is_used) = ColumnAssignment::of(&table, statements)?;
-    Ok((table, columns, is_used))
+    Ok(vec![(table, columns, is_used)])
 }
 
 fn text(records: &[FileRecord], statements: &Statements) -> String {
@@ -294,6 +311,11 @@ fn keys(
             "s; at rest before (not yet released or struck)",
         ),
         (
+            "    window",
+            (record.known).map(|[from, to]| format!("{{min: {from}, max: {to}}}")),
+            "s; the longest part in which no value of the input is missing",
+        ),
+        (
             "    force",
             columns.has(Role::Force).then(|| between.clone()),
             or,
@@ -324,6 +346,10 @@ fn keys(
     owned.into()
 }
 
+/// Words for a motion measured from the base, and from the ground.
+const RELATIVE: [&str; 4] = ["relative", "rel", "drift", "deformation"];
+const ABSOLUTE: [&str; 2] = ["absolute", "abs"];
+
 /// Sensors with estimated parameters, and the reasons.
 fn sensors(
     columns: &ColumnAssignment,
@@ -334,7 +360,7 @@ fn sensors(
     if columns.has(Role::Acceleration) {
         let has_base = columns.has(Role::BaseAcceleration) || columns.has(Role::BaseDisplacement);
         sensors.push(
-            match has_base && columns.is_named(table, Role::Acceleration, "relative") {
+            match has_base && columns.is_named(table, Role::Acceleration, &RELATIVE) {
                 true => (
                     "acceleration: {offset: estimate, absolute: false}",
                     "relative to the base, by its name; accelerometers usually have an offset",
@@ -352,7 +378,7 @@ fn sensors(
                 "displacement: {offset: estimate, drift: estimate}",
                 "the record oscillates about a sloping line",
             ),
-            false if columns.is_named(table, Role::Displacement, "absolute") && columns.has(Role::BaseDisplacement) => (
+            false if columns.is_named(table, Role::Displacement, &ABSOLUTE) && columns.has(Role::BaseDisplacement) => (
                 "displacement: {offset: estimate, absolute: true}",
                 "relative to the ground, by its name; the zero of a displacement is seldom that of the rest position",
             ),

@@ -3,6 +3,7 @@
 
 use super::columns::ColumnAssignment;
 use super::roles::{Role, UsedColumn};
+use crate::config::build::known_stretches;
 use crate::config::dominant::{Oscillation, remove_outliers, values_of};
 use crate::error::InputError;
 use crate::tables::{Duplicates, RepeatedTimes, Table, lines_in_words, repeated_times};
@@ -36,6 +37,8 @@ pub struct RecordSummary {
     pub outliers: Option<(usize, f64)>,
     /// Onset of the response, s; `None` without an initial rest.
     pub begins: Option<f64>,
+    /// First and last time of the longest part without missing values of the input, s; `None` where none is missing.
+    pub known: Option<[f64; 2]>,
     /// Dominant frequency, Hz.
     pub frequency: Option<f64>,
     /// True if the samples drift along a straight line.
@@ -58,15 +61,23 @@ impl RecordSummary {
         let Some(column) = order.into_iter().find_map(channel) else {
             return Err(InputError::file(table.path(), "no column of a response"));
         };
-        let mut pairs = moving(table, &times, in_si(table, column)?)?;
+        let response = in_si(table, column)?;
         let spacings: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
         let spacing = median(&*spacings);
         let drives = [Role::Force, Role::BaseAcceleration, Role::BaseDisplacement];
         let input = drives.into_iter().find_map(channel);
         let mut input = input.map(|c| in_si(table, c)).transpose()?;
+        let mut part = 0..times.len();
         if let Some(input) = &mut input {
-            input.retain(|x| x.is_finite());
+            let longest = known_stretches(input)
+                .into_iter()
+                .max_by_key(|run| run.len());
+            part = longest.unwrap_or(part);
+            *input = input[part.clone()].to_vec();
         }
+        let known = (part.len() < times.len()).then(|| [times[part.start], times[part.end - 1]]);
+        let times = &times[part.clone()];
+        let mut pairs = moving(table, times, &response[part])?;
         let missing = times.len() - pairs.len();
         let outliers = remove_outliers(&mut pairs);
         let values = values_of(&pairs);
@@ -89,6 +100,7 @@ impl RecordSummary {
             channel: (column.role, column.factor()),
             outliers,
             begins: begins.map(|_| round_time(pairs[0].0, spacing)),
+            known,
             duration,
             spacing,
             is_regular: (spacings.iter()).all(|s| (s - spacing).abs() <= REGULAR * spacing),
@@ -116,8 +128,8 @@ impl RecordSummary {
 }
 
 /// Samples with their times. Refuses too few samples and constant ones.
-fn moving(table: &Table, times: &[f64], values: Vec<f64>) -> Result<Vec<(f64, f64)>, InputError> {
-    let pairs = times.iter().copied().zip(values);
+fn moving(table: &Table, times: &[f64], values: &[f64]) -> Result<Vec<(f64, f64)>, InputError> {
+    let pairs = times.iter().copied().zip(values.iter().copied());
     let pairs: Vec<(f64, f64)> = pairs.filter(|(_, value)| value.is_finite()).collect();
     if pairs.len() < FEWEST {
         return Err(InputError::file(table.path(), "too few samples")

@@ -1,5 +1,6 @@
 //! Roles of columns from their names and units.
 
+use crate::quantity_names::{is_foreign, quantity_of, without_base};
 use crate::tables::Table;
 use crate::units::{Quantity, ScaledUnit, Unit};
 
@@ -14,31 +15,6 @@ pub enum Role {
     BaseAcceleration,
     BaseDisplacement,
 }
-
-/// Prefixes of column names, in lower case, by role.
-const NAMES: [(Role, &[&str]); 5] = [
-    (Role::Time, &["time", "zeit", "uhrzeit", "t"]),
-    (
-        Role::Displacement,
-        &[
-            "disp", "pos", "defl", "angle", "roll", "pitch", "y", "x", "z", "u", "s",
-        ],
-    ),
-    (Role::Velocity, &["vel", "v"]),
-    (Role::Acceleration, &["acc", "a"]),
-    (Role::Force, &["force", "load", "torque", "f"]),
-];
-/// Words in a name that denote the base.
-const BASE: [&str; 5] = ["base", "table", "ground", "floor", "support"];
-/// Names that match only as whole words, not as prefixes (`roller` is not `roll`).
-const WHOLE: [&str; 2] = ["roll", "pitch"];
-/// Unit suffixes, in lower case, of quantities without a role.
-const FOREIGN: [&str; 18] = [
-    "hz", "khz", "rpm", "degc", "°c", "celsius", "kelvin", "%", "percent", "pa", "kpa", "mpa",
-    "bar", "ohm", "ma", "db", "kg", "volt",
-];
-/// Longest name that is compared as a single letter with a number or unit: `y1`.
-const LONGEST_LETTER: usize = 2;
 
 impl Role {
     /// All roles.
@@ -73,6 +49,16 @@ impl Role {
             Role::Velocity => Quantity::Velocity,
             Role::Acceleration | Role::BaseAcceleration => Quantity::Acceleration,
             Role::Force => Quantity::Force,
+        }
+    }
+
+    fn of(kind: Quantity) -> Self {
+        match kind {
+            Quantity::Time => Role::Time,
+            Quantity::Displacement => Role::Displacement,
+            Quantity::Velocity => Role::Velocity,
+            Quantity::Acceleration => Role::Acceleration,
+            Quantity::Force => Role::Force,
         }
     }
 
@@ -158,7 +144,8 @@ impl UsedColumn {
 /// Role and unit of a column from its name and stated unit.
 pub(super) fn known(table: &Table, index: usize) -> Option<UsedColumn> {
     let (label, is_base) = without_base(table.quantity_name(index));
-    let by_name = role_of(&label.to_lowercase());
+    let path = || quantity_of(table.headers().get(index)?);
+    let by_name = quantity_of(&label).or_else(path).map(Role::of);
     let stated = table.stated_unit(index);
     let roles = [
         Role::Time,
@@ -171,7 +158,8 @@ pub(super) fn known(table: &Table, index: usize) -> Option<UsedColumn> {
         let explicit = stated.explicit(role.kind()).map(|u| (u, false));
         explicit.or_else(|| stated.suffix(role.kind()).map(|u| (u, true)))
     };
-    let by_unit = roles.into_iter().find(|role| unit_of(*role).is_some());
+    let is_mechanical = |role: &Role| unit_of(*role).is_some_and(|(unit, _)| !unit.is_arbitrary());
+    let by_unit = roles.into_iter().find(is_mechanical);
     if by_unit.is_none() && is_foreign(&label) {
         return None;
     }
@@ -180,7 +168,8 @@ pub(super) fn known(table: &Table, index: usize) -> Option<UsedColumn> {
         .filter(|r| unit_of(*r).is_some())
         .or(by_unit)
         .or(by_name)?;
-    let found = unit_of(role);
+    let word = || stated.last_word(role.kind()).map(|u| (u, true));
+    let found = unit_of(role).or_else(word);
     let (unit, in_name) = found.unwrap_or((Unit::si(role.kind()), false));
     Some(UsedColumn {
         role: role.of_base().filter(|_| is_base).unwrap_or(role),
@@ -189,46 +178,4 @@ pub(super) fn known(table: &Table, index: usize) -> Option<UsedColumn> {
         unit,
         ..UsedColumn::guessed(index, role)
     })
-}
-
-/// A label without a word for the base, and true if it had one: `table_acc` is an acceleration of the base.
-fn without_base(label: &str) -> (String, bool) {
-    // ASCII lower case keeps the byte length.
-    let small = label.to_ascii_lowercase();
-    let found = BASE
-        .iter()
-        .find_map(|word| Some((small.find(word)?, word.len())));
-    let Some((at, length)) = found else {
-        return (label.to_owned(), false);
-    };
-    let rest = [&label[..at], &label[at + length..]].concat();
-    let is_separator = |c: char| matches!(c, '_' | ' ' | '-' | '.');
-    (rest.trim_start_matches(is_separator).to_owned(), true)
-}
-
-/// True for a name that ends with a unit of [`FOREIGN`].
-pub(super) fn is_foreign(label: &str) -> bool {
-    let small = label.to_lowercase();
-    let mut words = small.split(['_', ' ', '[', ']', '(', ')', '/']);
-    words.next();
-    words
-        .rfind(|word| !word.is_empty())
-        .is_some_and(|unit| FOREIGN.contains(&unit))
-}
-
-/// Role of a column by its name in lower case.
-fn role_of(name: &str) -> Option<Role> {
-    let bare = name
-        .split(['_', ' ', '[', '(', '/'])
-        .next()
-        .unwrap_or_default();
-    let means = |begin: &str| match begin.len() {
-        1 => bare.starts_with(begin) && bare.len() <= LONGEST_LETTER,
-        _ if WHOLE.contains(&begin) => bare.trim_end_matches(|c: char| c.is_ascii_digit()) == begin,
-        _ => bare.starts_with(begin),
-    };
-    let named = NAMES
-        .iter()
-        .find(|(_, begins)| begins.iter().any(|b| means(b)));
-    named.map(|(role, _)| *role)
 }

@@ -13,6 +13,10 @@ use kmcfit_core::internals::functions::CoefficientKind;
 pub struct Statements {
     /// Sampling rate of a table without a column of times, Hz.
     pub sample_rate: Option<f64>,
+    /// Column of the times, by name or number.
+    pub time: Option<String>,
+    /// Columns of responses, each with its quantity before it or without, `acceleration=ch1`.
+    pub responses: Vec<String>,
     /// Column of the force, by name or number.
     pub force: Option<String>,
     /// Column of the motion of the base.
@@ -140,10 +144,37 @@ impl ColumnStatements {
             is_used: vec![false; statements.units.len()],
             ..Self::default()
         };
-        for (option, name) in [("--force", &statements.force), ("--base", &statements.base)] {
-            let Some(name) = name else {
-                continue;
+        let stated = [
+            ("--time", &statements.time),
+            ("--force", &statements.force),
+            ("--base", &statements.base),
+        ];
+        let stated = stated
+            .into_iter()
+            .filter_map(|(option, name)| Some((option, name.as_ref()?)));
+        let responses = statements.responses.iter().map(|name| ("--response", name));
+        for (option, name) in stated.chain(responses) {
+            let quantity = name
+                .split_once('=')
+                .filter(|_| option == "--response" && column_of(table, name).is_none());
+            let response = match quantity {
+                Some((key, _)) => Some(
+                    Role::ALL
+                        .into_iter()
+                        .find(|r| r.is_channel() && r.key() == key.trim())
+                        .ok_or_else(|| {
+                            let keys = Role::ALL
+                                .into_iter()
+                                .filter(|role| role.is_channel())
+                                .map(Role::key);
+                            InputError::argument(option, "no such response")
+                                .found(quote(key))
+                                .expected(one_of(keys))
+                        })?,
+                ),
+                None => None,
             };
+            let name = quantity.map_or(name.as_str(), |(_, column)| column.trim());
             let index = column_of(table, name).ok_or_else(|| {
                 let labels: Vec<String> = (0..table.width()).map(|i| table.label(i)).collect();
                 InputError::argument(option, "no such column")
@@ -152,7 +183,14 @@ impl ColumnStatements {
             })?;
             let is_length =
                 || known(table, index).is_some_and(|own| own.role.kind() == Quantity::Displacement);
+            let own = || {
+                known(table, index)
+                    .map(|own| own.role)
+                    .filter(|role| role.is_channel())
+            };
             let role = match option {
+                "--time" => Role::Time,
+                "--response" => response.or_else(own).unwrap_or(Role::Displacement),
                 "--force" => Role::Force,
                 _ if is_length() => Role::BaseDisplacement,
                 _ => Role::BaseAcceleration,
@@ -162,7 +200,7 @@ impl ColumnStatements {
         for (place, entry) in statements.units.iter().enumerate() {
             let index = match Role::ALL.iter().find(|role| role.key() == entry.name) {
                 Some(role) => {
-                    let unit = parse(role.kind(), &entry.unit)?;
+                    let unit = parse(role.kind(), &entry.unit, None)?;
                     found.quantities.push((place, *role, unit));
                     continue;
                 }
@@ -170,7 +208,7 @@ impl ColumnStatements {
             };
             if let Some(index) = index {
                 found.is_used[place] = true;
-                let own = known(table, index).map(|column| column.role);
+                let own = known(table, index);
                 found.state(index, own, &entry.unit)?;
             }
         }
@@ -195,12 +233,19 @@ impl ColumnStatements {
     }
 
     /// States the unit of a column, and its role: its own where the unit is of its quantity, else the first that has this unit.
-    fn state(&mut self, index: usize, own: Option<Role>, text: &str) -> Result<(), InputError> {
-        let is_of = |role: &Role| Unit::recognise(role.kind(), split_factor(text).1).is_some();
+    fn state(
+        &mut self,
+        index: usize,
+        own: Option<UsedColumn>,
+        text: &str,
+    ) -> Result<(), InputError> {
+        let in_file = own.map(|column| column.unit);
+        let own = own.map(|column| column.role);
+        let is_of = |role: &Role| ScaledUnit::parse(role.kind(), text, None).is_ok();
         let any = || Role::ALL.into_iter().find(is_of);
         let role = own.filter(is_of).or_else(any);
         let role = role.ok_or_else(|| unknown_unit(text))?;
-        let unit = parse(role.kind(), text)?;
+        let unit = parse(role.kind(), text, in_file)?;
         self.columns.retain(|column| column.index != index);
         self.columns.push(ColumnStatement { index, role, unit });
         Ok(())
@@ -253,8 +298,8 @@ impl ColumnStatements {
 }
 
 /// A unit with a factor, for the option `--units`.
-fn parse(kind: Quantity, text: &str) -> Result<ScaledUnit, InputError> {
-    ScaledUnit::parse(kind, text).map_err(|error| InputError {
+fn parse(kind: Quantity, text: &str, in_file: Option<Unit>) -> Result<ScaledUnit, InputError> {
+    ScaledUnit::parse(kind, text, in_file).map_err(|error| InputError {
         place: InputError::argument("--units", "").place,
         problem: format!("{} of the {}", error.problem, kind.name()),
         ..error

@@ -9,7 +9,7 @@ use crate::record::Weighting;
 use crate::signal::{Spectrum, median_spacing};
 use crate::system::Grid;
 
-/// Number of intervals: with a penalty, more change neither estimate nor interval.
+/// Most intervals: with a penalty whose weight the data choose, more change neither estimate nor interval.
 const INTERVALS: usize = 40;
 /// Samples per interval.
 const SAMPLES_PER_INTERVAL: usize = 10;
@@ -51,10 +51,16 @@ impl Builder {
             .sum();
         let room = (FEW_PARAMETERS - OTHERS) / keys.len();
         let most = grid.nodes().saturating_sub(5).min(room.saturating_sub(3));
-        let slow = self.periods().map_or(INTERVALS, |periods| {
+        let slow = self.periods().map_or(usize::MAX, |periods| {
             (periods / PERIODS_PER_INTERVAL) as usize
         });
-        let intervals = INTERVALS
+        // The light penalty of the equation error leaves the smoothness to the knots.
+        let richest = if self.is_equation_error() {
+            most
+        } else {
+            INTERVALS
+        };
+        let intervals = richest
             .min(samples / SAMPLES_PER_INTERVAL)
             .min(most)
             .min(slow)

@@ -118,6 +118,11 @@ impl Parameterization {
         &self.scalars
     }
 
+    /// True without a function of several parameters.
+    pub fn are_constants(&self) -> bool {
+        self.iter().all(|f| f.parameters() <= 1)
+    }
+
     /// Range of the scalars in `theta`.
     pub fn scalar_range(&self) -> Range<usize> {
         let first = self.function_parameters();

@@ -338,16 +338,8 @@ impl Maker<'_> {
                 .map(|f| image(&f.undetermined))
                 .collect(),
             sizes: self.nodes.iter().map(size).collect(),
-            basis_error: match self.is_penalised(f) {
-                true => vec![0.0; self.nodes.len()],
-                false => basis_error(functions.get(f), &self.theta[range], &self.times),
-            },
+            basis_error: basis_error(self.problem, f, self.theta, &self.times),
         }
-    }
-
-    /// True if a penalty smooths function `f`.
-    fn is_penalised(&self, f: usize) -> bool {
-        self.problem.penalties.iter().any(|p| p.function == f)
     }
 
     fn band(

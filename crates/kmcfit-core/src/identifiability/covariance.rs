@@ -120,10 +120,14 @@ impl Information {
         let functions = problem.functions.scalar_range().start;
         let scores = Scores::of(equation, &sensitivity, theta, functions);
         let measured = sensitivity.jacobian.clone();
-        Self {
+        let information = Self {
             scores: Some(scores),
             kernels: Vec::new(),
             ..Self::of_measured(problem, theta, sensitivity, measured)
+        };
+        match &equation.change {
+            Some(change) => information.with_error(change),
+            None => information,
         }
     }
 
@@ -257,7 +261,19 @@ impl Information {
         };
         let mut answers = &self.measured * &inverse_root;
         if let Some(scores) = &self.scores {
-            return kernel_root(scores, &inverse_root, answers.norm_squared(), undetermined);
+            let root = scores.root(&inverse_root, answers.norm_squared());
+            let Some(root) = root else {
+                return CovarianceRoot {
+                    root: DMatrix::zeros(n, 0),
+                    undetermined: DMatrix::identity(n, n),
+                    variance: None,
+                };
+            };
+            return CovarianceRoot {
+                root: self.with_shift(root, &inverse_root),
+                undetermined: scores.undetermined(undetermined),
+                variance: None,
+            };
         }
         let variance = self.variance(&answers);
         if let Some(variance) = variance {
@@ -358,25 +374,6 @@ impl Information {
             () if squares == 0.0 => self.rounding.powi(2),
             () => squares / left,
         })
-    }
-}
-
-/// Covariance root from the scores of an equation error; all directions are undetermined if these have no covariance.
-fn kernel_root(
-    scores: &Scores,
-    inverse_root: &DMatrix<f64>,
-    effective: f64,
-    undetermined: DMatrix<f64>,
-) -> CovarianceRoot {
-    let all = inverse_root.nrows();
-    let (root, undetermined) = match scores.root(inverse_root, effective) {
-        Some(root) => (root, scores.undetermined(undetermined)),
-        None => (DMatrix::zeros(all, 0), DMatrix::identity(all, all)),
-    };
-    CovarianceRoot {
-        root,
-        undetermined,
-        variance: None,
     }
 }
 

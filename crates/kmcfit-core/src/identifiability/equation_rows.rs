@@ -8,7 +8,7 @@
 //! ```
 //!
 //! with the kernel covariance `S` of the scores ([`KernelCovariance`]): no assumption is made on the variance and the correlation of the
-//! residuals. It **excludes** the bias by errors of the rows, which contain the measured response.
+//! residuals. Where a misfit makes the estimates depend on the width of the bump functions, their change is a further root of the covariance. It **excludes** the bias by errors of the rows, which contain the measured response.
 
 use super::active::ActiveRow;
 use super::columns::with_column;
@@ -26,6 +26,8 @@ pub struct EquationRows {
     pub residuals: Vec<f64>,
     /// Rows of each record, in time order.
     pub records: Vec<Range<usize>>,
+    /// Change of each row by that of the estimates with the width of the bump functions, where a misfit makes them depend on it.
+    pub change: Option<DVector<f64>>,
     /// Linear forms of the parameters held besides the constraints, as columns and coefficients: nuisance parameters, and the mean of the
     /// mass where the common scale of the functions is undetermined.
     pub held: Vec<Vec<(usize, f64)>>,

@@ -53,14 +53,7 @@ pub(crate) fn means_at(
         row.for_each(|(j, b)| gradient[first + j] += factor * b);
     };
     let errors: Vec<Vec<f64>> = (0..values.len())
-        .map(|f| {
-            let is_penalised = problem.penalties.iter().any(|p| p.function == f);
-            let range = functions.ranges()[f].clone();
-            match is_penalised {
-                true => vec![0.0; nodes],
-                false => basis_error(functions.get(f), &theta[range], &times),
-            }
-        })
+        .map(|f| basis_error(problem, f, theta, &times))
         .collect();
     let record = |value, basis_error, gradient| MeanOverRecord {
         value,

@@ -2,15 +2,18 @@
 
 use crate::signal::SecondOrder;
 use crate::system::TimePoint;
+use std::sync::OnceLock;
 
 /// Responses of all experiments, estimated from their samples.
 ///
 /// For a single channel of equally spaced accelerations the response is integrated in a band around its dominant frequency,
 /// and force and base pass the same filter. For other channels a smooth curve through all samples is differentiated.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Measurements {
     /// One entry per experiment; `None` for an experiment without samples.
     pub(crate) experiments: Vec<Option<Measured>>,
+    /// Halvings of the width of the bump functions of the weak form, once they are chosen for a problem with these records.
+    pub(crate) halvings: OnceLock<i32>,
 }
 
 /// State of an experiment at some times, with force and base acceleration.

@@ -78,6 +78,8 @@ struct Attempts<'a, 'w> {
     /// True if several starting points may be tried.
     has_several: bool,
     truncated: Option<(StartStrategy, Prepared)>,
+    /// Minimum of the equation error, once it is computed.
+    from_data: Option<Vec<f64>>,
     /// Cost and gradient at the start values, the reference of all attempts.
     reference: Option<Reference>,
     /// Work before and between the searches.
@@ -108,6 +110,7 @@ impl<'a, 'w> Attempts<'a, 'w> {
             watch,
             has_several,
             truncated: None,
+            from_data: None,
             reference: None,
             counts: SolveCounts::default(),
             timings: Timings::default(),
@@ -207,11 +210,19 @@ impl<'a, 'w> Attempts<'a, 'w> {
         is_last
     }
 
+    /// Minimum of the equation error, which two strategies start from.
+    fn equation_error_start(&mut self) -> Vec<f64> {
+        let (problem, start) = (self.problem, self.start);
+        let find = || {
+            timed(&mut self.timings.start, || {
+                equation_error_start(problem, start)
+            })
+        };
+        self.from_data.get_or_insert_with(find).clone()
+    }
+
     fn starting_point(&mut self, strategy: StartStrategy) -> Prepared {
         let (problem, start) = (self.problem, self.start);
-        let equation_error_start = |timings: &mut Timings| {
-            timed(&mut timings.start, || equation_error_start(problem, start))
-        };
         let parameters = match strategy {
             StartStrategy::Truncated { .. } => match self.truncated.take() {
                 Some((_, prepared)) => return prepared,
@@ -222,11 +233,11 @@ impl<'a, 'w> Attempts<'a, 'w> {
             | StartStrategy::WithoutOutliers
             | StartStrategy::Continued => start.to_vec(),
             StartStrategy::EquationError => {
-                let found = equation_error_start(&mut self.timings);
+                let found = self.equation_error_start();
                 problem.feasible_or(found, start)
             }
             StartStrategy::GrowingHorizon => {
-                let from = equation_error_start(&mut self.timings);
+                let from = self.equation_error_start();
                 let (found, counts, timings) =
                     growing_horizon_start(problem, from, &self.probing, self.watch);
                 self.counts += counts;

@@ -113,6 +113,13 @@ pub fn read(
     let source = Source::of(file, spec, wanted, &column_key, (id, own))?;
     let tables = source.tables(notes)?;
     let table = source.table(&tables)?;
+    for note in table.notes() {
+        let text = note.clone();
+        notes.state(
+            &file.experiment_name(wanted.experiment),
+            &DataFact::File { text },
+        );
+    }
     let column_key = match own {
         Some(_) => format!("{column_key}.column"),
         None => column_key,
@@ -438,7 +445,7 @@ fn two_times(file: &ModelFile, experiment: &str) -> InputError {
 }
 
 /// First and last time of the window, on the time axis of the file.
-fn window(
+pub fn window(
     file: &ModelFile,
     experiment: &str,
     spec: &ExperimentSpec,

@@ -131,6 +131,9 @@ pub enum DataFact {
     /// Times that are equally spaced but for the rounding of their printed digits.
     #[error("times printed with {digits} decimals: taken as equally spaced, at {} Hz", significant(*rate, 9))]
     RoundedTimes { digits: usize, rate: f64 },
+    /// Treatment of a file when it is read: common times, units of clocks, lines that are left out.
+    #[error("{text}")]
+    File { text: String },
     /// Gaps in the times or samples of a channel.
     #[error("{} in the {channel}, {}: {}", counted(*count, "gap"), gaps_in_words(places, *count), action.words())]
     Gaps {

@@ -1,6 +1,6 @@
 //! Excitation of an experiment: force and base motion.
 
-use super::column_samples::{self, ColumnRequest};
+use super::column_samples::{self, ColumnRequest, ColumnSamples};
 use super::data_facts::{DataAction, DataFact, RecordNotes};
 use super::faults::{Column, is_coarse, quantisation_step};
 use crate::config::ModelFile;
@@ -11,6 +11,7 @@ use crate::units::Quantity;
 use kmcfit_core::internals::diagnostics::standard_deviation;
 use kmcfit_core::internals::record::{BaseMotion, Input, Waveform};
 use kmcfit_core::internals::signal::{ExcitationShape, Interpolation, Signal, SweepLaw};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Excitation of an experiment, as samples or shapes.
@@ -194,7 +195,46 @@ fn base(
     Ok(Some(BaseMotion::Displacement(signal)))
 }
 
-/// A column as a signal. Refuses missing samples, because an excitation acts at all times.
+/// Stretches without missing values, as ranges of rows.
+pub(in crate::config) fn known_stretches(values: &[f64]) -> Vec<Range<usize>> {
+    let mut stretches: Vec<Range<usize>> = Vec::new();
+    for i in (0..values.len()).filter(|i| !values[*i].is_nan()) {
+        match stretches.last_mut().filter(|run| run.end == i) {
+            Some(run) => run.end += 1,
+            None => stretches.push(i..i + 1),
+        }
+    }
+    stretches
+}
+
+fn gaps(
+    file: &ModelFile,
+    key: &str,
+    source: &ColumnSamples,
+    known: &[Range<usize>],
+    zero: f64,
+) -> InputError {
+    let missing = source.values.iter().filter(|v| v.is_nan()).count();
+    let first = source.values.iter().position(|v| v.is_nan()).unwrap_or(0);
+    let error = file
+        .error_at(key, "the input has gaps")
+        .found(format!(
+            "{missing} of {} values missing, the first at {} s",
+            source.values.len(),
+            source.times[first] + zero
+        ))
+        .expected("a value in every row of the window: it acts at all times");
+    match known.iter().max_by_key(|run| run.len()) {
+        Some(run) => error.hint(format!(
+            "`window: {{min: {}, max: {}}}` is the longest part without gaps",
+            source.times[run.start] + zero,
+            source.times[run.end - 1] + zero
+        )),
+        None => error,
+    }
+}
+
+/// A column as a signal. Refuses missing samples in the window, because an excitation acts at all times.
 fn signal(
     file: &ModelFile,
     spec: &ExperimentSpec,
@@ -209,17 +249,23 @@ fn signal(
     };
     let mut source = column_samples::read(file, &unbounded, wanted, notes)?;
     let key = format!("experiments[{}].columns.{}", wanted.experiment, wanted.name);
-    let missing = source.values.iter().filter(|v| v.is_nan()).count();
-    if missing > 0 {
-        let first = source.values.iter().position(|v| v.is_nan()).unwrap_or(0);
-        return Err(file
-            .error_at(&key, "the input has gaps")
-            .found(format!(
-                "{missing} of {} values missing, the first at {} s",
-                source.values.len(),
-                source.times[first]
-            ))
-            .expected("a value in every row: it acts at all times"));
+    let [from, to] =
+        column_samples::window(file, &format!("experiments[{}]", wanted.experiment), spec)?;
+    let known = known_stretches(&source.values);
+    let last = source.times.len() - 1;
+    let zero = spec.time_zero.map_or(0.0, |t| t.0);
+    let [from, to] = [
+        (from - zero).max(source.times[0]),
+        (to - zero).min(source.times[last]),
+    ];
+    let covers =
+        |run: &&Range<usize>| source.times[run.start] <= from && source.times[run.end - 1] >= to;
+    match known.iter().find(covers).cloned() {
+        Some(run) => {
+            source.times = source.times[run.clone()].to_vec();
+            source.values = source.values[run].to_vec();
+        }
+        None => return Err(gaps(file, &key, &source, &known, zero)),
     }
     let column = Column {
         file,

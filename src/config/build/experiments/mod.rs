@@ -27,6 +27,7 @@ pub(in crate::config) use channel::sensor_of;
 pub(super) use data_facts::RecordNotes;
 pub use delays::DelayLimits;
 use excitation::RawExcitation;
+pub(in crate::config) use excitation::known_stretches;
 use kmcfit_core::internals::builder::{self, ChannelSpec, ScalarSpec, listed};
 use kmcfit_core::internals::functions::{Prior, ScalarParameter};
 use kmcfit_core::internals::record::{ChannelKind, Experiment, InputErrorKind};

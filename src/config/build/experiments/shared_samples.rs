@@ -39,7 +39,12 @@ pub fn refuse_one_column_twice(
     Ok(())
 }
 
-/// Refuses a record whose response is its input, sample by sample.
+/// Factors between units in which one signal is written twice: the same, g and m/s^2, thousandths, hundredths.
+const FACTORS: [f64; 7] = [1.0, 9.806_65, 1.0 / 9.806_65, 1e3, 1e-3, 1e2, 1e-2];
+/// Difference of such signals by the rounding of seven digits, relative to their largest value; noise of sensors is above it.
+const ROUNDING: f64 = 1e-6;
+
+/// Refuses a record whose response is its input, sample by sample, also in another unit.
 ///
 /// # Errors
 /// At the response.
@@ -51,9 +56,15 @@ pub fn refuse_input_as_response(
     let Some((name, signal)) = record.excitation.samples() else {
         return Ok(());
     };
+    let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let is_input = |channel: &&RawChannel| {
-        let same = channel.values.iter().zip(signal.values());
-        channel.values.len() == signal.values().len() && same.into_iter().all(|(a, b)| a == b)
+        let (values, most) = (&channel.values, largest(&channel.values));
+        let slack = |factor: f64| if factor == 1.0 { 0.0 } else { ROUNDING * most };
+        let same = |factor: &f64| {
+            let mut pairs = values.iter().zip(signal.values());
+            pairs.all(|(a, b)| (a - factor * b).abs() <= slack(*factor))
+        };
+        values.len() == signal.values().len() && FACTORS.iter().any(same)
     };
     match record.channels.iter().find(is_input) {
         Some(channel) => Err(refused(file, i, [name, channel.kind.name()])),

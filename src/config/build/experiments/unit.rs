@@ -32,6 +32,16 @@ impl QuantityColumn<'_> {
         if let Some(text) = self.given {
             return self.given_unit(text, warnings);
         }
+        let unapplied = self.table.unapplied(self.index);
+        if !unapplied.is_empty() {
+            let warning = DataWarning::ScaleNotApplied {
+                column: self.table.label(self.index),
+                stated: unapplied.join(", "),
+                quantity: self.name.to_owned(),
+                unit: Unit::si(self.kind).symbol().to_owned(),
+            };
+            warnings.push(warning.at(&format!("{}.columns.{}", self.experiment, self.name)));
+        }
         self.stated_unit(warnings).map(ScaledUnit::from)
     }
 
@@ -42,12 +52,13 @@ impl QuantityColumn<'_> {
     ) -> Result<ScaledUnit, InputError> {
         let Self { name, kind, .. } = *self;
         let units_key = format!("{}.units.{name}", self.experiment);
-        let scaled = ScaledUnit::parse(kind, &text.0)
-            .map_err(|error| self.file.error_about(&units_key, error))?;
         let stated = self.table.stated_unit(self.index);
         let other = stated.explicit(kind).or(stated.suffix(kind));
+        let scaled = ScaledUnit::parse(kind, &text.0, other)
+            .map_err(|error| self.file.error_about(&units_key, error))?;
         let unit = scaled.unit;
-        if let Some(other) = other.filter(|other| other.factor() != unit.factor()) {
+        let differs = |other: &Unit| !other.is_arbitrary() && other.factor() != unit.factor();
+        if let Some(other) = other.filter(differs) {
             let warning = DataWarning::UnitDiffersFromFile {
                 column: self.table.label(self.index),
                 used: unit.symbol().into(),
@@ -64,12 +75,25 @@ impl QuantityColumn<'_> {
         let stated = self.table.stated_unit(self.index);
         let columns_key = format!("{}.columns.{name}", self.experiment);
         let label = self.table.label(self.index);
-        let (si, suffix) = (Unit::si(kind), stated.suffix(kind));
+        let (si, suffix) = (
+            Unit::si(kind),
+            stated.suffix(kind).or(stated.last_word(kind)),
+        );
         let differs = |unit: &Unit, used: Unit| unit.factor() != used.factor();
         self.table.check_stated_unit(self.index).map_err(|error| {
             let way_out = format!("state the unit in the model: `units: {{{name}: …}}`");
             error.key(&*columns_key).hint(way_out)
         })?;
+        let found = stated.explicit(kind).or(suffix);
+        if let Some(volts) = found.filter(Unit::is_arbitrary) {
+            let warning = DataWarning::Volts {
+                column: label,
+                quantity: name.to_owned(),
+                unit: volts.symbol().into(),
+            };
+            warnings.push(warning.at(&columns_key));
+            return Ok(volts);
+        }
         if let Some(unit) = stated.explicit(kind) {
             if let Some(other) = suffix.filter(|other| differs(other, unit)) {
                 let warning = DataWarning::UnitDiffersFromName {
@@ -92,7 +116,7 @@ impl QuantityColumn<'_> {
             return Ok(si);
         }
         let warning = match suffix {
-            // A name like `phi_rad` or `acc_V` has the symbol of the unit for reports.
+            // A name like `phi_rad` has the symbol of the unit for reports.
             Some(unit) if !differs(&unit, si) => return Ok(unit),
             Some(unit) => DataWarning::UnitOfNameUnused {
                 column: label,

@@ -26,12 +26,36 @@ pub(crate) enum DataWarning {
         stated: String,
     },
     /// The file states a unit that the program cannot convert.
-    #[error("unknown unit `{stated}` of {quantity} in column `{column}`; {used} is assumed")]
+    #[error(
+        "the unit `{stated}` of the {quantity} in the column `{column}` is not known: {used} is assumed; state one under `units`"
+    )]
     UnknownUnit {
         column: String,
         stated: String,
         quantity: &'static str,
         used: String,
+    },
+    /// The samples are voltages of a sensor whose sensitivity is not stated.
+    #[error(
+        "the {} in the column `{column}` is in {unit}: state the sensitivity of its sensor, as in `units: {{{quantity}: \
+         10 V/(m/s²)}}`",
+        quantity.replace('_', " ")
+    )]
+    Volts {
+        column: String,
+        quantity: String,
+        unit: String,
+    },
+    /// The file states a scale by a name that no convention defines.
+    #[error(
+        "the file states {stated} for the column `{column}`, which is not applied: state what one unit of its numbers is, as in \
+         `units: {{{quantity}: 0.1 {unit}}}`"
+    )]
+    ScaleNotApplied {
+        column: String,
+        stated: String,
+        quantity: String,
+        unit: String,
     },
     /// Neither the model nor the file states the unit of a column. A statement beside a result, and no warning.
     #[error("{} in {unit} (column `{column}`)", quantity.replace('_', " "))]
@@ -240,7 +264,11 @@ impl DataWarning {
     /// Kind of [`DataWarning::UnitAssumed`].
     pub const UNIT_ASSUMED: &str = "unit_assumed";
     /// Kinds of the warnings that show a wrong unit.
-    pub const DOUBTFUL_UNITS: [&str; 4] = [
+    pub const DOUBTFUL_UNITS: [&str; 8] = [
+        "scale_not_applied",
+        "unknown_unit",
+        "unit_of_name_unused",
+        "volts",
         "implausible_magnitudes",
         "mains_hum",
         "suspicious_factor",

@@ -9,6 +9,8 @@
 
 use crate::functions::{Basis, CoefficientFunction, CoefficientKind, Parameterization};
 use crate::problem::{FEW_PARAMETERS, Problem};
+use crate::record::Experiment;
+use crate::signal::{Spectrum, median_spacing};
 use crate::solvers::linearization::{Linearization, linearise};
 use crate::solvers::timings::Timings;
 use crate::system::Term;
@@ -20,6 +22,9 @@ use std::f64::consts::TAU;
 const FREQUENCIES: usize = 25;
 /// Periods of the lowest frequency in the shortest record, and samples per period of the highest one.
 const LIMITS: [f64; 2] = [2.0, 2.5];
+/// Largest ratio of a natural frequency to the dominant one of a free response of constants: an octave, so that two modes, harmonics and
+/// friction leave it within.
+const NEAR: f64 = 2.0;
 /// Steps from each frequency, and further ones from those kept.
 const SCAN_STEPS: [u64; 2] = [2, 4];
 /// Frequencies that are kept after the first steps.
@@ -206,7 +211,8 @@ fn descents(problem: &Problem, steps: u64, starts: Vec<Vec<f64>>) -> Vec<(Vec<f6
     points.filter(|(_, cost)| cost.is_finite()).collect()
 }
 
-/// Natural frequencies of the scan, rad/s: equally spaced logarithms between [`LIMITS`].
+/// Natural frequencies of the scan, rad/s: equally spaced logarithms between [`LIMITS`]; of constants in free records those near the
+/// dominant frequency of a channel.
 fn frequencies(problem: &Problem) -> Option<Vec<f64>> {
     let channels = || problem.channels().filter(|c| c.len() > 1);
     let length = |times: &[f64]| times[times.len() - 1] - times[0];
@@ -219,7 +225,19 @@ fn frequencies(problem: &Problem) -> Option<Vec<f64>> {
     (low > 0.0 && high > low && high.is_finite()).then_some(())?;
     let share = |i: usize| i as f64 / (FREQUENCIES - 1) as f64;
     let all = (0..FREQUENCIES).map(|i| low * (high / low).powf(share(i)));
-    Some(all.collect())
+    let dominant = channels().filter_map(|c| {
+        let spectrum = Spectrum::of(c.observed(), median_spacing(c.times()))?;
+        Some(TAU * spectrum.dominant())
+    });
+    let dominant: Vec<f64> = match problem.functions.are_constants()
+        && problem.experiments.iter().all(Experiment::is_free)
+    {
+        true => dominant.collect(),
+        false => Vec::new(),
+    };
+    let is_near = |omega: &f64| dominant.iter().any(|d| (omega / d).max(d / omega) <= NEAR);
+    let near: Vec<f64> = all.clone().filter(is_near).collect();
+    Some(if near.is_empty() { all.collect() } else { near })
 }
 
 /// Levenberg–Marquardt steps in the logarithms of positive mass, damping and stiffness.
@@ -309,5 +327,32 @@ impl<'a> Descent<'a> {
             false => t + scale * step,
         })
         .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::{BasisSpec, Builder, CoefficientSpec, Knots, Record, Start};
+
+    /// Free decay of 5 rad/s in 40 s: constants are scanned within an octave of it, a stiffness on knots over the whole range.
+    #[test]
+    fn constants_of_a_free_record_are_scanned_near_its_frequency() {
+        let times: Vec<f64> = (0..801).map(|i| 0.05 * f64::from(i)).collect();
+        let decay = |t: &f64| (-0.05 * t).exp() * (5.0 * t).cos();
+        let samples: Vec<f64> = times.iter().map(decay).collect();
+        let scanned = |stiffness: CoefficientSpec| {
+            let parts = [1.0, 0.2].map(CoefficientSpec::constant);
+            let [mass, damping] = parts;
+            let record = Record::new("decay").displacement(&times, &samples);
+            let builder = Builder::new([mass, damping, stiffness]).record(record);
+            frequencies(&builder.build().expect("a problem")).expect("frequencies")
+        };
+        let near = scanned(CoefficientSpec::constant(10.0));
+        assert!((5..=10).contains(&near.len()), "{near:?}");
+        assert!(near[0] >= 2.4 && near[near.len() - 1] <= 10.2, "{near:?}");
+        let basis = BasisSpec::PiecewiseLinear(Knots::Count(3));
+        let varying = CoefficientSpec::estimated(basis, Start::Constant(10.0));
+        assert_eq!(scanned(varying).len(), FREQUENCIES);
     }
 }

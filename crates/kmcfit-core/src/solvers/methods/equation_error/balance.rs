@@ -2,6 +2,7 @@
 
 use super::equation::{EquationForm, Equations};
 use super::nodal;
+use super::widths;
 use crate::functions::CoefficientKind;
 use crate::problem::Problem;
 use crate::record::Measurements;
@@ -97,6 +98,7 @@ pub struct EquationBalance {
 /// response, and without records.
 pub fn equation_balance(problem: &Problem, theta: &[f64]) -> Option<EquationBalance> {
     let measurements = Measurements::with_scalars(problem, problem.scalars(theta)).ok()?;
+    widths::choose(problem, &measurements);
     let equations = Equations::of(problem, &measurements);
     if equations.list.is_empty() {
         return None;

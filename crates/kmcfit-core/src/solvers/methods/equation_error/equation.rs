@@ -6,7 +6,8 @@
 //! response. The weak form is used where the bump functions outnumber the parameters of all functions eight times and these are at most
 //! [`FEW_PARAMETERS`]; a function with one value per node needs equations that are local in time, and has the pointwise form.
 
-use super::bumps::{Bumps, noise_gain};
+use super::bump_lengths;
+use super::bumps::Bumps;
 use super::nodal;
 use super::response::blend;
 use super::restored::restored;
@@ -14,18 +15,9 @@ use super::robust::ResidualLoss;
 use crate::functions::{Basis, CoefficientFunction};
 use crate::problem::{FEW_PARAMETERS, Problem};
 use crate::qp::Subproblem;
-use crate::record::{ChannelKind, Experiment};
-use crate::record::{Measured, Measurements};
-use crate::simd::sum::rms;
-use crate::solvers::state_estimation::{noise_of, unsensed};
+use crate::record::{Experiment, Measured, Measurements};
 use crate::system::{NodalCoefficients, Term, TimePoint};
-use std::f64::consts::TAU;
 
-/// Half length of a bump function in periods.
-const HALF_LENGTH: f64 = 0.35;
-/// Noise of the averaged acceleration relative to its root mean square, up to which a bump function is as short as the acceleration
-/// allows. The noise of the factors biases the estimates by about the square of this ratio.
-const NOISE_SHARE: f64 = 0.01;
 /// Relative decrease of the cost from which a restored state is used.
 const RESTORED: f64 = 1e-6;
 /// Fewest bump functions per parameter.
@@ -282,25 +274,36 @@ pub(super) struct Equations<'a> {
 }
 
 impl<'a> Equations<'a> {
-    /// The equations in the form that the module comment states, with the losses of the channels.
+    /// The equations in the form that the module comment states, with the losses of the channels and bump functions of the width that
+    /// was chosen for the measurements, else of the largest one.
     pub fn of(problem: &'a Problem, measurements: &'a Measurements) -> Self {
+        let halvings = measurements.halvings.get().copied();
+        Self::of_width(problem, measurements, halvings.unwrap_or(0))
+    }
+
+    /// [`Equations::of`] with bump functions whose width is halved `halvings` times.
+    pub fn of_width(problem: &'a Problem, measurements: &'a Measurements, halvings: i32) -> Self {
         let pairs = problem.experiments.iter().zip(&measurements.experiments);
         let pairs: Vec<(&Experiment, &Measured)> = pairs
             .filter_map(|(experiment, measured)| Some((experiment, measured.as_ref()?)))
             .collect();
-        let step = problem.system.grid.step();
-        let bumps = pairs.iter().map(|(experiment, measured)| {
-            let measured = measured.in_weak_form();
-            let samples = half_length(experiment, measured) / measured.weight;
-            let half = (samples.round() as usize).clamp(1, measured.places.len());
-            Bumps::of(&measured.runs(step), half)
-        });
-        let bumps: Vec<Bumps> = bumps.collect();
+        let bumps = |halvings| -> Vec<Bumps> {
+            let each = pairs.iter().map(|(experiment, measured)| {
+                bump_lengths::bumps(problem, experiment, measured.in_weak_form(), halvings)
+            });
+            each.collect()
+        };
         let parameters = problem.functions.scalar_range().start;
-        let count: usize = bumps.iter().map(Bumps::count).sum();
+        let widest = bumps(0);
+        let count: usize = widest.iter().map(Bumps::count).sum();
         let is_weak = parameters <= FEW_PARAMETERS && count >= FEWEST * parameters.max(1);
+        let bumps = if halvings > 0 {
+            bumps(halvings)
+        } else {
+            widest
+        };
         let list = pairs
-            .into_iter()
+            .iter()
             .zip(bumps)
             .map(|((experiment, measured), bumps)| {
                 let equation = match is_weak {
@@ -319,6 +322,20 @@ impl<'a> Equations<'a> {
             },
             list: list.collect(),
         }
+    }
+
+    /// Changes the width of the bump functions of the weak form; true if it is another one.
+    pub fn set_halvings(&mut self, problem: &Problem, halvings: i32) -> bool {
+        let mut is_changed = false;
+        for equation in &mut self.list {
+            if let Some(bumps) = &mut equation.bumps {
+                let next =
+                    bump_lengths::bumps(problem, equation.experiment, equation.measured, halvings);
+                is_changed |= next.length() != bumps.length();
+                *bumps = next;
+            }
+        }
+        is_changed
     }
 
     /// [`Equations::of`] with restored nonlinear terms and the scales of robust losses at the parameters `theta`.
@@ -360,34 +377,4 @@ fn is_continuous(function: &CoefficientFunction) -> bool {
         Some(_) => true,
         None => function.offset.windows(2).all(|pair| pair[0] == pair[1]),
     }
-}
-
-/// Half length of the bump functions of a record, s: 0.35 periods of the acceleration, whose frequency is `rms(y'')/rms(y')`. Where the
-/// noise of the averaged acceleration then exceeds [`NOISE_SHARE`], they are longer, up to 0.35 periods of the displacement,
-/// `rms(y')/rms(y)`.
-fn half_length(experiment: &Experiment, measured: &Measured) -> f64 {
-    let series = [&measured.y, &measured.v, &measured.a];
-    let [y, v, a] = series.map(|series| {
-        let filtered = measured.filtered(series.clone());
-        let mean = filtered.iter().sum::<f64>() / filtered.len().max(1) as f64;
-        rms(&filtered.iter().map(|x| x - mean).collect::<Vec<f64>>())
-    });
-    let length = |ratio: f64| HALF_LENGTH * TAU * ratio;
-    let (shortest, longest) = (length(v / a), length(y / v));
-    let quiet = experiment.channels.iter().map(|channel| {
-        let order = match channel.kind() {
-            ChannelKind::Displacement => 2,
-            ChannelKind::Velocity => 1,
-            ChannelKind::Acceleration => 0,
-        };
-        let times = channel.times();
-        let spacing = (times[times.len() - 1] - times[0]) / (times.len().max(2) - 1) as f64;
-        let (values, gain) = unsensed(channel, &[]);
-        let noise = noise_of(channel, &values) / gain.abs();
-        let variance = noise_gain(order) * spacing * noise * noise;
-        let ratio = variance / (NOISE_SHARE * a).powi(2);
-        ratio.powf(1.0 / (2 * order + 1) as f64)
-    });
-    let quiet = quiet.fold(f64::INFINITY, f64::min);
-    quiet.max(shortest.min(longest)).min(shortest.max(longest))
 }

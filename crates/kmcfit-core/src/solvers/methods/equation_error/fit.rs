@@ -1,6 +1,7 @@
 //! Equation-error method: minimises the residual of the equation of motion, one convex problem.
 
 use super::equation::{Equation, EquationForm, Equations};
+use super::widths;
 use super::{Accuracy, ConvexMinimum, minimise};
 use crate::host::Instant;
 use crate::objective::{Evaluation, Gradient};
@@ -175,6 +176,7 @@ struct Cost<'a> {
 
 impl<'a> Cost<'a> {
     fn of(problem: &'a Problem, measurements: &'a Measurements) -> Self {
+        widths::choose(problem, measurements);
         Self {
             problem,
             measurements,

@@ -38,6 +38,7 @@ impl Measurements {
         let experiments = problem.experiments.iter().enumerate().map(one);
         Ok(Self {
             experiments: experiments.collect::<Result<_, _>>()?,
+            ..Self::default()
         })
     }
 

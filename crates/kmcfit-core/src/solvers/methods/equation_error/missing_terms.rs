@@ -10,13 +10,14 @@
 //! with the [kernel covariance](KernelCovariance) of the scores `z_i (e_i - p z_i)`. A term is missing where `t` is large; it is
 //! added, and the remaining candidates are tested again.
 
+use super::dense_rows::DenseRows;
 use super::equation::{EquationForm, Equations};
 use super::rows::measurements_at;
 use super::scale_row;
+use super::widths;
 use crate::functions::CoefficientKind;
 use crate::noise::KernelCovariance;
 use crate::problem::{FEW_PARAMETERS, Problem};
-use crate::qp::Subproblem;
 use crate::simd::sum::rms;
 use crate::system::Term;
 use nalgebra::{DMatrix, DVector};
@@ -66,6 +67,7 @@ pub fn missing_terms(problem: &Problem, theta: &[f64]) -> Vec<MissingTerm> {
     let Ok(measurements) = measurements_at(problem, theta) else {
         return Vec::new();
     };
+    widths::choose(problem, &measurements);
     let equations = Equations::at(problem, &measurements, theta);
     if equations.form != EquationForm::Weak {
         return Vec::new();
@@ -108,10 +110,22 @@ fn candidates(problem: &Problem, equations: &Equations) -> Vec<Candidate> {
         kinds.any(|k| k == kind)
     };
     let in_bands = measured().any(|m| m.corner.is_some());
-    let kinds = TESTED_TERMS.into_iter();
+    // Where the model has no spring, a nonlinear one takes the place of another misfit: only a linear one is tested.
+    let is_spring = |f: &&usize| problem.functions.get(**f).quantity == CoefficientKind::Stiffness;
+    let has_spring = set.iter().find(is_spring).is_some_and(|f| {
+        let function = problem.functions.get(*f);
+        function.parameters() > 0 || function.offset.iter().any(|k| *k != 0.0)
+    });
+    let kinds = TESTED_TERMS.into_iter().map(|kind| match kind {
+        CoefficientKind::CubicStiffness if !has_spring => CoefficientKind::Stiffness,
+        kind => kind,
+    });
     kinds
         // The filter of an acceleration removes a static force.
-        .filter(|kind| !(is_there(*kind) || in_bands && *kind == CoefficientKind::Offset))
+        .filter(|kind| {
+            let is_tested = *kind == CoefficientKind::Stiffness || !is_there(*kind);
+            is_tested && !(in_bands && *kind == CoefficientKind::Offset)
+        })
         .filter_map(|kind| {
             Some(Candidate {
                 kind,
@@ -137,37 +151,20 @@ struct WeakForm<'a> {
 
 impl<'a> WeakForm<'a> {
     fn of(problem: &Problem, theta: &[f64], equations: &'a Equations<'a>) -> Self {
-        let mut sub = Subproblem::new(problem.parameters());
-        let mut windows = Vec::new();
-        let mut roots = Vec::new();
-        for equation in &equations.list {
-            let first = sub.residuals.len();
-            let residuals = equation.residuals_at(problem, theta);
-            let root = |e: f64| equation.loss.weight(e).sqrt();
-            equation.add_rows(problem, &residuals, root, &mut sub);
-            windows.push(first..sub.residuals.len());
-            roots.extend(residuals.into_iter().map(root));
-        }
+        let dense = DenseRows::of(problem, equations, theta);
         let mut weak = Self {
             equations,
-            roots,
+            roots: dense.roots,
             terms: Vec::new(),
-            residuals: DVector::from_iterator(
-                sub.residuals.len(),
-                sub.residuals.right().iter().map(|e| -e),
-            ),
-            windows,
+            residuals: dense.residuals,
+            windows: dense.records,
             largest: 0.0,
         };
         let is_scale_free = scale_row(problem, &problem.constraints, theta).is_some();
         let masses = problem.functions.ranges()[problem.functions.coefficient_set(0)[0]].clone();
         let functions = problem.functions.scalar_range().start;
-        let mut columns: DMatrix<f64> = DMatrix::zeros(sub.residuals.len(), functions);
-        for i in 0..sub.residuals.len() {
-            (sub.residuals.row(i)).for_each(|(j, x)| columns[(i, j)] += x);
-        }
         for (j, value) in theta[..functions].iter().enumerate() {
-            let of_parameter = columns.column(j).into_owned();
+            let of_parameter = dense.rows.column(j).into_owned();
             let size = (of_parameter.norm_squared() / of_parameter.len().max(1) as f64).sqrt();
             weak.largest = weak.largest.max(value.abs() * size);
             // Without a scale the equation holds at zero: that of the mass is kept.

@@ -7,7 +7,9 @@
 //! with bump functions where the parameters are few ([`EquationForm`]); the starting point has the equation at every node.
 
 mod balance;
+mod bump_lengths;
 mod bumps;
+mod dense_rows;
 mod equation;
 mod fit;
 mod measured;
@@ -18,6 +20,7 @@ mod response;
 mod restored;
 mod robust;
 mod rows;
+mod widths;
 
 pub use balance::{EquationBalance, EquationPart, EquationShare, equation_balance};
 pub use equation::EquationForm;
@@ -88,7 +91,11 @@ pub fn equation_error(problem: &Problem, start: &[f64]) -> Result<Vec<f64>, Coni
     add_variations(problem, start, &mut sub);
     // The size of a function is that of its start or, where that is zero, the value that balances the equation.
     let own = Measurements::own_sizes(problem, start);
-    let natural = Measurements { experiments }.sizes(problem, start);
+    let natural = Measurements {
+        experiments,
+        ..Measurements::default()
+    };
+    let natural = natural.sizes(problem, start);
     let either = |(own, natural): (f64, f64)| if own > 0.0 { own } else { natural };
     let sizes: Vec<f64> = own.into_iter().zip(natural).map(either).collect();
     let minimum = minimise(

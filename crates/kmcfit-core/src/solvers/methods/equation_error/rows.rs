@@ -1,12 +1,11 @@
 //! The equation of motion as rows in the parameters, for the covariance of the estimates.
 
+use super::dense_rows::DenseRows;
 use super::equation::Equations;
-use super::scale_row;
+use super::{scale_row, widths};
 use crate::identifiability::EquationRows;
 use crate::problem::Problem;
-use crate::qp::Subproblem;
 use crate::record::Measurements;
-use nalgebra::DMatrix;
 use std::sync::Arc;
 
 /// Largest work of a covariance, rows x parameters^2: some seconds, and memory for 120,000 rows of 64 parameters.
@@ -31,37 +30,31 @@ pub enum NoEquationRows {
 /// The reason why there are none.
 pub fn equation_rows(problem: &Problem, theta: &[f64]) -> Result<EquationRows, NoEquationRows> {
     let measurements = measurements_at(problem, theta)?;
-    let equations = Equations::at(problem, &measurements, theta);
+    widths::choose(problem, &measurements);
+    let mut equations = Equations::at(problem, &measurements, theta);
     let count: usize = equations.list.iter().map(|equation| equation.len()).sum();
     let n = problem.parameters();
     if count as f64 * (n * n) as f64 > MOST_WORK {
         return Err(NoEquationRows::ManySamples);
     }
-    let mut sub = Subproblem::new(n);
-    let mut records = Vec::new();
-    let mut curvatures = Vec::new();
-    for equation in &equations.list {
-        let first = sub.residuals.len();
-        let residuals = equation.residuals_at(problem, theta);
-        let root = |e: f64| (equation.weight() * equation.loss.weight(e)).sqrt();
-        equation.add_rows(problem, &residuals, root, &mut sub);
-        records.push(first..sub.residuals.len());
-        curvatures.push(equation.loss.curvature(&residuals));
+    let mut dense = DenseRows::of(problem, &equations, theta);
+    for (record, equation) in dense.records.iter().zip(&equations.list) {
+        let curvature = equation
+            .loss
+            .curvature(&equation.residuals_at(problem, theta));
+        let mut rows = dense.rows.rows_mut(record.start, record.len());
+        rows *= curvature;
     }
-    let mut rows = DMatrix::zeros(count, n);
-    for (record, curvature) in records.iter().zip(curvatures) {
-        for i in record.clone() {
-            let row = sub.residuals.row(i);
-            row.for_each(|(j, x)| rows[(i, j)] += curvature * x);
-        }
-    }
+    let change = widths::change(problem, &measurements, &mut equations, theta);
+    let change = change.map(|change| &dense.rows * change);
     let scale = scale_row(problem, &problem.constraints, theta);
     let scalars = problem.functions.scalar_range();
     let held = scalars.map(|j| vec![(j, 1.0)]).chain(scale.clone());
     Ok(EquationRows {
-        rows,
-        residuals: sub.residuals.right().iter().map(|e| -e).collect(),
-        records,
+        residuals: dense.residuals.as_slice().to_vec(),
+        rows: dense.rows,
+        records: dense.records,
+        change,
         held: held.collect(),
         is_scale_free: scale.is_some(),
     })

@@ -1,0 +1,188 @@
+//! Columns of a text table after its rows are read: names in a comment, footers, units of clocks, and runs side by side.
+
+use super::Table;
+use super::origin::ColumnValues;
+use crate::quantity_names::quantity_of;
+use crate::text_io::quote;
+use crate::units::{Quantity, Unit};
+use kmcfit_core::internals::signal::median;
+
+/// Delimiters of names in a comment beside that of the rows.
+const DELIMITERS: [char; 4] = [',', ';', '\t', ' '];
+/// Times since 1970 and their units: milliseconds, microseconds and nanoseconds of the years from 1973 to 2286.
+const SINCE_1970: [(f64, &str); 3] = [(1e11, "ms"), (1e14, "µs"), (1e17, "ns")];
+/// Serial days of spreadsheets, of the years from 1982 to 2119, and the spacing (s) below which these are no seconds.
+const SERIAL_DAYS: std::ops::Range<f64> = 3e4..8e4;
+const DENSE: f64 = 1e-4;
+/// Names of times that state their unit.
+const NAMED: [(&str, &str); 3] = [("millis", "ms"), ("micros", "µs"), ("nanos", "ns")];
+
+impl Table {
+    /// Takes the names, and a row of units after them, from the comments before the rows, where there are as many as columns.
+    pub(super) fn name_by_comments(&mut self, text: &str, delimiter: char) {
+        let before = self.lines.first().map_or(0, |line| line.saturating_sub(1));
+        let comments = text.lines().take(before).filter_map(|line| {
+            let line = line.trim_start().strip_prefix('#')?;
+            Some(line.trim_start_matches('#').trim())
+        });
+        let mut comments: Vec<&str> = comments.filter(|line| !line.is_empty()).collect();
+        let width = self.columns.len();
+        let fields = |line: &str| {
+            let mut signs = std::iter::once(delimiter).chain(DELIMITERS);
+            signs.find_map(|sign| {
+                let fields = split(line, sign);
+                (fields.len() == width
+                    && !fields
+                        .iter()
+                        .any(|f| f.is_empty() || f.parse::<f64>().is_ok()))
+                .then_some(fields)
+            })
+        };
+        let Some(last) = comments.pop().and_then(fields) else {
+            return;
+        };
+        let is_units = last.iter().all(|text| Unit::looks_like(text));
+        let names = comments.pop().filter(|_| is_units).and_then(fields);
+        let (names, units) = match names {
+            Some(names) => (names, last),
+            None => (last, Vec::new()),
+        };
+        // A sentence is no name.
+        let is_name = |name: &String| {
+            name.chars().count() <= 40 && names.iter().filter(|n| *n == name).count() == 1
+        };
+        if names.iter().all(is_name) {
+            self.headers = names;
+            self.units = units;
+        }
+    }
+
+    /// States the units of times that follow from their form or magnitude, and where these follow from.
+    pub(super) fn state_clocks(&mut self) {
+        for index in 0..self.width() {
+            let Some(column) = self.columns.get_mut(index) else {
+                continue;
+            };
+            if let Some(clock) = column.clock.filter(|_| column.unreadable.is_none()) {
+                clock.over_midnights(&mut column.samples);
+                self.state_unit(index, "s");
+                self.notes.push(format!(
+                    "the times of day in {} are read as seconds since the first",
+                    quote(&self.label(index))
+                ));
+            } else if let Some(unit) = self.unit_of_magnitude(index) {
+                self.state_unit(index, unit);
+                self.notes.push(format!(
+                    "the times in {} are read in {unit}",
+                    quote(&self.label(index))
+                ));
+            }
+        }
+    }
+
+    fn unit_of_magnitude(&self, index: usize) -> Option<&'static str> {
+        let name = self.quantity_name(index);
+        let stated = self.stated_unit(index);
+        let kind = Quantity::Time;
+        let is_stated =
+            stated.text().is_some() || stated.suffix(kind).or(stated.last_word(kind)).is_some();
+        (quantity_of(name) == Some(kind) && !is_stated).then_some(())?;
+        let small = name.to_lowercase();
+        if let Some((_, unit)) = NAMED.iter().find(|(word, _)| small.contains(word)) {
+            return Some(unit);
+        }
+        let times = &self.columns.get(index)?.samples;
+        let first = *times.first()?;
+        let since = SINCE_1970
+            .iter()
+            .find(|(least, _)| (*least..1e2 * least).contains(&first));
+        if let Some((_, unit)) = since {
+            return Some(unit);
+        }
+        let spacings: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let is_dense = !spacings.is_empty() && (0.0..DENSE).contains(&median(&*spacings));
+        (SERIAL_DAYS.contains(&first) && is_dense).then_some("day")
+    }
+
+    fn state_unit(&mut self, index: usize, unit: &str) {
+        self.units.resize(self.width(), String::new());
+        if let Some(own) = self.units.get_mut(index) {
+            unit.clone_into(own);
+        }
+    }
+
+    /// The runs of a table that stand side by side, each with its own times in its first column; else the table.
+    pub(super) fn runs(self) -> Vec<Self> {
+        let is_time = |i: &usize| {
+            let explicit = self.stated_unit(*i).explicit(Quantity::Time).is_some();
+            explicit
+                || self.unit(*i).is_none() && quantity_of(&self.headers[*i]) == Some(Quantity::Time)
+        };
+        let mut begins: Vec<usize> = (0..self.headers.len()).filter(is_time).collect();
+        let is_same = |i: &usize| {
+            let samples = |i: usize| self.columns[i].samples.iter().map(|x| x.to_bits());
+            samples(*i).eq(samples(begins[0]))
+        };
+        if begins.len() < 2 || begins[0] != 0 || begins.iter().all(is_same) {
+            return vec![self];
+        }
+        begins.push(self.width());
+        if begins.windows(2).any(|pair| pair[1] - pair[0] < 2) {
+            return vec![self];
+        }
+        let runs = begins.windows(2).map(|pair| self.part(pair[0]..pair[1]));
+        runs.collect()
+    }
+
+    /// The columns of a run, as long as it has times.
+    fn part(&self, range: std::ops::Range<usize>) -> Self {
+        let times = &self.columns[range.start].samples;
+        let rows = times
+            .iter()
+            .rposition(|t| t.is_finite())
+            .map_or(0, |last| last + 1);
+        let column = |own: &ColumnValues| {
+            let samples = own.samples[..rows.min(own.samples.len())].to_vec();
+            let unnumbered = own
+                .unnumbered
+                .clone()
+                .filter(|_| samples.iter().any(|x| x.is_nan()) || own.unreadable.is_some());
+            ColumnValues {
+                samples,
+                unnumbered,
+                ..own.clone()
+            }
+        };
+        Self {
+            headers: self.headers[range.clone()].to_vec(),
+            units: self
+                .units
+                .get(range.clone())
+                .map_or_else(Vec::new, <[String]>::to_vec),
+            lines: self.lines[..rows].to_vec(),
+            columns: self.columns[range.clone()].iter().map(column).collect(),
+            first: range.start,
+            path: self.path.clone(),
+            origin: self.origin.clone(),
+            notes: self.notes.clone(),
+        }
+    }
+}
+
+/// Fields of a line of names; blanks do not part a name from its unit in brackets.
+fn split(line: &str, sign: char) -> Vec<String> {
+    if sign != ' ' {
+        return line
+            .split(sign)
+            .map(|f| f.trim().trim_matches('"').to_owned())
+            .collect();
+    }
+    let mut fields: Vec<String> = Vec::new();
+    for word in line.split_whitespace() {
+        match fields.last_mut() {
+            Some(last) if word.starts_with(['(', '[']) => *last = format!("{last} {word}"),
+            _ => fields.push(word.to_owned()),
+        }
+    }
+    fields
+}
